@@ -1,0 +1,117 @@
+"""What an EOS says about itself, kept from its events; and setting its properties."""
+
+from labrig.clock import Clock
+from labrig.errors import DeviceError
+
+from .eos_events import ChoicesChanged, ObjectOffered, ValueChanged, parse_events
+from .eos_protocol import Eos, Property, property_dataset, value_text
+from .failures import MalformedError
+from .session import USUAL, Patience, Session
+
+POLL_PERIOD_S = 0.03
+#: A camera lists itself in a few answers; more than so many in a row is a babbling one.
+MOST_ANSWERS = 64
+
+
+class EosState:
+    """Mirror of the camera's properties and of the frames that it offers.
+
+    Parameters
+    ----------
+    session
+        Over which the camera is asked.
+    clock
+        On which is waited for it.
+    settle_s
+        Seconds within which it must have taken a setting.
+    """
+
+    def __init__(self, session: Session, clock: Clock, settle_s: float) -> None:
+        self._session = session
+        self._clock = clock
+        self._settle_s = settle_s
+        self._values: dict[int, bytes] = {}
+        self._choices: dict[int, tuple[int, ...]] = {}
+        self._offered: list[ObjectOffered] = []
+
+    @property
+    def offered(self) -> tuple[ObjectOffered, ...]:
+        """Frames that wait in the camera, oldest first."""
+        return tuple(self._offered)
+
+    def value(self, prop: Property) -> int | None:
+        """A numeric property, None if the camera never spoke of it."""
+        value = self._values.get(prop)
+        return int.from_bytes(value[:4], "little") if value else None
+
+    def choices(self, prop: Property) -> tuple[int, ...]:
+        """Codes that a property can be set to, as the camera lists them."""
+        return self._choices.get(prop, ())
+
+    def refresh(self, busy_s: float = USUAL.busy_s) -> None:
+        """Take in all that the camera has to say; it may be busy for `busy_s` seconds.
+
+        Raises
+        ------
+        DeviceError
+            It does not answer, not in the protocol's terms, or never comes to an end.
+        """
+        for _ in range(MOST_ANSWERS):
+            if not self.listen(busy_s):
+                return
+        raise MalformedError("the camera does not stop reporting events: switch it off and on")
+
+    def listen(self, busy_s: float = USUAL.busy_s) -> bool:
+        """Ask once for events; True if there were any. The camera may be busy for `busy_s`.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer, or not in the protocol's terms.
+        """
+        patience = Patience(USUAL.answer_s, busy_s)
+        events = parse_events(self._session.transact(Eos.GetEvent, patience=patience).data)
+        for event in events:
+            match event:
+                case ValueChanged(prop, value):
+                    self._values[prop] = value
+                case ChoicesChanged(prop, codes):
+                    self._choices[prop] = codes
+                case ObjectOffered():
+                    if event.handle not in {known.handle for known in self._offered}:
+                        self._offered.append(event)
+        return bool(events)
+
+    def forget(self, offered: ObjectOffered) -> None:
+        """A frame no longer waits in the camera."""
+        self._offered.remove(offered)
+
+    def set(self, prop: Property, value: bytes) -> None:
+        """Set a property unless it has the value already, and wait for the camera to say so.
+
+        Raises
+        ------
+        DeviceError
+            The camera refuses, or still says something else at the end of the settling time.
+        """
+        if self._has(prop, value):
+            return
+        self._session.transact(Eos.SetDevicePropValueEx, data=property_dataset(prop, value))
+        deadline_s = self._clock.now() + self._settle_s
+        self.refresh()
+        while not self._has(prop, value):
+            if self._clock.now() >= deadline_s:
+                said = self._values.get(prop)
+                raise DeviceError(
+                    f"asked the camera for {prop.name.replace('_', ' ')} (0x{prop:X}) = "
+                    f"{value_text(prop, value)}, it says "
+                    f"{'nothing' if said is None else value_text(prop, said)}: "
+                    "turn its dial to M, leave its menus, and try again"
+                )
+            self._clock.sleep(POLL_PERIOD_S)
+            self.refresh()
+
+    def _has(self, prop: Property, value: bytes) -> bool:
+        """Whether the camera says so; models differ in how many zeros they write after a value."""
+        said = self._values.get(prop)
+        return said is not None and said.rstrip(b"\0") == value.rstrip(b"\0")

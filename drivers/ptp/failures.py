@@ -1,0 +1,33 @@
+"""The ways in which talking to a camera fails; all of them are `DeviceError` to the outside."""
+
+from labrig.errors import DeviceError
+
+
+class NoAnswerError(DeviceError):
+    """The camera did not answer in time."""
+
+
+class UnpluggedError(DeviceError):
+    """The camera is gone: cable, battery or its own power saving."""
+
+
+class StallError(DeviceError):
+    """The camera halted an endpoint, its way of giving a transaction up."""
+
+
+class MalformedError(DeviceError):
+    """Bytes that are not what the protocol says."""
+
+
+class RefusedError(DeviceError):
+    """The camera answered something other than OK.
+
+    Attributes
+    ----------
+    code
+        Its response code.
+    """
+
+    def __init__(self, message: str, code: int) -> None:
+        super().__init__(message)
+        self.code = code

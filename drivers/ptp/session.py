@@ -1,0 +1,225 @@
+"""One PTP session: transactions of command, data and response, each answered before the next."""
+
+from dataclasses import dataclass
+from enum import IntEnum
+
+from labrig.clock import Clock
+from labrig.errors import DeviceError
+
+from .containers import HEADER_BYTES, Container, Kind, command, decode, encode
+from .failures import MalformedError, RefusedError
+from .ptp_codes import (
+    DEVICE_BUSY,
+    OK,
+    SESSION_ALREADY_OPEN,
+    Standard,
+    advice,
+    operation_text,
+    response_text,
+)
+from .usb_link import UsbLink
+
+SESSION_ID = 1
+LAST_TRANSACTION_ID = 0xFFFFFFFE
+#: Left-over containers of earlier transactions that are passed over before giving up.
+MOST_STALE = 32
+FIRST_BACK_OFF_S = 0.02
+LONGEST_BACK_OFF_S = 0.5
+#: More than any answer but a frame: an EOS lists its properties in some 20 kB.
+MOST_ANSWER_BYTES = 4 * 1024 * 1024
+
+
+@dataclass(frozen=True)
+class Patience:
+    """How long a transaction may take.
+
+    Attributes
+    ----------
+    answer_s
+        Seconds until the camera must have answered.
+    busy_s
+        Seconds for which DeviceBusy is met by asking again; 0 for once only.
+    """
+
+    answer_s: float
+    busy_s: float
+
+
+#: For what a camera does at once.
+USUAL = Patience(answer_s=5.0, busy_s=3.0)
+#: For taking leave: nothing waits for it.
+CURT = Patience(answer_s=2.0, busy_s=0.0)
+
+
+@dataclass(frozen=True)
+class Reply:
+    """What the camera answered, and when.
+
+    Attributes
+    ----------
+    params
+        Response parameters.
+    data
+        Data phase; empty where there was none.
+    sent_s, answered_s
+        Clock times around the attempt that succeeded.
+    """
+
+    params: tuple[int, ...]
+    data: bytes
+    sent_s: float
+    answered_s: float
+
+
+class Session:
+    """Transactions over a link.
+
+    A transaction broken off by an error or an interruption stays noted as under way; the next
+    one, or `resynchronise`, first has the camera give it up.
+    """
+
+    def __init__(self, link: UsbLink, clock: Clock) -> None:
+        self._link = link
+        self._clock = clock
+        self._next_id = 0
+        self._under_way: int | None = None
+
+    def open(self) -> bool:
+        """Open the session; True if one was open already, left behind by a program that died.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not open one.
+        """
+        try:
+            self._open()
+        except RefusedError as refusal:
+            if refusal.code != SESSION_ALREADY_OPEN:
+                raise
+            self.transact(Standard.CloseSession)
+            self._open()
+            return True
+        return False
+
+    def close(self) -> None:
+        """Close the session.
+
+        Raises
+        ------
+        DeviceError
+            The camera did not take it.
+        """
+        self.transact(Standard.CloseSession, patience=CURT)
+
+    def transact(
+        self,
+        operation: IntEnum,
+        *params: int,
+        data: bytes | None = None,
+        patience: Patience = USUAL,
+        most_bytes: int = MOST_ANSWER_BYTES,
+    ) -> Reply:
+        """One operation, asked again while the camera is busy.
+
+        Parameters
+        ----------
+        operation
+            Member of an enumeration of operation codes.
+        params
+            Its u32 parameters.
+        data
+            What is sent in the data phase, if it has one outwards.
+        patience
+            How long it may take.
+        most_bytes
+            Longest data phase that is accepted.
+
+        Raises
+        ------
+        RefusedError
+            The camera answered something other than OK.
+        DeviceError
+            It did not answer, or not in the protocol's terms.
+        """
+        deadline_s = self._clock.now() + patience.busy_s
+        back_off_s = FIRST_BACK_OFF_S
+        while True:
+            self.resynchronise()
+            sent_s = self._clock.now()
+            response, incoming = self._exchange(operation, params, data, patience, most_bytes)
+            answered_s = self._clock.now()
+            if response.code == OK:
+                return Reply(response.params, incoming, sent_s, answered_s)
+            if response.code != DEVICE_BUSY or answered_s >= deadline_s:
+                raise RefusedError(
+                    f"expected 0x2001 OK from the camera to {operation_text(operation)}, "
+                    f"got {response_text(response.code)}: {advice(response.code)}",
+                    response.code,
+                )
+            self._clock.sleep(back_off_s)
+            back_off_s = min(2 * back_off_s, LONGEST_BACK_OFF_S)
+
+    def resynchronise(self) -> None:
+        """Have the camera give up a transaction that was broken off; nothing if there is none.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not come back into step.
+        """
+        if self._under_way is not None:
+            self._link.cancel(self._under_way)
+            self._under_way = None
+
+    def start_over(self) -> None:
+        """Reset the camera's side and open a session anew, when cancelling did not help.
+
+        Raises
+        ------
+        DeviceError
+            That did not help either.
+        """
+        self._link.reset()
+        self._under_way = None
+        self.open()
+
+    def _open(self) -> None:
+        self._next_id = 0  # OpenSession is transaction 0, the session's first is 1
+        self.transact(Standard.OpenSession, SESSION_ID)
+
+    def _exchange(
+        self,
+        operation: IntEnum,
+        params: tuple[int, ...],
+        data: bytes | None,
+        patience: Patience,
+        most_bytes: int,
+    ) -> tuple[Container, bytes]:
+        transaction_id = self._next_id
+        self._next_id = transaction_id % LAST_TRANSACTION_ID + 1
+        doing = operation_text(operation)
+        self._under_way = transaction_id
+        self._link.write(encode(command(operation, transaction_id, params)), doing)
+        if data is not None:
+            outgoing = Container(Kind.DATA, operation, transaction_id, data)
+            self._link.write(encode(outgoing), doing)
+        incoming: bytes | None = None
+        for _ in range(MOST_STALE):
+            raw = self._link.read(doing, patience.answer_s, HEADER_BYTES + most_bytes)
+            container = decode(raw)
+            if container.kind is Kind.EVENT or container.transaction_id != transaction_id:
+                continue  # left over from a program that died, or out of order
+            if container.kind is Kind.RESPONSE:
+                self._under_way = None
+                return container, incoming or b""
+            if container.kind is not Kind.DATA or container.code != operation or incoming:
+                raise MalformedError(
+                    f"{doing}: expected data or a response, the camera sent a container of kind "
+                    f"{container.kind.name} and code 0x{container.code:04X}: start again"
+                )
+            incoming = container.payload
+        raise DeviceError(
+            f"{doing}: expected an answer to transaction {transaction_id}, the camera sent "
+            f"{MOST_STALE} containers of others: unplug it and plug it in again"
+        )

@@ -1,0 +1,73 @@
+"""What a rig file can say about a camera on PTP, and what planning without the camera assumes."""
+
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field, field_validator
+
+from labrig.acquire.values import CameraOffers
+from labrig.quantity import DurationS, SizeBytes
+
+from .eos_codes import F_NUMBERS, ISOS, shutter_time_s, third_stop_codes
+
+
+class PtpCameraSettings(BaseModel):
+    """Keys of the rig file beside `driver` and `address`.
+
+    Attributes
+    ----------
+    shutter_lag
+        From the release to the begin of the exposure, as `labrig rig check` measured it.
+    isos
+        The sensor's native sensitivities; the camera's others (gain after digitising) stay unused.
+    f_numbers
+        Apertures of the lens; read from the camera when there is one.
+    longest_exposure
+        Longer ones are not used; a true 32 s is the dial's 30 s.
+    frame_time
+        From the end of an exposure until its frame is on the PC and the next can begin.
+    frame_size
+        Of one RAW file, for planning disk space.
+    transfer_timeout
+        From the end of an exposure until the camera must have offered its frame.
+    answer_timeout
+        Until the camera must have taken a setting.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    shutter_lag: Annotated[DurationS, Field(ge=0)] = 0.0
+    isos: Annotated[tuple[int, ...], Field(min_length=1)] = (100, 200, 400, 800, 1600)
+    f_numbers: tuple[float, ...] = (2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
+    longest_exposure: Annotated[DurationS, Field(gt=0)] = 32.0
+    frame_time: Annotated[DurationS, Field(ge=0)] = 2.0
+    frame_size: Annotated[SizeBytes, Field(gt=0)] = 30e6
+    transfer_timeout: Annotated[DurationS, Field(gt=0)] = 30.0
+    answer_timeout: Annotated[DurationS, Field(gt=0)] = 5.0
+
+    @field_validator("isos")
+    @classmethod
+    def _known_isos(cls, isos: tuple[int, ...]) -> tuple[int, ...]:
+        if unknown := sorted(set(isos) - set(ISOS.values())):
+            raise ValueError(f"expected ISO values of a Canon dial, such as 100, got {unknown}")
+        return tuple(sorted(set(isos)))
+
+    @field_validator("f_numbers")
+    @classmethod
+    def _known_f_numbers(cls, f_numbers: tuple[float, ...]) -> tuple[float, ...]:
+        if unknown := sorted(set(f_numbers) - set(F_NUMBERS.values())):
+            raise ValueError(f"expected f-numbers of a Canon lens, such as 5.6, got {unknown}")
+        return tuple(sorted(set(f_numbers)))
+
+    def allows_exposure(self, exposure_s: float) -> bool:
+        """Whether `exposure_s` seconds are within `longest_exposure`."""
+        return exposure_s <= self.longest_exposure * 1.0001
+
+    def declared_offers(self) -> CameraOffers:
+        """What a camera on these settings can be expected to offer, in thirds of a stop."""
+        times_s = (shutter_time_s(code) for code in third_stop_codes())
+        return CameraOffers(
+            exposures_s=tuple(sorted(t for t in times_s if t and self.allows_exposure(t))),
+            isos=self.isos,
+            f_numbers=self.f_numbers,
+            overhead_s=self.frame_time,
+        )

@@ -1,0 +1,87 @@
+"""A serial line read against deadlines on the injected clock.
+
+pyserial's own time-outs count on the system's clock, so ports are opened non-blocking.
+"""
+
+import serial
+
+from labrig.acquire.connections import SerialPort
+from labrig.clock import Clock
+from labrig.errors import DeviceError
+
+#: How often the line is looked at; USB serial adapters deliver once a millisecond at best.
+POLL_S = 0.002
+
+
+class SerialLine:
+    """Bytes out, bytes in, time-outs and one-line errors.
+
+    Parameters
+    ----------
+    port
+        Open port whose reads do not block.
+    name
+        What to call the device in messages: `Numato board at COM3`.
+    """
+
+    def __init__(self, port: SerialPort, clock: Clock, name: str) -> None:
+        self._port = port
+        self._clock = clock
+        self._name = name
+
+    def write(self, data: bytes) -> None:
+        """Send `data`."""
+        try:
+            self._port.write(data)
+        except (serial.SerialException, OSError) as error:
+            raise self._gone(error) from None
+
+    def read_until(self, end: bytes, timeout_s: float) -> bytes:
+        """Bytes up to and including `end`.
+
+        Raises
+        ------
+        DeviceError
+            `end` did not come in time; shows what came.
+        """
+        deadline_s = self._clock.now() + timeout_s
+        came = b""
+        while not came.endswith(end):
+            came += self._read_one()
+            if came.endswith(end):
+                break
+            if self._clock.now() >= deadline_s:
+                raise DeviceError(
+                    f"{self._name} did not answer within {timeout_s:g} s: expected {end!r} at the "
+                    f"end, got {came!r}; check its power, cable and address"
+                )
+            if not self._waiting():
+                self._clock.sleep(POLL_S)
+        return came
+
+    def drain(self, quiet_s: float, timeout_s: float) -> None:
+        """Read and forget what comes until the line is quiet for `quiet_s`."""
+        deadline_s = self._clock.now() + timeout_s
+        quiet_since_s = self._clock.now()
+        while self._clock.now() - quiet_since_s < quiet_s and self._clock.now() < deadline_s:
+            if self._waiting():
+                self._read_one()
+                quiet_since_s = self._clock.now()
+            else:
+                self._clock.sleep(POLL_S)
+
+    def _read_one(self) -> bytes:
+        try:
+            return self._port.read(1) if self._port.in_waiting else b""
+        except (serial.SerialException, OSError) as error:
+            raise self._gone(error) from None
+
+    def _waiting(self) -> bool:
+        try:
+            return self._port.in_waiting > 0
+        except (serial.SerialException, OSError) as error:
+            raise self._gone(error) from None
+
+    def _gone(self, error: Exception) -> DeviceError:
+        said = " ".join(str(error).split())
+        return DeviceError(f"{self._name} is gone ({said}); plug it in again, then resume")

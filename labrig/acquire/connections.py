@@ -1,0 +1,51 @@
+"""How a driver reaches its device: one resolver from address to transport."""
+
+from typing import Any, Protocol
+
+from labrig.clock import Clock
+
+
+class SerialPort(Protocol):
+    """The part of pyserial's `Serial` that drivers use; reads never block."""
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that can be read at once."""
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Up to `size` bytes that are there already."""
+
+    def write(self, data: bytes, /) -> int | None:
+        """Send all of `data`."""
+
+    def reset_input_buffer(self) -> None:
+        """Forget what has come in."""
+
+    def close(self) -> None:
+        """Release the port."""
+
+
+class Connections(Protocol):
+    """Opens transports for drivers, real or simulated alike, each address once."""
+
+    @property
+    def clock(self) -> Clock:
+        """The clock on which time-outs count."""
+
+    def serial(self, address: str, baudrate: int) -> SerialPort:
+        """The serial port at `COM3`, `/dev/…` or `sim://room/device`, shared by its users.
+
+        Raises
+        ------
+        DeviceError
+            There is no such port, or something else holds it.
+        """
+
+    def usb(self, address: str) -> Any:
+        """The `usb.core.Device` at `usb://vid:pid[/serial]` or `sim://room/device`.
+
+        Raises
+        ------
+        DeviceError
+            No such device, or access is refused.
+        """

@@ -1,0 +1,199 @@
+"""The plan: the protocol's own code run on devices that only take the time they would need."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from typing import TypeVar
+
+from labrig.acquire import plugins
+from labrig.acquire.protocol import ProtocolModel
+from labrig.acquire.rig import Rig
+from labrig.acquire.rig_file import RigFile
+from labrig.acquire.roles import Device
+from labrig.acquire.session import Session
+from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.clock import VirtualClock
+from labrig.errors import ProtocolError
+from labrig.quantity import duration_text
+from labrig.record import FrameRecord
+from labrig.yaml_file import validate
+
+T = TypeVar("T")
+
+#: A planned action may begin this much after its time; a PC is no better (wire facts: 5 ms tails).
+TOLERANCE_S = 0.02
+
+
+@dataclass(frozen=True)
+class Step:
+    """One line of the timeline; `at_s` counts from the start of the run."""
+
+    at_s: float
+    unit: str
+    device: str
+    action: str
+
+
+@dataclass(frozen=True)
+class Plan:
+    """All that will happen, at the latest and at most."""
+
+    steps: tuple[Step, ...]
+    units: tuple[str, ...]
+    unit_ends_s: tuple[float, ...]
+    frames: int
+    frame_bytes: int
+
+    @property
+    def duration_s(self) -> float:
+        """Lab time of the whole run."""
+        return self.unit_ends_s[-1] if self.unit_ends_s else 0.0
+
+    @property
+    def size_bytes(self) -> int:
+        """What the frames will take on disk."""
+        return self.frames * self.frame_bytes
+
+    def lines(self) -> list[str]:
+        """The timeline as `@t (+dt) device action`, a heading per unit."""
+        out, unit, before_s = [], "", 0.0
+        for step in self.steps:
+            if step.unit != unit:
+                unit = step.unit
+                out.append(f"unit {unit}")
+            out.append(
+                f"  @{step.at_s:10.3f} s (+{step.at_s - before_s:9.3f} s)  "
+                f"{step.device:8} {step.action}"
+            )
+            before_s = step.at_s
+        return out
+
+
+def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
+    """Lay out `protocol` on the devices of `rig` without touching any of them.
+
+    Raises
+    ------
+    ProtocolError
+        It cannot work: a device is missing, a setting is not offered, a frame does not fit.
+    """
+    clock = VirtualClock()
+    recorder = _PlanRecorder(clock)
+    devices: dict[str, Device] = {}
+    offers = CameraOffers((), ())
+    for key, entry in rig.devices.items():
+        driver = plugins.load(plugins.DRIVERS, entry.driver, source)
+        settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
+        if key == "camera":
+            offers = driver.declared_offers(settings)
+            devices[key] = _PlannedCamera(clock, offers)
+        elif key == "lamp":
+            devices[key] = _PlannedLamp()
+    warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
+    planned = Rig(rig.name, clock, devices, warm_up_s)
+    units, ends = protocol.units(), []
+    for unit in units:
+        recorder.unit = unit.name
+        unit.run(Session(planned, recorder, recorder))
+        ends.append(clock.now())
+    return Plan(
+        tuple(recorder.steps),
+        tuple(unit.name for unit in units),
+        tuple(ends),
+        recorder.frame_count,
+        offers.frame_bytes,
+    )
+
+
+class _PlannedDevice:
+    def identity(self) -> str:
+        return "planned"
+
+    def make_safe(self) -> None:
+        pass
+
+    def disconnect(self) -> None:
+        pass
+
+
+class _PlannedLamp(_PlannedDevice):
+    def __init__(self) -> None:
+        self._on = False
+
+    def on(self) -> None:
+        self._on = True
+
+    def off(self) -> None:
+        self._on = False
+
+    def is_on(self) -> bool:
+        return self._on
+
+
+class _PlannedCamera(_PlannedDevice):
+    def __init__(self, clock: VirtualClock, offers: CameraOffers) -> None:
+        self._clock = clock
+        self._offers = offers
+        self._settings: ExposureSettings | None = None
+
+    def offers(self) -> CameraOffers:
+        return self._offers
+
+    def configure(self, settings: ExposureSettings) -> ExposureSettings:
+        self._offers.check(settings)
+        self._settings = settings
+        return settings
+
+    def arm(self) -> None:
+        pass
+
+    def shoot(self) -> Frame:
+        assert self._settings is not None, "a session configures before it shoots"
+        start_s = self._clock.now()
+        end_s = start_s + self._settings.exposure_s
+        self._clock.spend(self._settings.exposure_s + self._offers.overhead_s)
+        return Frame(b"", "", start_s, end_s, self._settings)
+
+
+@dataclass
+class _PlanRecorder:
+    """Recorder and observer of a plan: notes the steps, refuses what comes too late."""
+
+    clock: VirtualClock
+    unit: str = ""
+    steps: list[Step] = field(default_factory=list)
+    frame_count: int = 0
+
+    def acted(
+        self, device: str, action: str, start_s: float, end_s: float, late_s: float
+    ) -> None:
+        self._note(start_s, device, action, late_s)
+
+    def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
+        self.frame_count += 1
+        self._note(frame.start_s, "camera", f"{purpose} frame, {frame.settings}", late_s)
+
+    def frames(self, purpose: str) -> Sequence[FrameRecord]:
+        return ()
+
+    def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
+        return worst
+
+    def doing(self, what: str, until_s: float | None = None) -> None:
+        if until_s is not None:
+            self._note(self.clock.now(), "-", what, 0.0)
+
+    def warn(self, text: str) -> None:
+        self._note(self.clock.now(), "-", f"warning: {text}", 0.0)
+
+    def frame(self, purpose: str, settings: ExposureSettings) -> None:
+        pass
+
+    def _note(self, at_s: float, device: str, action: str, late_s: float) -> None:
+        if late_s > TOLERANCE_S:
+            before = next(step for step in reversed(self.steps) if step.device != "-")
+            raise ProtocolError(
+                f"{self.unit}: '{action}' would begin {duration_text(late_s)} late, because "
+                f"'{before.action}' is not over; leave more time between frames (every:) or "
+                "expose for less"
+            )
+        self.steps.append(Step(at_s, self.unit, device, action))

@@ -1,0 +1,93 @@
+"""Drivers and protocols by name: the shipped ones and those that other packages add.
+
+A package adds its own by an entry point in `labrig.drivers` or `labrig.protocols`.
+"""
+
+from importlib.metadata import EntryPoint, entry_points
+from pathlib import Path
+from typing import Any
+
+from labrig import shipped
+from labrig.acquire.protocol import ProtocolModel
+from labrig.errors import UsageError
+from labrig.yaml_file import did_you_mean, read_yaml, validate
+
+DRIVERS = "labrig.drivers"
+PROTOCOLS = "labrig.protocols"
+
+
+def names(group: str) -> list[str]:
+    """Names that can be used, sorted."""
+    return sorted({entry.name for entry in entry_points(group=group)})
+
+
+def load(group: str, name: str, source: str) -> Any:
+    """The class registered as `name`; `source` says in messages who asked for it.
+
+    Raises
+    ------
+    UsageError
+        There is none, or it cannot be imported.
+    """
+    found = {entry.name: entry for entry in entry_points(group=group)}
+    kind = "driver" if group == DRIVERS else "protocol"
+    if name not in found:
+        raise UsageError(f"{source}: unknown {kind} '{name}'; {did_you_mean(name, list(found))}")
+    try:
+        return _import(found[name])
+    except (ImportError, AttributeError) as error:
+        raise UsageError(
+            f"{source}: the {kind} '{name}' ({found[name].value}) cannot be imported ({error})"
+        ) from None
+
+
+def _import(entry: EntryPoint) -> Any:
+    if entry.dist is not None and entry.dist.name == "labrig":
+        return getattr(shipped.load(entry.module), entry.attr)
+    return entry.load()
+
+
+def find(folder: str, name_or_path: str) -> Path:
+    """File of a shipped name (`decay`, `sim`), or the path as given.
+
+    Parameters
+    ----------
+    folder
+        Shipped folder where names live: `protocols` or `config`.
+
+    Raises
+    ------
+    UsageError
+        Neither a shipped name nor a file.
+    """
+    given = Path(name_or_path)
+    if given.suffix in {".yaml", ".yml"} or len(given.parts) > 1:
+        if not given.is_file():
+            raise UsageError(f"{given}: no such file")
+        return given
+    known = {path.stem: path for path in sorted(shipped.folder(folder).glob("*.yaml"))}
+    if name_or_path not in known:
+        kind = "rig" if folder == "config" else "protocol"
+        raise UsageError(
+            f"no shipped {kind} is called '{name_or_path}'; "
+            f"{did_you_mean(name_or_path, list(known))}; a file of your own ends in .yaml"
+        )
+    return known[name_or_path]
+
+
+def read_protocol(path: Path) -> ProtocolModel:
+    """Read and check a protocol file by the model that its key `protocol` names.
+
+    Raises
+    ------
+    UsageError
+        One line that names the file and the key.
+    """
+    content = read_yaml(path)
+    kind = content.get("protocol")
+    if not isinstance(kind, str):
+        raise UsageError(
+            f"{path}: the key 'protocol' must name one of: {', '.join(names(PROTOCOLS))}"
+        )
+    model: type[ProtocolModel] = load(PROTOCOLS, kind, str(path))
+    return validate(content, model, str(path))

@@ -1,0 +1,47 @@
+"""What every protocol is: a small YAML file as a frozen model, that says which units it takes."""
+
+from abc import abstractmethod
+from collections.abc import Sequence
+from typing import Protocol
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.acquire.session import Session
+
+
+class Unit(Protocol):
+    """Something that is done completely or did not happen: one charge-and-decay, one filter."""
+
+    @property
+    def name(self) -> str:
+        """Unique within the protocol, the same at every run of it."""
+
+    def run(self, session: Session) -> None:
+        """Do it. Ends by exception or complete."""
+
+
+class Sample(BaseModel):
+    """What lies on the bench, for the record."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str = Field("sample", min_length=1)
+    thickness: str | None = None
+    batch: str | None = None
+    last_light: str | None = Field(None, description="when and which light it saw last")
+    notes: str | None = None
+
+
+class ProtocolModel(BaseModel):
+    """Base of the protocols' models; a YAML file names its model in `protocol:`."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    protocol: str
+    sample: Sample = Sample()
+
+    @abstractmethod
+    def units(self) -> Sequence[Unit]:
+        """All units in order, known before anything moves."""
+
+

@@ -1,0 +1,81 @@
+"""The rig file: which driver at which address, and how long each device takes to warm up."""
+
+from pathlib import Path
+from typing import Any, Self
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.acquire.roles import ROLES
+from labrig.errors import UsageError
+from labrig.quantity import DurationS
+from labrig.yaml_file import did_you_mean, read_model
+
+
+class DeviceEntry(BaseModel):
+    """One device; further keys are its driver's own and checked by the driver's model."""
+
+    model_config = ConfigDict(frozen=True, extra="allow")
+
+    driver: str
+    address: str
+    warm_up: DurationS = 0.0
+
+    def settings(self) -> dict[str, Any]:
+        """The driver's own keys."""
+        return dict(self.__pydantic_extra__ or {})
+
+
+class Optics(BaseModel):
+    """Which measured curves describe this bench; names of shipped files or paths."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    camera: str | None = None
+    lamp: str | None = None
+
+
+class RigFile(BaseModel):
+    """A rig file as written."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: str
+    devices: dict[str, DeviceEntry] = Field(min_length=1)
+    optics: Optics = Optics()
+    simulation: dict[str, Any] | None = Field(
+        None, description="only in a simulated rig: what is in the simulated room"
+    )
+
+    def anchored(self, folder: Path) -> Self:
+        """The same rig with files beside it named by absolute paths, so that it can be copied."""
+        content = self.model_dump()
+        for key in ("optics", "simulation"):
+            content[key] = _anchor(content[key], folder)
+        return self.model_validate(content)
+
+
+def _anchor(value: Any, folder: Path) -> Any:
+    if isinstance(value, dict):
+        return {key: _anchor(inner, folder) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_anchor(inner, folder) for inner in value]
+    if isinstance(value, str) and Path(value).suffix and (folder / value).is_file():
+        return str(folder / value)
+    return value
+
+
+def read_rig_file(path: Path) -> RigFile:
+    """Read and check a rig file, all but its drivers' own keys.
+
+    Raises
+    ------
+    UsageError
+        One line that names the file and the key.
+    """
+    rig = read_model(path, RigFile)
+    for key in rig.devices:
+        if key not in ROLES:
+            raise UsageError(
+                f"{path}: unknown device '{key}' under 'devices'; {did_you_mean(key, list(ROLES))}"
+            )
+    return rig

@@ -1,0 +1,111 @@
+"""What a protocol may ask of a device. A driver fills one of these roles."""
+
+from typing import Protocol, runtime_checkable
+
+from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+
+
+@runtime_checkable
+class Device(Protocol):
+    """What every device can do."""
+
+    def identity(self) -> str:
+        """One line that identifies the device that answers: maker, model, serial, firmware."""
+
+    def make_safe(self) -> None:
+        """Bring the line back into step, whatever was interrupted, then reach the safe state.
+
+        Raises
+        ------
+        DeviceError
+            The safe state could not be confirmed.
+        """
+
+    def disconnect(self) -> None:
+        """Release the device. Never raises because it is gone already."""
+
+
+@runtime_checkable
+class Lamp(Device, Protocol):
+    """A light that charges the sample. Safe: off."""
+
+    def on(self) -> None:
+        """Switch on, read back."""
+
+    def off(self) -> None:
+        """Switch off, read back."""
+
+    def is_on(self) -> bool:
+        """What the device says, not what was asked."""
+
+
+@runtime_checkable
+class LedBank(Device, Protocol):
+    """Narrow-band LEDs, one lit at a time. Safe: all off."""
+
+    def channels(self) -> tuple[str, ...]:
+        """Names of the LEDs."""
+
+    def light(self, channel: str) -> None:
+        """Light one LED, all others off, read back."""
+
+    def dark(self) -> None:
+        """All off, read back."""
+
+
+@runtime_checkable
+class TrapDoor(Device, Protocol):
+    """Swings the sample away from the filter and towards the camera. Safe: closed."""
+
+    def open(self) -> None:
+        """Begin to open; returns when the command is acknowledged."""
+
+    def close(self) -> None:
+        """Begin to close."""
+
+    def travel_s(self) -> float:
+        """Seconds from the command until the door has stopped."""
+
+
+@runtime_checkable
+class Camera(Device, Protocol):
+    """A camera that delivers RAW frames. Safe: shutter released, nothing pending."""
+
+    def offers(self) -> CameraOffers:
+        """What it can be set to, as it is now."""
+
+    def configure(self, settings: ExposureSettings) -> ExposureSettings:
+        """Set and read back; returns the settings in force, with the true shutter time.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not offer them or did not take them.
+        """
+
+    def arm(self) -> None:
+        """Do all that can be done beforehand, so that `shoot` starts without delay."""
+
+    def shoot(self) -> Frame:
+        """Release now, wait for the exposure, transfer the frame."""
+
+
+@runtime_checkable
+class Spectrometer(Device, Protocol):
+    """Measures relative spectral irradiance. Safe: idle."""
+
+    def wavelengths_nm(self) -> tuple[float, ...]:
+        """Wavelength of each pixel, ascending."""
+
+    def counts(self, integration_s: float) -> tuple[float, ...]:
+        """One reading, dark not subtracted, one value per wavelength."""
+
+
+#: The key of a device in the rig file, and what it must be able to do.
+ROLES: dict[str, type] = {
+    "lamp": Lamp,
+    "leds": LedBank,
+    "door": TrapDoor,
+    "camera": Camera,
+    "spectrometer": Spectrometer,
+}

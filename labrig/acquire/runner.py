@@ -1,0 +1,84 @@
+"""The runner: unit after unit onto the bench and into the run folder."""
+
+from collections.abc import Callable, Mapping, Sequence
+from typing import Any, Protocol, TypeVar
+
+from labrig.acquire.protocol import Unit
+from labrig.acquire.rig import Rig
+from labrig.acquire.session import Observer, Session
+from labrig.acquire.values import Frame
+from labrig.clock import Clock
+from labrig.record import ActionRecord, FrameRecord, RunFolder
+from labrig.record.attempt import AttemptWriter
+
+T = TypeVar("T")
+
+
+class RunObserver(Observer, Protocol):
+    """Is also told of units."""
+
+    def unit(self, name: str, number: int, total: int) -> None:
+        """A unit begins."""
+
+
+def run_units(
+    units: Sequence[Unit],
+    rig: Rig,
+    folder: RunFolder,
+    observer: RunObserver,
+    metadata: Mapping[str, Any],
+) -> None:
+    """Do all units that are not complete in `folder`, in order.
+
+    A unit that ends by an exception leaves its attempt open: the caller first reaches the safe
+    state, then closes the attempt with `RunFolder.close_open_attempts`.
+    """
+    record = folder.read()
+    done = record.completed()
+    frames = [frame for attempt in done.values() for frame in attempt.frames]
+    for number, unit in enumerate(units, start=1):
+        if unit.name in done:
+            continue
+        observer.unit(unit.name, number, len(units))
+        writer = folder.attempt(unit.name, rig.clock.wall, metadata)
+        recorder = _Recorder(rig.clock, writer, frames)
+        unit.run(Session(rig, recorder, observer))
+        writer.stop("success")
+        frames = recorder.kept
+
+
+class _Recorder:
+    """Turns the rig's times into wall times and passes all on to the attempt."""
+
+    def __init__(self, clock: Clock, writer: AttemptWriter, kept: Sequence[FrameRecord]) -> None:
+        self._clock = clock
+        self._writer = writer
+        self.kept = list(kept)
+
+    def acted(
+        self, device: str, action: str, start_s: float, end_s: float, late_s: float
+    ) -> None:
+        wall = self._clock.wall
+        self._writer.action(
+            ActionRecord(self._writer.unit, device, action, wall(start_s), wall(end_s), late_s)
+        )
+
+    def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
+        record = self._writer.frame(
+            frame.data,
+            frame.suffix,
+            purpose=purpose,
+            exposure_s=frame.settings.exposure_s,
+            iso=frame.settings.iso,
+            f_number=frame.settings.f_number,
+            start_time=self._clock.wall(frame.start_s),
+            end_time=self._clock.wall(frame.end_s),
+            late_s=late_s,
+        )
+        self.kept.append(record)
+
+    def frames(self, purpose: str) -> Sequence[FrameRecord]:
+        return [frame for frame in self.kept if frame.purpose == purpose]
+
+    def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
+        return decide()

@@ -1,0 +1,184 @@
+"""Opens a rig: the one place where drivers, clock and, in a simulated rig, the room meet."""
+
+from collections.abc import Iterator
+from contextlib import ExitStack, contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TYPE_CHECKING, Any
+from urllib.parse import urlsplit
+
+import platformdirs
+import serial
+import usb.core
+from filelock import FileLock, Timeout
+
+from labrig import shipped
+from labrig.acquire import Device, Rig, RigFile, plugins
+from labrig.acquire.connections import SerialPort
+from labrig.acquire.rig_file import DeviceEntry
+from labrig.acquire.roles import ROLES
+from labrig.clock import Clock, SystemClock
+from labrig.errors import DeviceError, UsageError
+from labrig.yaml_file import validate
+
+if TYPE_CHECKING:
+    from sim import OpenRoom
+
+SERIAL_WRITE_TIMEOUT_S = 2.0
+
+
+@dataclass(frozen=True)
+class Bench:
+    """A rig before its devices are opened: which clock it runs on, which room it stands in."""
+
+    file: RigFile
+    source: str
+    clock: Clock
+    room: "OpenRoom | None"
+
+    @property
+    def seed(self) -> int | None:
+        """Seed of everything random in a simulated rig; `None` on a real bench."""
+        return None if self.room is None else self.room.seed
+
+    @contextmanager
+    def devices(self) -> Iterator[Rig]:
+        """Open all devices, each at once brought to its safe state; safe again at the end.
+
+        Raises
+        ------
+        DeviceError
+            A device is missing, or cannot confirm that it is safe.
+        UsageError
+            Another labrig holds one of the addresses.
+        """
+        with ExitStack() as stack:
+            # Entered first, so that ports close after the devices on them are safe.
+            transports = stack.enter_context(ExitStack())
+            connections = _Connections(self.clock, self.room, transports)
+            warm_up_s = {key: entry.warm_up for key, entry in self.file.devices.items()}
+            rig = Rig(self.file.name, self.clock, {}, warm_up_s)
+            stack.callback(rig.disconnect)
+            stack.callback(rig.make_safe)
+            for key, entry in self.file.devices.items():
+                rig.devices[key] = _open(key, entry, connections, self.source)
+                rig.devices[key].make_safe()
+            yield rig
+
+
+@contextmanager
+def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterator[Bench]:
+    """The bench that a rig file describes; nothing is opened yet.
+
+    Parameters
+    ----------
+    source
+        Path of the rig file, for messages.
+    not_before_s
+        Seconds since 1970 at which a simulated room's clock starts at the earliest: a resumed run
+        goes on after its last journal line.
+    """
+    if file.simulation is None:
+        yield Bench(file, source, SystemClock(), None)
+        return
+    sim = shipped.load("sim")
+    with sim.open_room(file.simulation, source, not_before_s) as room:
+        yield Bench(file, source, room.clock, room)
+
+
+def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str) -> Device:
+    driver = plugins.load(plugins.DRIVERS, entry.driver, source)
+    settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
+    device: Device = driver(entry.address, settings, connections)
+    if not isinstance(device, ROLES[key]):
+        device.disconnect()
+        raise UsageError(
+            f"{source}: the driver '{entry.driver}' is no {key}; choose another driver for "
+            f"'devices.{key}'"
+        )
+    return device
+
+
+class _Connections:
+    """Opens each address once; real ones under a lock that other labrigs respect."""
+
+    def __init__(self, clock: Clock, room: "OpenRoom | None", stack: ExitStack) -> None:
+        self.clock = clock
+        self._room = room
+        self._stack = stack
+        self._ports: dict[str, SerialPort] = {}
+
+    def serial(self, address: str, baudrate: int) -> SerialPort:
+        if address not in self._ports:
+            self._hold(address)
+            try:
+                port = serial.serial_for_url(
+                    address, baudrate=baudrate, timeout=0, write_timeout=SERIAL_WRITE_TIMEOUT_S
+                )
+            except (serial.SerialException, OSError, ValueError) as error:
+                raise DeviceError(
+                    f"cannot open the serial port {address} ({' '.join(str(error).split())}); "
+                    "check that it is plugged in and that no other program uses it"
+                ) from None
+            self._stack.callback(port.close)
+            self._ports[address] = port
+        return self._ports[address]
+
+    def usb(self, address: str) -> Any:
+        url = urlsplit(address)
+        self._hold(address)
+        if url.scheme == "sim":
+            backend = None if self._room is None else self._room.usb(url.path.strip("/"))
+            found = None if backend is None else usb.core.find(backend=backend)
+        elif url.scheme == "usb":
+            found = self._find(address)
+        else:
+            raise UsageError(
+                f"'{address}' is no USB address; write usb://VENDOR:PRODUCT in hexadecimal, such "
+                "as usb://04a9:3199, with /SERIAL behind it if there are several"
+            )
+        if found is None:
+            raise DeviceError(
+                f"no device at {address}; switch it on and check its cable (a camera that went to "
+                "sleep is off, too)"
+            )
+        return found
+
+    def _find(self, address: str) -> Any:
+        url = urlsplit(address)
+        try:
+            vendor, product = (int(part, 16) for part in url.netloc.split(":"))
+        except ValueError:
+            raise UsageError(
+                f"'{address}' is no USB address; write usb://VENDOR:PRODUCT in hexadecimal, such "
+                "as usb://04a9:3199"
+            ) from None
+        wanted = {"serial_number": url.path.strip("/")} if url.path.strip("/") else {}
+        try:
+            return usb.core.find(idVendor=vendor, idProduct=product, **wanted)
+        except usb.core.NoBackendError:
+            raise DeviceError(
+                "libusb is not installed, so USB cameras cannot be reached; install libusb-1.0 "
+                "(Linux: libusb-1.0-0, macOS: brew install libusb, Windows: the package "
+                "libusb-package)"
+            ) from None
+        except (usb.core.USBError, ValueError) as error:
+            raise DeviceError(
+                f"{address} refuses access ({error}); on Linux allow it by a udev rule, on Windows "
+                "give the camera the WinUSB driver"
+            ) from None
+
+    def _hold(self, address: str) -> None:
+        """Lock a real address; a simulated room is private to its process."""
+        if address.startswith("sim://"):
+            return
+        folder = Path(platformdirs.user_runtime_path("labrig", ensure_exists=True))
+        name = "".join(c if c.isalnum() else "-" for c in address)
+        lock = FileLock(folder / f"{name}.lock")
+        try:
+            lock.acquire(timeout=0)
+        except Timeout:
+            raise UsageError(
+                f"{address} is held by another labrig; wait until it has ended"
+            ) from None
+        self._stack.callback(lock.release)

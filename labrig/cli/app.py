@@ -1,0 +1,33 @@
+"""The command line. Each command is thin, and imports what it needs when it is called."""
+
+import typer
+
+from labrig.cli import fit, frame, process, protocol, run
+
+app = typer.Typer(
+    help="From a lab bench to a measured phosphorescent or fluorescent material.",
+    no_args_is_help=True,
+    add_completion=False,
+    pretty_exceptions_enable=False,
+    rich_markup_mode=None,
+    context_settings={"help_option_names": ["-h", "--help"]},
+)
+app.command("run")(run.run)
+app.command("plan")(run.plan)
+app.command("resume")(run.resume)
+app.command("process")(process.process)
+app.command("frame")(frame.frame)
+app.add_typer(fit.app, name="fit")
+app.add_typer(protocol.app, name="protocol")
+
+
+@app.callback(invoke_without_command=True)
+def main(
+    version: bool = typer.Option(False, "--version", help="Print the version and end."),
+) -> None:
+    """From a lab bench to a measured phosphorescent or fluorescent material."""
+    if version:
+        from importlib.metadata import version as installed
+
+        typer.echo(f"labrig {installed('labrig')}")
+        raise typer.Exit

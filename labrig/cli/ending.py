@@ -1,0 +1,93 @@
+"""How a command ends: an exit code, and one line where something went wrong."""
+
+import os
+import signal
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from types import FrameType
+
+from labrig.clock import Clock, Interrupted
+from labrig.errors import DiskError, LabrigError
+
+#: What stops a run: Ctrl-C, a shutdown, and Windows' Ctrl-Break.
+STOP_SIGNALS = [
+    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name)
+]
+
+
+def guarded(arguments: Sequence[str]) -> int:
+    """Run the command line and return its exit code."""
+    for signum in STOP_SIGNALS:
+        signal.signal(signum, _raise_interrupted)
+    try:
+        code = _run(arguments)
+        sys.stdout.flush()
+    except BrokenPipeError:
+        # The reader of a pipe has gone; nobody is left to complain to.
+        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        code = 0
+    finally:
+        for signum in STOP_SIGNALS:
+            signal.signal(signum, signal.SIG_IGN)
+    return code
+
+
+@contextmanager
+def interrupting(clock: Clock) -> Iterator[None]:
+    """Stop signals are answered at the clock's next wait, never inside a device transaction."""
+
+    def ask(signum: int, frame: FrameType | None) -> None:
+        clock.interrupt(signum)
+
+    before = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
+    try:
+        yield
+    finally:
+        for signum, handler in before.items():
+            signal.signal(signum, handler)
+
+
+def _run(arguments: Sequence[str]) -> int:
+    import click
+
+    from labrig.cli.app import app
+
+    try:
+        app(args=list(arguments), prog_name="labrig", standalone_mode=False)
+    except Interrupted as interrupted:
+        return _complain(str(interrupted), 130 if interrupted.signum == signal.SIGINT else 143)
+    except LabrigError as error:
+        return _complain(str(error), error.exit_code)
+    except click.exceptions.Exit as ending:
+        return ending.exit_code
+    except click.ClickException as error:
+        return _complain(f"{error.format_message()} (see labrig --help)", 2)
+    except OSError as error:
+        if isinstance(error, BrokenPipeError):
+            raise
+        return _complain(f"{error.filename or 'disk'}: {error.strerror}", DiskError.exit_code)
+    except Exception as error:
+        return _complain(_fault(error), 1)
+    return 0
+
+
+def _fault(error: Exception) -> str:
+    """A fault of labrig's own: the traceback goes to a file that can be sent along."""
+    import tempfile
+    import traceback
+
+    with tempfile.NamedTemporaryFile(
+        "w", prefix="labrig-fault-", suffix=".txt", delete=False, encoding="utf-8"
+    ) as file:
+        traceback.print_exception(error, file=file)
+    return f"a fault in labrig itself ({error!r}); please report it with {file.name}"
+
+
+def _complain(text: str, code: int) -> int:
+    print(f"labrig: {' '.join(text.split())}", file=sys.stderr)
+    return code
+
+
+def _raise_interrupted(signum: int, frame: FrameType | None) -> None:
+    raise Interrupted(signum)

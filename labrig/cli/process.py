@@ -1,0 +1,48 @@
+"""`labrig process`: from a recorded run to its result."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from labrig.process import Choices
+
+
+def process(
+    run: Annotated[Path, typer.Argument(help="The run folder.")],
+    roi: Annotated[
+        list[str] | None,
+        typer.Option("--roi", help="NAME=x,y,width,height (or x,y,…): another region. Repeatable."),
+    ] = None,
+    exclude: Annotated[
+        list[str] | None,
+        typer.Option("--exclude", help="A frame to leave out, by number or name. Repeatable."),
+    ] = None,
+    states: Annotated[
+        int | None, typer.Option("--states", min=1, max=3, help="Number of states to fit.")
+    ] = None,
+    json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
+) -> None:
+    """Reduce, fit and report a run again; earlier results are kept as result-1, result-2, …"""
+    from labrig.process import Choices
+
+    process_and_tell(run, Choices.parse(roi or [], exclude or [], states), json=json)
+    typer.echo(run)
+
+
+def process_and_tell(run: Path, choices: "Choices | None" = None, *, json: bool) -> None:
+    """Process the run in `run` and print what came out."""
+    import json as json_format
+
+    from labrig.process import process_run
+
+    result = process_run(run, choices)
+    if json:
+        typer.echo(json_format.dumps({name: fit.to_json() for name, fit in result.fits.items()}))
+        return
+    for name, fit in result.fits.items():
+        typer.echo(f"{name}\n{fit}")
+    for warning in result.warnings:
+        typer.echo(f"warning: {warning}", err=True)
+    typer.echo(f"report: {result.report}")

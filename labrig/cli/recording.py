@@ -1,0 +1,168 @@
+"""From a protocol and a rig to a filled run folder, told to the person at the terminal."""
+
+import shutil
+import signal
+from collections.abc import Sequence
+from dataclasses import dataclass
+from importlib.metadata import version
+from pathlib import Path
+from typing import Self
+
+from labrig.acquire import (
+    Plan,
+    ProtocolModel,
+    RigFile,
+    plan,
+    plugins,
+    read_rig_file,
+    run_units,
+)
+from labrig.bench import Bench, open_bench
+from labrig.cli.ending import interrupting
+from labrig.cli.progress import progress
+from labrig.clock import Interrupted
+from labrig.errors import DataError, DiskError, LabrigError, UsageError
+from labrig.quantity import duration_text
+from labrig.record import RunFolder, read_run
+from labrig.yaml_file import yaml_text
+
+#: Room left on the disk beyond what the frames need: journal, results, report.
+SPARE_BYTES = 200e6
+
+
+@dataclass(frozen=True)
+class Recording:
+    """A protocol that fits its rig, before anything is opened."""
+
+    protocol: ProtocolModel
+    rig: RigFile
+    rig_source: Path
+    runs: Path
+    plan: Plan
+
+    @classmethod
+    def prepare(cls, protocol_path: Path, rig_path: Path, runs: Path) -> Self:
+        """Read both files, lay out the plan, refuse what cannot work.
+
+        Raises
+        ------
+        UsageError
+            A file is malformed, or the plan cannot work on this rig.
+        DiskError
+            The frames will not fit.
+        """
+        protocol = plugins.read_protocol(protocol_path)
+        rig = read_rig_file(rig_path).anchored(rig_path.resolve().parent)
+        laid_out = plan(protocol, rig, str(rig_path))
+        free_bytes = shutil.disk_usage(_existing(runs)).free
+        if laid_out.size_bytes + SPARE_BYTES > free_bytes:
+            raise DiskError(
+                f"{runs}: {laid_out.frames} frames need {laid_out.size_bytes / 1e9:.2f} GB, "
+                f"{free_bytes / 1e9:.2f} GB are free; free some space or give another --runs"
+            )
+        return cls(protocol, rig, rig_path, runs, laid_out)
+
+    def summary(self) -> str:
+        """Duration, frames and bytes in one line."""
+        return (
+            f"{len(self.plan.units)} units, at most {duration_text(self.plan.duration_s)} of lab "
+            f"time, {self.plan.frames} frames, {self.plan.size_bytes / 1e6:.0f} MB"
+        )
+
+    def record(self) -> Path:
+        """Make a run folder and fill it; returns its path.
+
+        Raises
+        ------
+        Interrupted, LabrigError
+            After the safe state was reached; the text says what is kept and how to go on.
+        """
+        with open_bench(self.rig, str(self.rig_source)) as stand:
+            folder = RunFolder.create(
+                self.runs,
+                f"{self.protocol.protocol}_{self.protocol.sample.name}",
+                stand.clock.wall(),
+                {
+                    "protocol.yaml": yaml_text(self.protocol.model_dump(mode="json", by_alias=True)),
+                    "rig.yaml": yaml_text(self.rig.model_dump(mode="json", exclude_none=True)),
+                },
+                stand.seed,
+            )
+            with folder:
+                _fill(folder, self.protocol, stand, self.plan)
+        return folder.path
+
+
+def resume_run(path: Path) -> Path:
+    """Do what is left of the run in `path`; returns the path.
+
+    Raises
+    ------
+    UsageError
+        Not a run folder.
+    """
+    if not (path / "protocol.yaml").is_file():
+        raise UsageError(f"{path}: expected a run folder with protocol.yaml in it; see --runs")
+    protocol = plugins.read_protocol(path / "protocol.yaml")
+    rig = read_rig_file(path / "rig.yaml")
+    last_time = read_run(path).last_time if (path / "journal.jsonl").exists() else 0.0
+    with open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as stand:
+        with RunFolder(path, stand.seed) as folder:
+            _fill(folder, protocol, stand, plan(protocol, rig, str(path / "rig.yaml")))
+    return path
+
+
+def _fill(folder: RunFolder, protocol: ProtocolModel, stand: Bench, laid_out: Plan) -> None:
+    dead = folder.close_open_attempts(
+        stand.clock.wall, "abort", "labrig ended before this attempt did; closed at resume"
+    )
+    done = folder.read().completed()
+    with progress(laid_out, list(done), stand.clock) as observer:
+        for unit in dead:
+            observer.warn(f"the unit {unit} was cut off and is done again")
+        units = protocol.units()
+        if all(unit.name in done for unit in units):
+            return
+        try:
+            with interrupting(stand.clock), stand.devices() as rig:
+                metadata = {
+                    "protocol": protocol.protocol,
+                    "sample": protocol.sample.name,
+                    "rig": rig.name,
+                    "devices": rig.identities(),
+                    "labrig_version": version("labrig"),
+                }
+                run_units(units, rig, folder, observer, metadata)
+        except Interrupted as stop:
+            _close(folder, stand, "abort", f"signal {stop.signum}")
+            name = signal.Signals(stop.signum).name
+            raise Interrupted(
+                stop.signum, f"stopped by {name}, safe state reached; {_kept(folder, units)}"
+            ) from None
+        except LabrigError as error:
+            _close(folder, stand, "fail", str(error))
+            raise type(error)(f"{error}; {_kept(folder, units)}") from error
+
+
+def _close(folder: RunFolder, stand: Bench, exit_status: str, reason: str) -> None:
+    """Close the attempt; a full disk must not hide why the run ended."""
+    try:
+        folder.close_open_attempts(stand.clock.wall, exit_status, reason)
+    except (DiskError, DataError):
+        return
+
+
+def _kept(folder: RunFolder, units: Sequence[object]) -> str:
+    done = len(folder.read().completed())
+    return (
+        f"{done} of {len(units)} units are complete and kept; go on with: "
+        f"labrig resume {folder.path}"
+    )
+
+
+def _existing(path: Path) -> Path:
+    path = path.absolute()
+    while not path.exists():
+        path = path.parent
+    return path
+

@@ -1,0 +1,70 @@
+"""`labrig run`, `labrig plan`, `labrig resume`: protocols on a rig."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+Protocol = Annotated[
+    str, typer.Argument(help="A shipped protocol, such as 'decay', or a path to a YAML file.")
+]
+RigOption = Annotated[
+    str, typer.Option("--rig", help="A shipped rig, such as 'sim', or a path to a YAML file.")
+]
+Runs = Annotated[Path, typer.Option("--runs", help="Where run folders are made.")]
+NoProcess = Annotated[
+    bool, typer.Option("--no-process", help="Stop after recording; reduce and fit later.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
+Yes = Annotated[bool, typer.Option("--yes", help="Answer every question with yes.")]
+
+
+def run(
+    protocol: Protocol,
+    rig: RigOption,
+    runs: Runs = Path("runs"),
+    yes: Yes = False,
+    no_process: NoProcess = False,
+    json: Json = False,
+) -> None:
+    """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
+    from labrig.acquire import plugins
+    from labrig.cli.recording import Recording
+
+    recording = Recording.prepare(
+        plugins.find("protocols", protocol), plugins.find("config", rig), runs
+    )
+    folder = recording.record()
+    _finish(folder, no_process, json)
+
+
+def plan(protocol: Protocol, rig: RigOption, runs: Runs = Path("runs")) -> None:
+    """Print what a protocol will do, how long it takes and what it needs; touch nothing."""
+    from labrig.acquire import plugins
+    from labrig.cli.recording import Recording
+
+    recording = Recording.prepare(
+        plugins.find("protocols", protocol), plugins.find("config", rig), runs
+    )
+    for line in recording.plan.lines():
+        typer.echo(line)
+    typer.echo(recording.summary())
+
+
+def resume(
+    run: Annotated[Path, typer.Argument(help="The run folder.")],
+    no_process: NoProcess = False,
+    json: Json = False,
+) -> None:
+    """Go on with a run that was interrupted: completed units are kept, the rest is done."""
+    from labrig.cli.recording import resume_run
+
+    _finish(resume_run(run), no_process, json)
+
+
+def _finish(folder: Path, no_process: bool, json: bool) -> None:
+    if not no_process:
+        from labrig.cli.process import process_and_tell
+
+        process_and_tell(folder, json=json)
+    typer.echo(folder)

@@ -1,0 +1,14 @@
+"""Fits: the least-squares core, and what is measured with it."""
+
+from labrig.fit.decay import Candidate, DecayFit, DecayState, PowerLaw, fit_decay
+from labrig.fit.least_squares import LeastSquaresFit, least_squares
+
+__all__ = [
+    "Candidate",
+    "DecayFit",
+    "DecayState",
+    "LeastSquaresFit",
+    "PowerLaw",
+    "fit_decay",
+    "least_squares",
+]

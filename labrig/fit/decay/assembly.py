@@ -1,0 +1,201 @@
+"""From the fit's own units to the user's: rates, amplitudes, covariance, warnings."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.fit.decay.diagnostics import (
+    Misfit,
+    misfit_warnings,
+    rising_warning,
+    state_warnings,
+)
+from labrig.fit.decay.envelope import Envelope
+from labrig.fit.decay.joint import parameter_sigma
+from labrig.fit.decay.power_law import PowerLaw
+from labrig.fit.decay.result import DecayFit, DecayState
+from labrig.fit.decay.selection import Candidate, bic
+from labrig.fit.decay.states import StatesFit
+from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.least_squares import FloatArray
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What led to the fit chosen.
+
+    Attributes
+    ----------
+    noise, noise_estimated
+        The envelope, and whether σ or flicker come from it.
+    candidates, power_law_bic, power_law
+        What was tried; the power law's parameters if it does clearly better.
+    asked, max_states, n_fixed
+        As the user had it.
+    """
+
+    noise: Envelope
+    noise_estimated: bool
+    candidates: tuple[Candidate, ...]
+    power_law_bic: float
+    power_law: PowerLaw | None
+    asked: int | None
+    max_states: int
+    n_fixed: int
+
+
+def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayFit:
+    """The result in the user's units and order of frames."""
+    series, joint = data.series, fit.joint
+    inflation = _inflation(fit, data, evidence)
+    covariance, log_rate_covariance = _covariances(fit, data)
+    covariance, log_rate_covariance = covariance * inflation, log_rate_covariance * inflation
+    order = np.argsort(-fit.log_rates, kind="stable")
+    rates = np.exp(fit.log_rates[order]) / series.span_s
+    amplitudes = (fit.amplitudes * np.exp(np.exp(fit.log_rates) * series.start))[order] * series.peak
+    sigma = np.sqrt(np.diag(covariance))
+    states = tuple(
+        DecayState(float(rates[i]), float(sigma[2 * i]), float(amplitudes[i]), float(sigma[2 * i + 1]))
+        for i in range(fit.n_states)
+    )
+    weight_sigma, _ = parameter_sigma(joint, series)
+    residuals = np.empty_like(series.values)
+    residuals[series.order] = series.values - fit.signal(series) - joint.offset
+    normalised = np.empty_like(series.values)
+    n_values = series.values.size
+    normalised[series.order] = -joint.least_squares.residuals[:n_values].reshape(
+        series.values.shape
+    )
+    return DecayFit(
+        states=states,
+        channels=series.channels,
+        channel_weights=tuple(joint.weights.tolist()),
+        channel_weights_sigma=tuple((weight_sigma * np.sqrt(inflation)).tolist()),
+        offset=joint.offset * series.peak,
+        offset_sigma=float(sigma[-1]),
+        flicker=evidence.noise.flicker,
+        flicker_sigma=evidence.noise.flicker_sigma,
+        chi2=joint.chi2,
+        dof=_dof(fit, data),
+        bic=bic(data, joint),
+        covariance=covariance,
+        warnings=tuple(_warnings(data, fit, states, log_rate_covariance[np.ix_(order, order)], evidence)),
+        candidates=evidence.candidates,
+        power_law_bic=evidence.power_law_bic,
+        power_law=evidence.power_law,
+        residuals=residuals * series.peak,
+        normalised_residuals=normalised,
+    )
+
+
+def _dof(fit: StatesFit, data: WhitenedSeries) -> int:
+    """Values measured, and the offset's prior, minus parameters."""
+    prior = int(data.series.has_offset and np.isfinite(data.series.offset_sigma))
+    return data.series.n_values + prior - fit.joint.n_parameters
+
+
+def _inflation(fit: StatesFit, data: WhitenedSeries, evidence: Evidence) -> float:
+    """By how much the variances grow because the noise itself was estimated.
+
+    A parameter over an estimated σ with ν degrees of freedom follows Student's t, whose variance is
+    ν/(ν − 2).
+    """
+    if not evidence.noise_estimated:
+        return 1.0
+    dof = _dof(fit, data)
+    if not data.series.sigma_given:
+        return fit.joint.chi2 / dof if dof > 0 else float("inf")
+    return evidence.noise.dof / max(evidence.noise.dof - 2, 1)
+
+
+def _covariances(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, FloatArray]:
+    """Of (k1, a1, …, offset) by falling rate in the user's units, and of log k, free rates first."""
+    series, n_free = data.series, fit.n_free
+    own = fit.joint.least_squares.covariance
+    n_states = fit.n_states
+    order = np.argsort(-fit.log_rates, kind="stable")
+    rates = np.exp(fit.log_rates)
+    b = fit.amplitudes
+    # Amplitudes are fitted at the first frame, given at lamp off: a = b e^(k t₀).
+    grown = np.exp(rates * series.start) * series.peak
+    transform = np.zeros((2 * n_states + 1, len(own)))
+    to_log_rates = np.zeros((n_states, len(own)))
+    for place, i in enumerate(order):
+        if i < n_free:
+            transform[2 * place, 2 * i] = rates[i] / series.span_s
+            transform[2 * place + 1, 2 * i] = b[i] * grown[i] * rates[i] * series.start
+            transform[2 * place + 1, 2 * i + 1] = grown[i]
+            to_log_rates[i, 2 * i] = 1.0
+        else:
+            transform[2 * place + 1, n_free + i] = grown[i]
+    if series.has_offset:
+        transform[-1, -1] = series.peak
+    known = np.isfinite(np.diag(own))
+    finite = np.where(np.multiply.outer(known, known), own, 0.0)
+    covariance = transform @ finite @ transform.T
+    log_rate_covariance = to_log_rates @ finite @ to_log_rates.T
+    unknown = (transform[:, ~known] != 0).any(axis=1)
+    covariance[unknown, unknown] = np.inf
+    unknown = (to_log_rates[:, ~known] != 0).any(axis=1)
+    log_rate_covariance[unknown, unknown] = np.inf
+    return covariance, log_rate_covariance
+
+
+def _warnings(
+    data: WhitenedSeries,
+    fit: StatesFit,
+    states: tuple[DecayState, ...],
+    log_rate_covariance: FloatArray,
+    evidence: Evidence,
+) -> list[str]:
+    series, joint = data.series, fit.joint
+    warnings = []
+    if not series.sigma_given:
+        scatter = np.sqrt(joint.chi2 / max(_dof(fit, data), 1)) * series.peak
+        scatter /= series.inverse_sigma.max()
+        warnings.append(
+            f"σ was not given: taken as {scatter:.3g} for all values, from their scatter; "
+            "give each value's σ for the right weights"
+        )
+    wanted = evidence.asked or evidence.n_fixed
+    if fit.n_states < wanted:
+        warnings.append(
+            f"{wanted} states were asked for, the data support {fit.n_states}: "
+            "the others' amplitude is zero; ask for fewer or take more light"
+        )
+    if evidence.power_law is not None:
+        law = evidence.power_law
+        n = evidence.candidates[-1].n_states
+        warnings.append(
+            f"a power law (1 + t/{law.tau_s:.3g} s)^−{law.exponent:.3g} fits better than "
+            f"{n} exponential{'s' if n > 1 else ''}: the rates are descriptive only, "
+            "do not extrapolate them beyond the times recorded"
+        )
+    frames = joint.frame_residuals(data)
+    spare = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
+    own = len(joint.shape) + int(series.has_offset)
+    more = (
+        "allow more states" if fit.n_states < evidence.max_states else "look for a power law"
+    )
+    warnings += misfit_warnings(
+        Misfit(
+            chi2=joint.chi2,
+            dof=_dof(fit, data),
+            frames=frames,
+            frame_dof=spare - own,
+            noise_dof=evidence.noise.dof if evidence.noise_estimated else np.inf,
+        ),
+        fit.n_states,
+        f"{more}, and check background and times",
+    )
+    low, high = series.log_rate_bounds
+    warnings += state_warnings(
+        states,
+        log_rate_covariance,
+        series.span_s,
+        (float(np.exp(low)) / series.span_s, float(np.exp(high)) / series.span_s),
+    )
+    unit = data.unit_signal(joint.weights)
+    information = np.einsum("fc,fc->f", unit, unit)
+    common = np.einsum("fc,fc->f", unit, data.values) / np.where(information > 0, information, 1.0)
+    return warnings + rising_warning(common, information)

@@ -1,0 +1,192 @@
+"""What to distrust in a decay fit, in one line each, with what to do about it."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc, fdtrc, ndtr
+
+from labrig.fit.decay.result import DecayState
+from labrig.fit.least_squares import FloatArray
+
+#: Chance at which data that are as assumed get a misfit warning, per test.
+MISFIT_LEVEL = 5e-4
+#: Frames below which residuals' order tells nothing.
+FEWEST_FOR_ORDER = 8
+ILL_DETERMINED = 0.3
+#: Two log rates closer than this many σ are one as far as the data know.
+APART_SIGMAS = 3.0
+RISING_SIGMAS = 5.0
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """Residuals of the chosen fit, split into what frames share and what colours them.
+
+    Attributes
+    ----------
+    chi2, dof
+        Of all values.
+    frames
+        (n,) residual along the signal by rising time, unit variance.
+    frame_dof
+        Degrees of freedom of `frames`.
+    noise_dof
+        Degrees of freedom of the noise's own estimate; inf if σ and flicker were given.
+    """
+
+    chi2: float
+    dof: int
+    frames: FloatArray
+    frame_dof: int
+    noise_dof: float
+
+
+def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
+    """Shape, scatter and colour against what the noise allows.
+
+    Parameters
+    ----------
+    misfit
+        The residuals.
+    n_states
+        Of the fit.
+    remedy
+        What to try if the shape is wrong.
+    """
+    warnings = []
+    p_order = order_p_value(misfit.frames)
+    if p_order < MISFIT_LEVEL:
+        exponentials = "one exponential" if n_states == 1 else f"{n_states} exponentials"
+        warnings.append(
+            f"{exponentials} do not describe this decay: neighbouring residuals agree "
+            f"(p = {p_order:.1g}); {remedy}"
+        )
+    frame_chi2 = float(misfit.frames @ misfit.frames)
+    colour_dof = misfit.dof - misfit.frame_dof
+    frame_p = _excess_p_value(frame_chi2, misfit.frame_dof, misfit.noise_dof)
+    if frame_p < MISFIT_LEVEL <= p_order:
+        factor = np.sqrt(frame_chi2 / misfit.frame_dof)
+        warnings.append(
+            f"frames scatter {factor:.2g} times as much as σ and flicker explain; every σ given "
+            "here is too small by about that: estimate the flicker (flicker=None) or check σ"
+        )
+    if colour_dof > 0:
+        colour_chi2 = max(misfit.chi2 - frame_chi2, 0.0)
+        if _excess_p_value(colour_chi2, colour_dof, np.inf) < MISFIT_LEVEL:
+            warnings.append(
+                "the colour changes during the decay more than σ allows (reduced χ² between the "
+                f"channels {colour_chi2 / colour_dof:.3g}): check dark level and σ of each channel, "
+                "or fit the channels one by one"
+            )
+    return warnings
+
+
+def order_p_value(residuals: FloatArray) -> float:
+    """Chance that independent residuals agree with their neighbours that much (n,).
+
+    The smaller of two: lag-1 autocorrelation and Wald and Wolfowitz's runs of signs.
+    """
+    n = len(residuals)
+    power = float(residuals @ residuals)
+    if n < FEWEST_FOR_ORDER or power == 0:
+        return 1.0
+    autocorrelation = float(residuals[1:] @ residuals[:-1]) / power
+    positive = residuals > 0
+    n_positive = int(positive.sum())
+    expected = 1 + 2 * n_positive * (n - n_positive) / n
+    variance = (expected - 1) * (expected - 2) / (n - 1)
+    runs = 1 + int(np.count_nonzero(positive[1:] != positive[:-1]))
+    z_runs = (expected - runs) / np.sqrt(variance) if variance > 0 else 0.0
+    return float(ndtr(-max(autocorrelation * np.sqrt(n), z_runs)))
+
+
+def _excess_p_value(chi2: float, dof: int, noise_dof: float) -> float:
+    if dof <= 0:
+        return 1.0
+    if np.isinf(noise_dof):
+        return float(chdtrc(dof, chi2))
+    return float(fdtrc(dof, noise_dof, chi2 / dof))
+
+
+def state_warnings(
+    states: tuple[DecayState, ...],
+    log_rate_covariance: FloatArray,
+    span_s: float,
+    rate_bounds_per_s: tuple[float, float],
+) -> list[str]:
+    """Rates that the data do not hold.
+
+    Parameters
+    ----------
+    states
+        By falling rate.
+    log_rate_covariance
+        (n, n) of log k.
+    span_s
+        From the first frame to the last.
+    rate_bounds_per_s
+        Slowest and fastest rate searched.
+    """
+    warnings = []
+    sigma = np.sqrt(np.diag(log_rate_covariance))
+    slowest, fastest = rate_bounds_per_s
+    for number, state in enumerate(states, start=1):
+        rate = f"k{number} = {state.k_r_per_s:.3g} /s"
+        if state.k_r_sigma_per_s == 0:
+            continue
+        if state.k_r_per_s < 1.001 * slowest:
+            warnings.append(
+                f"{rate} is the slowest rate {span_s:.4g} s can tell from a constant: subtract the "
+                "dark level, fit an offset (offset_sigma) or record longer"
+            )
+        elif state.k_r_per_s > 0.999 * fastest:
+            warnings.append(
+                f"{rate} is the fastest rate the steps in time can tell: take the first frames "
+                "closer together, or leave the first one out if the lamp still glowed"
+            )
+        elif sigma[number - 1] > ILL_DETERMINED:
+            warnings.append(
+                f"{rate} is known to {100 * sigma[number - 1]:.0f} % only: "
+                "ask for fewer states or take more light"
+            )
+    for number in range(1, len(states)):
+        fast, slow = number - 1, number
+        variance = (
+            log_rate_covariance[fast, fast]
+            + log_rate_covariance[slow, slow]
+            - 2 * log_rate_covariance[fast, slow]
+        )
+        apart = np.log(states[fast].k_r_per_s / states[slow].k_r_per_s)
+        if variance > 0 and apart < APART_SIGMAS * np.sqrt(variance):
+            warnings.append(
+                f"k{number} and k{number + 1} cannot be told apart: ask for one state fewer"
+            )
+    if states[-1].k_r_per_s > slowest and 1 / states[-1].k_r_per_s > span_s:
+        warnings.append(
+            f"the slowest state lives {1 / states[-1].k_r_per_s:.3g} s, longer than the {span_s:.4g} s "
+            "recorded: record longer to be sure of it"
+        )
+    return warnings
+
+
+def rising_warning(signal: FloatArray, information: FloatArray) -> list[str]:
+    """Whether the last quarter of the frames is brighter than the first.
+
+    Parameters
+    ----------
+    signal, information
+        (n,) common signal of the channels by rising time, and its inverse variance.
+    """
+    quarter = max(len(signal) // 4, 1)
+
+    def mean(part: slice) -> tuple[float, float]:
+        total = float(information[part].sum())
+        return (float(signal[part] @ information[part]) / total, 1 / total) if total else (0.0, np.inf)
+
+    first, first_variance = mean(slice(None, quarter))
+    last, last_variance = mean(slice(-quarter, None))
+    if last - first > RISING_SIGMAS * np.sqrt(first_variance + last_variance):
+        return [
+            "the signal rises: check that the lamp was off and that times and values belong together"
+        ]
+    return []

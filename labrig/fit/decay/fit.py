@@ -1,0 +1,182 @@
+"""From frames to rates: `fit_decay`."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from labrig.errors import FitError
+from labrig.fit.decay.assembly import Evidence, assemble
+from labrig.fit.decay.envelope import envelope
+from labrig.fit.decay.power_law import fit_power_law, power_law
+from labrig.fit.decay.result import DecayFit
+from labrig.fit.decay.selection import CLEAR_BIC, Candidate, bic, choose_states
+from labrig.fit.decay.series import DecaySeries, decay_series
+from labrig.fit.decay.states import StatesFit, refit
+from labrig.fit.decay.whitening import WhitenedSeries, whitened
+from labrig.fit.least_squares import FloatArray
+
+#: Rounds in which the flicker's weights follow the model; each gains two digits or more.
+REWEIGHTINGS = 8
+REWEIGHTED_ENOUGH = 1e-9
+#: Scatter below which data are taken for exact: rounding.
+EXACT = 1e-13
+FEWEST_FOR_FLICKER = 6
+
+
+def fit_decay(
+    t_s: ArrayLike,
+    values: ArrayLike,
+    sigma: ArrayLike | None,
+    *,
+    exposure_s: ArrayLike = 0.0,
+    channels: Sequence[str] = ("value",),
+    n_states: int | None = None,
+    max_states: int = 3,
+    offset_sigma: float = 0.0,
+    flicker: float | None = 0.0,
+    fixed_rates: Sequence[float] = (),
+) -> DecayFit:
+    """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in one or more channels (Nalbach et al. sec. 4.4).
+
+    Frame f, channel c: y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + offset, g the mean of e^(−k t) over the
+    exposure. Cov = diag(σ_fc²) + ρ² s_f s_fᵀ within a frame.
+
+    Parameters
+    ----------
+    t_s
+        (n,) start of the exposures after lamp off, ≥ 0, in any order.
+    values
+        (n,) or (n, C), linear in light, dark subtracted.
+    sigma
+        Their standard uncertainties without flicker, > 0, broadcast to `values`; inf leaves a value
+        out. None, for one channel only: equal for all, estimated from the scatter.
+    exposure_s
+        Length of the exposures ≥ 0, one for all or (n,).
+    channels
+        C names.
+    n_states
+        Number of states, or None to choose up to `max_states`, by BIC and F-test.
+    max_states
+        Most states tried.
+    offset_sigma
+        Prior σ of a constant common to all channels, in the values' units: 0 holds it at zero, inf
+        leaves it free.
+    flicker
+        Relative noise ρ that all channels of a frame share; None estimates it from the scatter of the
+        frames about the smoothest curve that fits, whatever the number of states.
+    fixed_rates
+        Rates in 1/s that take part and are held; they count as states.
+
+    Raises
+    ------
+    FitError
+        Data from which no decay can be had.
+    """
+    series = decay_series(t_s, values, sigma, exposure_s, channels, offset_sigma)
+    fixed = _log_rates(fixed_rates, series.span_s)
+    numbers = _numbers_of_states(series, n_states, max_states, len(fixed))
+    _check_flicker(series, flicker)
+    smooth = envelope(series, flicker)
+    if not series.sigma_given:
+        scale = max(smooth.noise_scale, EXACT)
+        series = replace(series, inverse_sigma=series.inverse_sigma / scale)
+    data = whitened(series, smooth.signal, smooth.flicker)
+    chosen, tried = _supported_states(data, numbers, fixed, smooth.weights, smooth.offset)
+    rival = fit_power_law(data, chosen.joint.weights, chosen.joint.offset)
+    rival_bic = bic(data, rival)
+    rival_wins = rival_bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
+    data, chosen = _reweighted(data, chosen, smooth.flicker)
+    return assemble(
+        data,
+        chosen,
+        Evidence(
+            noise=smooth,
+            noise_estimated=flicker is None or not series.sigma_given,
+            candidates=tuple(tried),
+            power_law_bic=rival_bic,
+            power_law=power_law(rival, series) if rival_wins else None,
+            asked=n_states,
+            max_states=max_states,
+            n_fixed=len(fixed),
+        ),
+    )
+
+
+def _log_rates(rates_per_s: Sequence[float], span_s: float) -> FloatArray:
+    rates = np.array(rates_per_s, dtype=np.float64)
+    if not np.all((rates > 0) & np.isfinite(rates)):
+        raise FitError(f"expected fixed rates > 0 per second, got {list(rates_per_s)}")
+    return np.log(rates * span_s)
+
+
+def _numbers_of_states(
+    series: DecaySeries, n_states: int | None, max_states: int, n_fixed: int
+) -> range:
+    """Numbers of states to try: what was asked for, or as many as the frames can tell."""
+    fewest = max(1, n_fixed) if n_states is None else n_states
+    most = max(max_states, fewest) if n_states is None else n_states
+    if fewest < max(1, n_fixed):
+        raise FitError(
+            f"expected n_states ≥ {max(1, n_fixed)}, got {fewest}; fixed rates count as states"
+        )
+    frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
+
+    def parameters(n: int) -> int:
+        return 2 * n - n_fixed + int(np.isinf(series.offset_sigma))
+
+    if frames < parameters(fewest):
+        raise FitError(
+            f"expected at least {parameters(fewest)} frames for {fewest} state(s), got {frames}; "
+            "record more frames or ask for fewer states"
+        )
+    # Choosing takes frames to spare.
+    enough = [n for n in range(fewest, most + 1) if n == fewest or frames > parameters(n) + 1]
+    return range(fewest, enough[-1] + 1)
+
+
+def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
+    if flicker is None and not series.sigma_given:
+        raise FitError(
+            "expected σ of the values to tell flicker from other noise, got none; "
+            "give σ, or the flicker"
+        )
+    if flicker is None and series.n_frames < FEWEST_FOR_FLICKER:
+        raise FitError(
+            f"expected at least {FEWEST_FOR_FLICKER} frames to estimate flicker, got "
+            f"{series.n_frames}; give the flicker (0.007 is common) or record more frames"
+        )
+    if flicker is not None and not 0 <= flicker < 1:
+        raise FitError(f"expected flicker in [0, 1), got {flicker:g}; 0.007 means 0.7 %")
+
+
+def _supported_states(
+    data: WhitenedSeries, numbers: range, fixed: FloatArray, weights: FloatArray, offset: float
+) -> tuple[StatesFit, list[Candidate]]:
+    """The states chosen; fewer than the fewest wanted if amplitudes vanish."""
+    for fewest in range(numbers.start, max(len(fixed), 1) - 1, -1):
+        chosen, tried = choose_states(
+            data, range(fewest, max(numbers.stop, fewest + 1)), fixed, weights, offset
+        )
+        if chosen is not None:
+            return chosen, tried
+    raise FitError(
+        "expected a signal that decays, got none that a positive exponential describes; "
+        "check the dark level, and that times count from lamp off"
+    )
+
+
+def _reweighted(
+    data: WhitenedSeries, fit: StatesFit, flicker: float
+) -> tuple[WhitenedSeries, StatesFit]:
+    """The fit whose flicker is a share of its own signal, and the data so whitened."""
+    if flicker == 0:
+        return data, refit(data, fit)
+    for _ in range(REWEIGHTINGS):
+        data = whitened(data.series, fit.signal(data.series), flicker)
+        before = fit.joint.shape
+        fit = refit(data, fit)
+        if np.allclose(fit.joint.shape, before, rtol=REWEIGHTED_ENOUGH, atol=0.0):
+            break
+    return data, fit

@@ -1,0 +1,174 @@
+"""Variable projection: where in the space of rates to look, the amplitudes being linear.
+
+For given rates the amplitudes (≥ 0) and the offset follow by linear least squares, so the search has
+one dimension per state: every combination of a grid of rates, then BOBYQA in log k from the best.
+Deterministic; the joint fit does the last digits.
+
+References
+----------
+G. H. Golub, V. Pereyra, *Inverse Problems* 19 (2003) R1; M. J. D. Powell, *The BOBYQA algorithm*,
+DAMTP 2009/NA06, by way of NLopt.
+"""
+
+from dataclasses import dataclass
+from itertools import combinations
+from math import comb
+
+import nlopt
+import numpy as np
+
+from labrig.fit.decay.series import DecaySeries
+from labrig.fit.decay.shapes import exponential_means
+from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.least_squares import FloatArray
+
+#: Combinations of rates looked at; decides how fine the grid can be.
+COMBINATIONS = 4000
+FINEST_GRID = 64
+#: Precision in log k at which the search hands over.
+LOG_RATE_TOLERANCE = 1e-2
+MAX_EVALUATIONS = 200
+
+
+@dataclass(frozen=True)
+class Projection:
+    """The linear half of the problem at given channel weights, the offset already eliminated.
+
+    Attributes
+    ----------
+    series
+        Times and exposures.
+    unit
+        (n, C) whitened signal of 1.
+    target
+        (m,) whitened values, orthogonal to the offset's direction.
+    offset_direction
+        (m,) of length 1, or None without an offset.
+    """
+
+    series: DecaySeries
+    unit: FloatArray
+    target: FloatArray
+    offset_direction: FloatArray | None
+
+    def rate_columns(self, log_rates: FloatArray) -> FloatArray:
+        """(m, len(log_rates)) whitened exponentials of amplitude 1 at the first frame."""
+        means = exponential_means(np.exp(log_rates), self.series.t, self.series.exposure)
+        return self.columns(means)
+
+    def columns(self, means: FloatArray) -> FloatArray:
+        """(m, q) whitened signals of unwhitened shapes (n, q)."""
+        columns = (self.unit[:, :, None] * means[:, None, :]).reshape(self.unit.size, -1)
+        if self.offset_direction is None:
+            return columns
+        columns = np.vstack([columns, np.zeros((1, columns.shape[1]))])
+        along = self.offset_direction @ columns
+        return columns - np.multiply.outer(self.offset_direction, along)
+
+    def amplitudes(self, log_rates: FloatArray) -> tuple[FloatArray, float]:
+        """Amplitudes ≥ 0 that fit best, and the χ² left."""
+        columns = self.rate_columns(log_rates)
+        found = nonnegative(columns.T @ columns, columns.T @ self.target)
+        left = self.target - columns @ found
+        return found, float(left @ left)
+
+
+def projection(data: WhitenedSeries, weights: FloatArray) -> Projection:
+    """The linear problem of `data` at channel weights (C,)."""
+    series = data.series
+    unit = data.unit_signal(weights)
+    target = data.values.ravel()
+    if not series.has_offset:
+        return Projection(series, unit, target, None)
+    direction = np.append(data.ones.ravel(), 1 / series.offset_sigma)
+    direction /= np.linalg.norm(direction)
+    target = np.append(target, 0.0)
+    return Projection(series, unit, target - direction * (direction @ target), direction)
+
+
+def nonnegative(gram: FloatArray, moments: FloatArray) -> FloatArray:
+    """argmin ½ aᵀGa − mᵀa over a ≥ 0, for a handful of columns: all sets of positive ones tried."""
+    n = len(moments)
+    best, best_cost = np.zeros(n), 0.0
+    for n_kept in range(n, 0, -1):
+        for kept in combinations(range(n), n_kept):
+            rows = list(kept)
+            try:
+                a = np.linalg.solve(gram[rows][:, rows], moments[rows])
+            except np.linalg.LinAlgError:
+                continue
+            cost = -0.5 * float(moments[rows] @ a)
+            if cost < best_cost and a.min() >= 0:
+                best, best_cost = np.zeros(n), cost
+                best[rows] = a
+                if n_kept == n:
+                    return best
+    return best
+
+
+def search_rates(problem: Projection, n_free: int, fixed: FloatArray) -> FloatArray | None:
+    """Log rates (n_free,) near the global best, or None if fewer states always do as well.
+
+    Parameters
+    ----------
+    problem
+        At the channel weights to be used.
+    n_free
+        Rates to find, ≥ 1.
+    fixed
+        (f,) log rates that take part but stay.
+    """
+    low, high = problem.series.log_rate_bounds
+    start = _best_on_grid(problem, n_free, fixed, low, high)
+    if start is None:
+        return None
+
+    def chi2(log_rates: FloatArray, gradient: FloatArray) -> float:
+        return problem.amplitudes(np.concatenate([log_rates, fixed]))[1]
+
+    # BOBYQA needs two dimensions.
+    algorithm = nlopt.LN_BOBYQA if n_free > 1 else nlopt.LN_COBYLA
+    optimiser = nlopt.opt(algorithm, n_free)
+    optimiser.set_min_objective(chi2)
+    optimiser.set_lower_bounds(np.full(n_free, low))
+    optimiser.set_upper_bounds(np.full(n_free, high))
+    optimiser.set_initial_step((high - low) / grid_size(n_free))
+    optimiser.set_xtol_abs(LOG_RATE_TOLERANCE)
+    optimiser.set_maxeval(MAX_EVALUATIONS)
+    try:
+        found = np.asarray(optimiser.optimize(start), dtype=np.float64)
+    except nlopt.RoundoffLimited:
+        # Noise-free data: χ² is all rounding before the rates have settled. The grid will do.
+        return start
+    return found
+
+
+def grid_size(n_free: int) -> int:
+    """Rates on the grid, so that no more than `COMBINATIONS` combinations arise."""
+    return max(
+        size for size in range(n_free + 2, FINEST_GRID + 1) if comb(size, n_free) <= COMBINATIONS
+    )
+
+
+def _best_on_grid(
+    problem: Projection, n_free: int, fixed: FloatArray, low: float, high: float
+) -> FloatArray | None:
+    """The best combination in which every amplitude is positive."""
+    grid = np.linspace(low, high, grid_size(n_free))
+    log_rates = np.concatenate([grid, fixed])
+    columns = problem.rate_columns(log_rates)
+    norms = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    columns = columns / np.where(norms > 0, norms, 1.0)
+    gram, moments = columns.T @ columns, columns.T @ problem.target
+    chosen = np.array(list(combinations(range(len(grid)), n_free)))
+    held = np.broadcast_to(np.arange(len(grid), len(log_rates)), (len(chosen), len(fixed)))
+    chosen = np.hstack([chosen, held])
+    matrices = gram[chosen[:, :, None], chosen[:, None, :]]
+    # Neighbours on the grid are nearly alike; a hint of a ridge keeps the batch solvable.
+    matrices = matrices + 1e-13 * np.eye(chosen.shape[1])
+    right = moments[chosen]
+    amplitudes = np.linalg.solve(matrices, right[:, :, None])[:, :, 0]
+    explained = np.einsum("ij,ij->i", amplitudes, right)
+    explained[~np.all(amplitudes[:, :n_free] > 0, axis=1)] = -np.inf
+    best = int(np.argmax(explained))
+    return grid[chosen[best, :n_free]] if np.isfinite(explained[best]) else None

@@ -1,0 +1,104 @@
+"""How many states, and whether exponentials at all.
+
+One more state is believed only if both the Bayesian information criterion and an F-test want it. The
+F-test's denominator is the frames' own scatter along the signal, so that neither an underestimated
+σ nor channels that flicker together can argue a state into being.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import fdtrc
+
+from labrig.fit.decay.joint import JointFit
+from labrig.fit.decay.states import StatesFit, fit_states
+from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.least_squares import FloatArray
+
+#: Chance of a second state where there is one. Its rate is searched for, which multiplies chances:
+#: at 0.002 per F-test 0.5 % of single exponentials come out double (tests/acceptance).
+F_TEST_LEVEL = 0.002
+#: How much lower a power law's BIC must be: odds of e^3 = 20 : 1.
+CLEAR_BIC = 6.0
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What n states achieved, all candidates at the same weights.
+
+    Attributes
+    ----------
+    n_states
+        States tried.
+    reduced_chi2
+        χ² per degree of freedom; NaN if there are none.
+    bic
+        χ² + parameters · log(independent data).
+    f_p_value
+        Chance of such a gain over one state fewer if that were enough; None for the first tried.
+    """
+
+    n_states: int
+    reduced_chi2: float
+    bic: float
+    f_p_value: float | None
+
+
+def bic(data: WhitenedSeries, joint: JointFit) -> float:
+    """Bayesian information criterion; the common noise's constant left out."""
+    independent = data.independent_data(joint.weights)
+    return joint.chi2 + joint.n_parameters * float(np.log(independent))
+
+
+def choose_states(
+    data: WhitenedSeries,
+    numbers: range,
+    fixed: FloatArray,
+    weights: FloatArray,
+    offset: float,
+) -> tuple[StatesFit | None, list[Candidate]]:
+    """Fits with more and more states, `numbers` of them, until one more is not worth it.
+
+    Parameters
+    ----------
+    data
+        Whitened by the envelope's signal, so that χ² compares.
+    numbers
+        States in all, those of the `fixed` log rates included.
+    weights, offset
+        Channel weights (C,) and offset to start from.
+
+    Returns
+    -------
+    The fit chosen (None if not even the first is supported) and what was tried.
+    """
+    chosen: StatesFit | None = None
+    tried: list[Candidate] = []
+    for n_states in numbers:
+        fit = fit_states(data, n_states - len(fixed), fixed, weights, offset)
+        if fit is None:
+            break
+        p_value = None if chosen is None else f_test(data, chosen.joint, fit.joint)
+        tried.append(
+            Candidate(n_states, fit.joint.least_squares.reduced_chi2, bic(data, fit.joint), p_value)
+        )
+        if p_value is not None and (p_value > F_TEST_LEVEL or tried[-1].bic > tried[-2].bic):
+            break
+        chosen = fit
+        weights, offset = fit.joint.weights, fit.joint.offset
+    return chosen, tried
+
+
+def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit) -> float:
+    """Chance of a gain in χ² as large as that from `fewer` to `more` parameters."""
+    added = more.n_parameters - fewer.n_parameters
+    frames = more.frame_residuals(data)
+    own = len(more.shape) + int(data.series.has_offset)
+    dof = len(frames) - own
+    scatter = float(frames @ frames)
+    if dof <= 0 or added <= 0:
+        return 1.0
+    if scatter == 0:
+        return 0.0
+    gain = max(fewer.chi2 - more.chi2, 0.0) / added
+    return float(fdtrc(added, dof, gain / (scatter / dof)))

@@ -1,0 +1,183 @@
+"""A decay as measured, checked and brought to order 1."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from labrig.errors import FitError
+from labrig.fit.least_squares import FloatArray
+
+#: Slowest rate searched: 1 / (this many spans of the data).
+SLOWEST_SPANS = 50.0
+#: Fastest rate searched: this many decays within the shortest step between frames.
+FASTEST_DECAYS = 10.0
+#: A fast state's signal must not have vanished e^600-fold before the first frame.
+LARGEST_PHASE = 600.0
+
+
+@dataclass(frozen=True)
+class DecaySeries:
+    """n frames in C channels by rising time; times in spans, values in units of the largest one.
+
+    Attributes
+    ----------
+    t, exposure
+        (n,) start since the first frame's and length of the exposures, in spans.
+    start
+        The first frame's time, in spans.
+    values, inverse_sigma
+        (n, C); an inverse σ of 0 marks a value that was not measured.
+    offset_sigma
+        Prior σ of the common offset: 0 held at zero, inf free.
+    span_s, peak
+        What times and values were divided by.
+    order
+        (n,) the frames as given, by rising time.
+    channels
+        C names.
+    sigma_given
+        False if σ is a scale still to be estimated.
+    """
+
+    t: FloatArray
+    exposure: FloatArray
+    start: float
+    values: FloatArray
+    inverse_sigma: FloatArray
+    offset_sigma: float
+    span_s: float
+    peak: float
+    order: NDArray[np.intp]
+    channels: tuple[str, ...]
+    sigma_given: bool
+
+    @property
+    def n_frames(self) -> int:
+        """Frames."""
+        return len(self.t)
+
+    @property
+    def n_values(self) -> int:
+        """Values measured."""
+        return int(np.count_nonzero(self.inverse_sigma))
+
+    @property
+    def has_offset(self) -> bool:
+        """Whether an offset is fitted."""
+        return self.offset_sigma > 0
+
+    @property
+    def log_rate_bounds(self) -> tuple[float, float]:
+        """Log of the slowest and the fastest rate these times can tell, in 1/spans."""
+        steps = np.diff(self.t)
+        shortest = float(steps[steps > 0].min())
+        fastest = FASTEST_DECAYS / shortest
+        if self.start > 0:
+            fastest = min(fastest, LARGEST_PHASE / self.start)
+        return float(-np.log(SLOWEST_SPANS)), float(np.log(fastest))
+
+
+def decay_series(
+    t_s: ArrayLike,
+    values: ArrayLike,
+    sigma: ArrayLike | None,
+    exposure_s: ArrayLike,
+    channels: Sequence[str],
+    offset_sigma: float,
+) -> DecaySeries:
+    """Check, sort and scale; arguments as `labrig.fit.decay.fit_decay` takes them.
+
+    Raises
+    ------
+    FitError
+        Shapes that do not agree, values that are not finite, nothing but zeros, no passing of time.
+    """
+    t = np.asarray(t_s, dtype=np.float64)
+    if t.ndim != 1 or len(t) < 2:
+        raise FitError(f"expected times of two or more frames, got shape {t.shape}; record more")
+    y = np.asarray(values, dtype=np.float64)
+    y = y[:, None] if y.ndim == 1 else y
+    names = tuple(channels)
+    if y.shape != (len(t), len(names)):
+        raise FitError(
+            f"expected values of {len(t)} frames in {len(names)} channel(s) "
+            f"({', '.join(names)}), got shape {np.shape(values)}; give one row per frame"
+        )
+    inverse_sigma = _inverse_sigma(sigma, y)
+    measured = inverse_sigma > 0
+    try:
+        exposure = np.broadcast_to(np.asarray(exposure_s, dtype=np.float64), t.shape)
+    except ValueError as error:
+        raise FitError(
+            f"expected one exposure or {len(t)}, got {np.size(exposure_s)}; give one per frame"
+        ) from error
+    _refuse_unless_finite("times", t)
+    _refuse_unless_finite("values", y[measured])
+    _refuse_unless_finite("exposures", exposure)
+    if t.min() < 0 or exposure.min() < 0:
+        raise FitError(
+            f"expected times after lamp off and exposures ≥ 0, got {min(t.min(), exposure.min()):g} "
+            "s; count the time from when the lamp went off"
+        )
+    if not offset_sigma >= 0:
+        raise FitError(f"expected offset_sigma ≥ 0, got {offset_sigma:g}; 0 holds the offset at 0")
+    order = np.argsort(t, kind="stable")
+    span = float(t.max() - t.min())
+    if span == 0:
+        raise FitError(f"expected frames at several times, got all at {t[0]:g} s; record a decay")
+    y = np.where(measured, y, 0.0)
+    peak = float(np.abs(y).max())
+    if y.max() <= 0:
+        raise FitError(
+            "expected a positive signal, got none above zero; "
+            "check that the sample was charged and the dark level subtracted once"
+        )
+    return DecaySeries(
+        t=(t[order] - t.min()) / span,
+        exposure=exposure[order] / span,
+        start=float(t.min()) / span,
+        values=y[order] / peak,
+        inverse_sigma=inverse_sigma[order] * (peak if sigma is not None else 1.0),
+        offset_sigma=offset_sigma / peak,
+        span_s=span,
+        peak=peak,
+        order=order,
+        channels=names,
+        sigma_given=sigma is not None,
+    )
+
+
+def _inverse_sigma(sigma: ArrayLike | None, y: FloatArray) -> FloatArray:
+    if sigma is None:
+        if y.shape[1] > 1:
+            raise FitError(
+                f"expected σ for every value of {y.shape[1]} channels, got none; without them the "
+                "channels cannot be weighed against each other: give σ or fit one channel"
+            )
+        return np.ones_like(y)
+    s = np.asarray(sigma, dtype=np.float64)
+    s = s[:, None] if s.ndim == 1 else s
+    try:
+        s = np.broadcast_to(s, y.shape)
+    except ValueError as error:
+        raise FitError(
+            f"expected σ of shape {y.shape}, got {np.shape(sigma)}; give one σ per value"
+        ) from error
+    if not np.all(s > 0):
+        raise FitError(
+            f"expected σ > 0, got {float(np.nanmin(s)):g} or NaN in "
+            f"{np.count_nonzero(~(s > 0))} value(s); give the reading's uncertainty, "
+            "or inf for a value to leave out"
+        )
+    return 1 / s
+
+
+def _refuse_unless_finite(what: str, numbers: FloatArray) -> None:
+    bad = np.count_nonzero(~np.isfinite(numbers))
+    if bad:
+        raise FitError(
+            f"expected finite {what}, got {bad} that are NaN or infinite; "
+            "leave those frames out (or give the value σ = inf)"
+        )

@@ -1,0 +1,140 @@
+"""n exponentials fitted to a whitened series."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.fit.decay.joint import JointFit, Shape, fit_jointly
+from labrig.fit.decay.search import projection, search_rates
+from labrig.fit.decay.series import DecaySeries
+from labrig.fit.decay.shapes import exponential_means_and_slopes
+from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.least_squares import FloatArray
+
+#: A state dimmer than this share of the brightest at the first frame is none.
+NEGLIGIBLE_AMPLITUDE = 1e-9
+#: Two rates closer than this in log k are one.
+MERGED_LOG_RATE = 1e-2
+#: A candidate is only compared by its χ²: evaluations and relative step that will do for that.
+CANDIDATE_ITERATIONS = 40
+CANDIDATE_TOLERANCE = 1e-5
+#: The answer is given to all digits.
+FINAL_ITERATIONS = 1000
+
+
+@dataclass(frozen=True)
+class StatesFit:
+    """n states, free rates first; rates per span, amplitudes at the first frame in units of the peak.
+
+    Attributes
+    ----------
+    joint
+        Its `shape` is [log k₁, b₁, log k₂, b₂, … of the free rates, b … of the fixed ones].
+    fixed
+        (f,) log of the rates held.
+    """
+
+    joint: JointFit
+    fixed: FloatArray
+
+    @property
+    def n_free(self) -> int:
+        """States whose rate was fitted."""
+        return (len(self.joint.shape) - len(self.fixed)) // 2
+
+    @property
+    def n_states(self) -> int:
+        """States present."""
+        return self.n_free + len(self.fixed)
+
+    @property
+    def log_rates(self) -> FloatArray:
+        """(n,) log k, free ones first."""
+        return np.concatenate([self.joint.shape[0 : 2 * self.n_free : 2], self.fixed])
+
+    @property
+    def amplitudes(self) -> FloatArray:
+        """(n,) in the order of `log_rates`."""
+        shape = self.joint.shape
+        return np.concatenate([shape[1 : 2 * self.n_free : 2], shape[2 * self.n_free :]])
+
+    def signal(self, series: DecaySeries) -> FloatArray:
+        """(n, C) without offset."""
+        h, _ = exponentials(series, self.n_free, self.fixed)(self.joint.shape)
+        return np.multiply.outer(h, self.joint.weights)
+
+
+def exponentials(series: DecaySeries, n_free: int, fixed: FloatArray) -> Shape:
+    """h = Σ b_i g(k_i; t, T) as a function of the parameters `StatesFit.joint` lists."""
+    paired = 2 * n_free
+
+    def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        rates = np.exp(np.concatenate([theta[0:paired:2], fixed]))
+        b = np.concatenate([theta[1:paired:2], theta[paired:]])
+        means, slopes = exponential_means_and_slopes(rates, series.t, series.exposure)
+        jacobian = np.empty((len(means), len(theta)))
+        jacobian[:, 0:paired:2] = slopes[:, :n_free] * b[:n_free]
+        jacobian[:, 1:paired:2] = means[:, :n_free]
+        jacobian[:, paired:] = means[:, n_free:]
+        return means @ b, jacobian
+
+    return shape
+
+
+def fit_states(
+    data: WhitenedSeries, n_free: int, fixed: FloatArray, weights: FloatArray, offset: float
+) -> StatesFit | None:
+    """The best `n_free` exponentials besides those of `fixed` log rates (f,).
+
+    Returns None if the data do not support that many: an amplitude vanishes or two rates merge, so
+    that fewer states do as well. A fixed rate without amplitude is left out of the result.
+    """
+    problem = projection(data, weights)
+    found: FloatArray | None = np.empty(0)
+    if n_free:
+        found = search_rates(problem, n_free, fixed)
+    if found is None:
+        return None
+    amplitudes, _ = problem.amplitudes(np.concatenate([found, fixed]))
+    start = np.empty(2 * n_free + len(fixed))
+    start[0 : 2 * n_free : 2] = found
+    start[1 : 2 * n_free : 2] = amplitudes[:n_free]
+    start[2 * n_free :] = amplitudes[n_free:]
+    fit = _fit_from(
+        data, start, fixed, weights, offset, CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE
+    )
+    vanished = fit.amplitudes <= NEGLIGIBLE_AMPLITUDE * fit.amplitudes.max()
+    if vanished[n_free:].any():
+        return fit_states(data, n_free, fixed[~vanished[n_free:]], weights, offset)
+    merged = n_free > 1 and np.diff(np.sort(fit.joint.shape[0 : 2 * n_free : 2])).min()
+    if vanished.any() or (n_free > 1 and merged < MERGED_LOG_RATE):
+        return None
+    return fit
+
+
+def refit(data: WhitenedSeries, fit: StatesFit) -> StatesFit:
+    """The same states under other whitening, from where they were."""
+    joint = fit.joint
+    return _fit_from(
+        data, joint.shape, fit.fixed, joint.weights, joint.offset, FINAL_ITERATIONS, 0.0
+    )
+
+
+def _fit_from(
+    data: WhitenedSeries,
+    start: FloatArray,
+    fixed: FloatArray,
+    weights: FloatArray,
+    offset: float,
+    max_iterations: int,
+    tolerance: float,
+) -> StatesFit:
+    n_free = (len(start) - len(fixed)) // 2
+    low, high = data.series.log_rate_bounds
+    lower, upper = np.zeros_like(start), np.full_like(start, np.inf)
+    lower[0 : 2 * n_free : 2], upper[0 : 2 * n_free : 2] = low, high
+    shape = exponentials(data.series, n_free, fixed)
+    joint = fit_jointly(
+        data, shape, start, weights, offset, lower, upper, max_iterations, tolerance
+    )
+    return StatesFit(joint, fixed)

@@ -1,0 +1,89 @@
+"""Noise of a frame: independent per value, plus flicker that all channels of the frame share.
+
+Lamp, shutter and aperture make a whole frame brighter or darker by a relative ρ, so that the values of
+one frame scatter together: Cov = diag(σ²) + ρ² s sᵀ with s the frame's signal. Residuals and models are
+multiplied by Cov^(−1/2), frame by frame, after which they are independent with unit variance.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.fit.decay.series import DecaySeries
+from labrig.fit.least_squares import FloatArray
+
+
+@dataclass(frozen=True)
+class WhitenedSeries:
+    """A series multiplied by its noise's Cov^(−1/2).
+
+    Attributes
+    ----------
+    series
+        What was whitened.
+    matrices
+        (n, C, C) one W per frame, with Wᵀ W = Cov⁻¹.
+    values, ones
+        (n, C) the values, and a signal of 1 in every channel, whitened.
+    """
+
+    series: DecaySeries
+    matrices: FloatArray
+    values: FloatArray
+    ones: FloatArray
+
+    def unit_signal(self, weights: FloatArray) -> FloatArray:
+        """(n, C) what a signal of 1 in the brightest channel becomes; `weights` (C,)."""
+        unit: FloatArray = self.matrices @ weights
+        return unit
+
+    def independent_data(self, weights: FloatArray) -> float:
+        """Values' worth of independent information on the common signal, between n and n C.
+
+        The ratio of the information in all channels to that in the best one: flicker, which the
+        channels share, makes a second channel say little new.
+        """
+        unit = self.unit_signal(weights)
+        together = np.einsum("fc,fc->f", unit, unit)
+        # Alone, a channel's variance is the diagonal of Cov.
+        variance = np.diagonal(_covariances(self.matrices), axis1=1, axis2=2)
+        best = (weights**2 / variance).max(axis=1)
+        seen = best > 0
+        return float((together[seen] / best[seen]).sum())
+
+
+def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> WhitenedSeries:
+    """The series in units of its noise.
+
+    Parameters
+    ----------
+    series
+        n frames, C channels.
+    signal
+        (n, C) model of the signal without offset, for the flicker's covariance.
+    flicker
+        Relative ρ ≥ 0.
+    """
+    n_channels = len(series.channels)
+    matrices = series.inverse_sigma[:, :, None] * np.eye(n_channels)
+    if flicker > 0:
+        u = flicker * signal * series.inverse_sigma
+        root = np.sqrt(1 + np.einsum("fc,fc->f", u, u))
+        # (1 + u uᵀ)^(−1/2) = 1 − u uᵀ / (root (1 + root)), without dividing by |u|.
+        shrink = u / (root * (1 + root))[:, None]
+        matrices = matrices - shrink[:, :, None] * (u * series.inverse_sigma)[:, None, :]
+    return WhitenedSeries(
+        series=series,
+        matrices=matrices,
+        values=np.einsum("fcd,fd->fc", matrices, series.values),
+        ones=matrices.sum(axis=2),
+    )
+
+
+def _covariances(matrices: FloatArray) -> FloatArray:
+    """(n, C, C) Cov = (Wᵀ W)⁻¹; infinite where a value was not measured."""
+    precision = np.einsum("fdc,fde->fce", matrices, matrices)
+    unmeasured = np.einsum("fcc->fc", precision) == 0
+    eye = np.eye(precision.shape[1])
+    covariance: FloatArray = np.linalg.inv(precision + unmeasured[:, :, None] * eye)
+    return np.where(unmeasured[:, :, None] & (eye > 0), np.inf, covariance)

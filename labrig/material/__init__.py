@@ -1,0 +1,1 @@
+"""Materials: their file, their rates and what follows from them."""

@@ -1,0 +1,202 @@
+"""The material file: what labrig measures of a phosphor, and what a simulated sample is made of.
+
+A state i has the rates of Nalbach et al., eq. 1 and 3:
+dr/dt = (1 − r) Σ_j k_e,j E_j − k_r r, and radiance L_j = Σ_i Λ_i,j k_r,i r_i.
+"""
+
+import os
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig import shipped
+from labrig.errors import UsageError
+from labrig.yaml_file import did_you_mean, read_model, write_yaml
+
+Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Concentration = Annotated[float, Field(ge=0, le=1)]
+Series = tuple[NotNegative, ...]
+
+#: What an uncertainty belongs to, field by field of a state.
+MEASURED = ("k_r_per_s", "amplitude", "r0", "k_e_per_s", "reradiation")
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class IrradianceNorm(_Part):
+    """How the irradiance E was scaled to which the excitation rates belong.
+
+    `vector_length`: the lamp's E, one number a band, was scaled to this Euclidean length; Table 1
+    of the paper uses 1.
+    """
+
+    kind: Literal["vector_length"]
+    value: Rate
+
+
+class State(_Part):
+    """One excited state. What was not measured is null; every σ is one standard deviation.
+
+    Attributes
+    ----------
+    k_r_per_s
+        Re-radiation rate.
+    amplitude
+        a = Λ* k_r r(0), as the decay shows it, in the camera's or the fit's own unit.
+    r0
+        Concentration at lamp-off to which `amplitude` belongs, 0 to 1.
+    k_e_per_s
+        Excitation rate of every band, per unit of the normalised irradiance. Length: bands.
+    reradiation
+        Λ of every band, relative radiance. Length: bands.
+    """
+
+    k_r_per_s: Rate
+    amplitude: NotNegative | None = None
+    r0: Concentration | None = None
+    k_e_per_s: Series | None = None
+    reradiation: Series | None = None
+    k_r_per_s_sigma: NotNegative | None = None
+    amplitude_sigma: NotNegative | None = None
+    r0_sigma: NotNegative | None = None
+    k_e_per_s_sigma: Series | None = None
+    reradiation_sigma: Series | None = None
+
+    @model_validator(mode="after")
+    def _sigma_has_its_value(self) -> Self:
+        for name in MEASURED:
+            value, sigma = getattr(self, name), getattr(self, f"{name}_sigma")
+            if sigma is None:
+                continue
+            if value is None:
+                raise ValueError(f"expected '{name}' beside '{name}_sigma', got nothing")
+            if isinstance(value, tuple) and len(sigma) != len(value):
+                raise ValueError(
+                    f"expected {len(value)} values in '{name}_sigma' as in '{name}', "
+                    f"got {len(sigma)}"
+                )
+        return self
+
+
+class Spectrum(_Part):
+    """Emission on a finer grid than the bands, largest value 1 (Λ* of section 4.3)."""
+
+    wavelength_nm: tuple[Rate, ...]
+    value: Series
+    sigma: Series | None = None
+
+    @model_validator(mode="after")
+    def _same_lengths(self) -> Self:
+        _rising(self.wavelength_nm, "wavelength_nm")
+        for name, series in (("value", self.value), ("sigma", self.sigma)):
+            if series is not None and len(series) != len(self.wavelength_nm):
+                raise ValueError(
+                    f"expected {len(self.wavelength_nm)} numbers in '{name}' as in "
+                    f"'wavelength_nm', got {len(series)}"
+                )
+        return self
+
+
+class Provenance(_Part):
+    """Where the numbers come from."""
+
+    source: str
+    run: str | None = None
+    frames: tuple[str, ...] | None = None
+    version: str | None = None
+    note: str | None = None
+
+
+class Material(_Part):
+    """A phosphorescent material.
+
+    Attributes
+    ----------
+    bands_nm
+        Edges of the bands, rising; one more than there are bands.
+    irradiance_norm
+        Needed as soon as a state has excitation rates: without it they mean nothing.
+    """
+
+    name: Annotated[str, Field(min_length=1)]
+    kind: Literal["phosphor"]
+    bands_nm: tuple[Rate, ...] | None = None
+    irradiance_norm: IrradianceNorm | None = None
+    states: Annotated[tuple[State, ...], Field(min_length=1)]
+    spectrum: Spectrum | None = None
+    provenance: Provenance | None = None
+
+    @model_validator(mode="after")
+    def _fits_its_bands(self) -> Self:
+        if self.bands_nm is not None:
+            _rising(self.bands_nm, "bands_nm")
+        bands = 0 if self.bands_nm is None else len(self.bands_nm) - 1
+        for number, state in enumerate(self.states):
+            for name in ("k_e_per_s", "reradiation"):
+                series = getattr(state, name)
+                if series is not None and len(series) != bands:
+                    raise ValueError(
+                        f"states.{number}.{name}: expected {bands} values, one for each band of "
+                        f"'bands_nm', got {len(series)}"
+                    )
+            if state.k_e_per_s is not None and self.irradiance_norm is None:
+                raise ValueError(
+                    f"expected 'irradiance_norm' beside states.{number}.k_e_per_s, got nothing"
+                )
+        return self
+
+
+def read_material(name: str | os.PathLike[str], beside: Path | None = None) -> Material:
+    """The material in a file, or the shipped one of that name.
+
+    Parameters
+    ----------
+    name
+        Absolute path, path relative to `beside`, or shipped name such as `blue-paint`.
+    beside
+        Folder of the file that mentions the material; default the current one.
+
+    Raises
+    ------
+    UsageError
+        No such material, or its file is malformed.
+    """
+    return read_model(material_path(name, beside), Material)
+
+
+def write_material(path: Path, material: Material) -> None:
+    """Write `material` so that `read_material` gives it back."""
+    write_yaml(path, material)
+
+
+def material_path(name: str | os.PathLike[str], beside: Path | None = None) -> Path:
+    """Where the material called `name` stands; see `read_material`."""
+    text = os.fspath(name)
+    path = (beside or Path()) / text
+    if path.is_file():
+        return path
+    known = shipped_materials()
+    if text in known:
+        return known[text]
+    if Path(text).suffix in (".yaml", ".yml") or Path(text).name != text:
+        raise UsageError(
+            f"{path}: no such material file; give a path, or a shipped name "
+            f"({', '.join(sorted(known))})"
+        )
+    raise UsageError(f"expected a material, got '{text}'; {did_you_mean(text, sorted(known))}")
+
+
+def shipped_materials() -> dict[str, Path]:
+    """Name and file of every material that comes with labrig."""
+    folder = shipped.folder("config") / "materials"
+    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
+
+
+def _rising(values: tuple[float, ...], name: str) -> None:
+    if len(values) < 2 or any(right <= left for left, right in pairwise(values)):
+        raise ValueError(f"expected two or more rising wavelengths in '{name}', got {list(values)}")

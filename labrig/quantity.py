@@ -1,0 +1,96 @@
+"""Quantities as people write them: `90 min`, `320 ms`, `1/60 s`, `450 nm`, `0.7 %`, `25 MB`.
+
+Each annotated type below turns such a text into a plain float in the named unit, so that inside
+labrig a name such as `exposure_s` says everything.
+"""
+
+import math
+import re
+from typing import Annotated, Any
+
+from pydantic import BeforeValidator, PlainSerializer
+
+TIME_S = {"us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
+LENGTH_NM = {"nm": 1.0, "um": 1e3, "µm": 1e3}
+FRACTION = {"%": 0.01}
+SIZE_BYTES = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}
+
+_PATTERN = re.compile(
+    r"\s*(?P<number>\d+(?:\.\d*)?(?:[eE][-+]?\d+)?|\.\d+)(?:\s*/\s*(?P<divisor>\d+(?:\.\d+)?))?"
+    r"\s*(?P<unit>[A-Za-zµ%]+)\s*"
+)
+
+
+def parse(text: str, units: dict[str, float]) -> float:
+    """Value of `text` in the base unit of `units`.
+
+    Raises
+    ------
+    ValueError
+        Not a number with one of the units, negative, or not finite.
+    """
+    match = _PATTERN.fullmatch(text)
+    if match is None or match["unit"] not in units:
+        example = next(unit for unit, factor in units.items() if factor == max(units.values()))
+        raise ValueError(
+            f"expected a number with a unit ({', '.join(units)}), such as '5 {example}', "
+            f"got '{text}'"
+        )
+    divisor = float(match["divisor"] or 1)
+    value = float(match["number"]) / divisor * units[match["unit"]] if divisor else math.inf
+    if not math.isfinite(value):
+        raise ValueError(f"expected a finite quantity, got '{text}'")
+    return value
+
+
+def duration_text(seconds: float) -> str:
+    """`seconds` as a person says it: `1 h 30 min`, `5 s`, `1/60 s`, `320 ms`."""
+    if seconds >= 3600:
+        minutes = round(seconds / 60)
+        return f"{minutes // 60} h" + (f" {minutes % 60} min" if minutes % 60 else "")
+    if seconds >= 120:
+        whole = round(seconds)
+        return f"{whole // 60} min" + (f" {whole % 60} s" if whole % 60 else "")
+    if seconds >= 1:
+        return f"{seconds:.4g} s"
+    return f"{seconds * 1e3:.4g} ms"
+
+
+def _validator(units: dict[str, float], bare: bool) -> BeforeValidator:
+    def validate(value: Any) -> Any:
+        if isinstance(value, str):
+            return parse(value, units)
+        if isinstance(value, (int, float)) and not isinstance(value, bool) and not bare:
+            unit = next(iter(units)) if len(units) == 1 else next(u for u in units if units[u] == 1)
+            raise ValueError(f"expected a quantity with its unit, such as '{value} {unit}'")
+        return value
+
+    return BeforeValidator(validate)
+
+
+def _written(unit: str) -> PlainSerializer:
+    return PlainSerializer(lambda value: f"{value!r} {unit}", return_type=str)
+
+
+def word_or_duration(*words: str) -> BeforeValidator:
+    """Accepts one of `words`, or a duration in seconds written with its unit."""
+
+    def validate(value: Any) -> Any:
+        if isinstance(value, str) and value not in words:
+            try:
+                return parse(value, TIME_S)
+            except ValueError as error:
+                raise ValueError(f"expected {' or '.join(words)}, or a duration; {error}") from None
+        return value
+
+    return BeforeValidator(validate)
+
+
+#: Seconds, written with a unit of time.
+DurationS = Annotated[float, _validator(TIME_S, bare=False), _written("s")]
+#: Nanometres.
+WavelengthNm = Annotated[float, _validator(LENGTH_NM, bare=False), _written("nm")]
+#: A fraction, written as `0.7 %` or as a bare 0.007.
+Fraction = Annotated[float, _validator(FRACTION, bare=True)]
+#: Bytes.
+SizeBytes = Annotated[float, _validator(SIZE_BYTES, bare=False), _written("B")]

@@ -1,0 +1,146 @@
+"""One attempt at a unit: one event-model run, committed by a RunStop that says `success`."""
+
+import hashlib
+from collections.abc import Callable, Mapping
+from pathlib import Path
+from typing import Any
+
+import event_model
+
+from labrig.record.durable import write_durably
+from labrig.record.frames import ActionRecord, FrameRecord
+from labrig.record.journal import Journal
+
+_ACTION_KEYS: dict[str, str] = {
+    "device": "string",
+    "action": "string",
+    "start_time": "number",
+    "end_time": "number",
+    "late_s": "number",
+}
+_FRAME_KEYS: dict[str, str] = {
+    "frame": "string",
+    "sha256": "string",
+    "size_bytes": "integer",
+    "purpose": "string",
+    "exposure_s": "number",
+    "iso": "integer",
+    "f_number": "number",
+    "start_time": "number",
+    "end_time": "number",
+    "late_s": "number",
+}
+
+
+class AttemptWriter:
+    """Writes what happens in one attempt, frame by frame, line by line.
+
+    Parameters
+    ----------
+    journal
+        Open journal of the run.
+    unit
+        Name of the unit attempted.
+    frames_folder
+        Where frames go, with the number the next one gets from `next_number`.
+    wall
+        Gives the time in seconds since 1970.
+    new_uid
+        Gives the uid of the next document.
+    metadata
+        Plan, devices, versions: what the RunStart says.
+    """
+
+    def __init__(
+        self,
+        journal: Journal,
+        unit: str,
+        frames_folder: Path,
+        next_number: Callable[[], int],
+        wall: Callable[[], float],
+        new_uid: Callable[[], str],
+        metadata: Mapping[str, Any],
+    ) -> None:
+        self.unit = unit
+        self._journal = journal
+        self._frames_folder = frames_folder
+        self._next_number = next_number
+        self._wall = wall
+        self._new_uid = new_uid
+        self._bundle = event_model.compose_run(
+            uid=new_uid(), time=wall(), metadata={**metadata, "unit": unit}
+        )
+        self._streams: dict[str, Any] = {}
+        journal.append("start", self._bundle.start_doc)
+
+    def action(self, record: ActionRecord) -> None:
+        """Write one action."""
+        self._event(
+            "actions",
+            _ACTION_KEYS,
+            {key: getattr(record, key) for key in _ACTION_KEYS},
+        )
+
+    def frame(
+        self,
+        data: bytes,
+        suffix: str,
+        *,
+        purpose: str,
+        exposure_s: float,
+        iso: int,
+        f_number: float | None,
+        start_time: float,
+        end_time: float,
+        late_s: float,
+    ) -> FrameRecord:
+        """Keep one frame: file first, durably, then its line. Returns its record."""
+        path = self._frames_folder / f"{self._next_number():06d}{suffix}"
+        write_durably(path, data)
+        record = FrameRecord(
+            path=path,
+            sha256=hashlib.sha256(data).hexdigest(),
+            size_bytes=len(data),
+            unit=self.unit,
+            purpose=purpose,
+            exposure_s=exposure_s,
+            iso=iso,
+            f_number=f_number,
+            start_time=start_time,
+            end_time=end_time,
+            late_s=late_s,
+        )
+        content = {key: getattr(record, key) for key in _FRAME_KEYS if key != "frame"}
+        self._event("frames", _FRAME_KEYS, {"frame": f"frames/{path.name}", **content})
+        return record
+
+    def stop(self, exit_status: str, reason: str = "") -> None:
+        """Close the attempt; `success` is the commit."""
+        self._journal.append(
+            "stop",
+            self._bundle.compose_stop(
+                exit_status=exit_status, reason=reason, uid=self._new_uid(), time=self._wall()
+            ),
+        )
+
+    def _event(self, stream: str, keys: Mapping[str, str], data: dict[str, Any]) -> None:
+        if stream not in self._streams:
+            self._streams[stream] = self._declare(stream, keys)
+        time = self._wall()
+        event = self._streams[stream].compose_event(
+            data=data, timestamps=dict.fromkeys(data, time), uid=self._new_uid(), time=time
+        )
+        self._journal.append("event", event)
+
+    def _declare(self, stream: str, keys: Mapping[str, str]) -> Any:
+        bundle = self._bundle.compose_descriptor(
+            name=stream,
+            data_keys={
+                key: {"source": "labrig", "dtype": dtype, "shape": []}
+                for key, dtype in keys.items()
+            },
+            uid=self._new_uid(),
+            time=self._wall(),
+        )
+        self._journal.append("descriptor", bundle.descriptor_doc)
+        return bundle

@@ -1,0 +1,45 @@
+"""What is known of a recorded photograph and of anything else that was done."""
+
+from dataclasses import dataclass
+from pathlib import Path
+
+
+@dataclass(frozen=True)
+class FrameRecord:
+    """One frame in a run folder. Times are seconds since 1970, as measured.
+
+    Attributes
+    ----------
+    path
+        The file, as the camera delivered it.
+    unit, purpose
+        Which unit took it, and what for: `dark`, `meter`, `decay`, `daylight`.
+    start_time, end_time
+        Measured begin and end of the exposure.
+    late_s
+        How long after its planned time it began.
+    """
+
+    path: Path
+    sha256: str
+    size_bytes: int
+    unit: str
+    purpose: str
+    exposure_s: float
+    iso: int
+    f_number: float | None
+    start_time: float
+    end_time: float
+    late_s: float
+
+
+@dataclass(frozen=True)
+class ActionRecord:
+    """One switch, move or choice. Times are seconds since 1970, as measured."""
+
+    unit: str
+    device: str
+    action: str
+    start_time: float
+    end_time: float
+    late_s: float

@@ -1,0 +1,164 @@
+"""The run folder: what was asked, what happened, every frame; made once, then only added to."""
+
+import re
+import uuid
+from collections.abc import Callable, Mapping
+from datetime import UTC, datetime
+from pathlib import Path
+from types import TracebackType
+from typing import Any, Self
+
+from filelock import FileLock, Timeout
+
+from labrig.errors import DiskError, UsageError
+from labrig.record.attempt import AttemptWriter
+from labrig.record.journal import Journal
+from labrig.record.reading import RunRecord, read_run
+
+_JOURNAL = "journal.jsonl"
+
+
+class RunFolder:
+    """A run folder open for writing; held by one labrig at a time.
+
+    Parameters
+    ----------
+    path
+        The folder, with `protocol.yaml` and `rig.yaml` in it.
+    seed
+        `None` for random uids; a number makes them, and so the journal's bytes, repeatable.
+    """
+
+    def __init__(self, path: Path, seed: int | None = None) -> None:
+        self.path = path
+        self._seed = seed
+        self._lock = FileLock(path / ".lock")
+        try:
+            self._lock.acquire(timeout=0)
+        except Timeout:
+            raise UsageError(f"{path}: another labrig is writing to this run") from None
+        self._documents = 0
+        journal = path / _JOURNAL
+        if journal.exists():
+            self._documents = journal.read_bytes().count(b"\n")
+        self._frame_number = _highest_frame(path / "frames")
+        self._journal = Journal(journal)
+
+    @classmethod
+    def create(
+        cls, runs: Path, name: str, started: float, texts: Mapping[str, str], seed: int | None
+    ) -> Self:
+        """Make a new run folder `<runs>/<time>_<name>`, `-2` and so on if that is taken.
+
+        Parameters
+        ----------
+        started
+            Seconds since 1970.
+        texts
+            File name → content: the protocol and the rig, as resolved.
+        """
+        stamp = datetime.fromtimestamp(started, UTC).strftime("%Y-%m-%dT%H-%M-%S")
+        wanted = f"{stamp}_{_slug(name)}"
+        try:
+            runs.mkdir(parents=True, exist_ok=True)
+            path = _make_new(runs, wanted)
+            (path / "frames").mkdir()
+            for file_name, text in texts.items():
+                (path / file_name).write_text(text, encoding="utf-8", newline="\n")
+        except OSError as error:
+            raise DiskError(
+                f"{runs}: a run folder cannot be made there ({error.strerror}); give another --runs"
+            ) from None
+        return cls(path, seed)
+
+    def read(self) -> RunRecord:
+        """What the journal says so far."""
+        return read_run(self.path)
+
+    def attempt(
+        self, unit: str, wall: Callable[[], float], metadata: Mapping[str, Any]
+    ) -> AttemptWriter:
+        """Begin an attempt at `unit`."""
+        return AttemptWriter(
+            self._journal,
+            unit,
+            self.path / "frames",
+            self._next_frame_number,
+            wall,
+            self._new_uid,
+            metadata,
+        )
+
+    def close_open_attempts(
+        self, wall: Callable[[], float], exit_status: str, reason: str
+    ) -> list[str]:
+        """Write the RunStop of attempts that an exception or a crash cut off; returns their units.
+
+        Parameters
+        ----------
+        exit_status
+            `abort` (somebody stopped it) or `fail`.
+        """
+        opened = [attempt for attempt in self.read().attempts if attempt.exit_status is None]
+        for attempt in opened:
+            counts = {"frames": len(attempt.frames), "actions": len(attempt.actions)}
+            self._journal.append(
+                "stop",
+                {
+                    "uid": self._new_uid(),
+                    "time": wall(),
+                    "run_start": attempt.uid,
+                    "exit_status": exit_status,
+                    "reason": reason,
+                    "num_events": {stream: number for stream, number in counts.items() if number},
+                },
+            )
+        return [attempt.unit for attempt in opened]
+
+    def close(self) -> None:
+        """Release the folder."""
+        self._journal.close()
+        self._lock.release()
+
+    def __enter__(self) -> Self:
+        return self
+
+    def __exit__(
+        self,
+        kind: type[BaseException] | None,
+        error: BaseException | None,
+        trace: TracebackType | None,
+    ) -> None:
+        self.close()
+
+    def _new_uid(self) -> str:
+        self._documents += 1
+        if self._seed is None:
+            return str(uuid.uuid4())
+        return str(uuid.uuid5(uuid.NAMESPACE_OID, f"labrig {self._seed} {self._documents}"))
+
+    def _next_frame_number(self) -> int:
+        self._frame_number += 1
+        return self._frame_number
+
+
+def _make_new(runs: Path, wanted: str) -> Path:
+    number = 1
+    while True:
+        path = runs / (wanted if number == 1 else f"{wanted}-{number}")
+        try:
+            path.mkdir()
+        except FileExistsError:
+            number += 1
+        else:
+            return path
+
+
+def _slug(name: str) -> str:
+    return re.sub(r"[^\w.-]+", "-", name).strip("-")[:80] or "run"
+
+
+def _highest_frame(frames: Path) -> int:
+    """Highest number in use, acknowledged or not: no frame is ever overwritten."""
+    numbers = [int(path.name[:6]) for path in frames.glob("[0-9]" * 6 + ".*")]
+    return max(numbers, default=0)

@@ -1,0 +1,137 @@
+"""What the sensor counts in the dark: its level over exposure time, and its hot pixels."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.errors import DataError
+from labrig.reduce.channels import PixelMask
+from labrig.reduce.noise import Floats, Mosaic
+from labrig.reduce.outliers import OUTLIER_SIGMAS
+from labrig.reduce.raw import RawFrame
+
+#: Exposures that differ by less than cameras round them by are one exposure.
+SAME_EXPOSURE = 0.02
+#: A pixel is hot if it stands out in this many frames: a cosmic ray does not strike twice.
+HOT_FRAMES = 2
+
+
+@dataclass(frozen=True, eq=False)
+class DarkModel:
+    """Dark level b + d·T of each channel of one patch, in DN above black.
+
+    Parameters
+    ----------
+    base, rate_per_s
+        b in DN and d in DN/s, each of shape (C,).
+    covariance
+        Shape (C, 2, 2), of b and d.
+    only_exposure_s
+        Set if all dark frames had one exposure: the model holds there only (and d is 0).
+    """
+
+    base: Floats
+    rate_per_s: Floats
+    covariance: Floats
+    only_exposure_s: float | None
+
+    def dark_level(self, exposure_s: float) -> tuple[Floats, Floats]:
+        """Level and its standard uncertainty in DN, each of shape (C,).
+
+        Raises
+        ------
+        DataError
+            All dark frames had another exposure.
+        """
+        only = self.only_exposure_s
+        if only is not None and not _same_exposure(only, exposure_s):
+            raise DataError(
+                f"expected dark frames of {exposure_s:g} s or of several exposures, got only "
+                f"{only:g} s; take dark frames at the shortest and the longest exposure"
+            )
+        at = np.array([1.0, exposure_s])
+        return self.base + self.rate_per_s * exposure_s, np.sqrt(at @ self.covariance @ at)
+
+
+def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
+    """Weighted least squares of b + d·T through dark levels.
+
+    Parameters
+    ----------
+    exposure_s
+        Shape (n,).
+    level, sigma
+        Shape (n, C), DN above black. If frames scatter by more than sigma (the camera's black
+        drifts), the covariance is raised to what they scatter by.
+    """
+    if len(exposure_s) == 0:
+        raise DataError("expected dark frames, got none; take some before charging")
+    one = _same_exposure(float(exposure_s.min()), float(exposure_s.max()))
+    design = np.ones((len(exposure_s), 1))
+    if not one:
+        design = np.stack([np.ones_like(exposure_s), exposure_s], axis=1)
+    channels = level.shape[1]
+    found, covariance = np.zeros((channels, 2)), np.zeros((channels, 2, 2))
+    used = design.shape[1]
+    freedom = len(exposure_s) - used
+    for channel in range(channels):
+        weighted = design / sigma[:, channel, np.newaxis]
+        inverse = np.linalg.inv(weighted.T @ weighted)
+        found[channel, :used] = inverse @ weighted.T @ (level[:, channel] / sigma[:, channel])
+        misfit = (level[:, channel] - design @ found[channel, :used]) / sigma[:, channel]
+        scatter = float(misfit @ misfit) / freedom if freedom else 1.0
+        covariance[channel, :used, :used] = inverse * max(scatter, 1.0)
+    return DarkModel(
+        base=found[:, 0],
+        rate_per_s=found[:, 1],
+        covariance=covariance,
+        only_exposure_s=float(exposure_s.mean()) if one else None,
+    )
+
+
+def _same_exposure(one_s: float, other_s: float) -> bool:
+    return abs(one_s - other_s) <= SAME_EXPOSURE * max(one_s, other_s)
+
+
+def hot_pixels(darks: Sequence[RawFrame]) -> PixelMask:
+    """Pixels of the sensor, shape (height, width), that are bright in the dark.
+
+    Parameters
+    ----------
+    darks
+        Two or more dark frames, the longest there are: a pixel is hot if it exceeds the median
+        of the 24 nearest of its colour by more than 8 robust standard deviations in two of them.
+
+    Raises
+    ------
+    DataError
+        Fewer than two frames, or of different sizes.
+    """
+    if len(darks) < HOT_FRAMES:
+        raise DataError(
+            f"expected {HOT_FRAMES} or more dark frames to tell hot pixels from cosmic rays, got "
+            f"{len(darks)}; take more"
+        )
+    shapes = {dark.mosaic.shape for dark in darks}
+    if len(shapes) > 1:
+        raise DataError(f"expected dark frames of one size, got {sorted(shapes)}; leave some out")
+    times_bright = np.zeros(darks[0].mosaic.shape, np.uint16)
+    for dark in darks:
+        times_bright += _bright(dark.mosaic)
+    return np.asarray(times_bright >= HOT_FRAMES)
+
+
+def _bright(mosaic: Mosaic) -> PixelMask:
+    """Pixels far above the median of their surroundings."""
+    import cv2  # its median filter is the fast one
+
+    bright = np.zeros(mosaic.shape, bool)
+    for row in (0, 1):
+        for column in (0, 1):
+            plane = np.ascontiguousarray(mosaic[row::2, column::2])
+            excess = plane.astype(np.float32) - np.asarray(cv2.medianBlur(plane, 5))
+            deviation = 1.4826 * float(np.median(np.abs(excess)))
+            # Whole numbers: a quiet sensor's median deviation may be 0 though it is not silent.
+            bright[row::2, column::2] = excess > OUTLIER_SIGMAS * max(deviation, 1.0)
+    return bright

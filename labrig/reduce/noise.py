@@ -1,0 +1,219 @@
+"""Temporal noise of one colour plane, estimated from a single frame.
+
+Wanted is the variance of a *mean over pixels* under photon and read noise alone: the pattern of
+the sample, vignetting and the lamp's gradient must not count, hot pixels must not count, and noise
+that neighbouring pixels share must count more. Small tiles spread over the plane serve for all
+three:
+
+- the second difference across rows and columns, [1 −2 1]ᵀ[1 −2 1]/6, removes every structure of
+  the form f(x) + g(y) and keeps white noise (Immerkær, CVIU 64, 1996);
+- its outliers are trimmed in each tile (hot pixels), and tiles that are rougher than others of
+  the same brightness are left out (edges of the sample);
+- the residual of a cubic surface in each tile gives the autocovariance C(h) of the noise at
+  short lags h, from which Var(mean) = Σ_h C(h)/n; it is believed only if it is significant and gone
+  at longer lags, since structure reaches far and shared noise does not.
+
+Two things one frame cannot tell: structure as fine as a pixel everywhere in the region counts as
+noise (the variance comes out too large), and noise shared by whole rows does not (too small; it
+shows in the scatter of dark frames).
+"""
+
+from dataclasses import dataclass
+from functools import cache
+from typing import TypeAlias, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+Floats: TypeAlias = npt.NDArray[np.float64]
+Mosaic: TypeAlias = npt.NDArray[np.uint16]
+NumberArray = TypeVar("NumberArray", npt.NDArray[np.float64], npt.NDArray[np.intp])
+
+#: Side of a tile in pixels of one colour: a cubic describes smooth light over 24 sensor pixels.
+TILE = 12
+#: Tiles looked at per plane and direction: 576 tiles give the variance to 1 %.
+TILES_ACROSS = 24
+#: Variance of rounding to whole numbers (uniform distribution), the least an integer can have.
+ROUNDING_VARIANCE = 1 / 12
+
+#: Lags of one half-plane (row, column): where noise may be shared …
+_NEAR = tuple((y, x) for y in range(3) for x in range(-2, 3) if (y, x) >= (0, 0))
+#: … and where only structure reaches.
+_FAR = tuple(lag for far in (3, 4, 5, 6) for lag in ((0, far), (far, 0)))
+#: Standard deviations by which a correlation must stand out to be corrected for.
+_SIGNIFICANT = 4.0
+#: Correlation with some neighbour below which there is none worth a correction.
+_CLEAR = 0.05
+#: Share of the nearest neighbours' correlation that may remain at the far lags.
+_FAR_SHARE = 0.15
+#: |ln| of a tile's variance over the line's beyond which it says nothing about the line.
+_MISFIT_CAP = 1.0
+
+
+@dataclass(frozen=True)
+class PlaneNoise:
+    """Noise of one colour plane.
+
+    Parameters
+    ----------
+    darkest_level, darkest_variance, variance_per_level
+        Temporal variance of a pixel (DN²) along brightness (DN, black included): read noise and
+        photon noise make it a straight line (the photon-transfer line; Janesick 2007).
+    mean_variance
+        n · Var(mean over n pixels), DN²: the pixels' variance times their correlation.
+    correlation
+        That factor: 1 where pixels are independent.
+    """
+
+    darkest_level: float
+    darkest_variance: float
+    variance_per_level: float
+    mean_variance: float
+    correlation: float
+
+    def variance_at(self, level: Floats) -> Floats:
+        """Temporal variance in DN² of pixels at `level`, never below that of rounding."""
+        rise = self.variance_per_level * (level - self.darkest_level)
+        return np.maximum(self.darkest_variance + rise, ROUNDING_VARIANCE)
+
+
+def plane_noise(plane: Mosaic) -> PlaneNoise:
+    """Noise of `plane`, shape (rows, columns) ≥ (3, 3), pixels of one colour."""
+    tiles = _tiles(plane)
+    level = tiles.mean(axis=(1, 2))
+    variance = _second_difference_variance(tiles)
+    correlation = 1.0
+    if tiles.shape[1:] == (TILE, TILE):
+        autocovariance, clean = _autocovariance(tiles)
+        correlation = _correlation(autocovariance[clean])
+        if correlation > 1:
+            # Differences of pixels that share noise are too small: take C(0) itself.
+            variance = autocovariance[:, 0]
+    darkest = float(level.min())
+    at_darkest, slope = _photon_line(level - darkest, variance)
+    expected = at_darkest + slope * (level - darkest)
+    # Chance scatters the variance of a tile by a quarter: at twice the expected it has an edge.
+    smooth = np.where(variance <= 2 * expected, variance, expected)
+    return PlaneNoise(darkest, at_darkest, slope, float(smooth.mean()) * correlation, correlation)
+
+
+def _tiles(plane: Mosaic) -> Floats:
+    """Tiles of `plane`, shape (n, side, side), spread evenly from border to border."""
+    rows, columns = (_tile_pixels(side) for side in plane.shape)
+    tiles = plane[rows[:, np.newaxis, :, np.newaxis], columns[:, np.newaxis, :]]
+    return tiles.reshape(-1, rows.shape[1], columns.shape[1]).astype(np.float64)
+
+
+def _tile_pixels(side: int) -> npt.NDArray[np.intp]:
+    """Indices of the pixels of each tile along a side, shape (tiles, pixels)."""
+    pixels = min(TILE, side)
+    starts = np.linspace(0, side - pixels, min(TILES_ACROSS, side // pixels))
+    return np.rint(starts).astype(np.intp)[:, np.newaxis] + np.arange(pixels)
+
+
+def _second_difference_variance(tiles: Floats) -> Floats:
+    """Variance of each tile's noise in DN², shape (n,)."""
+    across = tiles[:, :-2] - 2 * tiles[:, 1:-1] + tiles[:, 2:]
+    residual = np.abs(across[:, :, :-2] - 2 * across[:, :, 1:-1] + across[:, :, 2:]) / 6
+    residual = residual.reshape(len(tiles), -1)
+    return _trimmed_mean_square(residual, 4.0)
+
+
+def _trimmed_mean_square(magnitude: Floats, sigmas: float) -> Floats:
+    """Mean square along the last axis of what lies within `sigmas` robust deviations."""
+    limit = sigmas * np.sqrt(_robust_variance(magnitude) + ROUNDING_VARIANCE)
+    kept = magnitude <= limit[..., np.newaxis]
+    return np.asarray(np.sum(np.square(magnitude), axis=-1, where=kept) / kept.sum(axis=-1))
+
+
+def _robust_variance(magnitude: Floats) -> Floats:
+    """Variance of a zero-mean normal from the median of |x| along the last axis."""
+    return np.square(1.4826 * np.median(magnitude, axis=-1))
+
+
+def _photon_line(level: Floats, variance: Floats) -> tuple[float, float]:
+    """Intercept and slope ≥ 0 of the line that most tiles lie on.
+
+    Of the lines through the medians of two groups of like brightness (or flat through one), the
+    one with the least capped misfit, in logarithms: tiles with structure, however many at one
+    brightness and however rough, pull no more than the cap.
+    """
+    groups = np.array_split(np.argsort(level, kind="stable"), max(1, min(16, len(level) // 6)))
+    x = np.array([np.median(level[group]) for group in groups])
+    y = np.array([np.median(variance[group]) for group in groups])
+    one, other = np.triu_indices(len(groups), k=1)
+    rising = (x[other] > x[one]) & (y[other] > y[one])
+    one, other = one[rising], other[rising]
+    slope = np.append((y[other] - y[one]) / (x[other] - x[one]), np.zeros(len(groups)))
+    intercept = np.append(y[one], y) - slope * np.append(x[one], x)
+    slope, intercept = slope[intercept >= 0], intercept[intercept >= 0]
+    line = intercept[:, np.newaxis] + slope[:, np.newaxis] * level
+    misfit = np.log((variance + ROUNDING_VARIANCE) / (line + ROUNDING_VARIANCE))
+    best = int(np.argmin(np.minimum(np.abs(misfit), _MISFIT_CAP).sum(axis=1)))
+    return float(intercept[best]), float(slope[best])
+
+
+def _autocovariance(tiles: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
+    """Covariance of the noise of each tile at the near, then the far lags, shape (n, lags).
+
+    With it, shape (n,): whether the tile is free of pixels that stick out.
+    """
+    basis, inverse = _cubic_surface()
+    flat = tiles.reshape(len(tiles), -1)
+    flat = flat - flat.mean(axis=1, keepdims=True)
+    residual = flat - (flat @ basis) @ basis.T
+    limit = 5 * np.sqrt(_robust_variance(np.abs(residual)) + ROUNDING_VARIANCE)
+    clean = np.all(np.abs(residual) <= limit[:, np.newaxis], axis=1)
+    square = residual.reshape(-1, TILE, TILE)
+    found = np.stack([(a * b).mean(axis=(1, 2)) for a, b in _shifted(square)], axis=1)
+    return found @ inverse.T, clean
+
+
+def _correlation(autocovariance: Floats) -> float:
+    """Factor by which shared noise raises the variance of a mean; 1 if none is evident."""
+    noisy = autocovariance[autocovariance[:, 0] > ROUNDING_VARIANCE]
+    if len(noisy) < 3:
+        return 1.0
+    lags = np.median(noisy / noisy[:, :1], axis=0)
+    near, far = lags[1 : len(_NEAR)], lags[len(_NEAR) :].reshape(-1, 2).mean(axis=1)
+    # A lag in a tile of white noise scatters by 1/TILE, the median of n tiles by √(π/2n) of that.
+    scatter = np.sqrt(np.pi / 2 / len(noisy)) / TILE
+    excess = 2 * float(near.sum())
+    significant = excess > _SIGNIFICANT * 2 * scatter * np.sqrt(len(near)) and near.max() > _CLEAR
+    reaches_far = np.abs(far).max() > max(_FAR_SHARE * near.max(), 3 * scatter)
+    return 1 + excess if significant and not reaches_far else 1.0
+
+
+def _shifted(square: NumberArray) -> list[tuple[NumberArray, NumberArray]]:
+    """Both factors of the autocovariance of `square`, shape (…, TILE, TILE), at every lag."""
+    pairs = []
+    for down, right in _NEAR + _FAR:
+        first = square[..., : TILE - down, max(0, -right) : TILE - max(0, right)]
+        second = square[..., down:, max(0, right) : TILE - max(0, -right)]
+        pairs.append((first, second))
+    return pairs
+
+
+@cache
+def _cubic_surface() -> tuple[Floats, Floats]:
+    """Orthonormal cubics of a tile, and what undoes their effect on autocovariances.
+
+    With R = 1 − QQᵀ the residual of noise of covariance Σ_h C(h) S_h (S_h: the shift by h and
+    back) has the autocovariances A = M C, M_gh = tr(R S_g R S_h)/(2 N_g); the inverse of M is
+    returned, so that removing a surface does not bias C.
+    """
+    y, x = np.mgrid[:TILE, :TILE].reshape(2, -1) / ((TILE - 1) / 2) - 1
+    powers = [x**i * y**j for i in range(4) for j in range(4 - i)]
+    basis = np.linalg.qr(np.stack(powers, axis=1))[0]
+    remover = np.eye(TILE**2) - basis @ basis.T
+    pixel = np.arange(TILE**2).reshape(TILE, TILE)
+    shifts, counts = [], []
+    for first, second in _shifted(pixel):
+        shift = np.zeros((TILE**2, TILE**2))
+        shift[first.ravel(), second.ravel()] = 1
+        shift[second.ravel(), first.ravel()] = 1
+        shifts.append(shift)
+        counts.append(shift.sum())
+    seen = [remover @ shift @ remover for shift in shifts]
+    effect = [[float(np.sum(s * h)) / n for h in shifts] for s, n in zip(seen, counts, strict=True)]
+    return np.asarray(basis, dtype=np.float64), np.linalg.inv(np.array(effect))

@@ -1,0 +1,242 @@
+"""From the frames of a run to one series for each patch of the sample, each file read once."""
+
+from collections import defaultdict
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from labrig.errors import DataError
+from labrig.reduce.channels import CHANNELS, FrameMeasurement, PixelMask, measure
+from labrig.reduce.dark import SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
+from labrig.reduce.noise import Floats
+from labrig.reduce.raw import RawFrame, read_raw
+from labrig.reduce.series import Series, add_flag
+from labrig.region import Region
+
+#: Share of a patch's pixels that may be saturated before its mean is too small.
+CLIPPED_SHARE = 0.001
+#: Dark frames held in memory at once, to look for hot pixels.
+_DARKS_FOR_HOT = 5
+
+
+@dataclass(frozen=True)
+class SeriesFrame:
+    """A frame on disk and its *measured* times.
+
+    Parameters
+    ----------
+    t_s, exposure_s
+        Start of the exposure (after lamp off) and its length. Of a dark frame, `t_s` is not used.
+    iso, f_number
+        None: as the file's EXIF says.
+    unit, flag
+        Unit of the run, and flags it already has.
+    """
+
+    path: Path
+    t_s: float
+    exposure_s: float
+    iso: float | None = None
+    f_number: float | None = None
+    unit: str = ""
+    flag: str = ""
+
+
+@dataclass(frozen=True)
+class _Shot:
+    """A frame, measured in every patch and in the background, if there is one."""
+
+    frame: SeriesFrame
+    patches: Mapping[str, FrameMeasurement]
+    background: FrameMeasurement | None
+
+    @property
+    def iso(self) -> float:
+        """NaN where neither the run nor the file says."""
+        return _first(self.frame.iso, *(m.iso for m in self.patches.values()))
+
+    @property
+    def f_number(self) -> float:
+        """NaN where neither the run nor the file says."""
+        return _first(self.frame.f_number, *(m.f_number for m in self.patches.values()))
+
+
+def reduce_series(
+    frames: Sequence[SeriesFrame],
+    region: Region,
+    darks: Sequence[SeriesFrame] = (),
+    background: Region | None = None,
+    name: str = "",
+) -> Series:
+    """The series of one patch, called `name`; see `reduce_patches`."""
+    return reduce_patches(frames, {name: region}, darks, background)[name]
+
+
+def reduce_patches(
+    frames: Sequence[SeriesFrame],
+    patches: Mapping[str, Region],
+    darks: Sequence[SeriesFrame] = (),
+    background: Region | None = None,
+) -> dict[str, Series]:
+    """The series of each patch, in DN/s, with a row for every frame in the given order.
+
+    Parameters
+    ----------
+    frames
+        Light frames; those of one unit have one ISO and one f-number.
+    patches
+        Where each patch lies, by its name.
+    darks
+        Dark frames at the same ISO, best at the shortest and the longest exposure and two or
+        more of the longest, whose hot pixels are then left out. Their level is subtracted.
+    background
+        A dark region of the frames themselves, whose level is subtracted instead.
+
+    Frames with more than 0.1 % of a patch saturated are flagged `clipped`, not dropped.
+
+    Raises
+    ------
+    DataError
+        Frames of different ISO or f-number in one unit, no exposure, or no dark frames that match.
+    FrameError, UsageError
+        As `read_raw` and `measure`.
+    """
+    if not frames or not patches:
+        raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
+    hot = _hot(darks)
+    models = {} if background else _dark_models(darks, patches, hot)
+    shots = [_shot(frame, patches, background, hot) for frame in frames]
+    _check_settings(shots)
+    return {name: _patch_series(name, shots, models) for name in patches}
+
+
+def _hot(darks: Sequence[SeriesFrame]) -> PixelMask | None:
+    """Hot pixels in the longest darks, if they are enough to tell."""
+    longest_s = max((dark.exposure_s for dark in darks), default=0.0)
+    longest = [dark for dark in darks if dark.exposure_s >= longest_s * (1 - SAME_EXPOSURE)]
+    if len(longest) < 2:
+        return None
+    return hot_pixels([read_raw(dark.path) for dark in longest[:_DARKS_FOR_HOT]])
+
+
+def _shot(
+    frame: SeriesFrame,
+    patches: Mapping[str, Region],
+    background: Region | None,
+    hot: PixelMask | None,
+) -> _Shot:
+    if not frame.exposure_s > 0:
+        raise DataError(f"{frame.path}: expected an exposure above 0 s, got {frame.exposure_s}")
+    raw = read_raw(frame.path)
+    return _Shot(
+        frame,
+        {name: _measured(raw, region, hot, frame.path) for name, region in patches.items()},
+        _measured(raw, background, hot, frame.path) if background else None,
+    )
+
+
+def _measured(raw: RawFrame, region: Region, hot: PixelMask | None, path: Path) -> FrameMeasurement:
+    try:
+        return measure(raw, region, hot)
+    except DataError as error:
+        raise type(error)(f"{path}: {error}") from None
+
+
+def _dark_models(
+    darks: Sequence[SeriesFrame], patches: Mapping[str, Region], hot: PixelMask | None
+) -> dict[tuple[str, float], DarkModel]:
+    """Dark level by patch and ISO."""
+    by_iso: dict[float, list[_Shot]] = defaultdict(list)
+    for dark in darks:
+        shot = _shot(dark, patches, None, hot)
+        by_iso[_key(shot.iso)].append(shot)
+    return {
+        (name, iso): fit_dark(
+            np.array([shot.frame.exposure_s for shot in shots]),
+            *_levels([shot.patches[name] for shot in shots]),
+        )
+        for iso, shots in by_iso.items()
+        for name in patches
+    }
+
+
+def _patch_series(
+    name: str, shots: Sequence[_Shot], models: Mapping[tuple[str, float], DarkModel]
+) -> Series:
+    exposure_s = np.array([shot.frame.exposure_s for shot in shots])
+    level, sigma = _levels([shot.patches[name] for shot in shots])
+    dark, dark_sigma = np.zeros_like(level), np.full_like(level, np.nan)
+    backgrounds = [shot.background for shot in shots if shot.background is not None]
+    if backgrounds:
+        dark, of_frame = _levels(backgrounds)
+        sigma, dark_sigma = np.hypot(sigma, of_frame), np.zeros_like(level)
+    elif models:
+        for row, shot in enumerate(shots):
+            model = models.get((name, _key(shot.iso)))
+            if model is None:
+                raise DataError(
+                    f"{shot.frame.path}: expected dark frames at ISO {shot.iso:g} as this frame, "
+                    "got none; take some, or name a background region"
+                )
+            dark[row], dark_sigma[row] = model.dark_level(shot.frame.exposure_s)
+    per_second = exposure_s[:, np.newaxis]
+    sigma = sigma / per_second
+    return Series(
+        t_s=np.array([shot.frame.t_s for shot in shots]),
+        exposure_s=exposure_s,
+        values=(level - dark) / per_second,
+        sigma=sigma,
+        # One number for all frames: as the offset acts on a fit, most where weights are highest.
+        dark_sigma=np.average(dark_sigma / per_second, axis=0, weights=1 / np.square(sigma)),
+        channels=CHANNELS,
+        iso=np.array([shot.iso for shot in shots]),
+        f_number=np.array([shot.f_number for shot in shots]),
+        frame=tuple(shot.frame.path.name for shot in shots),
+        unit=tuple(shot.frame.unit for shot in shots),
+        flag=tuple(_flag(shot, name) for shot in shots),
+        region=name,
+    )
+
+
+def _levels(measurements: Sequence[FrameMeasurement]) -> tuple[Floats, Floats]:
+    """Means and their sigma in DN, each of shape (n, C)."""
+    stats = [[m.channels[channel] for channel in CHANNELS] for m in measurements]
+    return (
+        np.array([[channel.mean for channel in row] for row in stats]),
+        np.array([[channel.sigma for channel in row] for row in stats]),
+    )
+
+
+def _flag(shot: _Shot, name: str) -> str:
+    regions = [shot.patches[name], *([shot.background] if shot.background else [])]
+    clipped = any(
+        stats.saturated > CLIPPED_SHARE * stats.n
+        for region in regions
+        for stats in region.channels.values()
+    )
+    return add_flag(shot.frame.flag, "clipped") if clipped else shot.frame.flag
+
+
+def _check_settings(shots: Sequence[_Shot]) -> None:
+    """DN/s compare only at one gain and one aperture."""
+    for unit in {shot.frame.unit for shot in shots}:
+        for what, found in (
+            ("ISO", {_key(shot.iso) for shot in shots if shot.frame.unit == unit}),
+            ("f-number", {_key(shot.f_number) for shot in shots if shot.frame.unit == unit}),
+        ):
+            if len(found) > 1:
+                raise DataError(
+                    f"expected one {what} in unit '{unit}', got {sorted(found)}; DN/s of different "
+                    "settings do not compare: reduce them apart"
+                )
+
+
+def _first(*numbers: float | None) -> float:
+    return next((number for number in numbers if number is not None), np.nan)
+
+
+def _key(number: float) -> float:
+    """`number`, or −1 for NaN, which as a key would not equal itself."""
+    return -1.0 if np.isnan(number) else number

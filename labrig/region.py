@@ -1,0 +1,65 @@
+"""A rectangle on the sensor, in pixels or in fractions of the frame."""
+
+from typing import Annotated
+
+from pydantic import AfterValidator, Field, TypeAdapter
+
+from labrig.errors import UsageError
+
+Corner = Annotated[float, Field(ge=0)]
+Extent = Annotated[float, Field(gt=0)]
+
+
+def _whole_or_fractions(region: tuple[float, float, float, float]) -> tuple[float, ...]:
+    if max(region) > 1 and any(value != int(value) for value in region):
+        raise ValueError(
+            "expected [x, y, width, height] in whole pixels, or all as fractions of the frame ≤ 1, "
+            f"got {list(region)}"
+        )
+    return region
+
+
+#: `[x, y, width, height]`: whole pixels, or fractions of the frame when all four are ≤ 1.
+Region = Annotated[
+    tuple[Corner, Corner, Extent, Extent], AfterValidator(_whole_or_fractions)
+]
+
+#: Where the sample is when nobody says: the middle quarter of the frame.
+CENTRE: Region = (0.25, 0.25, 0.5, 0.5)
+
+
+def parse_region(text: str) -> Region:
+    """The region in `x,y,width,height`, as given on a command line.
+
+    Raises
+    ------
+    UsageError
+        Not four numbers that can be a region.
+    """
+    try:
+        return TypeAdapter(Region).validate_python([float(part) for part in text.split(",")])
+    except ValueError:
+        raise UsageError(
+            f"'{text}' is no region; expected x,y,width,height in whole pixels (or all as fractions "
+            "of the frame), such as 700,400,64,64"
+        ) from None
+
+
+def region_pixels(region: Region, width: int, height: int) -> tuple[int, int, int, int]:
+    """`(x, y, width, height)` in pixels of a `width` × `height` frame.
+
+    Raises
+    ------
+    UsageError
+        The region leaves the frame.
+    """
+    x, y, w, h = region
+    if max(region) <= 1:
+        x, y, w, h = x * width, y * height, w * width, h * height
+    left, top, wide, high = round(x), round(y), max(round(w), 2), max(round(h), 2)
+    if left + wide > width or top + high > height:
+        raise UsageError(
+            f"region {list(region)} leaves the frame of {width} x {height} pixels; "
+            "give x, y, width, height inside it"
+        )
+    return left, top, wide, high

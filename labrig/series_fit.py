@@ -1,0 +1,139 @@
+"""From a series to its decay fit: what a run's processing and `labrig fit decay` have in common."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from labrig.errors import FitError, UsageError
+from labrig.fit import DecayFit, fit_decay
+from labrig.quantity import FRACTION, parse
+from labrig.reduce import Series, read_series
+
+#: Counts below which a Poisson weight would trust a point too much.
+LEAST_COUNTS = 5.0
+_COLUMNS = ("t_s", "exposure_s", "values", "sigma", "iso", "f_number")
+
+
+def fit_series(
+    series: Series,
+    states: int | None = None,
+    offset_sigma: float | None = None,
+    flicker: float | None = None,
+) -> DecayFit:
+    """Fit the usable rows of `series`.
+
+    Parameters
+    ----------
+    states
+        Number of states; None chooses.
+    offset_sigma
+        Prior σ of a constant background in the unit of the values: 0 fixes it at zero, infinity
+        leaves it free. None takes what the dark subtraction left uncertain.
+    flicker
+        Relative scatter common to the channels of a frame; None measures it.
+
+    Raises
+    ------
+    FitError
+        The data do not allow a fit.
+    """
+    usable = series.take(np.flatnonzero(series.usable))
+    if not len(usable.t_s):
+        raise FitError("no usable frames: all are clipped or excluded; expose for less")
+    if offset_sigma is None:
+        known = series.dark_sigma[np.isfinite(series.dark_sigma)]
+        offset_sigma = float(known.max()) if len(known) else 0.0
+    return fit_decay(
+        usable.t_s,
+        usable.values,
+        None if np.isnan(usable.sigma).all() else usable.sigma,
+        exposure_s=usable.exposure_s,
+        channels=usable.channels,
+        n_states=states,
+        offset_sigma=offset_sigma,
+        flicker=flicker,
+    )
+
+
+def fit_table(
+    path: Path,
+    states: int | None,
+    offset: str,
+    flicker: str,
+    weights: str,
+    origin_s: float,
+    from_s: float | None,
+) -> list[tuple[str, DecayFit]]:
+    """Fit every region in anybody's table; see `labrig fit decay --help` for the texts.
+
+    Raises
+    ------
+    UsageError
+        A text that is none of those.
+    DataError
+        The table or the data in it.
+    """
+    offset_sigma = {"zero": 0.0, "free": np.inf}.get(offset)
+    if offset_sigma is None:
+        offset_sigma = _sigma(offset)
+    rho = None if flicker == "auto" else _flicker(flicker)
+    if weights not in ("given", "counts"):
+        raise UsageError(f"--weights: expected 'given' or 'counts', got '{weights}'")
+    fits = []
+    for series in _by_region(read_series(path)):
+        rows = np.flatnonzero(series.t_s >= (-np.inf if from_s is None else from_s))
+        if not len(rows):
+            raise UsageError(f"{path}: no point at {from_s:g} s or later; give an earlier --from")
+        part = series.take(rows)
+        part = replace(part, t_s=part.t_s - origin_s)
+        if weights == "counts":
+            part = replace(part, sigma=np.sqrt(np.maximum(part.values, LEAST_COUNTS)))
+        fits.append((part.region, fit_series(part, states, offset_sigma, rho)))
+    return fits
+
+
+def _by_region(parts: Sequence[Series]) -> list[Series]:
+    """Repeats of a decay joined: they share rates and amplitudes."""
+    regions: dict[str, list[Series]] = {}
+    for part in parts:
+        regions.setdefault(part.region, []).append(part)
+    return [_joined(same) for same in regions.values()]
+
+
+def _joined(parts: Sequence[Series]) -> Series:
+    def column(name: str) -> Any:
+        return np.concatenate([getattr(part, name) for part in parts])
+
+    def texts(name: str) -> tuple[str, ...]:
+        return tuple(text for part in parts for text in getattr(part, name))
+
+    return replace(
+        parts[0],
+        **{name: column(name) for name in _COLUMNS},
+        **{name: texts(name) for name in ("frame", "unit", "flag")},
+    )
+
+
+def _sigma(text: str) -> float:
+    try:
+        sigma = float(text)
+    except ValueError:
+        sigma = -1.0
+    if not sigma >= 0:
+        raise UsageError(
+            f"--offset: expected 'zero', 'free' or the σ of a background in the data's unit, got "
+            f"'{text}'"
+        )
+    return sigma
+
+
+def _flicker(text: str) -> float:
+    try:
+        return parse(text, FRACTION) if "%" in text else float(text)
+    except ValueError:
+        raise UsageError(
+            f"--flicker: expected 'auto', a percentage such as '0.7 %' or 0, got '{text}'"
+        ) from None

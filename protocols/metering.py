@@ -1,0 +1,152 @@
+"""How long to expose: from the frames of a metering unit to the shutter times of a decay."""
+
+import math
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Self
+
+import numpy as np
+import numpy.typing as npt
+
+from labrig.acquire import CameraOffers
+from labrig.quantity import duration_text
+from labrig.record import FrameRecord
+from labrig.reduce import ChannelStats, measure, read_raw
+from labrig.region import Region
+
+FloatArray = npt.NDArray[np.float64]
+
+#: Share of the range between black and white that the brightest frame may fill. The rest is room
+#: for a longer charge, the lamp's drift and the shutter's flicker.
+TARGET = 0.4
+#: A glow is seen when its mean is this many standard uncertainties and at least this many counts.
+SEEN_SIGMA = 5.0
+SEEN_DN = 2.0
+#: Below this share of the range the longest exposure still leaves a picture that is all noise.
+DIM = 0.002
+
+
+def glow(path: Path, region: Region) -> float:
+    """Mean black-subtracted value of the brightest channel in `region`, in DN."""
+    return max(channel.mean for channel in measure(read_raw(path), region).channels.values())
+
+
+@dataclass(frozen=True)
+class Schedule:
+    """When each frame of a decay begins, in seconds after lamp off, and its shutter time."""
+
+    times_s: tuple[float, ...]
+    exposures_s: tuple[float, ...]
+
+    @classmethod
+    def constant(cls, times_s: Sequence[float], exposure_s: float) -> Self:
+        """The same shutter time throughout."""
+        return cls(tuple(times_s), (exposure_s,) * len(times_s))
+
+    def frames(self) -> Iterator[tuple[float, float]]:
+        """Begin and shutter time of each frame."""
+        return zip(self.times_s, self.exposures_s, strict=True)
+
+    def __str__(self) -> str:
+        shortest, longest = (duration_text(f(self.exposures_s)) for f in (min, max))
+        return shortest if shortest == longest else f"{shortest} to {longest}"
+
+
+@dataclass(frozen=True)
+class _Reading:
+    """One frame in which the glow is seen and nothing clips."""
+
+    time_s: float
+    rate_dn_per_s: float
+    mean_dn: float
+    peak_dn: float
+
+
+class DecayMeter:
+    """What a metering unit's frames say about the glow after lamp off.
+
+    Parameters
+    ----------
+    frames
+        Frames of the unit, in order; the first one begins when a decay's first one does.
+    regions
+        Patches; in each frame the brightest one decides.
+    """
+
+    def __init__(self, frames: Sequence[FrameRecord], regions: Sequence[Region]) -> None:
+        self._range_dn = math.inf
+        self._readings: list[_Reading] = []
+        self._shortest_clipped = False
+        for frame in frames:
+            raw = read_raw(frame.path)
+            self._range_dn = min(self._range_dn, raw.white - max(raw.black))
+            channels = [
+                channel
+                for region in regions
+                for channel in measure(raw, region).channels.values()
+            ]
+            self._take(frame, frame.start_time - frames[0].start_time, channels)
+
+    def _take(self, frame: FrameRecord, time_s: float, channels: list[ChannelStats]) -> None:
+        if any(channel.saturated > 0 for channel in channels):
+            self._shortest_clipped |= not self._readings
+            return
+        brightest = max(channels, key=lambda channel: channel.mean)
+        if brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN):
+            rate = brightest.mean / frame.exposure_s
+            self._readings.append(_Reading(time_s, rate, brightest.mean, brightest.peak))
+
+    def schedule(
+        self,
+        times_s: Sequence[float],
+        offers: CameraOffers,
+        longest_s: float,
+        growth: float,
+        warn: Callable[[str], None],
+    ) -> Schedule:
+        """Shutter time for each frame, at most `growth` times the first one.
+
+        Parameters
+        ----------
+        times_s
+            Begin of each frame, seconds after lamp off.
+        longest_s
+            No exposure is longer.
+        warn
+            Is told when the glow is too bright or too dim for these settings.
+        """
+        if not self._readings:
+            if self._shortest_clipped:
+                warn("even the shortest exposure clips; lower camera.iso or close the aperture")
+                return Schedule.constant(times_s, offers.exposures_s[0])
+            warn("no glow was seen while metering; raise camera.iso or open the aperture")
+            return Schedule.constant(times_s, longest_s)
+        rates = self._peak_rates(np.asarray(times_s) - times_s[0])
+        wanted_s = TARGET * self._range_dn / rates
+        first_s = offers.exposure_at_most(min(float(wanted_s[0]), longest_s))
+        if rates[0] * first_s < DIM * self._range_dn:
+            warn("the glow is very dim at these settings; raise camera.iso or open the aperture")
+        limit_s = min(first_s * growth, longest_s)
+        exposures_s = (
+            max(first_s, offers.exposure_at_most(min(float(wish_s), limit_s)))
+            for wish_s in wanted_s
+        )
+        return Schedule(tuple(times_s), tuple(exposures_s))
+
+    def _peak_rates(self, times_s: FloatArray) -> FloatArray:
+        """Rate of the brightest pixels in DN/s at times after the first frame.
+
+        Log-linear between readings; before the first reading the glow was brighter, so the slope
+        of the first two is drawn back. How far the brightest pixels stand above the mean is taken
+        from the reading with most counts: in dim ones it is noise.
+        """
+        seen_s = np.array([reading.time_s for reading in self._readings])
+        log_rate = np.log([reading.rate_dn_per_s for reading in self._readings])
+        rates = np.interp(times_s, seen_s, log_rate)
+        if len(seen_s) > 1:
+            slope = min((log_rate[1] - log_rate[0]) / (seen_s[1] - seen_s[0]), 0.0)
+            early = times_s < seen_s[0]
+            rates[early] = log_rate[0] + slope * (times_s[early] - seen_s[0])
+        fullest = max(self._readings, key=lambda reading: reading.mean_dn)
+        return np.exp(rates) * fullest.peak_dn / fullest.mean_dn

@@ -1,0 +1,141 @@
+"""From light to photo-electrons: the simulated camera's own curves, aperture and lens.
+
+The curves are the shipped ones of a Canon EOS 5D Mark II, bent smoothly by as much as three
+laboratories disagree about that camera: labrig, which has the shipped ones, must cope.
+"""
+
+import json
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline, PchipInterpolator
+from scipy.optimize import brentq
+
+from labrig import shipped
+from labrig.errors import UsageError
+from labrig.material.file import Material
+
+from .lamp import CELL_NM, WAVELENGTH_NM
+from .phosphor import band_cells
+
+FloatArray = NDArray[np.float64]
+
+CURVES = "canon_eos_5d_mark_ii.json"
+CHANNELS = ("R", "G", "B")
+
+#: Three published sets of this camera's curves, peak-normalised, differ by 0.02–0.06 RMS.
+DISAGREEMENT_RMS = (0.022, 0.058)
+#: Distance of the random knots of that difference: smooth like a wrong reference diode.
+KNOTS_NM: FloatArray = np.arange(340.0, 840.0, 40.0)
+#: Share of it that is stray light and dark error, added where the curve itself is nearly zero.
+ADDED = 0.05
+
+#: Photo-electrons a second and pixel at f/1 for 1 nm of radiance 1 in Table 1's scale at
+#: sensitivity 1. Chosen: blue paint just after a long charge fills half of the range at ISO 400,
+#: f/4, 1 s.
+ELECTRONS_PER_S_NM = 33_000.0
+#: Radiance that a white surface reflects at irradiance 1. Chosen: under the default lamp a grey
+#: card fills half of the range at ISO 100, f/5.6, 1/60 s, about 500 times the glow of blue paint.
+REFLECTED = 12.5
+#: Reflectance of a sample, and of the black cloth around it.
+SAMPLE_REFLECTANCE = 0.5
+CLOTH_REFLECTANCE = 0.03
+
+#: Tangent of the field angle in the corner of the frame: full format behind a 75 mm lens.
+CORNER_TANGENT = 0.29
+
+
+@dataclass(frozen=True)
+class CameraCurves:
+    """Spectral sensitivity, shape (3, 160) on `WAVELENGTH_NM`, relative; rows R, G, B."""
+
+    sensitivity: FloatArray
+
+    def glow_electrons_per_s(self, emission: FloatArray, f_number: float) -> FloatArray:
+        """Of emission spectra (…, wavelengths) in Table 1's scale; shape (…, 3)."""
+        rate: FloatArray = (
+            ELECTRONS_PER_S_NM / f_number**2 * CELL_NM * (emission @ self.sensitivity.T)
+        )
+        return rate
+
+    def reflected_electrons(self, lamp_exposure: FloatArray, f_number: float) -> FloatArray:
+        """Of a white surface under ∫ irradiance dt (wavelengths,); shape (3,)."""
+        return self.glow_electrons_per_s(REFLECTED * lamp_exposure, f_number)
+
+
+def shipped_curves() -> CameraCurves:
+    """The curves as measured, on the simulator's grid."""
+    path = shipped.folder("config") / "optics" / CURVES
+    table = json.loads(path.read_text(encoding="utf-8"))["spectral_data"]["data"]["main"]
+    wavelength_nm = np.array([float(key) for key in table])
+    values = np.array(list(table.values()))
+    return CameraCurves(np.maximum(PchipInterpolator(wavelength_nm, values)(WAVELENGTH_NM).T, 0.0))
+
+
+def bent_curves(rng: np.random.Generator) -> CameraCurves:
+    """The curves as this simulated camera has them."""
+    return CameraCurves(np.array([_bent(row, rng) for row in shipped_curves().sensitivity]))
+
+
+def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
+    peak = curve.max()
+    goal = rng.uniform(*DISAGREEMENT_RMS)
+    factor, added = CubicSpline(KNOTS_NM, rng.standard_normal((2, len(KNOTS_NM))), axis=1)(
+        WAVELENGTH_NM
+    )
+    seen = (WAVELENGTH_NM > 400.0) & (WAVELENGTH_NM < 700.0)
+
+    def normalised(strength: float) -> FloatArray:
+        bent = curve / peak * np.exp(strength * factor) + strength * ADDED * added
+        positive: FloatArray = np.maximum(bent, 0.0)
+        return positive / float(positive.max())
+
+    def excess(strength: float) -> float:
+        difference = (normalised(strength) - curve / peak)[seen]
+        return float(np.sqrt(np.mean(difference**2))) - goal
+
+    result: FloatArray = peak * normalised(brentq(excess, 0.0, 1.0, xtol=1e-6))
+    return result
+
+
+def emission(material: Material) -> FloatArray:
+    """Λ of every state as a smooth spectrum, shape (states, wavelengths).
+
+    A spectrum in the file gives the shape; without one, the bands' values are joined smoothly
+    through the centres of the bands, going to zero one band beyond the outermost.
+
+    Raises
+    ------
+    UsageError
+        The file does not say what the material radiates.
+    """
+    if material.bands_nm is None or any(state.reradiation is None for state in material.states):
+        raise UsageError(
+            f"{material.name}: expected 'bands_nm' and 'reradiation' in every state, which a "
+            "simulated sample needs to glow"
+        )
+    bands = np.array([state.reradiation for state in material.states], dtype=np.float64)
+    if material.spectrum is not None:
+        measured = material.spectrum
+        shape = PchipInterpolator(measured.wavelength_nm, measured.value, extrapolate=False)
+        fine = np.nan_to_num(shape(WAVELENGTH_NM))
+        cells = band_cells(material.bands_nm)
+        in_bands = (cells @ fine / np.maximum(cells.sum(axis=1), 1e-12)).sum()
+        return np.outer(bands.sum(axis=1) / in_bands, fine)
+    edges = np.asarray(material.bands_nm)
+    centres = (edges[:-1] + edges[1:]) / 2
+    ends = edges[0] * 2 - centres[0], edges[-1] * 2 - centres[-1]
+    knots = np.concatenate([[ends[0]], centres, [ends[1]]])
+    values = np.pad(bands, ((0, 0), (1, 1)))
+    smooth = PchipInterpolator(knots, values, axis=1, extrapolate=False)(WAVELENGTH_NM)
+    return np.nan_to_num(smooth)
+
+
+def vignetting(height: int, width: int) -> FloatArray:
+    """Light of a pixel over that in the middle, cos⁴ of the field angle, shape (height, width)."""
+    y = (np.arange(height) - (height - 1) / 2)[:, None]
+    x = (np.arange(width) - (width - 1) / 2)[None, :]
+    tangent2 = CORNER_TANGENT**2 * (x**2 + y**2) / ((height / 2) ** 2 + (width / 2) ** 2)
+    falloff: FloatArray = (1 + tangent2) ** -2
+    return falloff

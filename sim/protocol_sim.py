@@ -1,0 +1,100 @@
+"""pyserial's URL handler for `sim://room/device`; pyserial finds it by this module's name.
+
+The registry of open rooms is the one module-level state in labrig: pyserial hands a handler
+nothing but the URL.
+"""
+
+from typing import Protocol
+from urllib.parse import urlsplit
+
+import serial
+
+from labrig.clock import VirtualClock
+
+#: A byte on a USB CDC line; a board's thinking time before it answers.
+BYTE_S = 20e-6
+ANSWER_S = 1.5e-3
+
+
+class Board(Protocol):
+    """The far end of a serial line."""
+
+    def receive(self, data: bytes) -> bytes:
+        """What it sends back for these bytes."""
+
+
+class SerialRoom(Protocol):
+    """A room with boards on serial lines."""
+
+    @property
+    def clock(self) -> VirtualClock:
+        """Time in the room."""
+
+    @property
+    def boards(self) -> dict[str, Board]:
+        """Boards by the device part of their address."""
+
+
+_ROOMS: dict[str, SerialRoom] = {}
+
+
+def open_door(name: str, room: SerialRoom) -> None:
+    """Make a room's boards reachable as `sim://name/board`."""
+    _ROOMS[name] = room
+    serial.protocol_handler_packages.insert(0, __package__)
+
+
+def close_door(name: str) -> None:
+    """Forget a room."""
+    del _ROOMS[name]
+    serial.protocol_handler_packages.remove(__package__)
+
+
+class Serial(serial.SerialBase):
+    """A serial port whose other end is an emulated board."""
+
+    def open(self) -> None:
+        """Connect to the board that the URL names."""
+        url = urlsplit(self.portstr or "")
+        room = _ROOMS.get(url.netloc)
+        board = None if room is None else room.boards.get(url.path.strip("/"))
+        if room is None or board is None:
+            raise serial.SerialException(f"there is no board at {self.portstr}")
+        self._clock = room.clock
+        self._board = board
+        self._incoming: list[tuple[float, int]] = []
+        self.is_open = True
+
+    def close(self) -> None:
+        """Disconnect."""
+        self.is_open = False
+
+    def _reconfigure_port(self) -> None:
+        """Line settings mean nothing to a USB CDC board."""
+
+    @property
+    def in_waiting(self) -> int:
+        """Bytes that have arrived by now."""
+        now_s = self._clock.now()
+        return sum(1 for due_s, _ in self._incoming if due_s <= now_s)
+
+    def read(self, size: int = 1, /) -> bytes:
+        """Up to `size` bytes that have arrived."""
+        count = min(size, self.in_waiting)
+        taken, self._incoming = self._incoming[:count], self._incoming[count:]
+        self._clock.spend(BYTE_S * count)
+        return bytes(byte for _, byte in taken)
+
+    def write(self, data: bytes, /) -> int:  # type: ignore[override]
+        """Send `data`; the answer arrives byte by byte, a little later."""
+        self._clock.spend(BYTE_S * len(data))
+        last_s = self._incoming[-1][0] if self._incoming else 0.0
+        due_s = max(last_s, self._clock.now() + ANSWER_S)
+        for byte in self._board.receive(bytes(data)):
+            due_s += BYTE_S
+            self._incoming.append((due_s, byte))
+        return len(data)
+
+    def reset_input_buffer(self) -> None:
+        """Forget what has arrived."""
+        self._incoming = self._incoming[self.in_waiting :]

@@ -1,0 +1,173 @@
+"""The sensor: photo-electrons in, a mosaic of 14-bit numbers with all their blemishes out.
+
+Figures are chosen: typical of a full-format DSLR of the EOS 5D Mark II's generation, whose read
+noise falls steeply up to ISO 1600. They are not a measurement of one.
+"""
+
+import math
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+Float32Array = NDArray[np.float32]
+Mosaic = NDArray[np.uint16]
+
+#: Colour channel (0 R, 1 G, 2 B) of the four places of a Bayer cell, row by row.
+BAYER_RGGB = (0, 1, 1, 2)
+
+BLACK_DN = 1024
+#: What the file calls white: a bit below where the signal really stops, as Canon's does.
+WHITE_DN = 15_600
+SATURATION_DN = 15_760
+MAX_DN = 16_383
+
+#: Electrons a DN at ISO 100.
+GAIN_ISO_100 = 4.2
+READ_NOISE_ISO = (100, 200, 400, 800, 1600, 3200, 6400)
+READ_NOISE_ELECTRONS = (27.8, 15.0, 8.1, 5.0, 3.1, 2.5, 2.4)
+
+#: Pixel response non-uniformity, offset noise of pixels and of columns (1 σ).
+PRNU = 0.006
+PIXEL_OFFSET_DN = 0.6
+COLUMN_OFFSET_DN = 0.4
+
+#: Dark current of an ordinary pixel at the ambient temperature, and its growth.
+DARK_ELECTRONS_PER_S = 0.08
+AMBIENT_C = 21.0
+DOUBLING_C = 6.0
+#: A warm pixel has this many times the ordinary dark current (log-normal: median, σ of ln).
+HOT_FRACTION = 1e-4
+HOT_MEDIAN = 3000.0
+HOT_SIGMA = 1.2
+
+#: The camera warms by itself, from being switched on at the epoch, and by exposing.
+SELF_HEATING_C = 7.0
+SELF_HEATING_S = 600.0
+HEATING_C_PER_EXPOSED_S = 0.01
+
+#: From here on a normal variate bent to Poisson's skewness will do: the steps of single electrons
+#: vanish in the read noise.
+MANY_ELECTRONS = 4.0
+
+
+def gain_electrons_per_dn(iso: float) -> float:
+    """Conversion at an ISO setting; amplification is exactly proportional to ISO."""
+    return GAIN_ISO_100 * 100.0 / iso
+
+
+def read_noise_electrons(iso: float) -> float:
+    """1 σ of reading a pixel, referred to electrons."""
+    logarithm = np.interp(math.log(iso), np.log(READ_NOISE_ISO), np.log(READ_NOISE_ELECTRONS))
+    return math.exp(logarithm)
+
+
+class SensorTemperature:
+    """Temperature of the silicon, which every exposure raises a little."""
+
+    def __init__(self) -> None:
+        self._exposures_s: dict[float, float] = {}
+
+    def expose(self, start_s: float, exposure_s: float) -> float:
+        """Degrees Celsius at the middle of an exposure."""
+        self._exposures_s[start_s] = exposure_s
+        middle_s = start_s + exposure_s / 2
+        itself_c = SELF_HEATING_C * -math.expm1(-middle_s / SELF_HEATING_S)
+        exposing_c = sum(
+            HEATING_C_PER_EXPOSED_S * exposed_s * math.exp((began_s - middle_s) / SELF_HEATING_S)
+            for began_s, exposed_s in self._exposures_s.items()
+            if began_s <= start_s
+        )
+        return AMBIENT_C + itself_c + exposing_c
+
+
+class Sensor:
+    """One specimen of a sensor, its blemishes drawn once.
+
+    Parameters
+    ----------
+    rng
+        For the fixed maps.
+    falloff : ndarray, shape (height, width)
+        Vignetting.
+    flicker
+        1 σ scatter of all light between frames: shutter, aperture, lamp.
+    """
+
+    def __init__(self, rng: np.random.Generator, falloff: FloatArray, flicker: float) -> None:
+        height, width = falloff.shape
+        response = falloff * (1 + PRNU * rng.standard_normal((height, width)))
+        self._response: Float32Array = response.astype(np.float32)
+        offset = PIXEL_OFFSET_DN * rng.standard_normal((height, width))
+        offset += COLUMN_OFFSET_DN * rng.standard_normal(width)
+        self._zero_dn: Float32Array = (BLACK_DN + offset).astype(np.float32)
+        count = round(HOT_FRACTION * height * width)
+        self.hot_pixels: NDArray[np.intp] = rng.choice(height * width, count, replace=False)
+        self._hot = HOT_MEDIAN * np.exp(HOT_SIGMA * rng.standard_normal(count))
+        self._flicker = flicker
+
+    def expose(
+        self,
+        light_electrons: Float32Array,
+        exposure_s: float,
+        iso: float,
+        temperature_c: float,
+        rng: np.random.Generator,
+    ) -> Mosaic:
+        """One exposure, read out.
+
+        Parameters
+        ----------
+        light_electrons : ndarray, shape (height, width)
+            Expected photo-electrons in the middle of the lens, per pixel.
+        exposure_s, iso
+            The camera's settings.
+        temperature_c
+            Of the sensor.
+        rng
+            Of this frame alone.
+
+        Returns
+        -------
+        ndarray of uint16, shape (height, width)
+        """
+        gain = gain_electrons_per_dn(iso)
+        common = max(1 + self._flicker * rng.standard_normal(), 0.0)
+        dark_e = DARK_ELECTRONS_PER_S * exposure_s * 2 ** ((temperature_c - AMBIENT_C) / DOUBLING_C)
+        electrons = light_electrons * self._response
+        electrons *= np.float32(common)
+        electrons += np.float32(dark_e)
+        electrons.reshape(-1)[self.hot_pixels] += (dark_e * self._hot).astype(np.float32)
+        full_well = np.float32((SATURATION_DN - BLACK_DN) * gain)
+        # More would be cut off below anyway; it only has to stay a finite number on the way.
+        np.minimum(electrons, 4 * full_well, out=electrons)
+        electrons = _shot_noise(electrons, rng)
+        np.minimum(electrons, full_well, out=electrons)
+        electrons *= np.float32(1 / gain)
+        noise = rng.standard_normal(electrons.shape, dtype=np.float32)
+        noise *= np.float32(read_noise_electrons(iso) / gain)
+        electrons += noise
+        electrons += self._zero_dn
+        electrons += np.float32(0.5)
+        return np.clip(electrons, 0, MAX_DN).astype(np.uint16)
+
+
+def _shot_noise(expected: Float32Array, rng: np.random.Generator) -> Float32Array:
+    """Electrons that arrive where `expected` are to be expected: Poisson's distribution.
+
+    For many electrons by Cornish and Fisher's expansion, λ + √(λ − 1/18) z + (z² − 1)/6, which has
+    the mean, the variance and the third moment of the Poisson distribution.
+    """
+    z = rng.standard_normal(expected.shape, dtype=np.float32)
+    arrived = np.sqrt(np.maximum(expected - np.float32(1 / 18), 0.0, dtype=np.float32))
+    arrived *= z
+    arrived += expected
+    z *= z
+    z -= np.float32(1)
+    z *= np.float32(1 / 6)
+    arrived += z
+    few = expected < MANY_ELECTRONS
+    if few.any():
+        arrived[few] = rng.poisson(expected[few])
+    result: Float32Array = arrived
+    return result

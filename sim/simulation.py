@@ -1,0 +1,167 @@
+"""The `simulation:` section of a rig file: what stands in the simulated dark room."""
+
+from datetime import UTC, datetime
+from pathlib import Path
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import AfterValidator, AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field
+
+from labrig.material.file import material_path, shipped_materials
+from labrig.quantity import DurationS, Fraction
+from labrig.region import Region
+from labrig.yaml_file import did_you_mean
+
+#: Named set-ups that go wrong on purpose, and what each does.
+FAULTS = {"lamp_dead": "the lamp's relay switches, but nothing lights up"}
+
+#: Where one sample lies when no region is given.
+MIDDLE: Region = (0.1, 0.1, 0.8, 0.8)
+
+#: A level below 1: only infinite light would reach 1 itself.
+Charge = Annotated[float, Field(ge=0, lt=1)]
+
+
+def _known_fault(name: str) -> str:
+    if name not in FAULTS:
+        raise ValueError(
+            f"expected the name of a simulated fault, got '{name}'; "
+            f"{did_you_mean(name, list(FAULTS))}"
+        )
+    return name
+
+
+def _even(pixels: int) -> int:
+    if pixels % 2:
+        raise ValueError(f"expected an even number of pixels (a Bayer cell is 2 x 2), got {pixels}")
+    return pixels
+
+
+#: LibRaw refuses pictures smaller than 22 pixels.
+Pixels = Annotated[int, Field(ge=32, le=8192), AfterValidator(_even)]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Patch(_Part):
+    """A sample of one material on the table.
+
+    Attributes
+    ----------
+    material
+        Material file, or shipped name.
+    region
+        Where the camera sees it, see `labrig.region`.
+    initial_charge
+        Level r that a long charge under this room's lamp reaches, given instead of computed from
+        the excitation rates. Null: computed; 0.5 for states without excitation rates.
+    """
+
+    material: str
+    region: Region = MIDDLE
+    initial_charge: Charge | None = None
+
+
+class SensorSettings(_Part):
+    """The simulated camera's sensor; `flicker` is the 1 σ scatter of light between frames."""
+
+    width: Pixels = 1404
+    height: Pixels = 936
+    flicker: Fraction = 0.007
+
+
+class LampSettings(_Part):
+    """The simulated halogen lamp.
+
+    Attributes
+    ----------
+    irradiance
+        Of the warm lamp, in multiples of the irradiance to which a material's k_e belong (with
+        Table 1's norm: the length of the 8-band vector E). 4 puts r∞ of Table 1's between 0.2
+        and 0.6.
+    warm_up
+        Time constant with which housing and mirror warm, and the light with them.
+    warm_up_deficit
+        Light missing when switched on cold.
+    drift_per_hour
+        Light lost by ageing and dust, per hour of the room's clock.
+    """
+
+    irradiance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 4.0
+    warm_up: Annotated[DurationS, Field(gt=0)] = 150.0
+    warm_up_deficit: Annotated[Fraction, Field(ge=0, lt=1)] = 0.03
+    drift_per_hour: Annotated[Fraction, Field(ge=0, lt=1)] = 0.002
+
+
+class InitialState(_Part):
+    """How the room is found at the epoch: what a crash left behind, a sample that still glows."""
+
+    lamp: Literal["off", "on"] = "off"
+    concentration: Annotated[float, Field(ge=0, le=1)] = 0.0
+
+
+def _alone(sample: Any) -> Any:
+    return [{"material": sample}] if isinstance(sample, str) else sample
+
+
+class Simulation(_Part):
+    """A simulated dark room.
+
+    Attributes
+    ----------
+    sample
+        The patches; in YAML also the name of a single material, in the middle of the frame.
+    initial_charge
+        As `Patch.initial_charge`, for patches that do not say.
+    epoch
+        Wall-clock time at which the room's clock stands at zero.
+    seed
+        Of everything random: camera curves, hot pixels, noise.
+    """
+
+    sample: Annotated[tuple[Patch, ...], BeforeValidator(_alone), Field(min_length=1)]
+    initial_charge: Charge | None = None
+    sensor: SensorSettings = SensorSettings()
+    epoch: Annotated[AwareDatetime, Field(ge=datetime(1970, 1, 1, tzinfo=UTC))] = datetime(
+        2026, 1, 1, tzinfo=UTC
+    )
+    seed: Annotated[int, Field(ge=0)] = 1
+    initial: InitialState = InitialState()
+    faults: tuple[Annotated[str, AfterValidator(_known_fault)], ...] = ()
+    lamp: LampSettings = LampSettings()
+
+    @property
+    def patches(self) -> tuple[Patch, ...]:
+        """The samples on the table, each with its charge resolved."""
+        return tuple(
+            patch.model_copy(update={"initial_charge": self.initial_charge})
+            if patch.initial_charge is None
+            else patch
+            for patch in self.sample
+        )
+
+    def beside(self, folder: Path) -> Self:
+        """The same with materials that are files beside the rig file made absolute paths.
+
+        Parameters
+        ----------
+        folder
+            Of the rig file.
+
+        Raises
+        ------
+        UsageError
+            No such material.
+        """
+        shipped = shipped_materials()
+        located = (
+            patch
+            if patch.material in shipped
+            and material_path(patch.material, folder) == shipped[patch.material]
+            else patch.model_copy(
+                update={"material": str(material_path(patch.material, folder).resolve())}
+            )
+            for patch in self.sample
+        )
+        return self.model_copy(update={"sample": tuple(located)})

@@ -1,0 +1,96 @@
+"""Devices that note what they are told, for tests of what happens around them."""
+
+from collections.abc import Callable
+
+from labrig.acquire import CameraOffers, ExposureSettings, Frame
+from labrig.clock import VirtualClock
+
+Note = Callable[[str], None]
+
+
+class NotingLamp:
+    """A lamp; fails on demand."""
+
+    def __init__(self, clock: VirtualClock, note: Note, fail: Exception | None = None) -> None:
+        self.lit = False
+        self.fail = fail
+        self._clock = clock
+        self._note = note
+
+    def identity(self) -> str:
+        return "noting lamp"
+
+    def on(self) -> None:
+        self._clock.sleep(0.001)
+        if self.fail:
+            raise self.fail
+        self.lit = True
+        self._note("lamp on")
+
+    def off(self) -> None:
+        self._clock.sleep(0.001)
+        self.lit = False
+        self._note("lamp off")
+
+    def is_on(self) -> bool:
+        return self.lit
+
+    def make_safe(self) -> None:
+        self.off()
+
+    def disconnect(self) -> None:
+        self._note("lamp gone")
+
+
+class NotingCamera:
+    """A camera whose frames say when they began."""
+
+    def __init__(self, clock: VirtualClock, note: Note) -> None:
+        self._clock = clock
+        self._note = note
+        self._settings = ExposureSettings(1.0, 100)
+
+    def identity(self) -> str:
+        return "noting camera"
+
+    def offers(self) -> CameraOffers:
+        return CameraOffers((0.5, 1.0, 2.0), (100, 400), (4.0,), overhead_s=1.0, frame_bytes=10)
+
+    def configure(self, settings: ExposureSettings) -> ExposureSettings:
+        self._note(f"configure {settings}")
+        self._settings = settings
+        return settings
+
+    def arm(self) -> None:
+        self._note("arm")
+
+    def shoot(self) -> Frame:
+        start_s = self._clock.now()
+        self._clock.sleep(self._settings.exposure_s + 1.0)
+        end_s = start_s + self._settings.exposure_s
+        return Frame(f"frame at {start_s:.3f}".encode(), ".raw", start_s, end_s, self._settings)
+
+    def make_safe(self) -> None:
+        self._note("camera safe")
+
+    def disconnect(self) -> None:
+        self._note("camera gone")
+
+
+class Watching:
+    """An observer that keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[str] = []
+
+    def unit(self, name: str, number: int, total: int) -> None:
+        self.told.append(f"unit {name} {number}/{total}")
+
+    def doing(self, what: str, until_s: float | None = None) -> None:
+        self.told.append(what)
+
+    def frame(self, purpose: str, settings: ExposureSettings) -> None:
+        self.told.append(f"kept {purpose}")
+
+    def warn(self, text: str) -> None:
+        self.told.append(f"warning: {text}")

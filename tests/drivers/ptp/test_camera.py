@@ -1,0 +1,267 @@
+"""What the camera offers, takes and delivers."""
+
+import math
+
+import pytest
+
+from drivers.ptp import PtpCamera
+from labrig.acquire.roles import Camera
+from labrig.acquire.values import CameraOffers, ExposureSettings
+from labrig.errors import DeviceError
+
+from .bench import SHORT, bench, photograph
+from .toy_eos import FULL, HALF, JPEG, OFF_FULL, OFF_HALF, OPERATIONS, RAW, Fault, ToyEos, _u32
+from .usb_wire import TRANSACTION_S
+
+
+def test_fills_the_role() -> None:
+    assert isinstance(bench().connect(), Camera)
+
+
+def test_takes_control_of_what_would_spoil_frames() -> None:
+    b = bench()
+    b.connect()
+    assert b.toy.values[0xD106] == _u32(0)  # single shot
+    assert b.toy.values[0xD11C] == _u32(4)  # to the PC
+    assert b.toy.values[0xD120] == RAW
+    assert (0x911A, 0x0FFFFFFF, 0x1000, 1) in b.toy.log
+
+
+def test_offers_what_the_camera_lists_and_the_rig_allows() -> None:
+    camera = bench().connect(isos=(200, 400, 6400), longest_exposure="1 s", frame_time="3 s")
+    assert camera.offers() == CameraOffers((1 / 128, 1 / 64, 1.0), (200, 6400), (4.0, 5.6), 3.0)
+
+
+def test_offers_follow_the_camera() -> None:
+    b = bench()
+    camera = b.connect()
+    b.toy.lists[0xD101] = ()
+    b.toy.values[0xD101] = _u32(0)
+    b.toy.control(b.wire, 0x67, b"")
+    b.toy._command = None
+    camera.disconnect()
+    assert b.connect().offers().f_numbers == ()
+
+
+def test_declared_offers_are_thirds_of_stops_by_their_true_times() -> None:
+    settings = PtpCamera.Settings.model_validate({"longest_exposure": "1 s", "isos": [400, 100]})
+    offers = PtpCamera.declared_offers(settings)
+    assert offers.exposures_s[-1] == 1.0
+    assert offers.exposures_s[0] == 1 / 8192
+    ratios = {b / a for a, b in zip(offers.exposures_s, offers.exposures_s[1:], strict=False)}
+    assert all(math.isclose(r, 2 ** (1 / 3)) for r in ratios)
+    assert offers.isos == (100, 400)
+    assert offers.overhead_s == settings.frame_time
+
+
+@pytest.mark.parametrize(
+    "rig", [{"isos": [123]}, {"f_numbers": [5.7]}, {"shuter_lag": "1 s"}, {"isos": []}]
+)
+def test_settings_refuse_what_no_camera_has(rig: dict[str, object]) -> None:
+    with pytest.raises(ValueError, match=r"isos|f_numbers|shuter_lag"):
+        PtpCamera.Settings.model_validate(rig)
+
+
+def test_configure_sets_only_what_is_not_in_force() -> None:
+    b = bench()
+    camera = b.connect()
+    sets = b.toy.log.count((0x9110,))
+    assert camera.configure(SHORT) == SHORT
+    assert b.toy.log.count((0x9110,)) == sets + 3
+    assert camera.configure(SHORT) == SHORT
+    assert b.toy.log.count((0x9110,)) == sets + 3
+
+
+def test_configure_takes_dial_labels_and_returns_true_times() -> None:
+    camera = bench().connect()
+    assert camera.configure(ExposureSettings(1 / 60, 100, None)).exposure_s == 1 / 64
+    assert camera.configure(ExposureSettings(30, 100, None)).exposure_s == 32
+
+
+@pytest.mark.parametrize(
+    ("asked", "message"),
+    [
+        (ExposureSettings(1 / 90, 100, 4.0), "shutter time"),
+        (ExposureSettings(1 / 64, 6400, 4.0), "ISO"),  # listed, but not native
+        (ExposureSettings(1 / 64, 100, 8.0), "f/4, f/5.6"),
+        (ExposureSettings(math.nan, 100, 4.0), "shutter time"),
+        (ExposureSettings(0.0, 100, 4.0), "shutter time"),
+    ],
+)
+def test_configure_refuses_what_is_not_offered(asked: ExposureSettings, message: str) -> None:
+    with pytest.raises(DeviceError, match=message):
+        bench().connect().configure(asked)
+
+
+def test_configure_says_what_was_asked_and_what_the_camera_says() -> None:
+    b = bench()
+    b.toy.stubborn.add(0xD102)
+    with pytest.raises(DeviceError, match=r"0x68 \(1/64 s\), it says 0x70 \(1/128 s\)"):
+        b.connect().configure(SHORT)
+
+
+def test_manual_lens() -> None:
+    b = bench()
+    b.toy.values[0xD101] = _u32(0)
+    b.toy.lists[0xD101] = ()
+    camera = b.connect()
+    assert camera.offers().f_numbers == ()
+    assert photograph(camera, ExposureSettings(1 / 64, 100)).settings.f_number is None
+    with pytest.raises(DeviceError, match="by hand"):
+        camera.configure(SHORT)
+
+
+@pytest.mark.parametrize(
+    ("prop", "value", "message"),
+    [(0xD105, 0, "dial"), (0xD102, 0x0C, "bulb"), (0xD103, 0, "automatic ISO")],
+)
+def test_wrong_mode_is_told(prop: int, value: int, message: str) -> None:
+    b = bench()
+    b.toy.values[prop] = _u32(value)
+    camera = b.connect()
+    with pytest.raises(DeviceError, match=message):
+        if prop == 0xD105:
+            camera.offers()
+        else:
+            camera.shoot()
+
+
+def test_a_dial_without_lists_is_told() -> None:
+    b = bench()
+    b.toy.lists[0xD102] = ()
+    with pytest.raises(DeviceError, match="turn its dial to M"):
+        b.connect().offers()
+
+
+def test_shoot_measures_the_press_that_succeeded() -> None:
+    b = bench()
+    camera = b.connect(shutter_lag="50 ms")
+    camera.configure(SHORT)
+    camera.arm()
+    b.toy.faults[FULL] = [Fault.BUSY] * 3
+    frame = camera.shoot()
+    true_start_s = b.toy.exposing_until_s - SHORT.exposure_s
+    # the answer is half a round trip after the command has arrived: here, one transaction
+    assert frame.start_s == pytest.approx(true_start_s + 0.05, abs=TRANSACTION_S)
+    assert frame.end_s == pytest.approx(frame.start_s + SHORT.exposure_s)
+    assert frame.data == b.toy.frame(1)
+
+
+def test_shoot_sends_nothing_before_the_press_and_lets_go_in_order() -> None:
+    b = bench()
+    camera = b.connect()
+    camera.configure(SHORT)
+    camera.arm()
+    camera.arm()
+    armed_at = len(b.toy.log)
+    camera.shoot()
+    assert b.toy.log[armed_at] == (*FULL, 0)
+    releases = [key for key in b.toy.log if key[0] in (0x9128, 0x9129)]
+    assert releases == [(*HALF, 0), (*FULL, 0), OFF_FULL, OFF_HALF]
+
+
+def test_shoot_without_arm_arms() -> None:
+    b = bench()
+    camera = b.connect()
+    assert camera.shoot().data == b.toy.frame(1)
+    assert b.toy.is_idle
+
+
+def test_configure_when_armed_lets_go_first() -> None:
+    b = bench()
+    camera = b.connect()
+    camera.arm()
+    assert photograph(camera).data == b.toy.frame(1)
+    assert b.toy.is_idle
+
+
+@pytest.mark.parametrize("size", [1, 512, 1024**2 - 12, 1024**2, 3 * 1024**2 + 5])
+@pytest.mark.parametrize("operation", [0x9107, 0x101B, 0x9104])
+def test_frames_of_any_size_by_any_operation(size: int, operation: int) -> None:
+    b = bench(ToyEos(tuple(op for op in OPERATIONS if op != 0x9107) + (operation,)))
+    b.toy.frame_bytes = size
+    assert photograph(b.connect()).data == b.toy.frame(1)
+    assert b.toy.stored == {}
+
+
+@pytest.mark.parametrize("extra", [-100, 100])
+@pytest.mark.parametrize("operation", [0x9107, 0x9104])
+def test_frame_of_another_size_than_announced(extra: int, operation: int) -> None:
+    b = bench(ToyEos(tuple(op for op in OPERATIONS if op != 0x9107) + (operation,)))
+    b.toy.announced_extra_bytes = extra
+    camera = b.connect()
+    if (extra, operation) == (-100, 0x9107):
+        return  # what lies beyond the announced end is never asked for
+    with pytest.raises(DeviceError, match="expected"):
+        photograph(camera)
+    camera.make_safe()
+    assert b.toy.is_idle
+
+
+def test_jpeg_is_no_frame() -> None:
+    b = bench()
+    b.toy.name = b"IMG_0001.JPG"
+    camera = b.connect()
+    with pytest.raises(DeviceError, match=r"RAW.*IMG_0001\.JPG"):
+        photograph(camera)
+    camera.make_safe()
+    assert b.toy.is_idle
+
+
+def test_quality_that_cannot_be_raw_is_refused() -> None:
+    b = bench()
+    b.toy.stubborn.add(0xD120)
+    with pytest.raises(DeviceError, match="image format"):
+        b.connect()
+    assert not b.wire.claimed
+    assert b.toy.values[0xD120] == JPEG
+
+
+def test_a_frame_taken_by_hand_is_not_mistaken() -> None:
+    b = bench()
+    camera = b.connect()
+    b.toy.offer(77)
+    assert photograph(camera).data == b.toy.frame(1)
+    assert b.toy.is_idle
+
+
+def test_no_frame_in_time() -> None:
+    b = bench()
+    b.toy.never_delivers = True
+    camera = b.connect(transfer_timeout="7 s")
+    with pytest.raises(DeviceError, match="within 7 s"):
+        photograph(camera)
+    camera.make_safe()
+    assert b.toy.is_idle
+
+
+def test_room_on_the_pc_is_told_again_when_it_runs_out() -> None:
+    b = bench()
+    b.toy.values[0xD11B] = _u32(3)
+    camera = b.connect()
+    told = b.toy.log.count((0x911A, 0x0FFFFFFF, 0x1000, 1))
+    camera.arm()
+    assert b.toy.log.count((0x911A, 0x0FFFFFFF, 0x1000, 1)) == told + 1
+
+
+class TestOlderRelease:
+    OPERATIONS = tuple(op for op in OPERATIONS if op not in (0x9128, 0x9129)) + (0x910F,)
+
+    def test_frame(self) -> None:
+        b = bench(ToyEos(self.OPERATIONS))
+        camera = b.connect()
+        assert photograph(camera).data == b.toy.frame(1)
+        camera.make_safe()
+
+    @pytest.mark.parametrize(
+        ("result", "message"), [(1, "focus"), (3, "mirror"), (7, "room"), (9, "menus")]
+    )
+    def test_results(self, result: int, message: str) -> None:
+        b = bench(ToyEos(self.OPERATIONS))
+        b.toy.release_result = result
+        camera = b.connect()
+        with pytest.raises(DeviceError, match=message):
+            photograph(camera)
+        camera.make_safe()
+        b.toy.release_result = 0
+        assert photograph(camera).data == b.toy.frame(1)

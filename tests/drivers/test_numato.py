@@ -1,0 +1,176 @@
+"""The Numato driver against wire transcripts and against the emulated board."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.numato import NumatoRelay
+from drivers.serial_line import SerialLine
+from labrig.acquire import Lamp
+from labrig.clock import Interrupted, VirtualClock
+from labrig.errors import DeviceError
+from sim.boards import NumatoBoard
+
+
+class ScriptedPort:
+    """Plays (what must be written, what comes back) in order; bytes come one per millisecond."""
+
+    def __init__(self, clock: VirtualClock, script: list[tuple[bytes, bytes]]) -> None:
+        self.script = script
+        self._clock = clock
+        self._coming: list[tuple[float, bytes]] = []
+
+    @property
+    def in_waiting(self) -> int:
+        return sum(due_s <= self._clock.now() for due_s, _ in self._coming)
+
+    def read(self, size: int = 1, /) -> bytes:
+        count = min(size, self.in_waiting)
+        taken, self._coming = self._coming[:count], self._coming[count:]
+        return b"".join(byte for _, byte in taken)
+
+    def write(self, data: bytes, /) -> int:
+        expected, answer = self.script.pop(0)
+        assert data == expected
+        now_s = self._clock.now()
+        self._coming += [(now_s + 0.001 * n, answer[n : n + 1]) for n in range(len(answer))]
+        return len(data)
+
+    def reset_input_buffer(self) -> None:
+        self._coming.clear()
+
+    def close(self) -> None:
+        pass
+
+
+class BoardPort(ScriptedPort):
+    """The same line with an emulated board at its end."""
+
+    def __init__(self, clock: VirtualClock, board: NumatoBoard) -> None:
+        super().__init__(clock, [])
+        self._board = board
+
+    def write(self, data: bytes, /) -> int:
+        self.script.append((data, self._board.receive(data)))
+        return super().write(data)
+
+
+class Wired:
+    """Connections with one port."""
+
+    def __init__(self, clock: VirtualClock, port: ScriptedPort) -> None:
+        self.clock = clock
+        self._port = port
+
+    def serial(self, address: str, baudrate: int) -> ScriptedPort:
+        return self._port
+
+    def usb(self, address: str) -> None:
+        raise AssertionError("no USB here")
+
+
+def lamp(script: list[tuple[bytes, bytes]], relay: int = 0) -> tuple[NumatoRelay, ScriptedPort]:
+    clock = VirtualClock()
+    port = ScriptedPort(clock, [(b"\r", b"\n\r>"), *script])
+    settings = NumatoRelay.Settings(relay=relay)
+    return NumatoRelay("COM3", settings, Wired(clock, port)), port
+
+
+def test_on_and_off_are_read_back() -> None:
+    driver, port = lamp(
+        [
+            (b"relay on A\r", b"relay on A\n\r>"),
+            (b"relay read A\r", b"relay read A\n\ron\n\r>"),
+            (b"relay off A\r", b"relay off A\n\r>"),
+            (b"relay read A\r", b"relay read A\n\roff\n\r>"),
+            (b"relay read A\r", b"relay read A\n\roff\n\r>"),
+            (b"ver\r", b"ver\n\r00000008\n\r>"),
+            (b"id get\r", b"id get\n\r12345678\n\r>"),
+        ],
+        relay=10,
+    )
+    assert isinstance(driver, Lamp)
+    driver.on()
+    driver.off()
+    assert not driver.is_on()
+    assert driver.identity() == "Numato relay board, firmware 00000008, id 12345678, relay 10"
+    assert port.script == []
+
+
+@pytest.mark.parametrize(
+    ("script", "said"),
+    [
+        ([(b"relay on 0\r", b"relay on 0\n\r>"), (b"relay read 0\r", b"relay read 0\n\roff\n\r>")],
+         "switched on but reads off"),
+        ([(b"relay on 0\r", b"")], "did not answer within 1 s"),
+        ([(b"relay on 0\r", b"\xff\xfe>")], "did not echo"),
+        ([(b"relay on 0\r", b"relay on 0\n\rbad relay\n\r>")], "refused"),
+        ([(b"relay on 0\r", b"relay on 0\n\r>"), (b"relay read 0\r", b"relay read 0\n\r>")],
+         "expected 'on' or 'off', got ''"),
+    ],
+    ids=["welded", "silent", "babble", "error text", "no value"],
+)  # fmt: skip
+def test_anything_but_the_expected_answer_is_a_device_error(
+    script: list[tuple[bytes, bytes]], said: str
+) -> None:
+    driver, _ = lamp(script)
+    with pytest.raises(DeviceError) as caught:
+        driver.on()
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@given(st.integers(0, 60))
+def test_an_interruption_at_any_wait_can_be_made_safe(waits: int) -> None:
+    """A half-read echo must not spoil the command that switches the lamp off."""
+    clock = InterruptingClock()
+    moved: list[tuple[int, bool]] = []
+    board = NumatoBoard(8, lambda relay, on: moved.append((relay, on)))
+    driver = NumatoRelay("COM3", NumatoRelay.Settings(relay=0), Wired(clock, BoardPort(clock, board)))
+    clock.waits_left = waits
+    try:
+        driver.on()
+        driver.off()
+        driver.on()
+    except Interrupted:
+        pass
+    clock.waits_left = 10**9
+    driver.make_safe()
+    assert not board.states[0]
+    assert not driver.is_on()
+
+
+class InterruptingClock(VirtualClock):
+    """Interrupts at the n-th wait."""
+
+    waits_left = 10**9
+
+    def _pause_until(self, deadline_s: float) -> None:
+        self.waits_left -= 1
+        if self.waits_left == 0:
+            self.interrupt(2)
+        super()._pause_until(deadline_s)
+
+
+@given(st.binary(max_size=40))
+def test_the_board_answers_any_bytes(data: bytes) -> None:
+    NumatoBoard(8, lambda relay, on: None).receive(data)
+
+
+@given(st.binary(max_size=60))
+def test_any_answer_is_understood_or_a_device_error(answer: bytes) -> None:
+    driver, _ = lamp([(b"relay read 0\r", answer)])
+    try:
+        assert driver.is_on() in (True, False)
+    except DeviceError as error:
+        assert "\n" not in str(error)
+
+
+def test_a_pulled_plug_is_a_device_error() -> None:
+    class Gone(ScriptedPort):
+        def write(self, data: bytes, /) -> int:
+            raise OSError(5, "Input/output error")
+
+    clock = VirtualClock()
+    with pytest.raises(DeviceError, match="is gone"):
+        SerialLine(Gone(clock, []), clock, "the board").write(b"x")

@@ -1,0 +1,162 @@
+"""The material file: what it takes, what it refuses, and that it survives being written."""
+
+from itertools import pairwise
+from pathlib import Path
+
+import pytest
+from hypothesis import HealthCheck, given, settings
+from hypothesis import strategies as st
+
+from labrig.errors import UsageError
+from labrig.material.file import (
+    IrradianceNorm,
+    Material,
+    Provenance,
+    Spectrum,
+    State,
+    material_path,
+    read_material,
+    shipped_materials,
+    write_material,
+)
+
+TABLE_1 = (
+    "blue-paint green-paint orange-paint pink-paint purple-paint red-paint white-paint "
+    "yellow-paint bottle gloves stickers"
+)
+
+positive = st.floats(1e-12, 1e12)
+not_negative = st.floats(0, 1e12)
+
+
+def series(length: int) -> st.SearchStrategy[tuple[float, ...]]:
+    return st.lists(not_negative, min_size=length, max_size=length).map(tuple)
+
+
+def rising(least: int) -> st.SearchStrategy[tuple[float, ...]]:
+    return st.lists(positive, min_size=least, max_size=6, unique=True).map(sorted).map(tuple)
+
+
+@st.composite
+def materials(draw: st.DrawFn) -> Material:
+    edges = draw(rising(2))
+    bands = len(edges) - 1
+    states = []
+    for _ in range(draw(st.integers(1, 3))):
+        k_e = draw(st.none() | series(bands))
+        states.append(
+            State(
+                k_r_per_s=draw(positive),
+                k_r_per_s_sigma=draw(st.none() | not_negative),
+                r0=draw(st.none() | st.floats(0, 1)),
+                k_e_per_s=k_e,
+                k_e_per_s_sigma=None if k_e is None else draw(st.none() | series(bands)),
+                reradiation=draw(st.none() | series(bands)),
+            )
+        )
+    wavelength_nm = draw(rising(2))
+    return Material(
+        name=draw(st.text(min_size=1).filter(lambda name: name.isprintable())),
+        kind="phosphor",
+        bands_nm=edges,
+        irradiance_norm=IrradianceNorm(kind="vector_length", value=draw(positive)),
+        states=tuple(states),
+        spectrum=draw(
+            st.none()
+            | series(len(wavelength_nm)).map(
+                lambda value: Spectrum(wavelength_nm=wavelength_nm, value=value)
+            )
+        ),
+        provenance=draw(st.none() | st.builds(Provenance, source=st.text("αb: #'\n-9"))),
+    )
+
+
+@settings(suppress_health_check=[HealthCheck.function_scoped_fixture], max_examples=50)
+@given(material=materials())
+def test_written_and_read_is_the_same(material: Material, tmp_path: Path) -> None:
+    path = tmp_path / "sample.yaml"
+    write_material(path, material)
+    assert read_material(path) == material
+
+
+@pytest.mark.parametrize("name", list(shipped_materials()))
+def test_shipped_materials_are_complete(name: str) -> None:
+    material = read_material(name)
+    assert material.name == name
+    assert material.provenance is not None
+    assert all(state.reradiation is not None for state in material.states)
+
+
+def test_table_1_is_shipped() -> None:
+    assert set(TABLE_1.split()) <= set(shipped_materials())
+    blue = read_material("blue-paint")
+    assert blue.bands_nm == pytest.approx([400 + 37.5 * i for i in range(9)])
+    (state,) = blue.states
+    assert state.k_r_per_s == 0.032
+    assert list(state.k_e_per_s or ()) == [0.017, 0.05, 0.004, 0, 0, 0, 0, 0]
+    assert list(state.reradiation or ()) == [0.34, 4.37, 3.65, 0.55, 0, 0.01, 0, 0]
+    unmeasured = {n for n in TABLE_1.split() if read_material(n).states[0].k_e_per_s is None}
+    assert unmeasured == {"bottle", "gloves", "stickers"}
+
+
+def test_double_exponentials_span_the_ratios() -> None:
+    doubles = [read_material(n) for n in shipped_materials() if n.startswith("double-")]
+    rates = [[state.k_r_per_s for state in material.states] for material in doubles]
+    assert sorted(round(fast / slow, 6) for fast, slow in rates) == [2.5, 2.5, 5, 5, 20, 20]
+    assert max(1 / slow for _, slow in rates) > 180
+    assert all(fast > slow for pair in rates for fast, slow in pairwise(pair))
+    assert all(s.k_e_per_s is not None for material in doubles for s in material.states)
+
+
+WHOLE = {
+    "name": "x",
+    "kind": "phosphor",
+    "bands_nm": [400, 500, 600],
+    "irradiance_norm": {"kind": "vector_length", "value": 1.0},
+    "states": [{"k_r_per_s": 0.1, "k_e_per_s": [0.1, 0.2], "reradiation": [1.0, 2.0]}],
+}
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        ("states: [{k_r_per_s: 0.1, reradiation: [1.0]}]", "expected 2 values, one for each band"),
+        ("states: [{k_r_per_s: 0}]", "greater than 0, got '0'"),
+        ("states: [{k_r_per_s: .inf}]", "finite number"),
+        ("states: [{k_r_per_s: 0.1, k_e_pers: [1.0]}]", "did you mean 'k_e_per_s'?"),
+        ("states: [{k_r_per_s: 0.1, r0_sigma: 0.1}]", "expected 'r0' beside 'r0_sigma'"),
+        (
+            "states: [{k_r_per_s: 0.1, reradiation: [1, 2], reradiation_sigma: [1]}]",
+            "expected 2 values in 'reradiation_sigma' as in 'reradiation', got 1",
+        ),
+        ("states: []", "at least 1 item"),
+        ("bands_nm: [500, 400, 600]", "rising wavelengths in 'bands_nm'"),
+        ("bands_nm: null", "expected 0 values"),
+        ("irradiance_norm: null", "expected 'irradiance_norm' beside states.0.k_e_per_s"),
+        ("spectrum: {wavelength_nm: [400, 500], value: [1]}", "expected 2 numbers in 'value'"),
+        ("kind: fluorescent", "'phosphor', got 'fluorescent'"),
+    ],
+)
+def test_refusals_say_what_was_expected(change: str, said: str, tmp_path: Path) -> None:
+    key = change.partition(":")[0]
+    lines = [f"{name}: {value}" for name, value in WHOLE.items() if name != key]
+    path = tmp_path / "sample.yaml"
+    path.write_text("\n".join([*lines, change]).replace("'", ""), encoding="utf-8")
+    with pytest.raises(UsageError) as refusal:
+        read_material(path)
+    assert said in str(refusal.value)
+    assert str(path) in str(refusal.value)
+
+
+def test_unknown_name_gets_a_suggestion() -> None:
+    with pytest.raises(UsageError, match="did you mean 'blue-paint'"):
+        read_material("blu-paint")
+    with pytest.raises(UsageError, match="no such material file"):
+        read_material("mine.yaml")
+
+
+def test_a_file_beside_goes_before_a_shipped_name(tmp_path: Path) -> None:
+    write_material(tmp_path / "bottle", read_material("gloves"))
+    assert material_path("bottle", tmp_path) == tmp_path / "bottle"
+    assert read_material("bottle", tmp_path).name == "gloves"
+    assert material_path("bottle") == shipped_materials()["bottle"]

@@ -1,0 +1,70 @@
+"""The simulated camera's curves differ from the shipped ones as laboratories do."""
+
+import numpy as np
+import pytest
+
+from labrig.errors import UsageError
+from labrig.material.file import Material, State, read_material
+from sim.lamp import CELL_NM, WAVELENGTH_NM
+from sim.optics import CameraCurves, bent_curves, emission, shipped_curves, vignetting
+from sim.phosphor import band_cells
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_curves_are_bent_by_2_to_6_percent(seed: int) -> None:
+    true = shipped_curves().sensitivity
+    bent = bent_curves(np.random.default_rng(seed)).sensitivity
+    assert bent.min() >= 0
+    assert bent.max(axis=1) == pytest.approx(true.max(axis=1))
+    seen = (WAVELENGTH_NM > 400) & (WAVELENGTH_NM < 700)
+    difference = (bent / bent.max(axis=1, keepdims=True))[:, seen]
+    difference -= (true / true.max(axis=1, keepdims=True))[:, seen]
+    rms = np.sqrt((difference**2).mean(axis=1))
+    assert np.all((rms > 0.02) & (rms < 0.06))
+    # Smooth: the difference does not scatter from one 2.5 nm cell to the next.
+    assert np.abs(np.diff(difference, 2, axis=1)).max() < 0.015
+
+
+def test_shipped_curves_peak_where_the_camera_does() -> None:
+    peaks_nm = WAVELENGTH_NM[shipped_curves().sensitivity.argmax(axis=1)]
+    assert peaks_nm == pytest.approx([600, 520, 460], abs=15)
+
+
+def test_bands_are_joined_smoothly() -> None:
+    blue = emission(read_material("blue-paint"))[0]
+    assert np.interp(456.25, WAVELENGTH_NM, blue) == pytest.approx(4.37, rel=0.02)
+    assert np.interp(493.75, WAVELENGTH_NM, blue) == pytest.approx(3.65, rel=0.02)
+    assert blue.min() >= 0
+    assert blue[-1] == 0
+
+
+def test_a_spectrum_gives_the_shape_and_the_bands_the_size() -> None:
+    material = read_material("double-wide")
+    assert material.bands_nm is not None
+    fine = emission(material)
+    cells = band_cells(material.bands_nm)
+    for spectrum, state in zip(fine, material.states, strict=True):
+        assert (cells @ spectrum).sum() * CELL_NM / 37.5 == pytest.approx(
+            sum(state.reradiation or ()), rel=1e-6
+        )
+        assert WAVELENGTH_NM[spectrum.argmax()] == pytest.approx(520, abs=5)
+
+
+def test_electrons_count_light_through_the_aperture() -> None:
+    flat = CameraCurves(np.ones((3, len(WAVELENGTH_NM))))
+    line = np.zeros(len(WAVELENGTH_NM))
+    line[50] = 2.0
+    at_4, at_8 = flat.glow_electrons_per_s(line, 4.0), flat.glow_electrons_per_s(line, 8.0)
+    assert at_4 == pytest.approx(4 * at_8)
+
+
+def test_a_material_that_cannot_glow_is_refused() -> None:
+    fitted = Material(name="fitted", kind="phosphor", states=(State(k_r_per_s=0.1),))
+    with pytest.raises(UsageError, match="fitted: expected 'bands_nm' and 'reradiation'"):
+        emission(fitted)
+
+
+def test_vignetting_is_a_gentle_falloff() -> None:
+    falloff = vignetting(64, 96)
+    assert falloff[31:33, 47:49] == pytest.approx(1.0, abs=1e-3)
+    assert falloff.min() == falloff[0, 0] == pytest.approx(0.85, abs=0.01)
