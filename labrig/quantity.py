@@ -48,7 +48,7 @@ def duration_text(seconds: float) -> str:
     if seconds >= 3600:
         minutes = round(seconds / 60)
         return f"{minutes // 60} h" + (f" {minutes % 60} min" if minutes % 60 else "")
-    if seconds >= 120:
+    if seconds >= 60:
         whole = round(seconds)
         return f"{whole // 60} min" + (f" {whole % 60} s" if whole % 60 else "")
     if seconds >= 1:
@@ -81,6 +81,11 @@ def word_or_duration(*words: str) -> BeforeValidator:
                 return parse(value, TIME_S)
             except ValueError as error:
                 raise ValueError(f"expected {' or '.join(words)}, or a duration; {error}") from None
+        if not isinstance(value, str):
+            raise ValueError(
+                f"expected {' or '.join(words)}, or a duration with its unit such as '5 s', "
+                f"got '{value}'"
+            )
         return value
 
     return BeforeValidator(validate)

@@ -29,7 +29,7 @@ LONGEST_LOG2 = 5
 
 #: XYZ (D65) to camera, row by row, as Adobe gives it for the EOS 5D Mark II; times 10000.
 COLOR_MATRIX = (4716, 603, -830, -7798, 15474, 2480, -1496, 1937, 6651)
-#: The camera's R, G, B of a grey card under a halogen simulated lamp.
+#: R, G, B of a grey card under the simulated lamp, green 1.
 AS_SHOT_NEUTRAL = (Fraction(63, 100), Fraction(1), Fraction(45, 100))
 
 _BYTE, _ASCII, _SHORT, _LONG, _RATIONAL, _UNDEFINED, _SRATIONAL = 1, 2, 3, 4, 5, 7, 10

@@ -1,12 +1,10 @@
 """The `simulation:` section of a rig file: what stands in the simulated dark room."""
 
 from datetime import UTC, datetime
-from pathlib import Path
-from typing import Annotated, Any, Literal, Self
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field
 
-from labrig.material.file import material_path, shipped_materials
 from labrig.quantity import DurationS, Fraction
 from labrig.region import Region
 from labrig.yaml_file import did_you_mean
@@ -140,28 +138,3 @@ class Simulation(_Part):
             else patch
             for patch in self.sample
         )
-
-    def beside(self, folder: Path) -> Self:
-        """The same with materials that are files beside the rig file made absolute paths.
-
-        Parameters
-        ----------
-        folder
-            Of the rig file.
-
-        Raises
-        ------
-        UsageError
-            No such material.
-        """
-        shipped = shipped_materials()
-        located = (
-            patch
-            if patch.material in shipped
-            and material_path(patch.material, folder) == shipped[patch.material]
-            else patch.model_copy(
-                update={"material": str(material_path(patch.material, folder).resolve())}
-            )
-            for patch in self.sample
-        )
-        return self.model_copy(update={"sample": tuple(located)})

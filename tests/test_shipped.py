@@ -21,7 +21,7 @@ for module in ("sim", "drivers.numato", "protocols.decay"):
 for group in (plugins.DRIVERS, plugins.PROTOCOLS):
     for name in plugins.names(group):
         plugins.load(group, name, "test")
-path = plugins.find("config", "sim")
+path = shipped.find("config", "rig", "sim")
 assert path.read_text().startswith("# The simulated rig"), path
 import sim, config
 assert sim.trap and config.trap, "the user's own modules stay importable"

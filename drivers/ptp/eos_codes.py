@@ -69,8 +69,6 @@ def third_stop_codes() -> tuple[int, ...]:
 
 def shutter_code(exposure_s: float, among: Iterable[int]) -> int | None:
     """The Tv code among `among` that means `exposure_s` seconds, true or as on the dial."""
-    if not (math.isfinite(exposure_s) and exposure_s > 0):
-        return None
     off_stops = {
         code: abs(math.log2(time_s / exposure_s))
         for code in among

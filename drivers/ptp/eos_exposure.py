@@ -73,8 +73,9 @@ class EosExposure:
         Raises
         ------
         DeviceError
-            It is at bulb, at automatic ISO, or at something unknown.
+            It is at bulb, at automatic ISO, at something unknown, or its dial not at M.
         """
+        self._require_manual()
         tv, iso, av = (
             self._state.value(prop)
             for prop in (Property.shutter_time, Property.iso, Property.aperture)
@@ -88,6 +89,11 @@ class EosExposure:
         return ExposureSettings(exposure_s, ISOS[iso], f_number)
 
     def _codes_of(self, wanted: ExposureSettings) -> dict[Property, int]:
+        if not wanted.exposure_s > 0:
+            raise DeviceError(
+                f"expected a shutter time longer than 0 s, asked for {wanted.exposure_s} s: "
+                "correct the protocol"
+            )
         shutter = shutter_code(wanted.exposure_s, self._shutter_codes())
         iso = iso_code(wanted.iso, self._iso_codes())
         if shutter is None or iso is None:

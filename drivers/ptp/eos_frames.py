@@ -8,6 +8,7 @@ from labrig.errors import DeviceError
 from .eos_events import ObjectOffered
 from .eos_state import POLL_PERIOD_S, EosState
 from .eos_transfer import EosTransfer
+from .failures import RefusedError
 from .session import USUAL
 
 _SUFFIX = re.compile(r"\.[a-z0-9]{1,5}")
@@ -95,7 +96,11 @@ class EosFrames:
         """
         self._state.refresh(USUAL.busy_s + self.exposing_for_s())
         for offered in self._state.offered:
-            self._settle(offered)
+            try:
+                self._settle(offered)
+            except RefusedError:
+                self._state.forget(offered)  # else it would be refused, and in the way, for ever
+                raise
 
     def _wait(self) -> bool:
         deadline_s = (self._due_after_s or self._clock.now()) + self._timeout_s

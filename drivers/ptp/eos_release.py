@@ -1,11 +1,12 @@
 """The release button of an EOS: two stages, or one on older cameras."""
 
 from abc import ABC, abstractmethod
-from contextlib import suppress
+from enum import Enum, auto
 
 from .device_info import DeviceInfo
 from .eos_protocol import Eos
 from .failures import RefusedError
+from .ptp_codes import DEVICE_BUSY
 from .session import Patience, Reply, Session
 
 HALF, FULL = 1, 2
@@ -21,13 +22,20 @@ _RESULTS = {
 }
 
 
+class Stage(Enum):
+    """Where a stage of the button is, as far as is known."""
+
+    UP = auto()
+    #: A press was sent, and not answered with OK.
+    UNKNOWN = auto()
+    DOWN = auto()
+
+
 class Release(ABC):
-    """Presses and lets go. Remembers what may be down, so that it can be let go after anything."""
+    """Presses and lets go, and can let go after anything."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
-        self.half_down = False
-        self.full_down = False
 
     @abstractmethod
     def press_half(self) -> None:
@@ -61,43 +69,46 @@ class Release(ABC):
 class TwoStageRelease(Release):
     """RemoteReleaseOn and Off: the first stage can be held, the second acts at once."""
 
+    def __init__(self, session: Session) -> None:
+        super().__init__(session)
+        self._stages = {HALF: Stage.UP, FULL: Stage.UP}
+
     def press_half(self) -> None:
-        if not self.half_down:
-            self.half_down = True
+        if self._stages[HALF] is not Stage.DOWN:
             self._press(HALF, Patience(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
 
     def press_full(self, exposure_s: float) -> Reply:
-        self.full_down = True
         # some cameras answer when the shutter has closed
         return self._press(FULL, Patience(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S))
 
     def let_go_full(self, busy_s: float) -> None:
-        if self.full_down:
-            self._let_go(FULL, busy_s)
-            self.full_down = False
+        self._let_go(FULL, busy_s)
 
     def let_go_half(self, busy_s: float) -> None:
-        if self.half_down:
-            self._let_go(HALF, busy_s)
-            self.half_down = False
+        self._let_go(HALF, busy_s)
 
     def let_go_blindly(self) -> None:
-        for stage in (FULL, HALF):
-            with suppress(RefusedError):  # it was not down
-                self._let_go(stage, LATE_PRESS_S)
-        self.half_down = self.full_down = False
+        self._stages = {HALF: Stage.UNKNOWN, FULL: Stage.UNKNOWN}
+        self._let_go(FULL, LATE_PRESS_S)
+        self._let_go(HALF, LATE_PRESS_S)
 
     def _press(self, stage: int, patience: Patience) -> Reply:
-        try:
-            return self._session.transact(Eos.RemoteReleaseOn, stage, 0, patience=patience)
-        except RefusedError:
-            self.half_down = self.half_down and stage != HALF
-            self.full_down = self.full_down and stage != FULL
-            raise
+        self._stages[stage] = Stage.UNKNOWN
+        reply = self._session.transact(Eos.RemoteReleaseOn, stage, 0, patience=patience)
+        self._stages[stage] = Stage.DOWN
+        return reply
 
     def _let_go(self, stage: int, busy_s: float) -> None:
+        if self._stages[stage] is Stage.UP:
+            return
         patience = Patience(answer_s=FOCUS_S, busy_s=busy_s)
-        self._session.transact(Eos.RemoteReleaseOff, stage, patience=patience)
+        try:
+            self._session.transact(Eos.RemoteReleaseOff, stage, patience=patience)
+        except RefusedError as refusal:
+            # a camera may refuse to let go of what was never down
+            if self._stages[stage] is Stage.DOWN or refusal.code == DEVICE_BUSY:
+                raise
+        self._stages[stage] = Stage.UP
 
 
 class OneStageRelease(Release):

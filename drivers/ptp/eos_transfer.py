@@ -6,7 +6,8 @@ from labrig.errors import DeviceError
 from .device_info import DeviceInfo
 from .eos_events import ObjectOffered
 from .eos_protocol import Eos
-from .ptp_codes import Standard
+from .failures import RefusedError
+from .ptp_codes import INVALID_OBJECT_HANDLE, Standard
 from .session import Patience, Session
 
 CHUNK_BYTES = 1024 * 1024
@@ -54,7 +55,12 @@ class EosTransfer:
         DeviceError
             The camera did not take it.
         """
-        self._session.transact(Eos.TransferComplete, offered.handle, patience=PATIENT)
+        try:
+            self._session.transact(Eos.TransferComplete, offered.handle, patience=PATIENT)
+        except RefusedError as refusal:
+            # it has forgotten it: it heard an earlier attempt, whose answer was lost
+            if refusal.code != INVALID_OBJECT_HANDLE:
+                raise
 
     def _piece(self, offered: ObjectOffered, offset: int, size: int) -> bytes:
         if self._chunked is None:

@@ -3,6 +3,7 @@
 from enum import IntEnum
 
 OK = 0x2001
+INVALID_OBJECT_HANDLE = 0x2009
 DEVICE_BUSY = 0x2019
 SESSION_ALREADY_OPEN = 0x201E
 
@@ -16,7 +17,7 @@ _RESPONSES = {
     0x2006: "ParameterNotSupported",
     0x2007: "IncompleteTransfer",
     0x2008: "InvalidStorageID",
-    0x2009: "InvalidObjectHandle",
+    INVALID_OBJECT_HANDLE: "InvalidObjectHandle",
     0x200A: "DevicePropNotSupported",
     0x200C: "StoreFull",
     0x200F: "AccessDenied",

@@ -47,34 +47,6 @@ def _import(entry: EntryPoint) -> Any:
     return entry.load()
 
 
-def find(folder: str, name_or_path: str) -> Path:
-    """File of a shipped name (`decay`, `sim`), or the path as given.
-
-    Parameters
-    ----------
-    folder
-        Shipped folder where names live: `protocols` or `config`.
-
-    Raises
-    ------
-    UsageError
-        Neither a shipped name nor a file.
-    """
-    given = Path(name_or_path)
-    if given.suffix in {".yaml", ".yml"} or len(given.parts) > 1:
-        if not given.is_file():
-            raise UsageError(f"{given}: no such file")
-        return given
-    known = {path.stem: path for path in sorted(shipped.folder(folder).glob("*.yaml"))}
-    if name_or_path not in known:
-        kind = "rig" if folder == "config" else "protocol"
-        raise UsageError(
-            f"no shipped {kind} is called '{name_or_path}'; "
-            f"{did_you_mean(name_or_path, list(known))}; a file of your own ends in .yaml"
-        )
-    return known[name_or_path]
-
-
 def read_protocol(path: Path) -> ProtocolModel:
     """Read and check a protocol file by the model that its key `protocol` names.
 

@@ -1,14 +1,14 @@
 """The rig file: which driver at which address, and how long each device takes to warm up."""
 
 from pathlib import Path
-from typing import Any, Self
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire.roles import ROLES
 from labrig.errors import UsageError
 from labrig.quantity import DurationS
-from labrig.yaml_file import did_you_mean, read_model
+from labrig.yaml_file import did_you_mean, read_yaml, validate
 
 
 class DeviceEntry(BaseModel):
@@ -46,36 +46,33 @@ class RigFile(BaseModel):
         None, description="only in a simulated rig: what is in the simulated room"
     )
 
-    def anchored(self, folder: Path) -> Self:
-        """The same rig with files beside it named by absolute paths, so that it can be copied."""
-        content = self.model_dump()
-        for key in ("optics", "simulation"):
-            content[key] = _anchor(content[key], folder)
-        return self.model_validate(content)
 
-
-def _anchor(value: Any, folder: Path) -> Any:
-    if isinstance(value, dict):
-        return {key: _anchor(inner, folder) for key, inner in value.items()}
-    if isinstance(value, list):
-        return [_anchor(inner, folder) for inner in value]
-    if isinstance(value, str) and Path(value).suffix and (folder / value).is_file():
-        return str(folder / value)
-    return value
 
 
 def read_rig_file(path: Path) -> RigFile:
     """Read and check a rig file, all but its drivers' own keys.
+
+    Files beside it are named by absolute paths in what is returned, so that it can be copied.
 
     Raises
     ------
     UsageError
         One line that names the file and the key.
     """
-    rig = read_model(path, RigFile)
+    rig = validate(_anchored(read_yaml(path), path.resolve().parent), RigFile, str(path))
     for key in rig.devices:
         if key not in ROLES:
             raise UsageError(
                 f"{path}: unknown device '{key}' under 'devices'; {did_you_mean(key, list(ROLES))}"
             )
     return rig
+
+
+def _anchored(value: Any, folder: Path) -> Any:
+    if isinstance(value, dict):
+        return {key: _anchored(inner, folder) for key, inner in value.items()}
+    if isinstance(value, list):
+        return [_anchored(inner, folder) for inner in value]
+    if isinstance(value, str) and Path(value).suffix and (folder / value).is_file():
+        return str(folder / value)
+    return value

@@ -33,13 +33,12 @@ def process(
 
 def process_and_tell(run: Path, choices: "Choices | None" = None, *, json: bool) -> None:
     """Process the run in `run` and print what came out."""
-    import json as json_format
-
     from labrig.process import process_run
 
     result = process_run(run, choices)
     if json:
-        typer.echo(json_format.dumps({name: fit.to_json() for name, fit in result.fits.items()}))
+        fits = ", ".join(f'"{name}": {fit.to_json()}' for name, fit in result.fits.items())
+        typer.echo(f"{{{fits}}}")
         return
     for name, fit in result.fits.items():
         typer.echo(f"{name}\n{fit}")

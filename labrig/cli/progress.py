@@ -72,7 +72,8 @@ class _State:
         now_s = begins_s + self._elapsed_s()
         for step in self.plan.steps:
             if step.unit == self.unit and step.at_s > now_s + 0.1:
-                return f"{step.action} in {duration_text(step.at_s - now_s)}"
+                what = step.action if step.device in ("-", "camera") else f"{step.device} {step.action}"
+                return f"{what} in {_countdown(step.at_s - now_s)}"
         following = self.plan.units[self.number :]
         return f"unit {following[0]}" if following else "the report"
 
@@ -112,7 +113,7 @@ class PlainProgress:
         self._say(f"warning: {text}")
 
     def _say(self, text: str) -> None:
-        left = duration_text(self._state.left_s())
+        left = _countdown(self._state.left_s())
         print(f"[{left} left] {text}", file=sys.stderr, flush=True)
 
 
@@ -148,9 +149,13 @@ class LiveProgress:
         table.add_row(Text("unit", style="dim"), f"{state.unit}  ({state.number} of {self._total})")
         countdown = ""
         if state.until_s is not None:
-            countdown = f"  ({duration_text(max(state.until_s - state.clock.now(), 0.0))} to go)"
+            countdown = f"  ({_countdown(state.until_s - state.clock.now())} to go)"
         table.add_row(Text("now", style="dim"), Text(state.doing + countdown, style="bold"))
         table.add_row(Text("next", style="dim"), state.next_step())
         table.add_row(Text("frames", style="dim"), f"{state.frames} of {state.plan.frames}")
-        table.add_row(Text("lab time left", style="dim"), duration_text(state.left_s()))
+        table.add_row(Text("lab time left", style="dim"), _countdown(state.left_s()))
         return table
+
+
+def _countdown(seconds: float) -> str:
+    return duration_text(max(round(seconds), 0)) if seconds >= 1 else "0 s"

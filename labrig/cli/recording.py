@@ -52,7 +52,7 @@ class Recording:
             The frames will not fit.
         """
         protocol = plugins.read_protocol(protocol_path)
-        rig = read_rig_file(rig_path).anchored(rig_path.resolve().parent)
+        rig = read_rig_file(rig_path)
         laid_out = plan(protocol, rig, str(rig_path))
         free_bytes = shutil.disk_usage(_existing(runs)).free
         if laid_out.size_bytes + SPARE_BYTES > free_bytes:

@@ -1,9 +1,12 @@
 """`labrig run`, `labrig plan`, `labrig resume`: protocols on a rig."""
 
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Annotated
 
 import typer
+
+if TYPE_CHECKING:
+    from labrig.cli.recording import Recording
 
 Protocol = Annotated[
     str, typer.Argument(help="A shipped protocol, such as 'decay', or a path to a YAML file.")
@@ -28,24 +31,12 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
-    from labrig.acquire import plugins
-    from labrig.cli.recording import Recording
-
-    recording = Recording.prepare(
-        plugins.find("protocols", protocol), plugins.find("config", rig), runs
-    )
-    folder = recording.record()
-    _finish(folder, no_process, json)
+    _finish(_prepared(protocol, rig, runs).record(), no_process, json)
 
 
 def plan(protocol: Protocol, rig: RigOption, runs: Runs = Path("runs")) -> None:
     """Print what a protocol will do, how long it takes and what it needs; touch nothing."""
-    from labrig.acquire import plugins
-    from labrig.cli.recording import Recording
-
-    recording = Recording.prepare(
-        plugins.find("protocols", protocol), plugins.find("config", rig), runs
-    )
+    recording = _prepared(protocol, rig, runs)
     for line in recording.plan.lines():
         typer.echo(line)
     typer.echo(recording.summary())
@@ -60,6 +51,15 @@ def resume(
     from labrig.cli.recording import resume_run
 
     _finish(resume_run(run), no_process, json)
+
+
+def _prepared(protocol: str, rig: str, runs: Path) -> "Recording":
+    from labrig import shipped
+    from labrig.cli.recording import Recording
+
+    return Recording.prepare(
+        shipped.find("protocols", "protocol", protocol), shipped.find("config", "rig", rig), runs
+    )
 
 
 def _finish(folder: Path, no_process: bool, json: bool) -> None:

@@ -12,8 +12,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig import shipped
-from labrig.errors import UsageError
-from labrig.yaml_file import did_you_mean, read_model, write_yaml
+from labrig.yaml_file import read_model, write_yaml
 
 Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
@@ -151,50 +150,20 @@ class Material(_Part):
         return self
 
 
-def read_material(name: str | os.PathLike[str], beside: Path | None = None) -> Material:
-    """The material in a file, or the shipped one of that name.
-
-    Parameters
-    ----------
-    name
-        Absolute path, path relative to `beside`, or shipped name such as `blue-paint`.
-    beside
-        Folder of the file that mentions the material; default the current one.
+def read_material(name_or_path: str | os.PathLike[str]) -> Material:
+    """The material in a file, or the shipped one of that name, such as `blue-paint`.
 
     Raises
     ------
     UsageError
         No such material, or its file is malformed.
     """
-    return read_model(material_path(name, beside), Material)
+    return read_model(shipped.find("config/materials", "material", name_or_path), Material)
 
 
 def write_material(path: Path, material: Material) -> None:
     """Write `material` so that `read_material` gives it back."""
     write_yaml(path, material)
-
-
-def material_path(name: str | os.PathLike[str], beside: Path | None = None) -> Path:
-    """Where the material called `name` stands; see `read_material`."""
-    text = os.fspath(name)
-    path = (beside or Path()) / text
-    if path.is_file():
-        return path
-    known = shipped_materials()
-    if text in known:
-        return known[text]
-    if Path(text).suffix in (".yaml", ".yml") or Path(text).name != text:
-        raise UsageError(
-            f"{path}: no such material file; give a path, or a shipped name "
-            f"({', '.join(sorted(known))})"
-        )
-    raise UsageError(f"expected a material, got '{text}'; {did_you_mean(text, sorted(known))}")
-
-
-def shipped_materials() -> dict[str, Path]:
-    """Name and file of every material that comes with labrig."""
-    folder = shipped.folder("config") / "materials"
-    return {path.stem: path for path in sorted(folder.glob("*.yaml"))}
 
 
 def _rising(values: tuple[float, ...], name: str) -> None:

@@ -53,10 +53,12 @@ class CameraResponse:
         residual is 9, 9 and 16 % RMS of x̄, ȳ, z̄; emissions 50-100 nm wide come out within a median
         ΔE*ab of 18, daylight within 1 %. Good for showing a glow, not for measuring its colour.
         """
+        step_nm = np.gradient(self.wavelength_nm)
         target = colour_matching(self.wavelength_nm)
-        gram = self.sensitivity.T @ self.sensitivity
-        fitted = np.linalg.solve(gram, self.sensitivity.T @ target).T
-        white, goal = self.sensitivity.sum(axis=0), target.sum(axis=0)
+        weighted = self.sensitivity.T * step_nm
+        gram = weighted @ self.sensitivity
+        fitted = np.linalg.solve(gram, weighted @ target).T
+        white, goal = weighted.sum(axis=1), step_nm @ target
         direction = np.linalg.solve(gram, white)
         matrix = fitted + np.outer(goal - fitted @ white, direction / (white @ direction))
         scaled: FloatArray = matrix * white.max() / goal[1]
@@ -64,7 +66,8 @@ class CameraResponse:
 
     def response(self, spectrum: FloatArray) -> FloatArray:
         """Camera values of a spectrum given at `wavelength_nm`, shape (3,), relative."""
-        return np.asarray(np.trapezoid(self.sensitivity.T * spectrum, self.wavelength_nm, axis=1))
+        values: FloatArray = (spectrum * np.gradient(self.wavelength_nm)) @ self.sensitivity
+        return values
 
 
 def shipped_cameras() -> dict[str, Path]:

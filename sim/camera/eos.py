@@ -82,6 +82,7 @@ class EosBody:
         self.objects.forget_memory()
         self._is_remote = False
         self._host_shots = 0
+        self._count_shots(0.0)
 
     def set_remote_mode(self, mode: int) -> ResponseCode:
         """SetRemoteMode."""

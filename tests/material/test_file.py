@@ -7,6 +7,7 @@ import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
 
+from labrig import shipped
 from labrig.errors import UsageError
 from labrig.material.file import (
     IrradianceNorm,
@@ -14,9 +15,7 @@ from labrig.material.file import (
     Provenance,
     Spectrum,
     State,
-    material_path,
     read_material,
-    shipped_materials,
     write_material,
 )
 
@@ -79,7 +78,7 @@ def test_written_and_read_is_the_same(material: Material, tmp_path: Path) -> Non
     assert read_material(path) == material
 
 
-@pytest.mark.parametrize("name", list(shipped_materials()))
+@pytest.mark.parametrize("name", list(shipped.names("config/materials")))
 def test_shipped_materials_are_complete(name: str) -> None:
     material = read_material(name)
     assert material.name == name
@@ -88,7 +87,7 @@ def test_shipped_materials_are_complete(name: str) -> None:
 
 
 def test_table_1_is_shipped() -> None:
-    assert set(TABLE_1.split()) <= set(shipped_materials())
+    assert set(TABLE_1.split()) <= set(shipped.names("config/materials"))
     blue = read_material("blue-paint")
     assert blue.bands_nm == pytest.approx([400 + 37.5 * i for i in range(9)])
     (state,) = blue.states
@@ -100,7 +99,7 @@ def test_table_1_is_shipped() -> None:
 
 
 def test_double_exponentials_span_the_ratios() -> None:
-    doubles = [read_material(n) for n in shipped_materials() if n.startswith("double-")]
+    doubles = [read_material(n) for n in shipped.names("config/materials") if n.startswith("double-")]
     rates = [[state.k_r_per_s for state in material.states] for material in doubles]
     assert sorted(round(fast / slow, 6) for fast, slow in rates) == [2.5, 2.5, 5, 5, 20, 20]
     assert max(1 / slow for _, slow in rates) > 180
@@ -155,8 +154,11 @@ def test_unknown_name_gets_a_suggestion() -> None:
         read_material("mine.yaml")
 
 
-def test_a_file_beside_goes_before_a_shipped_name(tmp_path: Path) -> None:
+def test_a_bare_word_is_the_shipped_one_whatever_lies_here(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
     write_material(tmp_path / "bottle", read_material("gloves"))
-    assert material_path("bottle", tmp_path) == tmp_path / "bottle"
-    assert read_material("bottle", tmp_path).name == "gloves"
-    assert material_path("bottle") == shipped_materials()["bottle"]
+    write_material(tmp_path / "bottle.yaml", read_material("gloves"))
+    monkeypatch.chdir(tmp_path)
+    assert read_material("bottle").name == "bottle"
+    assert read_material("bottle.yaml").name == "gloves"

@@ -7,7 +7,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 from scipy.special import hyp1f1
 
-from labrig.material.file import read_material, shipped_materials
+from labrig import shipped
+from labrig.material.file import read_material
 from sim.lamp import BURNING_K, WAVELENGTH_NM, Lamp, filament_spectrum
 from sim.phosphor import Phosphor, band_cells, phosphor
 from sim.simulation import LampSettings
@@ -76,7 +77,7 @@ def test_dark_decay_over_ten_lifetimes() -> None:
 
 
 def test_table_1_is_neither_hardly_nor_fully_charged_by_the_default_lamp() -> None:
-    names = [n for n in shipped_materials() if n != "power-law"]
+    names = [n for n in shipped.names("config/materials") if n != "power-law"]
     materials = [read_material(name) for name in names]
     states = phosphor(materials, [None] * len(names), STEADY.irradiance)
     lamp = Lamp.found(STEADY, on=True)

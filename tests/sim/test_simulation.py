@@ -67,14 +67,3 @@ def test_mistakes_are_named(text: str, said: str) -> None:
     with pytest.raises(UsageError) as refusal:
         parsed(text)
     assert said in str(refusal.value)
-
-
-def test_materials_beside_the_rig_are_found_from_elsewhere(tmp_path: Path) -> None:
-    write_material(tmp_path / "mine.yaml", read_material("gloves"))
-    mine, bottle = (
-        parsed("sample: [{material: mine.yaml}, {material: bottle}]").beside(tmp_path).patches
-    )
-    assert Path(mine.material) == (tmp_path / "mine.yaml").resolve()
-    assert bottle.material == "bottle"
-    with pytest.raises(UsageError, match="did you mean 'bottle'"):
-        parsed("sample: botle").beside(tmp_path)

@@ -7,6 +7,7 @@ import numpy as np
 from labrig.fit.decay.diagnostics import (
     Misfit,
     misfit_warnings,
+    offset_warning,
     rising_warning,
     state_warnings,
 )
@@ -141,6 +142,21 @@ def _covariances(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, Floa
     return covariance, log_rate_covariance
 
 
+def _misfit(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> Misfit:
+    series, joint = data.series, fit.joint
+    frames = joint.frame_residuals(data)
+    n_frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
+    n_channels = len(series.channels)
+    residuals = joint.least_squares.residuals[: series.values.size]
+    return Misfit(
+        frames=frames,
+        frame_dof=n_frames - len(joint.shape) - int(series.has_offset),
+        colour_chi2=max(float(residuals @ residuals - frames @ frames), 0.0),
+        colour_dof=series.n_values - n_frames - (n_channels - 1) if n_channels > 1 else 0,
+        noise_dof=evidence.noise.dof if evidence.noise_estimated else np.inf,
+    )
+
+
 def _warnings(
     data: WhitenedSeries,
     fit: StatesFit,
@@ -171,23 +187,11 @@ def _warnings(
             f"{n} exponential{'s' if n > 1 else ''}: the rates are descriptive only, "
             "do not extrapolate them beyond the times recorded"
         )
-    frames = joint.frame_residuals(data)
-    spare = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
-    own = len(joint.shape) + int(series.has_offset)
-    more = (
-        "allow more states" if fit.n_states < evidence.max_states else "look for a power law"
-    )
+    more = "allow more states" if fit.n_states < evidence.max_states else "look for a power law"
     warnings += misfit_warnings(
-        Misfit(
-            chi2=joint.chi2,
-            dof=_dof(fit, data),
-            frames=frames,
-            frame_dof=spare - own,
-            noise_dof=evidence.noise.dof if evidence.noise_estimated else np.inf,
-        ),
-        fit.n_states,
-        f"{more}, and check background and times",
+        _misfit(data, fit, evidence), fit.n_states, f"{more}, and check background and times"
     )
+    warnings += offset_warning(joint.offset, series.offset_sigma)
     low, high = series.log_rate_bounds
     warnings += state_warnings(
         states,

@@ -16,6 +16,7 @@ ILL_DETERMINED = 0.3
 #: Two log rates closer than this many σ are one as far as the data know.
 APART_SIGMAS = 3.0
 RISING_SIGMAS = 5.0
+OFFSET_SIGMAS = 4.0
 
 
 @dataclass(frozen=True)
@@ -24,20 +25,20 @@ class Misfit:
 
     Attributes
     ----------
-    chi2, dof
-        Of all values.
     frames
         (n,) residual along the signal by rising time, unit variance.
     frame_dof
         Degrees of freedom of `frames`.
+    colour_chi2, colour_dof
+        Of the residuals across the signal; 0 for one channel.
     noise_dof
         Degrees of freedom of the noise's own estimate; inf if σ and flicker were given.
     """
 
-    chi2: float
-    dof: int
     frames: FloatArray
     frame_dof: int
+    colour_chi2: float
+    colour_dof: int
     noise_dof: float
 
 
@@ -56,13 +57,12 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
     warnings = []
     p_order = order_p_value(misfit.frames)
     if p_order < MISFIT_LEVEL:
-        exponentials = "one exponential" if n_states == 1 else f"{n_states} exponentials"
+        subject = "1 exponential does" if n_states == 1 else f"{n_states} exponentials do"
         warnings.append(
-            f"{exponentials} do not describe this decay: neighbouring residuals agree "
+            f"{subject} not describe this decay: neighbouring residuals agree "
             f"(p = {p_order:.1g}); {remedy}"
         )
     frame_chi2 = float(misfit.frames @ misfit.frames)
-    colour_dof = misfit.dof - misfit.frame_dof
     frame_p = _excess_p_value(frame_chi2, misfit.frame_dof, misfit.noise_dof)
     if frame_p < MISFIT_LEVEL <= p_order:
         factor = np.sqrt(frame_chi2 / misfit.frame_dof)
@@ -70,12 +70,11 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
             f"frames scatter {factor:.2g} times as much as σ and flicker explain; every σ given "
             "here is too small by about that: estimate the flicker (flicker=None) or check σ"
         )
-    if colour_dof > 0:
-        colour_chi2 = max(misfit.chi2 - frame_chi2, 0.0)
-        if _excess_p_value(colour_chi2, colour_dof, np.inf) < MISFIT_LEVEL:
+    if misfit.colour_dof > 0:
+        if _excess_p_value(misfit.colour_chi2, misfit.colour_dof, np.inf) < MISFIT_LEVEL:
             warnings.append(
                 "the colour changes during the decay more than σ allows (reduced χ² between the "
-                f"channels {colour_chi2 / colour_dof:.3g}): check dark level and σ of each channel, "
+                f"channels {misfit.colour_chi2 / misfit.colour_dof:.3g}): check dark level and σ of each channel, "
                 "or fit the channels one by one"
             )
     return warnings
@@ -167,6 +166,16 @@ def state_warnings(
             "recorded: record longer to be sure of it"
         )
     return warnings
+
+
+def offset_warning(offset: float, prior_sigma: float) -> list[str]:
+    """Whether the fit had to pull the offset away from its prior; both in the same units."""
+    if not 0 < prior_sigma < np.inf or abs(offset) < OFFSET_SIGMAS * prior_sigma:
+        return []
+    return [
+        f"the offset is {abs(offset) / prior_sigma:.0f} times its prior σ from zero: "
+        "check the dark level, or widen offset_sigma"
+    ]
 
 
 def rising_warning(signal: FloatArray, information: FloatArray) -> list[str]:

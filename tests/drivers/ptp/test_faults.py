@@ -10,6 +10,7 @@ from labrig.errors import DeviceError
 
 from .bench import SHORT, Bench, bench, photograph
 from .toy_eos import FULL, HALF, OFF_FULL, OFF_HALF, OPERATIONS, Fault, Key, ToyEos
+from .usb_wire import Wire
 
 STEPS: dict[str, Key] = {
     "set property": (0x9110,),
@@ -111,12 +112,12 @@ def test_make_safe_resets_a_camera_that_cannot_be_cancelled() -> None:
     b.toy.status = 0x2019
     reset = b.toy.control
 
-    def recovers_by_reset(wire: object, request: int, data: bytes) -> bytes:
+    def recovers_by_reset(wire: Wire, request: int, data: bytes) -> bytes:
         if request == 0x66:
             b.toy.status = 0x2001
-        return reset(b.wire, request, data)
+        return reset(wire, request, data)
 
-    b.toy.control = recovers_by_reset  # type: ignore[method-assign, assignment]
+    b.toy.control = recovers_by_reset  # type: ignore[method-assign]
     assert_usable(b, camera)
 
 

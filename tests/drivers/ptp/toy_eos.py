@@ -6,7 +6,8 @@ from enum import Enum, auto
 
 from .usb_wire import PACKET, Wire
 
-OK, GENERAL_ERROR, BUSY, ALREADY_OPEN, CANCELLED = 0x2001, 0x2002, 0x2019, 0x201E, 0x201F
+OK, GENERAL_ERROR, NO_SUCH_OBJECT, BUSY = 0x2001, 0x2002, 0x2009, 0x2019
+ALREADY_OPEN, CANCELLED = 0x201E, 0x201F
 OPERATIONS = (
     0x1001, 0x1002, 0x1003, 0x9107, 0x9110, 0x9114, 0x9115, 0x9116, 0x9117, 0x911A, 0x911D,
     0x9128, 0x9129,
@@ -41,8 +42,8 @@ class ToyEos:
         self.faults: defaultdict[Key, list[Fault]] = defaultdict(list)
         self.log: list[Key] = []
         self.values = {
-            0xD101: _u32(0x28), 0xD102: _u32(0x70), 0xD103: _u32(0x48), 0xD105: _u32(3),
-            0xD106: _u32(1), 0xD11B: _u32(5000), 0xD11C: _u32(2), 0xD120: JPEG, 0xD1B0: _u32(2),
+            0xD101: u32(0x28), 0xD102: u32(0x70), 0xD103: u32(0x48), 0xD105: u32(3),
+            0xD106: u32(1), 0xD11B: u32(5000), 0xD11C: u32(2), 0xD120: JPEG, 0xD1B0: u32(2),
         }  # fmt: skip
         self.lists: dict[int, tuple[int, ...]] = {
             0xD101: (0x28, 0x30),
@@ -89,7 +90,8 @@ class ToyEos:
             self._command = ((code, *params), tid)
             self.log.append((code, *params))
             if code == 0x9110:  # data will follow
-                if self._fault((code,)) is Fault.STALLED:
+                if self.faults[(code,)][:1] == [Fault.STALLED]:
+                    self.faults[(code,)].pop(0)
                     self._stall(wire)
                 return
             self._answer(wire, b"")
@@ -137,10 +139,12 @@ class ToyEos:
         if fault is Fault.UNPLUGGED:
             wire.unplugged = True
             return
+        answer: tuple[int, tuple[int, ...], bytes | None]
         if fault is Fault.BUSY or fault is Fault.REFUSED:
-            code, params, data = (BUSY if fault is Fault.BUSY else GENERAL_ERROR), (), None
+            answer = (BUSY if fault is Fault.BUSY else GENERAL_ERROR), (), None
         else:
-            code, params, data = self._do(wire, key, incoming)
+            answer = self._do(wire, key, incoming)
+        code, params, data = answer
         if fault is Fault.SILENT:
             if data:  # half of the data came
                 whole = (12 + len(data)) // 2 // PACKET * PACKET
@@ -180,7 +184,7 @@ class ToyEos:
             self.session_open = False
         elif operation == 0x9115 and params == (1,):
             self.events = [_value(p, v) for p, v in self.values.items()]
-            self.events += [_list(p, codes) for p, codes in self.lists.items()]
+            self.events += [choices_changed(p, codes) for p, codes in self.lists.items()]
         elif operation == 0x9116:
             data = self._take_events(now_s)
         elif operation == 0x9110:
@@ -194,7 +198,8 @@ class ToyEos:
         elif operation == 0x9104:
             data = self.stored[params[0]]
         elif operation == 0x9117:
-            del self.stored[params[0]]
+            if self.stored.pop(params[0], None) is None:
+                return NO_SUCH_OBJECT, (), None
         elif operation == 0x9128:
             if now_s < self.exposing_until_s:
                 return BUSY, (), None
@@ -240,7 +245,7 @@ class ToyEos:
         return head + codes + bytes(16) + texts
 
 
-def _u32(value: int) -> bytes:
+def u32(value: int) -> bytes:
     return struct.pack("<I", value)
 
 
@@ -253,10 +258,10 @@ def _record(code: int, payload: bytes) -> bytes:
 
 
 def _value(prop: int, value: bytes) -> bytes:
-    return _record(0xC189, _u32(prop) + value)
+    return _record(0xC189, u32(prop) + value)
 
 
-def _list(prop: int, codes: tuple[int, ...]) -> bytes:
+def choices_changed(prop: int, codes: tuple[int, ...]) -> bytes:
     return _record(0xC18A, struct.pack(f"<3I{len(codes)}I", prop, 3, len(codes), *codes))
 
 

@@ -230,6 +230,14 @@ def test_no_room_on_the_host_no_photograph() -> None:
     assert host.do(0x9128, 2, 1).code == 0x200C
 
 
+def test_the_next_host_must_say_again_that_it_has_room() -> None:
+    host = Bench().ready()
+    host.do(0x1003)
+    host.do(0x1002, 1, transaction_id=0)
+    host.do(0x9114, 1)
+    assert host.do(0x9128, 2, 1).code == 0x200C
+
+
 def test_a_capture_to_the_card_is_listed_described_and_deleted() -> None:
     bench = Bench()
     host = bench.ready(TO_CARD)

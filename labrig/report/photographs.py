@@ -1,0 +1,189 @@
+"""RAW frames as small pictures for the page."""
+
+import base64
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import LabrigError, UsageError
+from labrig.record.frames import FrameRecord
+from labrig.reduce import RawFrame, read_raw
+from labrig.region import region_pixels
+from labrig.report.colours import Screen, encoded, into_gamut
+from labrig.report.content import GlowPhotograph, PatchReport
+from labrig.report.written_numbers import rounded
+
+Picture = NDArray[np.float32]
+
+DAYLIGHT_WIDTH = 1000
+GLOW_WIDTH = 420
+JPEG_QUALITY = 88
+#: Share of pixels that may be saturated in a daylight photograph that counts as well exposed.
+BLOWN_SHARE = 0.002
+#: What is shown at full brightness: this quantile of the pixels, so that hot ones do not decide.
+BRIGHT_QUANTILE = 0.995
+#: Noise brightened more than this tells nothing.
+MOST_BRIGHTENED = 4096.0
+
+
+@dataclass(frozen=True)
+class Marked:
+    """A rectangle over a picture, in per mille of its width and height."""
+
+    name: str
+    x: float
+    y: float
+    width: float
+    height: float
+
+
+@dataclass(frozen=True)
+class Daylight:
+    """The photograph under the lamp; `source` is a data URI."""
+
+    source: str
+    width: int
+    height: int
+    marks: tuple[Marked, ...]
+    caption: str
+
+
+@dataclass(frozen=True)
+class GlowPicture:
+    """One photograph of the glow, as it is and brightened; both are data URIs."""
+
+    t_s: float
+    exposure_s: float
+    frame: str
+    source: str
+    brightened_source: str
+    brightened: str
+
+
+def daylight_picture(
+    frames: Sequence[FrameRecord], patches: Sequence[PatchReport], screen: Screen
+) -> Daylight | None:
+    """The longest exposed of `frames` that is not overexposed, with the patches marked.
+
+    None if there is no frame that can be read.
+    """
+    best: tuple[FrameRecord, RawFrame] | None = None
+    for frame in sorted(frames, key=lambda frame: frame.exposure_s):
+        raw = _read(frame.path)
+        if raw is None:
+            continue
+        blown = float(np.mean(raw.mosaic >= raw.white))
+        if best is not None and blown > BLOWN_SHARE:
+            break
+        best = frame, raw
+    if best is None:
+        return None
+    frame, raw = best
+    linear = into_gamut(_small(_binned(raw), DAYLIGHT_WIDTH) @ screen.lamp_lit.T)
+    # Black cloth fills most of such pictures: what is bright should look bright.
+    linear /= max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
+    height, width = linear.shape[:2]
+    return Daylight(
+        source=_jpeg(encoded(linear)),
+        width=width,
+        height=height,
+        marks=_marks(patches, raw),
+        caption=f"Frame {frame.path.name}, {rounded(frame.exposure_s, 3)} s, shown "
+        + ("white balanced for a halogen lamp." if screen.known else "in the camera's own colours."),
+    )
+
+
+def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tuple[GlowPicture, ...]:
+    """Photographs of one decay on one scale of DN/s, and each brightened to be seen."""
+    rates: list[tuple[GlowPhotograph, Picture]] = []
+    for photograph in photographs:
+        raw = _read(photograph.frame.path)
+        if raw is not None:
+            small = _small(_binned(raw), GLOW_WIDTH) / _light_gathered(photograph.frame)
+            linear = into_gamut(small @ screen.glow.T)
+            rates.append((photograph, linear.astype(np.float32)))
+    if not rates:
+        return ()
+    levels = [float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear in rates]
+    full = max(*levels, 1e-9)
+    pictures = []
+    for (photograph, linear), level in zip(rates, levels, strict=True):
+        factor = float(f"{min(full / max(level, 1e-9), MOST_BRIGHTENED):.1e}")
+        pictures.append(
+            GlowPicture(
+                t_s=photograph.t_s,
+                exposure_s=photograph.frame.exposure_s,
+                frame=photograph.frame.path.name,
+                source=_jpeg(encoded(linear / full)),
+                brightened_source=_jpeg(encoded(linear * (factor / full))),
+                brightened=rounded(factor, 2),
+            )
+        )
+    return tuple(pictures)
+
+
+def _read(path: Path) -> RawFrame | None:
+    """The frame, None if it cannot be read: a report must not fail for a picture."""
+    try:
+        return read_raw(path)
+    except LabrigError:
+        return None
+
+
+def _light_gathered(frame: FrameRecord) -> float:
+    """What a frame's values are proportional to, besides the light."""
+    return frame.exposure_s * frame.iso / (frame.f_number or 1.0) ** 2
+
+
+def _binned(raw: RawFrame) -> Picture:
+    """R, G, B of every 2 × 2 cell above black, 1 = saturated, shape (height / 2, width / 2, 3).
+
+    Binning and not demosaicing: the picture is shown smaller anyway, and nothing is invented.
+    """
+    rows, columns = raw.height // 2, raw.width // 2
+    picture = np.zeros((rows, columns, 3), np.float32)
+    for position, colour in enumerate(raw.cfa):
+        plane = raw.mosaic[position // 2 : 2 * rows : 2, position % 2 : 2 * columns : 2]
+        share = 0.5 if colour == "G" else 1.0
+        scale = share / (raw.white - raw.black[position])
+        picture[..., "RGB".index(colour)] += (plane - np.float32(raw.black[position])) * scale
+    return picture
+
+
+def _small(picture: Picture, width: int) -> Picture:
+    """Averaged down to `width` or a little less; never enlarged."""
+    import cv2  # takes a tenth of a second to load
+
+    height_in, width_in = picture.shape[:2]
+    if width_in <= width:
+        return picture
+    size = (width, max(1, round(height_in * width / width_in)))
+    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
+
+
+def _jpeg(rgb: NDArray[np.uint8]) -> str:
+    """As a data URI."""
+    import cv2
+
+    good, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+    if not good:
+        raise RuntimeError("OpenCV could not encode a JPEG")
+    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
+
+
+def _marks(patches: Sequence[PatchReport], raw: RawFrame) -> tuple[Marked, ...]:
+    """Where the patches lie that have a place in the photograph."""
+    marks = []
+    for patch in patches:
+        if patch.region is None:
+            continue
+        try:
+            x, y, wide, high = region_pixels(patch.region, raw.width, raw.height)
+        except UsageError:
+            continue  # photographs of another size than the measured frames
+        across, down = 1000 / raw.width, 1000 / raw.height
+        marks.append(Marked(patch.name, x * across, y * down, wide * across, high * down))
+    return tuple(marks)

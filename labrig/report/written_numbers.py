@@ -1,0 +1,55 @@
+"""Numbers as a laboratory notebook has them: rounded by their uncertainty."""
+
+import math
+
+_SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
+#: Without a power of ten are written values from here …
+SMALLEST_PLAIN = 1e-3
+#: … to here.
+LARGEST_PLAIN = 1e6
+
+
+def plus_minus(value: float, sigma: float) -> str:
+    """`0.03208 ± 0.00027`: σ to two digits, the value to the same place.
+
+    `σ = 0` means that the value was held, a σ that is not finite that nothing is known of it.
+    """
+    if not math.isfinite(value):
+        return "–"
+    if sigma == 0:
+        return f"{rounded(value)} (held)"
+    if not math.isfinite(sigma):
+        return f"{rounded(value, 3)} ± ?"
+    exponent = _exponent(max(abs(value), sigma))
+    plain = SMALLEST_PLAIN <= 10.0**exponent < LARGEST_PLAIN
+    scale = 1.0 if plain else 10.0**exponent
+    decimals = 1 - _exponent(float(f"{sigma / scale:.1e}"))
+    places = max(decimals, 0)
+    written = f"{round(value / scale, decimals):.{places}f} ± {round(sigma / scale, decimals):.{places}f}"
+    written = written.replace("-", "−")
+    return written if plain else f"({written}) × {power_of_ten(exponent)}"
+
+
+def rounded(value: float, digits: int = 4) -> str:
+    """`value` to `digits` significant ones, with a power of ten if very large or small."""
+    if not math.isfinite(value):
+        return "–"
+    if value == 0:
+        return "0"
+    exponent = _exponent(float(f"{value:.{digits - 1}e}"))
+    if SMALLEST_PLAIN <= 10.0**exponent < LARGEST_PLAIN:
+        decimals = digits - 1 - exponent
+        written = f"{round(value, decimals):.{max(decimals, 0)}f}"
+        written = written.rstrip("0").rstrip(".") if "." in written else written
+        return written.replace("-", "−")
+    mantissa = f"{value / 10.0**exponent:.{digits - 1}f}".rstrip("0").rstrip(".")
+    return f"{mantissa.replace('-', '−')} × {power_of_ten(exponent)}"
+
+
+def power_of_ten(exponent: int) -> str:
+    """`10⁻³`."""
+    return "10" + str(exponent).translate(_SUPERSCRIPT)
+
+
+def _exponent(number: float) -> int:
+    return math.floor(math.log10(abs(number)))

@@ -1,0 +1,77 @@
+"""What many tests need: small simulated rigs, quick protocols, the command line in process."""
+
+import signal
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+
+from labrig import shipped
+from labrig.cli.ending import STOP_SIGNALS, guarded
+
+
+@dataclass(frozen=True)
+class Ended:
+    """How a command ended and what it said."""
+
+    code: int
+    out: str
+    err: str
+
+    @property
+    def run_folder(self) -> Path:
+        return Path(self.out.splitlines()[-1])
+
+
+@pytest.fixture
+def labrig(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., Ended]]:
+    """Runs `labrig ARGUMENTS…` in this process."""
+    before = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
+
+    def run(*arguments: object) -> Ended:
+        capfd.readouterr()
+        code = guarded([str(argument) for argument in arguments])
+        said = capfd.readouterr()
+        return Ended(code, said.out, said.err)
+
+    yield run
+    for signum, handler in before.items():
+        signal.signal(signum, handler)
+
+
+@pytest.fixture
+def make_rig(tmp_path: Path) -> Callable[..., Path]:
+    """Writes the shipped simulated rig with a small sensor, changed as told."""
+
+    def write(name: str = "rig.yaml", base: str = "sim", **simulation: object) -> Path:
+        content = yaml.safe_load((shipped.folder("config") / f"{base}.yaml").read_text())
+        content["simulation"] |= {"sensor": {"width": 96, "height": 64}}
+        # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
+        content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+        content["simulation"] |= simulation
+        path = tmp_path / name
+        path.write_text(yaml.safe_dump(content))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def make_protocol(tmp_path: Path) -> Callable[..., Path]:
+    """Writes a short decay protocol, changed as told."""
+
+    def write(name: str = "protocol.yaml", **keys: object) -> Path:
+        content = {
+            "protocol": "decay",
+            "sample": {"name": "test"},
+            "charge": "10 min",
+            "for": "60 s",
+            "exposure": "1 s",
+        } | keys
+        path = tmp_path / name
+        path.write_text(yaml.safe_dump(content))
+        return path
+
+    return write

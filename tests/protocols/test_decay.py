@@ -1,0 +1,148 @@
+"""The decay protocol: its timeline, what it refuses, and what it measures in a simulated room."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+
+from labrig import shipped
+from labrig.acquire import Plan, plan, plugins, read_rig_file
+from labrig.errors import ProtocolError, UsageError
+from labrig.record import read_run
+from labrig.yaml_file import read_yaml
+from tests.conftest import Ended
+
+GOLDEN = Path(__file__).parent / "decay.timeline.txt"
+PROTOCOLS = sorted(path.stem for path in shipped.folder("protocols").glob("*.yaml"))
+
+
+def planned(protocol: Path, rig: str | Path = "sim") -> Plan:
+    rig_path = shipped.find("config", "rig", rig)
+    return plan(plugins.read_protocol(protocol), read_rig_file(rig_path), str(rig_path))
+
+
+def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
+    laid_out = planned(shipped.find("protocols", "protocol", "decay"))
+    assert "\n".join(laid_out.lines()) + "\n" == GOLDEN.read_text()
+
+
+@pytest.mark.parametrize("name", PROTOCOLS)
+def test_every_shipped_protocol_runs_dry(
+    name: str, labrig: Callable[..., Ended], make_rig: Callable[..., Path], tmp_path: Path
+) -> None:
+    base = "sim-eleven" if name == "decay-eleven" else "sim"
+    ended = labrig("run", name, "--rig", make_rig(base=base), "--runs", tmp_path / "runs")
+    assert ended.code == 0, ended.err
+    assert (ended.run_folder / "result" / "report.html").stat().st_size > 10_000
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"exposure": "8 s"}, "does not fit between frames"),
+        ({"exposure": "4.5 s"}, "late"),
+        ({"camera": {"iso": 3200, "f_number": 4}}, "does not offer ISO 3200"),
+        ({"camera": {"iso": 400, "f_number": 1.2}}, "cannot be set to f/1.2"),
+        ({"exposure": "1/100000 s"}, "does not offer an exposure"),
+    ],
+)
+def test_a_plan_that_cannot_work_is_refused(
+    make_protocol: Callable[..., Path], keys: dict[str, object], said: str
+) -> None:
+    with pytest.raises((ProtocolError, UsageError)) as caught:
+        planned(make_protocol(**keys))
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("keys", "said"),
+    [
+        ({"exposur": "1 s"}, "did you mean 'exposure'?"),
+        ({"exposure": "bright"}, "expected auto or grow, or a duration"),
+        ({"exposure": 1}, "exposure"),
+        ({"charge": "forever"}, "expected plateau, or a duration"),
+        ({"for": "3 s"}, "leaves no two frames"),
+        ({"dark": "background"}, "needs the key 'background"),
+        ({"patches": {}}, "patches"),
+        ({"patches": {"a": [0, 0, 10.5, 3]}}, "whole pixels"),
+        ({"states": 4}, "states"),
+        ({"sample": {"nam": "x"}}, "did you mean 'name'?"),
+        ({"repeats": 0}, "repeats"),
+    ],
+)
+def test_a_misspelt_or_impossible_key_is_one_clear_line(
+    make_protocol: Callable[..., Path], keys: dict[str, object], said: str
+) -> None:
+    path = make_protocol(**keys)
+    with pytest.raises(UsageError) as caught:
+        plugins.read_protocol(path)
+    assert str(caught.value).startswith(f"{path}: ")
+    assert said in str(caught.value)
+
+
+def test_a_written_protocol_reads_back_as_itself(make_protocol: Callable[..., Path]) -> None:
+    for keys in ({}, {"charge": "plateau", "exposure": "grow"}, {"dark": "background",
+                 "background": [0, 0, 0.1, 0.1]}):  # fmt: skip
+        protocol = plugins.read_protocol(make_protocol(**keys))
+        path = make_protocol()
+        path.write_text(yaml.safe_dump(protocol.model_dump(mode="json", by_alias=True)))
+        assert plugins.read_protocol(path) == protocol
+
+
+def test_metering_keeps_an_unknown_brightness_from_clipping(
+    labrig: Callable[..., Ended],
+    make_rig: Callable[..., Path],
+    make_protocol: Callable[..., Path],
+    tmp_path: Path,
+) -> None:
+    """Stickers glow several hundred times as bright as green paint after a minute."""
+    for sample in ("stickers", "green-paint"):
+        ended = labrig(
+            "run", make_protocol(exposure="auto"), "--rig", make_rig(sample=sample),
+            "--runs", tmp_path / sample,
+        )  # fmt: skip
+        assert ended.code == 0, ended.err
+        assert "clipped" not in (ended.run_folder / "result" / "series.csv").read_text()
+
+
+def test_growing_exposures_keep_counts_along_the_decay(
+    labrig: Callable[..., Ended],
+    make_rig: Callable[..., Path],
+    make_protocol: Callable[..., Path],
+    tmp_path: Path,
+) -> None:
+    ended = labrig(
+        "run", make_protocol(exposure="grow", grow_at_most=8), "--rig", make_rig(),
+        "--runs", tmp_path / "runs",
+    )  # fmt: skip
+    assert ended.code == 0, ended.err
+    exposures_s = [frame.exposure_s for frame in read_run(ended.run_folder).frames("decay")]
+    assert exposures_s == sorted(exposures_s)
+    assert 3 < exposures_s[-1] / exposures_s[0] <= 8.01
+
+
+def test_a_charge_until_the_plateau_ends_when_the_glow_stops_growing(
+    labrig: Callable[..., Ended],
+    make_rig: Callable[..., Path],
+    make_protocol: Callable[..., Path],
+    tmp_path: Path,
+) -> None:
+    protocol = make_protocol(
+        charge="plateau",
+        plateau={"growth": "3 %", "check_every": "60 s", "at_most": "60 min"},
+    )
+    rig = read_yaml(make_rig())
+    rig["devices"]["lamp"]["warm_up"] = "30 s"
+    path = tmp_path / "cold.yaml"
+    path.write_text(yaml.safe_dump(rig))
+    ended = labrig("run", protocol, "--rig", path, "--runs", tmp_path / "runs")
+    assert ended.code == 0, ended.err
+    run = read_run(ended.run_folder)
+    assert 2 <= len(run.frames("plateau")) < 10
+    times_s = [
+        float(line.split(",")[0])
+        for line in (ended.run_folder / "result" / "series.csv").read_text().splitlines()[1:]
+    ]
+    assert min(times_s) == pytest.approx(0.56, abs=0.03), "time counts from the last lamp-off"
