@@ -33,6 +33,7 @@ if TYPE_CHECKING:
     from labrig.optics import CameraResponse as CameraResponse
     from labrig.optics import read_camera as read_camera
     from labrig.process import Choices as Choices
+    from labrig.process import fit_series as fit_series
     from labrig.process import process_run as process_run
     from labrig.record import RunRecord as RunRecord
     from labrig.record import read_run as read_run
@@ -40,7 +41,6 @@ if TYPE_CHECKING:
     from labrig.reduce import measure as measure
     from labrig.reduce import read_raw as read_raw
     from labrig.reduce import read_series as read_series
-    from labrig.series_fit import fit_series as fit_series
 
 #: Public name → module. Loaded when first used, so that `labrig --help` answers at once.
 _HOME = {
@@ -60,7 +60,7 @@ _HOME = {
     "UsageError": "errors",
     "open_bench": "bench",
     "fit_decay": "fit",
-    "fit_series": "series_fit",
+    "fit_series": "process",
     "measure": "reduce",
     "plan": "acquire",
     "process_run": "process",

@@ -19,6 +19,7 @@ from labrig.acquire.rig_file import DeviceEntry
 from labrig.acquire.roles import ROLES
 from labrig.clock import Clock, SystemClock
 from labrig.errors import DeviceError, UsageError
+from labrig.signals import interrupting
 from labrig.yaml_file import validate
 
 if TYPE_CHECKING:
@@ -45,14 +46,19 @@ class Bench:
     def devices(self) -> Iterator[Rig]:
         """Open all devices, each at once brought to its safe state; safe again at the end.
 
+        Ctrl-C and its like are answered at waits, and never keep the safe state from being reached.
+
         Raises
         ------
         DeviceError
             A device is missing, or cannot confirm that it is safe.
         UsageError
             Another labrig holds one of the addresses.
+        Interrupted
+            Somebody asked to stop.
         """
         with ExitStack() as stack:
+            stack.enter_context(interrupting(self.clock))
             # Entered first, so that ports close after the devices on them are safe.
             transports = stack.enter_context(ExitStack())
             connections = _Connections(self.clock, self.room, transports)

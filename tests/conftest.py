@@ -9,7 +9,8 @@ import pytest
 import yaml
 
 from labrig import shipped
-from labrig.cli.ending import STOP_SIGNALS, guarded
+from labrig.cli.ending import guarded
+from labrig.signals import STOP_SIGNALS
 
 
 @dataclass(frozen=True)

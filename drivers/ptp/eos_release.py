@@ -26,7 +26,7 @@ class Stage(Enum):
     """Where a stage of the button is, as far as is known."""
 
     UP = auto()
-    #: A press was sent, and not answered with OK.
+    #: A command was sent, and not answered with OK.
     UNKNOWN = auto()
     DOWN = auto()
 
@@ -99,14 +99,17 @@ class TwoStageRelease(Release):
         return reply
 
     def _let_go(self, stage: int, busy_s: float) -> None:
-        if self._stages[stage] is Stage.UP:
+        before = self._stages[stage]
+        if before is Stage.UP:
             return
+        self._stages[stage] = Stage.UNKNOWN
         patience = Patience(answer_s=FOCUS_S, busy_s=busy_s)
         try:
             self._session.transact(Eos.RemoteReleaseOff, stage, patience=patience)
         except RefusedError as refusal:
-            # a camera may refuse to let go of what was never down
-            if self._stages[stage] is Stage.DOWN or refusal.code == DEVICE_BUSY:
+            # a camera may refuse to let go of what is not down
+            if before is Stage.DOWN or refusal.code == DEVICE_BUSY:
+                self._stages[stage] = before
                 raise
         self._stages[stage] = Stage.UP
 

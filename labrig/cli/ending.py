@@ -3,23 +3,16 @@
 import os
 import signal
 import sys
-from collections.abc import Iterator, Sequence
-from contextlib import contextmanager
-from types import FrameType
+from collections.abc import Sequence
 
-from labrig.clock import Clock, Interrupted
+from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError
-
-#: What stops a run: Ctrl-C, a shutdown, and Windows' Ctrl-Break.
-STOP_SIGNALS = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name)
-]
-
+from labrig.signals import STOP_SIGNALS, raise_interrupted
 
 def guarded(arguments: Sequence[str]) -> int:
     """Run the command line and return its exit code."""
     for signum in STOP_SIGNALS:
-        signal.signal(signum, _raise_interrupted)
+        signal.signal(signum, raise_interrupted)
     try:
         code = _run(arguments)
         sys.stdout.flush()
@@ -31,21 +24,6 @@ def guarded(arguments: Sequence[str]) -> int:
         for signum in STOP_SIGNALS:
             signal.signal(signum, signal.SIG_IGN)
     return code
-
-
-@contextmanager
-def interrupting(clock: Clock) -> Iterator[None]:
-    """Stop signals are answered at the clock's next wait, never inside a device transaction."""
-
-    def ask(signum: int, frame: FrameType | None) -> None:
-        clock.interrupt(signum)
-
-    before = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
-    try:
-        yield
-    finally:
-        for signum, handler in before.items():
-            signal.signal(signum, handler)
 
 
 def _run(arguments: Sequence[str]) -> int:
@@ -87,7 +65,3 @@ def _fault(error: Exception) -> str:
 def _complain(text: str, code: int) -> int:
     print(f"labrig: {' '.join(text.split())}", file=sys.stderr)
     return code
-
-
-def _raise_interrupted(signum: int, frame: FrameType | None) -> None:
-    raise Interrupted(signum)

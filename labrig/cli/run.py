@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from labrig.cli.recording import Recording
+    from labrig.run import Recording
 
 Protocol = Annotated[
     str, typer.Argument(help="A shipped protocol, such as 'decay', or a path to a YAML file.")
@@ -31,7 +31,9 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
-    _finish(_prepared(protocol, rig, runs).record(), no_process, json)
+    from labrig.cli.progress import progress
+
+    _finish(_prepared(protocol, rig, runs).record(progress), no_process, json)
 
 
 def plan(protocol: Protocol, rig: RigOption, runs: Runs = Path("runs")) -> None:
@@ -48,14 +50,15 @@ def resume(
     json: Json = False,
 ) -> None:
     """Go on with a run that was interrupted: completed units are kept, the rest is done."""
-    from labrig.cli.recording import resume_run
+    from labrig.cli.progress import progress
+    from labrig.run import resume_run
 
-    _finish(resume_run(run), no_process, json)
+    _finish(resume_run(run, progress), no_process, json)
 
 
 def _prepared(protocol: str, rig: str, runs: Path) -> "Recording":
     from labrig import shipped
-    from labrig.cli.recording import Recording
+    from labrig.run import Recording
 
     return Recording.prepare(
         shipped.find("protocols", "protocol", protocol), shipped.find("config", "rig", rig), runs

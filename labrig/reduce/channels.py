@@ -226,8 +226,8 @@ def _channel(name: str, planes: list[_PlaneCount]) -> ChannelStats:
         raise FrameError(
             f"every {name} pixel of the region is marked hot; choose a larger region or newer darks"
         )
-    mean = float(value @ count) / n
-    spread = float(np.square(value - mean) @ count)
+    mean = float(np.sum(value * count)) / n
+    spread = float(np.sum(np.square(value - mean) * count))
     order = np.argsort(value, kind="stable")
     peak = value[order][np.searchsorted(np.cumsum(count[order]), PEAK_QUANTILE * n)]
     variance = sum(plane.noise.mean_variance * float(plane.count.sum()) for plane in planes) / n**2

@@ -39,15 +39,13 @@ def isolated_outliers(
         kernel[down + 2, right + 2] = 1
     greatest = np.asarray(cv2.dilate(window, kernel))
     excess = np.asarray(cv2.subtract(window, greatest))
-    darkest = np.array([float(window.min())])
-    least = min(float(noise.variance_at(darkest)[0]) for noise in noises.values())
-    # Few pixels pass this, and only those are looked at more closely.
-    passed = np.flatnonzero(excess > _ABOVE_ALL_SIGMAS * np.sqrt(least))
+    levels = np.arange(65536, dtype=np.float64)
+    quietest = np.min([noise.variance_at(levels) for noise in noises.values()], axis=0)
+    limit = _ABOVE_ALL_SIGMAS * np.sqrt(quietest)
+    # Compared with one number first, then by level, then closely: each time few are left.
+    passed = np.flatnonzero(excess > int(limit[int(window.min())]))
+    passed = passed[excess.ravel()[passed] > limit[greatest.ravel()[passed]]]
     y, x = np.divmod(passed, window.shape[1])
-    level = greatest[y, x].astype(np.float64)
-    limit = level + _ABOVE_ALL_SIGMAS * _deviation(level, y, x, corner, noises)
-    alone = window[y, x] > limit
-    y, x = y[alone], x[alone]
     level = _median_of_neighbours(window, y, x)
     far = window[y, x] > level + OUTLIER_SIGMAS * _deviation(level, y, x, corner, noises)
     return y[far] + corner[0], x[far] + corner[1]

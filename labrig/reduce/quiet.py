@@ -7,8 +7,8 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 
 _STDERR = 2
-#: LibRaw opens its lines with the name of the file, which for a buffer is this.
-_LIBRAW_PREFIX = b"unknown file:"
+#: How LibRaw's lines begin (it names the file, which a buffer has not), and those of its libjpeg.
+_PREFIXES = (b"unknown file:", b"Corrupt JPEG data:", b"Premature end of JPEG file")
 #: The process has one stderr: two redirections at once would restore each other's.
 _lock = threading.Lock()
 
@@ -33,5 +33,5 @@ def quiet_stderr() -> Iterator[None]:
             os.close(kept)
             caught.seek(0)
             for line in caught:
-                if not line.startswith(_LIBRAW_PREFIX):
+                if not line.startswith(_PREFIXES):
                     os.write(_STDERR, line)

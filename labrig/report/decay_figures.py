@@ -98,10 +98,10 @@ def logarithmic_decay(series: Series, fit: DecayFit | None) -> Figure:
     figure, axes = _axes()
     axes.set_yscale("log", nonpositive="clip")
     _draw(axes, series, fit)
-    low, high = _decades(series)
+    low, high = log_axis_ends(series)
     axes.set_ylim(low, high)
     axes.yaxis.set_major_locator(LogLocator(numticks=8))
-    axes.yaxis.set_major_formatter(FuncFormatter(_decade_text))
+    axes.yaxis.set_major_formatter(FuncFormatter(decade_text))
     axes.yaxis.set_minor_formatter(NullFormatter())
     for number, name in enumerate(series.channels):
         below = series.values[:, number] < low
@@ -122,7 +122,27 @@ def logarithmic_decay(series: Series, fit: DecayFit | None) -> Figure:
 
 def values_below_axis(series: Series) -> int:
     """How many values a logarithmic axis cannot show."""
-    return int(np.count_nonzero(series.values < _decades(series)[0]))
+    return int(np.count_nonzero(series.values < log_axis_ends(series)[0]))
+
+
+def log_axis_ends(series: Series) -> tuple[float, float]:
+    """Lower and upper end of a logarithmic axis."""
+    used = series.values[series.usable] if series.usable.any() else series.values
+    highest = float(used.max())
+    if highest <= 0:
+        return 0.1, 10.0
+    positive = float(series.values[series.values > 0].min())
+    late = np.argsort(series.t_s, kind="stable")[-max(1, len(series.t_s) // 4) :]
+    noise = series.sigma[late][np.isfinite(series.sigma[late])]
+    floor = SHARE_OF_NOISE * float(np.median(noise)) if noise.size else 0.0
+    low = max(positive * 0.7, floor, highest * 10.0**-MOST_DECADES)
+    return min(low, highest / 10), highest * 1.6
+
+
+def decade_text(value: float, _: int | None) -> str:
+    """A decade's tick: `0.01` to `10000`, beyond that a power of ten."""
+    exponent = round(np.log10(value))
+    return f"{value:g}" if -3 <= exponent <= 4 else power_of_ten(exponent)
 
 
 def _axes() -> tuple[Figure, Axes]:
@@ -219,25 +239,3 @@ def _legend(figure: Figure, series: Series, fit: DecayFit | None) -> None:
         columnspacing=1.3,
         borderaxespad=0.4,
     )
-
-
-def _decades(series: Series) -> tuple[float, float]:
-    """Lower and upper end of a logarithmic axis."""
-    used = series.values[series.usable] if series.usable.any() else series.values
-    highest = float(used.max())
-    if highest <= 0:
-        return 0.1, 10.0
-    positive = float(series.values[series.values > 0].min())
-    late = np.argsort(series.t_s, kind="stable")[-max(1, len(series.t_s) // 4) :]
-    noise = series.sigma[late]
-    floor = SHARE_OF_NOISE * float(np.median(noise[np.isfinite(noise)])) if np.isfinite(
-        noise
-    ).any() else 0.0
-    low = max(positive * 0.7, floor, highest * 10.0**-MOST_DECADES)
-    return min(low, highest / 10), highest * 1.6
-
-
-def _decade_text(value: float, _: int | None) -> str:
-    """`0.01` to `10000`, beyond that a power of ten."""
-    exponent = round(np.log10(value))
-    return f"{value:g}" if -3 <= exponent <= 4 else power_of_ten(exponent)

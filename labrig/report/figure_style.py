@@ -57,9 +57,9 @@ def channel_colour(name: str, number: int) -> str:
     return CHANNEL.get(name, OTHER_CHANNELS[number % len(OTHER_CHANNELS)])
 
 
-def new_figure(height_pt: float) -> Figure:
-    """An empty, transparent figure of the usual width."""
-    figure = Figure(figsize=(WIDTH_PT / 72, height_pt / 72), dpi=72)
+def new_figure(height_pt: float, width_pt: float = WIDTH_PT) -> Figure:
+    """An empty, transparent figure."""
+    figure = Figure(figsize=(width_pt / 72, height_pt / 72), dpi=72)
     figure.patch.set_visible(False)
     return figure
 

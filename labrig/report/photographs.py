@@ -31,8 +31,9 @@ MOST_BRIGHTENED = 4096.0
 
 @dataclass(frozen=True)
 class Marked:
-    """A rectangle over a picture, in per mille of its width and height."""
+    """A rectangle over a picture, in its pixels; `number` counts the patches from 1."""
 
+    number: int
     name: str
     x: float
     y: float
@@ -90,7 +91,7 @@ def daylight_picture(
         source=_jpeg(encoded(linear)),
         width=width,
         height=height,
-        marks=_marks(patches, raw),
+        marks=_marks(patches, raw, width, height),
         caption=f"Frame {frame.path.name}, {rounded(frame.exposure_s, 3)} s, shown "
         + ("white balanced for a halogen lamp." if screen.known else "in the camera's own colours."),
     )
@@ -174,16 +175,19 @@ def _jpeg(rgb: NDArray[np.uint8]) -> str:
     return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
 
 
-def _marks(patches: Sequence[PatchReport], raw: RawFrame) -> tuple[Marked, ...]:
+def _marks(
+    patches: Sequence[PatchReport], raw: RawFrame, width: int, height: int
+) -> tuple[Marked, ...]:
     """Where the patches lie that have a place in the photograph."""
     marks = []
-    for patch in patches:
+    across, down = width / raw.width, height / raw.height
+    for number, patch in enumerate(patches, start=1):
         if patch.region is None:
             continue
         try:
             x, y, wide, high = region_pixels(patch.region, raw.width, raw.height)
         except UsageError:
             continue  # photographs of another size than the measured frames
-        across, down = 1000 / raw.width, 1000 / raw.height
-        marks.append(Marked(patch.name, x * across, y * down, wide * across, high * down))
+        place = (x * across, y * down, wide * across, high * down)
+        marks.append(Marked(number, patch.name, *(round(value, 1) for value in place)))
     return tuple(marks)

@@ -4,62 +4,106 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
 
 from labrig.fit import DecayFit
 from labrig.report.content import PatchReport
 from labrig.report.decay_figures import (
-    SIGNAL_LABEL,
     TIME_LABEL,
     decade_text,
     fitted_curve,
     log_axis_ends,
     middles_s,
 )
-from labrig.report.figure_style import INK, MUTED, SMALL_PT, channel_colour, new_figure, place
+from labrig.report.figure_style import (
+    INK,
+    MARKERS,
+    MUTED,
+    OTHER_CHANNELS,
+    SMALL_PT,
+    channel_colour,
+    new_figure,
+    place,
+)
+from labrig.report.timing import FrameTiming
 from labrig.report.written_numbers import rounded
 
-COLUMNS = 3
-ROW_PT = 104.0
-TIMING_HEIGHT_PT = 190.0
+SMALL_WIDTH_PT, SMALL_HEIGHT_PT = 190.0, 140.0
+SMALL_FONT_PT = 8.5
+TIMING_HEIGHT_PT = 200.0
 
 
-def overview_figure(patches: Sequence[PatchReport]) -> Figure:
-    """Small logarithmic decays of all patches on common axes."""
-    columns = min(COLUMNS, len(patches))
-    rows = -(-len(patches) // columns)
-    height = rows * ROW_PT + 48
-    figure = new_figure(height)
+def overview_figures(patches: Sequence[PatchReport]) -> list[Figure]:
+    """A small logarithmic decay for each patch, all with the same axes."""
     ends = [log_axis_ends(patch.series) for patch in patches]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
-    last = max(float(middles_s(patch.series).max()) for patch in patches) or 1.0
-    wide = (420.0 - 54 - 8) / columns
-    for number, patch in enumerate(patches):
-        row, column = divmod(number, columns)
-        left = 54 + column * wide
-        top = row * ROW_PT
-        axes = place(
-            figure,
-            left=left + (6 if column else 0),
-            bottom=height - top - ROW_PT,
-            right=420 - left - wide,
-            top=top + 20,
+    last_s = max(float(middles_s(patch.series).max()) for patch in patches) or 1.0
+    return [_small_decay(patch, low, high, last_s) for patch in patches]
+
+
+def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> Figure:
+    figure = new_figure(SMALL_HEIGHT_PT, SMALL_WIDTH_PT)
+    axes = place(figure, left=44, bottom=30, right=6, top=6)
+    axes.set_yscale("log", nonpositive="clip")
+    axes.set_ylim(low, high)
+    axes.set_xlim(-0.03 * last_s, 1.03 * last_s)
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+    axes.yaxis.set_major_locator(LogLocator(numticks=6))
+    axes.yaxis.set_minor_locator(NullLocator())
+    axes.yaxis.set_major_formatter(FuncFormatter(decade_text))
+    axes.yaxis.set_minor_formatter(NullFormatter())
+    axes.tick_params(labelsize=SMALL_FONT_PT, pad=2)
+    axes.set_xlabel("Time / s", fontsize=SMALL_FONT_PT, labelpad=1)
+    axes.set_ylabel("DN/s", fontsize=SMALL_FONT_PT, labelpad=1)
+    series = patch.series
+    curve = fitted_curve(series, patch.fit) if isinstance(patch.fit, DecayFit) else None
+    for number, name in enumerate(series.channels):
+        colour = channel_colour(name, number)
+        axes.plot(
+            middles_s(series)[series.usable],
+            series.values[series.usable, number],
+            linestyle="none",
+            marker=MARKERS[number % len(MARKERS)],
+            markersize=2.2,
+            markeredgewidth=0,
+            color=colour,
         )
-        axes.set_yscale("log", nonpositive="clip")
-        axes.set_ylim(low, high)
-        axes.set_xlim(-0.02 * last, 1.03 * last)
-        axes.yaxis.set_major_locator(LogLocator(numticks=5))
-        axes.yaxis.set_minor_locator(NullLocator())
-        axes.yaxis.set_major_formatter(FuncFormatter(decade_text))
-        axes.yaxis.set_minor_formatter(NullFormatter())
-        axes.tick_params(labelleft=column == 0, labelbottom=number + columns >= len(patches))
-        axes.locator_params(axis="x", nbins=4)
-        axes.set_title(patch.name, fontsize=SMALL_PT, color=INK, loc="left", pad=4)
-        _small_decay(axes, patch)
-    figure.text(
-        0.5 + 23 / 420, 4 / height, TIME_LABEL, ha="center", va="bottom", color=INK
-    )
-    figure.text(
-        12 / 420, 0.5 + 24 / height, SIGNAL_LABEL, rotation=90, ha="center", va="center", color=INK
-    )
+        if curve is not None:
+            axes.plot(curve.t_s, curve.total[:, number], color=colour, linewidth=0.9)
+    return figure
+
+
+def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
+    """How much later than planned each exposure began, one mark a frame, one colour a unit."""
+    figure = new_figure(TIMING_HEIGHT_PT)
+    axes = place(figure, left=62, bottom=42, right=12, top=14)
+    axes.axhline(0, color=MUTED, linewidth=0.8)
+    units = list(dict.fromkeys(timing.unit for timing in timings))
+    for number, unit in enumerate(units):
+        of_unit = [timing for timing in timings if timing.unit == unit]
+        axes.plot(
+            [timing.t_s for timing in of_unit],
+            [1e3 * timing.late_s for timing in of_unit],
+            linestyle="none",
+            marker=MARKERS[number % len(MARKERS)],
+            markersize=3.6,
+            color=INK if number == 0 else OTHER_CHANNELS[number % len(OTHER_CHANNELS)],
+            label=unit,
+        )
+    late_ms = np.array([1e3 * timing.late_s for timing in timings])
+    reach = max(float(np.abs(late_ms).max()), 0.1)
+    axes.set_ylim(min(float(late_ms.min()) * 1.15, -0.08 * reach), 1.15 * reach)
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
+    axes.set_xlabel(TIME_LABEL)
+    axes.set_ylabel("Late by / ms")
+    if 1 < len(units) <= len(MARKERS):
+        figure.legend(
+            loc="upper left",
+            bbox_to_anchor=(54 / 420, 1.0),
+            ncols=min(len(units), 4),
+            frameon=False,
+            fontsize=SMALL_PT,
+            labelcolor=INK,
+            borderaxespad=0.2,
+        )
     return figure

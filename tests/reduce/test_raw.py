@@ -174,6 +174,6 @@ def _read_or_refused(content: bytes) -> None:
 
 def test_only_libraw_is_kept_quiet(capfd: pytest.CaptureFixture[str]) -> None:
     with quiet_stderr():
-        os.write(2, b"unknown file: Unexpected end of file\nlamp off\n")
+        os.write(2, b"unknown file: Unexpected end of file\nlamp off\nCorrupt JPEG data: x\n")
     os.write(2, b"door closed\n")
     assert capfd.readouterr().err == "lamp off\ndoor closed\n"

@@ -27,8 +27,8 @@ class Evidence:
 
     Attributes
     ----------
-    noise, noise_estimated
-        The envelope, and whether σ or flicker come from it.
+    noise, noise_dof
+        The envelope; its degrees of freedom if σ or flicker come from it, else inf.
     candidates, power_law_bic, power_law
         What was tried; the power law's parameters if it does clearly better.
     asked, max_states, n_fixed
@@ -36,7 +36,7 @@ class Evidence:
     """
 
     noise: Envelope
-    noise_estimated: bool
+    noise_dof: float
     candidates: tuple[Candidate, ...]
     power_law_bic: float
     power_law: PowerLaw | None
@@ -101,12 +101,12 @@ def _inflation(fit: StatesFit, data: WhitenedSeries, evidence: Evidence) -> floa
     A parameter over an estimated σ with ν degrees of freedom follows Student's t, whose variance is
     ν/(ν − 2).
     """
-    if not evidence.noise_estimated:
-        return 1.0
-    dof = _dof(fit, data)
     if not data.series.sigma_given:
+        dof = _dof(fit, data)
         return fit.joint.chi2 / dof if dof > 0 else float("inf")
-    return evidence.noise.dof / max(evidence.noise.dof - 2, 1)
+    if np.isinf(evidence.noise_dof):
+        return 1.0
+    return evidence.noise_dof / max(evidence.noise_dof - 2, 1.0)
 
 
 def _covariances(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, FloatArray]:
@@ -144,7 +144,7 @@ def _covariances(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, Floa
 
 def _misfit(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> Misfit:
     series, joint = data.series, fit.joint
-    frames = joint.frame_residuals(data)
+    frames, _ = joint.frame_residuals(data)
     n_frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
     n_channels = len(series.channels)
     residuals = joint.least_squares.residuals[: series.values.size]
@@ -153,7 +153,7 @@ def _misfit(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> Misfit:
         frame_dof=n_frames - len(joint.shape) - int(series.has_offset),
         colour_chi2=max(float(residuals @ residuals - frames @ frames), 0.0),
         colour_dof=series.n_values - n_frames - (n_channels - 1) if n_channels > 1 else 0,
-        noise_dof=evidence.noise.dof if evidence.noise_estimated else np.inf,
+        noise_dof=evidence.noise_dof,
     )
 
 

@@ -10,7 +10,7 @@ missing state or a power law.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import brentq, nnls
+from scipy.optimize import nnls
 
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.shapes import exponential_means
@@ -25,6 +25,7 @@ ROUNDS = 3
 #: Turns of curve, channel weights and flicker; of curve and weights if the flicker is given.
 ALTERNATIONS = 5
 ALTERNATIONS_IF_GIVEN = 2
+FLICKER_ITERATIONS = 12
 
 
 @dataclass(frozen=True)
@@ -40,7 +41,7 @@ class Envelope:
     offset
         Common to all channels.
     dof
-        Frames minus the curve's degrees of freedom.
+        Degrees of freedom of the noise's estimate: the frames that tell, less those the curve took.
     flicker, flicker_sigma
         Relative, common to the channels of a frame.
     noise_scale
@@ -50,7 +51,7 @@ class Envelope:
     signal: FloatArray
     weights: FloatArray
     offset: float
-    dof: int
+    dof: float
     flicker: float
     flicker_sigma: float
     noise_scale: float
@@ -63,21 +64,20 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     """
     weights = _first_weights(series)
     signal = np.zeros_like(series.values)
-    offset, rho, rho_sigma, dof = 0.0, 0.0, 0.0, series.n_frames
     if len(weights) == 1 and flicker == 0 and series.sigma_given:
-        return Envelope(signal, np.ones(1), offset, dof, rho, rho_sigma, 1.0)
+        return Envelope(signal, weights, 0.0, series.n_frames, 0.0, 0.0, 1.0)
+    rho, rho_sigma, noise_scale = 0.0, 0.0, 1.0
     for _ in range(ALTERNATIONS if flicker is None else ALTERNATIONS_IF_GIVEN):
         data = whitened(series, signal, rho)
-        curve, offset, support = _monotone_curve(data, weights)
-        dof = max(series.n_frames - support, 1)
+        curve, offset, leverage = _monotone_curve(data, weights)
+        dof = max(series.n_frames - float(leverage.sum()), 1.0)
         if len(weights) > 1:
             weights, curve = _channel_weights(data, curve, offset)
         signal = np.multiply.outer(curve, weights)
         if flicker is None:
-            rho, rho_sigma = _flicker(series, signal, offset, dof)
+            rho, rho_sigma, dof = _flicker(series, signal, offset, leverage)
         else:
             rho = flicker
-    noise_scale = 1.0
     if not series.sigma_given:
         left = series.inverse_sigma * (series.values - signal - offset)
         noise_scale = float(np.sqrt((left**2).sum() / dof))
@@ -92,8 +92,10 @@ def _first_weights(series: DecaySeries) -> FloatArray:
     return weights / weights.max() if weights.max() > 0 else np.ones_like(weights)
 
 
-def _monotone_curve(data: WhitenedSeries, weights: FloatArray) -> tuple[FloatArray, float, int]:
-    """The curve (n,), the offset, and how many degrees of freedom they took."""
+def _monotone_curve(
+    data: WhitenedSeries, weights: FloatArray
+) -> tuple[FloatArray, float, FloatArray]:
+    """The curve (n,), the offset, and how much of each frame's scatter (n,) the curve follows."""
     series = data.series
     low, high = series.log_rate_bounds
     log_rates = np.linspace(low, high, COARSE_RATES)
@@ -107,7 +109,11 @@ def _monotone_curve(data: WhitenedSeries, weights: FloatArray) -> tuple[FloatArr
             around = step * np.arange(-REFINEMENT, REFINEMENT + 1)
             log_rates = np.unique(np.add.outer(log_rates[used], around).round(12))
             log_rates = np.clip(log_rates, low, high)
-    return means @ amplitudes, offset, int(used.sum()) + int(series.has_offset)
+    followed = np.linalg.norm(data.unit_signal(weights), axis=1)[:, None] * means[:, used]
+    if series.has_offset:
+        followed = np.column_stack([followed, np.linalg.norm(data.ones, axis=1)])
+    orthogonal = np.linalg.qr(followed)[0]
+    return means @ amplitudes, offset, np.einsum("ij,ij->i", orthogonal, orthogonal)
 
 
 def _nonnegative(
@@ -144,29 +150,29 @@ def _channel_weights(
 
 
 def _flicker(
-    series: DecaySeries, signal: FloatArray, offset: float, dof: int
-) -> tuple[float, float]:
-    """ρ and its σ from the frames' common scatter about the curve, less the values' own noise.
+    series: DecaySeries, signal: FloatArray, offset: float, leverage: FloatArray
+) -> tuple[float, float, float]:
+    """ρ, its σ and its degrees of freedom from the frames' common scatter about the curve.
 
-    Along the signal's direction û = (s/σ)/|s/σ| a frame scatters with variance 1 + ρ²|s/σ|²; ρ² is
-    what makes the weighted sum of squares equal to the degrees of freedom (Mandel and Paule 1970).
+    Along the signal's direction a frame scatters with variance V = 1 + ρ² B, B = |s/σ|², of which
+    the curve followed the share `leverage` (n,). ρ² is the restricted maximum of the likelihood
+    (REML; Patterson and Thompson 1971), by its fixed-point form.
     """
     u = signal * series.inverse_sigma
     brightness2 = np.einsum("fc,fc->f", u, u)
     left = series.inverse_sigma * (series.values - signal - offset)
-    along2 = np.einsum("fc,fc->f", u, left) ** 2 / np.maximum(brightness2, 1e-300)
-
-    def surplus(variance: float) -> float:
-        return float((along2 / (1 + variance * brightness2)).sum()) - dof
-
+    along2 = np.einsum("fc,fc->f", u, left) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
+    spare = np.maximum(1 - leverage, 0.0)
     variance = 0.0
-    if surplus(0.0) > 0:
-        highest = float((along2 / np.maximum(brightness2, 1e-300)).sum()) / dof + 1e-30
-        while surplus(highest) > 0:
-            highest *= 4
-        variance = float(brentq(surplus, 0.0, highest, xtol=1e-16, rtol=1e-10))
-    information = float(((brightness2 / (1 + variance * brightness2)) ** 2).sum())
-    variance_sigma = float(np.sqrt(2 * series.n_frames / dof / information))
+    for _ in range(FLICKER_ITERATIONS):
+        told = brightness2 / (1 + variance * brightness2)
+        scatter = float((told**2 / np.where(brightness2 > 0, brightness2, 1.0)) @ (along2 - spare))
+        variance = max(scatter / float(told**2 @ spare), 0.0)
+    told = brightness2 / (1 + variance * brightness2)
+    variance_sigma = float(np.sqrt(2 / (told**2 @ spare)))
+    # 2/ν is the squared relative error of V where frames tell about the decay.
+    dof = 2 / (variance_sigma**2 * float((told**3).sum() / told.sum()))
     flicker = float(np.sqrt(variance))
     # Near zero the square root is not linear: then √σ(ρ²) is the scale of what ρ could be.
-    return flicker, min(variance_sigma / (2 * max(flicker, 1e-30)), float(np.sqrt(variance_sigma)))
+    sigma = min(variance_sigma / (2 * max(flicker, 1e-30)), float(np.sqrt(variance_sigma)))
+    return flicker, sigma, dof

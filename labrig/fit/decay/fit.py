@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
 from labrig.fit.decay.assembly import Evidence, assemble
-from labrig.fit.decay.envelope import envelope
+from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.power_law import fit_power_law, power_law
 from labrig.fit.decay.result import DecayFit
 from labrig.fit.decay.selection import CLEAR_BIC, Candidate, bic, choose_states
@@ -83,7 +83,9 @@ def fit_decay(
         scale = max(smooth.noise_scale, EXACT)
         series = replace(series, inverse_sigma=series.inverse_sigma / scale)
     data = whitened(series, smooth.signal, smooth.flicker)
-    chosen, tried = _supported_states(data, numbers, fixed, smooth.weights, smooth.offset)
+    noise_estimated = flicker is None or not series.sigma_given
+    noise_dof = smooth.dof if noise_estimated else np.inf
+    chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
     rival = fit_power_law(data, chosen.joint.weights, chosen.joint.offset)
     rival_bic = bic(data, rival)
     rival_wins = rival_bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
@@ -93,7 +95,7 @@ def fit_decay(
         chosen,
         Evidence(
             noise=smooth,
-            noise_estimated=flicker is None or not series.sigma_given,
+            noise_dof=noise_dof,
             candidates=tuple(tried),
             power_law_bic=rival_bic,
             power_law=power_law(rival, series) if rival_wins else None,
@@ -152,12 +154,13 @@ def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
 
 
 def _supported_states(
-    data: WhitenedSeries, numbers: range, fixed: FloatArray, weights: FloatArray, offset: float
+    data: WhitenedSeries, numbers: range, fixed: FloatArray, smooth: Envelope, noise_dof: float
 ) -> tuple[StatesFit, list[Candidate]]:
     """The states chosen; fewer than the fewest wanted if amplitudes vanish."""
     for fewest in range(numbers.start, max(len(fixed), 1) - 1, -1):
+        those = range(fewest, max(numbers.stop, fewest + 1))
         chosen, tried = choose_states(
-            data, range(fewest, max(numbers.stop, fewest + 1)), fixed, weights, offset
+            data, those, fixed, smooth.weights, smooth.offset, noise_dof
         )
         if chosen is not None:
             return chosen, tried

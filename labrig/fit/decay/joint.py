@@ -51,12 +51,14 @@ class JointFit:
         """Parameters fitted."""
         return len(self.least_squares.parameters)
 
-    def frame_residuals(self, data: WhitenedSeries) -> FloatArray:
-        """(n,) whitened residuals along the signal: one number of unit variance per frame."""
+    def frame_residuals(self, data: WhitenedSeries) -> tuple[FloatArray, FloatArray]:
+        """(n,) residuals along the signal, one of unit variance per frame; (n,) squared SNR."""
         unit = data.unit_signal(self.weights)
-        length = np.sqrt(np.einsum("fc,fc->f", unit, unit))
+        length = np.linalg.norm(unit, axis=1)
         residuals = self.least_squares.residuals[: unit.size].reshape(unit.shape)
-        return np.einsum("fc,fc->f", unit, residuals) / np.where(length > 0, length, 1.0)
+        along = np.einsum("fc,fc->f", unit, residuals) / np.where(length > 0, length, 1.0)
+        signal = residuals + data.values - self.offset * data.ones
+        return along, np.einsum("fc,fc->f", signal, signal)
 
 
 def fit_jointly(

@@ -56,6 +56,7 @@ def choose_states(
     fixed: FloatArray,
     weights: FloatArray,
     offset: float,
+    noise_dof: float,
 ) -> tuple[StatesFit | None, list[Candidate]]:
     """Fits with more and more states, `numbers` of them, until one more is not worth it.
 
@@ -67,6 +68,8 @@ def choose_states(
         States in all, those of the `fixed` log rates included.
     weights, offset
         Channel weights (C,) and offset to start from.
+    noise_dof
+        Degrees of freedom of the noise's own estimate; inf if it was given.
 
     Returns
     -------
@@ -78,7 +81,7 @@ def choose_states(
         fit = fit_states(data, n_states - len(fixed), fixed, weights, offset)
         if fit is None:
             break
-        p_value = None if chosen is None else f_test(data, chosen.joint, fit.joint)
+        p_value = None if chosen is None else f_test(data, chosen.joint, fit.joint, noise_dof)
         tried.append(
             Candidate(n_states, fit.joint.least_squares.reduced_chi2, bic(data, fit.joint), p_value)
         )
@@ -89,16 +92,22 @@ def choose_states(
     return chosen, tried
 
 
-def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit) -> float:
-    """Chance of a gain in χ² as large as that from `fewer` to `more` parameters."""
+def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit, noise_dof: float) -> float:
+    """Chance of a gain in χ² as large as that from `fewer` to `more` parameters.
+
+    The scatter it is compared with is that of all frames, or of the bright ones if that is larger:
+    these make the gain, and an unsuspected flicker shows in them only.
+    """
     added = more.n_parameters - fewer.n_parameters
-    frames = more.frame_residuals(data)
+    frames, brightness2 = more.frame_residuals(data)
     own = len(more.shape) + int(data.series.has_offset)
     dof = len(frames) - own
-    scatter = float(frames @ frames)
     if dof <= 0 or added <= 0:
         return 1.0
+    spare = dof / len(frames)
+    bright = float(brightness2 @ frames**2) / float(brightness2.sum())
+    scatter = max(float(frames @ frames) / len(frames), bright) / spare
     if scatter == 0:
         return 0.0
     gain = max(fewer.chi2 - more.chi2, 0.0) / added
-    return float(fdtrc(added, dof, gain / (scatter / dof)))
+    return float(fdtrc(added, min(dof, noise_dof), gain / scatter))

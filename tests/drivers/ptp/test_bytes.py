@@ -5,7 +5,7 @@ from contextlib import suppress
 from fractions import Fraction
 
 import pytest
-from hypothesis import given, settings
+from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
 from drivers.ptp.containers import Container, Kind, command, decode, encode
@@ -238,6 +238,7 @@ class DamagingWire(Wire):
     position=st.one_of(st.integers(0, 13), st.integers(0, 4000)),
     byte=st.one_of(st.none(), st.integers(0, 255)),
 )
+@example(transfer=48, position=6, byte=0)  # half press taken, answered with another code than OK
 def test_damage_anywhere_is_survived(transfer: int, position: int, byte: int | None) -> None:
     b = bench()
     wire = DamagingWire(b.toy, b.wire.clock)

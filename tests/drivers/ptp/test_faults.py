@@ -102,6 +102,18 @@ def test_make_safe_tries_everything(fault: Fault) -> None:
     assert_usable(b, camera)
 
 
+@pytest.mark.parametrize("fault", BROKEN, ids=lambda f: f.name.lower())
+@pytest.mark.parametrize("step", [HALF, FULL, OFF_HALF], ids=["half press", "full press", "let go"])
+def test_nothing_to_let_go_of_is_safe(step: Key, fault: Fault) -> None:
+    b = bench()
+    b.toy.refuses_idle_let_go = True
+    camera = b.connect()
+    b.toy.faults[step] = [fault]
+    with pytest.raises(DeviceError):
+        photograph(camera)
+    assert_usable(b, camera)
+
+
 def test_make_safe_resets_a_camera_that_cannot_be_cancelled() -> None:
     b = bench()
     camera = b.connect()

@@ -60,6 +60,7 @@ class ToyEos:
         self.announced_extra_bytes = 0
         self.name = b"IMG_0001.CR2"
         self.never_delivers = False
+        self.refuses_idle_let_go = False
         self.release_result = 0
         self.stored: dict[int, bytes] = {}
         self.events: list[bytes] = []
@@ -208,6 +209,8 @@ class ToyEos:
                 assert 1 in self.buttons
                 self._expose(now_s)
         elif operation == 0x9129:
+            if self.refuses_idle_let_go and params[0] not in self.buttons:
+                return GENERAL_ERROR, (), None
             self.buttons.discard(params[0])
         elif operation == 0x910F:
             result = (self.release_result,)

@@ -1,26 +1,26 @@
-"""From a protocol and a rig to a filled run folder, told to the person at the terminal."""
+"""A protocol on a bench, into a run folder: prepared, recorded, resumed."""
 
 import shutil
 import signal
 from collections.abc import Sequence
+from contextlib import AbstractContextManager
 from dataclasses import dataclass
 from importlib.metadata import version
 from pathlib import Path
-from typing import Self
+from typing import Protocol, Self
 
 from labrig.acquire import (
     Plan,
     ProtocolModel,
     RigFile,
+    RunObserver,
     plan,
     plugins,
     read_rig_file,
     run_units,
 )
 from labrig.bench import Bench, open_bench
-from labrig.cli.ending import interrupting
-from labrig.cli.progress import progress
-from labrig.clock import Interrupted
+from labrig.clock import Clock, Interrupted
 from labrig.errors import DataError, DiskError, LabrigError, UsageError
 from labrig.quantity import duration_text
 from labrig.record import RunFolder, read_run
@@ -28,6 +28,15 @@ from labrig.yaml_file import yaml_text
 
 #: Room left on the disk beyond what the frames need: journal, results, report.
 SPARE_BYTES = 200e6
+
+
+class Watch(Protocol):
+    """Tells a person what is going on: given the plan, the units already complete, the clock."""
+
+    def __call__(
+        self, plan: Plan, done: Sequence[str], clock: Clock
+    ) -> AbstractContextManager[RunObserver]:
+        """The observer of one run."""
 
 
 @dataclass(frozen=True)
@@ -69,7 +78,7 @@ class Recording:
             f"time, {self.plan.frames} frames, {self.plan.size_bytes / 1e6:.0f} MB"
         )
 
-    def record(self) -> Path:
+    def record(self, watch: Watch) -> Path:
         """Make a run folder and fill it; returns its path.
 
         Raises
@@ -89,11 +98,11 @@ class Recording:
                 stand.seed,
             )
             with folder:
-                _fill(folder, self.protocol, stand, self.plan)
+                fill(folder, self.protocol, stand, self.plan, watch)
         return folder.path
 
 
-def resume_run(path: Path) -> Path:
+def resume_run(path: Path, watch: Watch) -> Path:
     """Do what is left of the run in `path`; returns the path.
 
     Raises
@@ -108,23 +117,32 @@ def resume_run(path: Path) -> Path:
     last_time = read_run(path).last_time if (path / "journal.jsonl").exists() else 0.0
     with open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as stand:
         with RunFolder(path, stand.seed) as folder:
-            _fill(folder, protocol, stand, plan(protocol, rig, str(path / "rig.yaml")))
+            fill(folder, protocol, stand, plan(protocol, rig, str(path / "rig.yaml")), watch)
     return path
 
 
-def _fill(folder: RunFolder, protocol: ProtocolModel, stand: Bench, laid_out: Plan) -> None:
+def fill(
+    folder: RunFolder, protocol: ProtocolModel, stand: Bench, laid_out: Plan, watch: Watch
+) -> None:
+    """Do all units that `folder` lacks; a unit cut off by a crash is done again.
+
+    Raises
+    ------
+    Interrupted, LabrigError
+        After the safe state was reached; the text says what is kept and how to go on.
+    """
     dead = folder.close_open_attempts(
         stand.clock.wall, "abort", "labrig ended before this attempt did; closed at resume"
     )
     done = folder.read().completed()
-    with progress(laid_out, list(done), stand.clock) as observer:
+    with watch(laid_out, list(done), stand.clock) as observer:
         for unit in dead:
             observer.warn(f"the unit {unit} was cut off and is done again")
         units = protocol.units()
         if all(unit.name in done for unit in units):
             return
         try:
-            with interrupting(stand.clock), stand.devices() as rig:
+            with stand.devices() as rig:
                 metadata = {
                     "protocol": protocol.protocol,
                     "sample": protocol.sample.name,

@@ -1,0 +1,113 @@
+"""What is asked of a run's processing: by its protocol, and by a person who wants it otherwise."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Literal, Protocol, Self, cast
+
+from labrig.acquire import Sample, plugins
+from labrig.errors import UsageError
+from labrig.record import FrameRecord
+from labrig.region import Region, parse_region
+from labrig.yaml_file import did_you_mean
+
+
+class DecayProtocol(Protocol):
+    """The keys of a decay protocol that its processing needs."""
+
+    sample: Sample
+    patches: dict[str, Region]
+    dark: Literal["frames", "background"]
+    background: Region | None
+    states: Literal["auto", 1, 2, 3]
+
+
+def read_decay_protocol(run: Path) -> DecayProtocol:
+    """The protocol in a run folder.
+
+    Raises
+    ------
+    UsageError
+        Not a run folder, or not one of a decay.
+    """
+    path = run / "protocol.yaml"
+    if not path.is_file():
+        raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
+    protocol = plugins.read_protocol(path)
+    if protocol.protocol != "decay":
+        raise UsageError(f"{run}: expected a run of 'decay', got one of '{protocol.protocol}'")
+    return cast(DecayProtocol, protocol)
+
+
+@dataclass(frozen=True)
+class Choices:
+    """What a person wants otherwise than the protocol says.
+
+    Attributes
+    ----------
+    regions
+        Patch name → region; the name "" stands for the only patch there is.
+    excluded
+        Frames to leave out, by file name or number.
+    states
+        Number of states; None leaves it to the protocol.
+    """
+
+    regions: Mapping[str, Region] = field(default_factory=dict)
+    excluded: frozenset[str] = frozenset()
+    states: int | None = None
+
+    @classmethod
+    def parse(cls, regions: Sequence[str], excluded: Sequence[str], states: int | None) -> Self:
+        """From the texts of a command line: `NAME=x,y,w,h` or `x,y,w,h`, frame numbers or names.
+
+        Raises
+        ------
+        UsageError
+            A region that is none.
+        """
+        named = {}
+        for text in regions:
+            name, _, numbers = text.rpartition("=")
+            named[name] = parse_region(numbers)
+        return cls(named, frozenset(excluded), states)
+
+    def patches(self, protocol: DecayProtocol) -> dict[str, Region]:
+        """The protocol's patches, moved where a person wants them.
+
+        Raises
+        ------
+        UsageError
+            There is no patch of that name.
+        """
+        patches = dict(protocol.patches)
+        for name, region in self.regions.items():
+            if not name and len(patches) == 1:
+                name = next(iter(patches))
+            if name not in patches:
+                raise UsageError(
+                    f"--roi: no patch is called '{name}'; {did_you_mean(name, list(patches))}; "
+                    "write --roi NAME=x,y,width,height"
+                )
+            patches[name] = region
+        return patches
+
+    def excludes(self, frame: FrameRecord) -> bool:
+        """Whether `frame` is to be left out."""
+        return bool(self.excluded & _names(frame))
+
+    def check(self, frames: Sequence[FrameRecord]) -> None:
+        """Refuse to exclude what is not there.
+
+        Raises
+        ------
+        UsageError
+            Names the frames that are not in the run.
+        """
+        unknown = self.excluded.difference(*(_names(frame) for frame in frames))
+        if unknown:
+            raise UsageError(f"--exclude: the run has no frame {', '.join(sorted(unknown))}")
+
+
+def _names(frame: FrameRecord) -> set[str]:
+    return {frame.path.name, frame.path.stem, str(int(frame.path.stem))}

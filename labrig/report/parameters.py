@@ -1,0 +1,149 @@
+"""What a fit found, in rows and sentences."""
+
+import math
+from dataclasses import dataclass
+
+from labrig.fit import DecayFit
+from labrig.report.written_numbers import plus_minus, rounded
+
+
+@dataclass(frozen=True)
+class Row:
+    """One line of a table: what, its unit, and the values, one a column."""
+
+    quantity: str
+    unit: str
+    values: tuple[str, ...]
+
+
+@dataclass(frozen=True)
+class CandidateRow:
+    """A model that was tried: its name, reduced χ², BIC above the best one's, F-test's p."""
+
+    model: str
+    reduced_chi2: str
+    bic_above_best: str
+    p_value: str
+    chosen: bool
+
+
+def state_rows(fit: DecayFit) -> list[Row]:
+    """Rates, times and amplitudes, one column a state."""
+    rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in fit.states]
+    lifetimes = [(1 / rate, sigma / rate**2) for rate, sigma in rates]
+    half_lives = [(math.log(2) * value, math.log(2) * sigma) for value, sigma in lifetimes]
+    amplitudes = [(state.amplitude, state.amplitude_sigma) for state in fit.states]
+    return [
+        Row("Rate kᵣ", "s⁻¹", _written(rates)),
+        Row("Lifetime 1/kᵣ", "s", _written(lifetimes)),
+        Row("Half-life ln 2/kᵣ", "s", _written(half_lives)),
+        Row("Amplitude a", "DN/s", _written(amplitudes)),
+    ]
+
+
+def quality_rows(fit: DecayFit) -> list[Row]:
+    """What the states share."""
+    rows = []
+    if len(fit.channels) > 1:
+        weights = zip(
+            fit.channels, fit.channel_weights, fit.channel_weights_sigma, strict=True
+        )
+        rows += [
+            Row(f"Weight of {name}", "", ("1" if weight == 1 else plus_minus(weight, sigma),))
+            for name, weight, sigma in weights
+        ]
+    rows.append(Row("Offset", "DN/s", (plus_minus(fit.offset, fit.offset_sigma),)))
+    if len(fit.channels) > 1:
+        flicker = plus_minus(100 * fit.flicker, 100 * fit.flicker_sigma)
+        rows.append(Row("Flicker of a frame", "%", (flicker,)))
+    rows.append(
+        Row("Reduced χ²", "", (f"{rounded(fit.reduced_chi2, 3)} with {fit.dof} degrees of freedom",))
+    )
+    return rows
+
+
+def paper_rows(fit: DecayFit) -> list[Row]:
+    """Λᵢ = aᵢ/kᵢ in each channel, as if every state had been full: rᵢ(0) = 1."""
+    rows = []
+    for name, weight, weight_sigma in zip(
+        fit.channels, fit.channel_weights, fit.channel_weights_sigma, strict=True
+    ):
+        values = []
+        for number, state in enumerate(fit.states):
+            rate, amplitude = state.k_r_per_s, state.amplitude
+            shared = 2 * float(fit.covariance[2 * number, 2 * number + 1]) / (rate * amplitude)
+            relative2 = (
+                (state.k_r_sigma_per_s / rate) ** 2
+                + (state.amplitude_sigma / amplitude) ** 2
+                - (shared if math.isfinite(shared) else 0.0)
+                + ((weight_sigma / weight) ** 2 if weight > 0 else 0.0)
+            )
+            value = weight * amplitude / rate
+            values.append((value, value * math.sqrt(max(relative2, 0.0))))
+        rows.append(Row(f"Λ in {name}", "DN", _written(values)))
+    return rows
+
+
+def candidate_rows(fit: DecayFit) -> list[CandidateRow]:
+    """The numbers of states tried, and the power law."""
+    best = min(*(candidate.bic for candidate in fit.candidates), fit.power_law_bic, math.inf)
+    rows = [
+        CandidateRow(
+            model=_states(candidate.n_states),
+            reduced_chi2=rounded(candidate.reduced_chi2, 3),
+            bic_above_best=_above(candidate.bic, best),
+            p_value="–" if candidate.f_p_value is None else _p_value(candidate.f_p_value),
+            chosen=candidate.n_states == fit.n_states,
+        )
+        for candidate in fit.candidates
+    ]
+    if math.isfinite(fit.power_law_bic):
+        rows.append(CandidateRow("power law", "–", _above(fit.power_law_bic, best), "–", False))
+    return rows
+
+
+def why_so_many_states(fit: DecayFit) -> str:
+    """In a sentence or two."""
+    tried = {candidate.n_states: candidate for candidate in fit.candidates}
+    here = tried.get(fit.n_states)
+    fewer, more = tried.get(fit.n_states - 1), tried.get(fit.n_states + 1)
+    said = []
+    if here is not None and fewer is not None:
+        said.append(
+            f"{_states(fit.n_states).capitalize()}: BIC is lower by {rounded(fewer.bic - here.bic, 3)} "
+            f"than with {fit.n_states - 1}."
+        )
+    if here is not None and more is not None:
+        change = more.bic - here.bic
+        word = "raises" if change >= 0 else "lowers"
+        chance = "" if more.f_p_value is None else f", and so small a gain is chance with p = {_p_value(more.f_p_value)}"
+        said.append(f"One more state {word} BIC by {rounded(abs(change), 3)}{chance}.")
+    if not said:
+        said.append(
+            f"{_states(fit.n_states).capitalize()}; no other number was tried or supported by the data."
+        )
+    elif more is None:
+        said.append("More were not asked for, or the data do not support them.")
+    if fit.power_law is not None:
+        law = fit.power_law
+        said.append(
+            f"A power law (1 + t/τ)⁻ᵖ describes the data clearly better: τ = {rounded(law.tau_s, 3)} s, "
+            f"p = {plus_minus(law.exponent, law.exponent_sigma)}."
+        )
+    return " ".join(said)
+
+
+def _written(pairs: list[tuple[float, float]]) -> tuple[str, ...]:
+    return tuple(plus_minus(value, sigma) for value, sigma in pairs)
+
+
+def _states(number: int) -> str:
+    return "1 state" if number == 1 else f"{number} states"
+
+
+def _above(bic: float, best: float) -> str:
+    return "best" if bic == best else f"+{rounded(bic - best, 3)}"
+
+
+def _p_value(p: float) -> str:
+    return "< 10⁻⁶" if p < 1e-6 else rounded(p, 2)

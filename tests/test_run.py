@@ -1,0 +1,217 @@
+"""A protocol on a simulated bench, stopped at any point: safe, resumable, nothing counted twice."""
+
+import os
+import random
+import signal
+import subprocess
+import sys
+import time
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+
+import event_model
+import pytest
+
+from labrig.acquire import Plan, RunObserver, plan, read_rig_file
+from labrig.acquire.plugins import read_protocol
+from labrig.bench import open_bench
+from labrig.clock import Clock, Interrupted, VirtualClock
+from labrig.errors import DeviceError
+from labrig.record import RunFolder, read_run
+from labrig.record.journal import read_journal
+from labrig.run import Recording, fill
+from tests.acquire.fakes import Watching
+
+UNITS = ["dark", "decay-1", "decay-2"]
+
+
+@contextmanager
+def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+    yield Watching()
+
+
+@pytest.fixture
+def quick(make_protocol: Callable[..., Path]) -> Path:
+    return make_protocol(repeats=2, charge="60 s", **{"for": "20 s"})
+
+
+def lamp_after(folder: Path, rig: Path, stop: Callable[[], None]) -> bool:
+    """Begin or go on with the run in `folder`, stopped by `stop`; is the lamp on in the end?"""
+    protocol, rig_file = read_protocol(folder / "protocol.yaml"), read_rig_file(rig)
+    with open_bench(rig_file, str(rig)) as stand, RunFolder(folder, stand.seed) as run:
+        assert stand.room is not None
+        stop()
+        try:
+            fill(run, protocol, stand, plan(protocol, rig_file, str(rig)), quietly)
+        except (Interrupted, DeviceError) as error:
+            assert "\n" not in str(error)
+            assert f"labrig resume {folder}" in str(error)
+        return stand.room.room.lamp_on
+
+
+@pytest.mark.parametrize("seed", range(12))
+@pytest.mark.parametrize("signum", [signal.SIGINT, signal.SIGTERM])
+@pytest.mark.parametrize("times", [1, 10])
+def test_stopped_at_any_wait_the_lamp_is_off_and_the_rest_can_be_done(
+    quick: Path,
+    make_rig: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    seed: int,
+    signum: int,
+    times: int,
+) -> None:
+    rng = random.Random(f"{seed} {signum} {times}")
+    folder = make_folder(quick, tmp_path)
+    waits_left = rng.randint(1, 900)
+    pause = VirtualClock._pause_until
+
+    def stopping_pause(clock: VirtualClock, deadline_s: float) -> None:
+        nonlocal waits_left
+        waits_left -= 1
+        if waits_left <= 0 and waits_left > -times:
+            os.kill(os.getpid(), signum)
+        pause(clock, deadline_s)
+
+    def stop() -> None:
+        monkeypatch.setattr(VirtualClock, "_pause_until", stopping_pause)
+
+    assert not lamp_after(folder, make_rig(), stop)
+    before = read_run(folder).completed()
+    monkeypatch.setattr(VirtualClock, "_pause_until", pause)
+    if list(before) != UNITS:  # a complete run has nothing to connect for
+        assert not lamp_after(folder, make_rig(initial={"lamp": "on"}), lambda: None)
+    record = read_run(folder)
+    assert list(record.completed()) == UNITS
+    assert len(record.frames("decay")) == 2 * 4
+    for name, attempt in before.items():
+        assert record.completed()[name].uid == attempt.uid
+    for name, doc in read_journal(folder / "journal.jsonl").documents:
+        event_model.schema_validators[event_model.DocumentNames[name]].validate(doc)
+
+
+@pytest.mark.parametrize("seed", range(8))
+def test_an_exception_anywhere_in_a_driver_ends_safely(
+    quick: Path,
+    make_rig: Callable[..., Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    seed: int,
+) -> None:
+    folder = make_folder(quick, tmp_path)
+    waits_left = random.Random(seed).randint(1, 700)
+    pause = VirtualClock._pause_until
+
+    def failing_pause(clock: VirtualClock, deadline_s: float) -> None:
+        nonlocal waits_left
+        waits_left -= 1
+        if waits_left == 0:
+            raise RuntimeError("a bug in a driver")
+        pause(clock, deadline_s)
+
+    def stop() -> None:
+        monkeypatch.setattr(VirtualClock, "_pause_until", failing_pause)
+
+    assert not lamp_after(folder, make_rig(), stop)
+    assert not lamp_after(folder, make_rig(), lambda: None)
+    assert list(read_run(folder).completed()) == UNITS
+
+
+def test_the_lamp_that_a_crash_left_on_is_switched_off_at_connect(
+    make_rig: Callable[..., Path],
+) -> None:
+    rig = make_rig(initial={"lamp": "on"})
+    with open_bench(read_rig_file(rig), str(rig)) as stand:
+        assert stand.room is not None
+        assert stand.room.room.lamp_on
+        with stand.devices() as devices:
+            assert not stand.room.room.lamp_on
+            devices.lamp.on()
+        assert not stand.room.room.lamp_on
+
+
+def test_the_same_rig_and_protocol_give_the_same_bytes(
+    quick: Path, make_rig: Callable[..., Path], tmp_path: Path
+) -> None:
+    contents = []
+    for name in ("a", "b"):
+        folder = Recording.prepare(quick, make_rig(), tmp_path / name).record(quietly)
+        files = sorted(path for path in folder.rglob("*") if path.is_file())
+        contents.append({path.relative_to(folder): path.read_bytes() for path in files})
+    assert contents[0] == contents[1]
+
+
+@pytest.mark.parametrize("seed", range(3))
+def test_after_kill_9_the_run_is_resumed(
+    quick: Path, make_rig: Callable[..., Path], tmp_path: Path, seed: int
+) -> None:
+    """A real process, really killed, at a moment that nobody chose."""
+    runs = tmp_path / "runs"
+    process = subprocess.Popen(
+        [sys.executable, "-m", "labrig", "run", quick, "--rig", make_rig(), "--runs", runs],
+        stdout=subprocess.DEVNULL,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    frames_seen = 0
+    for line in process.stderr:
+        frames_seen += "frame " in line
+        if frames_seen > 3 + 3 * seed:
+            break
+    time.sleep(0.01 * seed)
+    process.kill()
+    process.wait()
+    process.stderr.close()
+    (folder,) = runs.iterdir()
+    before = read_run(folder).completed()
+    done = subprocess.run(
+        [sys.executable, "-m", "labrig", "resume", folder, "--no-process"],
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    record = read_run(folder)
+    assert list(record.completed()) == UNITS
+    assert len(record.frames("decay")) == 2 * 4
+    for name, attempt in before.items():
+        assert record.completed()[name].uid == attempt.uid
+
+
+@pytest.mark.parametrize(("signum", "code"), [(signal.SIGINT, 130), (signal.SIGTERM, 143)])
+def test_a_stopped_process_leaves_with_its_code_and_one_line(
+    make_protocol: Callable[..., Path],
+    make_rig: Callable[..., Path],
+    tmp_path: Path,
+    signum: int,
+    code: int,
+) -> None:
+    protocol = make_protocol(repeats=500)
+    process = subprocess.Popen(
+        [sys.executable, "-m", "labrig", "run", protocol, "--rig", make_rig(),
+         "--runs", tmp_path / "runs"],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )  # fmt: skip
+    assert process.stderr is not None
+    for line in process.stderr:
+        if "frame 20 " in line:
+            break
+    for _ in range(10):
+        process.send_signal(signum)
+    out, err = process.communicate(timeout=60)
+    assert process.returncode == code
+    complaints = [line for line in err.splitlines() if not line.startswith("[")]
+    assert len(complaints) == 1, err
+    assert "safe state reached" in complaints[0]
+    assert "labrig resume" in complaints[0]
+    assert "Traceback" not in out + err
+
+
+def make_folder(protocol: Path, tmp_path: Path) -> Path:
+    texts = {"protocol.yaml": protocol.read_text(), "rig.yaml": ""}
+    with RunFolder.create(tmp_path / "runs", "test", 1_767_225_600.0, texts, seed=1) as folder:
+        return folder.path
