@@ -1,5 +1,6 @@
 """Opens a rig: the one place where drivers, clock and, in a simulated rig, the room meet."""
 
+import tempfile
 from collections.abc import Iterator
 from contextlib import ExitStack, contextmanager
 from dataclasses import dataclass
@@ -7,7 +8,6 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
-import platformdirs
 import serial
 import usb.core
 from filelock import FileLock, Timeout
@@ -178,13 +178,13 @@ class _Connections:
         """Lock a real address; a simulated room is private to its process."""
         if address.startswith("sim://"):
             return
-        folder = Path(platformdirs.user_runtime_path("labrig", ensure_exists=True))
         name = "".join(c if c.isalnum() else "-" for c in address)
-        lock = FileLock(folder / f"{name}.lock")
+        # For every user of this PC, hence not in a user's own folder.
+        lock = FileLock(Path(tempfile.gettempdir()) / f"labrig-{name}.lock", mode=0o666)
         try:
             lock.acquire(timeout=0)
-        except Timeout:
+        except (Timeout, PermissionError):
             raise UsageError(
-                f"{address} is held by another labrig; wait until it has ended"
+                f"{address} is held by another labrig on this PC; wait until it has ended"
             ) from None
         self._stack.callback(lock.release)

@@ -22,6 +22,7 @@ from labrig.acquire import (
 from labrig.bench import Bench, open_bench
 from labrig.clock import Clock, Interrupted
 from labrig.errors import DataError, DiskError, LabrigError, UsageError
+from labrig.optics import read_camera
 from labrig.quantity import duration_text
 from labrig.record import RunFolder, read_run
 from labrig.yaml_file import yaml_text
@@ -62,6 +63,8 @@ class Recording:
         """
         protocol = plugins.read_protocol(protocol_path)
         rig = read_rig_file(rig_path)
+        if rig.optics.camera is not None:
+            read_camera(rig.optics.camera)  # a misspelt name is found now, not after the run
         laid_out = plan(protocol, rig, str(rig_path))
         free_bytes = shutil.disk_usage(_existing(runs)).free
         if laid_out.size_bytes + SPARE_BYTES > free_bytes:

@@ -46,6 +46,7 @@ class EosExposure:
             isos=tuple(isos),
             f_numbers=tuple(sorted(f_numbers)),
             overhead_s=self._settings.frame_time,
+            frame_bytes=round(self._settings.frame_size),
         )
 
     def apply(self, wanted: ExposureSettings) -> None:

@@ -70,4 +70,5 @@ class PtpCameraSettings(BaseModel):
             isos=self.isos,
             f_numbers=self.f_numbers,
             overhead_s=self.frame_time,
+            frame_bytes=round(self.frame_size),
         )

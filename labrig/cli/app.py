@@ -6,7 +6,6 @@ from labrig.cli import fit, frame, process, protocol, run
 
 app = typer.Typer(
     help="From a lab bench to a measured phosphorescent or fluorescent material.",
-    no_args_is_help=True,
     add_completion=False,
     pretty_exceptions_enable=False,
     rich_markup_mode=None,

@@ -9,6 +9,7 @@ from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
 
+
 def guarded(arguments: Sequence[str]) -> int:
     """Run the command line and return its exit code."""
     for signum in STOP_SIGNALS:
@@ -27,19 +28,20 @@ def guarded(arguments: Sequence[str]) -> int:
 
 
 def _run(arguments: Sequence[str]) -> int:
-    import click
+    import typer
+    from typer.exceptions import TyperException
 
     from labrig.cli.app import app
 
     try:
-        app(args=list(arguments), prog_name="labrig", standalone_mode=False)
+        app(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
     except Interrupted as interrupted:
         return _complain(str(interrupted), 130 if interrupted.signum == signal.SIGINT else 143)
     except LabrigError as error:
         return _complain(str(error), error.exit_code)
-    except click.exceptions.Exit as ending:
+    except typer.Exit as ending:
         return ending.exit_code
-    except click.ClickException as error:
+    except TyperException as error:
         return _complain(f"{error.format_message()} (see labrig --help)", 2)
     except OSError as error:
         if isinstance(error, BrokenPipeError):

@@ -5,7 +5,7 @@ from typing import Annotated
 
 import typer
 
-app = typer.Typer(help="Fit data from any source.", no_args_is_help=True)
+app = typer.Typer(help="Fit data from any source.")
 
 
 @app.callback()

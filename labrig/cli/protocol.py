@@ -2,7 +2,7 @@
 
 import typer
 
-app = typer.Typer(help="The protocols that can be run.", no_args_is_help=True)
+app = typer.Typer(help="The protocols that can be run.")
 
 
 @app.command("list")

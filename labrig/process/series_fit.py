@@ -3,7 +3,6 @@
 from collections.abc import Sequence
 from dataclasses import replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -14,7 +13,11 @@ from labrig.reduce import Series, read_series
 
 #: Counts below which a Poisson weight would trust a point too much.
 LEAST_COUNTS = 5.0
-_COLUMNS = ("t_s", "exposure_s", "values", "sigma", "iso", "f_number")
+#: Fewer frames do not tell their flicker; shutters and apertures scatter by 0.5-1 %.
+FRAMES_FOR_FLICKER = 6
+TYPICAL_FLICKER = 0.007
+#: A decay whose every amplitude is less certain than this was not seen.
+SEEN_SIGMA = 3.0
 
 
 def fit_series(
@@ -46,7 +49,9 @@ def fit_series(
     if offset_sigma is None:
         known = series.dark_sigma[np.isfinite(series.dark_sigma)]
         offset_sigma = float(known.max()) if len(known) else 0.0
-    return fit_decay(
+    if flicker is None and len(usable.t_s) < FRAMES_FOR_FLICKER:
+        flicker = TYPICAL_FLICKER
+    fit = fit_decay(
         usable.t_s,
         usable.values,
         None if np.isnan(usable.sigma).all() else usable.sigma,
@@ -56,6 +61,13 @@ def fit_series(
         offset_sigma=offset_sigma,
         flicker=flicker,
     )
+    if all(state.amplitude < SEEN_SIGMA * state.amplitude_sigma for state in fit.states):
+        raise FitError(
+            "expected a decay, got nothing that stands out of the noise by "
+            f"{SEEN_SIGMA:g} σ; did the lamp light, is the region on the sample, is the exposure "
+            "long enough?"
+        )
+    return fit
 
 
 def fit_table(
@@ -104,16 +116,17 @@ def _by_region(parts: Sequence[Series]) -> list[Series]:
 
 
 def _joined(parts: Sequence[Series]) -> Series:
-    def column(name: str) -> Any:
-        return np.concatenate([getattr(part, name) for part in parts])
-
-    def texts(name: str) -> tuple[str, ...]:
-        return tuple(text for part in parts for text in getattr(part, name))
-
     return replace(
         parts[0],
-        **{name: column(name) for name in _COLUMNS},
-        **{name: texts(name) for name in ("frame", "unit", "flag")},
+        t_s=np.concatenate([part.t_s for part in parts]),
+        exposure_s=np.concatenate([part.exposure_s for part in parts]),
+        values=np.concatenate([part.values for part in parts]),
+        sigma=np.concatenate([part.sigma for part in parts]),
+        iso=np.concatenate([part.iso for part in parts]),
+        f_number=np.concatenate([part.f_number for part in parts]),
+        frame=tuple(frame for part in parts for frame in part.frame),
+        unit=tuple(unit for part in parts for unit in part.unit),
+        flag=tuple(flag for part in parts for flag in part.flag),
     )
 
 

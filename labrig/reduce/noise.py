@@ -13,9 +13,10 @@ three:
   short lags h, from which Var(mean) = Σ_h C(h)/n; it is believed only if it is significant and gone
   at longer lags, since structure reaches far and shared noise does not.
 
-Two things one frame cannot tell: structure as fine as a pixel everywhere in the region counts as
-noise (the variance comes out too large), and noise shared by whole rows does not (too small; it
-shows in the scatter of dark frames).
+Two things one frame cannot tell. Structure as fine as a pixel all over the region counts as
+noise, and as shared noise: the variance comes out too large, tens of times in a sharp photograph
+full of detail, and by how much depends on which tiles are looked at. Noise shared by whole rows
+does not count: too small; it shows in the scatter of dark frames.
 """
 
 from dataclasses import dataclass
@@ -48,6 +49,8 @@ _SIGNIFICANT = 4.0
 _CLEAR = 0.05
 #: Share of the nearest neighbours' correlation that may remain at the far lags.
 _FAR_SHARE = 0.15
+#: Chance scatters the variance of a tile by a quarter: at this multiple it has structure in it.
+_ROUGH = 2.0
 #: |ln| of a tile's variance over the line's beyond which it says nothing about the line.
 _MISFIT_CAP = 1.0
 
@@ -83,19 +86,23 @@ def plane_noise(plane: Mosaic) -> PlaneNoise:
     """Noise of `plane`, shape (rows, columns) ≥ (3, 3), pixels of one colour."""
     tiles = _tiles(plane)
     level = tiles.mean(axis=(1, 2))
+    darkest = float(level.min())
+    above = level - darkest
     variance = _second_difference_variance(tiles)
+    at_darkest, slope = _photon_line(above, variance)
     correlation = 1.0
     if tiles.shape[1:] == (TILE, TILE):
-        autocovariance, clean = _autocovariance(tiles)
+        # Only tiles on the line say whether noise is shared: in the others it is the sample.
+        plain = variance <= _ROUGH * (at_darkest + slope * above)
+        autocovariance, clean = _autocovariance(tiles[plain])
         correlation = _correlation(autocovariance[clean])
         if correlation > 1:
             # Differences of pixels that share noise are too small: take C(0) itself.
-            variance = autocovariance[:, 0]
-    darkest = float(level.min())
-    at_darkest, slope = _photon_line(level - darkest, variance)
-    expected = at_darkest + slope * (level - darkest)
-    # Chance scatters the variance of a tile by a quarter: at twice the expected it has an edge.
-    smooth = np.where(variance <= 2 * expected, variance, expected)
+            variance = np.where(plain, 0.0, np.inf)
+            variance[plain] = autocovariance[:, 0]
+            at_darkest, slope = _photon_line(above[plain], variance[plain])
+    expected = at_darkest + slope * above
+    smooth = np.where(variance <= _ROUGH * expected, variance, expected)
     # Few tiles may miss how much of the plane is bright, thousands of single pixels do not.
     missed = slope * (_brightness(plane) - float(level.mean()))
     mean_variance = max(float(smooth.mean()) + missed, 0.0) * correlation

@@ -42,10 +42,13 @@ def isolated_outliers(
     levels = np.arange(65536, dtype=np.float64)
     quietest = np.min([noise.variance_at(levels) for noise in noises.values()], axis=0)
     limit = _ABOVE_ALL_SIGMAS * np.sqrt(quietest)
-    # Compared with one number first, then by level, then closely: each time few are left.
+    # Compared with one number, then by level, then by the noise of their own plane: few are left.
     passed = np.flatnonzero(excess > int(limit[int(window.min())]))
     passed = passed[excess.ravel()[passed] > limit[greatest.ravel()[passed]]]
     y, x = np.divmod(passed, window.shape[1])
+    level = greatest[y, x].astype(np.float64)
+    alone = excess[y, x] > _ABOVE_ALL_SIGMAS * _deviation(level, y, x, corner, noises)
+    y, x = y[alone], x[alone]
     level = _median_of_neighbours(window, y, x)
     far = window[y, x] > level + OUTLIER_SIGMAS * _deviation(level, y, x, corner, noises)
     return y[far] + corner[0], x[far] + corner[1]

@@ -27,12 +27,14 @@ FloatArray = NDArray[np.float64]
 
 TIME_LABEL = "Time after lamp off / s"
 SIGNAL_LABEL = "Signal / (DN/s)"
-HEIGHT_PT = 290.0
+HEIGHT_PT = 272.0
 CURVE_POINTS = 240
 #: A logarithmic axis begins at this share of the noise at the end of the decay, and spans no more
 #: than so many decades: below is nothing but the noise's chance zeros.
 SHARE_OF_NOISE = 0.5
 MOST_DECADES = 6.0
+#: Values left out of the fit are shown up to this many times the highest fitted one.
+LEFT_OUT_SHOWN = 3.0
 
 
 @dataclass(frozen=True, eq=False)
@@ -84,8 +86,7 @@ def linear_decay(series: Series, fit: DecayFit | None) -> Figure:
     """Signal over time."""
     figure, axes = _axes()
     _draw(axes, series, fit)
-    usable = series.values[series.usable] if series.usable.any() else series.values
-    highest, lowest = max(float(usable.max()), 0.0), min(float(usable.min()), 0.0)
+    highest, lowest = max(_highest(series), 0.0), min(float(_used(series).min()), 0.0)
     room = 0.06 * (highest - lowest) or 1.0
     axes.set_ylim(lowest - (room if lowest < 0 else 0.0), highest + room)
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
@@ -127,8 +128,7 @@ def values_below_axis(series: Series) -> int:
 
 def log_axis_ends(series: Series) -> tuple[float, float]:
     """Lower and upper end of a logarithmic axis."""
-    used = series.values[series.usable] if series.usable.any() else series.values
-    highest = float(used.max())
+    highest = _highest(series)
     if highest <= 0:
         return 0.1, 10.0
     positive = float(series.values[series.values > 0].min())
@@ -147,10 +147,21 @@ def decade_text(value: float, _: int | None) -> str:
 
 def _axes() -> tuple[Figure, Axes]:
     figure = new_figure(HEIGHT_PT)
-    axes = place(figure, left=62, bottom=42, right=12, top=44)
+    axes = place(figure, left=62, bottom=38, right=12, top=30)
     axes.set_xlabel(TIME_LABEL)
     axes.set_ylabel(SIGNAL_LABEL)
     return figure, axes
+
+
+def _used(series: Series) -> FloatArray:
+    """Values that are fitted, shape (m, C); all if none are."""
+    return series.values[series.usable] if series.usable.any() else series.values
+
+
+def _highest(series: Series) -> float:
+    """The highest value worth an axis: of those left out no more than a few times the fitted ones."""
+    used = float(_used(series).max())
+    return min(float(series.values.max()), LEFT_OUT_SHOWN * used) if used > 0 else used
 
 
 def _draw(axes: Axes, series: Series, fit: DecayFit | None) -> None:

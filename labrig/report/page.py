@@ -164,8 +164,8 @@ def _timing(timings: tuple[FrameTiming, ...]) -> _Timing | None:
     return _Timing(
         figure=Markup(svg(timing_figure(timings), "timing", "Lateness of the frames")),
         n_frames=len(timings),
-        median_ms=rounded(1e3 * late_s[len(late_s) // 2], 3),
-        worst_ms=rounded(1e3 * worst.late_s, 3),
+        median_ms=rounded(1e3 * late_s[len(late_s) // 2], 2),
+        worst_ms=rounded(1e3 * worst.late_s, 2),
         worst_frame=worst.frame,
     )
 

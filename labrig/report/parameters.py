@@ -3,13 +3,15 @@
 import math
 from dataclasses import dataclass
 
+from markupsafe import Markup
+
 from labrig.fit import DecayFit
 from labrig.report.written_numbers import plus_minus, rounded
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a table: what, its unit, and the values, one a column."""
+    """One line of a table: what (text or markup), its unit, and the values, one a column."""
 
     quantity: str
     unit: str
@@ -34,9 +36,9 @@ def state_rows(fit: DecayFit) -> list[Row]:
     half_lives = [(math.log(2) * value, math.log(2) * sigma) for value, sigma in lifetimes]
     amplitudes = [(state.amplitude, state.amplitude_sigma) for state in fit.states]
     return [
-        Row("Rate kᵣ", "s⁻¹", _written(rates)),
-        Row("Lifetime 1/kᵣ", "s", _written(lifetimes)),
-        Row("Half-life ln 2/kᵣ", "s", _written(half_lives)),
+        Row(Markup("Rate k<sub>r</sub>"), "s⁻¹", _written(rates)),
+        Row(Markup("Lifetime 1/k<sub>r</sub>"), "s", _written(lifetimes)),
+        Row(Markup("Half-life ln 2/k<sub>r</sub>"), "s", _written(half_lives)),
         Row("Amplitude a", "DN/s", _written(amplitudes)),
     ]
 

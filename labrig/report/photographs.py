@@ -23,8 +23,12 @@ GLOW_WIDTH = 420
 JPEG_QUALITY = 88
 #: Share of pixels that may be saturated in a daylight photograph that counts as well exposed.
 BLOWN_SHARE = 0.002
+#: Share of saturated pixels from which a spot is shown as saturated.
+BLOWN_LOOKS = 0.5
 #: What is shown at full brightness: this quantile of the pixels, so that hot ones do not decide.
 BRIGHT_QUANTILE = 0.995
+#: Linear level to which that is brought in a daylight photograph.
+DAYLIGHT_BRIGHT = 0.8
 #: Noise brightened more than this tells nothing.
 MOST_BRIGHTENED = 4096.0
 
@@ -54,7 +58,10 @@ class Daylight:
 
 @dataclass(frozen=True)
 class GlowPicture:
-    """One photograph of the glow, as it is and brightened; both are data URIs."""
+    """One photograph of the glow, as it is and brightened; both are data URIs.
+
+    `blown`: some of it is saturated, and shown white, since its colour is not known.
+    """
 
     t_s: float
     exposure_s: float
@@ -62,6 +69,7 @@ class GlowPicture:
     source: str
     brightened_source: str
     brightened: str
+    blown: bool
 
 
 def daylight_picture(
@@ -84,8 +92,8 @@ def daylight_picture(
         return None
     frame, raw = best
     linear = into_gamut(_small(_binned(raw), DAYLIGHT_WIDTH) @ screen.lamp_lit.T)
-    # Black cloth fills most of such pictures: what is bright should look bright.
-    linear /= max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
+    # How well it was exposed does not matter here: what is bright should look bright.
+    linear *= DAYLIGHT_BRIGHT / max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
     height, width = linear.shape[:2]
     return Daylight(
         source=_jpeg(encoded(linear)),
@@ -99,28 +107,32 @@ def daylight_picture(
 
 def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tuple[GlowPicture, ...]:
     """Photographs of one decay on one scale of DN/s, and each brightened to be seen."""
-    rates: list[tuple[GlowPhotograph, Picture]] = []
+    shown = []
     for photograph in photographs:
         raw = _read(photograph.frame.path)
         if raw is not None:
-            small = _small(_binned(raw), GLOW_WIDTH) / _light_gathered(photograph.frame)
-            linear = into_gamut(small @ screen.glow.T)
-            rates.append((photograph, linear.astype(np.float32)))
-    if not rates:
+            small = _small(_binned(raw), GLOW_WIDTH)
+            blown = (_small(_blown(raw), GLOW_WIDTH) > BLOWN_LOOKS)[..., np.newaxis]
+            linear = into_gamut(small / _light_gathered(photograph.frame) @ screen.glow.T)
+            shown.append((photograph, linear, blown))
+    if not shown:
         return ()
-    levels = [float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear in rates]
+    levels = [
+        float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear, _ in shown
+    ]
     full = max(*levels, 1e-9)
     pictures = []
-    for (photograph, linear), level in zip(rates, levels, strict=True):
+    for (photograph, linear, blown), level in zip(shown, levels, strict=True):
         factor = float(f"{min(full / max(level, 1e-9), MOST_BRIGHTENED):.1e}")
         pictures.append(
             GlowPicture(
                 t_s=photograph.t_s,
                 exposure_s=photograph.frame.exposure_s,
                 frame=photograph.frame.path.name,
-                source=_jpeg(encoded(linear / full)),
-                brightened_source=_jpeg(encoded(linear * (factor / full))),
+                source=_jpeg(encoded(np.where(blown, 1.0, linear / full))),
+                brightened_source=_jpeg(encoded(np.where(blown, 1.0, linear * factor / full))),
                 brightened=rounded(factor, 2),
+                blown=bool(blown.any()),
             )
         )
     return tuple(pictures)
@@ -152,6 +164,13 @@ def _binned(raw: RawFrame) -> Picture:
         scale = share / (raw.white - raw.black[position])
         picture[..., "RGB".index(colour)] += (plane - np.float32(raw.black[position])) * scale
     return picture
+
+
+def _blown(raw: RawFrame) -> Picture:
+    """1 where one of the four pixels of a cell is saturated, else 0."""
+    rows, columns = raw.height // 2, raw.width // 2
+    cells = (raw.mosaic[: 2 * rows, : 2 * columns] >= raw.white).reshape(rows, 2, columns, 2)
+    return cells.any(axis=(1, 3)).astype(np.float32)
 
 
 def _small(picture: Picture, width: int) -> Picture:

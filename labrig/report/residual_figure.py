@@ -74,7 +74,7 @@ def residual_figure(series: Series, fit: DecayFit) -> Figure:
     left = residuals(series, fit)
     several = len(series.channels) > 1
     figure = new_figure(HEIGHT_PT if several else LOW_HEIGHT_PT)
-    upper = place(figure, left=62, bottom=146 if several else 42, right=12, top=14)
+    upper = place(figure, left=62, bottom=142 if several else 38, right=12, top=14)
     t_s, usable = middles_s(series), series.usable
     last = float(t_s.max())
     upper.axhspan(-BAND, BAND, color=SHADE, linewidth=0)
@@ -101,7 +101,7 @@ def residual_figure(series: Series, fit: DecayFit) -> Figure:
         upper.set_xlabel(TIME_LABEL)
         return figure
     upper.tick_params(labelbottom=False)
-    lower = place(figure, left=62, bottom=42, right=12, top=164, share_x=upper)
+    lower = place(figure, left=62, bottom=38, right=12, top=166, share_x=upper)
     lower.axhspan(-200 * fit.flicker, 200 * fit.flicker, color=SHADE, linewidth=0)
     lower.axhline(0, color=MUTED, linewidth=0.8)
     known = left.common_sigma <= max(COMMON_SIGMA, 3 * np.nanmin(left.common_sigma))

@@ -29,7 +29,7 @@ from labrig.report.timing import FrameTiming
 from labrig.report.written_numbers import rounded
 
 SMALL_WIDTH_PT, SMALL_HEIGHT_PT = 190.0, 140.0
-SMALL_FONT_PT = 8.5
+SMALL_FONT_PT = 9.5
 TIMING_HEIGHT_PT = 200.0
 
 
@@ -43,7 +43,7 @@ def overview_figures(patches: Sequence[PatchReport]) -> list[Figure]:
 
 def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> Figure:
     figure = new_figure(SMALL_HEIGHT_PT, SMALL_WIDTH_PT)
-    axes = place(figure, left=44, bottom=30, right=6, top=6)
+    axes = place(figure, left=50, bottom=32, right=6, top=6)
     axes.set_yscale("log", nonpositive="clip")
     axes.set_ylim(low, high)
     axes.set_xlim(-0.03 * last_s, 1.03 * last_s)
@@ -76,7 +76,7 @@ def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> 
 def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
     """How much later than planned each exposure began, one mark a frame, one colour a unit."""
     figure = new_figure(TIMING_HEIGHT_PT)
-    axes = place(figure, left=62, bottom=42, right=12, top=14)
+    axes = place(figure, left=62, bottom=38, right=12, top=14)
     axes.axhline(0, color=MUTED, linewidth=0.8)
     units = list(dict.fromkeys(timing.unit for timing in timings))
     for number, unit in enumerate(units):

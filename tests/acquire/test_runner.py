@@ -9,6 +9,7 @@ import pytest
 from labrig.acquire import (
     LAMP_OFF,
     LAMP_ON,
+    Device,
     ExposureSettings,
     Rig,
     Session,
@@ -63,7 +64,7 @@ class StoppingClock(VirtualClock):
 
 def make_rig(clock: VirtualClock, notes: list[str]) -> tuple[Rig, NotingLamp]:
     lamp = NotingLamp(clock, notes.append)
-    devices = {"lamp": lamp, "camera": NotingCamera(clock, notes.append)}
+    devices: dict[str, Device] = {"lamp": lamp, "camera": NotingCamera(clock, notes.append)}
     return Rig("test bench", clock, devices, {}), lamp
 
 

@@ -11,7 +11,7 @@ from labrig.fit.decay.diagnostics import (
     rising_warning,
     state_warnings,
 )
-from labrig.fit.decay.envelope import Envelope
+from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
 from labrig.fit.decay.joint import parameter_sigma
 from labrig.fit.decay.power_law import PowerLaw
 from labrig.fit.decay.result import DecayFit, DecayState
@@ -172,6 +172,11 @@ def _warnings(
         warnings.append(
             f"σ was not given: taken as {scatter:.3g} for all values, from their scatter; "
             "give each value's σ for the right weights"
+        )
+    if evidence.noise_dof < FEWEST_NOISE_DOF:
+        warnings.append(
+            f"flicker was estimated from {max(evidence.noise_dof, 1):.0f} frames' worth of bright "
+            "signal: give a flicker measured elsewhere, or record more frames while it is bright"
         )
     wanted = evidence.asked or evidence.n_fixed
     if fit.n_states < wanted:

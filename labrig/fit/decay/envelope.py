@@ -12,7 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.optimize import nnls
 
-from labrig.fit.decay.series import DecaySeries
+from labrig.errors import FitError
+from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.shapes import exponential_means
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
@@ -26,6 +27,8 @@ ROUNDS = 3
 ALTERNATIONS = 5
 ALTERNATIONS_IF_GIVEN = 2
 FLICKER_ITERATIONS = 12
+#: Degrees of freedom below which the estimated flicker is not to be relied on.
+FEWEST_NOISE_DOF = 4.0
 
 
 @dataclass(frozen=True)
@@ -43,7 +46,8 @@ class Envelope:
     dof
         Degrees of freedom of the noise's estimate: the frames that tell, less those the curve took.
     flicker, flicker_sigma
-        Relative, common to the channels of a frame.
+        Relative, common to the channels of a frame; with fewer than `FEWEST_NOISE_DOF` degrees of
+        freedom one σ(ρ²) more than the estimate.
     noise_scale
         Scatter in units of σ; 1 unless σ was not given.
     """
@@ -61,6 +65,11 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     """Curve, channel weights and, if `flicker` is None, the flicker; by turns.
 
     One channel with noise given needs none of these: the envelope is then flat.
+
+    Raises
+    ------
+    FitError
+        Nothing that decays.
     """
     weights = _first_weights(series)
     signal = np.zeros_like(series.values)
@@ -74,6 +83,8 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
         if len(weights) > 1:
             weights, curve = _channel_weights(data, curve, offset)
         signal = np.multiply.outer(curve, weights)
+        if not signal.any():
+            raise FitError(NO_DECAY)
         if flicker is None:
             rho, rho_sigma, dof = _flicker(series, signal, offset, leverage)
         else:
@@ -168,10 +179,18 @@ def _flicker(
         told = brightness2 / (1 + variance * brightness2)
         scatter = float((told**2 / np.where(brightness2 > 0, brightness2, 1.0)) @ (along2 - spare))
         variance = max(scatter / float(told**2 @ spare), 0.0)
-    told = brightness2 / (1 + variance * brightness2)
-    variance_sigma = float(np.sqrt(2 / (told**2 @ spare)))
-    # 2/ν is the squared relative error of V where frames tell about the decay.
-    dof = 2 / (variance_sigma**2 * float((told**3).sum() / told.sum()))
+
+    def error(variance: float) -> tuple[float, float]:
+        """σ(ρ²), and ν: 2/ν is the squared relative error of V where frames tell of the decay."""
+        told = brightness2 / (1 + variance * brightness2)
+        sigma = float(np.sqrt(2 / (told**2 @ spare)))
+        return sigma, 2 / (sigma**2 * float((told**3).sum() / told.sum()))
+
+    variance_sigma, dof = error(variance)
+    if dof < FEWEST_NOISE_DOF:
+        # So few frames tell that a low estimate is an accident: err on the noisy side.
+        variance += variance_sigma
+        variance_sigma, dof = error(variance)
     flicker = float(np.sqrt(variance))
     # Near zero the square root is not linear: then √σ(ρ²) is the scale of what ρ could be.
     sigma = min(variance_sigma / (2 * max(flicker, 1e-30)), float(np.sqrt(variance_sigma)))

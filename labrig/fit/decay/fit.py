@@ -12,7 +12,7 @@ from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.power_law import fit_power_law, power_law
 from labrig.fit.decay.result import DecayFit
 from labrig.fit.decay.selection import CLEAR_BIC, Candidate, bic, choose_states
-from labrig.fit.decay.series import DecaySeries, decay_series
+from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
@@ -164,10 +164,7 @@ def _supported_states(
         )
         if chosen is not None:
             return chosen, tried
-    raise FitError(
-        "expected a signal that decays, got none that a positive exponential describes; "
-        "check the dark level, and that times count from lamp off"
-    )
+    raise FitError(NO_DECAY)
 
 
 def _reweighted(

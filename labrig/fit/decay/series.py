@@ -16,6 +16,11 @@ FASTEST_DECAYS = 10.0
 #: A fast state's signal must not have vanished e^600-fold before the first frame.
 LARGEST_PHASE = 600.0
 
+NO_DECAY = (
+    "expected a signal that decays, got none that a positive exponential describes; "
+    "check the dark level, and that times count from lamp off"
+)
+
 
 @dataclass(frozen=True)
 class DecaySeries:

@@ -42,8 +42,16 @@ def test_takes_control_of_what_would_spoil_frames() -> None:
 
 
 def test_offers_what_the_camera_lists_and_the_rig_allows() -> None:
-    camera = bench().connect(isos=(200, 400, 6400), longest_exposure="1 s", frame_time="3 s")
-    assert camera.offers() == CameraOffers((1 / 128, 1 / 64, 1.0), (200, 6400), (4.0, 5.6), 3.0)
+    camera = bench().connect(
+        isos=(200, 400, 6400), longest_exposure="1 s", frame_time="3 s", frame_size="25 MB"
+    )
+    assert camera.offers() == CameraOffers(
+        exposures_s=(1 / 128, 1 / 64, 1.0),
+        isos=(200, 6400),
+        f_numbers=(4.0, 5.6),
+        overhead_s=3.0,
+        frame_bytes=25_000_000,
+    )
 
 
 def test_offers_follow_the_camera() -> None:
@@ -62,6 +70,7 @@ def test_declared_offers_are_thirds_of_stops_by_their_true_times() -> None:
     assert all(math.isclose(r, 2 ** (1 / 3)) for r in ratios)
     assert offers.isos == (100, 400)
     assert offers.overhead_s == settings.frame_time
+    assert offers.frame_bytes == settings.frame_size
 
 
 @pytest.mark.parametrize(

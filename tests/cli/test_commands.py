@@ -1,0 +1,240 @@
+"""The commands as a person uses them: results, exit codes, one clear line when something is wrong."""
+
+import json
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+
+from labrig.record import read_run
+from tests.conftest import Ended
+
+Labrig = Callable[..., Ended]
+Make = Callable[..., Path]
+
+
+def one_line(ended: Ended, code: int, *said: str) -> None:
+    lines = [line for line in ended.err.splitlines() if not line.startswith("[")]
+    assert ended.code == code, ended.err
+    assert len(lines) == 1, ended.err
+    assert lines[0].startswith("labrig: ")
+    for text in said:
+        assert text in lines[0]
+
+
+@pytest.mark.parametrize("command", ["run", "plan"])
+@pytest.mark.parametrize(
+    ("protocol", "rig", "said"),
+    [
+        ("decya", "sim", "did you mean 'decay'?"),
+        ("decay", "sin", "did you mean 'sim'?"),
+        ("none.yaml", "sim", "none.yaml: no such protocol file"),
+        ("decay", "none/rig.yaml", "no such rig file"),
+    ],
+)
+def test_unknown_protocols_and_rigs(
+    labrig: Labrig, tmp_path: Path, command: str, protocol: str, rig: str, said: str
+) -> None:
+    one_line(labrig(command, protocol, "--rig", rig, "--runs", tmp_path), 2, said)
+    assert list(tmp_path.iterdir()) == []
+
+
+@pytest.mark.parametrize(
+    ("change", "said"),
+    [
+        (lambda rig: rig.pop("name"), "'name' is missing"),
+        (lambda rig: rig.update(nmae="x"), "did you mean 'name'?"),
+        (lambda rig: rig["devices"].update(lmap=rig["devices"].pop("lamp")), "did you mean 'lamp'"),
+        (lambda rig: rig["devices"].pop("lamp"), "needs a lamp"),
+        (lambda rig: rig["devices"].pop("camera"), "needs a camera"),
+        (lambda rig: rig["devices"]["lamp"].update(driver="numato"), "did you mean 'numato_relay'"),
+        (lambda rig: rig["devices"]["lamp"].update(relya=1), "did you mean 'relay'"),
+        (lambda rig: rig["devices"]["lamp"].update(relay=99), "relay"),
+        (lambda rig: rig["devices"]["lamp"].update(warm_up=15), "unit"),
+        (lambda rig: rig["devices"]["camera"].update(frame_size="1 TB"), "frame_size"),
+        (lambda rig: rig["devices"]["camera"].update(frame_size="90000 GB"), "free"),
+        (lambda rig: rig["optics"].update(camera="canon"), "canon"),
+    ],
+)
+def test_a_plan_is_refused_before_anything_moves(
+    labrig: Labrig, make_rig: Make, tmp_path: Path, change: Callable[[dict], None], said: str  # type: ignore[type-arg]
+) -> None:
+    path = make_rig()
+    rig = yaml.safe_load(path.read_text())
+    change(rig)
+    path.write_text(yaml.safe_dump(rig))
+    for command in ("plan", "run"):
+        ended = labrig(command, "decay", "--rig", path, "--runs", tmp_path / "runs")
+        one_line(ended, 5 if said == "free" else 2, said)
+    assert not (tmp_path / "runs").exists()
+
+
+@pytest.mark.parametrize(
+    ("change", "code", "said"),
+    [
+        ({"sample": "blu-paint"}, 2, "did you mean 'blue-paint'?"),
+        ({"sensr": {}}, 2, "did you mean 'sensor'?"),
+        ({"faults": ["lamp_daed"]}, 2, "did you mean 'lamp_dead'?"),
+    ],
+)
+def test_a_room_that_cannot_be_built_is_refused(
+    labrig: Labrig, make_rig: Make, tmp_path: Path, change: dict[str, object], code: int, said: str
+) -> None:
+    one_line(
+        labrig("run", "decay", "--rig", make_rig(**change), "--runs", tmp_path / "runs"), code, said
+    )
+
+
+def test_a_duplicate_key_is_named_with_its_line(labrig: Labrig, tmp_path: Path) -> None:
+    path = tmp_path / "twice.yaml"
+    path.write_text("protocol: decay\nevery: 5 s\nevery: 6 s\n")
+    one_line(labrig("plan", path, "--rig", "sim"), 2, "line 3", "'every' stands twice")
+
+
+@pytest.mark.parametrize(
+    "arguments", [["frobnicate"], ["run"], ["run", "decay"], ["plan", "decay", "--rgi", "sim"]]
+)
+def test_wrong_usage(labrig: Labrig, arguments: list[str]) -> None:
+    one_line(labrig(*arguments), 2, "see labrig --help")
+
+
+@pytest.mark.parametrize("command", [["resume"], ["process"]])
+def test_what_is_no_run_folder(labrig: Labrig, tmp_path: Path, command: list[str]) -> None:
+    one_line(labrig(*command, tmp_path), 2, "expected a run folder")
+    one_line(labrig(*command, tmp_path / "nowhere"), 2, "expected a run folder")
+
+
+def test_a_device_that_is_not_there_is_exit_code_3(
+    labrig: Labrig, make_rig: Make, tmp_path: Path
+) -> None:
+    path = make_rig()
+    rig = yaml.safe_load(path.read_text())
+    rig["devices"]["lamp"]["address"] = str(tmp_path / "ttyACM7")
+    path.write_text(yaml.safe_dump(rig))
+    one_line(
+        labrig("run", "decay", "--rig", path, "--runs", tmp_path / "runs"), 3, "ttyACM7", "resume"
+    )
+
+
+@pytest.fixture
+def finished(labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path) -> Path:
+    ended = labrig("run", make_protocol(), "--rig", make_rig(), "--runs", tmp_path / "runs")
+    assert ended.code == 0, ended.err
+    return ended.run_folder
+
+
+def test_a_run_ends_in_a_result_that_agrees_with_itself(labrig: Labrig, finished: Path) -> None:
+    result = finished / "result"
+    fit = json.loads((result / "fit.json").read_text())
+    (state,) = fit["states"]
+    assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_sigma_per_s"]
+    material = yaml.safe_load((result / "material.yaml").read_text())
+    assert material["states"][0]["k_r_per_s"] == state["k_r_per_s"]
+    assert material["states"][0]["r0"] is None, "a decay alone does not tell r(0)"
+    again = labrig("fit", "decay", result / "series.csv", "--json")
+    refit = json.loads(again.out)
+    assert refit["states"][0]["k_r_per_s"] == pytest.approx(state["k_r_per_s"], rel=1e-3)
+
+
+def test_processing_again_keeps_what_was_and_gives_the_same(
+    labrig: Labrig, finished: Path
+) -> None:
+    before = {path.name: path.read_bytes() for path in (finished / "result").iterdir()}
+    assert labrig("process", finished).code == 0
+    assert {p.name: p.read_bytes() for p in (finished / "result-1").iterdir()} == before
+    assert {p.name: p.read_bytes() for p in (finished / "result").iterdir()} == before
+
+
+def test_processing_otherwise(labrig: Labrig, finished: Path) -> None:
+    ended = labrig(
+        "process", finished, "--roi", "36,24,12,12", "--exclude", "3", "--states", "2", "--json"
+    )
+    assert ended.code == 0, ended.err
+    excluded = [
+        line
+        for line in (finished / "result" / "series.csv").read_text().splitlines()
+        if "excluded" in line
+    ]
+    assert excluded == [], "frame 3 is a dark frame, not part of the series"
+    frame = read_run(finished).frames("decay")[2].path.name
+    assert labrig("process", finished, "--exclude", frame).code == 0
+    assert f"{frame},decay-1,sample,excluded" in (finished / "result" / "series.csv").read_text()
+    one_line(labrig("process", finished, "--exclude", "999"), 2, "no frame 999")
+    one_line(labrig("process", finished, "--roi", "nose=1,2,3,4"), 2, "no patch is called 'nose'")
+    one_line(labrig("process", finished, "--roi", "90,60,40,40"), 2, "leaves the frame")
+
+
+def test_a_frame_changed_on_disk_is_noticed(labrig: Labrig, finished: Path) -> None:
+    frame = read_run(finished).frames("decay")[1].path
+    frame.write_bytes(frame.read_bytes()[:-1] + b"\x00")
+    one_line(labrig("process", finished), 4, frame.name, "checksum")
+    frame.unlink()
+    one_line(labrig("process", finished), 4, frame.name, "missing")
+    assert labrig("process", finished, "--exclude", frame.name).code == 0
+
+
+def test_a_series_without_light_is_kept_and_said(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
+) -> None:
+    ended = labrig(
+        "run", make_protocol(), "--rig", make_rig(faults=["lamp_dead"]), "--runs", tmp_path / "runs"
+    )
+    one_line(ended, 4, "did the lamp light", "the run is kept")
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert len(read_run(folder).frames("decay")) == 12
+    assert (folder / "result" / "report.html").exists()
+
+
+def test_frame_prints_what_is_in_a_raw_file(labrig: Labrig, finished: Path) -> None:
+    path = read_run(finished).frames("decay")[0].path
+    ended = labrig("frame", path, "--roi", "32,20,30,24", "--json")
+    measured = json.loads(ended.out)
+    assert set(measured) == {
+        "channels", "black", "white", "cfa", "width", "height", "exposure_s", "iso", "f_number",
+        "make", "model",
+    }  # fmt: skip
+    assert (measured["width"], measured["height"], measured["cfa"]) == (96, 64, "RGGB")
+    assert measured["channels"]["G"]["mean"] > 100
+    assert "G" in labrig("frame", path).out
+    one_line(labrig("frame", path, "--roi", "1,2,3"), 2, "x,y,width,height")
+
+
+def test_what_cannot_be_reduced_is_exit_code_4(labrig: Labrig, tmp_path: Path) -> None:
+    (tmp_path / "photo.cr2").write_bytes(b"no photo at all")
+    one_line(labrig("frame", tmp_path / "photo.cr2"), 4, "photo.cr2")
+    one_line(labrig("frame", tmp_path / "none.cr2"), 2, "none.cr2")
+    (tmp_path / "series.csv").write_text("t_s,G\n0,1\n1,nan\n2,3\n")
+    one_line(labrig("fit", "decay", tmp_path / "series.csv"), 4, "series.csv")
+    (tmp_path / "short.csv").write_text("t_s,G\n0,1\n")
+    one_line(labrig("fit", "decay", tmp_path / "short.csv"), 4)
+
+
+def test_the_command_starts_fast_and_lists_what_there_is(labrig: Labrig) -> None:
+    assert "decay" in labrig("protocol", "list").out
+    done = subprocess.run(
+        [sys.executable, "-X", "importtime", "-m", "labrig", "--help"],
+        capture_output=True, text=True, check=True,
+    )  # fmt: skip
+    for slow in ("numpy", "scipy", "pydantic", "event_model", "rawpy"):
+        assert f"| {slow}\n" not in done.stderr.replace("|   ", "| "), f"--help imports {slow}"
+
+
+def test_a_rig_copied_elsewhere_still_runs(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
+) -> None:
+    """A material file beside the rig is found from wherever labrig is called, and at resume."""
+    place = tmp_path / "elsewhere"
+    place.mkdir()
+    (place / "mine.yaml").write_text(
+        "name: mine\nkind: phosphor\nbands_nm: [400, 550, 700]\n"
+        + "states: [{k_r_per_s: 0.05, reradiation: [2.0, 2.0]}]\n"
+    )
+    rig = make_rig(sample="mine.yaml").rename(place / "rig.yaml")
+    ended = labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs")
+    assert ended.code == 0, ended.err
+    fit = json.loads((ended.run_folder / "result" / "fit.json").read_text())
+    assert fit["states"][0]["k_r_per_s"] == pytest.approx(0.05, rel=0.02)
+    assert labrig("resume", ended.run_folder).code == 0
