@@ -1,6 +1,6 @@
 """Fits: the least-squares core, and what is measured with it."""
 
-from labrig.fit.decay import Candidate, DecayFit, DecayState, PowerLaw, fit_decay
+from labrig.fit.decay import Candidate, DecayFit, DecayState, Rival, fit_decay
 from labrig.fit.least_squares import LeastSquaresFit, least_squares
 
 __all__ = [
@@ -8,7 +8,7 @@ __all__ = [
     "DecayFit",
     "DecayState",
     "LeastSquaresFit",
-    "PowerLaw",
+    "Rival",
     "fit_decay",
     "least_squares",
 ]

@@ -94,8 +94,8 @@ def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
     path = known.get(text, Path(text))
     if text not in known and path.suffix != ".json":
         raise UsageError(
-            f"unknown camera '{text}'; {did_you_mean(text, list(known))}; a file of your own ends in "
-            ".json"
+            f"unknown camera '{text}'; {did_you_mean(text, list(known))}; a file of your own "
+            "ends in .json"
         )
     try:
         content = json.loads(path.read_text(encoding="utf-8"))

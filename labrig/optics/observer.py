@@ -1,8 +1,8 @@
 """The CIE 1931 2° standard observer, without the half second and 60 MB of a colour library.
 
 C. Wyman, P.-P. Sloan, P. Shirley, *Simple analytic approximations to the CIE XYZ color matching
-functions*, JCGT 2 (2013) 2, eq. 4: sums of Gaussians with two widths. Against the tables at 5 nm: RMS
-0.006, 0.003 and 0.005, integrals to 0.1 %; a camera's own misfit is twenty times that.
+functions*, JCGT 2 (2013) 2, eq. 4: sums of Gaussians with two widths. Against the tables at 5 nm:
+RMS 0.006, 0.003 and 0.005, integrals to 0.1 %; a camera's own misfit is twenty times that.
 """
 
 import numpy as np

@@ -61,9 +61,9 @@ def screen_for(camera: CameraResponse | None) -> Screen:
 
 
 def into_gamut(linear: FloatArray) -> FloatArray:
-    """Linear sRGB, shape (…, 3), with colours that a screen cannot show mixed with grey until it can.
+    """Linear sRGB, shape (…, 3), as near as a screen can show it.
 
-    Luminance stays; what is negative in all (noise about black) becomes black.
+    Colours outside are mixed with grey until they are inside. Luminance stays; what is negative in all (noise about black) becomes black.
     """
     luminance = np.maximum(linear @ _LUMINANCE, 0.0)[..., np.newaxis]
     lowest = linear.min(axis=-1, keepdims=True)
@@ -78,7 +78,8 @@ def encoded(linear: FloatArray) -> Bytes:
     curve = np.where(
         clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055
     )
-    return np.rint(255 * curve).astype(np.uint8)
+    rounded: Bytes = np.rint(255 * curve).astype(np.uint8)
+    return rounded
 
 
 def css_colour(linear: FloatArray) -> str:

@@ -10,12 +10,12 @@ from labrig.region import Region
 
 #: What every decay measured with a camera rests on, for `RunReport.assumptions`.
 DECAY_ASSUMPTIONS = (
-    "The amplitudes aᵢ are what the decay measures: the signal at lamp off in the brightest channel, "
-    "extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiance Λᵢ and "
+    "The amplitudes aᵢ are what the decay measures: the signal at lamp off in the brightest "
+    "channel, extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiance Λᵢ and "
     "concentration rᵢ(0) cannot be told apart by a decay alone.",
     "A frame measures the mean over its exposure, and is fitted as such.",
-    "Rates and amplitudes are shared by the channels; each channel has one weight. So every state is "
-    "taken to have the same colour.",
+    "Rates and amplitudes are shared by the channels; each channel has one weight. So every state "
+    "is taken to have the same colour.",
     "Signals are relative: DN/s of this camera at the ISO speed and aperture listed below, not an "
     "absolute radiance.",
     "Uncertainties are standard uncertainties (1 σ) from photon, read and dark noise and, where it "

@@ -159,7 +159,7 @@ def _used(series: Series) -> FloatArray:
 
 
 def _highest(series: Series) -> float:
-    """The highest value worth an axis: of those left out no more than a few times the fitted ones."""
+    """The highest value worth an axis: those left out of the fit do not dwarf the fitted ones."""
     used = float(_used(series).max())
     return min(float(series.values.max()), LEFT_OUT_SHOWN * used) if used > 0 else used
 

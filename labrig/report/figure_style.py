@@ -12,7 +12,6 @@ from io import BytesIO
 
 import matplotlib.style
 from matplotlib.axes import Axes
-from matplotlib.backends.backend_svg import FigureCanvasSVG
 from matplotlib.figure import Figure
 
 #: Figures are this wide in points, so that 10 pt is legible at half a desktop's or a phone's width.
@@ -65,7 +64,12 @@ def new_figure(height_pt: float, width_pt: float = WIDTH_PT) -> Figure:
 
 
 def place(
-    figure: Figure, left: float, bottom: float, right: float, top: float, share_x: Axes | None = None
+    figure: Figure,
+    left: float,
+    bottom: float,
+    right: float,
+    top: float,
+    share_x: Axes | None = None,
 ) -> Axes:
     """Axes with margins in points from the figure's left, bottom, right and top edge."""
     width, height = figure.get_size_inches() * 72
@@ -92,6 +96,8 @@ def svg(figure: Figure, name: str, described: str) -> str:
 
     Parameters
     ----------
+    figure
+        Made within `figure_style`.
     name
         Unique on the page; letters, digits and hyphens.
     described
@@ -99,7 +105,7 @@ def svg(figure: Figure, name: str, described: str) -> str:
     """
     buffer = BytesIO()
     nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    FigureCanvasSVG(figure).print_svg(buffer, metadata=nothing)
+    figure.savefig(buffer, format="svg", metadata=nothing)
     text = buffer.getvalue().decode("utf-8")
     text = text[text.index("<svg") :].strip()
     body = text.split(">", 1)[1]
@@ -113,4 +119,5 @@ def svg(figure: Figure, name: str, described: str) -> str:
     for colour, variable in _VARIABLES.items():
         body = body.replace(colour, f"var(--{variable}, {colour})")
     body = re.sub(r">\s+<", "><", body)
-    return f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{escape(described)}">{body}'
+    label = escape(described)
+    return f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{label}">{body}'

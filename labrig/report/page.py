@@ -104,6 +104,7 @@ def _page(report: RunReport) -> str:
         report=report,
         # The style sheet is labrig's own; escaping it would break its selectors.
         style=Markup((folder / STYLE).read_text(encoding="utf-8")),
+        warnings=_warnings(report),
         patches=patches,
         timing=timing,
         daylight=daylight_picture(report.daylight, report.patches, screen),
@@ -111,6 +112,21 @@ def _page(report: RunReport) -> str:
         colours_known=screen.known,
         names_on_photograph=len(report.patches) <= NAMES_ON_PHOTOGRAPH,
     )
+
+
+def _warnings(report: RunReport) -> list[str]:
+    """Those of the report, and every missing fit that they do not mention."""
+    missing = [
+        (patch.name, patch.fit) for patch in report.patches if isinstance(patch.fit, str)
+    ]
+    return [
+        *report.warnings,
+        *(
+            f"{name}: no fit: {reason}"
+            for name, reason in missing
+            if not any(reason in warning for warning in report.warnings)
+        ),
+    ]
 
 
 def _patches(report: RunReport, screen: Screen) -> list[_Patch]:
@@ -140,17 +156,14 @@ def _patches(report: RunReport, screen: Screen) -> list[_Patch]:
 def _figures(number: int, patch: PatchReport) -> _Figures:
     series = patch.series
     fit = patch.fit if isinstance(patch.fit, DecayFit) else None
+    linear, logarithmic = linear_decay(series, fit), logarithmic_decay(series, fit)
     left = Markup("")
     if fit is not None:
         figure = residual_figure(series, fit)
         left = Markup(svg(figure, f"residuals-{number}", f"Residuals of the fit to {patch.name}"))
     return _Figures(
-        linear=Markup(
-            svg(linear_decay(series, fit), f"linear-{number}", f"Decay of {patch.name}, linear")
-        ),
-        logarithmic=Markup(
-            svg(logarithmic_decay(series, fit), f"log-{number}", f"Decay of {patch.name}, logarithmic")
-        ),
+        linear=Markup(svg(linear, f"linear-{number}", f"Decay of {patch.name}, linear")),
+        logarithmic=Markup(svg(logarithmic, f"log-{number}", f"Decay of {patch.name}, logarithmic")),
         residuals=left,
         below_axis=values_below_axis(series),
     )

@@ -8,6 +8,9 @@ from markupsafe import Markup
 from labrig.fit import DecayFit
 from labrig.report.written_numbers import plus_minus, rounded
 
+#: Relative σ of a rate from which its reciprocal is given without one.
+WORST_FOR_LIFETIME = 0.5
+
 
 @dataclass(frozen=True)
 class Row:
@@ -32,7 +35,7 @@ class CandidateRow:
 def state_rows(fit: DecayFit) -> list[Row]:
     """Rates, times and amplitudes, one column a state."""
     rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in fit.states]
-    lifetimes = [(1 / rate, sigma / rate**2) for rate, sigma in rates]
+    lifetimes = [_lifetime(rate, sigma) for rate, sigma in rates]
     half_lives = [(math.log(2) * value, math.log(2) * sigma) for value, sigma in lifetimes]
     amplitudes = [(state.amplitude, state.amplitude_sigma) for state in fit.states]
     return [
@@ -58,10 +61,8 @@ def quality_rows(fit: DecayFit) -> list[Row]:
     if len(fit.channels) > 1:
         flicker = plus_minus(100 * fit.flicker, 100 * fit.flicker_sigma)
         rows.append(Row("Flicker of a frame", "%", (flicker,)))
-    rows.append(
-        Row("Reduced χ²", "", (f"{rounded(fit.reduced_chi2, 3)} with {fit.dof} degrees of freedom",))
-    )
-    return rows
+    chi2 = f"{rounded(fit.reduced_chi2, 3)} with {fit.dof} degrees of freedom"
+    return [*rows, Row("Reduced χ²", "", (chi2,))]
 
 
 def paper_rows(fit: DecayFit) -> list[Row]:
@@ -111,28 +112,31 @@ def why_so_many_states(fit: DecayFit) -> str:
     fewer, more = tried.get(fit.n_states - 1), tried.get(fit.n_states + 1)
     said = []
     if here is not None and fewer is not None:
-        said.append(
-            f"{_states(fit.n_states).capitalize()}: BIC is lower by {rounded(fewer.bic - here.bic, 3)} "
-            f"than with {fit.n_states - 1}."
-        )
+        gain = rounded(fewer.bic - here.bic, 3)
+        said.append(f"BIC is lower by {gain} than with {_states(fewer.n_states)}.")
     if here is not None and more is not None:
         change = more.bic - here.bic
         word = "raises" if change >= 0 else "lowers"
-        chance = "" if more.f_p_value is None else f", and so small a gain is chance with p = {_p_value(more.f_p_value)}"
-        said.append(f"One more state {word} BIC by {rounded(abs(change), 3)}{chance}.")
+        said.append(f"One more state {word} BIC by {rounded(abs(change), 3)}.")
+        if more.f_p_value is not None:
+            said.append(f"Chance alone gains as much in χ² with p = {_p_value(more.f_p_value)}.")
     if not said:
-        said.append(
-            f"{_states(fit.n_states).capitalize()}; no other number was tried or supported by the data."
-        )
+        said.append("No other number of states was tried or supported by the data.")
     elif more is None:
         said.append("More were not asked for, or the data do not support them.")
     if fit.power_law is not None:
         law = fit.power_law
         said.append(
-            f"A power law (1 + t/τ)⁻ᵖ describes the data clearly better: τ = {rounded(law.tau_s, 3)} s, "
-            f"p = {plus_minus(law.exponent, law.exponent_sigma)}."
+            "A power law (1 + t/τ)⁻ᵖ describes the data clearly better: "
+            f"τ = {rounded(law.tau_s, 3)} s, p = {plus_minus(law.exponent, law.exponent_sigma)}."
         )
     return " ".join(said)
+
+
+def _lifetime(rate_per_s: float, sigma_per_s: float) -> tuple[float, float]:
+    """1/k and its σ in s; unknown where k is so uncertain that 1/k has no symmetric error."""
+    known = sigma_per_s < WORST_FOR_LIFETIME * rate_per_s
+    return 1 / rate_per_s, sigma_per_s / rate_per_s**2 if known else math.inf
 
 
 def _written(pairs: list[tuple[float, float]]) -> tuple[str, ...]:

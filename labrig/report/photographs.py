@@ -14,7 +14,7 @@ from labrig.reduce import RawFrame, read_raw
 from labrig.region import region_pixels
 from labrig.report.colours import Screen, encoded, into_gamut
 from labrig.report.content import GlowPhotograph, PatchReport
-from labrig.report.written_numbers import rounded
+from labrig.report.written_numbers import exposure_text, rounded
 
 Picture = NDArray[np.float32]
 
@@ -64,8 +64,6 @@ class GlowPicture:
     """
 
     t_s: float
-    exposure_s: float
-    frame: str
     source: str
     brightened_source: str
     brightened: str
@@ -95,13 +93,13 @@ def daylight_picture(
     # How well it was exposed does not matter here: what is bright should look bright.
     linear *= DAYLIGHT_BRIGHT / max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
     height, width = linear.shape[:2]
+    balance = "white balanced for a halogen lamp" if screen.known else "in raw colours"
     return Daylight(
         source=_jpeg(encoded(linear)),
         width=width,
         height=height,
         marks=_marks(patches, raw, width, height),
-        caption=f"Frame {frame.path.name}, {rounded(frame.exposure_s, 3)} s, shown "
-        + ("white balanced for a halogen lamp." if screen.known else "in the camera's own colours."),
+        caption=f"Frame {frame.path.name}, {exposure_text(frame.exposure_s)}, {balance}."
     )
 
 
@@ -127,8 +125,6 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
         pictures.append(
             GlowPicture(
                 t_s=photograph.t_s,
-                exposure_s=photograph.frame.exposure_s,
-                frame=photograph.frame.path.name,
                 source=_jpeg(encoded(np.where(blown, 1.0, linear / full))),
                 brightened_source=_jpeg(encoded(np.where(blown, 1.0, linear * factor / full))),
                 brightened=rounded(factor, 2),
@@ -170,7 +166,7 @@ def _blown(raw: RawFrame) -> Picture:
     """1 where one of the four pixels of a cell is saturated, else 0."""
     rows, columns = raw.height // 2, raw.width // 2
     cells = (raw.mosaic[: 2 * rows, : 2 * columns] >= raw.white).reshape(rows, 2, columns, 2)
-    return cells.any(axis=(1, 3)).astype(np.float32)
+    return np.asarray(cells.any(axis=(1, 3)), dtype=np.float32)
 
 
 def _small(picture: Picture, width: int) -> Picture:

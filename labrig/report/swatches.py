@@ -24,7 +24,7 @@ class Swatch:
     time
         Seconds after lamp off, written.
     glow
-        CSS colour, all times on one exposure.
+        CSS colour, all times on one exposure; black where there is nothing but noise.
     hue
         CSS colour at full brightness; empty where noise hides it.
     """
@@ -42,16 +42,19 @@ def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
     rows = rows[np.argsort(series.t_s[rows], kind="stable")]
     if len(rows) > MOST_SWATCHES:
         rows = rows[np.rint(np.linspace(0, len(rows) - 1, MOST_SWATCHES)).astype(int)]
-    linear = into_gamut(series.values[rows] @ screen.glow.T)
+    values, sigma = series.values[rows], series.sigma[rows]
+    linear = into_gamut(values @ screen.glow.T)
+    signal_to_noise = np.sqrt(np.sum((values / sigma) ** 2, axis=1))
+    # Without a known σ there is no reason to doubt.
+    seen = ~(signal_to_noise < LEAST_FOR_HUE) & (linear.max(axis=1) > 0)
+    linear[~seen] = 0.0
     brightest = linear.max(axis=1)
     full = max(float(brightest.max()), 1e-12)
-    signal_to_noise = np.sqrt(np.sum((series.values[rows] / series.sigma[rows]) ** 2, axis=1))
     return tuple(
         Swatch(
             time=rounded(float(series.t_s[row]), 3),
             glow=css_colour(colour / full),
-            # Without a known σ there is no reason to doubt.
-            hue="" if noise < LEAST_FOR_HUE or peak <= 0 else css_colour(colour / peak),
+            hue=css_colour(colour / peak) if visible else "",
         )
-        for row, colour, peak, noise in zip(rows, linear, brightest, signal_to_noise, strict=True)
+        for row, colour, peak, visible in zip(rows, linear, brightest, seen, strict=True)
     )

@@ -8,6 +8,9 @@ SMALLEST_PLAIN = 1e-3
 #: … to here.
 LARGEST_PLAIN = 1e6
 
+#: Exposures up to here are said as fractions.
+LONGEST_FRACTION_S = 0.3
+
 
 def plus_minus(value: float, sigma: float) -> str:
     """`0.03208 ± 0.00027`: σ to two digits, the value to the same place.
@@ -25,8 +28,8 @@ def plus_minus(value: float, sigma: float) -> str:
     scale = 1.0 if plain else 10.0**exponent
     decimals = 1 - _exponent(float(f"{sigma / scale:.1e}"))
     places = max(decimals, 0)
-    written = f"{round(value / scale, decimals):.{places}f} ± {round(sigma / scale, decimals):.{places}f}"
-    written = written.replace("-", "−")
+    both = (f"{round(number / scale, decimals):.{places}f}" for number in (value, sigma))
+    written = " ± ".join(both).replace("-", "−")
     return written if plain else f"({written}) × {power_of_ten(exponent)}"
 
 
@@ -44,6 +47,13 @@ def rounded(value: float, digits: int = 4) -> str:
         return written.replace("-", "−")
     mantissa = f"{value / 10.0**exponent:.{digits - 1}f}".rstrip("0").rstrip(".")
     return f"{mantissa.replace('-', '−')} × {power_of_ten(exponent)}"
+
+
+def exposure_text(exposure_s: float) -> str:
+    """`1/64 s`, `0.5 s`, `30 s`."""
+    if 0 < exposure_s < LONGEST_FRACTION_S:
+        return f"1/{1 / exposure_s:.0f} s"
+    return f"{rounded(exposure_s, 3)} s"
 
 
 def power_of_ten(exponent: int) -> str:

@@ -99,11 +99,13 @@ def fit_case(name: str, seed: int) -> tuple[DecayFit, truths.Observed]:
 def report(case: Case, fits: list[tuple[DecayFit, truths.Observed]]) -> str:
     """Shares of choices and warnings; pulls, coverage and efficiency where the truth has rates."""
     found = np.array([fit.n_states for fit, _ in fits])
-    power_law = np.mean([fit.power_law is not None for fit, _ in fits])
+    rivals = [fit.better_rival.name if fit.better_rival else "" for fit, _ in fits]
+    power_law = np.mean([name == "power law" for name in rivals])
+    stretched = np.mean([name == "stretched exponential" for name in rivals])
     warned = np.mean([bool(fit.warnings) for fit, _ in fits])
     text = (
         f"{case.name:42s} n=1/2/3 {100 * np.mean(found == 1):5.1f} {100 * np.mean(found == 2):5.1f} "
-        f"{100 * np.mean(found == 3):5.1f} %  power law {100 * power_law:5.1f} %  "
+        f"{100 * np.mean(found == 3):5.1f} %  power law {100 * power_law:.1f}, stretched {100 * stretched:.1f} %  "
         f"warned {100 * warned:5.1f} %  ρ {100 * np.mean([fit.flicker for fit, _ in fits]):.2f} %"
     )
     right = [fit for fit, _ in fits if fit.n_states == len(case.states)]

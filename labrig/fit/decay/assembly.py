@@ -13,8 +13,8 @@ from labrig.fit.decay.diagnostics import (
 )
 from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
 from labrig.fit.decay.joint import parameter_sigma
-from labrig.fit.decay.power_law import PowerLaw
 from labrig.fit.decay.result import DecayFit, DecayState
+from labrig.fit.decay.rivals import Rival
 from labrig.fit.decay.selection import Candidate, bic
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
@@ -29,8 +29,10 @@ class Evidence:
     ----------
     noise, noise_dof
         The envelope; its degrees of freedom if σ or flicker come from it, else inf.
-    candidates, power_law_bic, power_law
-        What was tried; the power law's parameters if it does clearly better.
+    candidates, rivals
+        What was tried.
+    better_rival
+        The rival that does clearly better than exponentials, if one does.
     asked, max_states, n_fixed
         As the user had it.
     """
@@ -38,8 +40,8 @@ class Evidence:
     noise: Envelope
     noise_dof: float
     candidates: tuple[Candidate, ...]
-    power_law_bic: float
-    power_law: PowerLaw | None
+    rivals: tuple[Rival, ...]
+    better_rival: Rival | None
     asked: int | None
     max_states: int
     n_fixed: int
@@ -82,8 +84,8 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         covariance=covariance,
         warnings=tuple(_warnings(data, fit, states, log_rate_covariance[np.ix_(order, order)], evidence)),
         candidates=evidence.candidates,
-        power_law_bic=evidence.power_law_bic,
-        power_law=evidence.power_law,
+        rivals=evidence.rivals,
+        better_rival=evidence.better_rival,
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
     )
@@ -184,15 +186,15 @@ def _warnings(
             f"{wanted} states were asked for, the data support {fit.n_states}: "
             "the others' amplitude is zero; ask for fewer or take more light"
         )
-    if evidence.power_law is not None:
-        law = evidence.power_law
+    rival = evidence.better_rival
+    if rival is not None:
         n = evidence.candidates[-1].n_states
         warnings.append(
-            f"a power law (1 + t/{law.tau_s:.3g} s)^−{law.exponent:.3g} fits better than "
-            f"{n} exponential{'s' if n > 1 else ''}: the rates are descriptive only, "
+            f"a {rival.name} {rival.formula} fits better than {n} exponential"
+            f"{'s' if n > 1 else ''}: the rates are descriptive only, "
             "do not extrapolate them beyond the times recorded"
         )
-    more = "allow more states" if fit.n_states < evidence.max_states else "look for a power law"
+    more = "allow more states" if fit.n_states < evidence.max_states else "look for another law of decay"
     warnings += misfit_warnings(
         _misfit(data, fit, evidence), fit.n_states, f"{more}, and check background and times"
     )

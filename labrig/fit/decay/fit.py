@@ -9,8 +9,8 @@ from numpy.typing import ArrayLike
 from labrig.errors import FitError
 from labrig.fit.decay.assembly import Evidence, assemble
 from labrig.fit.decay.envelope import Envelope, envelope
-from labrig.fit.decay.power_law import fit_power_law, power_law
 from labrig.fit.decay.result import DecayFit
+from labrig.fit.decay.rivals import RIVALS, Rival, fit_rival, fitted_rival
 from labrig.fit.decay.selection import CLEAR_BIC, Candidate, bic, choose_states
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.states import StatesFit, refit
@@ -86,9 +86,9 @@ def fit_decay(
     noise_estimated = flicker is None or not series.sigma_given
     noise_dof = smooth.dof if noise_estimated else np.inf
     chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
-    rival = fit_power_law(data, chosen.joint.weights, chosen.joint.offset)
-    rival_bic = bic(data, rival)
-    rival_wins = rival_bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
+    rivals = _rivals(data, chosen)
+    best = min(rivals, key=lambda rival: rival.bic)
+    best_wins = best.bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
     data, chosen = _reweighted(data, chosen, smooth.flicker)
     return assemble(
         data,
@@ -97,8 +97,8 @@ def fit_decay(
             noise=smooth,
             noise_dof=noise_dof,
             candidates=tuple(tried),
-            power_law_bic=rival_bic,
-            power_law=power_law(rival, series) if rival_wins else None,
+            rivals=rivals,
+            better_rival=best if best_wins else None,
             asked=n_states,
             max_states=max_states,
             n_fixed=len(fixed),
@@ -165,6 +165,13 @@ def _supported_states(
         if chosen is not None:
             return chosen, tried
     raise FitError(NO_DECAY)
+
+
+def _rivals(data: WhitenedSeries, chosen: StatesFit) -> tuple[Rival, ...]:
+    """What is no sum of exponentials, fitted under the candidates' weights."""
+    joint = chosen.joint
+    fits = [(shape, fit_rival(data, shape, joint.weights, joint.offset)) for shape in RIVALS]
+    return tuple(fitted_rival(shape, fit, data.series, bic(data, fit)) for shape, fit in fits)
 
 
 def _reweighted(

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.fit.decay.power_law import PowerLaw
+from labrig.fit.decay.rivals import Rival
 from labrig.fit.decay.selection import Candidate
 from labrig.fit.decay.shapes import exponential_means
 from labrig.fit.least_squares import FloatArray
@@ -58,8 +58,10 @@ class DecayFit:
         What to distrust, and what to do about it.
     candidates
         The numbers of states tried.
-    power_law_bic, power_law
-        BIC of A (1 + t/τ)^(−p); its parameters if it does clearly better.
+    rivals
+        Power law and stretched exponential, fitted to the same series.
+    better_rival
+        The one of them that does clearly better than exponentials, if one does.
     residuals, normalised_residuals
         Value − model, one row per frame in the order given, one column per channel: in the values'
         units, and whitened (independent, unit variance if the noise is as assumed).
@@ -79,8 +81,8 @@ class DecayFit:
     covariance: FloatArray
     warnings: tuple[str, ...]
     candidates: tuple[Candidate, ...]
-    power_law_bic: float
-    power_law: PowerLaw | None
+    rivals: tuple[Rival, ...]
+    better_rival: Rival | None
     residuals: FloatArray
     normalised_residuals: FloatArray
 
@@ -141,8 +143,8 @@ class DecayFit:
             "covariance": self.covariance.tolist(),
             "warnings": list(self.warnings),
             "candidates": [asdict(candidate) for candidate in self.candidates],
-            "power_law_bic": self.power_law_bic,
-            "power_law": asdict(self.power_law) if self.power_law else None,
+            "rivals": [asdict(rival) for rival in self.rivals],
+            "better_rival": self.better_rival.name if self.better_rival else None,
         }
         return json.dumps(_finite(fields), indent=2, ensure_ascii=False, allow_nan=False)
 

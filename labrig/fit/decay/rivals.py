@@ -1,0 +1,154 @@
+"""The rivals of a sum of exponentials: a power law A (1 + t/τ)^(−p), a stretched A exp(−(t/τ)^β).
+
+Traps of many depths, or electrons and holes that must meet, decay so (Nalbach et al. sec. 4.4, after
+Jonscher and de Polignac 1984 and Lee et al. 2001). They are fitted to the same series with the same
+noise, to say so when one does better.
+"""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.fit.decay.joint import JointFit, fit_jointly
+from labrig.fit.decay.rival_shapes import power_law_mean, stretched_mean
+from labrig.fit.decay.search import projection
+from labrig.fit.decay.series import DecaySeries
+from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.least_squares import FloatArray
+
+#: τ from this share of the shortest step between frames …
+SHORTEST_STEPS = 0.01
+#: … to this many spans.
+LONGEST_SPANS = 100.0
+GRID = (24, 12)
+MAX_ITERATIONS = 60
+TOLERANCE = 1e-5
+
+Mean = Callable[[float, float, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+
+
+@dataclass(frozen=True)
+class RivalShape:
+    """A decay of τ and one exponent.
+
+    Attributes
+    ----------
+    name, formula
+        As people say it; `formula` takes `tau` and `exponent`.
+    mean
+        (τ, exponent, t, T) → mean over the exposures, and derivatives by log τ and the exponent.
+    exponents
+        Least and largest considered: with an exponential as its limit a rival must end somewhere.
+    """
+
+    name: str
+    formula: str
+    mean: Mean
+    exponents: tuple[float, float]
+
+
+RIVALS = (
+    RivalShape("power law", "(1 + t/{tau:.3g} s)^−{exponent:.3g}", power_law_mean, (0.1, 10.0)),
+    RivalShape(
+        "stretched exponential", "exp(−(t/{tau:.3g} s)^{exponent:.3g})", stretched_mean, (0.1, 0.95)
+    ),
+)
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A rival fitted, in the brightest channel, in the values' units.
+
+    Attributes
+    ----------
+    name, formula
+        Which, and how it reads.
+    amplitude, tau_s, exponent, exponent_sigma
+        A at lamp off, τ, p or β and its σ.
+    bic
+        Bayesian information criterion, comparable with the candidates'.
+    """
+
+    name: str
+    formula: str
+    amplitude: float
+    tau_s: float
+    exponent: float
+    exponent_sigma: float
+    bic: float
+
+
+def fit_rival(
+    data: WhitenedSeries, rival: RivalShape, weights: FloatArray, offset: float
+) -> JointFit:
+    """Least squares from the best of a grid of τ and exponent; `shape` is [A, log τ, exponent]."""
+    series = data.series
+    time = series.t + series.start
+    steps = np.diff(series.t)
+    low = np.log(SHORTEST_STEPS * steps[steps > 0].min())
+    high = np.log(LONGEST_SPANS)
+
+    def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        mean, slopes = rival.mean(
+            float(np.exp(theta[1])), float(theta[2]), time, series.exposure
+        )
+        return theta[0] * mean, np.column_stack([mean, theta[0] * slopes])
+
+    start = _best_on_grid(data, rival, weights, (low, high))
+    return fit_jointly(
+        data,
+        shape,
+        start,
+        weights,
+        offset,
+        np.array([0.0, low, rival.exponents[0]]),
+        np.array([np.inf, high, rival.exponents[1]]),
+        MAX_ITERATIONS,
+        TOLERANCE,
+    )
+
+
+def _best_on_grid(
+    data: WhitenedSeries, rival: RivalShape, weights: FloatArray, log_taus: tuple[float, float]
+) -> FloatArray:
+    """[A, log τ, exponent] of the grid's best, exposures taken for points in their middle."""
+    series = data.series
+    problem = projection(data, weights)
+    middle = series.t + series.start + series.exposure / 2
+    log_tau, exponents = (
+        grid.ravel()
+        for grid in np.meshgrid(np.linspace(*log_taus, GRID[0]), np.geomspace(*rival.exponents, GRID[1]))
+    )
+    # The shapes depend on t/τ only: one call per exponent for all τ.
+    ratios = np.multiply.outer(middle, np.exp(-log_tau[: GRID[0]]))
+    means = np.hstack(
+        [
+            rival.mean(1.0, float(exponent), ratios.ravel(), np.zeros(ratios.size))[0].reshape(
+                ratios.shape
+            )
+            for exponent in exponents[:: GRID[0]]
+        ]
+    )
+    columns = problem.columns(means)
+    moments = problem.target @ columns
+    norms2 = np.einsum("ij,ij->j", columns, columns)
+    gains = np.maximum(moments, 0) ** 2 / np.where(norms2 > 0, norms2, np.inf)
+    best = int(np.argmax(gains))
+    amplitude = max(float(moments[best]), 0.0) / float(norms2[best])
+    return np.array([amplitude, log_tau[best], exponents[best]])
+
+
+def fitted_rival(rival: RivalShape, fit: JointFit, series: DecaySeries, bic: float) -> Rival:
+    """The fit in the user's units."""
+    amplitude, log_tau, exponent = (float(x) for x in fit.shape)
+    tau_s = float(np.exp(log_tau)) * series.span_s
+    return Rival(
+        name=rival.name,
+        formula=rival.formula.format(tau=tau_s, exponent=exponent),
+        amplitude=amplitude * series.peak,
+        tau_s=tau_s,
+        exponent=exponent,
+        exponent_sigma=float(fit.least_squares.sigma[2]),
+        bic=bic,
+    )

@@ -1,0 +1,187 @@
+"""The PTP driver and the simulated camera, written apart from the same facts, meet here."""
+
+import hashlib
+from typing import Any
+
+import pytest
+import usb.core
+
+from drivers.ptp import PtpCamera
+from labrig.acquire import Camera, ExposureSettings
+from labrig.acquire.connections import SerialPort
+from labrig.clock import Interrupted, VirtualClock
+from labrig.errors import DeviceError
+from sim.camera import CameraFaults, SimulatedCamera
+
+SETTINGS = ExposureSettings(1.0, 400, 4.0)
+BUSY, OPEN_SESSION, GET_EVENT, RELEASE_ON, GET_PARTIAL = 0x2019, 0x1002, 0x9116, 0x9128, 0x9107
+
+
+class Picture:
+    """A sensor whose files say what was exposed; sizes that end on packet borders included."""
+
+    def __init__(self, size: int) -> None:
+        self.size = size
+        self.taken: list[tuple[float, float]] = []
+
+    def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
+        self.taken.append((start_s, exposure_s))
+        text = f"{start_s:.6f} {exposure_s:.6f} {iso}".encode()
+        return hashlib.sha256(text).digest() * (self.size // 32) + b"x" * (self.size % 32)
+
+
+class StoppingClock(VirtualClock):
+    """Is interrupted at its n-th wait."""
+
+    waits_left = -1
+
+    def _pause_until(self, deadline_s: float) -> None:
+        self.waits_left -= 1
+        if self.waits_left == 0:
+            self.interrupt(2)
+        super()._pause_until(deadline_s)
+
+
+class Wired:
+    """Connections to one camera."""
+
+    def __init__(self, clock: VirtualClock, camera: SimulatedCamera) -> None:
+        self.clock = clock
+        self._camera = camera
+
+    def serial(self, address: str, baudrate: int) -> SerialPort:
+        raise AssertionError("no serial line here")
+
+    def usb(self, address: str) -> Any:
+        found = usb.core.find(backend=self._camera.backend)
+        if found is None:
+            raise DeviceError("no camera")
+        return found
+
+
+def bench(
+    size: int = 70_000, **faults: Any
+) -> tuple[StoppingClock, Picture, SimulatedCamera, PtpCamera]:
+    clock, picture = StoppingClock(), Picture(size)
+    camera = SimulatedCamera(clock, picture, serial="1", seed=1, faults=CameraFaults(**faults))
+    settings = PtpCamera.Settings(shutter_lag="63 ms")
+    return clock, picture, camera, PtpCamera("sim://room/camera", settings, Wired(clock, camera))
+
+
+@pytest.mark.parametrize("size", [500, 512 * 40 - 12, 512 * 40, 2 * 1024 * 1024, 2_600_001])
+def test_frames_arrive_whole_with_their_true_times(size: int) -> None:
+    _, picture, _, driver = bench(size)
+    assert isinstance(driver, Camera)
+    for exposure_s in (1 / 64, 1.0, 2.0):
+        in_force = driver.configure(ExposureSettings(exposure_s, 400, 4.0))
+        driver.arm()
+        frame = driver.shoot()
+        start_s, true_exposure_s = picture.taken[-1]
+        assert in_force.exposure_s == true_exposure_s == frame.settings.exposure_s
+        assert frame.start_s == pytest.approx(start_s, abs=0.012)
+        assert frame.end_s - frame.start_s == pytest.approx(true_exposure_s)
+        assert len(frame.data) == size
+        assert frame.data[:32] == picture.photograph(start_s, true_exposure_s, 400, 4.0)[:32]
+        assert frame.suffix == ".dng"
+    driver.make_safe()
+    driver.disconnect()
+
+
+def test_an_armed_camera_releases_at_once() -> None:
+    clock, picture, _, driver = bench()
+    driver.configure(SETTINGS)
+    driver.arm()
+    clock.sleep(0.2)  # a half press takes the lens its time, before the moment that counts
+    asked_s = clock.now()
+    driver.shoot()
+    assert picture.taken[0][0] - asked_s < 0.075, "63 ms are the body's own lag"
+
+
+@pytest.mark.parametrize(
+    "faults",
+    [
+        {"busy_releases": 3},
+        {"stall_at": GET_PARTIAL},
+        {"lost_event": True},
+        {"timeout_once_at": GET_PARTIAL},
+        {"timeout_once_at": RELEASE_ON},
+        {"stall_at": GET_EVENT},
+        {"stall_at": RELEASE_ON},
+        {"timeout_once_at": GET_EVENT},
+    ],
+    ids=str,
+)
+def test_a_fault_is_mended_or_said_and_the_next_frame_is_good(faults: dict[str, Any]) -> None:
+    try:
+        _, picture, _, driver = bench(**faults)
+    except DeviceError as error:
+        assert "\n" not in str(error)
+        return
+    for attempt in range(3):
+        try:
+            driver.configure(SETTINGS)
+            driver.arm()
+            frame = driver.shoot()
+        except DeviceError as error:
+            assert "\n" not in str(error)
+            assert attempt < 2, "the fault strikes once"
+            driver.make_safe()
+            continue
+        start_s, exposure_s = picture.taken[-1]
+        assert frame.data[:32] == picture.photograph(start_s, exposure_s, 400, 4.0)[:32]
+        return
+    pytest.fail("no frame in three attempts")
+
+
+@pytest.mark.parametrize("waits", range(1, 60, 3))
+def test_interrupted_at_any_wait_it_is_made_safe_and_no_frame_is_taken_for_another(
+    waits: int,
+) -> None:
+    clock, picture, _, driver = bench()
+    driver.configure(SETTINGS)
+    clock.waits_left = waits
+    try:
+        for _ in range(2):
+            driver.arm()
+            driver.shoot()
+    except Interrupted:
+        pass
+    clock.waits_left = -1
+    with clock.shielded():
+        driver.make_safe()
+    driver.configure(ExposureSettings(0.5, 400, 4.0))
+    driver.arm()
+    frame = driver.shoot()
+    start_s, exposure_s = picture.taken[-1]
+    assert frame.settings.exposure_s == exposure_s == 0.5
+    assert frame.start_s == pytest.approx(start_s, abs=0.012)
+    assert frame.data[:32] == picture.photograph(start_s, exposure_s, 400, 4.0)[:32]
+
+
+@pytest.mark.parametrize("after_bytes", [100, 3_000, 20_000, 60_000, 100_000])
+def test_unplugged_is_one_clear_line(after_bytes: int) -> None:
+    with pytest.raises(DeviceError) as caught:
+        _, _, _, driver = bench(unplug_after_bytes=after_bytes)
+        for _ in range(3):
+            driver.configure(SETTINGS)
+            driver.arm()
+            driver.shoot()
+    assert "\n" not in str(caught.value)
+
+
+def test_what_a_killed_program_left_behind_is_taken_over() -> None:
+    clock, _, camera, driver = bench()
+    driver.configure(SETTINGS)
+    driver.arm()
+    camera.lose_host()
+    again = PtpCamera("sim://room/camera", PtpCamera.Settings(), Wired(clock, camera))
+    again.configure(SETTINGS)
+    again.arm()
+    assert len(again.shoot().data) == 70_000
+
+
+def test_what_the_camera_does_not_offer_is_refused() -> None:
+    *_, driver = bench()
+    with pytest.raises(DeviceError, match="ISO"):
+        driver.configure(ExposureSettings(1.0, 125, 4.0))
+    assert 400 in driver.offers().isos
