@@ -56,8 +56,10 @@ def region_pixels(region: Region, width: int, height: int) -> tuple[int, int, in
     x, y, w, h = region
     if max(region) <= 1:
         x, y, w, h = x * width, y * height, w * width, h * height
-    left, top, wide, high = round(x), round(y), max(round(w), 2), max(round(h), 2)
-    if left + wide > width or top + high > height:
+    # Edges are rounded, not extents, so that neighbours share an edge and 1 is the frame's.
+    left, top = round(x), round(y)
+    wide, high = max(round(x + w) - left, 2), max(round(y + h) - top, 2)
+    if min(left, top) < 0 or left + wide > width or top + high > height:
         raise UsageError(
             f"region {list(region)} leaves the frame of {width} x {height} pixels; "
             "give x, y, width, height inside it"

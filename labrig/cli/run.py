@@ -5,6 +5,8 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.clock import Interrupted
+
 if TYPE_CHECKING:
     from labrig.run import Recording
 
@@ -69,5 +71,10 @@ def _finish(folder: Path, no_process: bool, json: bool) -> None:
     if not no_process:
         from labrig.cli.process import process_and_tell
 
-        process_and_tell(folder, json=json)
+        try:
+            process_and_tell(folder, json=json)
+        except Interrupted as stop:
+            raise Interrupted(
+                stop.signum, f"stopped; the run is recorded, go on with: labrig process {folder}"
+            ) from None
     typer.echo(folder)

@@ -63,7 +63,8 @@ def screen_for(camera: CameraResponse | None) -> Screen:
 def into_gamut(linear: FloatArray) -> FloatArray:
     """Linear sRGB, shape (…, 3), as near as a screen can show it.
 
-    Colours outside are mixed with grey until they are inside. Luminance stays; what is negative in all (noise about black) becomes black.
+    Colours outside are mixed with grey until they are inside. Luminance stays; what is negative in
+    all (noise about black) becomes black.
     """
     luminance = np.maximum(linear @ _LUMINANCE, 0.0)[..., np.newaxis]
     lowest = linear.min(axis=-1, keepdims=True)

@@ -11,8 +11,8 @@ from labrig.region import Region
 #: What every decay measured with a camera rests on, for `RunReport.assumptions`.
 DECAY_ASSUMPTIONS = (
     "The amplitudes aᵢ are what the decay measures: the signal at lamp off in the brightest "
-    "channel, extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiance Λᵢ and "
-    "concentration rᵢ(0) cannot be told apart by a decay alone.",
+    "channel, extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiance Λᵢ "
+    "and concentration rᵢ(0) cannot be told apart by a decay alone.",
     "A frame measures the mean over its exposure, and is fitted as such.",
     "Rates and amplitudes are shared by the channels; each channel has one weight. So every state "
     "is taken to have the same colour.",

@@ -162,8 +162,8 @@ def _figures(number: int, patch: PatchReport) -> _Figures:
         figure = residual_figure(series, fit)
         left = Markup(svg(figure, f"residuals-{number}", f"Residuals of the fit to {patch.name}"))
     return _Figures(
-        linear=Markup(svg(linear, f"linear-{number}", f"Decay of {patch.name}, linear")),
-        logarithmic=Markup(svg(logarithmic, f"log-{number}", f"Decay of {patch.name}, logarithmic")),
+        linear=Markup(svg(linear, f"linear-{number}", f"{patch.name}, linear")),
+        logarithmic=Markup(svg(logarithmic, f"log-{number}", f"{patch.name}, logarithmic")),
         residuals=left,
         below_axis=values_below_axis(series),
     )

@@ -1,0 +1,142 @@
+"""Figures: labelled, legends clear of the data, nothing lost from the logarithmic one."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import matplotlib as mpl
+import numpy as np
+import pytest
+from matplotlib.figure import Figure
+
+from labrig.fit import DecayFit
+from labrig.reduce import Series
+from labrig.report.decay_figures import (
+    fitted_curve,
+    linear_decay,
+    logarithmic_decay,
+    values_below_axis,
+)
+from labrig.report.figure_style import figure_style, svg
+from labrig.report.residual_figure import residual_figure, residuals
+from labrig.report.run_figures import overview_figures, timing_figure
+from labrig.report.timing import FrameTiming
+
+from .made import decay_series, fitted, patch
+
+SERIES = decay_series()
+FLAGGED = replace(SERIES, flag=("clipped", "excluded", *SERIES.flag[2:]))
+
+
+def fit_of(series: Series) -> DecayFit:
+    fit = fitted(series)
+    assert isinstance(fit, DecayFit)
+    return fit
+
+
+FIT = fit_of(SERIES)
+TIMINGS = [FrameTiming(f"{n}", f"decay-{n % 2}", 5.0 * n, 0.001 * n) for n in range(10)]
+
+
+@pytest.mark.parametrize(
+    "make",
+    [
+        lambda: linear_decay(SERIES, FIT),
+        lambda: logarithmic_decay(SERIES, FIT),
+        lambda: residual_figure(SERIES, FIT),
+        lambda: overview_figures([patch(SERIES)])[0],
+        lambda: timing_figure(TIMINGS),
+    ],
+    ids=["linear", "log", "residuals", "overview", "timing"],
+)
+def test_axes_are_labelled_and_inside_the_figure(make: Callable[[], Figure]) -> None:
+    with figure_style():
+        figure = make()
+        figure.canvas.draw()
+        width, height = figure.get_size_inches() * figure.dpi
+        assert figure.axes[-1].get_xlabel().endswith("/ s")
+        for axes in figure.axes:
+            assert axes.get_ylabel()
+            box = axes.get_tightbbox()
+            assert box is not None
+            assert box.x0 >= 0
+            assert box.y0 >= 0
+            assert box.x1 <= width
+            assert box.y1 <= height
+
+
+@pytest.mark.parametrize("series", [SERIES, FLAGGED], ids=["plain", "flagged"])
+@pytest.mark.parametrize("make", [linear_decay, logarithmic_decay])
+def test_the_legend_covers_no_data(
+    make: Callable[[Series, DecayFit | None], Figure], series: Series
+) -> None:
+    with figure_style():
+        figure = make(series, FIT)
+        figure.canvas.draw()
+        (legend,) = figure.legends
+        box, axes = legend.get_window_extent(), figure.axes[0].get_window_extent()
+        assert box.y0 >= axes.y1
+        assert box.x1 <= figure.get_size_inches()[0] * figure.dpi
+    texts = [text.get_text() for text in legend.get_texts()]
+    assert texts[:3] == ["R", "G", "B"]
+    assert ("left out" in texts) == (series is FLAGGED)
+
+
+def test_timing_of_several_units_has_a_legend_in_the_figure() -> None:
+    with figure_style():
+        figure = timing_figure(TIMINGS)
+        figure.canvas.draw()
+        (legend,) = figure.legends
+        assert legend.get_window_extent().y0 >= figure.axes[0].get_window_extent().y1
+
+
+def test_values_that_a_logarithm_cannot_show_are_marked() -> None:
+    series = replace(SERIES, values=SERIES.values - 100.0)
+    assert values_below_axis(series) >= np.count_nonzero(series.values <= 0) > 0
+    with figure_style():
+        axes = logarithmic_decay(series, FIT).axes[0]
+    low = axes.get_ylim()[0]
+    at_foot = sum(
+        len(line.get_xdata())  # type: ignore[arg-type]
+        for line in axes.lines
+        if line.get_marker() == 7
+    )
+    assert low > 0
+    assert at_foot == values_below_axis(series)
+
+
+def test_the_curve_goes_through_what_the_fit_predicts() -> None:
+    curve = fitted_curve(SERIES, FIT)
+    np.testing.assert_allclose(curve.total[0], FIT.predict(SERIES.t_s[:1], SERIES.exposure_s[:1])[0])
+    signal = curve.states.sum(axis=1) + FIT.offset
+    np.testing.assert_allclose(signal, curve.total[:, curve.brightest], rtol=1e-3)
+
+
+def test_what_channels_have_in_common_is_found() -> None:
+    model = FIT.predict(SERIES.t_s, SERIES.exposure_s)
+    moved = model.copy()
+    moved[3] *= 1.05
+    left = residuals(replace(SERIES, values=moved), FIT)
+    assert left.common[3] == pytest.approx(0.05, abs=1e-6)
+    assert left.common[4] == pytest.approx(0.0, abs=1e-9)
+
+
+def test_overviews_share_their_axes() -> None:
+    dim = replace(SERIES, values=SERIES.values / 50, sigma=SERIES.sigma / 50)
+    with figure_style():
+        first, second = overview_figures([patch(SERIES), replace(patch(dim), fit="too dim")])
+    assert first.axes[0].get_ylim() == second.axes[0].get_ylim()
+
+
+def test_svg_follows_the_page_and_not_the_users_settings() -> None:
+    def drawn() -> str:
+        with figure_style():
+            return svg(linear_decay(SERIES, FIT), "a", 'Decay of "x" <b>')
+
+    plain = drawn()
+    with mpl.rc_context({"font.size": 30, "svg.fonttype": "path", "axes.grid": False}):
+        assert drawn() == plain
+    assert "var(--ink, " in plain
+    assert "Time after lamp off / s" in plain
+    assert "aria-label=\"Decay of &quot;x&quot; &lt;b&gt;\"" in plain
+    for forbidden in ("font-family", "<style", "<metadata", "xlink", "http"):
+        assert forbidden not in plain

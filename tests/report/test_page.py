@@ -1,0 +1,218 @@
+"""The page: everything is on it, nothing is fetched, nothing breaks it."""
+
+import re
+from dataclasses import replace
+from html.parser import HTMLParser
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labrig.errors import DiskError
+from labrig.fit import DecayFit
+from labrig.report import PatchReport, RunReport, write_report
+from labrig.report.written_numbers import plus_minus
+
+from .made import decay_series, patch, run_report
+
+VOID = {"meta", "img", "br"}
+
+
+class Page(HTMLParser):
+    """Text, ids and references of a page; complains of tags that do not match."""
+
+    def __init__(self, text: str) -> None:
+        super().__init__()
+        self.open: list[str] = []
+        self.ids: list[str] = []
+        self.references: list[str] = []
+        self.tags: list[str] = []
+        self.text = ""
+        self.feed(text)
+        assert not self.open
+
+    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.tags.append(tag)
+        if tag not in VOID:
+            self.open.append(tag)
+        for name, value in attrs:
+            if name == "id":
+                self.ids.append(value or "")
+            elif name in ("href", "src", "xlink:href"):
+                self.references.append(value or "")
+
+    def handle_startendtag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
+        self.handle_starttag(tag, attrs)
+        if tag not in VOID:
+            self.open.pop()
+
+    def handle_endtag(self, tag: str) -> None:
+        assert self.open.pop() == tag
+
+    def handle_data(self, data: str) -> None:
+        if not self.open or self.open[-1] != "style":
+            self.text += data
+
+
+def written(folder: Path, report: RunReport) -> str:
+    write_report(folder / "report.html", report)
+    return (folder / "report.html").read_text(encoding="utf-8")
+
+
+def test_all_numbers_are_on_the_page(tmp_path: Path) -> None:
+    report = run_report(tmp_path)
+    page = Page(written(tmp_path, report))
+    fit = report.patches[0].fit
+    assert isinstance(fit, DecayFit)
+    assert fit.n_states == 2
+    for state in fit.states:
+        assert plus_minus(state.k_r_per_s, state.k_r_sigma_per_s) in page.text
+        assert plus_minus(state.amplitude, state.amplitude_sigma) in page.text
+        assert plus_minus(1 / state.k_r_per_s, state.k_r_sigma_per_s / state.k_r_per_s**2) in page.text
+    for expected in (
+        "blue-paint",
+        report.run,
+        "thickness",
+        "Numato relay 00000009",
+        "COM3",
+        "protocol: decay",
+        "1.2.3",
+        "Reduced χ²",
+        "Flicker",
+        "Offset",
+        "power law",
+        "cannot be told apart by a decay alone",
+        "No warnings.",
+        f"{101:064x}",
+        "1/64 s",
+    ):
+        assert expected in page.text
+    assert page.tags.count("img") == 1 + 2 * 2
+    assert page.tags.count("li") >= 18
+
+
+def test_nothing_is_fetched(tmp_path: Path) -> None:
+    text = written(tmp_path, run_report(tmp_path))
+    page = Page(text)
+    assert all(reference.startswith(("#", "data:image/")) for reference in page.references)
+    for forbidden in ("http:", "https:", "@import", "<script", "<link", "@font-face"):
+        assert forbidden not in text
+
+
+def test_ids_are_unique_and_references_lead_somewhere(tmp_path: Path) -> None:
+    patches = [patch(decay_series(seed=n, name=f"patch {n}")) for n in (1, 2)]
+    text = written(tmp_path, run_report(tmp_path, patches))
+    page = Page(text)
+    assert len(page.ids) == len(set(page.ids))
+    wanted = {ref[1:] for ref in page.references if ref.startswith("#")}
+    wanted |= set(re.findall(r"url\(#([^)]+)\)", text))
+    assert wanted <= set(page.ids)
+
+
+def test_warnings_stand_before_everything_else(tmp_path: Path) -> None:
+    text = written(tmp_path, run_report(tmp_path, warnings=["2 frames are clipped"]))
+    page = Page(text)
+    assert page.text.index("1 warning") < page.text.index("2 frames are clipped")
+    assert page.text.index("2 frames are clipped") < page.text.index("Results")
+    assert "No warnings." not in page.text
+
+
+def test_what_people_type_stays_text(tmp_path: Path) -> None:
+    evil = "<script>alert(1)</script>\"'&"
+    report = run_report(
+        tmp_path, [patch(decay_series(name=evil)), patch(decay_series(name="b"))], [evil]
+    )
+    report = replace(
+        report, title=evil, rig=evil, run=evil, protocol_text=evil, sample=((evil, evil),)
+    )
+    text = written(tmp_path, report)
+    assert "<script" not in text
+    assert evil in Page(text).text
+
+
+def test_the_same_report_gives_the_same_bytes(tmp_path: Path) -> None:
+    report = run_report(tmp_path)
+    assert written(tmp_path, report) == written(tmp_path, report)
+
+
+def test_a_simulated_rig_says_so(tmp_path: Path) -> None:
+    report = run_report(tmp_path)
+    assert "simulated rig" not in written(tmp_path, report)
+    assert "simulated rig" in written(tmp_path, replace(report, simulated=True))
+
+
+def clipped_series() -> PatchReport:
+    series = decay_series()
+    return patch(replace(series, flag=("clipped",) * len(series.flag)))
+
+
+def negative_series() -> PatchReport:
+    series = decay_series()
+    return patch(replace(series, values=series.values - [60.0, 20.0, 5.0]))
+
+
+def noise_series() -> PatchReport:
+    series = decay_series()
+    values = np.random.default_rng(3).normal(-1.0, 0.5, series.values.shape)
+    return PatchReport("noise", None, replace(series, values=values), "nothing but noise")
+
+
+def unknown_sigma() -> PatchReport:
+    series = decay_series()
+    fit = patch(series).fit
+    return PatchReport("table", None, replace(series, sigma=np.full_like(series.sigma, np.nan)), fit)
+
+
+@pytest.mark.parametrize(
+    "odd",
+    [
+        patch(decay_series(1)),
+        patch(decay_series(2)),
+        clipped_series(),
+        negative_series(),
+        noise_series(),
+        unknown_sigma(),
+        patch(decay_series(channels=("L",))),
+        patch(decay_series(channels=("450 nm", "550 nm"))),
+    ],
+    ids=lambda odd: f"{len(odd.series.t_s)} {odd.series.channels} {odd.series.flag[0]} {odd.name}",
+)
+def test_odd_data_are_reported_all_the_same(tmp_path: Path, odd: PatchReport) -> None:
+    page = Page(written(tmp_path, run_report(tmp_path, [odd])))
+    if isinstance(odd.fit, str):
+        assert f"no fit: {odd.fit}" in page.text[: page.text.index("Results")]
+    assert page.tags.count("svg") >= 3
+
+
+def test_a_missing_fit_is_warned_of_once(tmp_path: Path) -> None:
+    odd = clipped_series()
+    page = Page(written(tmp_path, run_report(tmp_path, [odd], [f"not fitted: {odd.fit}"])))
+    assert "1 warning" in page.text
+
+
+def test_eleven_patches(tmp_path: Path) -> None:
+    patches = [patch(decay_series(seed=n, name=f"paint {n}")) for n in range(11)]
+    page = Page(written(tmp_path, run_report(tmp_path, patches)))
+    for number in range(1, 12):
+        assert f"patch-{number}" in page.ids
+        assert any(one.startswith(f"overview-{number}-") for one in page.ids)
+        assert page.text.count(f"paint {number - 1}") >= 3
+
+
+def test_without_camera_curves_or_photographs(tmp_path: Path) -> None:
+    report = replace(run_report(tmp_path), camera=None, glow=(), daylight=(), frames=(), devices=())
+    page = Page(written(tmp_path, report))
+    assert "img" not in page.tags
+    assert "sensitivity is not known" in page.text
+
+
+def test_unreadable_photographs_are_left_out(tmp_path: Path) -> None:
+    report = run_report(tmp_path)
+    for one in report.frames:
+        one.path.write_bytes(b"not a photograph")
+    assert "img" not in Page(written(tmp_path, report)).tags
+
+
+def test_a_full_disk_is_a_disk_error(tmp_path: Path) -> None:
+    with pytest.raises(DiskError, match="cannot be written"):
+        write_report(tmp_path / "none" / "report.html", run_report(tmp_path))
