@@ -57,11 +57,12 @@ def region_pixels(region: Region, width: int, height: int) -> tuple[int, int, in
     if max(region) <= 1:
         x, y, w, h = x * width, y * height, w * width, h * height
     # Edges are rounded, not extents, so that neighbours share an edge and 1 is the frame's.
-    left, top = round(x), round(y)
-    wide, high = max(round(x + w) - left, 2), max(round(y + h) - top, 2)
-    if min(left, top) < 0 or left + wide > width or top + high > height:
+    right, low = round(x + w), round(y + h)
+    # A cell of the colour filter is two pixels wide and high.
+    left, top = min(round(x), right - 2), min(round(y), low - 2)
+    if min(left, top) < 0 or right > width or low > height:
         raise UsageError(
             f"region {list(region)} leaves the frame of {width} x {height} pixels; "
             "give x, y, width, height inside it"
         )
-    return left, top, wide, high
+    return left, top, right - left, low - top

@@ -14,8 +14,8 @@ def test_pixels_and_fractions() -> None:
 
 
 @given(
-    st.integers(8, 6000), st.integers(8, 6000), st.floats(0, 0.9), st.floats(0, 0.9),
-    st.floats(0.001, 1), st.floats(0.001, 1),
+    st.integers(20, 6000), st.integers(20, 6000), st.floats(0, 0.9), st.floats(0, 0.9),
+    st.floats(0.1, 1), st.floats(0.1, 1),
 )  # fmt: skip
 def test_what_lies_in_the_frame_is_in_it_as_pixels(
     width: int, height: int, x: float, y: float, w: float, h: float
