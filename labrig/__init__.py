@@ -74,7 +74,7 @@ _HOME = {
     "write_material": "material",
 }
 
-__all__ = list(_HOME)  # noqa: PLE0605
+__all__ = list(_HOME)
 
 
 def __getattr__(name: str) -> Any:

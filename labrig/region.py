@@ -20,9 +20,7 @@ def _whole_or_fractions(region: tuple[float, float, float, float]) -> tuple[floa
 
 
 #: `[x, y, width, height]`: whole pixels, or fractions of the frame when all four are ≤ 1.
-Region = Annotated[
-    tuple[Corner, Corner, Extent, Extent], AfterValidator(_whole_or_fractions)
-]
+Region = Annotated[tuple[Corner, Corner, Extent, Extent], AfterValidator(_whole_or_fractions)]
 
 #: Where the sample is when nobody says: the middle quarter of the frame.
 CENTRE: Region = (0.25, 0.25, 0.5, 0.5)
@@ -40,8 +38,8 @@ def parse_region(text: str) -> Region:
         return TypeAdapter(Region).validate_python([float(part) for part in text.split(",")])
     except ValueError:
         raise UsageError(
-            f"'{text}' is no region; expected x,y,width,height in whole pixels (or all as fractions "
-            "of the frame), such as 700,400,64,64"
+            f"'{text}' is no region; expected x,y,width,height in whole pixels (or all as "
+            "fractions of the frame), such as 700,400,64,64"
         ) from None
 
 

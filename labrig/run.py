@@ -95,7 +95,9 @@ class Recording:
                 f"{self.protocol.protocol}_{self.protocol.sample.name}",
                 stand.clock.wall(),
                 {
-                    "protocol.yaml": yaml_text(self.protocol.model_dump(mode="json", by_alias=True)),
+                    "protocol.yaml": yaml_text(
+                        self.protocol.model_dump(mode="json", by_alias=True)
+                    ),
                     "rig.yaml": yaml_text(self.rig.model_dump(mode="json", exclude_none=True)),
                 },
                 stand.seed,
@@ -118,9 +120,12 @@ def resume_run(path: Path, watch: Watch) -> Path:
     protocol = plugins.read_protocol(path / "protocol.yaml")
     rig = read_rig_file(path / "rig.yaml")
     last_time = read_run(path).last_time if (path / "journal.jsonl").exists() else 0.0
-    with open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as stand:
-        with RunFolder(path, stand.seed) as folder:
-            fill(folder, protocol, stand, plan(protocol, rig, str(path / "rig.yaml")), watch)
+    laid_out = plan(protocol, rig, str(path / "rig.yaml"))
+    with (
+        open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as stand,
+        RunFolder(path, stand.seed) as folder,
+    ):
+        fill(folder, protocol, stand, laid_out, watch)
     return path
 
 
@@ -186,4 +191,3 @@ def _existing(path: Path) -> Path:
     while not path.exists():
         path = path.parent
     return path
-

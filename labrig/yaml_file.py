@@ -59,9 +59,7 @@ for _tag, _pattern, _first in (
     _whole = re.compile(f"(?:{_pattern.pattern})\\Z")
     _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _whole, list(_first))
 _Loader.add_constructor("tag:yaml.org,2002:float", _construct_float)
-_Loader.add_constructor(
-    "tag:yaml.org,2002:int", lambda loader, node: int(str(node.value))
-)
+_Loader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(str(node.value)))
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
@@ -84,7 +82,7 @@ def read_yaml(path: Path) -> dict[str, Any]:
 def parse_yaml(text: str, source: str) -> dict[str, Any]:
     """As `read_yaml`, from text; `source` names it in messages."""
     try:
-        content = yaml.load(text, Loader=_Loader)  # noqa: S506
+        content = yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
         place = "" if mark is None else f", line {mark.line + 1}"

@@ -62,9 +62,7 @@ class Decay(ProtocolModel):
     """The decay protocol; see `decay.yaml` for what each key means."""
 
     protocol: Literal["decay"] = "decay"
-    charge: Annotated[
-        float | Literal["plateau"], word_or_duration("plateau"), Written
-    ] = 5400.0
+    charge: Annotated[float | Literal["plateau"], word_or_duration("plateau"), Written] = 5400.0
     plateau: Plateau = Plateau()
     every: DurationS = Field(5.0, gt=0)
     duration: DurationS = Field(180.0, gt=0, alias="for")

@@ -82,9 +82,7 @@ class DecayMeter:
             raw = read_raw(frame.path)
             self._range_dn = min(self._range_dn, raw.white - max(raw.black))
             channels = [
-                channel
-                for region in regions
-                for channel in measure(raw, region).channels.values()
+                channel for region in regions for channel in measure(raw, region).channels.values()
             ]
             self._take(frame, frame.start_time - frames[0].start_time, channels)
 

@@ -34,9 +34,7 @@ class OpenRoom:
         relays = NumatoBoard(RELAYS, self._relay_moved)
         relays.states[LAMP_RELAY] = self.room.lamp_on
         self.boards: dict[str, Board] = {"relays": relays}
-        self.camera = SimulatedCamera(
-            clock, self.room, serial="0730100001", seed=simulation.seed
-        )
+        self.camera = SimulatedCamera(clock, self.room, serial="0730100001", seed=simulation.seed)
 
     def usb(self, device: str) -> usb.backend.IBackend | None:
         """The USB bus on which `device` is alone; `None` if there is no such device."""

@@ -25,7 +25,9 @@ def test_durations(text: str, seconds: float) -> None:
     assert parse(text, TIME_S) == pytest.approx(seconds, rel=1e-15)
 
 
-@pytest.mark.parametrize("text", ["5", "five s", "5 parsec", "-5 s", "1/0 s", "nan s", "1e999 s", ""])
+@pytest.mark.parametrize(
+    "text", ["5", "five s", "5 parsec", "-5 s", "1/0 s", "nan s", "1e999 s", ""]
+)
 def test_what_is_no_duration_is_refused(text: str) -> None:
     with pytest.raises(ValueError, match="expected"):
         parse(text, TIME_S)

@@ -22,13 +22,15 @@ def test_what_lies_in_the_frame_is_in_it_as_pixels(
 ) -> None:
     region = (x, y, min(w, 1 - x), min(h, 1 - y))
     left, top, wide, high = region_pixels(region, width, height)
-    assert 0 <= left
-    assert 0 <= top
+    assert left >= 0
+    assert top >= 0
     assert left + wide <= width
     assert top + high <= height
 
 
-@pytest.mark.parametrize("text", ["", "1,2,3", "1,2,3,x", "-1,2,3,4", "1,2,0,4", "1.5,2,3,4", "nan,0,1,1"])
+@pytest.mark.parametrize(
+    "text", ["", "1,2,3", "1,2,3,x", "-1,2,3,4", "1,2,0,4", "1.5,2,3,4", "nan,0,1,1"]
+)
 def test_what_is_no_region_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="x,y,width,height"):
         parse_region(text)

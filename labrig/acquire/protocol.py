@@ -43,5 +43,3 @@ class ProtocolModel(BaseModel):
     @abstractmethod
     def units(self) -> Sequence[Unit]:
         """All units in order, known before anything moves."""
-
-

@@ -8,7 +8,6 @@ from labrig.clock import Clock
 from labrig.errors import DeviceError, LabrigError, ProtocolError
 
 
-
 class Rig:
     """Open devices by their key in the rig file.
 

@@ -47,8 +47,6 @@ class RigFile(BaseModel):
     )
 
 
-
-
 def read_rig_file(path: Path) -> RigFile:
     """Read and check a rig file, all but its drivers' own keys.
 

@@ -55,9 +55,7 @@ class _Recorder:
         self._writer = writer
         self.kept = list(kept)
 
-    def acted(
-        self, device: str, action: str, start_s: float, end_s: float, late_s: float
-    ) -> None:
+    def acted(self, device: str, action: str, start_s: float, end_s: float, late_s: float) -> None:
         wall = self._clock.wall
         self._writer.action(
             ActionRecord(self._writer.unit, device, action, wall(start_s), wall(end_s), late_s)

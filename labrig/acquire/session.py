@@ -61,9 +61,7 @@ def at(at_s: float, action: Action) -> Timed:
 class Recorder(Protocol):
     """Keeps what happens in a unit. Times are on the rig's clock."""
 
-    def acted(
-        self, device: str, action: str, start_s: float, end_s: float, late_s: float
-    ) -> None:
+    def acted(self, device: str, action: str, start_s: float, end_s: float, late_s: float) -> None:
         """Something was switched, moved or decided."""
 
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:

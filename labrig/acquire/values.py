@@ -27,7 +27,9 @@ class ExposureSettings:
 
     def __str__(self) -> str:
         shutter = (
-            f"1/{1 / self.exposure_s:.0f} s" if self.exposure_s < 0.3 else f"{self.exposure_s:.3g} s"
+            f"1/{1 / self.exposure_s:.0f} s"
+            if self.exposure_s < 0.3
+            else f"{self.exposure_s:.3g} s"
         )
         aperture = "" if self.f_number is None else f" f/{self.f_number:g}"
         return f"{shutter} ISO {self.iso}{aperture}"
@@ -68,8 +70,8 @@ class CameraOffers:
         near_s = min(self.exposures_s, key=lambda offered: abs(math.log(offered / exposure_s)))
         if abs(math.log2(near_s / exposure_s)) > 1 / 6:
             raise ProtocolError(
-                f"the camera does not offer an exposure of {duration_text(exposure_s)}; the nearest "
-                f"is {duration_text(near_s)} ({duration_text(self.exposures_s[0])} to "
+                f"the camera does not offer an exposure of {duration_text(exposure_s)}; the "
+                f"nearest is {duration_text(near_s)} ({duration_text(self.exposures_s[0])} to "
                 f"{duration_text(self.exposures_s[-1])} are offered)"
             )
         return near_s

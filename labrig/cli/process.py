@@ -40,8 +40,8 @@ def process_and_tell(run: Path, choices: "Choices | None" = None, *, json: bool)
         fits = ", ".join(f'"{name}": {fit.to_json()}' for name, fit in result.fits.items())
         typer.echo(f"{{{fits}}}")
         return
+    for warning in result.run_warnings:
+        typer.echo(f"warning: {warning}", err=True)
     for name, fit in result.fits.items():
         typer.echo(f"{name}\n{fit}")
-    for warning in result.warnings:
-        typer.echo(f"warning: {warning}", err=True)
     typer.echo(f"report: {result.report}")

@@ -72,7 +72,11 @@ class _State:
         now_s = begins_s + self._elapsed_s()
         for step in self.plan.steps:
             if step.unit == self.unit and step.at_s > now_s + 0.1:
-                what = step.action if step.device in ("-", "camera") else f"{step.device} {step.action}"
+                what = (
+                    step.action
+                    if step.device in ("-", "camera")
+                    else f"{step.device} {step.action}"
+                )
                 return f"{what} in {_countdown(step.at_s - now_s)}"
         following = self.plan.units[self.number :]
         return f"unit {following[0]}" if following else "the report"

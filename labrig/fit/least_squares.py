@@ -1,13 +1,15 @@
 """The one nonlinear least-squares core under every fit.
 
-A Levenberg–Marquardt search with Moré's column scaling and Nielsen's damping finds the basin; undamped
-Gauss–Newton steps, each by an orthogonal factorisation of the scaled Jacobian (never the normal
-equations, which square its condition), then carry the minimum to the precision of the arithmetic.
+A Levenberg–Marquardt search with Moré's column scaling and Nielsen's damping finds the basin;
+undamped Gauss–Newton steps, each by an orthogonal factorisation of the scaled Jacobian (never the
+normal equations, which square its condition), then carry the minimum to the precision of the
+arithmetic.
 
 References
 ----------
-J. J. Moré, *The Levenberg–Marquardt algorithm*, LNM 630 (1978); H. B. Nielsen, *Damping parameter in
-Marquardt's method*, IMM-REP-1999-05; Å. Björck, *Numerical methods for least squares problems* (1996).
+J. J. Moré, *The Levenberg–Marquardt algorithm*, LNM 630 (1978); H. B. Nielsen, *Damping parameter
+in Marquardt's method*, IMM-REP-1999-05; Å. Björck, *Numerical methods for least squares problems*
+(1996).
 """
 
 from collections.abc import Callable
@@ -127,8 +129,8 @@ def least_squares(
         point = _evaluate(residuals, np.clip(x, low, high))
         if not (np.isfinite(point.chi2) and np.all(np.isfinite(point.jacobian))):
             raise FitError(
-                "expected finite residuals at the start of the fit, got infinite or undefined ones; "
-                "start nearer to the solution"
+                "expected finite residuals at the start of the fit, got infinite or undefined "
+                "ones; start nearer to the solution"
             )
         point, iterations = _damped_search(
             residuals, point, low, high, max_iterations, max(tolerance, SEARCH_STEP)
@@ -144,6 +146,8 @@ def _evaluate(residuals: Residuals, x: FloatArray) -> _Point:
 
 def _free(point: _Point, low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
     """Parameters that no bound holds: inside the box, or pulled back into it by the gradient."""
+    if np.all((low < point.x) & (point.x < high)):
+        return np.ones(point.x.shape, dtype=np.bool_)
     gradient = point.jacobian.T @ point.residuals
     held = ((point.x <= low) & (gradient >= 0)) | ((point.x >= high) & (gradient <= 0))
     return ~held
@@ -183,8 +187,8 @@ def _damped_search(
                 return point, evaluations
             trial = _evaluate(residuals, trial_x)
             evaluations += 1
-            predicted = point.residuals + point.jacobian @ step
-            promised = point.chi2 - float(predicted @ predicted)
+            change = point.jacobian @ step
+            promised = -float(2 * point.residuals @ change + change @ change)
             gain = (point.chi2 - trial.chi2) / promised if promised > 0 else -1.0
             accepted = bool(
                 trial.chi2 < point.chi2 and gain > 1e-4 and np.all(np.isfinite(trial.jacobian))
@@ -234,7 +238,7 @@ def _polish(
 
 
 def _rank_tolerance(jacobian: FloatArray) -> float:
-    return max(jacobian.shape) * EPSILON
+    return float(max(jacobian.shape)) * EPSILON
 
 
 def _result(

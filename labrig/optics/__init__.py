@@ -1,5 +1,5 @@
 """Spectra and what light passes on its way to a number."""
 
-from labrig.optics.camera import CameraResponse, read_camera, shipped_cameras
+from labrig.optics.camera import CameraResponse, read_camera
 
-__all__ = ["CameraResponse", "read_camera", "shipped_cameras"]
+__all__ = ["CameraResponse", "read_camera"]

@@ -1,9 +1,8 @@
-"""Spectral sensitivity of a camera's channels, and the colours that follow from it."""
+"""Spectral sensitivity of a camera's channels."""
 
 import json
 import os
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,8 +10,6 @@ from numpy.typing import NDArray
 
 from labrig import shipped
 from labrig.errors import UsageError
-from labrig.optics.observer import colour_matching
-from labrig.yaml_file import did_you_mean
 
 FloatArray = NDArray[np.float64]
 
@@ -40,40 +37,10 @@ class CameraResponse:
     wavelength_nm: FloatArray
     sensitivity: FloatArray
 
-    def camera_to_xyz(self) -> FloatArray:
-        """M, shape (3, 3): CIE 1931 XYZ ≈ M · (R, G, B) of raw linear camera values.
-
-        Least squares of the colour-matching functions by the sensitivities over all wavelengths
-        (spectra of any shape being equally likely), under the condition that equal energy comes
-        out exactly (Finlayson and Drew, *Color constancy and white-point preserving least squares*,
-        J. Imaging Sci. Technol. 41, 1997). Scaled so that the equal-energy spectrum that gives the
-        camera's highest channel 1 gives Y = 1.
-
-        No camera is an observer, so narrow-band light is displaced: for the EOS 5D Mark II the
-        residual is 9, 9 and 16 % RMS of x̄, ȳ, z̄; emissions 50-100 nm wide come out within a median
-        ΔE*ab of 18, daylight within 1 %. Good for showing a glow, not for measuring its colour.
-        """
-        step_nm = np.gradient(self.wavelength_nm)
-        target = colour_matching(self.wavelength_nm)
-        weighted = self.sensitivity.T * step_nm
-        gram = weighted @ self.sensitivity
-        fitted = np.linalg.solve(gram, weighted @ target).T
-        white, goal = weighted.sum(axis=1), step_nm @ target
-        direction = np.linalg.solve(gram, white)
-        matrix = fitted + np.outer(goal - fitted @ white, direction / (white @ direction))
-        scaled: FloatArray = matrix * white.max() / goal[1]
-        return scaled
-
     def response(self, spectrum: FloatArray) -> FloatArray:
         """Camera values of a spectrum given at `wavelength_nm`, shape (3,), relative."""
         values: FloatArray = (spectrum * np.gradient(self.wavelength_nm)) @ self.sensitivity
         return values
-
-
-def shipped_cameras() -> dict[str, Path]:
-    """Name and file of every camera that comes with labrig."""
-    folder = shipped.folder("config") / "optics"
-    return {path.stem: path for path in sorted(folder.glob("*.json"))}
 
 
 def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
@@ -89,18 +56,9 @@ def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
     UsageError
         No such camera, or its file is malformed.
     """
-    text = os.fspath(name_or_path)
-    known = shipped_cameras()
-    path = known.get(text, Path(text))
-    if text not in known and path.suffix != ".json":
-        raise UsageError(
-            f"unknown camera '{text}'; {did_you_mean(text, list(known))}; a file of your own "
-            "ends in .json"
-        )
+    path = shipped.find("config/optics", "camera", name_or_path)
     try:
         content = json.loads(path.read_text(encoding="utf-8"))
-    except FileNotFoundError:
-        raise UsageError(f"{path}: no such file") from None
     except OSError as error:
         raise UsageError(f"{path}: cannot be read ({error.strerror})") from None
     except (ValueError, RecursionError) as error:

@@ -1,6 +1,6 @@
 """A decay run, from its folder to its result: the way of a photon's number, in one function."""
 
-from collections.abc import Mapping
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -19,12 +19,15 @@ from labrig.report import write_report
 
 @dataclass(frozen=True)
 class Result:
-    """What came out of a run; series and fits by the name of their patch."""
+    """What came out of a run; series and fits by the name of their patch.
+
+    Each fit has warnings of its own; `run_warnings` are about everything before the fits.
+    """
 
     report: Path
     series: Mapping[str, Series]
     fits: Mapping[str, DecayFit]
-    warnings: tuple[str, ...]
+    run_warnings: tuple[str, ...]
 
 
 def process_run(folder: Path, choices: Choices | None = None) -> Result:
@@ -54,7 +57,8 @@ def process_run(folder: Path, choices: Choices | None = None) -> Result:
         protocol.background if protocol.dark == "background" else None,
     )
     fits = {name: _fit(one, protocol, choices) for name, one in series.items()}
-    warnings = (*timing_warnings(run), *_warnings(series, fits))
+    run_warnings = (*timing_warnings(run), *_clipping_warnings(series))
+    warnings = (*run_warnings, *_fit_warnings(fits))
 
     with replaced_result(folder) as made:
         for name, fit in fits.items():
@@ -68,7 +72,7 @@ def process_run(folder: Path, choices: Choices | None = None) -> Result:
     fitted = {name: fit for name, fit in fits.items() if isinstance(fit, DecayFit)}
     if not fitted:
         raise FitError(f"{'; '.join(map(str, fits.values()))}; the run is kept, see {report}")
-    return Result(report, series, fitted, warnings)
+    return Result(report, series, fitted, run_warnings)
 
 
 def _fit(series: Series, protocol: DecayProtocol, choices: Choices) -> DecayFit | str:
@@ -80,16 +84,21 @@ def _fit(series: Series, protocol: DecayProtocol, choices: Choices) -> DecayFit 
         return str(error)
 
 
-def _warnings(series: Mapping[str, Series], fits: Mapping[str, DecayFit | str]) -> list[str]:
-    warnings = []
-    for name, fit in fits.items():
-        patch = f"{name}: " if len(fits) > 1 else ""
-        clipped = sum("clipped" in flag for flag in series[name].flag)
+def _clipping_warnings(series: Mapping[str, Series]) -> Iterator[str]:
+    for name, one in series.items():
+        clipped = sum("clipped" in flag for flag in one.flag)
         if clipped:
-            warnings.append(
-                f"{patch}{clipped} of {len(series[name].flag)} frames are clipped and left out; "
-                "expose for less or lower the ISO"
+            yield (
+                f"{_patch(name, series)}{clipped} of {len(one.flag)} frames are clipped and left "
+                "out; expose for less or lower the ISO"
             )
+
+
+def _fit_warnings(fits: Mapping[str, DecayFit | str]) -> Iterator[str]:
+    for name, fit in fits.items():
         said = [f"not fitted: {fit}"] if isinstance(fit, str) else fit.warnings
-        warnings += [f"{patch}{text}" for text in said]
-    return warnings
+        yield from (f"{_patch(name, fits)}{text}" for text in said)
+
+
+def _patch(name: str, patches: Mapping[str, object]) -> str:
+    return f"{name}: " if len(patches) > 1 else ""

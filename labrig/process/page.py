@@ -63,9 +63,7 @@ def _glow(run: RunRecord, series: Series) -> tuple[GlowPhotograph, ...]:
     first = series.by_unit()[0]
     last = len(first.frame) - 1
     chosen = sorted({round(share * last) for share in GLOW_SHARES})
-    return tuple(
-        GlowPhotograph(frames[first.frame[row]], float(first.t_s[row])) for row in chosen
-    )
+    return tuple(GlowPhotograph(frames[first.frame[row]], float(first.t_s[row])) for row in chosen)
 
 
 def _written(seconds: float) -> str:

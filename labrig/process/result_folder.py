@@ -30,9 +30,7 @@ def replaced_result(run: Path) -> Iterator[Path]:
     made.rename(final)
 
 
-def write_patch(
-    place: Path, series: Series, fit: DecayFit | str, material: str, run: str
-) -> None:
+def write_patch(place: Path, series: Series, fit: DecayFit | str, material: str, run: str) -> None:
     """Write series.csv and, where there is a fit, fit.json and material.yaml into `place`."""
     place.mkdir(exist_ok=True)
     write_series(place / "series.csv", [series])

@@ -43,9 +43,11 @@ def fit_series(
     FitError
         The data do not allow a fit.
     """
+    if not series.usable.any():
+        raise FitError(
+            "expected usable frames, got none: all are clipped or excluded; expose for less"
+        )
     usable = series.take(np.flatnonzero(series.usable))
-    if not len(usable.t_s):
-        raise FitError("no usable frames: all are clipped or excluded; expose for less")
     if offset_sigma is None:
         known = series.dark_sigma[np.isfinite(series.dark_sigma)]
         offset_sigma = float(known.max()) if len(known) else 0.0

@@ -75,9 +75,7 @@ def _intact(attempt: Attempt, purpose: str, choices: Choices) -> Iterator[FrameR
 
 
 def _is_intact(frame: FrameRecord) -> bool:
-    return (
-        frame.path.is_file() and sha256(frame.path.read_bytes()).hexdigest() == frame.sha256
-    )
+    return frame.path.is_file() and sha256(frame.path.read_bytes()).hexdigest() == frame.sha256
 
 
 def _timed(frame: FrameRecord, lamp_off_time: float, choices: Choices) -> SeriesFrame:
@@ -94,7 +92,7 @@ def _timed(frame: FrameRecord, lamp_off_time: float, choices: Choices) -> Series
 
 
 def _lamp_off_time(attempt: Attempt, frame: FrameRecord) -> float:
-    """Middle of the last lamp-off transaction before the frame: the relay opened somewhere in it."""
+    """Middle of the last lamp-off transaction before the frame: the relay opened in it."""
     offs = [
         (action.start_time + action.end_time) / 2
         for action in attempt.actions

@@ -1,4 +1,4 @@
-"""The journal: bluesky event-model documents, one JSON line each, on the disk before the next step."""
+"""The journal: event-model documents, one JSON line each, on the disk before the next step."""
 
 import json
 import os

@@ -53,6 +53,14 @@ class DarkModel:
         at = np.array([1.0, exposure_s])
         return self.base + self.rate_per_s * exposure_s, np.sqrt(at @ self.covariance @ at)
 
+    def current(self, exposure_s: float) -> Floats:
+        """What dark current adds during an exposure, in DN, shape (C,); at most so much if all
+        dark frames had one exposure, which does not tell it from an error of the black level.
+        """
+        if self.only_exposure_s is not None:
+            return self.base
+        return self.rate_per_s * exposure_s
+
 
 def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
     """Weighted least squares of b + d·T through dark levels.

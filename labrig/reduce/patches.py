@@ -17,6 +17,9 @@ from labrig.region import Region
 
 #: Share of a patch's pixels that may be saturated before its mean is too small.
 CLIPPED_SHARE = 0.001
+#: Share by which the dark current changes when the sensor is one degree warmer than in the dark
+#: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before.
+ONE_DEGREE = 2 ** (1 / 6) - 1
 #: Dark frames held in memory at once, to look for hot pixels.
 _DARKS_FOR_HOT = 5
 
@@ -180,7 +183,9 @@ def _patch_series(
                     f"{shot.frame.path}: expected dark frames at ISO {shot.iso:g} as this frame, "
                     "got none; take some, or name a background region"
                 )
-            dark[row], dark_sigma[row] = model.dark_level(shot.frame.exposure_s)
+            dark[row], of_model = model.dark_level(shot.frame.exposure_s)
+            drift = ONE_DEGREE * np.abs(model.current(shot.frame.exposure_s))
+            dark_sigma[row] = np.hypot(of_model, drift)
     per_second = exposure_s[:, np.newaxis]
     sigma = sigma / per_second
     return Series(

@@ -10,20 +10,8 @@ from labrig.optics import CameraResponse
 FloatArray = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
-#: XYZ (D65) to linear sRGB, IEC 61966-2-1.
-_XYZ_TO_SRGB = np.array(
-    [
-        [3.2406, -1.5372, -0.4986],
-        [-0.9689, 1.8758, 0.0415],
-        [0.0557, -0.2040, 1.0570],
-    ]
-)
-#: Rec. 709 luminance of linear sRGB.
-_LUMINANCE = np.array([0.2126, 0.7152, 0.0722])
 #: Colour temperature of a tungsten halogen lamp, the usual one for charging.
 HALOGEN_K = 3200.0
-#: Second radiation constant, nm K.
-_C2_NM_K = 1.438777e7
 
 
 @dataclass(frozen=True, eq=False)
@@ -50,8 +38,10 @@ def screen_for(camera: CameraResponse | None) -> Screen:
     """The way to the screen for a camera."""
     if camera is None:
         return Screen(np.eye(3), np.eye(3), known=False)
-    glow = _XYZ_TO_SRGB @ camera.camera_to_xyz()
-    halogen = camera.wavelength_nm**-5.0 / np.expm1(_C2_NM_K / HALOGEN_K / camera.wavelength_nm)
+    import colour  # takes seconds to load
+
+    glow = colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB @ camera_to_xyz(camera)
+    halogen = np.asarray(colour.colorimetry.planck_law(camera.wavelength_nm * 1e-9, HALOGEN_K))
     under_lamp = camera.response(halogen)
     equal_energy = camera.response(np.ones_like(camera.wavelength_nm))
     # Von Kries in the camera's own channels, then the colour matrix with its rows scaled to white.
@@ -60,27 +50,57 @@ def screen_for(camera: CameraResponse | None) -> Screen:
     return Screen(glow, matrix / white[:, np.newaxis], known=True)
 
 
-def into_gamut(linear: FloatArray) -> FloatArray:
-    """Linear sRGB, shape (…, 3), as near as a screen can show it.
+def camera_to_xyz(camera: CameraResponse) -> FloatArray:
+    """M, shape (3, 3): CIE 1931 XYZ ≈ M · (R, G, B) of raw linear camera values.
 
-    Colours outside are mixed with grey until they are inside. Luminance stays; what is negative in
-    all (noise about black) becomes black.
+    Least squares of the colour-matching functions by the sensitivities over all wavelengths
+    (spectra of any shape being equally likely), under the condition that equal energy comes out
+    exactly (Finlayson and Drew, *Color constancy and white-point preserving least squares*,
+    J. Imaging Sci. Technol. 41, 1997). Scaled so that the equal-energy spectrum that gives the
+    camera's highest channel 1 gives Y = 1.
+
+    No camera is an observer, so narrow-band light is displaced: for the EOS 5D Mark II the residual
+    is 9, 9 and 16 % RMS of x̄, ȳ, z̄; emissions 50-100 nm wide come out within a median ΔE*ab of 18,
+    daylight within 1 %. Good for showing a glow, not for measuring its colour.
     """
-    luminance = np.maximum(linear @ _LUMINANCE, 0.0)[..., np.newaxis]
-    lowest = linear.min(axis=-1, keepdims=True)
-    share = np.where(lowest < 0, -lowest / np.maximum(luminance - lowest, 1e-12), 0.0)
-    mixed: FloatArray = linear + share * (luminance - linear)
-    return np.maximum(mixed, 0.0)
+    step_nm = np.gradient(camera.wavelength_nm)
+    target = colour_matching(camera.wavelength_nm)
+    weighted = camera.sensitivity.T * step_nm
+    gram = weighted @ camera.sensitivity
+    fitted = np.linalg.solve(gram, weighted @ target).T
+    white, goal = weighted.sum(axis=1), step_nm @ target
+    direction = np.linalg.solve(gram, white)
+    matrix = fitted + np.outer(goal - fitted @ white, direction / (white @ direction))
+    return np.asarray(matrix * white.max() / goal[1])
+
+
+def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
+    """x̄, ȳ, z̄ of the CIE 1931 2° observer at each wavelength, shape (n, 3); 0 outside its table."""
+    import colour
+
+    observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
+    columns = [
+        np.interp(wavelength_nm, observer.wavelengths, column, left=0.0, right=0.0)
+        for column in observer.values.T
+    ]
+    return np.stack(columns, axis=1)
+
+
+def into_gamut(linear: FloatArray) -> FloatArray:
+    """Linear sRGB, shape (…, 3), as near as a screen can show it: what is negative becomes 0.
+
+    Mixing with grey of the same luminance would keep the hue of narrow-band light better, but the
+    luminance of deep blue is so small, and so uncertain from a camera, that it would turn black.
+    """
+    return np.maximum(linear, 0.0)
 
 
 def encoded(linear: FloatArray) -> Bytes:
     """Linear sRGB as bytes with sRGB's transfer curve; more than 1 is cut off."""
-    clipped = np.clip(linear, 0.0, 1.0)
-    curve = np.where(
-        clipped <= 0.0031308, 12.92 * clipped, 1.055 * clipped ** (1 / 2.4) - 0.055
-    )
-    rounded: Bytes = np.rint(255 * curve).astype(np.uint8)
-    return rounded
+    import colour
+
+    curve = colour.cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB")
+    return np.asarray(np.rint(255 * np.asarray(curve)), dtype=np.uint8)
 
 
 def css_colour(linear: FloatArray) -> str:

@@ -71,9 +71,7 @@ def fitted_curve(series: Series, fit: DecayFit) -> Curve:
     t_s = np.linspace(known_t[0], known_t[-1], CURVE_POINTS)
     exposure_s = np.interp(t_s, known_t, known_exposure)
     middle_s = t_s + exposure_s / 2
-    states = [
-        state.amplitude * np.exp(-state.k_r_per_s * middle_s) for state in fit.states
-    ]
+    states = [state.amplitude * np.exp(-state.k_r_per_s * middle_s) for state in fit.states]
     return Curve(
         t_s=middle_s,
         total=fit.predict(t_s, exposure_s),

@@ -116,9 +116,7 @@ def _page(report: RunReport) -> str:
 
 def _warnings(report: RunReport) -> list[str]:
     """Those of the report, and every missing fit that they do not mention."""
-    missing = [
-        (patch.name, patch.fit) for patch in report.patches if isinstance(patch.fit, str)
-    ]
+    missing = [(patch.name, patch.fit) for patch in report.patches if isinstance(patch.fit, str)]
     return [
         *report.warnings,
         *(

@@ -41,7 +41,7 @@ def state_rows(fit: DecayFit) -> list[Row]:
     return [
         Row(Markup("Rate k<sub>r</sub>"), "s⁻¹", _written(rates)),
         Row(Markup("Lifetime 1/k<sub>r</sub>"), "s", _written(lifetimes)),
-        Row(Markup("Half-life ln 2/k<sub>r</sub>"), "s", _written(half_lives)),
+        Row("Half-life", "s", _written(half_lives)),
         Row("Amplitude a", "DN/s", _written(amplitudes)),
     ]
 
@@ -50,9 +50,7 @@ def quality_rows(fit: DecayFit) -> list[Row]:
     """What the states share."""
     rows = []
     if len(fit.channels) > 1:
-        weights = zip(
-            fit.channels, fit.channel_weights, fit.channel_weights_sigma, strict=True
-        )
+        weights = zip(fit.channels, fit.channel_weights, fit.channel_weights_sigma, strict=True)
         rows += [
             Row(f"Weight of {name}", "", ("1" if weight == 1 else plus_minus(weight, sigma),))
             for name, weight, sigma in weights
@@ -88,8 +86,9 @@ def paper_rows(fit: DecayFit) -> list[Row]:
 
 
 def candidate_rows(fit: DecayFit) -> list[CandidateRow]:
-    """The numbers of states tried, and the power law."""
-    best = min(*(candidate.bic for candidate in fit.candidates), fit.power_law_bic, math.inf)
+    """The numbers of states tried, and their rivals."""
+    bics = [candidate.bic for candidate in fit.candidates] + [rival.bic for rival in fit.rivals]
+    best = min(bics, default=math.inf)
     rows = [
         CandidateRow(
             model=_states(candidate.n_states),
@@ -100,8 +99,9 @@ def candidate_rows(fit: DecayFit) -> list[CandidateRow]:
         )
         for candidate in fit.candidates
     ]
-    if math.isfinite(fit.power_law_bic):
-        rows.append(CandidateRow("power law", "–", _above(fit.power_law_bic, best), "–", False))
+    rows += [
+        CandidateRow(rival.name, "–", _above(rival.bic, best), "–", False) for rival in fit.rivals
+    ]
     return rows
 
 
@@ -124,11 +124,12 @@ def why_so_many_states(fit: DecayFit) -> str:
         said.append("No other number of states was tried or supported by the data.")
     elif more is None:
         said.append("More were not asked for, or the data do not support them.")
-    if fit.power_law is not None:
-        law = fit.power_law
+    if fit.better_rival is not None:
+        rival = fit.better_rival
+        exponent = plus_minus(rival.exponent, rival.exponent_sigma)
         said.append(
-            "A power law (1 + t/τ)⁻ᵖ describes the data clearly better: "
-            f"τ = {rounded(law.tau_s, 3)} s, p = {plus_minus(law.exponent, law.exponent_sigma)}."
+            f"A {rival.name}, {rival.formula}, describes the data clearly better "
+            f"(exponent {exponent})."
         )
     return " ".join(said)
 

@@ -99,7 +99,7 @@ def daylight_picture(
         width=width,
         height=height,
         marks=_marks(patches, raw, width, height),
-        caption=f"Frame {frame.path.name}, {exposure_text(frame.exposure_s)}, {balance}."
+        caption=f"Frame {frame.path.name}, {exposure_text(frame.exposure_s)}, {balance}.",
     )
 
 
@@ -115,9 +115,7 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
             shown.append((photograph, linear, blown))
     if not shown:
         return ()
-    levels = [
-        float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear, _ in shown
-    ]
+    levels = [float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear, _ in shown]
     full = max(*levels, 1e-9)
     pictures = []
     for (photograph, linear, blown), level in zip(shown, levels, strict=True):

@@ -75,10 +75,11 @@ def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> 
 
 def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
     """How much later than planned each exposure began, one mark a frame, one colour a unit."""
-    figure = new_figure(TIMING_HEIGHT_PT)
-    axes = place(figure, left=62, bottom=38, right=12, top=14)
-    axes.axhline(0, color=MUTED, linewidth=0.8)
     units = list(dict.fromkeys(timing.unit for timing in timings))
+    several = 1 < len(units) <= len(MARKERS)
+    figure = new_figure(TIMING_HEIGHT_PT)
+    axes = place(figure, left=62, bottom=38, right=12, top=46 if several else 14)
+    axes.axhline(0, color=MUTED, linewidth=0.8)
     for number, unit in enumerate(units):
         of_unit = [timing for timing in timings if timing.unit == unit]
         axes.plot(
@@ -96,7 +97,7 @@ def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
     axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
     axes.set_xlabel(TIME_LABEL)
     axes.set_ylabel("Late by / ms")
-    if 1 < len(units) <= len(MARKERS):
+    if several:
         figure.legend(
             loc="upper left",
             bbox_to_anchor=(54 / 420, 1.0),

@@ -80,7 +80,11 @@ CASES = {
         Case("power law τ 10, p 1.5", truths.power_law(10, 1.5)),
         Case("power law τ 1, p 1", truths.power_law(1, 1.0), fit={"flicker": None}),
         Case("stretched τ 20, β .5", truths.stretched(20, 0.5)),
-        Case("stretched τ 20, β .5, n = 2", truths.stretched(20, 0.5), fit={"flicker": 0.007, "n_states": 2}),
+        Case(
+            "stretched τ 20, β .5, n = 2",
+            truths.stretched(20, 0.5),
+            fit={"flicker": 0.007, "n_states": 2},
+        ),
         Case("background drifting by 1 %", _drifting),
     ]
 }
@@ -103,9 +107,10 @@ def report(case: Case, fits: list[tuple[DecayFit, truths.Observed]]) -> str:
     power_law = np.mean([name == "power law" for name in rivals])
     stretched = np.mean([name == "stretched exponential" for name in rivals])
     warned = np.mean([bool(fit.warnings) for fit, _ in fits])
+    shares = [100 * np.mean(found == n) for n in (1, 2, 3)]
     text = (
-        f"{case.name:42s} n=1/2/3 {100 * np.mean(found == 1):5.1f} {100 * np.mean(found == 2):5.1f} "
-        f"{100 * np.mean(found == 3):5.1f} %  power law {100 * power_law:.1f}, stretched {100 * stretched:.1f} %  "
+        f"{case.name:42s} n = 1, 2, 3: {shares[0]:5.1f} {shares[1]:5.1f} {shares[2]:5.1f} %  "
+        f"power law {100 * power_law:.1f} %  stretched {100 * stretched:.1f} %  "
         f"warned {100 * warned:5.1f} %  ρ {100 * np.mean([fit.flicker for fit, _ in fits]):.2f} %"
     )
     right = [fit for fit, _ in fits if fit.n_states == len(case.states)]

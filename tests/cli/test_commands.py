@@ -1,4 +1,4 @@
-"""The commands as a person uses them: results, exit codes, one clear line when something is wrong."""
+"""The commands as a person uses them: results, exit codes, one line when something is wrong."""
 
 import json
 import subprocess
@@ -60,7 +60,11 @@ def test_unknown_protocols_and_rigs(
     ],
 )
 def test_a_plan_is_refused_before_anything_moves(
-    labrig: Labrig, make_rig: Make, tmp_path: Path, change: Callable[[dict], None], said: str  # type: ignore[type-arg]
+    labrig: Labrig,
+    make_rig: Make,
+    tmp_path: Path,
+    change: Callable[[dict], None],
+    said: str,  # type: ignore[type-arg]
 ) -> None:
     path = make_rig()
     rig = yaml.safe_load(path.read_text())
@@ -139,9 +143,7 @@ def test_a_run_ends_in_a_result_that_agrees_with_itself(labrig: Labrig, finished
     assert refit["states"][0]["k_r_per_s"] == pytest.approx(state["k_r_per_s"], rel=1e-3)
 
 
-def test_processing_again_keeps_what_was_and_gives_the_same(
-    labrig: Labrig, finished: Path
-) -> None:
+def test_processing_again_keeps_what_was_and_gives_the_same(labrig: Labrig, finished: Path) -> None:
     before = {path.name: path.read_bytes() for path in (finished / "result").iterdir()}
     assert labrig("process", finished).code == 0
     assert {p.name: p.read_bytes() for p in (finished / "result-1").iterdir()} == before
@@ -238,3 +240,15 @@ def test_a_rig_copied_elsewhere_still_runs(
     fit = json.loads((ended.run_folder / "result" / "fit.json").read_text())
     assert fit["states"][0]["k_r_per_s"] == pytest.approx(0.05, rel=0.02)
     assert labrig("resume", ended.run_folder).code == 0
+
+
+def test_a_run_whose_every_frame_clips_is_kept_and_said(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
+) -> None:
+    ended = labrig(
+        "run", make_protocol(exposure="3.2 s", camera={"iso": 1600, "f_number": 4}), "--rig",
+        make_rig(sample="stickers"), "--runs", tmp_path / "runs",
+    )  # fmt: skip
+    one_line(ended, 4, "all are clipped", "the run is kept")
+    (folder,) = (tmp_path / "runs").iterdir()
+    assert "clipped" in (folder / "result" / "report.html").read_text()

@@ -126,7 +126,9 @@ def test_an_interruption_at_any_wait_can_be_made_safe(waits: int) -> None:
     clock = InterruptingClock()
     moved: list[tuple[int, bool]] = []
     board = NumatoBoard(8, lambda relay, on: moved.append((relay, on)))
-    driver = NumatoRelay("COM3", NumatoRelay.Settings(relay=0), Wired(clock, BoardPort(clock, board)))
+    driver = NumatoRelay(
+        "COM3", NumatoRelay.Settings(relay=0), Wired(clock, BoardPort(clock, board))
+    )
     clock.waits_left = waits
     try:
         driver.on()

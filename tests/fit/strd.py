@@ -1,4 +1,4 @@
-"""NIST's Statistical Reference Datasets for nonlinear regression: files, models, certified values."""
+"""NIST's Statistical Reference Datasets for nonlinear regression: models, certified values."""
 
 import re
 from collections.abc import Callable
@@ -33,7 +33,8 @@ def _enso(b: ComplexArray, x: FloatArray) -> ComplexArray:
         phase = 2 * np.pi * x / period
         return np.asarray(cosine * np.cos(phase) + sine * np.sin(phase))
 
-    return b[0] + wave(b[1], b[2], 12) + wave(b[4], b[5], b[3]) + wave(b[7], b[8], b[6])
+    waves = wave(b[1], b[2], 12) + wave(b[4], b[5], b[3]) + wave(b[7], b[8], b[6])
+    return np.asarray(b[0] + waves)
 
 
 #: Name → y(parameters, x), analytic in the parameters, as printed in the file's header.
@@ -92,11 +93,15 @@ class ReferenceSet:
 
 def read(path: Path) -> ReferenceSet:
     """A set as NIST distributes it."""
-    lines = path.read_text().splitlines()
+    text = path.read_text()
+    lines = text.splitlines()
     number = r"[-+]?[\d.]+(?:[eE][-+]?\d+)?"
-    rows = [re.findall(number, line.split("=")[1]) for line in lines if re.match(r"\s*b\d+ =", line)]
+    parameters = [line.split("=")[1] for line in lines if re.match(r"\s*b\d+ =", line)]
+    rows = [re.findall(number, parameter) for parameter in parameters]
     table = np.array([[float(cell) for cell in row] for row in rows])
-    first, last = map(int, re.search(r"Data\s+\(lines (\d+) to (\d+)\)", "\n".join(lines)).groups())  # type: ignore[union-attr]
+    where = re.search(r"Data\s+\(lines (\d+) to (\d+)\)", text)
+    assert where is not None
+    first, last = map(int, where.groups())
     data = np.array([[float(cell) for cell in line.split()] for line in lines[first - 1 : last]])
     y = np.log(data[:, 0]) if path.stem == "Nelson" else data[:, 0]
     x = data[:, 1:].T if path.stem == "Nelson" else data[:, 1]

@@ -1,4 +1,4 @@
-"""Decays whose truth is known, made without labrig's formulae: exposures are integrated numerically."""
+"""Decays whose truth is known, made without labrig's formulae: exposures integrated numerically."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,7 +13,7 @@ _NODES, _SHARES = np.polynomial.legendre.leggauss(24)
 NODES, SHARES = (_NODES + 1) / 2, _SHARES / 2
 
 #: A frame every 5 s for 180 s, as in Nalbach et al. sec. 4.4.
-TIMES_S = 0.3 + 5.0 * np.arange(37)
+TIMES_S: FloatArray = 0.3 + 5.0 * np.arange(37, dtype=np.float64)
 RGB_WEIGHTS = np.array([0.6, 1.0, 0.3])
 
 Decay = Callable[[FloatArray], FloatArray]

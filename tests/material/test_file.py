@@ -99,7 +99,9 @@ def test_table_1_is_shipped() -> None:
 
 
 def test_double_exponentials_span_the_ratios() -> None:
-    doubles = [read_material(n) for n in shipped.names("config/materials") if n.startswith("double-")]
+    doubles = [
+        read_material(n) for n in shipped.names("config/materials") if n.startswith("double-")
+    ]
     rates = [[state.k_r_per_s for state in material.states] for material in doubles]
     assert sorted(round(fast / slow, 6) for fast, slow in rates) == [2.5, 2.5, 5, 5, 20, 20]
     assert max(1 / slow for _, slow in rates) > 180

@@ -106,9 +106,7 @@ def test_a_dead_attempt_is_closed_and_its_frames_do_not_count(
 
 
 @pytest.mark.parametrize(("seed", "alike"), [(7, True), (None, False)])
-def test_a_seed_makes_the_bytes_repeatable(
-    tmp_path: Path, seed: int | None, alike: bool
-) -> None:
+def test_a_seed_makes_the_bytes_repeatable(tmp_path: Path, seed: int | None, alike: bool) -> None:
     journals = []
     for name in ("a", "b"):
         ticks = itertools.count()

@@ -10,6 +10,7 @@ import pytest
 
 from labrig.errors import DataError, FrameError
 from labrig.reduce import Series, SeriesFrame, reduce_patches, reduce_series
+from labrig.reduce.patches import ONE_DEGREE
 
 WriteDng = Callable[..., bytes]
 Take = Callable[..., SeriesFrame]
@@ -38,10 +39,16 @@ def take(tmp_path: Path, write_dng: WriteDng) -> Take:
     rng = np.random.default_rng(7)
     taken = 0
 
-    def shot(t_s: float, exposure_s: float, lit: bool = True, iso: int = 100) -> SeriesFrame:
+    def shot(
+        t_s: float,
+        exposure_s: float,
+        lit: bool = True,
+        iso: int = 100,
+        dark_per_s: float = DARK_PER_S,
+    ) -> SeriesFrame:
         nonlocal taken
         taken += 1
-        signal = (_light(t_s) * lit + DARK_PER_S) * exposure_s
+        signal = (_light(t_s) * lit + dark_per_s) * exposure_s
         mosaic = 1000 + DARK_DN + rng.poisson(signal) + rng.normal(0, READ_DN, signal.shape)
         mosaic[HOT] += 2000 * exposure_s
         path = tmp_path / f"{taken:06d}.dng"
@@ -53,7 +60,8 @@ def take(tmp_path: Path, write_dng: WriteDng) -> Take:
 
 def _pulls(series: Series, share: float) -> Floats:
     truth = share * np.exp(-RATE_PER_S * series.t_s)[:, np.newaxis] * np.array(LIGHT_PER_S)
-    of_dark = np.nan_to_num(series.dark_sigma)
+    drift = ONE_DEGREE * DARK_PER_S  # allowed for, but this sensor keeps its temperature
+    of_dark = np.sqrt(np.maximum(np.nan_to_num(series.dark_sigma) ** 2 - drift**2, 0))
     return np.asarray((series.values - truth) / np.hypot(series.sigma, of_dark))
 
 
@@ -70,8 +78,18 @@ def test_a_decay_is_recovered_with_darks_of_two_exposures(take: Take) -> None:
         assert set(series.flag) == {""}
         assert np.abs(_pulls(series, share)).max() < 4
         assert 0.6 < _pulls(series, share).std() < 1.4
-        assert (series.dark_sigma > 0).all()
-        assert (series.dark_sigma < 0.3).all()
+        assert (series.dark_sigma > ONE_DEGREE * DARK_PER_S * 0.9).all()
+        assert (series.dark_sigma < 0.7).all()
+
+
+def test_a_sensor_that_warmed_by_a_degree_is_allowed_for(take: Take) -> None:
+    warm_per_s = DARK_PER_S * 2 ** (1 / 6)
+    frames = [take(200, 4.0, dark_per_s=warm_per_s) for _ in range(4)]
+    darks = [take(0, exposure_s, lit=False) for exposure_s in (1.0, 1.0, 4.0, 4.0)]
+    series = reduce_series(frames, PAINT, darks, name="paint")
+    error = series.values.mean(axis=0) - np.exp(-RATE_PER_S * 200) * np.array(LIGHT_PER_S)
+    assert (error > 2 * series.sigma.mean(axis=0) / 2).all(), "the warmth is seen"
+    assert (np.abs(error) < 2 * series.dark_sigma).all()
 
 
 def test_a_background_region_takes_the_place_of_darks(take: Take) -> None:

@@ -25,7 +25,7 @@ BLACK, WHITE = 1024, 15600
 def decay_series(
     n: int = 30, channels: Sequence[str] = ("R", "G", "B"), seed: int = 1, name: str = "sample"
 ) -> Series:
-    t_s = 0.5 + 5.0 * np.arange(n)
+    t_s = 0.5 + 5.0 * np.arange(n, dtype=np.float64)
     exposure_s = np.ones(n)
     x = np.multiply.outer(exposure_s, RATES)
     means = np.exp(-np.multiply.outer(t_s, RATES)) * -np.expm1(-x) / x
@@ -97,7 +97,9 @@ def write_dng(path: Path, signal_dn: FloatArray, size: tuple[int, int] = (48, 64
     return path
 
 
-def frame(path: Path, number: int = 1, purpose: str = "decay", exposure_s: float = 1.0) -> FrameRecord:
+def frame(
+    path: Path, number: int = 1, purpose: str = "decay", exposure_s: float = 1.0
+) -> FrameRecord:
     return FrameRecord(
         path=path,
         sha256=f"{number:064x}",

@@ -12,9 +12,9 @@ import pytest
 import rawpy
 from numpy.typing import NDArray
 
+from labrig import shipped
 from labrig.clock import VirtualClock
 from labrig.errors import UsageError
-from labrig import shipped
 from sim.room import Room
 from sim.simulation import Simulation
 

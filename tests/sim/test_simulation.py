@@ -5,7 +5,6 @@ from pathlib import Path
 import pytest
 
 from labrig.errors import UsageError
-from labrig.material.file import read_material, write_material
 from labrig.yaml_file import parse_yaml, read_model, validate, write_yaml
 from sim.simulation import Simulation
 

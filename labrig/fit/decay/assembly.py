@@ -55,10 +55,14 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     covariance, log_rate_covariance = covariance * inflation, log_rate_covariance * inflation
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates[order]) / series.span_s
-    amplitudes = (fit.amplitudes * np.exp(np.exp(fit.log_rates) * series.start))[order] * series.peak
+    amplitudes = (fit.amplitudes * np.exp(np.exp(fit.log_rates) * series.start))[
+        order
+    ] * series.peak
     sigma = np.sqrt(np.diag(covariance))
     states = tuple(
-        DecayState(float(rates[i]), float(sigma[2 * i]), float(amplitudes[i]), float(sigma[2 * i + 1]))
+        DecayState(
+            float(rates[i]), float(sigma[2 * i]), float(amplitudes[i]), float(sigma[2 * i + 1])
+        )
         for i in range(fit.n_states)
     )
     weight_sigma, _ = parameter_sigma(joint, series)
@@ -82,7 +86,9 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         dof=_dof(fit, data),
         bic=bic(data, joint),
         covariance=covariance,
-        warnings=tuple(_warnings(data, fit, states, log_rate_covariance[np.ix_(order, order)], evidence)),
+        warnings=tuple(
+            _warnings(data, fit, states, log_rate_covariance[np.ix_(order, order)], evidence)
+        ),
         candidates=evidence.candidates,
         rivals=evidence.rivals,
         better_rival=evidence.better_rival,
@@ -112,7 +118,7 @@ def _inflation(fit: StatesFit, data: WhitenedSeries, evidence: Evidence) -> floa
 
 
 def _covariances(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, FloatArray]:
-    """Of (k1, a1, …, offset) by falling rate in the user's units, and of log k, free rates first."""
+    """Of (k1, a1, …, offset) by falling rate in the user's units; of log k, free rates first."""
     series, n_free = data.series, fit.n_free
     own = fit.joint.least_squares.covariance
     n_states = fit.n_states
@@ -194,7 +200,11 @@ def _warnings(
             f"{'s' if n > 1 else ''}: the rates are descriptive only, "
             "do not extrapolate them beyond the times recorded"
         )
-    more = "allow more states" if fit.n_states < evidence.max_states else "look for another law of decay"
+    more = (
+        "allow more states"
+        if fit.n_states < evidence.max_states
+        else "look for another law of decay"
+    )
     warnings += misfit_warnings(
         _misfit(data, fit, evidence), fit.n_states, f"{more}, and check background and times"
     )

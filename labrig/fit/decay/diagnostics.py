@@ -70,13 +70,12 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
             f"frames scatter {factor:.2g} times as much as σ and flicker explain; every σ given "
             "here is too small by about that: estimate the flicker (flicker=None) or check σ"
         )
-    if misfit.colour_dof > 0:
-        if _excess_p_value(misfit.colour_chi2, misfit.colour_dof, np.inf) < MISFIT_LEVEL:
-            warnings.append(
-                "the colour changes during the decay more than σ allows (reduced χ² between the "
-                f"channels {misfit.colour_chi2 / misfit.colour_dof:.3g}): check dark level and σ of each channel, "
-                "or fit the channels one by one"
-            )
+    if _excess_p_value(misfit.colour_chi2, misfit.colour_dof, np.inf) < MISFIT_LEVEL:
+        warnings.append(
+            "the colour changes during the decay more than σ allows (reduced χ² between the "
+            f"channels {misfit.colour_chi2 / misfit.colour_dof:.3g}): check dark level and σ of "
+            "each channel, or fit the channels one by one"
+        )
     return warnings
 
 
@@ -160,10 +159,11 @@ def state_warnings(
             warnings.append(
                 f"k{number} and k{number + 1} cannot be told apart: ask for one state fewer"
             )
-    if states[-1].k_r_per_s > slowest and 1 / states[-1].k_r_per_s > span_s:
+    lifetime_s = 1 / states[-1].k_r_per_s
+    if lifetime_s > span_s:
         warnings.append(
-            f"the slowest state lives {1 / states[-1].k_r_per_s:.3g} s, longer than the {span_s:.4g} s "
-            "recorded: record longer to be sure of it"
+            f"the slowest state lives {lifetime_s:.3g} s, longer than the {span_s:.4g} s recorded: "
+            "record longer to be sure of it"
         )
     return warnings
 
@@ -190,12 +190,15 @@ def rising_warning(signal: FloatArray, information: FloatArray) -> list[str]:
 
     def mean(part: slice) -> tuple[float, float]:
         total = float(information[part].sum())
-        return (float(signal[part] @ information[part]) / total, 1 / total) if total else (0.0, np.inf)
+        return (
+            (float(signal[part] @ information[part]) / total, 1 / total) if total else (0.0, np.inf)
+        )
 
     first, first_variance = mean(slice(None, quarter))
     last, last_variance = mean(slice(-quarter, None))
     if last - first > RISING_SIGMAS * np.sqrt(first_variance + last_variance):
         return [
-            "the signal rises: check that the lamp was off and that times and values belong together"
+            "the signal rises: check that the lamp was off and that times and values belong "
+            "together"
         ]
     return []

@@ -1,10 +1,10 @@
 """A smooth curve that no choice of model has shaped, to measure the noise against.
 
 Sums of positive exponentials with *any* number of rates are all the completely monotone functions
-(Bernstein's theorem): every sum of exponentials, and every power law and stretched exponential, too.
-Non-negative least squares over a grid of rates, refined where it puts weight, finds the best of them.
-What scatters about it is noise, whatever the number of states: so flicker measured here cannot hide a
-missing state or a power law.
+(Bernstein's theorem): every sum of exponentials, and every power law and stretched exponential,
+too. Non-negative least squares over a grid of rates, refined where it puts weight, finds the best
+of them. What scatters about it is noise, whatever the number of states: so flicker measured here
+cannot hide a missing state or a power law.
 """
 
 from dataclasses import dataclass

@@ -38,10 +38,10 @@ def fit_decay(
     flicker: float | None = 0.0,
     fixed_rates: Sequence[float] = (),
 ) -> DecayFit:
-    """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in one or more channels (Nalbach et al. sec. 4.4).
+    """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al. sec. 4.4).
 
-    Frame f, channel c: y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + offset, g the mean of e^(−k t) over the
-    exposure. Cov = diag(σ_fc²) + ρ² s_f s_fᵀ within a frame.
+    Frame f, channel c: y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + offset, g the mean of e^(−k t) over
+    the exposure. Cov = diag(σ_fc²) + ρ² s_f s_fᵀ within a frame, s the signal without the offset.
 
     Parameters
     ----------
@@ -64,8 +64,8 @@ def fit_decay(
         Prior σ of a constant common to all channels, in the values' units: 0 holds it at zero, inf
         leaves it free.
     flicker
-        Relative noise ρ that all channels of a frame share; None estimates it from the scatter of the
-        frames about the smoothest curve that fits, whatever the number of states.
+        Relative noise ρ that all channels of a frame share; None estimates it from the scatter of
+        the frames about the best monotone curve, whatever the number of states.
     fixed_rates
         Rates in 1/s that take part and are held; they count as states.
 
@@ -159,9 +159,7 @@ def _supported_states(
     """The states chosen; fewer than the fewest wanted if amplitudes vanish."""
     for fewest in range(numbers.start, max(len(fixed), 1) - 1, -1):
         those = range(fewest, max(numbers.stop, fewest + 1))
-        chosen, tried = choose_states(
-            data, those, fixed, smooth.weights, smooth.offset, noise_dof
-        )
+        chosen, tried = choose_states(data, those, fixed, smooth.weights, smooth.offset, noise_dof)
         if chosen is not None:
             return chosen, tried
     raise FitError(NO_DECAY)
@@ -184,6 +182,7 @@ def _reweighted(
         data = whitened(data.series, fit.signal(data.series), flicker)
         before = fit.joint.shape
         fit = refit(data, fit)
-        if np.allclose(fit.joint.shape, before, rtol=REWEIGHTED_ENOUGH, atol=0.0):
+        after = fit.joint.shape
+        if len(after) == len(before) and np.allclose(after, before, REWEIGHTED_ENOUGH, 0.0):
             break
     return data, fit

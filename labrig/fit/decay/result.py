@@ -115,13 +115,14 @@ class DecayFit:
         exposure = np.asarray(exposure_s, dtype=np.float64)
         if t.ndim != 1 or exposure.shape not in {(), t.shape}:
             raise FitError(
-                f"expected times (n,) and one exposure or (n,), got {t.shape} and {exposure.shape}; "
-                "give one exposure per time"
+                f"expected times (n,) and one exposure or (n,), got {t.shape} and "
+                f"{exposure.shape}; give one exposure per time"
             )
         rates = np.array([state.k_r_per_s for state in self.states])
         amplitudes = np.array([state.amplitude for state in self.states])
         signal = exponential_means(rates, t, np.broadcast_to(exposure, t.shape)) @ amplitudes
-        return np.multiply.outer(signal, np.array(self.channel_weights)) + self.offset
+        predicted: FloatArray = signal[:, None] * np.array(self.channel_weights) + self.offset
+        return predicted
 
     def to_json(self) -> str:
         """The text of `fit.json`; what is not finite is null."""
@@ -154,9 +155,7 @@ class DecayFit:
             [
                 str(number),
                 with_uncertainty(state.k_r_per_s, state.k_r_sigma_per_s),
-                with_uncertainty(
-                    1 / state.k_r_per_s, state.k_r_sigma_per_s / state.k_r_per_s**2
-                ),
+                with_uncertainty(1 / state.k_r_per_s, state.k_r_sigma_per_s / state.k_r_per_s**2),
                 with_uncertainty(state.amplitude, state.amplitude_sigma),
             ]
             for number, state in enumerate(self.states, start=1)
@@ -180,7 +179,7 @@ class DecayFit:
 
 
 def with_uncertainty(value: float, sigma: float) -> str:
-    """`0.0802(13)`: the value to two digits of its σ, and those; `0.08` if σ is 0, `0.08(?)` if unknown."""
+    """`0.0802(13)`: the value to two digits of its σ; `0.08` if σ is 0, `0.08(?)` if unknown."""
     if sigma == 0:
         return f"{value:.6g}"
     if not math.isfinite(sigma):
@@ -196,7 +195,7 @@ def with_uncertainty(value: float, sigma: float) -> str:
     if decimals < 0:
         return f"{round(value, decimals):.0f}({digits * 10**-decimals})"
     # σ of 1 and more is written with its decimal point, as in 12.5(1.3).
-    bracket = f"{sigma:.{decimals}f}" if 0 < decimals and sigma >= 1 else str(digits)
+    bracket = f"{sigma:.{decimals}f}" if decimals > 0 and sigma >= 1 else str(digits)
     return f"{value:.{decimals}f}({bracket})"
 
 

@@ -1,4 +1,4 @@
-"""Decays that are no finite sum of exponentials, as a frame sees them: their mean over [t, t + T]."""
+"""Decays that are no finite sum of exponentials, as a frame sees them: means over [t, t + T]."""
 
 import numpy as np
 
@@ -79,7 +79,8 @@ def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """ψ(x) = (e^x − 1)/x and its logarithmic derivative 1/(1 − e^(−x)) − 1/x."""
     small = np.abs(x) < SERIES_BELOW
     safe = np.where(small, 1.0, x)
-    psi = np.where(small, 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5))), np.expm1(safe) / safe)
+    series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6))))
+    psi = np.where(small, series, np.expm1(safe) / safe)
     # 1/2 + x/12 − x³/720 + …
     slope = np.where(small, 0.5 + x / 12 - x**3 / 720, -1 / np.expm1(-safe) - 1 / safe)
     return psi, slope

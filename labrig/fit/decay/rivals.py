@@ -1,8 +1,8 @@
 """The rivals of a sum of exponentials: a power law A (1 + t/τ)^(−p), a stretched A exp(−(t/τ)^β).
 
-Traps of many depths, or electrons and holes that must meet, decay so (Nalbach et al. sec. 4.4, after
-Jonscher and de Polignac 1984 and Lee et al. 2001). They are fitted to the same series with the same
-noise, to say so when one does better.
+Traps of many depths, or electrons and holes that must meet, decay so (Nalbach et al. sec. 4.4,
+after Jonscher and de Polignac 1984 and Lee et al. 2001). They are fitted to the same series with
+the same noise, to say so when one does better.
 """
 
 from collections.abc import Callable
@@ -23,7 +23,7 @@ SHORTEST_STEPS = 0.01
 LONGEST_SPANS = 100.0
 GRID = (24, 12)
 MAX_ITERATIONS = 60
-TOLERANCE = 1e-5
+TOLERANCE = 1e-4
 
 Mean = Callable[[float, float, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
 
@@ -36,6 +36,8 @@ class RivalShape:
     ----------
     name, formula
         As people say it; `formula` takes `tau` and `exponent`.
+    value
+        (t/τ, exponent) → value at a moment.
     mean
         (τ, exponent, t, T) → mean over the exposures, and derivatives by log τ and the exponent.
     exponents
@@ -44,14 +46,25 @@ class RivalShape:
 
     name: str
     formula: str
+    value: Callable[[FloatArray, FloatArray], FloatArray]
     mean: Mean
     exponents: tuple[float, float]
 
 
 RIVALS = (
-    RivalShape("power law", "(1 + t/{tau:.3g} s)^−{exponent:.3g}", power_law_mean, (0.1, 10.0)),
     RivalShape(
-        "stretched exponential", "exp(−(t/{tau:.3g} s)^{exponent:.3g})", stretched_mean, (0.1, 0.95)
+        name="power law",
+        formula="(1 + t/{tau:.3g} s)^−{exponent:.3g}",
+        value=lambda ratio, exponent: (1 + ratio) ** -exponent,
+        mean=power_law_mean,
+        exponents=(0.1, 10.0),
+    ),
+    RivalShape(
+        name="stretched exponential",
+        formula="exp(−(t/{tau:.3g} s)^{exponent:.3g})",
+        value=lambda ratio, exponent: np.exp(-(ratio**exponent)),
+        mean=stretched_mean,
+        exponents=(0.1, 0.95),
     ),
 )
 
@@ -90,9 +103,7 @@ def fit_rival(
     high = np.log(LONGEST_SPANS)
 
     def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        mean, slopes = rival.mean(
-            float(np.exp(theta[1])), float(theta[2]), time, series.exposure
-        )
+        mean, slopes = rival.mean(float(np.exp(theta[1])), float(theta[2]), time, series.exposure)
         return theta[0] * mean, np.column_stack([mean, theta[0] * slopes])
 
     start = _best_on_grid(data, rival, weights, (low, high))
@@ -116,20 +127,11 @@ def _best_on_grid(
     series = data.series
     problem = projection(data, weights)
     middle = series.t + series.start + series.exposure / 2
+    taus = np.linspace(*log_taus, GRID[0])
     log_tau, exponents = (
-        grid.ravel()
-        for grid in np.meshgrid(np.linspace(*log_taus, GRID[0]), np.geomspace(*rival.exponents, GRID[1]))
+        grid.ravel() for grid in np.meshgrid(taus, np.geomspace(*rival.exponents, GRID[1]))
     )
-    # The shapes depend on t/τ only: one call per exponent for all τ.
-    ratios = np.multiply.outer(middle, np.exp(-log_tau[: GRID[0]]))
-    means = np.hstack(
-        [
-            rival.mean(1.0, float(exponent), ratios.ravel(), np.zeros(ratios.size))[0].reshape(
-                ratios.shape
-            )
-            for exponent in exponents[:: GRID[0]]
-        ]
-    )
+    means = rival.value(np.multiply.outer(middle, np.exp(-log_tau)), exponents)
     columns = problem.columns(means)
     moments = problem.target @ columns
     norms2 = np.einsum("ij,ij->j", columns, columns)

@@ -1,8 +1,8 @@
 """Variable projection: where in the space of rates to look, the amplitudes being linear.
 
-For given rates the amplitudes (≥ 0) and the offset follow by linear least squares, so the search has
-one dimension per state: every combination of a grid of rates, then BOBYQA in log k from the best.
-Deterministic; the joint fit does the last digits.
+For given rates the amplitudes (≥ 0) and the offset follow by linear least squares, so the search
+has one dimension per state: every combination of a grid of rates, then BOBYQA in log k from the
+best. Deterministic; the joint fit does the last digits.
 
 References
 ----------
@@ -24,9 +24,9 @@ from labrig.fit.least_squares import FloatArray
 
 #: Combinations of rates looked at; decides how fine the grid can be.
 COMBINATIONS = 4000
-FINEST_GRID = 64
+FINEST_GRID = 36
 #: Precision in log k at which the search hands over.
-LOG_RATE_TOLERANCE = 1e-2
+LOG_RATE_TOLERANCE = 3e-2
 MAX_EVALUATIONS = 200
 
 
@@ -87,7 +87,7 @@ def projection(data: WhitenedSeries, weights: FloatArray) -> Projection:
 
 
 def nonnegative(gram: FloatArray, moments: FloatArray) -> FloatArray:
-    """argmin ½ aᵀGa − mᵀa over a ≥ 0, for a handful of columns: all sets of positive ones tried."""
+    """Minimise ½ aᵀGa − mᵀa over a ≥ 0 for a handful of columns, all sets of them tried."""
     n = len(moments)
     best, best_cost = np.zeros(n), 0.0
     for n_kept in range(n, 0, -1):
@@ -136,7 +136,9 @@ def search_rates(problem: Projection, n_free: int, fixed: FloatArray) -> FloatAr
     optimiser.set_xtol_abs(LOG_RATE_TOLERANCE)
     optimiser.set_maxeval(MAX_EVALUATIONS)
     try:
-        found = np.asarray(optimiser.optimize(start), dtype=np.float64)
+        # An exception must not pass through NLopt's C code.
+        with np.errstate(all="ignore"):
+            found = np.asarray(optimiser.optimize(start), dtype=np.float64)
     except nlopt.RoundoffLimited:
         # Noise-free data: χ² is all rounding before the rates have settled. The grid will do.
         return start

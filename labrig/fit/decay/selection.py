@@ -1,8 +1,8 @@
 """How many states, and whether exponentials at all.
 
-One more state is believed only if both the Bayesian information criterion and an F-test want it. The
-F-test's denominator is the frames' own scatter along the signal, so that neither an underestimated
-σ nor channels that flicker together can argue a state into being.
+One more state is believed only if both the Bayesian information criterion and an F-test want it.
+The F-test's denominator is the frames' own scatter along the signal, so that neither an
+underestimated σ nor channels that flicker together can argue a state into being.
 """
 
 from dataclasses import dataclass
@@ -15,8 +15,8 @@ from labrig.fit.decay.states import StatesFit, fit_states
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 
-#: Chance of a second state where there is one. Its rate is searched for, which multiplies chances:
-#: at 0.002 per F-test 0.5 % of single exponentials come out double (tests/acceptance).
+#: Chance of a state too many, were its rate known. It is searched for, which multiplies chances;
+#: the BIC divides them again: ≤ 0.3 % of single exponentials come out double (tests/acceptance).
 F_TEST_LEVEL = 0.002
 #: How much lower a power law's BIC must be: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
@@ -65,7 +65,9 @@ def choose_states(
     data
         Whitened by the envelope's signal, so that χ² compares.
     numbers
-        States in all, those of the `fixed` log rates included.
+        States in all, the fixed ones included.
+    fixed
+        (f,) log of the rates held.
     weights, offset
         Channel weights (C,) and offset to start from.
     noise_dof

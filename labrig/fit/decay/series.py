@@ -13,8 +13,8 @@ from labrig.fit.least_squares import FloatArray
 SLOWEST_SPANS = 50.0
 #: Fastest rate searched: this many decays within the shortest step between frames.
 FASTEST_DECAYS = 10.0
-#: A fast state's signal must not have vanished e^600-fold before the first frame.
-LARGEST_PHASE = 600.0
+#: A fast state's signal must not have vanished e^300-fold before the first frame: squares overflow.
+LARGEST_PHASE = 300.0
 
 NO_DECAY = (
     "expected a signal that decays, got none that a positive exponential describes; "
@@ -122,9 +122,10 @@ def decay_series(
     _refuse_unless_finite("values", y[measured])
     _refuse_unless_finite("exposures", exposure)
     if t.min() < 0 or exposure.min() < 0:
+        earliest = min(t.min(), exposure.min())
         raise FitError(
-            f"expected times after lamp off and exposures ≥ 0, got {min(t.min(), exposure.min()):g} "
-            "s; count the time from when the lamp went off"
+            f"expected times after lamp off and exposures ≥ 0, got {earliest:g} s; "
+            "count the time from when the lamp went off"
         )
     if not offset_sigma >= 0:
         raise FitError(f"expected offset_sigma ≥ 0, got {offset_sigma:g}; 0 holds the offset at 0")

@@ -1,4 +1,4 @@
-"""What a frame sees of a decay: the mean of the decay over the exposure [t, t + T], never its start."""
+"""What a frame sees of a decay: its mean over the exposure [t, t + T], never its start."""
 
 import numpy as np
 
@@ -51,7 +51,7 @@ def _mean_over(x: FloatArray) -> FloatArray:
 
 
 def _mean_slope(x: FloatArray, mean: FloatArray) -> FloatArray:
-    """x φ′(x) = e^(−x) − φ(x)."""
+    """Give x φ′(x) = e^(−x) − φ(x)."""
     # Σ_j j (−x)^j / (j + 1)!, j = 1 … 6.
     series = -x * (1 / 2 - x * (1 / 3 - x * (1 / 8 - x * (1 / 30 - x * (1 / 144 - x / 840)))))
     return np.where(x < SERIES_BELOW, series, np.exp(-x) - mean)

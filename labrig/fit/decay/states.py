@@ -3,10 +3,12 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from labrig.errors import FitError
 from labrig.fit.decay.joint import JointFit, Shape, fit_jointly
 from labrig.fit.decay.search import projection, search_rates
-from labrig.fit.decay.series import DecaySeries
+from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.shapes import exponential_means_and_slopes
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
@@ -24,7 +26,7 @@ FINAL_ITERATIONS = 1000
 
 @dataclass(frozen=True)
 class StatesFit:
-    """n states, free rates first; rates per span, amplitudes at the first frame in units of the peak.
+    """Some states, free rates first; rates per span, amplitudes at the first frame over the peak.
 
     Attributes
     ----------
@@ -58,6 +60,14 @@ class StatesFit:
         shape = self.joint.shape
         return np.concatenate([shape[1 : 2 * self.n_free : 2], shape[2 * self.n_free :]])
 
+    @property
+    def vanished(self) -> NDArray[np.bool_]:
+        """(n,) states without amplitude, in the order of `log_rates`."""
+        vanished: NDArray[np.bool_] = (
+            self.amplitudes <= NEGLIGIBLE_AMPLITUDE * self.amplitudes.max()
+        )
+        return vanished
+
     def signal(self, series: DecaySeries) -> FloatArray:
         """(n, C) without offset."""
         h, _ = exponentials(series, self.n_free, self.fixed)(self.joint.shape)
@@ -65,7 +75,7 @@ class StatesFit:
 
 
 def exponentials(series: DecaySeries, n_free: int, fixed: FloatArray) -> Shape:
-    """h = Σ b_i g(k_i; t, T) as a function of the parameters `StatesFit.joint` lists."""
+    """Signal Σ b_i g(k_i; t, T) as a function of the parameters `StatesFit.joint` lists."""
     paired = 2 * n_free
 
     def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -100,10 +110,8 @@ def fit_states(
     start[0 : 2 * n_free : 2] = found
     start[1 : 2 * n_free : 2] = amplitudes[:n_free]
     start[2 * n_free :] = amplitudes[n_free:]
-    fit = _fit_from(
-        data, start, fixed, weights, offset, CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE
-    )
-    vanished = fit.amplitudes <= NEGLIGIBLE_AMPLITUDE * fit.amplitudes.max()
+    fit = _fit_from(data, start, fixed, weights, offset, CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE)
+    vanished = fit.vanished
     if vanished[n_free:].any():
         return fit_states(data, n_free, fixed[~vanished[n_free:]], weights, offset)
     merged = n_free > 1 and np.diff(np.sort(fit.joint.shape[0 : 2 * n_free : 2])).min()
@@ -113,10 +121,22 @@ def fit_states(
 
 
 def refit(data: WhitenedSeries, fit: StatesFit) -> StatesFit:
-    """The same states under other whitening, from where they were."""
-    joint = fit.joint
-    return _fit_from(
-        data, joint.shape, fit.fixed, joint.weights, joint.offset, FINAL_ITERATIONS, 0.0
+    """The same states to all digits, perhaps under other whitening, less those that vanish."""
+    return _to_all_digits(data, fit.joint.shape, fit.fixed, fit.joint.weights, fit.joint.offset)
+
+
+def _to_all_digits(
+    data: WhitenedSeries, start: FloatArray, fixed: FloatArray, weights: FloatArray, offset: float
+) -> StatesFit:
+    fit = _fit_from(data, start, fixed, weights, offset, FINAL_ITERATIONS, 0.0)
+    kept, n_free = ~fit.vanished, fit.n_free
+    if kept.all():
+        return fit
+    if not kept.any():
+        raise FitError(NO_DECAY)
+    still_present = np.concatenate([np.repeat(kept[:n_free], 2), kept[n_free:]])
+    return _to_all_digits(
+        data, fit.joint.shape[still_present], fixed[kept[n_free:]], weights, offset
     )
 
 

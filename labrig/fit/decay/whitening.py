@@ -1,8 +1,9 @@
 """Noise of a frame: independent per value, plus flicker that all channels of the frame share.
 
-Lamp, shutter and aperture make a whole frame brighter or darker by a relative ρ, so that the values of
-one frame scatter together: Cov = diag(σ²) + ρ² s sᵀ with s the frame's signal. Residuals and models are
-multiplied by Cov^(−1/2), frame by frame, after which they are independent with unit variance.
+Lamp, shutter and aperture make a whole frame brighter or darker by a relative ρ, so that the values
+of one frame scatter together: Cov = diag(σ²) + ρ² s sᵀ with s the frame's signal. Residuals and
+models are multiplied by Cov^(−1/2), frame by frame, after which they are independent with unit
+variance.
 """
 
 from dataclasses import dataclass
@@ -25,12 +26,15 @@ class WhitenedSeries:
         (n, C, C) one W per frame, with Wᵀ W = Cov⁻¹.
     values, ones
         (n, C) the values, and a signal of 1 in every channel, whitened.
+    variance
+        (n, C) of each value alone, flicker included; inf where not measured.
     """
 
     series: DecaySeries
     matrices: FloatArray
     values: FloatArray
     ones: FloatArray
+    variance: FloatArray
 
     def unit_signal(self, weights: FloatArray) -> FloatArray:
         """(n, C) what a signal of 1 in the brightest channel becomes; `weights` (C,)."""
@@ -45,9 +49,7 @@ class WhitenedSeries:
         """
         unit = self.unit_signal(weights)
         together = np.einsum("fc,fc->f", unit, unit)
-        # Alone, a channel's variance is the diagonal of Cov.
-        variance = np.diagonal(_covariances(self.matrices), axis1=1, axis2=2)
-        best = (weights**2 / variance).max(axis=1)
+        best = (weights**2 / self.variance).max(axis=1)
         seen = best > 0
         return float((together[seen] / best[seen]).sum())
 
@@ -65,6 +67,7 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         Relative ρ ≥ 0.
     """
     n_channels = len(series.channels)
+    measured = series.inverse_sigma > 0
     matrices = series.inverse_sigma[:, :, None] * np.eye(n_channels)
     if flicker > 0:
         u = flicker * signal * series.inverse_sigma
@@ -77,13 +80,6 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         matrices=matrices,
         values=np.einsum("fcd,fd->fc", matrices, series.values),
         ones=matrices.sum(axis=2),
+        variance=np.where(measured, 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2, np.inf)
+        + (flicker * signal) ** 2,
     )
-
-
-def _covariances(matrices: FloatArray) -> FloatArray:
-    """(n, C, C) Cov = (Wᵀ W)⁻¹; infinite where a value was not measured."""
-    precision = np.einsum("fdc,fde->fce", matrices, matrices)
-    unmeasured = np.einsum("fcc->fc", precision) == 0
-    eye = np.eye(precision.shape[1])
-    covariance: FloatArray = np.linalg.inv(precision + unmeasured[:, :, None] * eye)
-    return np.where(unmeasured[:, :, None] & (eye > 0), np.inf, covariance)

@@ -1,0 +1,183 @@
+"""Noise-free decays give back their parameters, in any unit, order and exposure."""
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from labrig.fit import DecayFit, fit_decay
+from labrig.fit.decay.joint import _Problem
+from labrig.fit.decay.series import decay_series
+from labrig.fit.decay.states import exponentials
+from labrig.fit.decay.whitening import whitened
+from tests.fit import truths
+
+States = tuple[tuple[float, float], ...]
+
+
+@st.composite
+def states(draw: st.DrawFn) -> States:
+    """1–3 states, rates 2.5–5 apart up to 0.5 /s, none dimmer than a tenth."""
+    rates = [draw(st.floats(0.006, 0.03))]
+    for _ in range(draw(st.integers(0, 2))):
+        rates.append(min(rates[-1] * draw(st.floats(2.5, 5.0)), 0.5))
+    return tuple((rate, draw(st.floats(0.1, 1.0))) for rate in reversed(rates))
+
+
+def _fit(seen: truths.Observed, **options: object) -> DecayFit:
+    channels = "RGB"[: seen.values.shape[1]]
+    return fit_decay(
+        seen.t_s,
+        seen.values,
+        seen.sigma,
+        exposure_s=seen.exposure_s,
+        channels=channels,
+        **options,  # type: ignore[arg-type]
+    )
+
+
+def _exact(
+    truth: States, exposure_s: float | truths.FloatArray, snr: float = 300.0
+) -> truths.Observed:
+    """Without a trace of noise, at the σ of a measurement of `snr`."""
+    exposure = np.broadcast_to(np.asarray(exposure_s), truths.TIMES_S.shape)
+    signal = truths.exposed(truths.exponentials(*truth), truths.TIMES_S, exposure)
+    values = np.multiply.outer(signal, truths.RGB_WEIGHTS)
+    return truths.Observed(truths.TIMES_S, exposure, values, np.sqrt(values + 1e-4) / snr)
+
+
+def _assert_recovered(fit: DecayFit, truth: States, rtol: float = 1e-6) -> None:
+    found = [(state.k_r_per_s, state.amplitude) for state in fit.states]
+    np.testing.assert_allclose(found, truth, rtol=rtol)
+
+
+@settings(deadline=None, max_examples=60)
+@given(truth=states(), exposure_s=st.sampled_from([0.0, 0.02, 1.5, 5.0]))
+def test_parameters_are_recovered(truth: States, exposure_s: float) -> None:
+    fit = _fit(_exact(truth, exposure_s), n_states=len(truth))
+    _assert_recovered(fit, truth)
+    np.testing.assert_allclose(fit.channel_weights, truths.RGB_WEIGHTS, rtol=1e-9)
+
+
+@settings(deadline=None, max_examples=15)
+@given(truth=states())
+def test_number_of_states_is_recovered_with_growing_exposures(truth: States) -> None:
+    growing_s = np.minimum(0.3 * 1.09 ** np.arange(37), 4.5)
+    _assert_recovered(_fit(_exact(truth, growing_s, snr=1e6)), truth)
+
+
+@pytest.mark.parametrize("flicker", [0.0, 0.007, None])
+@pytest.mark.parametrize("offset_sigma", [0.0, 0.01, np.inf])
+def test_any_noise_model_recovers_exact_data(flicker: float | None, offset_sigma: float) -> None:
+    truth = ((0.08, 1.0), (0.015, 0.4))
+    fit = _fit(_exact(truth, 1.5), n_states=2, flicker=flicker, offset_sigma=offset_sigma)
+    _assert_recovered(fit, truth)
+    assert fit.offset == pytest.approx(0, abs=1e-8)
+
+
+def test_free_offset_is_found() -> None:
+    truth = ((0.08, 1.0), (0.015, 0.4))
+    exact = _exact(truth, 1.5)
+    raised = truths.Observed(exact.t_s, exact.exposure_s, exact.values + 0.05, exact.sigma)
+    fit = _fit(raised, offset_sigma=np.inf)
+    _assert_recovered(fit, truth)
+    assert fit.offset == pytest.approx(0.05, rel=1e-6)
+    assert fit.offset_sigma > 0
+
+
+def test_fixed_rate_is_held_and_drops_out_of_the_covariance() -> None:
+    truth = ((0.08, 1.0), (0.015, 0.4))
+    fit = _fit(_exact(truth, 1.5), fixed_rates=[0.015])
+    _assert_recovered(fit, truth)
+    assert fit.states[1].k_r_sigma_per_s == 0
+    assert not fit.covariance[2].any()
+    assert fit.covariance[3, 3] > 0
+
+
+def test_fixed_rate_without_amplitude_is_dropped_with_a_warning() -> None:
+    fit = _fit(_exact(((0.02, 1.0),), 0.0), n_states=2, fixed_rates=[0.3])
+    assert fit.n_states == 1
+    assert any("2 states were asked for" in warning for warning in fit.warnings)
+
+
+@pytest.mark.parametrize("time_unit", [1e-3, 60.0])
+@pytest.mark.parametrize("value_unit", [1e-7, 3e4])
+def test_units_do_not_matter(time_unit: float, value_unit: float) -> None:
+    seen = truths.observe(truths.exponentials((0.08, 1.0), (0.015, 0.4)), seed=5)
+    here = _fit(seen, flicker=None)
+    there = _fit(
+        truths.Observed(
+            seen.t_s * time_unit,
+            seen.exposure_s * time_unit,
+            seen.values * value_unit,
+            seen.sigma * value_unit,
+        ),
+        flicker=None,
+    )
+    assert there.n_states == here.n_states
+    for a, b in zip(here.states, there.states, strict=True):
+        assert b.k_r_per_s * time_unit == pytest.approx(a.k_r_per_s, rel=1e-8)
+        assert b.k_r_sigma_per_s * time_unit == pytest.approx(a.k_r_sigma_per_s, rel=1e-6)
+        assert b.amplitude / value_unit == pytest.approx(a.amplitude, rel=1e-8)
+    assert there.bic == pytest.approx(here.bic, rel=1e-8)
+
+
+def test_order_of_channels_and_frames_does_not_matter() -> None:
+    seen = truths.observe(truths.exponentials((0.08, 1.0), (0.015, 0.4)), seed=6)
+    here = _fit(seen, flicker=0.007)
+    frames = np.random.default_rng(1).permutation(37)
+    channels = [2, 0, 1]
+    there = fit_decay(
+        seen.t_s[frames],
+        seen.values[frames][:, channels],
+        seen.sigma[frames][:, channels],
+        exposure_s=seen.exposure_s[frames],
+        channels="BRG",
+        flicker=0.007,
+    )
+    np.testing.assert_allclose(there.covariance, here.covariance, rtol=1e-6)
+    for a, b in zip(here.states, there.states, strict=True):
+        assert b.k_r_per_s == pytest.approx(a.k_r_per_s, rel=1e-9)
+    np.testing.assert_allclose(there.residuals, here.residuals[frames][:, channels], atol=1e-11)
+    np.testing.assert_allclose(
+        there.normalised_residuals, here.normalised_residuals[frames][:, channels], atol=1e-7
+    )
+
+
+def test_value_of_infinite_sigma_is_left_out() -> None:
+    truth = ((0.08, 1.0), (0.015, 0.4))
+    exact = _exact(truth, 1.5)
+    values, sigma = exact.values.copy(), exact.sigma.copy()
+    values[0, 1], sigma[0, 1] = np.nan, np.inf
+    values[5], sigma[5] = 1e9, np.inf
+    fit = _fit(truths.Observed(exact.t_s, exact.exposure_s, values, sigma), flicker=0.007)
+    _assert_recovered(fit, truth)
+    assert fit.dof == 37 * 3 - 4 - 6
+
+
+@pytest.mark.parametrize("offset_sigma", [0.0, 0.02])
+def test_jacobian_is_the_difference(offset_sigma: float) -> None:
+    seen = truths.observe(truths.exponentials((0.08, 1.0), (0.015, 0.4)), seed=7)
+    series = decay_series(seen.t_s, seen.values, seen.sigma, seen.exposure_s, "RGB", offset_sigma)
+    data = whitened(series, series.values, 0.007)
+    fixed = np.log([2.0])
+    problem = _Problem(data, exponentials(series, 2, fixed), 5, [0, 2])
+    x = np.array([2.5, 0.9, 0.9, 0.3, 0.1, 0.6, 0.3] + [0.01] * bool(offset_sigma))
+    _, jacobian = problem.residuals(x)
+    for j, step in enumerate(1e-6 * np.eye(len(x))):
+        difference = (problem.residuals(x + step)[0] - problem.residuals(x - step)[0]) / 2e-6
+        np.testing.assert_allclose(jacobian[:, j], difference, rtol=1e-6, atol=1e-5)
+
+
+def test_whitening_is_the_inverse_root_of_the_covariance() -> None:
+    seen = truths.observe(truths.exponentials((0.08, 1.0)), seed=8)
+    series = decay_series(seen.t_s, seen.values, seen.sigma, seen.exposure_s, "RGB", 0.0)
+    matrices = whitened(series, series.values, 0.05).matrices
+    covariance = (1 / series.inverse_sigma**2)[:, :, None] * np.eye(3) + 0.05**2 * (
+        series.values[:, :, None] * series.values[:, None, :]
+    )
+    np.testing.assert_allclose(
+        np.einsum("fab,fbc,fdc->fad", matrices, covariance, matrices),
+        np.broadcast_to(np.eye(3), (37, 3, 3)),
+        atol=1e-9,
+    )

@@ -1,0 +1,200 @@
+"""What a decay fit hands back: JSON, table, predictions, warnings, refusals."""
+
+import json
+from typing import Any
+
+import numpy as np
+import pytest
+
+from labrig.errors import FitError
+from labrig.fit import DecayFit, fit_decay
+from labrig.fit.decay.result import with_uncertainty
+from tests.fit import truths
+
+DOUBLE = truths.exponentials((0.08, 1.0), (0.015, 0.4))
+T = truths.TIMES_S
+SEEN = truths.observe(DOUBLE, seed=11)
+
+
+def _seen_fit(**options: Any) -> DecayFit:
+    return fit_decay(
+        SEEN.t_s,
+        SEEN.values,
+        SEEN.sigma,
+        exposure_s=SEEN.exposure_s,
+        channels="RGB",
+        flicker=None,
+        **options,
+    )
+
+
+def test_json_has_the_contract_keys_in_its_order() -> None:
+    fit = _seen_fit(offset_sigma=0.01)
+    read = json.loads(fit.to_json())
+    assert read["n_states"] == 2
+    assert read["states"][0]["k_r_per_s"] > read["states"][1]["k_r_per_s"]
+    assert set(read["states"][0]) == {
+        "k_r_per_s",
+        "k_r_sigma_per_s",
+        "amplitude",
+        "amplitude_sigma",
+    }
+    assert read["channel_weights"].keys() == {"R", "G", "B"}
+    assert max(read["channel_weights"].values()) == 1
+    covariance = np.array(read["covariance"])
+    assert covariance.shape == (5, 5)
+    states = read["states"]
+    sigma = [states[i][key] for i in (0, 1) for key in ("k_r_sigma_per_s", "amplitude_sigma")]
+    np.testing.assert_allclose(np.sqrt(np.diag(covariance)), [*sigma, read["offset_sigma"]])
+    assert read["warnings"] == []
+    assert read["reduced_chi2"] == pytest.approx(1, abs=0.4)
+    assert [candidate["n_states"] for candidate in read["candidates"]][:2] == [1, 2]
+    assert {"offset", "bic", "flicker", "rivals"} <= read.keys()
+
+
+def test_what_is_not_finite_is_null() -> None:
+    fit = fit_decay([0.0, 1.0], [2.0, 1.0], [0.1, 0.1])
+    assert np.isnan(fit.reduced_chi2)
+    assert json.loads(fit.to_json())["reduced_chi2"] is None
+
+
+def test_table_shows_rates_with_their_sigma() -> None:
+    text = str(_seen_fit())
+    assert "k / s⁻¹" in text
+    assert "flicker" in text
+    assert "0.08" in text
+
+
+@pytest.mark.parametrize(
+    ("value", "sigma", "text"),
+    [
+        (0.08021, 0.00131, "0.0802(13)"),
+        (12.53, 1.31, "12.5(1.3)"),
+        (10851.3, 172.0, "10850(170)"),
+        (0.5, 0.0, "0.5"),
+        (0.5, float("inf"), "0.5(?)"),
+        (0.0802, 0.000996, "0.0802(10)"),
+        (2.5e-10, 3.1e-12, "2.500(31)e-10"),
+    ],
+)
+def test_value_with_uncertainty(value: float, sigma: float, text: str) -> None:
+    assert with_uncertainty(value, sigma) == text
+
+
+def test_prediction_and_residuals_add_up_to_the_values() -> None:
+    fit = _seen_fit(offset_sigma=0.01)
+    predicted = fit.predict(SEEN.t_s, SEEN.exposure_s)
+    np.testing.assert_allclose(predicted + fit.residuals, SEEN.values, atol=1e-12)
+    assert fit.predict(0.0).shape == (1, 3)
+    assert float(np.mean(fit.normalised_residuals**2)) == pytest.approx(1, abs=0.35)
+    with pytest.raises(FitError, match="one exposure per time"):
+        fit.predict([1.0, 2.0], [1.0, 2.0, 3.0])
+
+
+def test_missing_sigma_is_estimated_and_said() -> None:
+    rng = np.random.default_rng(0)
+    values = 50 * DOUBLE(T) + 0.2 * rng.normal(size=37)
+    fit = fit_decay(T, values, None)
+    told = fit_decay(T, values, 0.2)
+    assert fit.n_states == told.n_states == 2
+    assert "σ was not given: taken as 0." in fit.warnings[0]
+    assert fit.states[0].k_r_per_s == pytest.approx(told.states[0].k_r_per_s, rel=1e-9)
+    scale = np.sqrt(told.reduced_chi2)
+    assert fit.states[0].k_r_sigma_per_s == pytest.approx(
+        scale * told.states[0].k_r_sigma_per_s, rel=1e-6
+    )
+
+
+def test_one_state_too_few_is_a_misfit() -> None:
+    fit = _seen_fit(n_states=1)
+    assert any("1 exponential does not describe" in line for line in fit.warnings)
+    assert any("allow more states" in line for line in fit.warnings)
+
+
+def test_states_the_data_do_not_support_are_dropped_or_ill_determined() -> None:
+    fit = _seen_fit(n_states=3)
+    assert any(
+        "3 states were asked for" in line or "% only" in line or "told apart" in line
+        for line in fit.warnings
+    )
+
+
+def test_decay_longer_than_the_record() -> None:
+    fit = fit_decay(T, np.exp(-0.002 * T), 0.002)
+    assert any("lives 500 s, longer than the 180 s" in line for line in fit.warnings)
+
+
+def test_constant_under_the_decay_is_noticed() -> None:
+    fit = fit_decay(T, np.exp(-0.05 * T) + 0.1, 0.002)
+    assert fit.n_states == 2
+    assert any("tell from a constant" in line for line in fit.warnings)
+
+
+def test_rising_signal() -> None:
+    fit = fit_decay(T, 1 + T / 180, 0.01)
+    assert any("the signal rises" in line for line in fit.warnings)
+
+
+def test_changing_colour() -> None:
+    values = np.stack([np.exp(-0.05 * T), np.exp(-0.045 * T)], axis=1)
+    fit = fit_decay(T, values, np.sqrt(values) / 300 + 1e-4, channels=["R", "G"])
+    assert any("colour changes" in line for line in fit.warnings)
+
+
+def test_offset_far_from_its_prior() -> None:
+    fit = fit_decay(T, np.exp(-0.05 * T) + 0.1, 0.001, offset_sigma=0.01)
+    assert any("times its prior σ" in line for line in fit.warnings)
+
+
+def test_flicker_from_too_few_bright_frames_is_said() -> None:
+    for seed in range(10):
+        seen = truths.observe(truths.exponentials((0.25, 1.0)), seed, weights=np.ones(1))
+        fit = fit_decay(seen.t_s, seen.values, seen.sigma, exposure_s=1.5, flicker=None)
+        assert any("give a flicker measured elsewhere" in line for line in fit.warnings)
+        (state,) = fit.states
+        assert abs(state.k_r_per_s - 0.25) < 4.5 * state.k_r_sigma_per_s
+
+
+GOOD = np.exp(-0.05 * T)
+
+
+@pytest.mark.parametrize(
+    ("arguments", "message"),
+    [
+        ((T, np.zeros(37), 0.1), "positive signal"),
+        ((T, -GOOD, 0.1), "positive signal"),
+        ((T, np.where(T > 50, np.nan, GOOD), 0.1), "expected finite values"),
+        ((np.full(37, 3.0), GOOD, 0.1), "record a decay"),
+        ((T - 10, GOOD, 0.1), "when the lamp went off"),
+        ((T[:1], GOOD[:1], 0.1), "two or more frames"),
+        ((T, GOOD[:-1], 0.1), "one row per frame"),
+        ((T, GOOD, 0.0), "expected σ > 0"),
+        ((T, GOOD, np.ones(5)), "one σ per value"),
+        ((np.where(T > 50, np.inf, T), GOOD, 0.1), "expected finite times"),
+    ],
+)
+def test_impossible_data_are_refused(arguments: tuple[Any, Any, Any], message: str) -> None:
+    with pytest.raises(FitError, match=message):
+        fit_decay(*arguments)
+
+
+@pytest.mark.parametrize(
+    ("options", "message"),
+    [
+        ({"n_states": 2, "t_s": T[:3], "values": GOOD[:3]}, "at least 4 frames for 2"),
+        ({"n_states": 0}, "n_states ≥ 1"),
+        ({"n_states": 1, "fixed_rates": [0.1, 0.2]}, "n_states ≥ 2"),
+        ({"fixed_rates": [-1.0]}, "fixed rates > 0"),
+        ({"flicker": -0.1}, r"flicker in \[0, 1\)"),
+        ({"flicker": None, "sigma": None}, "to tell flicker"),
+        ({"flicker": None, "t_s": T[:5], "values": GOOD[:5]}, "to estimate flicker"),
+        ({"offset_sigma": -1.0}, "offset_sigma ≥ 0"),
+        ({"exposure_s": np.ones(4)}, "one exposure or 37"),
+        ({"exposure_s": -1.0}, "exposures ≥ 0"),
+        ({"sigma": None, "channels": "RG", "values": np.ones((37, 2))}, "weighed against"),
+    ],
+)
+def test_impossible_wishes_are_refused(options: dict[str, Any], message: str) -> None:
+    arguments: dict[str, Any] = {"t_s": T, "values": GOOD, "sigma": 0.01}
+    with pytest.raises(FitError, match=message):
+        fit_decay(**(arguments | options))

@@ -1,0 +1,78 @@
+"""Exposure-averaged decays against numerical integration and differences."""
+
+from collections.abc import Callable
+
+import numpy as np
+import pytest
+
+from labrig.fit.decay.rival_shapes import power_law_mean, stretched_mean
+from labrig.fit.decay.shapes import exponential_means, exponential_means_and_slopes
+from labrig.fit.least_squares import FloatArray
+from tests.fit import truths
+
+T_S = np.array([0.0, 0.3, 5.0, 50.0, 175.0])
+EXPOSURE_S = np.array([0.0, 1e-3, 0.5, 2.0, 5.0])
+
+
+@pytest.mark.parametrize("rate", [1e-5, 0.003, 0.02, 0.5, 3.0])
+def test_exponential_mean_is_the_integral(rate: float) -> None:
+    mean = exponential_means(np.array([rate]), T_S, EXPOSURE_S)[:, 0]
+    expected = truths.exposed(truths.exponentials((rate, 1.0)), T_S, EXPOSURE_S)
+    np.testing.assert_allclose(mean, expected, rtol=1e-13)
+
+
+@pytest.mark.parametrize("exposure_s", [np.zeros(5), EXPOSURE_S])
+@pytest.mark.parametrize("rate", [1e-5, 0.003, 0.02, 0.5])
+def test_exponential_slope_is_the_difference(rate: float, exposure_s: FloatArray) -> None:
+    def mean(log_rate: float) -> FloatArray:
+        return exponential_means(np.array([np.exp(log_rate)]), T_S, exposure_s)[:, 0]
+
+    means, slopes = exponential_means_and_slopes(np.array([rate]), T_S, exposure_s)
+    np.testing.assert_array_equal(means[:, 0], mean(float(np.log(rate))))
+    step = 1e-4
+    difference = (mean(np.log(rate) + step) - mean(np.log(rate) - step)) / (2 * step)
+    np.testing.assert_allclose(slopes[:, 0], difference, rtol=1e-6, atol=1e-12)
+
+
+def test_mean_of_a_short_exposure_tends_to_the_moment() -> None:
+    rates = np.array([0.02, 0.5])
+    moment = exponential_means(rates, T_S, np.zeros(5))
+    np.testing.assert_allclose(exponential_means(rates, T_S, np.full(5, 1e-12)), moment, rtol=1e-11)
+
+
+Mean = Callable[[float, float, FloatArray, FloatArray], tuple[FloatArray, FloatArray]]
+
+
+@pytest.mark.parametrize(
+    ("mean", "truth", "exponent", "precision"),
+    [
+        (power_law_mean, truths.power_law, 0.5, 1e-12),
+        (power_law_mean, truths.power_law, 1.0, 1e-12),
+        (power_law_mean, truths.power_law, 1.001, 1e-12),
+        (power_law_mean, truths.power_law, 6.0, 1e-12),
+        # Eight points an exposure.
+        (stretched_mean, truths.stretched, 0.3, 1e-6),
+        (stretched_mean, truths.stretched, 0.9, 1e-6),
+    ],
+)
+@pytest.mark.parametrize("tau_s", [3.0, 100.0])
+def test_rivals(
+    mean: Mean,
+    truth: Callable[[float, float], truths.Decay],
+    exponent: float,
+    precision: float,
+    tau_s: float,
+) -> None:
+    found, slopes = mean(tau_s, exponent, T_S, EXPOSURE_S)
+    expected = truths.exposed(truth(tau_s, exponent), T_S, EXPOSURE_S)
+    np.testing.assert_allclose(found, expected, rtol=precision)
+    step = 1e-5
+    by_log_tau = (
+        mean(tau_s * np.exp(step), exponent, T_S, EXPOSURE_S)[0]
+        - mean(tau_s * np.exp(-step), exponent, T_S, EXPOSURE_S)[0]
+    ) / (2 * step)
+    by_exponent = (
+        mean(tau_s, exponent + step, T_S, EXPOSURE_S)[0]
+        - mean(tau_s, exponent - step, T_S, EXPOSURE_S)[0]
+    ) / (2 * step)
+    np.testing.assert_allclose(slopes, np.stack([by_log_tau, by_exponent], 1), atol=1e-9)

@@ -1,0 +1,149 @@
+"""Uncertainties, choices and warnings over a few dozen seeds; many more in tests/acceptance."""
+
+from collections.abc import Sequence
+
+import numpy as np
+import pytest
+
+from labrig.fit import DecayFit, fit_decay
+from tests.fit import truths
+
+SINGLE = ((0.02, 1.0),)
+DOUBLE = ((0.08, 1.0), (0.015, 0.4))
+CLOSE = ((0.05, 1.0), (0.02, 1.0))
+SEEDS = range(30)
+
+
+def _fits(
+    decay: truths.Decay,
+    seeds: Sequence[int] = SEEDS,
+    flicker: float | None = None,
+    n_states: int | None = None,
+    *,
+    true_flicker: float = 0.007,
+    heavy_tails: bool = False,
+) -> list[DecayFit]:
+    seen = [
+        truths.observe(decay, seed, flicker=true_flicker, heavy_tails=heavy_tails) for seed in seeds
+    ]
+    return [
+        fit_decay(
+            one.t_s,
+            one.values,
+            one.sigma,
+            exposure_s=one.exposure_s,
+            channels="RGB",
+            flicker=flicker,
+            n_states=n_states,
+        )
+        for one in seen
+    ]
+
+
+def _pulls(fits: list[DecayFit], truth: tuple[tuple[float, float], ...]) -> truths.FloatArray:
+    return np.array(
+        [
+            (state.k_r_per_s - k) / state.k_r_sigma_per_s
+            for fit in fits
+            for state, (k, _) in zip(fit.states, truth, strict=True)
+        ]
+    )
+
+
+@pytest.mark.parametrize("flicker", [0.007, None])
+@pytest.mark.parametrize("truth", [SINGLE, DOUBLE, CLOSE], ids=["1", "2", "2 close"])
+def test_number_and_rates_within_their_sigma(
+    truth: tuple[tuple[float, float], ...], flicker: float | None
+) -> None:
+    fits = _fits(truths.exponentials(*truth), flicker=flicker)
+    assert [fit.n_states for fit in fits] == [len(truth)] * len(fits)
+    pulls = _pulls(fits, truth)
+    assert np.abs(pulls).max() < 4.5
+    # E|z| = 0.80, of 30 or 60 within 0.11.
+    assert 0.55 < np.abs(pulls).mean() < 1.05
+    assert 0.8 < np.median([fit.reduced_chi2 for fit in fits]) < 1.2
+
+
+def test_sigma_is_the_cramer_rao_bound() -> None:
+    fits = _fits(truths.exponentials(*DOUBLE), flicker=0.007, n_states=2)
+    seen = truths.observe(truths.exponentials(*DOUBLE), 0)
+    bound = truths.fisher_rate_sigma(DOUBLE, seen, 0.007)
+    sigma = np.median([[state.k_r_sigma_per_s for state in fit.states] for fit in fits], axis=0)
+    # 1.1 % and 0.5 %: docs/physics, "Decay fit".
+    np.testing.assert_allclose(bound / [0.08, 0.015], [0.011, 0.005], rtol=0.1)
+    np.testing.assert_allclose(sigma / bound, 1, atol=0.07)
+
+
+@pytest.mark.parametrize(
+    "decay",
+    [truths.exponentials(*DOUBLE), truths.power_law(10, 1.5), truths.stretched(20, 0.5)],
+    ids=["2 states", "power law", "stretched"],
+)
+@pytest.mark.parametrize("true_flicker", [0.007, 0.02])
+def test_flicker_from_the_data_whatever_the_law(decay: truths.Decay, true_flicker: float) -> None:
+    fits = _fits(decay, range(20), true_flicker=true_flicker, n_states=1)
+    found = np.array([fit.flicker for fit in fits])
+    assert np.sqrt(np.mean(found**2)) == pytest.approx(true_flicker, rel=0.2)
+    # n_states = 1 is wrong for all of these, and the flicker has not covered it up.
+    assert all(any("not describe" in line for line in fit.warnings) for fit in fits)
+    claimed = np.mean([fit.flicker_sigma for fit in fits])
+    assert 0.6 < np.std(found) / claimed < 1.5
+
+
+@pytest.mark.parametrize(
+    ("decay", "name"),
+    [
+        (truths.power_law(3, 1.2), "power law"),
+        (truths.power_law(10, 1.5), "power law"),
+        (truths.stretched(20, 0.5), "stretched exponential"),
+    ],
+)
+@pytest.mark.parametrize("flicker", [0.007, None])
+def test_other_laws_are_named(decay: truths.Decay, name: str, flicker: float | None) -> None:
+    fits = _fits(decay, range(15), flicker)
+    named = [fit.better_rival is not None and fit.better_rival.name == name for fit in fits]
+    assert np.mean(named) >= 0.8
+    assert all(
+        any(name in line and "descriptive only" in line for line in fit.warnings)
+        for fit, right in zip(fits, named, strict=True)
+        if right
+    )
+
+
+def test_drifting_background_is_noticed() -> None:
+    fits = _fits(lambda t: truths.exponentials(*DOUBLE)(t) + 0.01 * t / 180, range(15), 0.007)
+    assert np.mean([bool(fit.warnings) for fit in fits]) >= 0.9
+
+
+def test_heavy_tailed_flicker_leaves_the_choice_alone() -> None:
+    fits = _fits(truths.exponentials(*DOUBLE), range(20), heavy_tails=True)
+    assert all(fit.n_states == 2 for fit in fits)
+    assert np.abs(_pulls(fits, DOUBLE)).max() < 5
+
+
+def test_unsuspected_flicker_makes_no_states_but_a_warning() -> None:
+    fits = _fits(truths.exponentials(*SINGLE), flicker=0.0)
+    assert all(fit.n_states == 1 for fit in fits)
+    warned = [any("estimate the flicker" in line for line in fit.warnings) for fit in fits]
+    assert np.mean(warned) > 0.7
+
+
+def test_growing_exposures_improve_the_slow_rate() -> None:
+    growing_s = np.minimum(0.25 * 1.085 ** np.arange(37), 4.0)
+    decay = truths.exponentials(*DOUBLE)
+
+    def sigma(exposure_s: float | truths.FloatArray) -> float:
+        seen = truths.observe(decay, 1, snr=100, flicker=0, exposure_s=exposure_s)
+        # Photons collect in proportion to the exposure.
+        noise = seen.sigma * np.sqrt(0.25 / seen.exposure_s)[:, None]
+        fit = fit_decay(
+            seen.t_s,
+            np.multiply.outer(truths.exposed(decay, seen.t_s, seen.exposure_s), truths.RGB_WEIGHTS),
+            noise,
+            exposure_s=seen.exposure_s,
+            channels="RGB",
+            n_states=2,
+        )
+        return fit.states[1].k_r_sigma_per_s
+
+    assert sigma(0.25) / sigma(growing_s) > 2

@@ -1,0 +1,86 @@
+"""The least-squares core: certified digits, bounds, rank."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labrig.errors import FitError
+from labrig.fit.least_squares import FloatArray, least_squares
+from tests.fit import strd
+
+STRD = Path(__file__).parents[3] / "shared" / "data" / "decay" / "nist_strd"
+CERTIFIED_DIGITS = 9
+
+
+@pytest.mark.shared_data
+@pytest.mark.skipif(not STRD.is_dir(), reason="no ../shared/data beside the checkout")
+@pytest.mark.parametrize("start", [0, 1])
+@pytest.mark.parametrize("name", strd.MODELS)
+def test_certified_digits(name: str, start: int) -> None:
+    reference = strd.read(STRD / f"{name}.dat")
+    fit = least_squares(reference.residuals, reference.starts[start])
+    assert fit.converged
+    assert fit.rank == len(reference.certified)
+    assert reference.certified_digits(fit.parameters) >= CERTIFIED_DIGITS
+    if name != "Lanczos1":  # Its residuals, 1e-13, are the rounding of its data.
+        sigma = fit.sigma * np.sqrt(fit.reduced_chi2)
+        np.testing.assert_allclose(sigma, reference.certified_sigma, rtol=1e-8)
+
+
+TIMES = np.linspace(0, 4, 30)
+
+
+def _exponential(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+    amplitude, rate = parameters
+    decayed = np.exp(-rate * TIMES)
+    return amplitude * decayed - 3 * np.exp(-0.7 * TIMES), np.stack(
+        [decayed, -amplitude * TIMES * decayed], axis=1
+    )
+
+
+def test_bound_holds_a_parameter_and_frees_it_again() -> None:
+    held = least_squares(_exponential, [1.0, 0.2], upper=[np.inf, 0.5])
+    assert held.at_bound.tolist() == [False, True]
+    assert held.parameters[1] == 0.5
+    # At the held rate the amplitude is the linear optimum.
+    decayed = np.exp(-0.5 * TIMES)
+    best = 3 * np.exp(-0.7 * TIMES) @ decayed / (decayed @ decayed)
+    assert held.parameters[0] == pytest.approx(best, rel=1e-12)
+    freed = least_squares(_exponential, [1.0, 0.5], lower=[0, 0.5])
+    assert freed.parameters == pytest.approx([3, 0.7], rel=1e-12)
+    assert not freed.at_bound.any()
+
+
+def test_parameter_without_effect_has_infinite_variance() -> None:
+    def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        r, jacobian = _exponential(parameters[:2])
+        return r, np.column_stack([jacobian, np.zeros(len(r))])
+
+    fit = least_squares(residuals, [1.0, 0.2, 5.0])
+    assert fit.rank == 2
+    assert fit.dof == len(TIMES) - 2
+    assert fit.parameters == pytest.approx([3, 0.7, 5], rel=1e-12)
+    assert np.isinf(fit.covariance[2, 2])
+    assert np.all(np.isfinite(fit.covariance[:2, :2]))
+
+
+def test_covariance_is_that_of_the_linear_model() -> None:
+    design = np.random.default_rng(3).normal(size=(40, 4))
+    target = np.arange(40.0)
+    fit = least_squares(lambda x: (design @ x - target, design), np.zeros(4))
+    np.testing.assert_allclose(fit.covariance, np.linalg.inv(design.T @ design), rtol=1e-11)
+    np.testing.assert_allclose(fit.parameters, np.linalg.lstsq(design, target)[0], rtol=1e-12)
+
+
+def test_overflow_at_a_trial_point_is_only_refused() -> None:
+    def residuals(parameters: FloatArray) -> tuple[FloatArray, FloatArray]:
+        grown = np.exp(parameters[0] * 20 * TIMES)
+        return grown - np.exp(20 * TIMES * 0.1), (20 * TIMES * grown)[:, None]
+
+    assert least_squares(residuals, [0.0]).parameters == pytest.approx([0.1], rel=1e-12)
+
+
+def test_start_must_be_finite() -> None:
+    with pytest.raises(FitError, match="expected finite residuals"):
+        least_squares(lambda x: (np.log(x), np.diag(1 / x)), [0.0])
