@@ -5,6 +5,7 @@ import subprocess
 import sys
 from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import pytest
 import yaml
@@ -63,8 +64,8 @@ def test_a_plan_is_refused_before_anything_moves(
     labrig: Labrig,
     make_rig: Make,
     tmp_path: Path,
-    change: Callable[[dict], None],
-    said: str,  # type: ignore[type-arg]
+    change: Callable[[dict[str, Any]], None],
+    said: str,
 ) -> None:
     path = make_rig()
     rig = yaml.safe_load(path.read_text())

@@ -10,13 +10,13 @@ cannot hide a missing state or a power law.
 from dataclasses import dataclass
 
 import numpy as np
-from scipy.optimize import nnls
 
 from labrig.errors import FitError
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.shapes import exponential_means
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
+from labrig.fit.nonnegative import nonnegative_least_squares
 
 COARSE_RATES = 48
 #: Each round puts this many rates between two former neighbours.
@@ -141,7 +141,7 @@ def _nonnegative(
         prior[0, -2:] = np.array([1.0, -1.0]) / data.series.offset_sigma
         design = np.vstack([design, prior])
         target = np.append(target, 0.0)
-    amplitudes, _ = nnls(design, target, maxiter=30 * design.shape[1])
+    amplitudes = nonnegative_least_squares(design, target)
     if data.series.has_offset:
         return amplitudes[:-2], float(amplitudes[-2] - amplitudes[-1])
     return amplitudes, 0.0

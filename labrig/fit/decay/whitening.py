@@ -75,6 +75,7 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         # (1 + u uᵀ)^(−1/2) = 1 − u uᵀ / (root (1 + root)), without dividing by |u|.
         shrink = u / (root * (1 + root))[:, None]
         matrices = matrices - shrink[:, :, None] * (u * series.inverse_sigma)[:, None, :]
+    alone = 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2
     return WhitenedSeries(
         series=series,
         matrices=matrices,
