@@ -102,8 +102,13 @@ class Recording:
                 },
                 stand.seed,
             )
-            with folder:
-                fill(folder, self.protocol, stand, self.plan, watch)
+            try:
+                with folder:
+                    fill(folder, self.protocol, stand, self.plan, watch)
+            except BaseException:
+                if not read_run(folder.path).attempts:
+                    shutil.rmtree(folder.path)  # no device was reached, nothing happened
+                raise
         return folder.path
 
 
@@ -179,7 +184,10 @@ def _close(folder: RunFolder, stand: Bench, exit_status: str, reason: str) -> No
 
 
 def _kept(folder: RunFolder, units: Sequence[object]) -> str:
-    done = len(folder.read().completed())
+    record = folder.read()
+    if not record.attempts:
+        return "nothing was recorded"
+    done = len(record.completed())
     return (
         f"{done} of {len(units)} units are complete and kept; go on with: "
         f"labrig resume {folder.path}"

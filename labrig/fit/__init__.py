@@ -2,6 +2,7 @@
 
 from labrig.fit.decay import Candidate, DecayFit, DecayState, Rival, fit_decay
 from labrig.fit.least_squares import LeastSquaresFit, least_squares
+from labrig.fit.nonnegative import nonnegative_least_squares
 
 __all__ = [
     "Candidate",
@@ -11,4 +12,5 @@ __all__ = [
     "Rival",
     "fit_decay",
     "least_squares",
+    "nonnegative_least_squares",
 ]

@@ -136,7 +136,7 @@ def least_squares(
             residuals, point, low, high, max_iterations, max(tolerance, SEARCH_STEP)
         )
         point, step = _polish(residuals, point, low, high, tolerance)
-    return _result(point, low, high, iterations, step < CONVERGED_STEP)
+        return _result(point, low, high, iterations, step < CONVERGED_STEP)
 
 
 def _evaluate(residuals: Residuals, x: FloatArray) -> _Point:

@@ -9,7 +9,6 @@ C. L. Lawson, R. J. Hanson, *Solving least squares problems* (1974), chapter 23.
 """
 
 import numpy as np
-
 from numpy.typing import NDArray
 
 from labrig.fit.least_squares import EPSILON, FloatArray
@@ -48,12 +47,12 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
         if trial[new] <= 0:
             used[new], refused[new] = False, True
             continue
-        while trial[used].min() <= 0:
+        while (falling := np.flatnonzero(used & (trial <= 0))).size:
             # Go towards the trial until the first coefficient reaches zero; do without that one.
-            falling = used & (trial <= 0)
-            share = float((solution[falling] / (solution[falling] - trial[falling])).min())
-            solution = solution + share * (trial - solution)
-            used &= ~(falling & (solution <= EPSILON * solution.max()))
+            shares = solution[falling] / (solution[falling] - trial[falling])
+            solution = solution + shares.min() * (trial - solution)
+            used[falling[np.argmin(shares)]] = False
+            used &= solution > 0
             solution[~used] = 0.0
             trial = _solve(columns, target, used)
         solution, refused = trial, norms == 0

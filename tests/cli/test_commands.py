@@ -120,8 +120,9 @@ def test_a_device_that_is_not_there_is_exit_code_3(
     rig["devices"]["lamp"]["address"] = str(tmp_path / "ttyACM7")
     path.write_text(yaml.safe_dump(rig))
     one_line(
-        labrig("run", "decay", "--rig", path, "--runs", tmp_path / "runs"), 3, "ttyACM7", "resume"
+        labrig("run", "decay", "--rig", path, "--runs", tmp_path / "runs"), 3, "ttyACM7", "nothing"
     )
+    assert list((tmp_path / "runs").iterdir()) == []
 
 
 @pytest.fixture

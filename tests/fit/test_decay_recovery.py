@@ -6,7 +6,7 @@ from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from labrig.fit import DecayFit, fit_decay
-from labrig.fit.decay.joint import _Problem
+from labrig.fit.decay.joint import JointProblem
 from labrig.fit.decay.series import decay_series
 from labrig.fit.decay.states import exponentials
 from labrig.fit.decay.whitening import whitened
@@ -161,7 +161,7 @@ def test_jacobian_is_the_difference(offset_sigma: float) -> None:
     series = decay_series(seen.t_s, seen.values, seen.sigma, seen.exposure_s, "RGB", offset_sigma)
     data = whitened(series, series.values, 0.007)
     fixed = np.log([2.0])
-    problem = _Problem(data, exponentials(series, 2, fixed), 5, [0, 2])
+    problem = JointProblem(data, exponentials(series, 2, fixed), 5, [0, 2])
     x = np.array([2.5, 0.9, 0.9, 0.3, 0.1, 0.6, 0.3] + [0.01] * bool(offset_sigma))
     _, jacobian = problem.residuals(x)
     for j, step in enumerate(1e-6 * np.eye(len(x))):

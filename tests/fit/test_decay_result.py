@@ -183,6 +183,7 @@ def test_impossible_data_are_refused(arguments: tuple[Any, Any, Any], message: s
     [
         ({"n_states": 2, "t_s": T[:3], "values": GOOD[:3]}, "at least 4 frames for 2"),
         ({"n_states": 0}, "n_states ≥ 1"),
+        ({"n_states": 9}, "at most 8 states"),
         ({"n_states": 1, "fixed_rates": [0.1, 0.2]}, "n_states ≥ 2"),
         ({"fixed_rates": [-1.0]}, "fixed rates > 0"),
         ({"flicker": -0.1}, r"flicker in \[0, 1\)"),
@@ -198,3 +199,9 @@ def test_impossible_wishes_are_refused(options: dict[str, Any], message: str) ->
     arguments: dict[str, Any] = {"t_s": T, "values": GOOD, "sigma": 0.01}
     with pytest.raises(FitError, match=message):
         fit_decay(**(arguments | options))
+
+
+def test_flicker_cannot_come_from_a_curve_through_all_bright_frames() -> None:
+    values = np.where(np.arange(37) == 0, 1.0, 0.0)
+    with pytest.raises(FitError, match="frames to spare"):
+        fit_decay(T, values, 1e-6, flicker=None)

@@ -139,15 +139,21 @@ def _covariances(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, Floa
             transform[2 * place + 1, n_free + i] = grown[i]
     if series.has_offset:
         transform[-1, -1] = series.peak
-    known = np.isfinite(np.diag(own))
-    finite = np.where(np.multiply.outer(known, known), own, 0.0)
-    covariance = transform @ finite @ transform.T
-    log_rate_covariance = to_log_rates @ finite @ to_log_rates.T
-    unknown = (transform[:, ~known] != 0).any(axis=1)
-    covariance[unknown, unknown] = np.inf
-    unknown = (to_log_rates[:, ~known] != 0).any(axis=1)
-    log_rate_covariance[unknown, unknown] = np.inf
-    return covariance, log_rate_covariance
+    return _propagated(own, transform), _propagated(own, to_log_rates)
+
+
+def _propagated(covariance: FloatArray, transform: FloatArray) -> FloatArray:
+    """T Cov Tᵀ, where an infinite variance stays one and correlates with nothing."""
+    known = np.isfinite(np.diag(covariance))
+    finite = np.where(np.multiply.outer(known, known), covariance, 0.0)
+    # What the data say nothing about may overflow: that is as good as infinite.
+    with np.errstate(over="ignore", invalid="ignore"):
+        result: FloatArray = transform @ finite @ transform.T
+    unknown = (transform[:, ~known] != 0).any(axis=1) | ~np.isfinite(np.diag(result))
+    result[unknown, :] = 0.0
+    result[:, unknown] = 0.0
+    result[unknown, unknown] = np.inf
+    return np.where(np.isfinite(result) | np.eye(len(result), dtype=bool), result, 0.0)
 
 
 def _misfit(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> Misfit:

@@ -27,6 +27,8 @@ ROUNDS = 3
 ALTERNATIONS = 5
 ALTERNATIONS_IF_GIVEN = 2
 FLICKER_ITERATIONS = 12
+#: Share of the bright frames' information that the curve must leave to the flicker.
+LEAST_SPARE = 1e-6
 #: Degrees of freedom below which the estimated flicker is not to be relied on.
 FEWEST_NOISE_DOF = 4.0
 
@@ -69,7 +71,7 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     Raises
     ------
     FitError
-        Nothing that decays.
+        Nothing that decays, or too few bright frames to estimate flicker.
     """
     weights = _first_weights(series)
     signal = np.zeros_like(series.values)
@@ -174,6 +176,11 @@ def _flicker(
     left = series.inverse_sigma * (series.values - signal - offset)
     along2 = np.einsum("fc,fc->f", u, left) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
     spare = np.maximum(1 - leverage, 0.0)
+    if float(brightness2**2 @ spare) <= LEAST_SPARE * float(brightness2 @ brightness2):
+        raise FitError(
+            "expected frames to spare to estimate flicker, got a curve through all bright ones; "
+            "give the flicker, or record more frames"
+        )
     variance = 0.0
     for _ in range(FLICKER_ITERATIONS):
         told = brightness2 / (1 + variance * brightness2)

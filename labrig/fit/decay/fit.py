@@ -23,6 +23,7 @@ REWEIGHTED_ENOUGH = 1e-9
 #: Scatter below which data are taken for exact: rounding.
 EXACT = 1e-13
 FEWEST_FOR_FLICKER = 6
+MOST_STATES = 8
 
 
 def fit_decay(
@@ -123,10 +124,15 @@ def _numbers_of_states(
         raise FitError(
             f"expected n_states ≥ {max(1, n_fixed)}, got {fewest}; fixed rates count as states"
         )
+    if most > MOST_STATES:
+        raise FitError(
+            f"expected at most {MOST_STATES} states, got {most}; "
+            "no decay tells more apart: a power law may be what you see"
+        )
     frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
 
     def parameters(n: int) -> int:
-        return 2 * n - n_fixed + int(np.isinf(series.offset_sigma))
+        return 2 * n - n_fixed + int(np.isinf(series.offset_sigma)) + int(not series.sigma_given)
 
     if frames < parameters(fewest):
         raise FitError(

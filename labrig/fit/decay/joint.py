@@ -92,7 +92,7 @@ def fit_jointly(
     brightest = int(np.argmax(weights))
     unit_weights = weights / weights[brightest]
     others = [c for c in range(len(weights)) if c != brightest]
-    problem = _Problem(data, shape, len(start), others)
+    problem = JointProblem(data, shape, len(start), others)
     solution = least_squares(
         problem.residuals,
         problem.pack(start, unit_weights, offset),
@@ -112,7 +112,7 @@ def fit_jointly(
 
 
 @dataclass(frozen=True)
-class _Problem:
+class JointProblem:
     """Residuals as a function of [θ, weights of the other channels, offset if fitted]."""
 
     data: WhitenedSeries

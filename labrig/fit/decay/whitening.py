@@ -81,6 +81,5 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         matrices=matrices,
         values=np.einsum("fcd,fd->fc", matrices, series.values),
         ones=matrices.sum(axis=2),
-        variance=np.where(measured, 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2, np.inf)
-        + (flicker * signal) ** 2,
+        variance=np.where(measured, alone + (flicker * signal) ** 2, np.inf),
     )
