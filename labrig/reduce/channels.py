@@ -96,6 +96,31 @@ class FrameMeasurement:
             "model": self.model,
         }
 
+    def __str__(self) -> str:
+        """A table for people; values in DN above black."""
+        make = self.make if self.make and self.make not in (self.model or "") else None
+        body = " ".join(filter(None, (make, self.model))) or "unknown camera"
+        taken = [
+            None if self.exposure_s is None else f"{self.exposure_s:.4g} s",
+            None if self.iso is None else f"ISO {self.iso:g}",
+            None if self.f_number is None else f"f/{self.f_number:g}",
+        ]
+        black = ", ".join(f"{level:g}" for level in dict.fromkeys(self.black))
+        rows = [
+            f"{name:<4}{stats.mean:>12.2f}{stats.sigma:>10.3f}{stats.std:>10.2f}"
+            f"{stats.n:>11}{stats.saturated:>9}{stats.hot:>6}"
+            for name, stats in self.channels.items()
+        ]
+        return "\n".join(
+            [
+                f"{body}, {', '.join(filter(None, taken)) or 'exposure not recorded'}",
+                f"{self.width} x {self.height} pixels, {self.cfa}, black {black}, "
+                f"white {self.white:g}",
+                f"    {'mean / DN':>12}{'σ':>10}{'std':>10}{'pixels':>11}{'clipped':>9}{'hot':>6}",
+                *rows,
+            ]
+        )
+
 
 @dataclass(frozen=True, eq=False)
 class _PlaneCount:

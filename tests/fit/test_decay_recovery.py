@@ -144,6 +144,16 @@ def test_order_of_channels_and_frames_does_not_matter() -> None:
     )
 
 
+@pytest.mark.parametrize("second", [0.999, 1.0, 1.001])
+def test_two_channels_about_equally_bright(second: float) -> None:
+    decay = truths.exponentials((0.08, 1.0), (0.015, 0.4))
+    for seed in range(5):
+        fit = _fit(truths.observe(decay, seed, weights=np.array([1.0, second])), flicker=0.007)
+        assert max(fit.channel_weights) == 1
+        assert fit.channel_weights == pytest.approx([1, second], abs=0.01)
+        assert sorted(fit.channel_weights_sigma)[0] == 0
+
+
 def test_value_of_infinite_sigma_is_left_out() -> None:
     truth = ((0.08, 1.0), (0.015, 0.4))
     exact = _exact(truth, 1.5)

@@ -17,6 +17,10 @@ from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
 Shape = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
+#: Tries to find out which channel is the brightest.
+CHANGES_OF_LEAD = 3
+
+
 @dataclass(frozen=True)
 class JointFit:
     """Shape, weights and offset together, in the series' own units.
@@ -89,26 +93,24 @@ def fit_jointly(
     tolerance
         Relative step small enough; 0 for all digits.
     """
-    brightest = int(np.argmax(weights))
-    unit_weights = weights / weights[brightest]
-    others = [c for c in range(len(weights)) if c != brightest]
-    problem = JointProblem(data, shape, len(start), others)
-    solution = least_squares(
-        problem.residuals,
-        problem.pack(start, unit_weights, offset),
-        lower=problem.pack(lower, np.zeros_like(weights), -np.inf),
-        upper=problem.pack(upper, np.full_like(weights, np.inf), np.inf),
-        max_iterations=max_iterations,
-        tolerance=tolerance,
-    )
-    theta, fitted_weights, fitted_offset = problem.unpack(solution.parameters)
-    fit = JointFit(theta, fitted_weights, fitted_offset, solution, brightest)
-    if fit.weights.max() > 1:
-        # Two channels about equally bright, and the other one, it turns out, leads.
-        return fit_jointly(
-            data, shape, theta, fit.weights, fit.offset, lower, upper, max_iterations, tolerance
+    theta = start
+    for _ in range(CHANGES_OF_LEAD):
+        brightest = int(np.argmax(weights))
+        others = [c for c in range(len(weights)) if c != brightest]
+        problem = JointProblem(data, shape, len(start), others)
+        solution = least_squares(
+            problem.residuals,
+            problem.pack(theta, weights / weights[brightest], offset),
+            lower=problem.pack(lower, np.zeros_like(weights), -np.inf),
+            upper=problem.pack(upper, np.full_like(weights, np.inf), np.inf),
+            max_iterations=max_iterations,
+            tolerance=tolerance,
         )
-    return fit
+        theta, weights, offset = problem.unpack(solution.parameters)
+        # Of two channels about equally bright the other one may turn out to lead.
+        if weights.max() <= 1:
+            break
+    return JointFit(theta, weights, offset, solution, brightest)
 
 
 @dataclass(frozen=True)
@@ -121,15 +123,18 @@ class JointProblem:
     others: list[int]
 
     def pack(self, theta: FloatArray, weights: FloatArray, offset: float) -> FloatArray:
+        """The parameters as one vector."""
         last = [offset] if self.data.series.has_offset else []
         return np.concatenate([theta, weights[self.others], last])
 
     def unpack(self, x: FloatArray) -> tuple[FloatArray, FloatArray, float]:
+        """θ, weights of all channels (C,), offset."""
         weights = np.ones(self.data.values.shape[1])
         weights[self.others] = x[self.n_shape : self.n_shape + len(weights) - 1]
         return x[: self.n_shape], weights, float(x[-1]) if self.data.series.has_offset else 0.0
 
     def residuals(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Whitened model − data (n C,) and its Jacobian, the offset's prior as a last row."""
         data, q, others = self.data, self.n_shape, self.others
         theta, weights, offset = self.unpack(x)
         h, slopes = self.shape(theta)

@@ -1,0 +1,85 @@
+"""Real measurements of other people, through the commands a person would use."""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labrig.reduce import read_series
+from tests.conftest import Ended
+
+DATA = Path(__file__).parents[2] / "shared" / "data"
+pytestmark = [
+    pytest.mark.shared_data,
+    pytest.mark.skipif(not DATA.is_dir(), reason="the folder of real data is not there"),
+]
+RAW = DATA / "raw_photos"
+#: Centres of the neutrals, white to black, in pixels, and their reflectance (BabelColor average of
+#: 30 charts, mean over 400-700 nm).
+NEUTRALS_X = (704, 816, 926, 1034, 1146, 1256)
+NEUTRALS_Y = 930
+
+
+def test_the_neutrals_of_a_colour_checker_are_linear(labrig: Callable[..., Ended]) -> None:
+    import colour  # slow, and only this test compares with tables
+
+    chart = colour.SDS_COLOURCHECKERS["BabelColor Average"]
+    names = [
+        "white 9.5 (.05 D)", "neutral 8 (.23 D)", "neutral 6.5 (.44 D)", "neutral 5 (.70 D)",
+        "neutral 3.5 (1.05 D)", "black 2 (1.5 D)",
+    ]  # fmt: skip
+    reflectance = [float(np.mean(chart[name].values)) for name in names]
+    green = []
+    for x in NEUTRALS_X:
+        ended = labrig(
+            "frame", RAW / "canon_550d_kissx4_colorchecker.dng",
+            "--roi", f"{x - 24},{NEUTRALS_Y - 24},48,48", "--json",
+        )  # fmt: skip
+        assert ended.code == 0, ended.err
+        green.append(json.loads(ended.out)["channels"]["G"]["mean"])
+    assert green == pytest.approx([1162, 757, 477, 259, 126, 47], abs=1.0)
+    assert np.corrcoef(green, reflectance)[0, 1] >= 0.9995
+
+
+@pytest.mark.parametrize(
+    ("name", "said"),
+    [
+        ("canon_eos_6d_linear.dng", "all colours in every pixel"),
+        ("canon_700d_truncated.cr2", "cut off"),
+    ],
+)
+def test_what_is_no_bayer_frame_is_refused_in_one_line(
+    labrig: Callable[..., Ended], name: str, said: str
+) -> None:
+    ended = labrig("frame", RAW / name)
+    assert ended.code == 4
+    assert said in ended.err
+    assert ended.err.count("\n") == 1
+
+
+def test_a_persistent_phosphor_has_the_rates_of_an_independent_fit(
+    labrig: Callable[..., Ended],
+) -> None:
+    """Castaing et al. 2024, 524 nm after 300 s of 400 nm; oracle in the data's README."""
+    table = DATA / "decay" / "perslqy_sao" / "sample_400_524_300s.txt"
+    fits = []
+    for states in (1, 2, 3):
+        ended = labrig(
+            "fit", "decay", table, "--origin", 330, "--from", 331.2, "--weights", "counts",
+            "--offset", "free", "--flicker", 0, "--states", states, "--json",
+        )  # fmt: skip
+        assert ended.code == 0, ended.err
+        fits.append(json.loads(ended.out))
+    chi2 = [fit["reduced_chi2"] for fit in fits]
+    assert chi2 == pytest.approx([49.6, 3.85, 1.66], rel=0.01)
+    rates = [state["k_r_per_s"] for state in fits[1]["states"]]
+    assert rates == pytest.approx([0.01046, 0.00205], rel=0.03)
+    assert all(fit["warnings"] for fit in fits), "no sum of three exponentials is its law"
+
+
+def test_a_table_of_somebody_elses_program_is_read() -> None:
+    (series,) = read_series(DATA / "decay" / "perslqy_sao" / "sample_400_524_300s.txt")
+    assert series.channels == ("counts",)
+    assert len(series.t_s) == 6551
