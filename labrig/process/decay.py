@@ -56,7 +56,7 @@ def process_run(folder: Path, choices: Choices | None = None) -> Result:
         dark_frames(run, choices),
         protocol.background if protocol.dark == "background" else None,
     )
-    fits = {name: _fit(one, protocol, choices) for name, one in series.items()}
+    fits = _fit_all(series, choices.states or _asked_states(protocol))
     run_warnings = (*timing_warnings(run), *_clipping_warnings(series))
     warnings = (*run_warnings, *_fit_warnings(fits))
 
@@ -75,13 +75,31 @@ def process_run(folder: Path, choices: Choices | None = None) -> Result:
     return Result(report, series, fitted, run_warnings)
 
 
-def _fit(series: Series, protocol: DecayProtocol, choices: Choices) -> DecayFit | str:
+def _fit_all(series: Mapping[str, Series], states: int | None) -> dict[str, DecayFit | str]:
+    """Fits by patch. Shutter and aperture flicker alike for all patches of a frame, so the patch
+    that tells their flicker best tells it for those that are dim or fade within a few frames.
+    """
+    fits = {name: _fit(one, states, None) for name, one in series.items()}
+    measured = [fit for fit in fits.values() if isinstance(fit, DecayFit) and fit.flicker > 0]
+    if len(fits) == 1 or not measured:
+        return fits
+    best = min(measured, key=lambda fit: fit.flicker_sigma / fit.flicker)
+    return {
+        name: fit if fit is best else _fit(series[name], states, best.flicker)
+        for name, fit in fits.items()
+    }
+
+
+def _fit(series: Series, states: int | None, flicker: float | None) -> DecayFit | str:
     """The fit, or why there is none."""
-    asked = None if protocol.states == "auto" else protocol.states
     try:
-        return fit_series(series, choices.states or asked)
+        return fit_series(series, states, flicker=flicker)
     except FitError as error:
         return str(error)
+
+
+def _asked_states(protocol: DecayProtocol) -> int | None:
+    return None if protocol.states == "auto" else protocol.states
 
 
 def _clipping_warnings(series: Mapping[str, Series]) -> Iterator[str]:

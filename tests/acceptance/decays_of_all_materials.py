@@ -75,7 +75,7 @@ def verdict(fit: dict[str, object], material: str) -> str:
     """What came out, in a line."""
     said = f"χ² {fit['reduced_chi2']:.2f}  ρ {fit['flicker']:.4f}  n {fit['n_states']}"
     if material == WITHOUT_TRUE_STATES:
-        return f"{said}  {'flagged' if fit['power_law'] else 'NOT FLAGGED'}  {fit['warnings']}"
+        return f"{said}  {'flagged' if fit['better_rival'] else 'NOT FLAGGED'}  {fit['warnings']}"
     true = len(read_material(material).states)
     if fit["n_states"] != true:
         return f"{said}  WRONG n (true {true})  {fit['states']} {fit['warnings']}"

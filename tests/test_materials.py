@@ -1,0 +1,61 @@
+"""Every shipped material through the whole simulated pipeline, on a small sensor.
+
+Figures on the full sensor: `python -m tests.acceptance.decays_of_all_materials`.
+"""
+
+import json
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from labrig import shipped
+from labrig.material import read_material
+from tests.conftest import Ended
+
+Labrig = Callable[..., Ended]
+Make = Callable[..., Path]
+EXPONENTIAL = [name for name in shipped.names("config/materials") if name != "power-law"]
+TABLE_1 = [name for name in EXPONENTIAL if not name.startswith("double-")]
+
+
+def fit_of(folder: Path, patch: str = "") -> dict[str, Any]:
+    content: dict[str, Any] = json.loads((folder / "result" / patch / "fit.json").read_text())
+    return content
+
+
+def measured(labrig: Labrig, tmp_path: Path, rig: Path, protocol: str) -> Path:
+    ended = labrig("run", protocol, "--rig", rig, "--runs", tmp_path / rig.stem)
+    assert ended.code == 0, ended.err
+    return ended.run_folder
+
+
+@pytest.mark.parametrize("name", EXPONENTIAL)
+def test_every_rate_is_within_3_sigma_and_the_states_are_as_many_as_there_are(
+    labrig: Labrig, make_rig: Make, tmp_path: Path, name: str
+) -> None:
+    fit = fit_of(measured(labrig, tmp_path, make_rig(sample=name), "decay"))
+    true = sorted((state.k_r_per_s for state in read_material(name).states), reverse=True)
+    assert fit["n_states"] == len(true)
+    for state, k_r_per_s in zip(fit["states"], true, strict=True):
+        assert abs(state["k_r_per_s"] - k_r_per_s) < 3 * state["k_r_sigma_per_s"]
+        assert state["k_r_sigma_per_s"] < 0.15 * k_r_per_s, "3 σ of nothing prove nothing"
+
+
+def test_a_power_law_is_flagged(labrig: Labrig, make_rig: Make, tmp_path: Path) -> None:
+    fit = fit_of(measured(labrig, tmp_path, make_rig(sample="power-law"), "decay"))
+    assert any("power law" in warning for warning in fit["warnings"])
+
+
+def test_eleven_patches_in_one_charge_give_the_rates_of_one_by_one(
+    labrig: Labrig, make_rig: Make, tmp_path: Path
+) -> None:
+    together = measured(labrig, tmp_path, make_rig("all.yaml", "sim-eleven"), "decay-eleven")
+    for name in TABLE_1:
+        alone = measured(labrig, tmp_path, make_rig(f"{name}.yaml", sample=name), "decay")
+        (one,), (other,) = fit_of(alone)["states"], fit_of(together, name)["states"]
+        (true,) = read_material(name).states
+        sigma = (one["k_r_sigma_per_s"] ** 2 + other["k_r_sigma_per_s"] ** 2) ** 0.5
+        assert abs(one["k_r_per_s"] - other["k_r_per_s"]) < 3 * sigma, name
+        assert abs(other["k_r_per_s"] - true.k_r_per_s) < 3 * other["k_r_sigma_per_s"], name
