@@ -1,5 +1,6 @@
 """What many tests need: small simulated rigs, quick protocols, the command line in process."""
 
+import os
 import signal
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
@@ -7,10 +8,16 @@ from pathlib import Path
 
 import pytest
 import yaml
+from hypothesis import settings
 
 from labrig import shipped
 from labrig.cli.ending import guarded
 from labrig.signals import STOP_SIGNALS
+
+# In CI the same examples every time, so that a red run is about the change; new ones elsewhere.
+settings.register_profile("ci", derandomize=True, deadline=None)
+settings.register_profile("default", deadline=None)
+settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 
 @dataclass(frozen=True)
