@@ -25,6 +25,7 @@ from labrig.errors import DataError, DiskError, LabrigError, UsageError
 from labrig.optics import read_camera
 from labrig.quantity import duration_text
 from labrig.record import RunFolder, read_run
+from labrig.signals import interrupting
 from labrig.yaml_file import yaml_text
 
 #: Room left on the disk beyond what the frames need: journal, results, report.
@@ -148,7 +149,8 @@ def fill(
         stand.clock.wall, "abort", "labrig ended before this attempt did; closed at resume"
     )
     done = folder.read().completed()
-    with watch(laid_out, list(done), stand.clock) as observer:
+    # More signals while the attempt is being closed must not cut that short.
+    with interrupting(stand.clock), watch(laid_out, list(done), stand.clock) as observer:
         for unit in dead:
             observer.warn(f"the unit {unit} was cut off and is done again")
         units = protocol.units()

@@ -31,14 +31,21 @@ def interrupting(clock: Clock) -> Iterator[None]:
         clock.interrupt(signum)
 
     before = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
+    stopped = False
     try:
         yield
+        clock.sleep(0.0)
+    except Interrupted:
+        stopped = True
+        raise
     finally:
         for signum, handler in before.items():
-            signal.signal(signum, handler)
-    clock.sleep(0.0)
+            ending = stopped and handler is raise_interrupted
+            signal.signal(signum, signal.SIG_IGN if ending else handler)
 
 
 def raise_interrupted(signum: int, frame: FrameType | None) -> None:
-    """Handler for when nothing is connected: stop at once."""
+    """Handler for when nothing is connected: stop at once. One stop is enough for a command."""
+    for ignored in STOP_SIGNALS:
+        signal.signal(ignored, signal.SIG_IGN)
     raise Interrupted(signum)

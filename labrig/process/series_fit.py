@@ -5,6 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import ArrayLike
 
 from labrig.errors import FitError, UsageError
 from labrig.fit import DecayFit, fit_decay
@@ -23,7 +24,7 @@ SEEN_SIGMA = 3.0
 def fit_series(
     series: Series,
     states: int | None = None,
-    offset_sigma: float | None = None,
+    offset_sigma: ArrayLike | None = None,
     flicker: float | None = None,
 ) -> DecayFit:
     """Fit the usable rows of `series`.
@@ -33,8 +34,9 @@ def fit_series(
     states
         Number of states; None chooses.
     offset_sigma
-        Prior σ of a constant background in the unit of the values: 0 fixes it at zero, infinity
-        leaves it free. None takes what the dark subtraction left uncertain.
+        Prior σ of a constant background, one for all channels or one each, in the unit of the
+        values: 0 fixes it at zero, infinity leaves it free. None takes what the dark subtraction
+        left uncertain in each channel.
     flicker
         Relative scatter common to the channels of a frame; None measures it.
 
@@ -49,8 +51,7 @@ def fit_series(
         )
     usable = series.take(np.flatnonzero(series.usable))
     if offset_sigma is None:
-        known = series.dark_sigma[np.isfinite(series.dark_sigma)]
-        offset_sigma = float(known.max()) if len(known) else 0.0
+        offset_sigma = np.where(np.isnan(series.dark_sigma), 0.0, series.dark_sigma)
     if flicker is None and len(usable.t_s) < FRAMES_FOR_FLICKER:
         flicker = TYPICAL_FLICKER
     fit = fit_decay(

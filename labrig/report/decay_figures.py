@@ -76,7 +76,7 @@ def fitted_curve(series: Series, fit: DecayFit) -> Curve:
         t_s=middle_s,
         total=fit.predict(t_s, exposure_s),
         states=np.stack(states, axis=1),
-        brightest=int(np.argmax(fit.channel_weights)),
+        brightest=fit.brightest,
     )
 
 
@@ -211,7 +211,7 @@ def _legend(figure: Figure, series: Series, fit: DecayFit | None) -> None:
     if fit is not None:
         handles.append(Line2D([], [], color=MUTED, linewidth=1.2, label="fit"))
         if fit.n_states > 1:
-            brightest = series.channels[int(np.argmax(fit.channel_weights))]
+            brightest = series.channels[fit.brightest]
             handles.append(
                 Line2D(
                     [],

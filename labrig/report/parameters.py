@@ -49,14 +49,22 @@ def state_rows(fit: DecayFit) -> list[Row]:
 def quality_rows(fit: DecayFit) -> list[Row]:
     """What the states share."""
     rows = []
-    if len(fit.channels) > 1:
+    several = len(fit.channels) > 1
+    if several:
         weights = zip(fit.channels, fit.channel_weights, fit.channel_weights_sigma, strict=True)
         rows += [
             Row(f"Weight of {name}", "", ("1" if weight == 1 else plus_minus(weight, sigma),))
             for name, weight, sigma in weights
         ]
-    rows.append(Row("Offset", "DN/s", (plus_minus(fit.offset, fit.offset_sigma),)))
-    if len(fit.channels) > 1:
+    if several and any(fit.offsets_sigma):
+        offsets = zip(fit.channels, fit.offsets, fit.offsets_sigma, strict=True)
+        rows += [
+            Row(f"Offset of {name}", "DN/s", (plus_minus(offset, sigma),))
+            for name, offset, sigma in offsets
+        ]
+    else:
+        rows.append(Row("Offset", "DN/s", (plus_minus(fit.offset, fit.offset_sigma),)))
+    if several:
         flicker = plus_minus(100 * fit.flicker, 100 * fit.flicker_sigma)
         rows.append(Row("Flicker of a frame", "%", (flicker,)))
     chi2 = f"{rounded(fit.reduced_chi2, 3)} with {fit.dof} degrees of freedom"

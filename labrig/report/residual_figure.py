@@ -55,7 +55,7 @@ class Residuals:
 def residuals(series: Series, fit: DecayFit) -> Residuals:
     """Of all rows of `series`, those left out of the fit, too."""
     model = fit.predict(series.t_s, series.exposure_s)
-    signal = model - fit.offset
+    signal = model - fit.offsets
     deviation = series.values - model
     # Without σ (a table from elsewhere) the scatter of the residuals has to do.
     scatter = np.full_like(deviation, np.sqrt(np.mean(deviation**2)) or 1.0)

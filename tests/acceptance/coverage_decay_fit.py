@@ -35,6 +35,19 @@ def _states(name: str, states: tuple[tuple[float, float], ...], **fit: Any) -> C
     return Case(name, truths.exponentials(*states), states, fit={"flicker": 0.007, **fit})
 
 
+def _with_dark_errors(
+    name: str, states: tuple[tuple[float, float], ...], dark_sigma: float
+) -> Case:
+    """Each channel's dark level is wrong; the fit knows by about how much, the bound does not."""
+    return Case(
+        name,
+        truths.exponentials(*states),
+        states,
+        {"dark_sigma": dark_sigma, "snr": 100},
+        {"flicker": 0.007, "offset_sigma": dark_sigma},
+    )
+
+
 def _drifting(t: truths.FloatArray) -> truths.FloatArray:
     return truths.exponentials(*DOUBLE)(t) + 0.01 * t / 180
 
@@ -75,6 +88,10 @@ CASES = {
             {"flicker": None},
         ),
         _states("3 states .2/.05/.01", ((0.2, 1.0), (0.05, 0.5), (0.01, 0.2))),
+        _with_dark_errors("1 state .02, dark ± .1 %", ((0.02, 1.0),), 0.001),
+        _with_dark_errors("1 state .02, dark ± .4 %", ((0.02, 1.0),), 0.004),
+        _with_dark_errors("1 state .08, dark ± .4 %", ((0.08, 1.0),), 0.004),
+        _with_dark_errors("2 states .08/.015, dark ± .4 %", DOUBLE, 0.004),
         Case("power law τ 3, p 1.2", truths.power_law(3, 1.2)),
         Case("power law τ 3, p 1.2, ρ from data", truths.power_law(3, 1.2), fit={"flicker": None}),
         Case("power law τ 10, p 1.5", truths.power_law(10, 1.5)),

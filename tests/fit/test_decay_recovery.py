@@ -72,7 +72,55 @@ def test_any_noise_model_recovers_exact_data(flicker: float | None, offset_sigma
     truth = ((0.08, 1.0), (0.015, 0.4))
     fit = _fit(_exact(truth, 1.5), n_states=2, flicker=flicker, offset_sigma=offset_sigma)
     _assert_recovered(fit, truth)
-    assert fit.offset == pytest.approx(0, abs=1e-8)
+    assert fit.offsets == pytest.approx([0, 0, 0], abs=1e-8)
+
+
+def test_free_offset_of_each_channel_is_found() -> None:
+    truth = ((0.08, 1.0), (0.015, 0.4))
+    exact = _exact(truth, 1.5)
+    darks = np.array([0.05, -0.02, 0.01])
+    moved = truths.Observed(exact.t_s, exact.exposure_s, exact.values + darks, exact.sigma)
+    fit = _fit(moved, offset_sigma=np.inf)
+    _assert_recovered(fit, truth)
+    assert fit.offsets == pytest.approx(darks, rel=1e-6)
+    assert all(sigma > 0 for sigma in fit.offsets_sigma)
+    # The brightest channel is G.
+    assert (fit.offset, fit.offset_sigma) == (fit.offsets[1], fit.offsets_sigma[1])
+    assert fit.dof == 37 * 3 - 4 - 2 - 3
+
+
+def test_each_channel_has_its_own_prior() -> None:
+    truth = ((0.08, 1.0), (0.015, 0.4))
+    exact = _exact(truth, 1.5)
+    values = exact.values + np.array([0.0, 0.05, 0.01])
+    moved = truths.Observed(exact.t_s, exact.exposure_s, values, exact.sigma)
+    fit = _fit(moved, n_states=2, offset_sigma=[0.0, np.inf, 0.5])
+    _assert_recovered(fit, truth, rtol=1e-4)
+    assert (fit.offsets[0], fit.offsets_sigma[0]) == (0, 0)
+    assert fit.offsets[1:] == pytest.approx([0.05, 0.01], rel=1e-4)
+    # One prior datum: that of B.
+    assert fit.dof == 37 * 3 + 1 - 4 - 2 - 2
+
+
+@pytest.mark.parametrize("offset_sigma", [0.0, 0.004, np.inf])
+def test_one_prior_for_all_is_the_same_for_each(offset_sigma: float) -> None:
+    seen = truths.observe(truths.exponentials((0.08, 1.0)), seed=9, dark_sigma=0.004)
+    one = _fit(seen, flicker=None, offset_sigma=offset_sigma)
+    each = _fit(seen, flicker=None, offset_sigma=np.full(3, offset_sigma))
+    assert one.to_json() == each.to_json()
+
+
+def test_channel_that_was_not_measured_has_no_offset() -> None:
+    exact = _exact(((0.08, 1.0), (0.015, 0.4)), 1.5)
+    sigma = exact.sigma.copy()
+    sigma[:, 2] = np.inf
+    fit = _fit(
+        truths.Observed(exact.t_s, exact.exposure_s, exact.values, sigma),
+        offset_sigma=np.inf,
+        flicker=0.007,
+    )
+    _assert_recovered(fit, ((0.08, 1.0), (0.015, 0.4)))
+    assert (fit.offsets[2], fit.offsets_sigma[2]) == (0, 0)
 
 
 def test_free_offset_is_found() -> None:
@@ -123,8 +171,10 @@ def test_units_do_not_matter(time_unit: float, value_unit: float) -> None:
 
 
 def test_order_of_channels_and_frames_does_not_matter() -> None:
-    seen = truths.observe(truths.exponentials((0.08, 1.0), (0.015, 0.4)), seed=6)
-    here = _fit(seen, flicker=0.007)
+    decay = truths.exponentials((0.08, 1.0), (0.015, 0.4))
+    seen = truths.observe(decay, seed=6, dark_sigma=0.004)
+    dark_sigma = np.array([0.003, 0.004, 0.005])
+    here = _fit(seen, flicker=0.007, offset_sigma=dark_sigma)
     frames = np.random.default_rng(1).permutation(37)
     channels = [2, 0, 1]
     there = fit_decay(
@@ -134,6 +184,11 @@ def test_order_of_channels_and_frames_does_not_matter() -> None:
         exposure_s=seen.exposure_s[frames],
         channels="BRG",
         flicker=0.007,
+        offset_sigma=dark_sigma[channels],
+    )
+    np.testing.assert_allclose(there.offsets, np.array(here.offsets)[channels], rtol=1e-7)
+    np.testing.assert_allclose(
+        there.offsets_sigma, np.array(here.offsets_sigma)[channels], rtol=1e-6
     )
     np.testing.assert_allclose(there.covariance, here.covariance, rtol=1e-6)
     for a, b in zip(here.states, there.states, strict=True):
@@ -165,14 +220,15 @@ def test_value_of_infinite_sigma_is_left_out() -> None:
     assert fit.dof == 37 * 3 - 4 - 6
 
 
-@pytest.mark.parametrize("offset_sigma", [0.0, 0.02])
-def test_jacobian_is_the_difference(offset_sigma: float) -> None:
+@pytest.mark.parametrize("offset_sigma", [0.0, 0.02, (0.02, 0.0, np.inf), np.inf])
+def test_jacobian_is_the_difference(offset_sigma: float | tuple[float, ...]) -> None:
     seen = truths.observe(truths.exponentials((0.08, 1.0), (0.015, 0.4)), seed=7)
     series = decay_series(seen.t_s, seen.values, seen.sigma, seen.exposure_s, "RGB", offset_sigma)
     data = whitened(series, series.values, 0.007)
     fixed = np.log([2.0])
     problem = JointProblem(data, exponentials(series, 2, fixed), 5, [0, 2])
-    x = np.array([2.5, 0.9, 0.9, 0.3, 0.1, 0.6, 0.3] + [0.01] * bool(offset_sigma))
+    offsets = [0.01] * len(series.fitted_offsets)
+    x = np.array([2.5, 0.9, 0.9, 0.3, 0.1, 0.6, 0.3, *offsets])
     _, jacobian = problem.residuals(x)
     for j, step in enumerate(1e-6 * np.eye(len(x))):
         difference = (problem.residuals(x + step)[0] - problem.residuals(x - step)[0]) / 2e-6

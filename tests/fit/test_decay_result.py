@@ -1,6 +1,7 @@
 """What a decay fit hands back: JSON, table, predictions, warnings, refusals."""
 
 import json
+import re
 from typing import Any
 
 import numpy as np
@@ -49,7 +50,11 @@ def test_json_has_the_contract_keys_in_its_order() -> None:
     assert read["warnings"] == []
     assert read["reduced_chi2"] == pytest.approx(1, abs=0.4)
     assert [candidate["n_states"] for candidate in read["candidates"]][:2] == [1, 2]
-    assert {"offset", "bic", "flicker", "rivals"} <= read.keys()
+    assert read["offsets"].keys() == read["offsets_sigma"].keys() == {"R", "G", "B"}
+    # G is the brightest.
+    assert read["offsets"]["G"] == read["offset"] != read["offsets"]["R"]
+    assert read["offsets_sigma"]["G"] == read["offset_sigma"] != read["offsets_sigma"]["R"]
+    assert {"bic", "flicker", "rivals"} <= read.keys()
 
 
 def test_what_is_not_finite_is_null() -> None:
@@ -63,6 +68,12 @@ def test_table_shows_rates_with_their_sigma() -> None:
     assert "k / s⁻¹" in text
     assert "flicker" in text
     assert "0.08" in text
+    assert "offsets" not in text
+
+
+def test_table_shows_the_offset_of_each_channel() -> None:
+    (line,) = [x for x in str(_seen_fit(offset_sigma=[0.01, 0, 0.01])).splitlines() if "offs" in x]
+    assert re.fullmatch(r"offsets  R -?[\d.]+\(\d+\), G 0, B -?[\d.]+\(\d+\)", line)
 
 
 @pytest.mark.parametrize(
@@ -146,6 +157,13 @@ def test_offset_far_from_its_prior() -> None:
     assert any("times its prior σ" in line for line in fit.warnings)
 
 
+def test_offset_far_from_its_prior_is_named() -> None:
+    values = np.stack([np.exp(-0.05 * T), 0.5 * np.exp(-0.05 * T) + 0.1], axis=1)
+    fit = fit_decay(T, values, 0.001, channels="RG", offset_sigma=0.01)
+    (warning,) = [line for line in fit.warnings if "times its prior σ" in line]
+    assert "offset of G" in warning
+
+
 def test_flicker_from_too_few_bright_frames_is_said() -> None:
     for seed in range(10):
         seen = truths.observe(truths.exponentials((0.25, 1.0)), seed, weights=np.ones(1))
@@ -190,6 +208,8 @@ def test_impossible_data_are_refused(arguments: tuple[Any, Any, Any], message: s
         ({"flicker": None, "sigma": None}, "to tell flicker"),
         ({"flicker": None, "t_s": T[:5], "values": GOOD[:5]}, "to estimate flicker"),
         ({"offset_sigma": -1.0}, "offset_sigma ≥ 0"),
+        ({"offset_sigma": np.nan}, "offset_sigma ≥ 0"),
+        ({"offset_sigma": [0.1, 0.1]}, "one offset_sigma or 1"),
         ({"exposure_s": np.ones(4)}, "one exposure or 37"),
         ({"exposure_s": -1.0}, "exposures ≥ 0"),
         ({"sigma": None, "channels": "RG", "values": np.ones((37, 2))}, "weighed against"),
@@ -199,6 +219,13 @@ def test_impossible_wishes_are_refused(options: dict[str, Any], message: str) ->
     arguments: dict[str, Any] = {"t_s": T, "values": GOOD, "sigma": 0.01}
     with pytest.raises(FitError, match=message):
         fit_decay(**(arguments | options))
+
+
+def test_noise_alone_is_no_decay() -> None:
+    values = np.full((37, 3), -0.1)
+    values[20] = 0.05
+    with pytest.raises(FitError, match="did the lamp light"):
+        fit_decay(T, values, 0.1, channels="RGB", flicker=None)
 
 
 def test_flicker_cannot_come_from_a_curve_through_all_bright_frames() -> None:

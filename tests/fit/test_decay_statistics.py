@@ -64,6 +64,31 @@ def test_number_and_rates_within_their_sigma(
     assert 0.8 < np.median([fit.reduced_chi2 for fit in fits]) < 1.2
 
 
+@pytest.mark.parametrize("dark_sigma", [0.004, 0.01])
+def test_dark_errors_of_opposite_signs_make_no_state(dark_sigma: float) -> None:
+    fits = []
+    for seed in range(100):
+        seen = truths.observe(truths.exponentials(*SINGLE), seed, snr=100)
+        dark = dark_sigma * np.abs(np.random.default_rng(seed + 1000).normal(size=3)) * [-1, 1, -1]
+        fits.append(
+            fit_decay(
+                seen.t_s,
+                seen.values + dark,
+                seen.sigma,
+                exposure_s=seen.exposure_s,
+                channels="RGB",
+                offset_sigma=dark_sigma,
+                flicker=0.007,
+            )
+        )
+    single = [fit for fit in fits if fit.n_states == 1]
+    assert len(single) >= 99
+    pulls = _pulls(single, SINGLE)
+    assert np.abs(pulls).max() < 4.5
+    assert 0.8 < np.sqrt(np.mean(pulls**2)) < 1.2
+    assert 0.9 < np.median([fit.reduced_chi2 for fit in fits]) < 1.1
+
+
 def test_sigma_is_the_cramer_rao_bound() -> None:
     fits = _fits(truths.exponentials(*DOUBLE), flicker=0.007, n_states=2)
     seen = truths.observe(truths.exponentials(*DOUBLE), 0)

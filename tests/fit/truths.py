@@ -60,10 +60,12 @@ def observe(
     t_s: FloatArray = TIMES_S,
     weights: FloatArray = RGB_WEIGHTS,
     heavy_tails: bool = False,
+    dark_sigma: float = 0.0,
 ) -> Observed:
     """Photon noise of `snr` at signal 1, a read noise of 1/100 of that, and flicker.
 
-    Flicker is Gaussian, or Student's t with 3 degrees of freedom scaled to the same σ.
+    Flicker is Gaussian, or Student's t with 3 degrees of freedom scaled to the same σ. The dark
+    level of each channel is wrong by a constant of its own, of `dark_sigma`.
     """
     rng = np.random.default_rng(seed)
     exposure = np.broadcast_to(np.asarray(exposure_s, dtype=np.float64), t_s.shape)
@@ -71,7 +73,9 @@ def observe(
     sigma = np.sqrt(signal + 1e-4) / snr
     shake = rng.standard_t(3, len(t_s)) / np.sqrt(3) if heavy_tails else rng.normal(size=len(t_s))
     noise = sigma * rng.normal(size=signal.shape)
-    return Observed(t_s, exposure, signal * (1 + flicker * shake[:, None]) + noise, sigma)
+    dark = dark_sigma * rng.normal(size=len(weights))
+    values = signal * (1 + flicker * shake[:, None]) + noise + dark
+    return Observed(t_s, exposure, values, sigma)
 
 
 def fisher_rate_sigma(

@@ -118,6 +118,14 @@ def test_what_channels_have_in_common_is_found() -> None:
     assert left.common[4] == pytest.approx(0.0, abs=1e-9)
 
 
+def test_each_channel_s_own_offset_is_no_signal() -> None:
+    fit = replace(FIT, offsets=(40.0, -20.0, 10.0))
+    model = fit.predict(SERIES.t_s, SERIES.exposure_s)
+    signal = model - np.array([40.0, -20.0, 10.0])
+    left = residuals(replace(SERIES, values=model + 0.05 * signal), fit)
+    np.testing.assert_allclose(left.common, 0.05, rtol=1e-9)
+
+
 def test_overviews_share_their_axes() -> None:
     dim = replace(SERIES, values=SERIES.values / 50, sigma=SERIES.sigma / 50)
     with figure_style():

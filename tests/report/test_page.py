@@ -11,6 +11,7 @@ import pytest
 from labrig.errors import DiskError
 from labrig.fit import DecayFit
 from labrig.report import PatchReport, RunReport, write_report
+from labrig.report.parameters import quality_rows
 from labrig.report.written_numbers import plus_minus
 
 from .made import decay_series, patch, run_report
@@ -90,6 +91,23 @@ def test_all_numbers_are_on_the_page(tmp_path: Path) -> None:
         assert expected in page.text
     assert page.tags.count("img") == 1 + 2 * 2
     assert page.tags.count("li") >= 18
+
+
+def test_offsets_are_one_row_a_channel_if_any_is_fitted() -> None:
+    fit = patch(decay_series()).fit
+    assert isinstance(fit, DecayFit)
+    moved = replace(fit, offsets=(1.5, -0.8, 0.0), offsets_sigma=(0.4, 0.3, 0.0))
+    offsets = [
+        (row.quantity, *row.values)
+        for row in quality_rows(moved)
+        if row.quantity.startswith("Offset")
+    ]
+    assert offsets == [
+        ("Offset of R", "1.50 ± 0.40"),
+        ("Offset of G", "−0.80 ± 0.30"),
+        ("Offset of B", "0 (held)"),
+    ]
+    assert [row.values for row in quality_rows(fit) if row.quantity == "Offset"] == [("0 (held)",)]
 
 
 def test_nothing_is_fetched(tmp_path: Path) -> None:

@@ -7,12 +7,12 @@ import numpy as np
 from labrig.fit.decay.diagnostics import (
     Misfit,
     misfit_warnings,
-    offset_warning,
+    offset_warnings,
     rising_warning,
     state_warnings,
 )
 from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
-from labrig.fit.decay.joint import parameter_sigma
+from labrig.fit.decay.joint import weight_sigma
 from labrig.fit.decay.result import DecayFit, DecayState
 from labrig.fit.decay.rivals import Rival
 from labrig.fit.decay.selection import Candidate, bic
@@ -65,9 +65,10 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         )
         for i in range(fit.n_states)
     )
-    weight_sigma, _ = parameter_sigma(joint, series)
+    weights_sigma = weight_sigma(joint) * np.sqrt(inflation)
     residuals = np.empty_like(series.values)
-    residuals[series.order] = series.values - fit.signal(series) - joint.offset
+    residuals[series.order] = series.values - fit.signal(series) - joint.offsets
+    brightest = [*range(2 * fit.n_states), 2 * fit.n_states + int(np.argmax(joint.weights))]
     normalised = np.empty_like(series.values)
     n_values = series.values.size
     normalised[series.order] = -joint.least_squares.residuals[:n_values].reshape(
@@ -77,15 +78,15 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         states=states,
         channels=series.channels,
         channel_weights=tuple(joint.weights.tolist()),
-        channel_weights_sigma=tuple((weight_sigma * np.sqrt(inflation)).tolist()),
-        offset=joint.offset * series.peak,
-        offset_sigma=float(sigma[-1]),
+        channel_weights_sigma=tuple(weights_sigma.tolist()),
+        offsets=tuple((joint.offsets * series.peak).tolist()),
+        offsets_sigma=tuple(sigma[2 * fit.n_states :].tolist()),
         flicker=evidence.noise.flicker,
         flicker_sigma=evidence.noise.flicker_sigma,
         chi2=joint.chi2,
         dof=_dof(fit, data),
         bic=bic(data, joint),
-        covariance=covariance,
+        covariance=covariance[np.ix_(brightest, brightest)],
         warnings=tuple(
             _warnings(data, fit, states, log_rate_covariance[np.ix_(order, order)], evidence)
         ),
@@ -98,9 +99,9 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
 
 
 def _dof(fit: StatesFit, data: WhitenedSeries) -> int:
-    """Values measured, and the offset's prior, minus parameters."""
-    prior = int(data.series.has_offset and np.isfinite(data.series.offset_sigma))
-    return data.series.n_values + prior - fit.joint.n_parameters
+    """Values measured, and the offsets' priors, minus parameters."""
+    n_priors = len(data.target) - data.values.size
+    return data.series.n_values + n_priors - fit.joint.n_parameters
 
 
 def _inflation(fit: StatesFit, data: WhitenedSeries, evidence: Evidence) -> float:
@@ -118,7 +119,7 @@ def _inflation(fit: StatesFit, data: WhitenedSeries, evidence: Evidence) -> floa
 
 
 def _covariances(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, FloatArray]:
-    """Of (k1, a1, …, offset) by falling rate in the user's units; of log k, free rates first."""
+    """Of k1, a1, … by falling rate and all offsets in the user's units; of log k, free first."""
     series, n_free = data.series, fit.n_free
     own = fit.joint.least_squares.covariance
     n_states = fit.n_states
@@ -127,7 +128,7 @@ def _covariances(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, Floa
     b = fit.amplitudes
     # Amplitudes are fitted at the first frame, given at lamp off: a = b e^(k t₀).
     grown = np.exp(rates * series.start) * series.peak
-    transform = np.zeros((2 * n_states + 1, len(own)))
+    transform = np.zeros((2 * n_states + len(series.channels), len(own)))
     to_log_rates = np.zeros((n_states, len(own)))
     for place, i in enumerate(order):
         if i < n_free:
@@ -137,8 +138,8 @@ def _covariances(fit: StatesFit, data: WhitenedSeries) -> tuple[FloatArray, Floa
             to_log_rates[i, 2 * i] = 1.0
         else:
             transform[2 * place + 1, n_free + i] = grown[i]
-    if series.has_offset:
-        transform[-1, -1] = series.peak
+    fitted = series.fitted_offsets
+    transform[2 * n_states + fitted, len(own) - len(fitted) + np.arange(len(fitted))] = series.peak
     return _propagated(own, transform), _propagated(own, to_log_rates)
 
 
@@ -160,13 +161,13 @@ def _misfit(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> Misfit:
     series, joint = data.series, fit.joint
     frames, _ = joint.frame_residuals(data)
     n_frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
-    n_channels = len(series.channels)
+    along, across = joint.followed(data)
     residuals = joint.least_squares.residuals[: series.values.size]
     return Misfit(
         frames=frames,
-        frame_dof=n_frames - len(joint.shape) - int(series.has_offset),
+        frame_dof=n_frames - along,
         colour_chi2=max(float(residuals @ residuals - frames @ frames), 0.0),
-        colour_dof=series.n_values - n_frames - (n_channels - 1) if n_channels > 1 else 0,
+        colour_dof=series.n_values - n_frames - across,
         noise_dof=evidence.noise_dof,
     )
 
@@ -214,7 +215,7 @@ def _warnings(
     warnings += misfit_warnings(
         _misfit(data, fit, evidence), fit.n_states, f"{more}, and check background and times"
     )
-    warnings += offset_warning(joint.offset, series.offset_sigma)
+    warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
     low, high = series.log_rate_bounds
     warnings += state_warnings(
         states,
@@ -222,7 +223,7 @@ def _warnings(
         series.span_s,
         (float(np.exp(low)) / series.span_s, float(np.exp(high)) / series.span_s),
     )
-    unit = data.unit_signal(joint.weights)
+    unit = data.constant(joint.weights)
     information = np.einsum("fc,fc->f", unit, unit)
     common = np.einsum("fc,fc->f", unit, data.values) / np.where(information > 0, information, 1.0)
     return warnings + rising_warning(common, information)

@@ -28,7 +28,7 @@ class Misfit:
     frames
         (n,) residual along the signal by rising time, unit variance.
     frame_dof
-        Degrees of freedom of `frames`.
+        Degrees of freedom that the fit left to `frames`.
     colour_chi2, colour_dof
         Of the residuals across the signal; 0 for one channel.
     noise_dof
@@ -36,9 +36,9 @@ class Misfit:
     """
 
     frames: FloatArray
-    frame_dof: int
+    frame_dof: float
     colour_chi2: float
-    colour_dof: int
+    colour_dof: float
     noise_dof: float
 
 
@@ -98,8 +98,8 @@ def order_p_value(residuals: FloatArray) -> float:
     return float(ndtr(-max(autocorrelation * np.sqrt(n), z_runs)))
 
 
-def _excess_p_value(chi2: float, dof: int, noise_dof: float) -> float:
-    if dof <= 0:
+def _excess_p_value(chi2: float, dof: float, noise_dof: float) -> float:
+    if dof < 1:
         return 1.0
     if np.isinf(noise_dof):
         return float(chdtrc(dof, chi2))
@@ -168,13 +168,15 @@ def state_warnings(
     return warnings
 
 
-def offset_warning(offset: float, prior_sigma: float) -> list[str]:
-    """Whether the fit had to pull the offset away from its prior; both in the same units."""
-    if not 0 < prior_sigma < np.inf or abs(offset) < OFFSET_SIGMAS * prior_sigma:
-        return []
+def offset_warnings(
+    channels: tuple[str, ...], offsets: FloatArray, prior_sigma: FloatArray
+) -> list[str]:
+    """Whether the fit had to pull offsets away from their priors; both (C,) in the same units."""
     return [
-        f"the offset is {abs(offset) / prior_sigma:.0f} times its prior σ from zero: "
-        "check the dark level, or widen offset_sigma"
+        f"the offset of {name} is {abs(offset) / sigma:.0f} times its prior σ from zero: "
+        "check its dark level, or widen offset_sigma"
+        for name, offset, sigma in zip(channels, offsets, prior_sigma, strict=True)
+        if 0 < sigma < np.inf and abs(offset) >= OFFSET_SIGMAS * sigma
     ]
 
 

@@ -12,6 +12,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.errors import FitError
+from labrig.fit.decay.search import projection
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.shapes import exponential_means
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
@@ -43,8 +44,8 @@ class Envelope:
         (n, C) without offset.
     weights
         (C,) maximum 1.
-    offset
-        Common to all channels.
+    offsets
+        (C,).
     dof
         Degrees of freedom of the noise's estimate: the frames that tell, less those the curve took.
     flicker, flicker_sigma
@@ -56,7 +57,7 @@ class Envelope:
 
     signal: FloatArray
     weights: FloatArray
-    offset: float
+    offsets: FloatArray
     dof: float
     flicker: float
     flicker_sigma: float
@@ -74,27 +75,28 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
         Nothing that decays, or too few bright frames to estimate flicker.
     """
     weights = _first_weights(series)
+    offsets = np.zeros_like(weights)
     signal = np.zeros_like(series.values)
     if len(weights) == 1 and flicker == 0 and series.sigma_given:
-        return Envelope(signal, weights, 0.0, series.n_frames, 0.0, 0.0, 1.0)
+        return Envelope(signal, weights, offsets, series.n_frames, 0.0, 0.0, 1.0)
     rho, rho_sigma, noise_scale = 0.0, 0.0, 1.0
     for _ in range(ALTERNATIONS if flicker is None else ALTERNATIONS_IF_GIVEN):
         data = whitened(series, signal, rho)
-        curve, offset, leverage = _monotone_curve(data, weights)
+        curve, offsets, leverage = _monotone_curve(data, weights)
         dof = max(series.n_frames - float(leverage.sum()), 1.0)
         if len(weights) > 1:
-            weights, curve = _channel_weights(data, curve, offset)
+            weights, curve = _channel_weights(data, curve, offsets)
         signal = np.multiply.outer(curve, weights)
         if not signal.any():
             raise FitError(NO_DECAY)
         if flicker is None:
-            rho, rho_sigma, dof = _flicker(series, signal, offset, leverage)
+            rho, rho_sigma, dof = _flicker(series, signal, offsets, leverage)
         else:
             rho = flicker
     if not series.sigma_given:
-        left = series.inverse_sigma * (series.values - signal - offset)
+        left = series.inverse_sigma * (series.values - signal - offsets)
         noise_scale = float(np.sqrt((left**2).sum() / dof))
-    return Envelope(signal, weights, offset, dof, rho, rho_sigma, noise_scale)
+    return Envelope(signal, weights, offsets, dof, rho, rho_sigma, noise_scale)
 
 
 def _first_weights(series: DecaySeries) -> FloatArray:
@@ -107,54 +109,36 @@ def _first_weights(series: DecaySeries) -> FloatArray:
 
 def _monotone_curve(
     data: WhitenedSeries, weights: FloatArray
-) -> tuple[FloatArray, float, FloatArray]:
-    """The curve (n,), the offset, and how much of each frame's scatter (n,) the curve follows."""
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """The curve (n,), offsets (C,), and how much of each frame's scatter (n,) they follow."""
     series = data.series
+    problem = projection(data, weights)
     low, high = series.log_rate_bounds
     log_rates = np.linspace(low, high, COARSE_RATES)
     step = (high - low) / (COARSE_RATES - 1)
     for refinement in range(ROUNDS + 1):
         means = exponential_means(np.exp(log_rates), series.t, series.exposure)
-        amplitudes, offset = _nonnegative(data, weights, means)
+        amplitudes = nonnegative_least_squares(problem.columns(means), problem.target)
         used = amplitudes > 0
         if refinement < ROUNDS:
             step /= REFINEMENT
             around = step * np.arange(-REFINEMENT, REFINEMENT + 1)
             log_rates = np.unique(np.add.outer(log_rates[used], around).round(12))
             log_rates = np.clip(log_rates, low, high)
-    followed = np.linalg.norm(data.unit_signal(weights), axis=1)[:, None] * means[:, used]
-    if series.has_offset:
-        followed = np.column_stack([followed, np.linalg.norm(data.ones, axis=1)])
-    orthogonal = np.linalg.qr(followed)[0]
-    return means @ amplitudes, offset, np.einsum("ij,ij->i", orthogonal, orthogonal)
-
-
-def _nonnegative(
-    data: WhitenedSeries, weights: FloatArray, means: FloatArray
-) -> tuple[FloatArray, float]:
-    """Amplitudes ≥ 0 (m,) of the columns of `means` (n, m), and an offset of either sign."""
-    unit = data.unit_signal(weights)
-    design = (unit[:, :, None] * means[:, None, :]).reshape(unit.size, -1)
-    target = data.values.ravel()
-    if data.series.has_offset:
-        ones = data.ones.reshape(-1, 1)
-        design = np.hstack([design, ones, -ones])
-        prior = np.zeros((1, design.shape[1]))
-        prior[0, -2:] = np.array([1.0, -1.0]) / data.series.offset_sigma
-        design = np.vstack([design, prior])
-        target = np.append(target, 0.0)
-    amplitudes = nonnegative_least_squares(design, target)
-    if data.series.has_offset:
-        return amplitudes[:-2], float(amplitudes[-2] - amplitudes[-1])
-    return amplitudes, 0.0
+    design = data.signal_design(problem.unit, means[:, used])
+    offsets = np.zeros_like(weights)
+    left = data.target - design @ amplitudes[used]
+    offsets[series.fitted_offsets] = np.linalg.lstsq(data.offset_design, left)[0]
+    along, _ = data.followed(weights, np.hstack([design, data.offset_design]))
+    return means @ amplitudes, offsets, along
 
 
 def _channel_weights(
-    data: WhitenedSeries, curve: FloatArray, offset: float
+    data: WhitenedSeries, curve: FloatArray, offsets: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
     """Weights (maximum 1) that explain the values by `curve`, and the curve in their units."""
     design = (data.matrices * curve[:, None, None]).reshape(-1, data.matrices.shape[2])
-    target = (data.values - offset * data.ones).ravel()
+    target = (data.values - data.constant(offsets)).ravel()
     weights = np.maximum(np.linalg.lstsq(design, target)[0], 0)
     brightest = float(weights.max())
     if brightest == 0:
@@ -163,7 +147,7 @@ def _channel_weights(
 
 
 def _flicker(
-    series: DecaySeries, signal: FloatArray, offset: float, leverage: FloatArray
+    series: DecaySeries, signal: FloatArray, offsets: FloatArray, leverage: FloatArray
 ) -> tuple[float, float, float]:
     """ρ, its σ and its degrees of freedom from the frames' common scatter about the curve.
 
@@ -173,7 +157,7 @@ def _flicker(
     """
     u = signal * series.inverse_sigma
     brightness2 = np.einsum("fc,fc->f", u, u)
-    left = series.inverse_sigma * (series.values - signal - offset)
+    left = series.inverse_sigma * (series.values - signal - offsets)
     along2 = np.einsum("fc,fc->f", u, left) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
     spare = np.maximum(1 - leverage, 0.0)
     if float(brightness2**2 @ spare) <= LEAST_SPARE * float(brightness2 @ brightness2):

@@ -35,14 +35,14 @@ def fit_decay(
     channels: Sequence[str] = ("value",),
     n_states: int | None = None,
     max_states: int = 3,
-    offset_sigma: float = 0.0,
+    offset_sigma: ArrayLike = 0.0,
     flicker: float | None = 0.0,
     fixed_rates: Sequence[float] = (),
 ) -> DecayFit:
     """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al. sec. 4.4).
 
-    Frame f, channel c: y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + offset, g the mean of e^(−k t) over
-    the exposure. Cov = diag(σ_fc²) + ρ² s_f s_fᵀ within a frame, s the signal without the offset.
+    Frame f, channel c: y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + b_c, g the mean of e^(−k t) over the
+    exposure. Cov = diag(σ_fc²) + ρ² s_f s_fᵀ within a frame, s the signal without b_c.
 
     Parameters
     ----------
@@ -62,7 +62,8 @@ def fit_decay(
     max_states
         Most states tried.
     offset_sigma
-        Prior σ of a constant common to all channels, in the values' units: 0 holds it at zero, inf
+        Prior σ of the channels' independent constants b_c, such as the σ of the dark level
+        subtracted from each; in the values' units, one for all or (C,): 0 holds it at zero, inf
         leaves it free.
     flicker
         Relative noise ρ that all channels of a frame share; None estimates it from the scatter of
@@ -132,7 +133,9 @@ def _numbers_of_states(
     frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
 
     def parameters(n: int) -> int:
-        return 2 * n - n_fixed + int(np.isinf(series.offset_sigma)) + int(not series.sigma_given)
+        return (
+            2 * n - n_fixed + int(np.isinf(series.offset_sigma).any()) + int(not series.sigma_given)
+        )
 
     if frames < parameters(fewest):
         raise FitError(
@@ -165,7 +168,7 @@ def _supported_states(
     """The states chosen; fewer than the fewest wanted if amplitudes vanish."""
     for fewest in range(numbers.start, max(len(fixed), 1) - 1, -1):
         those = range(fewest, max(numbers.stop, fewest + 1))
-        chosen, tried = choose_states(data, those, fixed, smooth.weights, smooth.offset, noise_dof)
+        chosen, tried = choose_states(data, those, fixed, smooth.weights, smooth.offsets, noise_dof)
         if chosen is not None:
             return chosen, tried
     raise FitError(NO_DECAY)
@@ -174,7 +177,7 @@ def _supported_states(
 def _rivals(data: WhitenedSeries, chosen: StatesFit) -> tuple[Rival, ...]:
     """What is no sum of exponentials, fitted under the candidates' weights."""
     joint = chosen.joint
-    fits = [(shape, fit_rival(data, shape, joint.weights, joint.offset)) for shape in RIVALS]
+    fits = [(shape, fit_rival(data, shape, joint.weights, joint.offsets)) for shape in RIVALS]
     return tuple(fitted_rival(shape, fit, data.series, bic(data, fit)) for shape, fit in fits)
 
 

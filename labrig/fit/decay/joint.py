@@ -1,7 +1,8 @@
-"""Everything at once: a decay's shape, the channels' weights and the offset, by least squares.
+"""Everything at once: a decay's shape, the channels' weights and offsets, by least squares.
 
-The signal is w_c h(t; θ): a shape h shared by all channels, times one weight per channel (rank one,
-Nalbach et al. sec. 4.3). The brightest channel's weight is held at 1, which fixes the scale of h.
+The model is w_c h(t; θ) + b_c: a shape h shared by all channels, times one weight per channel
+(rank one, Nalbach et al. sec. 4.3), plus what each channel's dark level is wrong by. The brightest
+channel's weight is held at 1, which fixes the scale of h.
 """
 
 from collections.abc import Callable
@@ -9,7 +10,6 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
 
@@ -23,7 +23,7 @@ CHANGES_OF_LEAD = 3
 
 @dataclass(frozen=True)
 class JointFit:
-    """Shape, weights and offset together, in the series' own units.
+    """Shape, weights and offsets together, in the series' own units.
 
     Attributes
     ----------
@@ -31,23 +31,23 @@ class JointFit:
         (q,) θ.
     weights
         (C,) maximum 1.
-    offset
-        Common to all channels.
+    offsets
+        (C,) 0 where held.
     least_squares
-        The solution of `[θ, weights of all but the brightest channel, offset if fitted]`.
+        The solution of `[θ, weights of all but the brightest channel, offsets that are fitted]`.
     brightest
         The channel whose weight is held at 1.
     """
 
     shape: FloatArray
     weights: FloatArray
-    offset: float
+    offsets: FloatArray
     least_squares: LeastSquaresFit
     brightest: int
 
     @property
     def chi2(self) -> float:
-        """Sum of squared whitened residuals, the offset's prior included."""
+        """Sum of squared whitened residuals, the offsets' priors included."""
         return self.least_squares.chi2
 
     @property
@@ -57,12 +57,17 @@ class JointFit:
 
     def frame_residuals(self, data: WhitenedSeries) -> tuple[FloatArray, FloatArray]:
         """(n,) residuals along the signal, one of unit variance per frame; (n,) squared SNR."""
-        unit = data.unit_signal(self.weights)
+        unit = data.constant(self.weights)
         length = np.linalg.norm(unit, axis=1)
         residuals = self.least_squares.residuals[: unit.size].reshape(unit.shape)
         along = np.einsum("fc,fc->f", unit, residuals) / np.where(length > 0, length, 1.0)
-        signal = residuals + data.values - self.offset * data.ones
+        signal = residuals + data.values - data.constant(self.offsets)
         return along, np.einsum("fc,fc->f", signal, signal)
+
+    def followed(self, data: WhitenedSeries) -> tuple[float, float]:
+        """Degrees of freedom that the fit took from the residuals along and across the signal."""
+        along, across = data.followed(self.weights, self.least_squares.jacobian)
+        return float(along.sum()), float(across.sum())
 
 
 def fit_jointly(
@@ -70,13 +75,13 @@ def fit_jointly(
     shape: Shape,
     start: FloatArray,
     weights: FloatArray,
-    offset: float,
+    offsets: FloatArray,
     lower: FloatArray,
     upper: FloatArray,
     max_iterations: int,
     tolerance: float,
 ) -> JointFit:
-    """Least squares over θ, weights and offset.
+    """Least squares over θ, weights and offsets.
 
     Parameters
     ----------
@@ -86,8 +91,8 @@ def fit_jointly(
         h and its Jacobian.
     start, lower, upper
         (q,) θ and its bounds.
-    weights, offset
-        (C,) and scalar to start from.
+    weights, offsets
+        (C,) to start from.
     max_iterations
         Evaluations after which a fit that still creeps is taken as it is.
     tolerance
@@ -100,66 +105,61 @@ def fit_jointly(
         problem = JointProblem(data, shape, len(start), others)
         solution = least_squares(
             problem.residuals,
-            problem.pack(theta, weights / weights[brightest], offset),
-            lower=problem.pack(lower, np.zeros_like(weights), -np.inf),
-            upper=problem.pack(upper, np.full_like(weights, np.inf), np.inf),
+            problem.pack(theta, weights / weights[brightest], offsets),
+            lower=problem.pack(lower, np.zeros_like(weights), np.full_like(weights, -np.inf)),
+            upper=problem.pack(upper, np.full_like(weights, np.inf), np.full_like(weights, np.inf)),
             max_iterations=max_iterations,
             tolerance=tolerance,
         )
-        theta, weights, offset = problem.unpack(solution.parameters)
+        theta, weights, offsets = problem.unpack(solution.parameters)
         # Of two channels about equally bright the other one may turn out to lead.
         if weights.max() <= 1:
             break
-    return JointFit(theta, weights, offset, solution, brightest)
+    return JointFit(theta, weights, offsets, solution, brightest)
 
 
 @dataclass(frozen=True)
 class JointProblem:
-    """Residuals as a function of [θ, weights of the other channels, offset if fitted]."""
+    """Residuals as a function of [θ, weights of the other channels, offsets that are fitted]."""
 
     data: WhitenedSeries
     shape: Shape
     n_shape: int
     others: list[int]
 
-    def pack(self, theta: FloatArray, weights: FloatArray, offset: float) -> FloatArray:
+    def pack(self, theta: FloatArray, weights: FloatArray, offsets: FloatArray) -> FloatArray:
         """The parameters as one vector."""
-        last = [offset] if self.data.series.has_offset else []
-        return np.concatenate([theta, weights[self.others], last])
+        fitted = self.data.series.fitted_offsets
+        return np.concatenate([theta, weights[self.others], offsets[fitted]])
 
-    def unpack(self, x: FloatArray) -> tuple[FloatArray, FloatArray, float]:
-        """θ, weights of all channels (C,), offset."""
-        weights = np.ones(self.data.values.shape[1])
-        weights[self.others] = x[self.n_shape : self.n_shape + len(weights) - 1]
-        return x[: self.n_shape], weights, float(x[-1]) if self.data.series.has_offset else 0.0
+    def unpack(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """θ, weights (C,) and offsets (C,) of all channels."""
+        first_offset = self.n_shape + len(self.others)
+        weights, offsets = np.ones(len(self.others) + 1), np.zeros(len(self.others) + 1)
+        weights[self.others] = x[self.n_shape : first_offset]
+        offsets[self.data.series.fitted_offsets] = x[first_offset:]
+        return x[: self.n_shape], weights, offsets
 
     def residuals(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Whitened model − data (n C,) and its Jacobian, the offset's prior as a last row."""
+        """Whitened model − target (n C + p,) and its Jacobian; the last p rows are the priors."""
         data, q, others = self.data, self.n_shape, self.others
-        theta, weights, offset = self.unpack(x)
+        theta, weights, _ = self.unpack(x)
         h, slopes = self.shape(theta)
-        unit = data.unit_signal(weights)
-        jacobian = np.empty((*unit.shape, len(x)))
-        jacobian[:, :, :q] = unit[:, :, None] * slopes[:, None, :]
+        unit, first_offset = data.constant(weights), q + len(others)
+        jacobian = np.zeros((len(data.target), len(x)))
+        frames = jacobian[: unit.size].reshape(*unit.shape, len(x))
+        frames[:, :, :q] = unit[:, :, None] * slopes[:, None, :]
         if others:
-            jacobian[:, :, q : q + len(others)] = h[:, None, None] * data.matrices[:, :, others]
-        r = unit * h[:, None] - data.values
-        if not data.series.has_offset:
-            return r.ravel(), jacobian.reshape(r.size, len(x))
-        jacobian[:, :, -1] = data.ones
-        prior = np.zeros((1, len(x)))
-        prior[0, -1] = 1 / data.series.offset_sigma
-        return (
-            np.append(r + offset * data.ones, offset / data.series.offset_sigma),
-            np.vstack([jacobian.reshape(r.size, len(x)), prior]),
-        )
+            frames[:, :, q:first_offset] = h[:, None, None] * data.matrices[:, :, others]
+        jacobian[:, first_offset:] = data.offset_design
+        residuals = data.offset_design @ x[first_offset:] - data.target
+        residuals[: unit.size] += (unit * h[:, None]).ravel()
+        return residuals, jacobian
 
 
-def parameter_sigma(fit: JointFit, series: DecaySeries) -> tuple[FloatArray, float]:
-    """σ of the channel weights (C,) and of the offset; 0 for what is held."""
-    sigma = fit.least_squares.sigma
-    n_shape = len(fit.shape)
-    weights = np.zeros(len(fit.weights))
-    others = [c for c in range(len(weights)) if c != fit.brightest]
-    weights[others] = sigma[n_shape : n_shape + len(others)]
-    return weights, float(sigma[-1]) if series.has_offset else 0.0
+def weight_sigma(fit: JointFit) -> FloatArray:
+    """σ of the channel weights (C,); 0 for the one that is held."""
+    n_shape, others = len(fit.shape), np.arange(len(fit.weights)) != fit.brightest
+    sigma = np.zeros(len(fit.weights))
+    sigma[others] = fit.least_squares.sigma[n_shape : n_shape + np.count_nonzero(others)]
+    return sigma

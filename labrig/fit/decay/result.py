@@ -36,7 +36,7 @@ class DecayState:
 
 @dataclass(frozen=True)
 class DecayFit:
-    """Σ_i a_i e^(−k_i t) times one weight per channel, plus an offset; with uncertainties.
+    """Σ_i a_i e^(−k_i t) times one weight per channel, plus its offset; with uncertainties.
 
     Attributes
     ----------
@@ -44,8 +44,8 @@ class DecayFit:
         By falling rate.
     channels, channel_weights, channel_weights_sigma
         Names, weights (maximum 1, which is held), their σ.
-    offset, offset_sigma
-        Common to all channels, in the values' units; σ 0 if held at 0.
+    offsets, offsets_sigma
+        Of the channels, in the values' units; σ 0 if held at 0.
     flicker, flicker_sigma
         Relative noise common to the channels of a frame; σ 0 if given.
     chi2, dof
@@ -53,7 +53,8 @@ class DecayFit:
     bic
         χ² + parameters · log(independent data).
     covariance
-        Rows of k1, a1, k2, a2, …, offset; channel weights marginalised.
+        Rows of k1, a1, k2, a2, …, offset of the brightest channel; channel weights and the others'
+        offsets marginalised.
     warnings
         What to distrust, and what to do about it.
     candidates
@@ -71,8 +72,8 @@ class DecayFit:
     channels: tuple[str, ...]
     channel_weights: tuple[float, ...]
     channel_weights_sigma: tuple[float, ...]
-    offset: float
-    offset_sigma: float
+    offsets: tuple[float, ...]
+    offsets_sigma: tuple[float, ...]
     flicker: float
     flicker_sigma: float
     chi2: float
@@ -92,12 +93,27 @@ class DecayFit:
         return len(self.states)
 
     @property
+    def brightest(self) -> int:
+        """The channel of weight 1, in whose units the amplitudes are."""
+        return int(np.argmax(self.channel_weights))
+
+    @property
+    def offset(self) -> float:
+        """Of the brightest channel."""
+        return self.offsets[self.brightest]
+
+    @property
+    def offset_sigma(self) -> float:
+        """Of the brightest channel."""
+        return self.offsets_sigma[self.brightest]
+
+    @property
     def reduced_chi2(self) -> float:
         """χ² per degree of freedom; NaN if there are none."""
         return self.chi2 / self.dof if self.dof > 0 else math.nan
 
     def predict(self, t_s: ArrayLike, exposure_s: ArrayLike = 0.0) -> FloatArray:
-        """Mean signal during exposures, (n, C), offset included.
+        """Mean signal during exposures, (n, C), offsets included.
 
         Parameters
         ----------
@@ -121,7 +137,7 @@ class DecayFit:
         rates = np.array([state.k_r_per_s for state in self.states])
         amplitudes = np.array([state.amplitude for state in self.states])
         signal = exponential_means(rates, t, np.broadcast_to(exposure, t.shape)) @ amplitudes
-        predicted: FloatArray = signal[:, None] * np.array(self.channel_weights) + self.offset
+        predicted: FloatArray = np.multiply.outer(signal, self.channel_weights) + self.offsets
         return predicted
 
     def to_json(self) -> str:
@@ -129,12 +145,12 @@ class DecayFit:
         fields: dict[str, Any] = {
             "n_states": self.n_states,
             "states": [asdict(state) for state in self.states],
-            "channel_weights": dict(zip(self.channels, self.channel_weights, strict=True)),
-            "channel_weights_sigma": dict(
-                zip(self.channels, self.channel_weights_sigma, strict=True)
-            ),
+            "channel_weights": self._by_channel(self.channel_weights),
+            "channel_weights_sigma": self._by_channel(self.channel_weights_sigma),
             "offset": self.offset,
             "offset_sigma": self.offset_sigma,
+            "offsets": self._by_channel(self.offsets),
+            "offsets_sigma": self._by_channel(self.offsets_sigma),
             "flicker": self.flicker,
             "flicker_sigma": self.flicker_sigma,
             "chi2": self.chi2,
@@ -160,22 +176,25 @@ class DecayFit:
             ]
             for number, state in enumerate(self.states, start=1)
         ]
-        weights = ", ".join(
-            f"{name} {with_uncertainty(weight, sigma)}"
-            for name, weight, sigma in zip(
-                self.channels, self.channel_weights, self.channel_weights_sigma, strict=True
-            )
-        )
         lines = _table([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
-        lines.append(f"weights  {weights}")
-        if self.offset_sigma:
-            lines.append(f"offset   {with_uncertainty(self.offset, self.offset_sigma)}")
+        lines.append(f"weights  {self._written(self.channel_weights, self.channel_weights_sigma)}")
+        if any(self.offsets_sigma):
+            lines.append(f"offsets  {self._written(self.offsets, self.offsets_sigma)}")
         if self.flicker or self.flicker_sigma:
             percent = with_uncertainty(100 * self.flicker, 100 * self.flicker_sigma)
             lines.append(f"flicker  {percent} %")
         lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
         lines += [f"! {warning}" for warning in self.warnings]
         return "\n".join(lines)
+
+    def _by_channel(self, values: tuple[float, ...]) -> dict[str, float]:
+        return dict(zip(self.channels, values, strict=True))
+
+    def _written(self, values: tuple[float, ...], sigmas: tuple[float, ...]) -> str:
+        return ", ".join(
+            f"{name} {with_uncertainty(value, sigma)}"
+            for name, value, sigma in zip(self.channels, values, sigmas, strict=True)
+        )
 
 
 def with_uncertainty(value: float, sigma: float) -> str:

@@ -93,7 +93,7 @@ class Rival:
 
 
 def fit_rival(
-    data: WhitenedSeries, rival: RivalShape, weights: FloatArray, offset: float
+    data: WhitenedSeries, rival: RivalShape, weights: FloatArray, offsets: FloatArray
 ) -> JointFit:
     """Least squares from the best of a grid of τ and exponent; `shape` is [A, log τ, exponent]."""
     series = data.series
@@ -112,7 +112,7 @@ def fit_rival(
         shape,
         start,
         weights,
-        offset,
+        offsets,
         np.array([0.0, low, rival.exponents[0]]),
         np.array([np.inf, high, rival.exponents[1]]),
         MAX_ITERATIONS,

@@ -1,6 +1,6 @@
 """Variable projection: where in the space of rates to look, the amplitudes being linear.
 
-For given rates the amplitudes (≥ 0) and the offset follow by linear least squares, so the search
+For given rates the amplitudes (≥ 0) and the offsets follow by linear least squares, so the search
 has one dimension per state: every combination of a grid of rates, then BOBYQA in log k from the
 best. Deterministic; the joint fit does the last digits.
 
@@ -17,7 +17,6 @@ from math import comb
 import nlopt
 import numpy as np
 
-from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.shapes import exponential_means
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
@@ -32,38 +31,34 @@ MAX_EVALUATIONS = 200
 
 @dataclass(frozen=True)
 class Projection:
-    """The linear half of the problem at given channel weights, the offset already eliminated.
+    """The linear half of the problem at given channel weights, the offsets already eliminated.
 
     Attributes
     ----------
-    series
-        Times and exposures.
+    data
+        The whitened series.
     unit
         (n, C) whitened signal of 1.
+    offset_directions
+        (n C + p, m) orthonormal: what the offsets can explain.
     target
-        (m,) whitened values, orthogonal to the offset's direction.
-    offset_direction
-        (m,) of length 1, or None without an offset.
+        (n C + p,) the rest of the whitened values.
     """
 
-    series: DecaySeries
+    data: WhitenedSeries
     unit: FloatArray
+    offset_directions: FloatArray
     target: FloatArray
-    offset_direction: FloatArray | None
 
     def rate_columns(self, log_rates: FloatArray) -> FloatArray:
-        """(m, len(log_rates)) whitened exponentials of amplitude 1 at the first frame."""
-        means = exponential_means(np.exp(log_rates), self.series.t, self.series.exposure)
-        return self.columns(means)
+        """(n C + p, q) of exponentials (q,) of amplitude 1 at the first frame."""
+        series = self.data.series
+        return self.columns(exponential_means(np.exp(log_rates), series.t, series.exposure))
 
-    def columns(self, means: FloatArray) -> FloatArray:
-        """(m, q) whitened signals of unwhitened shapes (n, q)."""
-        columns = (self.unit[:, :, None] * means[:, None, :]).reshape(self.unit.size, -1)
-        if self.offset_direction is None:
-            return columns
-        columns = np.vstack([columns, np.zeros((1, columns.shape[1]))])
-        along = self.offset_direction @ columns
-        return columns - np.multiply.outer(self.offset_direction, along)
+    def columns(self, shapes: FloatArray) -> FloatArray:
+        """(n C + p, q) what shapes (n, q) become, less what the offsets can explain of them."""
+        design = self.data.signal_design(self.unit, shapes)
+        return design - self.offset_directions @ (self.offset_directions.T @ design)
 
     def amplitudes(self, log_rates: FloatArray) -> tuple[FloatArray, float]:
         """Amplitudes ≥ 0 that fit best, and the χ² left."""
@@ -75,15 +70,9 @@ class Projection:
 
 def projection(data: WhitenedSeries, weights: FloatArray) -> Projection:
     """The linear problem of `data` at channel weights (C,)."""
-    series = data.series
-    unit = data.unit_signal(weights)
-    target = data.values.ravel()
-    if not series.has_offset:
-        return Projection(series, unit, target, None)
-    direction = np.append(data.ones.ravel(), 1 / series.offset_sigma)
-    direction /= np.linalg.norm(direction)
-    target = np.append(target, 0.0)
-    return Projection(series, unit, target - direction * (direction @ target), direction)
+    directions = np.linalg.qr(data.offset_design)[0]
+    target = data.target - directions @ (directions.T @ data.target)
+    return Projection(data, data.constant(weights), directions, target)
 
 
 def nonnegative(gram: FloatArray, moments: FloatArray) -> FloatArray:
@@ -118,7 +107,7 @@ def search_rates(problem: Projection, n_free: int, fixed: FloatArray) -> FloatAr
     fixed
         (f,) log rates that take part but stay.
     """
-    low, high = problem.series.log_rate_bounds
+    low, high = problem.data.series.log_rate_bounds
     start = _best_on_grid(problem, n_free, fixed, low, high)
     if start is None:
         return None

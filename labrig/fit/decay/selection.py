@@ -55,7 +55,7 @@ def choose_states(
     numbers: range,
     fixed: FloatArray,
     weights: FloatArray,
-    offset: float,
+    offsets: FloatArray,
     noise_dof: float,
 ) -> tuple[StatesFit | None, list[Candidate]]:
     """Fits with more and more states, `numbers` of them, until one more is not worth it.
@@ -68,8 +68,8 @@ def choose_states(
         States in all, the fixed ones included.
     fixed
         (f,) log of the rates held.
-    weights, offset
-        Channel weights (C,) and offset to start from.
+    weights, offsets
+        (C,) to start from.
     noise_dof
         Degrees of freedom of the noise's own estimate; inf if it was given.
 
@@ -80,7 +80,7 @@ def choose_states(
     chosen: StatesFit | None = None
     tried: list[Candidate] = []
     for n_states in numbers:
-        fit = fit_states(data, n_states - len(fixed), fixed, weights, offset)
+        fit = fit_states(data, n_states - len(fixed), fixed, weights, offsets)
         if fit is None:
             break
         p_value = None if chosen is None else f_test(data, chosen.joint, fit.joint, noise_dof)
@@ -90,7 +90,7 @@ def choose_states(
         if p_value is not None and (p_value > F_TEST_LEVEL or tried[-1].bic > tried[-2].bic):
             break
         chosen = fit
-        weights, offset = fit.joint.weights, fit.joint.offset
+        weights, offsets = fit.joint.weights, fit.joint.offsets
     return chosen, tried
 
 
@@ -102,9 +102,8 @@ def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit, noise_dof: flo
     """
     added = more.n_parameters - fewer.n_parameters
     frames, brightness2 = more.frame_residuals(data)
-    own = len(more.shape) + int(data.series.has_offset)
-    dof = len(frames) - own
-    if dof <= 0 or added <= 0:
+    dof = len(frames) - more.followed(data)[0]
+    if dof < 1 or added <= 0:
         return 1.0
     spare = dof / len(frames)
     bright = float(brightness2 @ frames**2) / float(brightness2.sum())

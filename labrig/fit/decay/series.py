@@ -18,7 +18,7 @@ LARGEST_PHASE = 300.0
 
 NO_DECAY = (
     "expected a signal that decays, got none that a positive exponential describes; "
-    "check the dark level, and that times count from lamp off"
+    "did the lamp light, is the dark level right, do times count from lamp off?"
 )
 
 
@@ -35,7 +35,7 @@ class DecaySeries:
     values, inverse_sigma
         (n, C); an inverse σ of 0 marks a value that was not measured.
     offset_sigma
-        Prior σ of the common offset: 0 held at zero, inf free.
+        (C,) prior σ of the channels' offsets: 0 held at zero, inf free.
     span_s, peak
         What times and values were divided by.
     order
@@ -51,7 +51,7 @@ class DecaySeries:
     start: float
     values: FloatArray
     inverse_sigma: FloatArray
-    offset_sigma: float
+    offset_sigma: FloatArray
     span_s: float
     peak: float
     order: NDArray[np.intp]
@@ -69,9 +69,9 @@ class DecaySeries:
         return int(np.count_nonzero(self.inverse_sigma))
 
     @property
-    def has_offset(self) -> bool:
-        """Whether an offset is fitted."""
-        return self.offset_sigma > 0
+    def fitted_offsets(self) -> NDArray[np.intp]:
+        """(m,) channels whose offset is fitted."""
+        return np.flatnonzero(self.offset_sigma)
 
     @property
     def log_rate_bounds(self) -> tuple[float, float]:
@@ -90,7 +90,7 @@ def decay_series(
     sigma: ArrayLike | None,
     exposure_s: ArrayLike,
     channels: Sequence[str],
-    offset_sigma: float,
+    offset_sigma: ArrayLike,
 ) -> DecaySeries:
     """Check, sort and scale; arguments as `labrig.fit.decay.fit_decay` takes them.
 
@@ -111,6 +111,7 @@ def decay_series(
             f"({', '.join(names)}), got shape {np.shape(values)}; give one row per frame"
         )
     inverse_sigma = _inverse_sigma(sigma, y)
+    prior_sigma = _prior_sigma(offset_sigma, len(names))
     measured = inverse_sigma > 0
     try:
         exposure = np.broadcast_to(np.asarray(exposure_s, dtype=np.float64), t.shape)
@@ -127,8 +128,6 @@ def decay_series(
             f"expected times after lamp off and exposures ≥ 0, got {earliest:g} s; "
             "count the time from when the lamp went off"
         )
-    if not offset_sigma >= 0:
-        raise FitError(f"expected offset_sigma ≥ 0, got {offset_sigma:g}; 0 holds the offset at 0")
     order = np.argsort(t, kind="stable")
     span = float(t.max() - t.min())
     if span == 0:
@@ -146,7 +145,8 @@ def decay_series(
         start=float(t.min()) / span,
         values=y[order] / peak,
         inverse_sigma=inverse_sigma[order] * (peak if sigma is not None else 1.0),
-        offset_sigma=offset_sigma / peak,
+        # A channel that was not measured has no offset to fit.
+        offset_sigma=np.where(measured.any(axis=0), prior_sigma / peak, 0.0),
         span_s=span,
         peak=peak,
         order=order,
@@ -178,6 +178,17 @@ def _inverse_sigma(sigma: ArrayLike | None, y: FloatArray) -> FloatArray:
             "or inf for a value to leave out"
         )
     return 1 / s
+
+
+def _prior_sigma(offset_sigma: ArrayLike, n_channels: int) -> FloatArray:
+    s = np.asarray(offset_sigma, dtype=np.float64)
+    if s.shape not in {(), (n_channels,)}:
+        raise FitError(
+            f"expected one offset_sigma or {n_channels}, got shape {s.shape}; give one per channel"
+        )
+    if not np.all(s >= 0):
+        raise FitError(f"expected offset_sigma ≥ 0, got {s.min():g}; 0 holds the offset at 0")
+    return np.broadcast_to(s, n_channels)
 
 
 def _refuse_unless_finite(what: str, numbers: FloatArray) -> None:

@@ -92,7 +92,7 @@ def exponentials(series: DecaySeries, n_free: int, fixed: FloatArray) -> Shape:
 
 
 def fit_states(
-    data: WhitenedSeries, n_free: int, fixed: FloatArray, weights: FloatArray, offset: float
+    data: WhitenedSeries, n_free: int, fixed: FloatArray, weights: FloatArray, offsets: FloatArray
 ) -> StatesFit | None:
     """The best `n_free` exponentials besides those of `fixed` log rates (f,).
 
@@ -110,10 +110,10 @@ def fit_states(
     start[0 : 2 * n_free : 2] = found
     start[1 : 2 * n_free : 2] = amplitudes[:n_free]
     start[2 * n_free :] = amplitudes[n_free:]
-    fit = _fit_from(data, start, fixed, weights, offset, CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE)
+    fit = _fit_from(data, start, fixed, weights, offsets, CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE)
     vanished = fit.vanished
     if vanished[n_free:].any():
-        return fit_states(data, n_free, fixed[~vanished[n_free:]], weights, offset)
+        return fit_states(data, n_free, fixed[~vanished[n_free:]], weights, offsets)
     merged = n_free > 1 and np.diff(np.sort(fit.joint.shape[0 : 2 * n_free : 2])).min()
     if vanished.any() or (n_free > 1 and merged < MERGED_LOG_RATE):
         return None
@@ -122,13 +122,17 @@ def fit_states(
 
 def refit(data: WhitenedSeries, fit: StatesFit) -> StatesFit:
     """The same states to all digits, perhaps under other whitening, less those that vanish."""
-    return _to_all_digits(data, fit.joint.shape, fit.fixed, fit.joint.weights, fit.joint.offset)
+    return _to_all_digits(data, fit.joint.shape, fit.fixed, fit.joint.weights, fit.joint.offsets)
 
 
 def _to_all_digits(
-    data: WhitenedSeries, start: FloatArray, fixed: FloatArray, weights: FloatArray, offset: float
+    data: WhitenedSeries,
+    start: FloatArray,
+    fixed: FloatArray,
+    weights: FloatArray,
+    offsets: FloatArray,
 ) -> StatesFit:
-    fit = _fit_from(data, start, fixed, weights, offset, FINAL_ITERATIONS, 0.0)
+    fit = _fit_from(data, start, fixed, weights, offsets, FINAL_ITERATIONS, 0.0)
     kept, n_free = ~fit.vanished, fit.n_free
     if kept.all():
         return fit
@@ -136,7 +140,7 @@ def _to_all_digits(
         raise FitError(NO_DECAY)
     still_present = np.concatenate([np.repeat(kept[:n_free], 2), kept[n_free:]])
     return _to_all_digits(
-        data, fit.joint.shape[still_present], fixed[kept[n_free:]], weights, offset
+        data, fit.joint.shape[still_present], fixed[kept[n_free:]], weights, offsets
     )
 
 
@@ -145,7 +149,7 @@ def _fit_from(
     start: FloatArray,
     fixed: FloatArray,
     weights: FloatArray,
-    offset: float,
+    offsets: FloatArray,
     max_iterations: int,
     tolerance: float,
 ) -> StatesFit:
@@ -155,6 +159,6 @@ def _fit_from(
     lower[0 : 2 * n_free : 2], upper[0 : 2 * n_free : 2] = low, high
     shape = exponentials(data.series, n_free, fixed)
     joint = fit_jointly(
-        data, shape, start, weights, offset, lower, upper, max_iterations, tolerance
+        data, shape, start, weights, offsets, lower, upper, max_iterations, tolerance
     )
     return StatesFit(joint, fixed)

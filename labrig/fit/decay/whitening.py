@@ -11,7 +11,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit.decay.series import DecaySeries
-from labrig.fit.least_squares import FloatArray
+from labrig.fit.least_squares import EPSILON, FloatArray
 
 
 @dataclass(frozen=True)
@@ -24,8 +24,13 @@ class WhitenedSeries:
         What was whitened.
     matrices
         (n, C, C) one W per frame, with Wᵀ W = Cov⁻¹.
-    values, ones
-        (n, C) the values, and a signal of 1 in every channel, whitened.
+    values
+        (n, C) whitened.
+    target
+        (n C + p,) the same in one row, then 0 for each of the p offsets whose prior σ is finite.
+    offset_design
+        (n C + p, m) what an offset of 1 in each channel that has one adds to the target, its prior
+        included.
     variance
         (n, C) of each value alone, flicker included; inf where not measured.
     """
@@ -33,13 +38,44 @@ class WhitenedSeries:
     series: DecaySeries
     matrices: FloatArray
     values: FloatArray
-    ones: FloatArray
+    target: FloatArray
+    offset_design: FloatArray
     variance: FloatArray
 
-    def unit_signal(self, weights: FloatArray) -> FloatArray:
-        """(n, C) what a signal of 1 in the brightest channel becomes; `weights` (C,)."""
-        unit: FloatArray = self.matrices @ weights
-        return unit
+    def constant(self, levels: FloatArray) -> FloatArray:
+        """(n, C) what the same signal (C,) in all frames becomes."""
+        constant: FloatArray = self.matrices @ levels
+        return constant
+
+    def signal_design(self, unit: FloatArray, shapes: FloatArray) -> FloatArray:
+        """(n C + p, q) what shapes (n, q) become that multiply a whitened signal `unit` (n, C)."""
+        design = np.zeros((len(self.target), shapes.shape[1]))
+        design[: unit.size] = (unit[:, :, None] * shapes[:, None, :]).reshape(unit.size, -1)
+        return design
+
+    def followed(self, weights: FloatArray, design: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Degrees of freedom that a linear model takes from each frame: parts of its hat matrix.
+
+        Parameters
+        ----------
+        weights
+            (C,) of the channels.
+        design
+            (n C + p, q) its columns.
+
+        Returns
+        -------
+        (n,) along the signal, at most 1 each, and (n,) across it, at most C − 1.
+        """
+        unit = self.constant(weights)
+        length = np.linalg.norm(unit, axis=1)
+        norms = np.linalg.norm(design, axis=0)
+        u, s, _ = np.linalg.svd(design / np.where(norms > 0, norms, 1.0), full_matrices=False)
+        independent = s > max(design.shape) * EPSILON * s.max(initial=0.0)
+        frames = u[: unit.size, independent].reshape(*unit.shape, -1)
+        direction = unit / np.where(length > 0, length, 1.0)[:, None]
+        along = (np.einsum("fc,fcq->fq", direction, frames) ** 2).sum(axis=1)
+        return along, (frames**2).sum(axis=(1, 2)) - along
 
     def independent_data(self, weights: FloatArray) -> float:
         """Values' worth of independent information on the common signal, between n and n C.
@@ -47,7 +83,7 @@ class WhitenedSeries:
         The ratio of the information in all channels to that in the best one: flicker, which the
         channels share, makes a second channel say little new.
         """
-        unit = self.unit_signal(weights)
+        unit = self.constant(weights)
         together = np.einsum("fc,fc->f", unit, unit)
         best = (weights**2 / self.variance).max(axis=1)
         seen = best > 0
@@ -76,10 +112,15 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         shrink = u / (root * (1 + root))[:, None]
         matrices = matrices - shrink[:, :, None] * (u * series.inverse_sigma)[:, None, :]
     alone = 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2
+    values = np.einsum("fcd,fd->fc", matrices, series.values)
+    fitted = series.fitted_offsets
+    prior = np.diag(1 / series.offset_sigma[fitted])
+    prior = prior[prior.any(axis=1)]
     return WhitenedSeries(
         series=series,
         matrices=matrices,
-        values=np.einsum("fcd,fd->fc", matrices, series.values),
-        ones=matrices.sum(axis=2),
+        values=values,
+        target=np.append(values, np.zeros(len(prior))),
+        offset_design=np.vstack([matrices[:, :, fitted].reshape(values.size, -1), prior]),
         variance=np.where(measured, alone + (flicker * signal) ** 2, np.inf),
     )

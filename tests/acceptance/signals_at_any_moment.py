@@ -1,0 +1,63 @@
+"""Real processes, stopped by real signals at moments that nobody chose: exit code and one line.
+
+    python -m tests.acceptance.signals_at_any_moment [--trials 50]
+
+Half of the trials count the time from the start of the process, half from a frame on, since a
+start-up on a busy machine would eat most of the first kind.
+"""
+
+import argparse
+import random
+import signal
+import subprocess
+import sys
+import tempfile
+import time
+
+CODES = {signal.SIGINT: 130, signal.SIGTERM: 143}
+
+
+def trial(rng: random.Random, runs: str) -> str:
+    """Start a run, stop it; what was wrong, or nothing."""
+    process = subprocess.Popen(
+        [sys.executable, "-m", "labrig", "run", "decay", "--rig", "sim", "--runs", runs],
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
+    assert process.stderr is not None
+    said = ""
+    if rng.random() < 0.5:
+        time.sleep(rng.uniform(0.4, 12.0))
+    else:
+        frame = rng.randint(1, 56)
+        for line in process.stderr:
+            said += line
+            if f"frame {frame} of" in line:
+                break
+    signum, times = rng.choice(list(CODES)), rng.choice([1, 10])
+    for _ in range(times):
+        process.send_signal(signum)
+        time.sleep(rng.choice([0.0002, 0.002, 0.02]))
+    out, rest = process.communicate(timeout=120)
+    complaints = [line for line in (said + rest).splitlines() if not line.startswith("[")]
+    ended_before = process.returncode == 0 and not complaints
+    stopped = process.returncode == CODES[signum] and len(complaints) == 1
+    if ended_before or stopped:
+        return ""
+    return f"{signum.name} x{times}: code {process.returncode}, {complaints}, {out[-200:]!r}"
+
+
+def main() -> None:
+    """Count the trials that went wrong and show them."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--trials", type=int, default=50)
+    trials = parser.parse_args().trials
+    rng = random.Random(1)
+    with tempfile.TemporaryDirectory() as runs:
+        wrong = [said for said in (trial(rng, runs) for _ in range(trials)) if said]
+    print(f"{len(wrong)} of {trials} went wrong", *wrong, sep="\n")
+
+
+if __name__ == "__main__":
+    main()
