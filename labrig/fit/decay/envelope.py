@@ -24,6 +24,9 @@ COARSE_RATES = 48
 REFINEMENT = 4
 #: Rounds: grid ratio 1.2 → 1.003, curve off by < 1e−5.
 ROUNDS = 3
+#: No shutter, aperture or lamp flickers more: what scatters more is a dark level or a model that is
+#: wrong, and must not pass for flicker.
+MOST_FLICKER = 0.1
 #: Turns of curve, channel weights and flicker; of curve and weights if the flicker is given.
 ALTERNATIONS = 5
 ALTERNATIONS_IF_GIVEN = 2
@@ -169,7 +172,7 @@ def _flicker(
     for _ in range(FLICKER_ITERATIONS):
         told = brightness2 / (1 + variance * brightness2)
         scatter = float((told**2 / np.where(brightness2 > 0, brightness2, 1.0)) @ (along2 - spare))
-        variance = max(scatter / float(told**2 @ spare), 0.0)
+        variance = min(max(scatter / float(told**2 @ spare), 0.0), MOST_FLICKER**2)
 
     def error(variance: float) -> tuple[float, float]:
         """σ(ρ²), and ν: 2/ν is the squared relative error of V where frames tell of the decay."""
@@ -180,7 +183,7 @@ def _flicker(
     variance_sigma, dof = error(variance)
     if dof < FEWEST_NOISE_DOF:
         # So few frames tell that a low estimate is an accident: err on the noisy side.
-        variance += variance_sigma
+        variance = min(variance + variance_sigma, MOST_FLICKER**2)
         variance_sigma, dof = error(variance)
     flicker = float(np.sqrt(variance))
     # Near zero the square root is not linear: then √σ(ρ²) is the scale of what ρ could be.
