@@ -18,8 +18,8 @@ NEGLIGIBLE_AMPLITUDE = 1e-9
 #: Two rates closer than this in log k are one.
 MERGED_LOG_RATE = 1e-2
 #: A candidate is only compared by its χ²: evaluations and relative step that will do for that.
-CANDIDATE_ITERATIONS = 40
-CANDIDATE_TOLERANCE = 1e-5
+CANDIDATE_ITERATIONS = 100
+CANDIDATE_TOLERANCE = 1e-8
 #: The answer is given to all digits.
 FINAL_ITERATIONS = 1000
 
