@@ -153,8 +153,12 @@ def test_changing_colour() -> None:
 
 
 def test_offset_far_from_its_prior() -> None:
-    fit = fit_decay(T, np.exp(-0.05 * T) + 0.1, 0.001, offset_sigma=0.01)
+    values = np.exp(-0.05 * T) + 0.1
+    fit = fit_decay(T, values, 0.001, offset_sigma=0.01, n_states=1)
     assert any("times its prior σ" in line for line in fit.warnings)
+    # Left to choose, a state too slow to tell from a constant takes it over: said as well.
+    fit = fit_decay(T, values, 0.001, offset_sigma=0.01)
+    assert any("subtract the dark level" in line for line in fit.warnings)
 
 
 def test_offset_far_from_its_prior_is_named() -> None:
