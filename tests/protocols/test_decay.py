@@ -1,5 +1,6 @@
 """The decay protocol: its timeline, what it refuses, and what it measures in a simulated room."""
 
+import json
 from collections.abc import Callable
 from pathlib import Path
 
@@ -146,3 +147,35 @@ def test_a_charge_until_the_plateau_ends_when_the_glow_stops_growing(
         for line in (ended.run_folder / "result" / "series.csv").read_text().splitlines()[1:]
     ]
     assert min(times_s) == pytest.approx(0.56, abs=0.03), "time counts from the last lamp-off"
+
+
+def test_a_dark_region_takes_the_place_of_dark_frames(
+    labrig: Callable[..., Ended],
+    make_rig: Callable[..., Path],
+    make_protocol: Callable[..., Path],
+    tmp_path: Path,
+) -> None:
+    protocol = make_protocol(dark="background", background=[0.0, 0.0, 1.0, 0.08])
+    ended = labrig("run", protocol, "--rig", make_rig(), "--runs", tmp_path / "runs")
+    assert ended.code == 0, ended.err
+    assert read_run(ended.run_folder).frames("dark") == []
+    (state,) = json.loads((ended.run_folder / "result" / "fit.json").read_text())["states"]
+    assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_sigma_per_s"]
+    assert state["k_r_sigma_per_s"] < 0.001
+
+
+def test_repeats_share_one_fit(
+    labrig: Callable[..., Ended],
+    make_rig: Callable[..., Path],
+    make_protocol: Callable[..., Path],
+    tmp_path: Path,
+) -> None:
+    sigmas = []
+    for repeats in (1, 4):
+        protocol = make_protocol(repeats=repeats)
+        ended = labrig("run", protocol, "--rig", make_rig(), "--runs", tmp_path / str(repeats))
+        assert ended.code == 0, ended.err
+        (state,) = json.loads((ended.run_folder / "result" / "fit.json").read_text())["states"]
+        assert abs(state["k_r_per_s"] - 0.032) < 3 * state["k_r_sigma_per_s"]
+        sigmas.append(state["k_r_sigma_per_s"])
+    assert sigmas[1] < 0.75 * sigmas[0]
