@@ -2,6 +2,7 @@
 
 import json
 from collections.abc import Callable
+from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
@@ -43,20 +44,50 @@ def test_the_neutrals_of_a_colour_checker_are_linear(labrig: Callable[..., Ended
     assert np.corrcoef(green, reflectance)[0, 1] >= 0.9995
 
 
-@pytest.mark.parametrize(
-    ("name", "said"),
-    [
-        ("canon_eos_6d_linear.dng", "all colours in every pixel"),
-        ("canon_700d_truncated.cr2", "cut off"),
-    ],
-)
-def test_what_is_no_bayer_frame_is_refused_in_one_line(
-    labrig: Callable[..., Ended], name: str, said: str
+@dataclass(frozen=True)
+class Photograph:
+    """A file of raw_photos/ and what its line in the README says of it."""
+
+    name: str
+    refused: str = ""
+    size: tuple[int, int] = (0, 0)
+    cfa: str = ""
+    black: int = 0
+    white: int = 0
+
+
+NO_CONTAINER = "no RAW container"
+PHOTOGRAPHS = [
+    Photograph("canon_550d_kissx4_colorchecker.dng", "", (1734, 1156), "RGGB", 2056, 15000),
+    Photograph("kodak_dc50.kdc", "", (768, 512), "GRBG", 0, 16383),
+    Photograph("canon_eos_6d_linear.dng", "all colours in every pixel"),
+    Photograph("canon_700d_truncated.cr2", "cut off"),
+    Photograph("isp_DSC_1339_768x512_rggb_u16le.raw", NO_CONTAINER),
+    Photograph("isp_DSC_1339_768x512_rggb_badpixels_u16le.raw", NO_CONTAINER),
+]
+
+
+def test_no_photograph_is_left_out() -> None:
+    assert {path.name for path in RAW.iterdir()} == {photo.name for photo in PHOTOGRAPHS}
+
+
+@pytest.mark.parametrize("photo", PHOTOGRAPHS, ids=lambda photo: photo.name)
+def test_every_photograph_is_reduced_or_refused_as_the_readme_says(
+    labrig: Callable[..., Ended], photo: Photograph
 ) -> None:
-    ended = labrig("frame", RAW / name)
-    assert ended.code == 4
-    assert said in ended.err
-    assert ended.err.count("\n") == 1
+    ended = labrig("frame", RAW / photo.name, "--json")
+    if photo.refused:
+        assert (ended.code, ended.out) == (4, "")
+        assert photo.refused in ended.err
+        assert ended.err.count("\n") == 1
+        return
+    assert ended.code == 0, ended.err
+    found = json.loads(ended.out)
+    assert (found["width"], found["height"]) == photo.size
+    assert (found["cfa"], found["white"]) == (photo.cfa, photo.white)
+    assert found["black"] == [photo.black] * 4
+    width, height = photo.size
+    assert sum(channel["n"] for channel in found["channels"].values()) == width * height
 
 
 def test_a_persistent_phosphor_has_the_rates_of_an_independent_fit(

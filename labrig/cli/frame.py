@@ -7,7 +7,7 @@ import typer
 
 
 def frame(
-    file: Annotated[Path, typer.Argument(help="A RAW file of any Bayer camera.")],
+    file: Annotated[Path, typer.Argument(help="A RAW file: Bayer, X-Trans, no colours.")],
     roi: Annotated[
         str | None,
         typer.Option("--roi", help="x,y,width,height in pixels of the visible frame."),

@@ -2,24 +2,18 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from typing import Any, TypeAlias
+from typing import Any
 
 import numpy as np
-import numpy.typing as npt
 
 from labrig.errors import DataError, FrameError
-from labrig.reduce.noise import ROUNDING_VARIANCE, TILE, Floats, Mosaic, PlaneNoise, plane_noise
-from labrig.reduce.outliers import isolated_outliers
+from labrig.reduce.noise import ROUNDING_VARIANCE
+from labrig.reduce.planes import PixelMask, PlaneCount, count_planes
 from labrig.reduce.raw import RawFrame
 from labrig.region import Region, region_pixels
 
-PixelMask: TypeAlias = npt.NDArray[np.bool_]
-
-CHANNELS = ("R", "G", "B")
 #: The quantile that says how close to clipping a channel is: a few hot pixels do not reach it.
 PEAK_QUANTILE = 0.995
-#: Noise of a smaller region is told from its surroundings of this many pixels: 2 × 2 tiles.
-_LEAST_WINDOW = 4 * TILE
 
 
 @dataclass(frozen=True)
@@ -56,11 +50,11 @@ class ChannelStats:
 
 @dataclass(frozen=True)
 class FrameMeasurement:
-    """The channels `R`, `G` (both greens) and `B` of a frame; the rest is as in `RawFrame`."""
+    """The channels `R`, `G` (all greens) and `B`, or `L`; the rest is as in `RawFrame`."""
 
     channels: Mapping[str, ChannelStats]
     cfa: str
-    black: tuple[float, float, float, float]
+    black: tuple[float, ...]
     white: float
     width: int
     height: int
@@ -122,18 +116,6 @@ class FrameMeasurement:
         )
 
 
-@dataclass(frozen=True, eq=False)
-class _PlaneCount:
-    """Pixels of one position of the CFA: how many (`count`) have which `value` (DN above black)."""
-
-    colour: str
-    value: Floats
-    count: Floats
-    saturated: int
-    hot: int
-    noise: PlaneNoise
-
-
 def measure(
     raw: RawFrame, region: Region | None = None, hot: PixelMask | None = None
 ) -> FrameMeasurement:
@@ -163,11 +145,11 @@ def measure(
     area = (0, 0, raw.width, raw.height)
     if region is not None:
         area = region_pixels(region, raw.width, raw.height)
-    planes = _plane_counts(raw, area, hot)
+    planes = count_planes(raw, area, hot)
     return FrameMeasurement(
         channels={
             name: _channel(name, [plane for plane in planes if plane.colour == name])
-            for name in CHANNELS
+            for name in raw.channels
         },
         cfa=raw.cfa,
         black=raw.black,
@@ -182,68 +164,8 @@ def measure(
     )
 
 
-def _plane_counts(
-    raw: RawFrame, area: tuple[int, int, int, int], hot: PixelMask | None
-) -> list[_PlaneCount]:
-    """The four CFA positions of `raw` in the pixels `area`: x, y, width, height."""
-    x, y, width, height = area
-    left, wide = _grown(x, width, raw.width)
-    top, high = _grown(y, height, raw.height)
-    window = raw.mosaic[top : top + high, left : left + wide]
-    # Rows and columns of the window that have the CFA's first row and column.
-    noises = {
-        (row, column): plane_noise(window[(row - top) % 2 :: 2, (column - left) % 2 :: 2])
-        for row in (0, 1)
-        for column in (0, 1)
-    }
-    out_y, out_x = isolated_outliers(window, (top, left), noises)
-    inside = (y <= out_y) & (out_y < y + height) & (x <= out_x) & (out_x < x + width)
-    out_y, out_x = out_y[inside], out_x[inside]
-    if hot is not None:
-        known = hot[out_y, out_x]
-        out_y, out_x = out_y[~known], out_x[~known]
-    found = []
-    for row, column in noises:
-        here = (
-            slice(y + (row - y) % 2, y + height, 2),
-            slice(x + (column - x) % 2, x + width, 2),
-        )
-        plane = np.ascontiguousarray(raw.mosaic[here])
-        histogram = _histogram(plane)
-        if hot is not None:
-            histogram -= np.bincount(plane[hot[here]], minlength=len(histogram))
-        level = np.flatnonzero(histogram)
-        count = histogram[level].astype(np.float64)
-        position = 2 * row + column
-        found.append(
-            _PlaneCount(
-                colour=raw.cfa[position],
-                value=np.asarray(level - raw.black[position], dtype=np.float64),
-                count=count,
-                saturated=int(count[level >= raw.white].sum()),
-                hot=int(np.count_nonzero((out_y % 2 == row) & (out_x % 2 == column))),
-                noise=noises[row, column],
-            )
-        )
-    return found
-
-
-def _grown(start: int, length: int, limit: int) -> tuple[int, int]:
-    """A side of a region, grown about its middle to what noise needs, inside the frame."""
-    grown = min(max(length, _LEAST_WINDOW), limit)
-    return min(max(start - (grown - length) // 2, 0), limit - grown), grown
-
-
-def _histogram(plane: Mosaic) -> npt.NDArray[np.int64]:
-    """Number of pixels at each of the 65536 levels: mean, spread, quantiles in one exact pass."""
-    import cv2  # counts ten times as fast as NumPy
-
-    counts = cv2.calcHist([plane], [0], None, [65536], [0, 65536])
-    return np.asarray(counts).ravel().astype(np.int64)
-
-
-def _channel(name: str, planes: list[_PlaneCount]) -> ChannelStats:
-    """Statistics over the one or two CFA positions of a colour."""
+def _channel(name: str, planes: list[PlaneCount]) -> ChannelStats:
+    """Statistics over all CFA positions of a colour."""
     value = np.concatenate([plane.value for plane in planes])
     count = np.concatenate([plane.count for plane in planes])
     n = float(count.sum())

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.errors import DataError
-from labrig.reduce.channels import PixelMask
-from labrig.reduce.noise import Floats, Mosaic
+from labrig.reduce.noise import Floats
 from labrig.reduce.outliers import OUTLIER_SIGMAS
+from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame
 
 #: Exposures that differ by less than cameras round them by are one exposure.
@@ -108,38 +108,42 @@ def hot_pixels(darks: Sequence[RawFrame]) -> PixelMask:
     Parameters
     ----------
     darks
-        Two or more dark frames, the longest there are: a pixel is hot if it exceeds the median
-        of the 24 nearest of its colour by more than 8 robust standard deviations in two of them.
+        Two or more dark frames, the longest there are: a pixel is hot if it exceeds the median of
+        the 24 nearest of its CFA position by more than 8 robust standard deviations in two of them.
 
     Raises
     ------
     DataError
-        Fewer than two frames, or of different sizes.
+        Fewer than two frames, or of different sizes or sensors.
     """
     if len(darks) < HOT_FRAMES:
         raise DataError(
             f"expected {HOT_FRAMES} or more dark frames to tell hot pixels from cosmic rays, got "
             f"{len(darks)}; take more"
         )
-    shapes = {dark.mosaic.shape for dark in darks}
-    if len(shapes) > 1:
-        raise DataError(f"expected dark frames of one size, got {sorted(shapes)}; leave some out")
+    kinds = {(*dark.mosaic.shape, dark.cfa) for dark in darks}
+    if len(kinds) > 1:
+        raise DataError(
+            f"expected dark frames of one size and sensor, got {sorted(kinds)}; leave some out"
+        )
     times_bright = np.zeros(darks[0].mosaic.shape, np.uint16)
     for dark in darks:
-        times_bright += _bright(dark.mosaic)
+        times_bright += _bright(dark)
     return np.asarray(times_bright >= HOT_FRAMES)
 
 
-def _bright(mosaic: Mosaic) -> PixelMask:
+def _bright(dark: RawFrame) -> PixelMask:
     """Pixels far above the median of their surroundings."""
     import cv2  # its median filter is the fast one
 
-    bright = np.zeros(mosaic.shape, bool)
-    for row in (0, 1):
-        for column in (0, 1):
-            plane = np.ascontiguousarray(mosaic[row::2, column::2])
+    side = dark.cfa_side
+    bright = np.zeros(dark.mosaic.shape, bool)
+    for row in range(side):
+        for column in range(side):
+            here = (slice(row, None, side), slice(column, None, side))
+            plane = np.ascontiguousarray(dark.mosaic[here])
             excess = plane.astype(np.float32) - np.asarray(cv2.medianBlur(plane, 5))
             deviation = 1.4826 * float(np.median(np.abs(excess)))
             # Whole numbers: a quiet sensor's median deviation may be 0 though it is not silent.
-            bright[row::2, column::2] = excess > OUTLIER_SIGMAS * max(deviation, 1.0)
+            bright[here] = excess > OUTLIER_SIGMAS * max(deviation, 1.0)
     return bright

@@ -9,17 +9,23 @@ from typing import Any
 
 @dataclass(frozen=True)
 class Exif:
-    """EXIF of one frame; None where absent, unreadable or a placeholder such as 0."""
+    """EXIF of one frame; None where absent, unreadable or a placeholder such as 0.
+
+    `dng`: the file says that it is a DNG.
+    """
 
     exposure_s: float | None = None
     iso: float | None = None
     f_number: float | None = None
     make: str | None = None
     model: str | None = None
+    dng: bool = False
 
 
 #: The value by which EXIF 2.3 says "more than 65534, look elsewhere".
 _ISO_OVERFLOW = 65535
+#: What exifread calls the tag that only DNG files have: by its number, as long as it has no name.
+_DNG_VERSION = ("Image Tag 0xC612", "Image DNGVersion")
 
 
 def read_exif(content: bytes) -> Exif:
@@ -42,6 +48,7 @@ def read_exif(content: bytes) -> Exif:
         f_number=_positive(tags, "FNumber"),
         make=_text(tags, "Image Make"),
         model=_text(tags, "Image Model"),
+        dng=any(name in tags for name in _DNG_VERSION),
     )
 
 

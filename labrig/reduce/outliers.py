@@ -14,29 +14,34 @@ Indices: TypeAlias = npt.NDArray[np.intp]
 OUTLIER_SIGMAS = 8.0
 #: … and the greatest of them, so that an edge of the sample is none.
 _ABOVE_ALL_SIGMAS = 4.0
-#: The nearest pixels of the same colour.
-_NEIGHBOURS = [(y, x) for y in (-2, 0, 2) for x in (-2, 0, 2) if (y, x) != (0, 0)]
+#: Where the nearest pixels of the same CFA position are, in repeats of the CFA.
+_NEIGHBOURS = [(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1) if (y, x) != (0, 0)]
 
 
 def isolated_outliers(
-    window: Mosaic, corner: tuple[int, int], noises: Mapping[tuple[int, int], PlaneNoise]
+    window: Mosaic,
+    corner: tuple[int, int],
+    side: int,
+    noises: Mapping[tuple[int, int], PlaneNoise],
 ) -> tuple[Indices, Indices]:
     """Rows and columns, on the sensor, of the outliers in `window`.
 
     Parameters
     ----------
     window
-        Part of a mosaic, at least 6 × 6 pixels.
+        Part of a mosaic, at least three repeats of the CFA wide and high.
     corner
         Row and column of its first pixel on the sensor.
+    side
+        Pixels after which the CFA repeats: 2 of a Bayer sensor.
     noises
-        Noise of the four CFA positions by the parity of row and column on the sensor.
+        Noise of each CFA position by row and column within the repeat.
     """
     import cv2  # SIMD over the whole mosaic: 20 ms for 21 megapixels
 
-    kernel = np.zeros((5, 5), np.uint8)
+    kernel = np.zeros((2 * side + 1, 2 * side + 1), np.uint8)
     for down, right in _NEIGHBOURS:
-        kernel[down + 2, right + 2] = 1
+        kernel[(down + 1) * side, (right + 1) * side] = 1
     greatest = np.asarray(cv2.dilate(window, kernel))
     excess = np.asarray(cv2.subtract(window, greatest))
     levels = np.arange(65536, dtype=np.float64)
@@ -47,10 +52,14 @@ def isolated_outliers(
     passed = passed[excess.ravel()[passed] > limit[greatest.ravel()[passed]]]
     y, x = np.divmod(passed, window.shape[1])
     level = greatest[y, x].astype(np.float64)
-    alone = excess[y, x] > _ABOVE_ALL_SIGMAS * _deviation(level, y, x, corner, noises)
+    alone = excess[y, x] > _ABOVE_ALL_SIGMAS * _deviation(
+        level, y + corner[0], x + corner[1], side, noises
+    )
     y, x = y[alone], x[alone]
-    level = _median_of_neighbours(window, y, x)
-    far = window[y, x] > level + OUTLIER_SIGMAS * _deviation(level, y, x, corner, noises)
+    level = _median_of_neighbours(window, y, x, side)
+    far = window[y, x] > level + OUTLIER_SIGMAS * _deviation(
+        level, y + corner[0], x + corner[1], side, noises
+    )
     return y[far] + corner[0], x[far] + corner[1]
 
 
@@ -58,21 +67,22 @@ def _deviation(
     level: Floats,
     y: Indices,
     x: Indices,
-    corner: tuple[int, int],
+    side: int,
     noises: Mapping[tuple[int, int], PlaneNoise],
 ) -> Floats:
-    """Standard deviation of the noise at `level` in the pixels (y, x) of the window."""
+    """Standard deviation of the noise at `level` in the pixels (y, x) of the sensor."""
     variance = np.zeros(len(level))
     for (row, column), noise in noises.items():
-        here = ((y + corner[0]) % 2 == row) & ((x + corner[1]) % 2 == column)
+        here = (y % side == row) & (x % side == column)
         variance[here] = noise.variance_at(level[here])
     return np.sqrt(variance)
 
 
-def _median_of_neighbours(window: Mosaic, y: Indices, x: Indices) -> Floats:
-    """Median of the eight same-colour neighbours; beyond a border, of the opposite ones."""
+def _median_of_neighbours(window: Mosaic, y: Indices, x: Indices, side: int) -> Floats:
+    """Median of the eight same-position neighbours; beyond a border, of the opposite ones."""
     values = np.empty((len(_NEIGHBOURS), len(y)))
-    for values_there, (down, right) in zip(values, _NEIGHBOURS, strict=True):
+    for values_there, repeats in zip(values, _NEIGHBOURS, strict=True):
+        down, right = (number * side for number in repeats)
         row, column = y + down, x + right
         row = np.where((row < 0) | (row >= window.shape[0]), y - down, row)
         column = np.where((column < 0) | (column >= window.shape[1]), x - right, column)

@@ -8,9 +8,10 @@ from pathlib import Path
 import numpy as np
 
 from labrig.errors import DataError
-from labrig.reduce.channels import CHANNELS, FrameMeasurement, PixelMask, measure
+from labrig.reduce.channels import FrameMeasurement, measure
 from labrig.reduce.dark import SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
 from labrig.reduce.noise import Floats
+from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
 from labrig.reduce.series import Series, add_flag
 from labrig.region import Region
@@ -109,9 +110,9 @@ def reduce_patches(
     if not frames or not patches:
         raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
     hot = _hot(darks)
-    models = {} if background else _dark_models(darks, patches, hot)
     shots = [_shot(frame, patches, background, hot) for frame in frames]
     _check_settings(shots)
+    models = {} if background else _dark_models(darks, patches, hot)
     return {name: _patch_series(name, shots, models) for name in patches}
 
 
@@ -178,10 +179,10 @@ def _patch_series(
     elif models:
         for row, shot in enumerate(shots):
             model = models.get((name, _key(shot.iso)))
-            if model is None:
+            if model is None or len(model.base) != level.shape[1]:
                 raise DataError(
                     f"{shot.frame.path}: expected dark frames at ISO {shot.iso:g} as this frame, "
-                    "got none; take some, or name a background region"
+                    "of the same sensor, got none; take some, or name a background region"
                 )
             dark[row], of_model = model.dark_level(shot.frame.exposure_s)
             drift = ONE_DEGREE * np.abs(model.current(shot.frame.exposure_s))
@@ -195,7 +196,7 @@ def _patch_series(
         sigma=sigma,
         # One number for all frames: as the offset acts on a fit, most where weights are highest.
         dark_sigma=np.average(dark_sigma / per_second, axis=0, weights=1 / np.square(sigma)),
-        channels=CHANNELS,
+        channels=tuple(shots[0].patches[name].channels),
         iso=np.array([shot.iso for shot in shots]),
         f_number=np.array([shot.f_number for shot in shots]),
         frame=tuple(shot.frame.path.name for shot in shots),
@@ -207,11 +208,12 @@ def _patch_series(
 
 def _levels(measurements: Sequence[FrameMeasurement]) -> tuple[Floats, Floats]:
     """Means and their sigma in DN, each of shape (n, C)."""
-    stats = [[m.channels[channel] for channel in CHANNELS] for m in measurements]
-    return (
-        np.array([[channel.mean for channel in row] for row in stats]),
-        np.array([[channel.sigma for channel in row] for row in stats]),
-    )
+    kinds = {tuple(m.channels) for m in measurements}
+    if len(kinds) > 1:
+        raise DataError(f"expected frames of one sensor, got channels {sorted(kinds)}")
+    pairs = [[(c.mean, c.sigma) for c in m.channels.values()] for m in measurements]
+    mean, sigma = np.moveaxis(np.array(pairs), 2, 0)
+    return mean, sigma
 
 
 def _flag(shot: _Shot, name: str) -> str:

@@ -1,7 +1,6 @@
 """A RAW file as the numbers the sensor counted, with what the camera says about them."""
 
 import io
-from collections.abc import Iterable
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,30 +8,39 @@ from typing import Any
 import numpy as np
 
 from labrig.errors import FrameError, UsageError
+from labrig.reduce.cfa import channels_of, side_of
 from labrig.reduce.exif import Exif, read_exif
 from labrig.reduce.noise import Mosaic
 from labrig.reduce.quiet import quiet_stderr
+from labrig.reduce.saturation import clip_level
+from labrig.reduce.sensor import sensor_pattern
 
-#: LibRaw's colour numbers: the second green, in the blue's row, is 3.
-_LIBRAW_COLOURS = "RGBG"
-_BAYER = {"RGGB", "BGGR", "GRBG", "GBRG"}
-#: Six rows give three of one colour, the least from which noise can be told.
-_LEAST_PIXELS = 6
-_EXPECTED = "expected a RAW file with a Bayer pattern"
+#: Rows and columns of one position of the CFA, the least from which noise can be told.
+_LEAST_PIXELS = 3
+_EXPECTED = "expected a RAW file with one colour in every pixel"
+#: How files begin that hold what a sensor counted: TIFF (most, NEF, ARW and DNG among them) and its
+#: kin of Olympus, Panasonic and Phase One; CIFF; Fujifilm; Minolta; Sigma.
+_CONTAINERS = (
+    b"II*\0", b"MM\0*", b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"IIII", b"MMMM",
+    b"II\x1a\0\0\0HEAPCCDR", b"FUJIFILMCCD-RAW", b"\0MRM", b"FOVb",
+)  # fmt: skip
+#: Canon's CR3, a kind of MPEG-4, says so here.
+_CR3, _CR3_AT = b"ftypcrx", 4
 
 
 @dataclass(frozen=True, eq=False)
 class RawFrame:
-    """The visible part of a Bayer sensor, undemosaiced.
+    """The visible part of a sensor, undemosaiced.
 
     Parameters
     ----------
     mosaic
         Shape (height, width), uint16, DN with the black level in it.
     cfa
-        Colours of the top-left 2 × 2 pixels in reading order, such as `RGGB`.
+        Colours of the smallest square that repeats, from the top-left pixel in reading order:
+        four letters such as `RGGB`, 36 of an X-Trans sensor, `L` of a monochrome one.
     black
-        Black level in DN of those four pixels, in the same order.
+        Black level in DN of those pixels, in the same order.
     white
         Level in DN from which a pixel is saturated.
     exposure_s, iso, f_number, make, model
@@ -41,7 +49,7 @@ class RawFrame:
 
     mosaic: Mosaic
     cfa: str
-    black: tuple[float, float, float, float]
+    black: tuple[float, ...]
     white: float
     exposure_s: float | None = None
     iso: float | None = None
@@ -50,14 +58,22 @@ class RawFrame:
     model: str | None = None
 
     def __post_init__(self) -> None:
-        if self.mosaic.ndim != 2 or min(self.mosaic.shape) < _LEAST_PIXELS:
-            raise FrameError(f"{_EXPECTED}, got an image of shape {self.mosaic.shape}")
+        if not set(self.cfa) == set(self.channels) or self.cfa_side**2 != len(self.cfa):
+            raise FrameError(
+                f"{_EXPECTED}, in a square of R, G and B that repeats or without filters, got "
+                f"'{self.cfa}'; labrig cannot reduce this kind of sensor"
+            )
+        least = _LEAST_PIXELS * self.cfa_side
+        if self.mosaic.ndim != 2 or min(self.mosaic.shape) < least:
+            raise FrameError(
+                f"{_EXPECTED}, {least} x {least} or more, got an image of shape {self.mosaic.shape}"
+            )
         if self.mosaic.dtype != np.uint16:
             raise FrameError(f"{_EXPECTED} of 16 bit, got numbers of type {self.mosaic.dtype}")
-        if self.cfa not in _BAYER:
+        if len(self.black) != len(self.cfa):
             raise FrameError(
-                f"{_EXPECTED} ({', '.join(sorted(_BAYER))}), got '{self.cfa}'; "
-                "labrig cannot reduce this kind of sensor"
+                f"expected {len(self.cfa)} black levels, one for each of {self.cfa}, "
+                f"got {len(self.black)}"
             )
         if not 0 <= max(self.black) < self.white:
             raise FrameError(
@@ -76,14 +92,14 @@ class RawFrame:
         return int(self.mosaic.shape[0])
 
     @property
-    def colour_index(self) -> tuple[tuple[int, int], tuple[int, int]]:
-        """LibRaw's colour number of the top-left 2 × 2 pixels: R 0, G 1, B 2, blue row's G 3."""
-        red_row = self.cfa.index("R") // 2
-        number = [
-            3 if colour == "G" and position // 2 != red_row else "RGB".index(colour)
-            for position, colour in enumerate(self.cfa)
-        ]
-        return (number[0], number[1]), (number[2], number[3])
+    def cfa_side(self) -> int:
+        """Pixels after which `cfa` repeats, down and across."""
+        return side_of(self.cfa)
+
+    @property
+    def channels(self) -> tuple[str, ...]:
+        """R, G and B, or L."""
+        return channels_of(self.cfa)
 
 
 def read_raw(source: Path | bytes, name: str = "the frame") -> RawFrame:
@@ -94,7 +110,7 @@ def read_raw(source: Path | bytes, name: str = "the frame") -> RawFrame:
     UsageError
         The file is missing or not readable.
     FrameError
-        Not a RAW file, cut off or damaged, or from a sensor that has no Bayer pattern.
+        Not a RAW file, cut off or damaged, or from a sensor of another kind.
     """
     if isinstance(source, Path):
         name = str(source)
@@ -117,23 +133,25 @@ def _decode(content: bytes) -> RawFrame:
         raise FrameError(f"{_EXPECTED}, got an empty file; transfer it again")
     if content.startswith(b"\xff\xd8\xff"):
         raise FrameError(f"{_EXPECTED}, got a JPEG; set the camera's image quality to RAW")
+    if not content.startswith(_CONTAINERS) and not content.startswith(_CR3, _CR3_AT):
+        # LibRaw would take plain numbers for the picture of a webcam, if only their count fits.
+        raise FrameError(
+            f"{_EXPECTED}, got no RAW container, its header is of no known format; take the file "
+            "as the camera wrote it, and transfer it again"
+        )
     import rawpy  # LibRaw takes a tenth of a second to load: only when a RAW file is read
 
     # LibRaw reports damage on the process's stderr besides raising.
     with quiet_stderr():
         try:
             with rawpy.imread(io.BytesIO(content)) as raw:
-                return _bayer(raw, rawpy.RawType.Flat, read_exif(content))
+                return _frame(raw, rawpy.RawType.Flat, content, read_exif(content))
         except FrameError:
             raise
-        except rawpy.LibRawIOError:
+        except (rawpy.LibRawIOError, rawpy.LibRawFileUnsupportedError):
             raise FrameError(
-                f"{_EXPECTED}, got one whose end is missing; transfer it again"
-            ) from None
-        except rawpy.LibRawFileUnsupportedError:
-            raise FrameError(
-                f"{_EXPECTED}, got something LibRaw does not know or that is cut off; "
-                "check that it is a RAW file and transfer it again"
+                f"{_EXPECTED}, got one that is cut off or that LibRaw cannot unpack; transfer it "
+                "again, or set the camera to plain (lossless or uncompressed) RAW"
             ) from None
         # A damaged file can fail anywhere in rawpy, with any exception: all mean the same.
         except Exception as error:
@@ -144,31 +162,20 @@ def _decode(content: bytes) -> RawFrame:
             ) from None
 
 
-def _bayer(raw: Any, flat: Any, exif: Exif) -> RawFrame:
-    """`raw`, an open rawpy file, if it has one 2 × 2 Bayer pattern."""
+def _frame(raw: Any, flat: Any, content: bytes, exif: Exif) -> RawFrame:
+    """`raw`, an open rawpy file, if it is undemosaiced."""
     if raw.raw_type != flat:
         raise FrameError(
             f"{_EXPECTED}, got an image with all colours in every pixel (linear DNG, sRAW or "
             "Foveon); convert without demosaicing, or set the camera to full-size RAW"
         )
-    pattern, names = raw.raw_pattern, raw.color_desc.decode("ascii", "replace")
-    if pattern is None:
-        raise FrameError(f"{_EXPECTED}, got a monochrome sensor, which labrig cannot reduce yet")
-    if pattern.shape != (2, 2) or names != _LIBRAW_COLOURS:
-        kind = "X-Trans" if pattern.shape == (6, 6) else names
-        rows, columns = pattern.shape
-        raise FrameError(
-            f"{_EXPECTED}, got a {rows} x {columns} pattern ({kind}), which labrig cannot "
-            "reduce yet; use a camera with a Bayer sensor"
-        )
-    order: Iterable[int] = [int(index) for index in pattern.ravel()]
-    # LibRaw lists levels as R, G, B, G2; here they follow the pixels of the pattern.
-    first, second, third, fourth = (float(raw.black_level_per_channel[i]) for i in order)
+    cfa, black = sensor_pattern(raw, content if exif.dng else None)
+    mosaic = np.array(raw.raw_image_visible)  # a copy: LibRaw frees its own
     return RawFrame(
-        mosaic=np.array(raw.raw_image_visible),  # a copy: LibRaw frees its own
-        cfa="".join(_LIBRAW_COLOURS[index] for index in order),
-        black=(first, second, third, fourth),
-        white=float(raw.white_level),
+        mosaic=mosaic,
+        cfa=cfa,
+        black=black,
+        white=clip_level(mosaic, max(black), float(raw.white_level)),
         exposure_s=exif.exposure_s,
         iso=exif.iso,
         f_number=exif.f_number,

@@ -57,7 +57,8 @@ def parse_series(text: str, source: str) -> list[Series]:
     try:
         return _series(_table(text))
     except LabrigError as error:
-        raise type(error)(f"{source}: {error}") from None
+        # In one line, though a cell may hold a form feed or another of Unicode's line ends.
+        raise type(error)(f"{source}: {' '.join(str(error).split())}") from None
 
 
 def _table(text: str) -> _Table:

@@ -89,11 +89,13 @@ def daylight_picture(
     if best is None:
         return None
     frame, raw = best
-    linear = into_gamut(_small(_binned(raw), DAYLIGHT_WIDTH) @ screen.lamp_lit.T)
+    linear = into_gamut(_on_screen(raw, _small(_binned(raw), DAYLIGHT_WIDTH), screen.lamp_lit))
     # How well it was exposed does not matter here: what is bright should look bright.
     linear *= DAYLIGHT_BRIGHT / max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
     height, width = linear.shape[:2]
     balance = "white balanced for a halogen lamp" if screen.known else "in raw colours"
+    if _is_grey(raw):
+        balance = "from a monochrome sensor"
     return Daylight(
         source=_jpeg(encoded(linear)),
         width=width,
@@ -111,7 +113,8 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
         if raw is not None:
             small = _small(_binned(raw), GLOW_WIDTH)
             blown = (_small(_blown(raw), GLOW_WIDTH) > BLOWN_LOOKS)[..., np.newaxis]
-            linear = into_gamut(small / _light_gathered(photograph.frame) @ screen.glow.T)
+            gathered = _light_gathered(photograph.frame)
+            linear = into_gamut(_on_screen(raw, small / gathered, screen.glow))
             shown.append((photograph, linear, blown))
     if not shown:
         return ()
@@ -145,25 +148,47 @@ def _light_gathered(frame: FrameRecord) -> float:
     return frame.exposure_s * frame.iso / (frame.f_number or 1.0) ** 2
 
 
+def _is_grey(raw: RawFrame) -> bool:
+    return len(raw.channels) == 1
+
+
+def _on_screen(raw: RawFrame, picture: Picture, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """`picture` by the camera's colour `matrix`, or as it is where there are no colours."""
+    return np.asarray(picture @ (np.eye(3) if _is_grey(raw) else matrix).T)
+
+
+def _cell(raw: RawFrame) -> int:
+    """Side of the cells of the CFA that become a pixel each; 2 if there is no CFA."""
+    return max(raw.cfa_side, 2)
+
+
 def _binned(raw: RawFrame) -> Picture:
-    """R, G, B of every 2 × 2 cell above black, 1 = saturated, shape (height / 2, width / 2, 3).
+    """R, G, B of every cell above black, 1 = saturated, shape (height / 2, width / 2, 3) of Bayer.
 
     Binning and not demosaicing: the picture is shown smaller anyway, and nothing is invented.
     """
-    rows, columns = raw.height // 2, raw.width // 2
+    side = _cell(raw)
+    rows, columns = raw.height // side, raw.width // side
     picture = np.zeros((rows, columns, 3), np.float32)
-    for position, colour in enumerate(raw.cfa):
-        plane = raw.mosaic[position // 2 : 2 * rows : 2, position % 2 : 2 * columns : 2]
-        share = 0.5 if colour == "G" else 1.0
-        scale = share / (raw.white - raw.black[position])
-        picture[..., "RGB".index(colour)] += (plane - np.float32(raw.black[position])) * scale
+    times = side**2 // len(raw.cfa)
+    colours, black = raw.cfa * times, raw.black * times
+    for position, colour in enumerate(colours):
+        y, x = divmod(position, side)
+        plane = raw.mosaic[y : side * rows : side, x : side * columns : side]
+        scale = 1 / colours.count(colour) / (raw.white - black[position])
+        shown = (plane - np.float32(black[position])) * np.float32(scale)
+        for channel in range(3) if _is_grey(raw) else ["RGB".index(colour)]:
+            picture[..., channel] += shown
     return picture
 
 
 def _blown(raw: RawFrame) -> Picture:
-    """1 where one of the four pixels of a cell is saturated, else 0."""
-    rows, columns = raw.height // 2, raw.width // 2
-    cells = (raw.mosaic[: 2 * rows, : 2 * columns] >= raw.white).reshape(rows, 2, columns, 2)
+    """1 where one of the pixels of a cell is saturated, else 0."""
+    side = _cell(raw)
+    rows, columns = raw.height // side, raw.width // side
+    cells = (raw.mosaic[: side * rows, : side * columns] >= raw.white).reshape(
+        rows, side, columns, side
+    )
     return np.asarray(cells.any(axis=(1, 3)), dtype=np.float32)
 
 

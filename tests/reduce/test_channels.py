@@ -48,7 +48,7 @@ def test_bad_pixels_of_a_real_photograph_are_found(shared_data: Path) -> None:
         (row, column): plane_noise(bad[row::2, column::2]) for row in (0, 1) for column in (0, 1)
     }
     found = np.zeros(bad.shape, bool)
-    found[isolated_outliers(bad, (0, 0), noises)] = True
+    found[isolated_outliers(bad, (0, 0), 2, noises)] = True
     hot = bad > good
     assert np.count_nonzero(hot) == 200
     assert np.array_equal(found & hot, hot)

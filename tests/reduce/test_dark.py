@@ -73,5 +73,7 @@ def test_hot_pixels_need_two_frames_of_one_size(make_raw: MakeRaw) -> None:
     dark = make_raw(np.full((20, 20), 1000))
     with pytest.raises(DataError, match="2 or more"):
         hot_pixels([dark])
+    with pytest.raises(DataError, match="one size and sensor"):
+        hot_pixels([dark, make_raw(np.full((20, 20), 1000), cfa="BGGR")])
     with pytest.raises(DataError, match="one size"):
         hot_pixels([dark, make_raw(np.full((20, 22), 1000))])

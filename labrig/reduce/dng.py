@@ -1,0 +1,120 @@
+"""Filter colours and black levels of a DNG file, by its own tags (DNG 1.6, chapter 4).
+
+LibRaw reads DNG, too, but moves an odd corner of the active area to an even one and then pairs
+black levels with the wrong pixels; it puts the mean of masked borders in place of the file's
+black level, knows one black level per colour, and takes patterns larger than it knows for others.
+"""
+
+import io
+import logging
+from collections.abc import Iterator
+from dataclasses import dataclass
+from typing import Any
+
+import numpy as np
+
+from labrig.errors import FrameError
+from labrig.reduce.cfa import MONOCHROME, Letters
+from labrig.reduce.noise import Floats
+
+#: PhotometricInterpretation of mosaics, and of images with all their colours in every pixel:
+#: of one, from a sensor without filters.
+_CFA, _LINEAR_RAW = 32803, 34892
+_REPEAT, _PATTERN, _LAYOUT = 33421, 33422, 50711
+_BLACK_REPEAT, _BLACK, _BLACK_BY_COLUMN, _BLACK_BY_ROW = 50713, 50714, 50715, 50716
+_ACTIVE_AREA = 50829
+#: Letters of the codes in CFAPattern: red to white. Only the first three can be reduced.
+_COLOURS = "RGBCMYW"
+_RECTANGULAR = 1
+#: TIFF's types of fractions.
+_FRACTIONS = (5, 10)
+
+
+@dataclass(frozen=True, eq=False)
+class DngPattern:
+    """What repeats over the sensor.
+
+    Parameters
+    ----------
+    corner
+        Row and column of the sensor where the repeats begin.
+    colours
+        Shape (rows, columns), one letter per pixel.
+    black
+        Black levels in DN, shape (rows, columns), not necessarily those of `colours`; None if the
+        file has none.
+    """
+
+    corner: tuple[int, int]
+    colours: Letters
+    black: Floats | None
+
+
+def read_dng(content: bytes, height: int, width: int) -> DngPattern | None:
+    """The pattern of the raw image of that size, masked borders included; None if there is none.
+
+    Raises
+    ------
+    FrameError
+        The sensor's rows are staggered.
+    """
+    import tifffile  # exifread does not look into the sub-images, where many a DNG has its raw one
+
+    # It warns through logging of every odd tag; what matters is looked at here.
+    logging.getLogger("tifffile").setLevel(logging.CRITICAL)
+    with tifffile.TiffFile(io.BytesIO(content)) as file:
+        for page in _pages(file):
+            if (page.imagelength, page.imagewidth) == (height, width):
+                if page.photometric == _CFA:
+                    return _pattern(page.tags, _mosaic_colours(page.tags))
+                if page.photometric == _LINEAR_RAW and page.samplesperpixel == 1:
+                    return _pattern(page.tags, np.array([[MONOCHROME]]))
+    return None
+
+
+def _pages(file: Any) -> Iterator[Any]:
+    """The first image of an open file, often a preview, and the ones inside it."""
+    yield file.pages[0]
+    yield from file.pages[0].pages or ()
+
+
+def _mosaic_colours(tags: Any) -> Letters:
+    if _numbers(tags, _LAYOUT, [_RECTANGULAR]) != [_RECTANGULAR]:
+        raise FrameError(
+            "expected pixels in rows and columns, got staggered ones (Super CCD); "
+            "labrig cannot reduce this kind of sensor"
+        )
+    rows, columns = (int(number) for number in _numbers(tags, _REPEAT))
+    letters = [_COLOURS[int(code)] for code in _numbers(tags, _PATTERN)]
+    return np.array(letters).reshape(rows, columns)
+
+
+def _pattern(tags: Any, colours: Letters) -> DngPattern:
+    top, left = (int(number) for number in _numbers(tags, _ACTIVE_AREA, [0, 0, 0, 0])[:2])
+    black = None
+    if _BLACK in tags:
+        rows, columns = (int(number) for number in _numbers(tags, _BLACK_REPEAT, [1, 1]))
+        black = np.array(_numbers(tags, _BLACK)).reshape(rows, columns)
+        # The level of single rows and columns: only its mean belongs to what repeats.
+        for tag in (_BLACK_BY_COLUMN, _BLACK_BY_ROW):
+            black = black + np.mean(_numbers(tags, tag, [0]))
+    return DngPattern((top, left), colours, black)
+
+
+def _numbers(tags: Any, code: int, absent: list[float] | None = None) -> list[float]:
+    """Values of a tag.
+
+    Raises
+    ------
+    ValueError
+        It is absent and must not be.
+    """
+    tag = tags.get(code)
+    if tag is None:
+        if absent is None:
+            raise ValueError(f"tag {code} is missing")
+        return absent
+    values = list(tag.value) if isinstance(tag.value, tuple | bytes) else [tag.value]
+    if tag.dtype in _FRACTIONS:
+        return [values[i] / values[i + 1] for i in range(0, len(values), 2)]
+    return [float(value) for value in values]

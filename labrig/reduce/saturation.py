@@ -1,0 +1,44 @@
+"""The level from which pixels are saturated, where the file's white level is not reached.
+
+Some sensors, and most at their lowest ISO, are full below the white level of their file. Then all
+pixels that would be brighter pile up at one level, the brightest of the frame. Pixels that are not
+saturated do not: photon noise alone spreads them over tens of levels up there.
+"""
+
+import numpy as np
+
+from labrig.reduce.histogram import histogram
+from labrig.reduce.noise import Mosaic
+
+#: Share of the range above black below which no sensor is full, whatever piles up there.
+_LEAST_FULL = 0.5
+#: A plateau holds this share of the frame's pixels, and so many of them, …
+_LEAST_SHARE = 1e-4
+_LEAST_PIXELS = 50
+#: … that many times as many as any of the levels next below it,
+_STANDS_OUT = 10
+#: counted over so many levels that occur (compressed files leave levels out). A frame with fewer
+#: of them has no noise and is no photograph: nothing can be told.
+_LEVELS_BELOW = 16
+
+
+def clip_level(mosaic: Mosaic, black: float, white: float) -> float:
+    """`white`, or the level below it at which the frame's pixels are clipped.
+
+    Parameters
+    ----------
+    mosaic
+        The whole visible frame, DN.
+    black, white
+        As the file says, DN.
+    """
+    highest = int(mosaic.max())
+    lowest = black + _LEAST_FULL * (white - black)
+    least = max(_LEAST_SHARE * mosaic.size, _LEAST_PIXELS)
+    if not lowest < highest < white or np.count_nonzero(mosaic == highest) < least:
+        return white  # nearly every frame: the histogram would take ten times as long
+    counts = histogram(mosaic)
+    below = np.flatnonzero(counts)[-1 - _LEVELS_BELOW : -1]
+    if len(below) < _LEVELS_BELOW:
+        return white
+    return float(highest) if counts[highest] >= _STANDS_OUT * counts[below].max() else white
