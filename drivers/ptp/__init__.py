@@ -1,4 +1,4 @@
-"""Canon EOS cameras over PTP on USB."""
+"""Canon EOS cameras over PTP, on USB or in the network (PTP/IP)."""
 
 from .camera import PtpCamera
 

@@ -6,8 +6,9 @@ from enum import IntEnum
 from labrig.clock import Clock
 from labrig.errors import DeviceError
 
-from .containers import HEADER_BYTES, Container, Kind, command, decode, encode
+from .containers import Container, Kind, command
 from .failures import MalformedError, RefusedError
+from .link import Link
 from .ptp_codes import (
     DEVICE_BUSY,
     OK,
@@ -17,7 +18,6 @@ from .ptp_codes import (
     operation_text,
     response_text,
 )
-from .usb_link import UsbLink
 
 SESSION_ID = 1
 LAST_TRANSACTION_ID = 0xFFFFFFFE
@@ -78,7 +78,7 @@ class Session:
     one, or `resynchronise`, first has the camera give it up.
     """
 
-    def __init__(self, link: UsbLink, clock: Clock) -> None:
+    def __init__(self, link: Link, clock: Clock) -> None:
         self._link = link
         self._clock = clock
         self._next_id = 0
@@ -200,14 +200,10 @@ class Session:
         self._next_id = transaction_id % LAST_TRANSACTION_ID + 1
         doing = operation_text(operation)
         self._under_way = transaction_id
-        self._link.write(encode(command(operation, transaction_id, params)), doing)
-        if data is not None:
-            outgoing = Container(Kind.DATA, operation, transaction_id, data)
-            self._link.write(encode(outgoing), doing)
+        self._link.send(command(operation, transaction_id, params), data, doing)
         incoming: bytes | None = None
         for _ in range(MOST_STALE):
-            raw = self._link.read(doing, patience.answer_s, HEADER_BYTES + most_bytes)
-            container = decode(raw)
+            container = self._link.receive(doing, patience.answer_s, most_bytes)
             if container.kind is Kind.EVENT or container.transaction_id != transaction_id:
                 continue  # left over from a program that died, or out of order
             if container.kind is Kind.RESPONSE:

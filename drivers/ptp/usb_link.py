@@ -16,7 +16,7 @@ import usb.util
 from labrig.clock import Clock
 from labrig.errors import DeviceError
 
-from .containers import announced_length
+from .containers import HEADER_BYTES, Container, Kind, announced_length, decode, encode
 from .failures import MalformedError, NoAnswerError, StallError, UnpluggedError
 from .ptp_codes import DEVICE_BUSY, OK, response_text
 from .usb_errors import WAKE_UP, usb_errors_explained
@@ -68,59 +68,28 @@ class UsbLink:
         self._out = endpoints.bulk_out
         self._packet_bytes = endpoints.packet_bytes
 
-    def write(self, data: bytes, doing: str) -> None:
-        """Send one container; an empty packet ends it if nothing shorter does.
+    def send(self, request: Container, data: bytes | None, doing: str) -> None:
+        """Send one command, and its data if it has some.
 
         Raises
         ------
         DeviceError
             It was not taken; `doing` says what for.
         """
-        try:
-            with self._named(doing):
-                sent = self._device.write(self._out, data, _ms(WRITE_TIMEOUT_S))
-                if sent == len(data) and len(data) % self._packet_bytes == 0:
-                    self._device.write(self._out, b"", _ms(WRITE_TIMEOUT_S))
-        except StallError:
-            self._clear_halts()
-            raise
-        if sent != len(data):
-            raise MalformedError(
-                f"camera {self._address}: {doing}: it took {sent} of {len(data)} bytes: "
-                "unplug it and plug it in again"
-            )
+        self._write(encode(request), doing)
+        if data is not None:
+            outgoing = Container(Kind.DATA, request.code, request.transaction_id, data)
+            self._write(encode(outgoing), doing)
 
-    def read(self, doing: str, timeout_s: float, at_most_bytes: int) -> bytes:
-        """One container, whole, within `timeout_s` a packet.
+    def receive(self, doing: str, timeout_s: float, at_most_bytes: int) -> Container:
+        """One container with at most so much in it, within `timeout_s` a packet.
 
         Raises
         ------
         DeviceError
             Nothing came, it was cut short, it is longer than it says or than `at_most_bytes`.
         """
-        # The empty packet that ends a transfer of whole packets is still to be read, or never
-        # came: cameras differ, so it is met at the head of the next one.
-        packet = self._bulk_read(self._packet_bytes, doing, timeout_s) or self._bulk_read(
-            self._packet_bytes, doing, timeout_s
-        )
-        length = announced_length(packet)
-        if length > at_most_bytes:
-            raise MalformedError(
-                f"camera {self._address}: {doing}: expected at most {at_most_bytes} bytes, "
-                f"it announces {length}"
-            )
-        received = bytearray(packet)
-        while len(received) < length and len(packet) > 0 and len(packet) % self._packet_bytes == 0:
-            missing_packets = -((len(received) - length) // self._packet_bytes)
-            size = min(missing_packets * self._packet_bytes, BLOCK_BYTES)
-            packet = self._bulk_read(size, doing, timeout_s)
-            received += packet
-        if len(received) != length:
-            raise MalformedError(
-                f"camera {self._address}: {doing}: expected {length} bytes as announced, "
-                f"it sent {len(received)}"
-            )
-        return bytes(received)
+        return decode(self._read(doing, timeout_s, HEADER_BYTES + at_most_bytes))
 
     def cancel(self, transaction_id: int) -> None:
         """Have the camera give up `transaction_id`, forget what it still sends, wait until ready.
@@ -153,6 +122,48 @@ class UsbLink:
         """Release the interface; says nothing if the device is gone already."""
         with suppress(usb.core.USBError, NotImplementedError):
             usb.util.dispose_resources(self._device)
+
+    def _write(self, data: bytes, doing: str) -> None:
+        """Send one container; an empty packet ends it if nothing shorter does."""
+        try:
+            with self._named(doing):
+                sent = self._device.write(self._out, data, _ms(WRITE_TIMEOUT_S))
+                if sent == len(data) and len(data) % self._packet_bytes == 0:
+                    self._device.write(self._out, b"", _ms(WRITE_TIMEOUT_S))
+        except StallError:
+            self._clear_halts()
+            raise
+        if sent != len(data):
+            raise MalformedError(
+                f"camera {self._address}: {doing}: it took {sent} of {len(data)} bytes: "
+                "unplug it and plug it in again"
+            )
+
+    def _read(self, doing: str, timeout_s: float, at_most_bytes: int) -> bytes:
+        """One container, whole."""
+        # The empty packet that ends a transfer of whole packets is still to be read, or never
+        # came: cameras differ, so it is met at the head of the next one.
+        packet = self._bulk_read(self._packet_bytes, doing, timeout_s) or self._bulk_read(
+            self._packet_bytes, doing, timeout_s
+        )
+        length = announced_length(packet)
+        if length > at_most_bytes:
+            raise MalformedError(
+                f"camera {self._address}: {doing}: expected at most {at_most_bytes} bytes, "
+                f"it announces {length}"
+            )
+        received = bytearray(packet)
+        while len(received) < length and len(packet) > 0 and len(packet) % self._packet_bytes == 0:
+            missing_packets = -((len(received) - length) // self._packet_bytes)
+            size = min(missing_packets * self._packet_bytes, BLOCK_BYTES)
+            packet = self._bulk_read(size, doing, timeout_s)
+            received += packet
+        if len(received) != length:
+            raise MalformedError(
+                f"camera {self._address}: {doing}: expected {length} bytes as announced, "
+                f"it sent {len(received)}"
+            )
+        return bytes(received)
 
     def _bulk_read(self, size: int, doing: str, timeout_s: float) -> bytes:
         try:

@@ -1,0 +1,148 @@
+"""PTP/IP packets (CIPA DC-005): u32 length of everything, u32 type, payload; little-endian."""
+
+import struct
+from collections.abc import Iterator
+from dataclasses import dataclass
+from enum import IntEnum
+
+_HEADER = struct.Struct("<II")
+#: No host sends this camera more than a name or a property; a greater length is one gone wrong.
+_MAX_FROM_HOST = 65536
+_MAX_PARAMETERS = 5
+#: A photograph goes out in pieces of this many bytes, so that a host can cancel between them.
+_PIECE_BYTES = 65536
+_VERSION = 0x00010000
+
+
+class PacketType(IntEnum):
+    """What a packet is for."""
+
+    INIT_COMMAND_REQUEST = 1
+    INIT_COMMAND_ACK = 2
+    INIT_EVENT_REQUEST = 3
+    INIT_EVENT_ACK = 4
+    INIT_FAIL = 5
+    OPERATION_REQUEST = 6
+    OPERATION_RESPONSE = 7
+    EVENT = 8
+    START_DATA = 9
+    DATA = 10
+    CANCEL = 11
+    END_DATA = 12
+    PING = 13
+    PONG = 14
+
+
+class FailReason(IntEnum):
+    """Why a host is not let in."""
+
+    REJECTED = 1
+    BUSY = 2
+
+
+class MalformedPacketError(Exception):
+    """Bytes that are no packet, or a packet that does not belong here."""
+
+
+@dataclass(frozen=True)
+class Packet:
+    """One packet as it came from the host."""
+
+    kind: int
+    payload: bytes
+
+    def fields(self, layout: str) -> tuple[int, ...]:
+        """The payload, which is exactly these numbers in `struct`'s letters."""
+        try:
+            return struct.unpack("<" + layout, self.payload)
+        except struct.error:
+            raise MalformedPacketError from None
+
+    def split(self, layout: str) -> tuple[tuple[int, ...], bytes]:
+        """The numbers that the payload begins with, and the rest of it."""
+        size = struct.calcsize("<" + layout)
+        return Packet(self.kind, self.payload[:size]).fields(layout), self.payload[size:]
+
+
+class PacketReader:
+    """Cuts what comes over TCP into packets."""
+
+    def __init__(self) -> None:
+        self._received = bytearray()
+
+    def feed(self, received: bytes) -> None:
+        """Take what has come."""
+        self._received += received
+
+    def next_packet(self) -> Packet | None:
+        """The next packet that is there in full.
+
+        Raises
+        ------
+        MalformedPacketError
+            The length cannot be; where the next packet begins is not known.
+        """
+        if len(self._received) < _HEADER.size:
+            return None
+        length, kind = _HEADER.unpack_from(self._received)
+        if not _HEADER.size <= length <= _MAX_FROM_HOST:
+            raise MalformedPacketError
+        if len(self._received) < length:
+            return None
+        packet = Packet(kind, bytes(self._received[_HEADER.size : length]))
+        del self._received[:length]
+        return packet
+
+
+def parameters(payload: bytes) -> tuple[int, ...]:
+    """At most five u32 parameters.
+
+    Raises
+    ------
+    MalformedPacketError
+        More of them, or not whole ones.
+    """
+    count, rest = divmod(len(payload), 4)
+    if rest or count > _MAX_PARAMETERS:
+        raise MalformedPacketError
+    return struct.unpack(f"<{count}I", payload)
+
+
+def packet(kind: PacketType, payload: bytes = b"") -> bytes:
+    """One packet as bytes."""
+    return _HEADER.pack(_HEADER.size + len(payload), kind) + payload
+
+
+def init_command_ack(connection: int, guid: bytes, name: str) -> bytes:
+    """The camera introduces itself."""
+    text = (name + "\0").encode("utf-16-le")
+    payload = struct.pack("<I", connection) + guid + text + struct.pack("<I", _VERSION)
+    return packet(PacketType.INIT_COMMAND_ACK, payload)
+
+
+def init_fail(reason: FailReason) -> bytes:
+    """The host is not let in."""
+    return packet(PacketType.INIT_FAIL, struct.pack("<I", reason))
+
+
+def response(code: int, transaction_id: int, params: tuple[int, ...] = ()) -> bytes:
+    """The end of a transaction."""
+    return packet(
+        PacketType.OPERATION_RESPONSE,
+        struct.pack(f"<HI{len(params)}I", code, transaction_id, *params),
+    )
+
+
+def event(code: int) -> bytes:
+    """An event that belongs to no transaction."""
+    return packet(PacketType.EVENT, struct.pack("<HI", code, 0xFFFFFFFF))
+
+
+def data_phase(transaction_id: int, data: bytes) -> Iterator[bytes]:
+    """Packets of a data phase to the host."""
+    yield packet(PacketType.START_DATA, struct.pack("<IQ", transaction_id, len(data)))
+    head = struct.pack("<I", transaction_id)
+    last_at = max(0, len(data) - 1) // _PIECE_BYTES * _PIECE_BYTES
+    for at in range(0, last_at, _PIECE_BYTES):
+        yield packet(PacketType.DATA, head + data[at : at + _PIECE_BYTES])
+    yield packet(PacketType.END_DATA, head + data[last_at:])

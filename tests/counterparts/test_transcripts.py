@@ -1,0 +1,100 @@
+"""Recorded sessions between libgphoto2 and an EOS: each side of this house meets the other's half.
+
+Made anew by `python -m tests.counterparts.record`.
+"""
+
+import struct
+from collections import deque
+from pathlib import Path
+
+import pytest
+
+from drivers.ptp.containers import Kind, command
+from drivers.ptp.device_info import parse_device_info
+from drivers.ptp.eos_events import Event, ObjectOffered, parse_events
+from labrig.clock import VirtualClock
+from sim.camera.ptpip_packets import Packet
+from sim.camera.ptpip_transactions import Transactions
+from tests.drivers.ptp.ip_wire import saying
+
+from . import transcript
+from .record import PICTURE_BYTES, SESSIONS
+from .served import EPOCH_S, Film, camera_on
+from .transcript import CAMERA, COMMAND, HOST, Line
+
+OPERATION_REQUEST, RESPONSE, EVENT, START_DATA, END_DATA = 6, 7, 8, 9, 12
+GET_DEVICE_INFO, GET_EVENT = 0x1001, 0x9116
+#: Of what these carry every byte counts: the pictures.
+OF_OBJECTS = {0x1009, 0x101B, 0x9104, 0x9107}
+TAKES_A_PICTURE = {"capture_to_host", "capture_to_card", "bulb"}
+
+recorded = pytest.mark.parametrize("path", transcript.paths(), ids=lambda path: path.stem)
+
+
+def transactions(lines: list[Line], sender: str) -> list[Line]:
+    """What one side said on the command connection after the introduction."""
+    return [
+        line
+        for line in lines
+        if (line.sender, line.connection) == (sender, COMMAND) and line.kind >= OPERATION_REQUEST
+    ]
+
+
+def test_there_is_one_of_every_session() -> None:
+    assert {path.stem for path in transcript.paths()} == set(SESSIONS)
+
+
+@recorded
+def test_the_simulated_camera_answers_the_recorded_host(path: Path) -> None:
+    lines = transcript.read(path)
+    clock = VirtualClock(EPOCH_S)
+    film = Film(size=PICTURE_BYTES)
+    responder = camera_on(clock, film).responder
+    host = Transactions(responder)
+    expected = deque(transactions(lines, CAMERA))
+    opcode = 0
+    for line in lines:
+        clock.sleep_until(line.t_s)
+        if line.sender == CAMERA and line.kind == EVENT:
+            responder.take_event()
+        if (line.sender, line.connection) != (HOST, COMMAND) or line.kind < OPERATION_REQUEST:
+            continue
+        if line.kind == OPERATION_REQUEST:
+            _, opcode = struct.unpack_from("<IH", line.payload)
+        for packet in host.take(Packet(line.kind, line.payload)):
+            meant = expected.popleft()
+            assert packet[4:8] == meant.packet[4:8], f"{opcode:04X} at {line.t_s} s"
+            if meant.kind == RESPONSE or opcode in OF_OBJECTS:
+                assert packet == meant.packet, f"{opcode:04X} at {line.t_s} s"
+        host.answered()
+    assert not expected
+    assert len(film.taken) == (path.stem in TAKES_A_PICTURE)
+
+
+@recorded
+def test_our_initiator_understands_the_recorded_camera(path: Path) -> None:
+    lines = transcript.read(path)
+    events: list[Event] = []
+    said = b"".join(line.packet for line in transactions(lines, CAMERA))
+    on_event = b"".join(line.packet for line in lines if line.kind == EVENT)
+    requests = [line for line in transactions(lines, HOST) if line.kind == OPERATION_REQUEST]
+    with saying(said, on_event) as camera:
+        link = camera.link()
+        for request in requests:
+            _, opcode, transaction_id = struct.unpack_from("<IHI", request.payload)
+            link.send(command(opcode, transaction_id, ()), None, "replaying")
+            camera.heard()
+            while True:
+                container = link.receive("replaying", 5.0, 1 << 20)
+                assert container.transaction_id == transaction_id
+                if container.kind is Kind.RESPONSE:
+                    break
+                assert (container.kind, container.code) == (Kind.DATA, opcode)
+                if opcode == GET_EVENT:
+                    events += parse_events(container.payload)
+                if opcode == GET_DEVICE_INFO:
+                    info = parse_device_info(container.payload)
+                    assert "5D Mark II" in str(info)
+    offered = [event for event in events if isinstance(event, ObjectOffered)]
+    pictures = 1 if path.stem in TAKES_A_PICTURE else 0
+    assert [event.size_bytes for event in offered] == [PICTURE_BYTES] * pictures
