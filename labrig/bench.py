@@ -1,8 +1,9 @@
 """Opens a rig: the one place where drivers, clock and, in a simulated rig, the room meet."""
 
+import socket
 import tempfile
-from collections.abc import Iterator
-from contextlib import ExitStack, contextmanager
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, closing, contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -26,6 +27,7 @@ if TYPE_CHECKING:
     from sim import OpenRoom
 
 SERIAL_WRITE_TIMEOUT_S = 2.0
+TCP_CONNECT_TIMEOUT_S = 5.0
 
 
 @dataclass(frozen=True)
@@ -92,6 +94,38 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
         yield Bench(file, source, room.clock, room)
 
 
+def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], None]) -> None:
+    """Serve a simulated rig's camera to other programs on this PC, as PTP/IP, in real time.
+
+    Parameters
+    ----------
+    source
+        Path of the rig file, for messages.
+    port
+        TCP port on the loopback network; 0 for any that is free.
+    tell
+        Called with the address once it can be reached.
+
+    Raises
+    ------
+    UsageError
+        No simulated rig, or the port is taken.
+    Interrupted
+        Somebody asked to stop: the only way to end.
+    """
+    if file.simulation is None:
+        raise UsageError(
+            f"{source}: expected a simulated rig, this one has no 'simulation:'; try --rig sim"
+        )
+    sim, camera = shipped.load("sim"), shipped.load("sim.camera")
+    clock = SystemClock()
+    with interrupting(clock), sim.open_room(file.simulation, source) as room:
+        pace = camera.Pace(clock, room.clock)
+        with closing(camera.PtpIpServer(room.camera.responder, pace.catch_up, port)) as server:
+            tell(server.address)
+            server.serve(clock)
+
+
 def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str) -> Device:
     driver = plugins.load(plugins.DRIVERS, entry.driver, source)
     settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
@@ -113,6 +147,7 @@ class _Connections:
         self._room = room
         self._stack = stack
         self._ports: dict[str, SerialPort] = {}
+        self._hosts: set[str] = set()
 
     def serial(self, address: str, baudrate: int) -> SerialPort:
         if address not in self._ports:
@@ -150,6 +185,21 @@ class _Connections:
             )
         return found
 
+    def tcp(self, address: str, default_port: int) -> socket.socket:
+        host, port = _host_and_port(address, default_port)
+        self._hold_host(f"{urlsplit(address).scheme}://{host}:{port}")
+        try:
+            connected = socket.create_connection((host, port), TCP_CONNECT_TIMEOUT_S)
+            # commands are small, and somebody waits for the answer to each
+            connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
+        except (OSError, UnicodeError) as error:
+            raise DeviceError(
+                f"nobody answers at {address} ({error}); check that the device is on and in the "
+                "same network, and its address"
+            ) from None
+        self._stack.callback(connected.close)
+        return connected
+
     def _find(self, address: str) -> Any:
         url = urlsplit(address)
         try:
@@ -174,6 +224,11 @@ class _Connections:
                 "give the camera the WinUSB driver"
             ) from None
 
+    def _hold_host(self, address: str) -> None:
+        if address not in self._hosts:
+            self._hold(address)
+            self._hosts.add(address)
+
     def _hold(self, address: str) -> None:
         """Lock a real address; a simulated room is private to its process."""
         if address.startswith("sim://"):
@@ -188,3 +243,17 @@ class _Connections:
                 f"{address} is held by another labrig on this PC; wait until it has ended"
             ) from None
         self._stack.callback(lock.release)
+
+
+def _host_and_port(address: str, default_port: int) -> tuple[str, int]:
+    url = urlsplit(address)
+    try:
+        host, port = url.hostname, url.port
+    except ValueError:
+        host, port = None, None
+    if not host or url.path.strip("/"):
+        raise UsageError(
+            f"'{address}' is no network address; write {url.scheme}://HOST or "
+            f"{url.scheme}://HOST:PORT, such as {url.scheme}://192.168.1.20"
+        )
+    return host, default_port if port is None else port

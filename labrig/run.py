@@ -10,8 +10,10 @@ from pathlib import Path
 from typing import Protocol, Self
 
 from labrig.acquire import (
+    Checkable,
     Plan,
     ProtocolModel,
+    Rig,
     RigFile,
     RunObserver,
     plan,
@@ -21,7 +23,7 @@ from labrig.acquire import (
 )
 from labrig.bench import Bench, open_bench
 from labrig.clock import Clock, Interrupted
-from labrig.errors import DataError, DiskError, LabrigError, UsageError
+from labrig.errors import DataError, DiskError, LabrigError, ProtocolError, UsageError
 from labrig.optics import read_camera
 from labrig.quantity import duration_text
 from labrig.record import RunFolder, read_run
@@ -158,6 +160,7 @@ def fill(
             return
         try:
             with stand.devices() as rig:
+                _refuse_what_spoils(rig)
                 metadata = {
                     "protocol": protocol.protocol,
                     "sample": protocol.sample.name,
@@ -175,6 +178,19 @@ def fill(
         except LabrigError as error:
             _close(folder, stand, "fail", str(error))
             raise type(error)(f"{error}; {_kept(folder, units)}") from error
+
+
+def _refuse_what_spoils(rig: Rig) -> None:
+    """Raise `ProtocolError` if a device is set so that its data could not be trusted."""
+    spoilers = [
+        f"{key}: {finding}"
+        for key, device in rig.devices.items()
+        if isinstance(device, Checkable)
+        for finding in device.findings()
+        if finding.severity == "refuse"
+    ]
+    if spoilers:
+        raise ProtocolError("this would spoil the measurement: " + "; ".join(spoilers))
 
 
 def _close(folder: RunFolder, stand: Bench, exit_status: str, reason: str) -> None:

@@ -10,6 +10,13 @@ from labrig.clock import VirtualClock
 from labrig.material.file import read_material
 from labrig.region import region_pixels
 
+from .aiming import (
+    LIVE_EXPOSURE_S,
+    LIVE_F_NUMBER,
+    ROOM_LIGHT,
+    developed,
+    live_stride,
+)
 from .dng import Shot, encode_dng
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
 from .optics import (
@@ -30,7 +37,7 @@ FloatArray = NDArray[np.float64]
 TICK_S = 1e-6
 
 #: Streams of random numbers drawn from the seed, so that one does not shift another.
-CURVES_STREAM, SENSOR_STREAM, FRAME_STREAM = 0, 1, 2
+CURVES_STREAM, SENSOR_STREAM, FRAME_STREAM, LIVE_STREAM = 0, 1, 2, 3
 
 
 class Room:
@@ -112,6 +119,25 @@ class Room:
             self._rng(FRAME_STREAM, round(self._clock.wall(start_s) * 1e6)),
         )
         return encode_dng(mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number))
+
+    def preview(self, at_s: float) -> NDArray[np.uint8]:
+        """The viewfinder's picture: R, G, B for a display, with the room light on if there is one.
+
+        That light is for the eye only: it does not charge the samples.
+        """
+        start_s = max(at_s - LIVE_EXPOSURE_S, 0.0)
+        _, glow_s = self._phosphor.evolve(self._level_at(start_s), start_s, at_s, self._lamp)
+        light = self._lamp.exposure(start_s, at_s)
+        if self._simulation.room_light:
+            light = light + ROOM_LIGHT * (at_s - start_s) * filament_spectrum(BURNING_K)
+        electrons = self._electrons(glow_s, self._simulation.lamp.irradiance * light, LIVE_F_NUMBER)
+        step = 2 * live_stride(*self._places.shape)
+        patch = self._places[::step, ::step] // 4
+        rgb = electrons.reshape(-1, 4)[:, [0, 1, 3]].astype(np.float64)[patch]
+        return developed(
+            rgb * vignetting(*patch.shape)[:, :, None],
+            self._rng(LIVE_STREAM, round(self._clock.wall(at_s) * 1e6)),
+        )
 
     def truth(self, iso: int = 400, f_number: float = 4.0) -> Truth:
         """What a perfect fit of the decay after the last lamp-off would find."""

@@ -116,6 +116,9 @@ class Simulation(_Part):
         Wall-clock time at which the room's clock stands at zero.
     seed
         Of everything random: camera curves, hot pixels, noise.
+    room_light
+        Whether the room's own light is on while somebody aims through the viewfinder; photographs
+        are always taken without it.
     """
 
     sample: Annotated[tuple[Patch, ...], BeforeValidator(_alone), Field(min_length=1)]
@@ -128,6 +131,7 @@ class Simulation(_Part):
     initial: InitialState = InitialState()
     faults: tuple[Annotated[str, AfterValidator(_known_fault)], ...] = ()
     lamp: LampSettings = LampSettings()
+    room_light: bool = True
 
     @property
     def patches(self) -> tuple[Patch, ...]:

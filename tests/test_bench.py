@@ -95,7 +95,7 @@ def test_a_port_that_is_not_there(rig: Callable[[str], Path], tmp_path: Path) ->
         pass
 
 
-@pytest.mark.parametrize("address", ["usb://04a9", "ptpip://127.0.0.1", "usb://zz:11", "COM3"])
+@pytest.mark.parametrize("address", ["usb://04a9", "ptp://127.0.0.1", "usb://zz:11", "COM3"])
 def test_what_is_no_usb_address(tmp_path: Path, address: str) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(f"name: x\ndevices:\n  camera: {{driver: ptp_camera, address: '{address}'}}\n")

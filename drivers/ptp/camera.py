@@ -1,13 +1,15 @@
-"""A Canon EOS on USB as labrig's camera."""
+"""A Canon EOS on USB or in the network as labrig's camera."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack, suppress
 
 from labrig.acquire.connections import Connections
+from labrig.acquire.findings import Finding
 from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
 from labrig.errors import DeviceError
 
 from .device_info import DeviceInfo, parse_device_info
+from .eos_checks import findings
 from .eos_exposure import EosExposure
 from .eos_frames import EosFrames
 from .eos_protocol import (
@@ -16,7 +18,6 @@ from .eos_protocol import (
     RAW_ONLY,
     SINGLE_SHOT,
     TO_HOST,
-    VIEWFINDER_OFF,
     Eos,
     Property,
     lacking_operations,
@@ -25,11 +26,12 @@ from .eos_protocol import (
 from .eos_release import LATE_PRESS_S, release_of
 from .eos_state import EosState
 from .eos_transfer import EosTransfer
+from .eos_viewfinder import EosViewfinder
 from .failures import RefusedError
+from .link import open_link
 from .ptp_codes import Standard
 from .session import CURT, Session
 from .settings import PtpCameraSettings
-from .usb_link import UsbLink
 
 
 class PtpCamera:
@@ -41,11 +43,11 @@ class PtpCamera:
     Parameters
     ----------
     address
-        `usb://vid:pid[/serial]` or `sim://room/device`.
+        `usb://vid:pid[/serial]`, `ptpip://host[:port]` or `sim://room/device`.
     settings
         The rig file's keys for this camera.
     connections
-        Opens the USB device; has the clock.
+        Opens the USB device or the network connection; has the clock.
 
     Raises
     ------
@@ -60,7 +62,7 @@ class PtpCamera:
         self._clock = connections.clock
         self._armed = False
         with ExitStack() as undo:
-            self._link = UsbLink(connections.usb(address), address, self._clock)
+            self._link = open_link(address, connections)
             undo.callback(self._link.close)
             self._session = Session(self._link, self._clock)
             self._state = EosState(self._session, self._clock, settings.answer_timeout)
@@ -71,6 +73,7 @@ class PtpCamera:
             self._release = release_of(self._info, self._session)
             transfer = EosTransfer(self._session, self._clock, self._info)
             timeout_s = settings.transfer_timeout
+            self._viewfinder = EosViewfinder(self._session, self._state, self._clock, self._info)
             self._frames = EosFrames(self._state, transfer, self._clock, timeout_s)
             self._take_control()
             if left_behind:
@@ -96,6 +99,29 @@ class PtpCamera:
         """
         self._state.refresh()
         return self._exposure.offers()
+
+    def findings(self) -> Sequence[Finding]:
+        """How its dial, lens switch and menus are set.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer.
+        """
+        self._state.refresh()
+        return findings(self._state, self._settings.isos, self._info.operations)
+
+    def keep_awake(self) -> None:
+        """Put off its automatic switching-off.
+
+        Raises
+        ------
+        DeviceError
+            The camera is gone.
+        """
+        # one that refuses is awake, too
+        with suppress(RefusedError):
+            self._send_if_known(Eos.KeepDeviceOn)
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
         """Set and read back; returns the settings in force, with the true shutter time.
@@ -126,6 +152,7 @@ class PtpCamera:
         """
         if self._armed:
             return
+        self._viewfinder.off()
         self._frames.discard_abandoned()
         shots = self._state.value(Property.shots_left)
         if shots is not None and shots < FEW_SHOTS:
@@ -157,6 +184,17 @@ class PtpCamera:
         self._release.let_go_half(LATE_PRESS_S)
         return Frame(data, suffix, start_s, end_s, settings)
 
+    def preview(self) -> bytes:
+        """One picture of the viewfinder, a JPEG; the first one starts it, `make_safe` stops it.
+
+        Raises
+        ------
+        DeviceError
+            The camera has no live view, does not start it, or sends no picture.
+        """
+        self._armed = False
+        return self._viewfinder.picture()
+
     def make_safe(self) -> None:
         """Bring the line back into step, let go of the button, viewfinder off, nothing pending.
 
@@ -173,7 +211,7 @@ class PtpCamera:
             lambda: self._release.let_go_full(self._busy_s()),
             lambda: self._release.let_go_half(self._busy_s()),
             self._frames.discard_offered,
-            self._viewfinder_off,
+            self._viewfinder.off_whoever_switched_it_on,
         )
         problems: list[str] = []
         with self._clock.shielded():
@@ -250,10 +288,6 @@ class PtpCamera:
             self._session.start_over()
             self._take_control()
             self._release.let_go_blindly()
-
-    def _viewfinder_off(self) -> None:
-        if self._state.value(Property.viewfinder_output) is not None:
-            self._state.set(Property.viewfinder_output, number(VIEWFINDER_OFF))
 
     def _busy_s(self) -> float:
         """How long the camera may be busy: to the end of an exposure, and a little more."""

@@ -26,6 +26,7 @@ class Eos(IntEnum):
     KeepDeviceOn = 0x911D
     RemoteReleaseOn = 0x9128
     RemoteReleaseOff = 0x9129
+    GetViewFinderData = 0x9153
 
 
 class Property(IntEnum):
@@ -36,10 +37,14 @@ class Property(IntEnum):
     iso = 0xD103
     exposure_mode = 0xD105
     drive_mode = 0xD106
+    focus_mode = 0xD108
+    auto_power_off = 0xD114
     shots_left = 0xD11B
     destination = 0xD11C
     image_format = 0xD120
+    custom_functions = 0xD1A0
     viewfinder_output = 0xD1B0
+    viewfinder_mode = 0xD1B1
 
 
 _NEEDED = (
@@ -54,6 +59,7 @@ MANUAL_EXPOSURE = 3
 SINGLE_SHOT = 0
 TO_HOST = 4
 VIEWFINDER_OFF = 0
+VIEWFINDER_TO_PC = 2
 #: One file of 16 bytes' description: kind 6 (RAW), size 0 (large), compression 4 (RAW).
 RAW_ONLY = struct.pack("<5I", 1, 0x10, 6, 0, 4)
 

@@ -3,6 +3,7 @@
 from labrig.clock import Clock
 from labrig.errors import DeviceError
 
+from .eos_custom import CustomFunctions
 from .eos_events import ChoicesChanged, ObjectOffered, ValueChanged, parse_events
 from .eos_protocol import Eos, Property, property_dataset, value_text
 from .failures import MalformedError
@@ -33,6 +34,7 @@ class EosState:
         self._values: dict[int, bytes] = {}
         self._choices: dict[int, tuple[int, ...]] = {}
         self._offered: list[ObjectOffered] = []
+        self.custom_functions = CustomFunctions()
 
     @property
     def offered(self) -> tuple[ObjectOffered, ...]:
@@ -75,6 +77,8 @@ class EosState:
             match event:
                 case ValueChanged(prop, value):
                     self._values[prop] = value
+                    if prop == Property.custom_functions:
+                        self.custom_functions.take(value)
                 case ChoicesChanged(prop, codes):
                     self._choices[prop] = codes
                 case ObjectOffered():

@@ -1,5 +1,6 @@
 """How a driver reaches its device: one resolver from address to transport."""
 
+import socket
 from typing import Any, Protocol
 
 from labrig.clock import Clock
@@ -26,7 +27,7 @@ class SerialPort(Protocol):
 
 
 class Connections(Protocol):
-    """Opens transports for drivers, real or simulated alike, each address once."""
+    """Opens transports for drivers, real or simulated alike; one user an address."""
 
     @property
     def clock(self) -> Clock:
@@ -48,4 +49,13 @@ class Connections(Protocol):
         ------
         DeviceError
             No such device, or access is refused.
+        """
+
+    def tcp(self, address: str, default_port: int) -> socket.socket:
+        """Another connection to the device at `scheme://host[:port]`, each time it is called.
+
+        Raises
+        ------
+        DeviceError
+            There is no such host, or nobody listens there.
         """

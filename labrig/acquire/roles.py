@@ -1,7 +1,9 @@
 """What a protocol may ask of a device. A driver fills one of these roles."""
 
+from collections.abc import Sequence
 from typing import Protocol, runtime_checkable
 
+from labrig.acquire.findings import Finding
 from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
 
 
@@ -91,6 +93,36 @@ class Camera(Device, Protocol):
 
 
 @runtime_checkable
+class LiveView(Device, Protocol):
+    """Shows what it sees, for aiming and focusing before the lights go out. Safe: switched off."""
+
+    def preview(self) -> bytes:
+        """One live picture, a JPEG. The first one starts the live view, `make_safe` stops it.
+
+        Raises
+        ------
+        DeviceError
+            There is no live view, or no picture comes.
+        """
+
+
+@runtime_checkable
+class Checkable(Protocol):
+    """A device that can say whether its own settings spoil a measurement."""
+
+    def findings(self) -> Sequence[Finding]:
+        """How it is set by hand, as far as it tells."""
+
+
+@runtime_checkable
+class KeptAwake(Protocol):
+    """A device that switches itself off unless it is spoken to."""
+
+    def keep_awake(self) -> None:
+        """Make it count its time anew. Short, and harmless at any time between two actions."""
+
+
+@runtime_checkable
 class Spectrometer(Device, Protocol):
     """Measures relative spectral irradiance. Safe: idle."""
 
@@ -107,5 +139,6 @@ ROLES: dict[str, type] = {
     "leds": LedBank,
     "door": TrapDoor,
     "camera": Camera,
+    "viewfinder": LiveView,
     "spectrometer": Spectrometer,
 }

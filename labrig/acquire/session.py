@@ -9,6 +9,7 @@ from dataclasses import dataclass
 from typing import Protocol, TypeVar
 
 from labrig.acquire.rig import Rig
+from labrig.acquire.roles import KeptAwake
 from labrig.acquire.values import ExposureSettings, Frame
 from labrig.clock import Clock
 from labrig.errors import DeviceError, LabrigError
@@ -16,6 +17,11 @@ from labrig.quantity import duration_text
 from labrig.record import FrameRecord
 
 T = TypeVar("T")
+
+#: Cameras can be set to switch off after a minute at the least.
+AWAKE_PERIOD_S = 30.0
+#: Nobody is spoken to so shortly before an action: a busy camera may take seconds to answer.
+QUIET_BEFORE_S = 10.0
 
 
 @dataclass(frozen=True)
@@ -105,7 +111,7 @@ class Session:
         """Wait `duration_s` seconds from now."""
         until_s = self.clock.now() + duration_s
         self._observer.doing(f"{why}, {duration_text(duration_s)}", until_s)
-        self.clock.sleep_until(until_s)
+        self._sleep_until(until_s)
 
     def wait_until_warm(self, key: str) -> None:
         """Wait until the device has been connected for its warm-up time."""
@@ -131,7 +137,7 @@ class Session:
         zero_s = self.clock.now()
         for timed in sequence:
             deadline_s = zero_s + timed.at_s
-            self.clock.sleep_until(deadline_s)
+            self._sleep_until(deadline_s)
             self._execute(timed.action, late_s=self.clock.now() - deadline_s)
             if isinstance(timed.action, Shoot) and photographs:
                 self._prepare(photographs.pop(0))
@@ -153,6 +159,16 @@ class Session:
     def warn(self, text: str) -> None:
         """Tell the person at the terminal."""
         self._observer.warn(text)
+
+    def _sleep_until(self, deadline_s: float) -> None:
+        """Wait, and keep from falling asleep what would."""
+        sleepy = {k: d for k, d in self.rig.devices.items() if isinstance(d, KeptAwake)}
+        while sleepy and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
+            self.clock.sleep(AWAKE_PERIOD_S)
+            for key, device in sleepy.items():
+                with _device_errors(key):
+                    device.keep_awake()
+        self.clock.sleep_until(deadline_s)
 
     def _prepare(self, action: Action) -> None:
         if not isinstance(action, Shoot):

@@ -2,7 +2,7 @@
 
 import typer
 
-from labrig.cli import fit, frame, process, protocol, run
+from labrig.cli import fit, frame, process, protocol, rig, run, sim
 
 app = typer.Typer(
     help="From a lab bench to a measured phosphorescent or fluorescent material.",
@@ -18,6 +18,8 @@ app.command("process")(process.process)
 app.command("frame")(frame.frame)
 app.add_typer(fit.app, name="fit")
 app.add_typer(protocol.app, name="protocol")
+app.add_typer(rig.app, name="rig")
+app.add_typer(sim.app, name="sim")
 
 
 @app.callback(invoke_without_command=True)

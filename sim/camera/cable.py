@@ -6,6 +6,7 @@ from labrig.clock import VirtualClock
 
 from . import usb_errors
 from .faults import CameraFaults
+from .power import AutoPowerOff
 
 #: Host controller and scheduler, for every transfer however small (one high-speed microframe).
 TRANSACTION_S = 125e-6
@@ -22,19 +23,25 @@ class Cable:
         The simulated room's.
     faults
         When the cable is pulled and put back.
+    power
+        A camera that is off is not on the bus either.
     """
 
-    def __init__(self, clock: VirtualClock, faults: CameraFaults) -> None:
+    def __init__(self, clock: VirtualClock, faults: CameraFaults, power: AutoPowerOff) -> None:
         self._clock = clock
+        self._power = power
         self._unplug_at_s = math.inf if faults.unplug_at_s is None else faults.unplug_at_s
         self._bytes_to_unplug = faults.unplug_after_bytes
         self._away_s = math.inf if faults.replug_after_s is None else faults.replug_after_s
 
     @property
     def is_plugged(self) -> bool:
-        """Whether the cable is in now."""
+        """Whether the cable is in now, with a camera that is on at its end."""
         now_s = self._clock.now()
-        return not self._unplug_at_s <= now_s < self._unplug_at_s + self._away_s
+        return (
+            not self._power.is_off
+            and not self._unplug_at_s <= now_s < self._unplug_at_s + self._away_s
+        )
 
     @property
     def plugging(self) -> int:
@@ -49,6 +56,7 @@ class Cable:
         usb.core.USBError
             The cable was pulled before the end of it.
         """
+        self._power.put_off()
         if self._bytes_to_unplug is not None:
             if n_bytes > self._bytes_to_unplug:
                 self._pass(TRANSACTION_S + self._bytes_to_unplug / BYTES_PER_S)

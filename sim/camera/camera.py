@@ -2,8 +2,10 @@
 
 from labrig.clock import VirtualClock
 
+from .body_settings import BodySettings
 from .cable import Cable
 from .faults import CameraFaults
+from .power import AutoPowerOff
 from .responder import Responder
 from .sensor import Sensor
 from .shutter import Shutter
@@ -11,6 +13,7 @@ from .still_image import StillImageFunction
 from .usb_backend import CameraBackend
 
 _NO_FAULTS = CameraFaults()
+_WELL_SET = BodySettings()
 
 
 class SimulatedCamera:
@@ -33,6 +36,8 @@ class SimulatedCamera:
         Mean and standard deviation of the time from a full press to the open shutter.
     faults
         What goes wrong.
+    body
+        What somebody has set by hand.
     """
 
     def __init__(
@@ -45,11 +50,13 @@ class SimulatedCamera:
         shutter_lag_s: float = 0.063,
         shutter_jitter_s: float = 0.002,
         faults: CameraFaults = _NO_FAULTS,
+        body: BodySettings = _WELL_SET,
     ) -> None:
         shutter = Shutter(clock, shutter_lag_s, shutter_jitter_s, seed)
-        self._responder = Responder(clock, sensor, shutter, serial, faults)
+        self._responder = Responder(clock, sensor, shutter, serial, faults, body)
+        power = AutoPowerOff(clock, body.auto_power_off_s)
         function = StillImageFunction(clock, self._responder, faults)
-        self._backend = CameraBackend(clock, function, Cable(clock, faults))
+        self._backend = CameraBackend(clock, function, Cable(clock, faults, power))
 
     @property
     def backend(self) -> CameraBackend:

@@ -7,6 +7,8 @@ A dial says 1/60 s or f/5.6; the shutter does 2⁻⁶ s and the diaphragm 2^2.5.
 import math
 from fractions import Fraction
 
+#: Sensitivity code of automatic ISO, and what a 5D Mark II takes for it with its dial at M.
+ISO_AUTO, _AUTO_AT_M = 0x00, 400
 #: Shutter code of the bulb setting.
 TV_BULB = 0x0C
 _TV_ONE_SECOND = 0x38
@@ -36,6 +38,11 @@ AV_CODES = _codes(0x15, 0x50)
 ISO_CODES = _codes(_ISO_100, 0x78)
 
 
+def iso_code(iso: int | None) -> int:
+    """Code of a number on the dial; None for automatic."""
+    return ISO_AUTO if iso is None else ISO_CODES[_ISO_LABELS.index(iso)]
+
+
 def _stops(code: int, zero: int) -> Fraction:
     """Stops between two codes, exact in thirds."""
     eighths = code - zero
@@ -56,4 +63,6 @@ def f_number(av_code: int) -> float:
 
 def iso(iso_code: int) -> int:
     """Sensitivity as the dial says it."""
+    if iso_code == ISO_AUTO:
+        return _AUTO_AT_M
     return _ISO_LABELS[int(_stops(iso_code, _ISO_100) * 3)]

@@ -8,12 +8,14 @@ from functools import partial
 from labrig.clock import Clock
 
 from . import codes
+from .body_settings import BodySettings
 from .events import EventQueue, object_added, record, transfer_request
 from .faults import CameraFaults
 from .objects import CARD_ID, SHOT_BYTES, ObjectStore
 from .properties import SELF_TIMER_S, Destination, Drive, PropertyBank
 from .sensor import Photograph, Sensor
 from .shutter import FOCUS_S, METERING_S, READOUT_S, Exposure, Shutter, Stage
+from .viewfinder import Viewfinder
 from .vocabulary import EosEvent, EosProperty, ResponseCode
 
 #: From a new value of a property to the event that says so.
@@ -47,21 +49,30 @@ class EosBody:
         Button and shutter.
     faults
         `busy_releases` and `lost_event` are the body's.
+    settings
+        What somebody has set by hand.
     """
 
     def __init__(
-        self, clock: Clock, sensor: Sensor, shutter: Shutter, faults: CameraFaults
+        self,
+        clock: Clock,
+        sensor: Sensor,
+        shutter: Shutter,
+        faults: CameraFaults,
+        settings: BodySettings,
     ) -> None:
         self._clock = clock
         self._sensor = sensor
         self._shutter = shutter
         self._busy_releases = faults.busy_releases
         self._event_to_lose = faults.lost_event
+        self._focus_s = FOCUS_S if settings.autofocus else METERING_S
         self._host_shots = 0
         self._is_remote = False
         self.objects = ObjectStore(clock)
         self.events = EventQueue(clock)
-        self._properties = PropertyBank(self.objects.free_shots)
+        self.viewfinder = Viewfinder(clock, sensor)
+        self._properties = PropertyBank(self.objects.free_shots, settings)
         self._pressed_with = self._settings()
 
     @property
@@ -80,6 +91,8 @@ class EosBody:
         self._shutter.let_go(Stage.HALF | Stage.FULL)
         self.events.silence()
         self.objects.forget_memory()
+        self._properties.put(EosProperty.EVF_OUTPUT, 0)
+        self.viewfinder.send_to(0)
         self._is_remote = False
         self._host_shots = 0
         self._count_shots(0.0)
@@ -110,6 +123,8 @@ class EosBody:
             self._report(code, PROPERTY_DELAY_S)
             if code == EosProperty.CAPTURE_DESTINATION:
                 self._count_shots(PROPERTY_DELAY_S)
+            elif code == EosProperty.EVF_OUTPUT:
+                self.viewfinder.send_to(self._properties.number(EosProperty.EVF_OUTPUT))
         return answer
 
     def request_property(self, code: int) -> ResponseCode:
@@ -129,7 +144,7 @@ class EosBody:
         """RemoteReleaseOn: 1 half, 2 full, 3 both; a `focus` of 1 leaves the lens alone."""
         if stages not in (1, 2, 3):
             return ResponseCode.INVALID_PARAMETER
-        settling_s = METERING_S if focus == _FOCUS_OFF else FOCUS_S
+        settling_s = METERING_S if focus == _FOCUS_OFF else self._focus_s
         if stages == Stage.HALF:
             if not self._is_remote:
                 return ResponseCode.GENERAL_ERROR
@@ -148,7 +163,7 @@ class EosBody:
 
     def release_once(self) -> ResponseCode:
         """RemoteRelease, the older way: focus, expose, let go."""
-        answer = self._full_press(FOCUS_S)
+        answer = self._full_press(self._focus_s)
         if answer is ResponseCode.OK:
             self._shutter.let_go(Stage.HALF | Stage.FULL)
         return answer

@@ -109,6 +109,9 @@ class Operations:
     def _eos_table(self) -> dict[int, Handler]:
         body = self._body
         return {
+            # libgphoto2 prepares for a capture again and again unless these two succeed
+            Operation.EOS_GET_STORAGE_IDS: Handler(self._storage_ids),
+            Operation.EOS_GET_STORAGE_INFO: Handler(self._storage_info, 1, 1),
             Operation.EOS_GET_OBJECT: Handler(self._object, 1, 1),
             Operation.EOS_GET_PARTIAL_OBJECT: Handler(self._part, 3, 3),
             Operation.EOS_REMOTE_RELEASE: Handler(self._release_once),
@@ -128,6 +131,7 @@ class Operations:
             ),
             Operation.EOS_REMOTE_RELEASE_ON: Handler(_only_code(body.release_on), 1, 2),
             Operation.EOS_REMOTE_RELEASE_OFF: Handler(_only_code(body.release_off), 1, 1),
+            Operation.EOS_GET_VIEWFINDER_DATA: Handler(self._live_picture, 1, 3),
         }
 
     def _storage_ids(self) -> Response:
@@ -228,6 +232,12 @@ class Operations:
         code = self._body.release_once()
         # The older operation also says what went wrong with the photograph; here nothing does.
         return Response(code, (0,) if code is ResponseCode.OK else ())
+
+    def _live_picture(self, *_which: int) -> Response:
+        records = self._body.viewfinder.records()
+        if records is None:
+            return Response(ResponseCode.EOS_OBJECT_NOT_READY)
+        return Response(ResponseCode.OK, data=records)
 
     def _events(self) -> Response:
         return Response(ResponseCode.OK, data=self._body.events.fetch())

@@ -4,11 +4,12 @@ import struct
 from enum import IntEnum
 
 from . import codes
+from .body_settings import BodySettings
 from .events import record
+from .viewfinder import TO_PC
 from .vocabulary import EosEvent, EosProperty, ResponseCode
 
-_MANUAL_EXPOSURE = 3
-_ONE_SHOT_FOCUS = 0
+_ONE_SHOT_FOCUS, _MANUAL_FOCUS = 0, 3
 #: Type of an availability list; the only one that is an enumeration.
 _ENUMERATION = 3
 
@@ -39,38 +40,43 @@ def _u32(*values: int) -> tuple[bytes, ...]:
     return tuple(struct.pack("<I", value) for value in values)
 
 
-#: What the host may set, and to what. Mirror lock-up and live view can only be off.
+#: What the host may set, and to what. Mirror lock-up can only be off.
 _CHOICES: dict[EosProperty, tuple[bytes, ...]] = {
     EosProperty.AV: _u32(*codes.AV_CODES),
     EosProperty.TV: _u32(*codes.TV_CODES),
-    EosProperty.ISO: _u32(*codes.ISO_CODES),
+    EosProperty.ISO: _u32(codes.ISO_AUTO, *codes.ISO_CODES),
     EosProperty.DRIVE_MODE: _u32(*Drive),
     EosProperty.CAPTURE_DESTINATION: _u32(*Destination),
     EosProperty.IMAGE_FORMAT: (_RAW,),
     EosProperty.MIRROR_UP: _u32(0),
-    EosProperty.EVF_OUTPUT: _u32(0),
+    EosProperty.EVF_OUTPUT: _u32(0, TO_PC),
 }
 
 
 class PropertyBank:
     """Present values of the EOS properties.
 
-    The mode dial stands on M and the lens switch on AF; neither can be set over the wire.
+    Dial, lens switch and menus cannot be set over the wire.
 
     Parameters
     ----------
     available_shots
         What the camera shows for its present destination.
+    settings
+        What somebody has set by hand.
     """
 
-    def __init__(self, available_shots: int) -> None:
+    def __init__(self, available_shots: int, settings: BodySettings) -> None:
+        focus = _ONE_SHOT_FOCUS if settings.autofocus else _MANUAL_FOCUS
+        self._custom_functions = settings.custom_function_blocks()
         self._values: dict[int, bytes] = {
             EosProperty.AV: struct.pack("<I", 0x30),
             EosProperty.TV: struct.pack("<I", 0x68),
-            EosProperty.ISO: struct.pack("<I", 0x48),
-            EosProperty.AE_MODE: struct.pack("<I", _MANUAL_EXPOSURE),
+            EosProperty.ISO: struct.pack("<I", codes.iso_code(settings.iso)),
+            EosProperty.AE_MODE: struct.pack("<I", settings.exposure_mode),
             EosProperty.DRIVE_MODE: struct.pack("<I", Drive.SINGLE),
-            EosProperty.FOCUS_MODE: struct.pack("<I", _ONE_SHOT_FOCUS),
+            EosProperty.FOCUS_MODE: struct.pack("<I", focus),
+            EosProperty.AUTO_POWER_OFF: struct.pack("<I", settings.auto_power_off_s),
             EosProperty.IMAGE_FORMAT: _RAW,
             EosProperty.CAPTURE_DESTINATION: struct.pack("<I", Destination.CARD),
             EosProperty.AVAILABLE_SHOTS: struct.pack("<I", available_shots),
@@ -102,11 +108,14 @@ class PropertyBank:
 
     def value_record(self, code: int) -> bytes:
         """PropValueChanged with the present value."""
-        return record(EosEvent.PROP_VALUE_CHANGED, struct.pack("<I", code) + self._values[code])
+        return _value_record(code, self._values[code])
 
     def all_records(self) -> bytes:
         """The flood of values, then of lists, when a host begins to listen."""
         values = [self.value_record(code) for code in self._values]
+        values += [
+            _value_record(EosProperty.CUSTOM_FUNCTIONS, block) for block in self._custom_functions
+        ]
         lists = [
             record(
                 EosEvent.AVAIL_LIST_CHANGED,
@@ -115,3 +124,7 @@ class PropertyBank:
             for code, choices in _CHOICES.items()
         ]
         return b"".join(values + lists)
+
+
+def _value_record(code: int, value: bytes) -> bytes:
+    return record(EosEvent.PROP_VALUE_CHANGED, struct.pack("<I", code) + value)

@@ -2,6 +2,7 @@
 
 from labrig.clock import Clock
 
+from .body_settings import BodySettings
 from .eos import EosBody
 from .faults import CameraFaults
 from .operations import Handler, Operations, Response
@@ -31,12 +32,20 @@ class Responder:
         Serial number in DeviceInfo.
     faults
         What is wrong with the body.
+    settings
+        What somebody has set on the body by hand.
     """
 
     def __init__(
-        self, clock: Clock, sensor: Sensor, shutter: Shutter, serial: str, faults: CameraFaults
+        self,
+        clock: Clock,
+        sensor: Sensor,
+        shutter: Shutter,
+        serial: str,
+        faults: CameraFaults,
+        settings: BodySettings,
     ) -> None:
-        self._body = EosBody(clock, sensor, shutter, faults)
+        self._body = EosBody(clock, sensor, shutter, faults, settings)
         self._operations = Operations(self._body, serial)
         self._table = {
             **self._operations.table,

@@ -1,5 +1,7 @@
 """The Numato driver against wire transcripts and against the emulated board."""
 
+from typing import NoReturn
+
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -67,6 +69,9 @@ class Wired:
 
     def usb(self, address: str) -> None:
         raise AssertionError("no USB here")
+
+    def tcp(self, address: str, default_port: int) -> NoReturn:
+        raise AssertionError("no network here")
 
 
 def lamp(script: list[tuple[bytes, bytes]], relay: int = 0) -> tuple[NumatoRelay, ScriptedPort]:

@@ -1,17 +1,17 @@
 """The PTP driver and the simulated camera, written apart from the same facts, meet here."""
 
 import hashlib
-from typing import Any
+from typing import Any, NoReturn
 
 import pytest
 import usb.core
 
 from drivers.ptp import PtpCamera
-from labrig.acquire import Camera, ExposureSettings
+from labrig.acquire import Camera, Checkable, ExposureSettings, KeptAwake, Rig, Session
 from labrig.acquire.connections import SerialPort
 from labrig.clock import Interrupted, VirtualClock
 from labrig.errors import DeviceError
-from sim.camera import CameraFaults, SimulatedCamera
+from sim.camera import BodySettings, CameraFaults, SimulatedCamera
 
 SETTINGS = ExposureSettings(1.0, 400, 4.0)
 BUSY, OPEN_SESSION, GET_EVENT, RELEASE_ON, GET_PARTIAL = 0x2019, 0x1002, 0x9116, 0x9128, 0x9107
@@ -58,12 +58,22 @@ class Wired:
             raise DeviceError("no camera")
         return found
 
+    def tcp(self, address: str, default_port: int) -> NoReturn:
+        raise AssertionError("no network here")
+
 
 def bench(
-    size: int = 70_000, **faults: Any
+    size: int = 70_000, body: BodySettings | None = None, **faults: Any
 ) -> tuple[StoppingClock, Picture, SimulatedCamera, PtpCamera]:
     clock, picture = StoppingClock(), Picture(size)
-    camera = SimulatedCamera(clock, picture, serial="1", seed=1, faults=CameraFaults(**faults))
+    camera = SimulatedCamera(
+        clock,
+        picture,
+        serial="1",
+        seed=1,
+        faults=CameraFaults(**faults),
+        body=body or BodySettings(),
+    )
     settings = PtpCamera.Settings(shutter_lag="63 ms")
     return clock, picture, camera, PtpCamera("sim://room/camera", settings, Wired(clock, camera))
 
@@ -188,3 +198,59 @@ def test_what_the_camera_does_not_offer_is_refused() -> None:
     with pytest.raises(DeviceError, match="ISO"):
         driver.configure(ExposureSettings(1.0, 125, 4.0))
     assert 400 in driver.offers().isos
+
+
+class Nobody:
+    """Neither records nor watches."""
+
+    def __getattr__(self, name: str) -> Any:
+        return lambda *arguments, **keys: None
+
+
+def test_a_camera_that_switches_itself_off_survives_a_charge_because_it_is_kept_awake() -> None:
+    clock, picture, _, driver = bench(body=BodySettings(auto_power_off_s=60))
+    assert isinstance(driver, KeptAwake)
+    session = Session(Rig("bench", clock, {"camera": driver}, {}), Nobody(), Nobody())
+    driver.configure(SETTINGS)
+    session.wait(600.0, "charging")
+    assert clock.now() == pytest.approx(600.0, abs=1.0)
+    driver.arm()
+    driver.shoot()
+    assert len(picture.taken) == 1
+
+
+def test_a_camera_left_alone_switches_itself_off_and_says_so_in_one_line() -> None:
+    clock, _, _, driver = bench(body=BodySettings(auto_power_off_s=60))
+    driver.configure(SETTINGS)
+    clock.sleep(61.0)
+    with pytest.raises(DeviceError, match="automatic switching-off") as caught:
+        driver.arm()
+    assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize(
+    ("body", "severity", "said"),
+    [
+        (BodySettings(exposure_mode=2), "refuse", "dial is at Av"),
+        (BodySettings(exposure_mode=4), "refuse", "dial is at B"),
+        (BodySettings(autofocus=True), "refuse", "lens to MF"),
+        (BodySettings(iso=None), "refuse", "automatic ISO"),
+        (BodySettings(iso=125), "refuse", "ISO 125 is not native"),
+        (BodySettings(auto_power_off_s=60), "warn", "Set-up 1 (yellow) → Auto power off → Off"),
+        (BodySettings(long_exposure_noise_reduction=True), "refuse", "C.Fn II (Image) → 1"),
+        (BodySettings(highlight_tone_priority=True), "refuse", "C.Fn II (Image) → 3"),
+        (BodySettings(mirror_lock_up=True), "refuse", "C.Fn III (Autofocus/Drive) → 6"),
+    ],
+    ids=str,
+)
+def test_what_is_set_by_hand_is_found(body: BodySettings, severity: str, said: str) -> None:
+    *_, driver = bench(body=body)
+    assert isinstance(driver, Checkable)
+    (found,) = [finding for finding in driver.findings() if finding.severity != "fine"]
+    assert found.severity == severity
+    assert said in str(found)
+
+
+def test_a_well_set_camera_is_fine() -> None:
+    *_, driver = bench()
+    assert {finding.severity for finding in driver.findings()} == {"fine"}

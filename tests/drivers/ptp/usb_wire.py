@@ -4,7 +4,7 @@ import errno
 from array import array
 from collections import deque
 from types import SimpleNamespace
-from typing import Any, Protocol
+from typing import Any, NoReturn, Protocol
 
 import usb.backend
 import usb.core
@@ -183,3 +183,6 @@ class OneDevice:
 
     def usb(self, address: str) -> Any:
         return self._device
+
+    def tcp(self, address: str, default_port: int) -> NoReturn:
+        raise AssertionError("this camera is on USB")

@@ -7,7 +7,7 @@ from typing import Any
 import usb.core
 
 from labrig.clock import VirtualClock
-from sim.camera import CameraFaults, SimulatedCamera
+from sim.camera import BodySettings, CameraFaults, SimulatedCamera
 
 IN, OUT, KNOCK = 0x81, 0x02, 0x83
 PACKET = 512
@@ -51,12 +51,21 @@ class Bench:
     """A clock, a camera on it, and one host at a time."""
 
     def __init__(
-        self, raw: bytes = b"RAW" * 1000, seed: int = 1, faults: CameraFaults | None = None
+        self,
+        raw: bytes = b"RAW" * 1000,
+        seed: int = 1,
+        faults: CameraFaults | None = None,
+        body: BodySettings | None = None,
     ) -> None:
         self.clock = VirtualClock(epoch_s=1_767_225_600.0)
         self.film = Film(self.clock, raw)
         self.camera = SimulatedCamera(
-            self.clock, self.film, serial="0123abcd", seed=seed, faults=faults or CameraFaults()
+            self.clock,
+            self.film,
+            serial="0123abcd",
+            seed=seed,
+            faults=faults or CameraFaults(),
+            body=body or BodySettings(),
         )
 
     def host(self) -> "Host":

@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.camera import CameraFaults
+from sim.camera import BodySettings, CameraFaults
 from tests.sim.camera.host import (
     AV,
     BUSY,
@@ -147,7 +147,7 @@ def test_a_file_that_nobody_fetches_is_never_computed() -> None:
 
 
 def test_full_press_is_busy_until_the_lens_is_focused_and_the_last_file_made() -> None:
-    bench = Bench()
+    bench = Bench(body=BodySettings(autofocus=True))
     host = bench.ready()
     assert host.do(0x9128, 1, 0).code == OK
     assert host.do(0x9128, 2, 0).code == BUSY
@@ -171,13 +171,17 @@ def test_the_button_must_come_up_between_two_photographs() -> None:
     assert host.do(0x9128, 2, 1).code == OK
 
 
-def test_without_a_half_press_focusing_is_added_to_the_lag() -> None:
-    bench = Bench()
+@pytest.mark.parametrize(("autofocus", "settling_s"), [(True, 0.1), (False, 0.02)])
+def test_without_a_half_press_focusing_is_added_to_the_lag(
+    autofocus: bool, settling_s: float
+) -> None:
+    bench = Bench(body=BodySettings(autofocus=autofocus))
     host = bench.ready()
     before_s = bench.clock.now()
     assert host.do(0x9128, 2, 0).code == OK
     host.photograph()
-    assert bench.film.taken[0].start_s - before_s == pytest.approx(LAG_S + 0.1, abs=5 * JITTER_S)
+    lag_s = bench.film.taken[0].start_s - before_s
+    assert lag_s == pytest.approx(LAG_S + settling_s, abs=5 * JITTER_S)
 
 
 def test_the_older_release_presses_and_lets_go() -> None:

@@ -1,0 +1,99 @@
+"""A webcam, or a stick on the camera's HDMI output, to aim by: 8 bits, never measured with.
+
+Addresses: `uvc://0` is the system's first video device; anything else that OpenCV opens, such as
+`http://…/stream.mjpg` or numbered files `frame%03d.png`, is given as it is.
+"""
+
+import cv2
+from pydantic import BaseModel, ConfigDict
+
+from labrig.acquire.connections import Connections
+from labrig.errors import DeviceError
+
+SCHEME = "uvc://"
+JPEG_QUALITY = 90
+
+
+class UvcPreview:
+    """Live view only; the device is not opened before somebody looks.
+
+    Parameters
+    ----------
+    address
+        As above.
+    settings
+        None.
+    connections
+        Not needed: OpenCV opens video devices itself.
+
+    Raises
+    ------
+    DeviceError
+        `uvc://` with anything but a number behind it.
+    """
+
+    class Settings(BaseModel):
+        """Keys of the rig file: none."""
+
+        model_config = ConfigDict(frozen=True, extra="forbid")
+
+    def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
+        self._address = address
+        number = address.removeprefix(SCHEME)
+        if number != address and not number.isdigit():
+            raise DeviceError(
+                f"'{address}' is no video device; write uvc://0 for the first one, uvc://1 for the "
+                "second, or a stream's own address"
+            )
+        self._source: int | str = int(number) if number != address else address
+        self._capture: cv2.VideoCapture | None = None
+
+    def identity(self) -> str:
+        """The address: video devices do not tell OpenCV who they are."""
+        return f"video device at {self._address}, for aiming only"
+
+    def preview(self) -> bytes:
+        """The next picture, as JPEG.
+
+        Raises
+        ------
+        DeviceError
+            No such device, or no picture comes.
+        """
+        if self._capture is None:
+            self._capture = self._opened()
+        there, picture = self._capture.read()
+        encoded = there and cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        if not encoded:
+            self.make_safe()
+            raise DeviceError(
+                f"expected a picture from {self._address}, none came: plug the video device in "
+                "again, and close other programs that show it"
+            )
+        return bytes(encoded[1])
+
+    def make_safe(self) -> None:
+        """Release the device; it is opened again when somebody looks."""
+        if self._capture is not None:
+            self._capture.release()
+            self._capture = None
+
+    def disconnect(self) -> None:
+        """Release the device."""
+        self.make_safe()
+
+    def _opened(self) -> cv2.VideoCapture:
+        # OpenCV would write its own lines beside labrig's one.
+        cv2.utils.logging.setLogLevel(cv2.utils.logging.LOG_LEVEL_SILENT)
+        try:
+            capture = cv2.VideoCapture(self._source)
+        except cv2.error as error:
+            raise DeviceError(f"cannot open {self._address}: {error.err}") from None
+        if not capture.isOpened():
+            raise DeviceError(
+                f"cannot open {self._address}: check that the video device is plugged in, that no "
+                "other program shows it, and that you may use it"
+            )
+        # One waiting picture at most, else what is seen lags behind the hand on the focus ring.
+        capture.set(cv2.CAP_PROP_BUFFERSIZE, 1)
+        return capture

@@ -1,0 +1,111 @@
+"""`labrig rig`: what is plugged in, and whether a rig works."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from labrig.cli import view
+from labrig.errors import DeviceError, ProtocolError
+
+if TYPE_CHECKING:
+    from labrig.setup import Discovery, RigReport
+
+app = typer.Typer(help="The devices of a bench.")
+
+_STYLES = {"refuse": "bold red", "failed": "bold red", "warn": "yellow", "fine": "green"}
+
+
+@app.callback()
+def rigs() -> None:
+    """The devices of a bench."""
+
+
+@app.command("list")
+def list_devices(
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """Serial ports and USB cameras on this PC, each with its line for a rig file.
+
+    Says, too, what else may hold a camera and how to make it let go. Nothing is switched or sent.
+    """
+    from dataclasses import asdict
+    from json import dumps
+
+    from labrig.acquire import plugins
+    from labrig.setup import Surroundings, discover
+
+    found = discover(Surroundings.of_this_pc(), plugins.names(plugins.DRIVERS))
+    if json:
+        typer.echo(dumps(asdict(found), ensure_ascii=False))
+    else:
+        _tell(found)
+
+
+@app.command("check")
+def check(
+    rig: Annotated[str, typer.Argument(help="A shipped rig, such as 'sim', or a path.")],
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON.")] = False,
+) -> None:
+    """Connect, identify, look for settings that spoil photometry, exercise gently, leave safe.
+
+    The lamp is lit three times, well under a second each; the camera takes three short frames and
+    a dark one of 2 s. Do it in the dark. Exit code 0: fine, 2: a setting has to be changed first,
+    3: a device failed.
+    """
+    from json import dumps
+
+    from labrig import shipped
+    from labrig.acquire import read_rig_file
+    from labrig.bench import open_bench
+    from labrig.setup import check_rig
+
+    path = shipped.find("config", "rig", rig)
+    with open_bench(read_rig_file(path), str(path)) as stand:
+        report = check_rig(stand)
+    if json:
+        typer.echo(dumps(report.to_json(), ensure_ascii=False))
+    else:
+        _print_table(report)
+    _end(report, path)
+
+
+app.command("view")(view.view)
+
+
+def _tell(found: "Discovery") -> None:
+    for title, devices in (("serial ports", found.ports), ("USB cameras", found.cameras)):
+        typer.echo(f"{title}:" if devices else f"{title}: none")
+        for device in devices:
+            typer.echo(f"  {device.address}  {device.name}")
+            for hint in device.hints:
+                typer.echo(f"    ! {hint}")
+    for note in found.notes:
+        typer.echo(f"! {note}")
+    if snippets := [d.snippet for d in (*found.ports, *found.cameras) if d.snippet]:
+        typer.echo("\nfor the rig file (a key may stand only once: keep what you use):\n\ndevices:")
+        for snippet in snippets:
+            typer.echo(f"  {snippet}")
+
+
+def _print_table(report: "RigReport") -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(title=report.rig, title_justify="left", show_header=False)
+    for device, verdict, what, value in report.rows():
+        if device:
+            table.add_section()
+        table.add_row(
+            Text(device, style="bold"), Text(verdict, style=_STYLES.get(verdict, "")),
+            Text(what), Text(value),
+        )  # fmt: skip
+    Console().print(table)
+
+
+def _end(report: "RigReport", path: Path) -> None:
+    if report.failures:
+        raise DeviceError(f"{path}: {'; '.join(report.failures)}")
+    if report.refusals:
+        raise ProtocolError(f"{path}: this would spoil photometry: {'; '.join(report.refusals)}")

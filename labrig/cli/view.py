@@ -1,0 +1,35 @@
+"""`labrig rig view`: aim, focus and draw regions, in the browser."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def view(
+    rig: Annotated[
+        str, typer.Argument(help="A shipped rig, such as 'sim', or a path to a YAML file.")
+    ],
+    protocol: Annotated[
+        Path | None,
+        typer.Option("--protocol", help="Your protocol file; regions are written into it."),
+    ] = None,
+    port: Annotated[
+        int, typer.Option("--port", help="On 127.0.0.1; 0 for any free one.", min=0, max=65535)
+    ] = 0,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Only print the page's address.")
+    ] = False,
+) -> None:
+    """Live view for aiming and focus, regions drawn into a protocol. Ctrl-C ends it."""
+    from labrig import shipped
+    from labrig.setup.view import view_rig
+
+    def tell(url: str) -> None:
+        typer.echo(url)
+        if not no_browser:
+            import webbrowser
+
+            webbrowser.open(url)
+
+    view_rig(shipped.find("config", "rig", rig), protocol, port, tell)

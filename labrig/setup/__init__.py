@@ -1,0 +1,19 @@
+"""Setting up a bench: what is plugged into this PC, and whether a rig does what it should."""
+
+from labrig.setup.check import check_rig
+from labrig.setup.discover import Discovery, Found, discover
+from labrig.setup.report import DeviceReport, Measured, RigReport, Suggestion
+from labrig.setup.surroundings import Process, Surroundings
+
+__all__ = [
+    "DeviceReport",
+    "Discovery",
+    "Found",
+    "Measured",
+    "Process",
+    "RigReport",
+    "Suggestion",
+    "Surroundings",
+    "check_rig",
+    "discover",
+]

@@ -1,0 +1,97 @@
+"""A rig's devices identified, looked over and exercised gently."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+from labrig.acquire import Camera, Checkable, Device, Lamp, Rig
+from labrig.bench import Bench
+from labrig.clock import Clock
+from labrig.errors import DeviceError, LabrigError
+from labrig.setup.photographs import exercise_camera
+from labrig.setup.report import DeviceReport, Measured, RigReport, spread_ms
+
+#: Often enough to see a slow line, seldom enough not to wear the relay.
+SWITCHINGS = 3
+
+
+def check_rig(stand: Bench) -> RigReport:
+    """Open the rig, look at every device, bring it to its safe state.
+
+    The lamp is lit for some hundredths of a second, three times; the camera takes four frames. A
+    camera whose settings would spoil photometry takes none.
+
+    Raises
+    ------
+    DeviceError
+        A device could not be opened; nothing was exercised.
+    """
+    report: RigReport | None = None
+    try:
+        with stand.devices() as rig:
+            report = _look_at(rig)
+    except DeviceError as error:
+        if report is None:
+            raise
+        return replace(report, unsafe=str(error))
+    return report
+
+
+def _look_at(rig: Rig) -> RigReport:
+    return RigReport(
+        rig.name,
+        tuple(_checked(key, device, rig.clock) for key, device in rig.devices.items()),
+    )
+
+
+def _checked(key: str, device: Device, clock: Clock) -> DeviceReport:
+    """Everything that can be told of one device, up to where it failed."""
+    report = DeviceReport(key, "did not answer")
+    try:
+        report = replace(report, identity=device.identity())
+        if isinstance(device, Checkable):
+            report = replace(report, findings=tuple(device.findings()))
+        if any(finding.severity == "refuse" for finding in report.findings):
+            return replace(
+                report, measured=(Measured("not exercised", "first mend what is refused"),)
+            )
+        if isinstance(device, Lamp):
+            report = replace(report, measured=_exercise_lamp(device, clock))
+        elif isinstance(device, Camera):
+            report = exercise_camera(report, device, clock)
+    except LabrigError as error:
+        report = replace(report, failure=str(error))
+    except Exception as error:  # a fault of a driver must not hide what the others do
+        report = replace(report, failure=f"its driver failed ({error!r})")
+    return report
+
+
+def _exercise_lamp(lamp: Lamp, clock: Clock) -> tuple[Measured, ...]:
+    on_s, off_s = [], []
+    try:
+        for _ in range(SWITCHINGS):
+            on_s.append(_timed(lamp.on, clock))
+            _require(lamp, on=True)
+            off_s.append(_timed(lamp.off, clock))
+            _require(lamp, on=False)
+    finally:
+        with clock.shielded():
+            lamp.off()
+    return (
+        Measured("switch on, read back", spread_ms(on_s)),
+        Measured("switch off, read back", spread_ms(off_s)),
+    )
+
+
+def _require(lamp: Lamp, *, on: bool) -> None:
+    if lamp.is_on() != on:
+        state = "on" if on else "off"
+        raise DeviceError(
+            f"the lamp was switched {state}, it says otherwise; look at it, switch it off by hand "
+            "and check the relay"
+        )
+
+
+def _timed(act: Callable[[], object], clock: Clock) -> float:
+    asked_s = clock.now()
+    act()
+    return clock.now() - asked_s

@@ -1,0 +1,153 @@
+"""Serial ports and USB cameras on this PC, with what a rig file needs to say of each."""
+
+from collections import Counter
+from collections.abc import Collection
+from dataclasses import dataclass
+from typing import Any
+
+import usb.core
+import usb.util
+
+from labrig.setup.holders import holders, unreachable
+from labrig.setup.surroundings import Port, Surroundings
+
+NO_LIBUSB = (
+    "libusb is not installed, so USB cameras cannot be seen: install libusb-1.0 (Linux: "
+    "libusb-1.0-0, macOS: brew install libusb, Windows: pip install libusb-package)"
+)
+_STILL_IMAGE = 6
+
+
+@dataclass(frozen=True)
+class _Board:
+    """What is known of a USB vendor's serial devices; `keys` are those of a rig file's lamp."""
+
+    name: str
+    driver: str | None = None
+    keys: str = ""
+
+
+#: USB vendor and product, or vendor alone. Sources: the vendors' manuals, the USB ID repository.
+_BOARDS: dict[tuple[int, int | None], _Board] = {
+    (0x2A19, None): _Board("Numato relay board", "numato_relay", ", relay: 0, warm_up: 15 min"),
+    (0x1A86, 0x7523): _Board("CH340 adapter, as on LCUS relay boards and Arduino clones"),
+    (0x1FFB, None): _Board("Pololu servo controller"),
+    (0x0403, None): _Board("FTDI adapter; the device behind it is not known"),
+    (0x10C4, 0xEA60): _Board("CP210x adapter; the device behind it is not known"),
+    (0x2341, None): _Board("Arduino"),
+    (0x1313, None): _Board("Thorlabs instrument"),
+    (0x04D8, 0xFFEE): _Board("Devantech relay board"),
+}
+
+
+@dataclass(frozen=True)
+class Found:
+    """One device that is plugged in.
+
+    Attributes
+    ----------
+    address
+        As a rig file says it.
+    snippet
+        A line for the rig file's `devices:`; empty where labrig has no driver for it.
+    hints
+        What stands in the way and what to do.
+    """
+
+    address: str
+    name: str
+    snippet: str = ""
+    hints: tuple[str, ...] = ()
+
+
+@dataclass(frozen=True)
+class Discovery:
+    """All that is plugged in; `notes` say what could not be looked for."""
+
+    ports: tuple[Found, ...]
+    cameras: tuple[Found, ...]
+    notes: tuple[str, ...] = ()
+
+
+def discover(around: Surroundings, drivers: Collection[str]) -> Discovery:
+    """Look at every serial port and every USB camera; nothing is sent to any of them.
+
+    Parameters
+    ----------
+    drivers
+        Names of installed drivers.
+    """
+    ports = tuple(
+        _serial(port, drivers) for port in sorted(around.ports(), key=lambda port: port.device)
+    )
+    try:
+        devices = [device for device in around.usb_devices() if _is_camera(device)]
+    except usb.core.NoBackendError:
+        return Discovery(ports, (), (NO_LIBUSB,))
+    alike = Counter((device.idVendor, device.idProduct) for device in devices)
+    return Discovery(
+        ports,
+        tuple(
+            _camera(device, around, alike[device.idVendor, device.idProduct] > 1)
+            for device in devices
+        ),
+    )
+
+
+def _serial(port: Port, drivers: Collection[str]) -> Found:
+    if port.vid is None or port.pid is None:
+        return Found(port.device, "not on USB")
+    ids = f"{port.vid:04x}:{port.pid:04x}"
+    board = _BOARDS.get((port.vid, port.pid)) or _BOARDS.get((port.vid, None))
+    if board is None:
+        return Found(port.device, f"{port.description} ({ids}), unknown to labrig")
+    serial = f", serial {port.serial_number}" if port.serial_number else ""
+    name = f"{board.name} ({ids}{serial})"
+    if board.driver not in drivers:
+        return Found(port.device, name)
+    return Found(
+        port.device,
+        name,
+        f'lamp: {{driver: {board.driver}, address: "{port.device}"{board.keys}}}',
+    )
+
+
+def _is_camera(device: Any) -> bool:
+    try:
+        return any(
+            interface.bInterfaceClass == _STILL_IMAGE
+            for configuration in device
+            for interface in configuration
+        )
+    except (usb.core.USBError, NotImplementedError):
+        return False  # a device that does not even show its descriptors is none of ours
+
+
+def _camera(device: Any, around: Surroundings, has_twin: bool) -> Found:
+    address = f"usb://{device.idVendor:04x}:{device.idProduct:04x}"
+    refused = unreachable(device, around.platform)
+    hints = [refused] if refused else []
+    hints += [f"may be held by {holder}" for holder in holders(device, around)]
+    serial = None if refused else _text(device, device.iSerialNumber)
+    if has_twin and serial:
+        address += f"/{serial}"
+    elif has_twin:
+        hints.append("there are several of this model and they tell no serial number: unplug one")
+    words = [] if refused else [_text(device, device.iManufacturer), _text(device, device.iProduct)]
+    usb.util.dispose_resources(device)
+    return Found(
+        address,
+        " ".join(word for word in words if word) or "camera",
+        f'camera: {{driver: ptp_camera, address: "{address}", warm_up: 30 min}}',
+        tuple(hints),
+    )
+
+
+def _text(device: Any, index: int) -> str | None:
+    if not index:
+        return None
+    try:
+        text: str | None = usb.util.get_string(device, index)
+    except (usb.core.USBError, NotImplementedError, ValueError):
+        return None
+    return text

@@ -1,0 +1,80 @@
+"""What else on this PC uses a camera, and how to make it let go.
+
+Sources: gphoto2 issues #154, #181 and #485 (Linux), libgphoto2 issue #1064 (macOS).
+"""
+
+from collections.abc import Iterable
+from typing import Any
+
+import usb.core
+import usb.util
+
+from labrig.setup.surroundings import Process, Surroundings
+
+#: Programs that take every camera they see, and what to do about each.
+_KNOWN = {
+    "linux": {
+        "gvfsd-gphoto2": "gio mount -s gphoto2",
+        "gvfs-gphoto2-volume-monitor": (
+            "systemctl --user mask --now gvfs-gphoto2-volume-monitor (until 'unmask')"
+        ),
+        "shotwell": "close Shotwell",
+        "digikam": "close digiKam",
+        "darktable": "close darktable",
+        "entangle": "close Entangle",
+        "gphoto2": "end gphoto2",
+    },
+    "darwin": {
+        "PTPCamera": "killall PTPCamera (it comes back when a camera is plugged in)",
+        "ptpcamerad": "launchctl disable gui/$UID/com.apple.ptpcamerad; killall ptpcamerad",
+        "icdd": "close Image Capture and Photos",
+        "EOS Utility": "close EOS Utility",
+    },
+}
+_ZADIG = "give this camera the WinUSB driver with Zadig (https://zadig.akeo.ie)"
+
+
+def holders(device: Any, around: Surroundings) -> list[str]:
+    """Who may hold a `usb.core.Device`, each with what to do."""
+    return [
+        f"{process.name} (process {process.pid}): {remedy}"
+        for process, remedy in _suspects(_node(device), around.processes(), around.platform)
+    ]
+
+
+def unreachable(device: Any, platform: str) -> str | None:
+    """What to do when this user cannot open a `usb.core.Device`; None when it can be opened."""
+    try:
+        device.get_active_configuration()
+    except (usb.core.USBError, NotImplementedError) as error:
+        if isinstance(error, usb.core.USBError) and error.errno is None:
+            return None  # pyusb's way of saying that no configuration is set: it was opened
+        said = " ".join(str(error).split())
+        if platform == "win32":
+            return f"it cannot be opened ({said}): {_ZADIG}"
+        if platform == "linux":
+            return (
+                f'it cannot be opened ({said}): put SUBSYSTEM=="usb", '
+                f'ATTR{{idVendor}}=="{device.idVendor:04x}", TAG+="uaccess" into '
+                "/etc/udev/rules.d/70-labrig.rules and plug it in again"
+            )
+        return f"it cannot be opened ({said}): unplug it and plug it in again"
+    finally:
+        usb.util.dispose_resources(device)
+    return None
+
+
+def _node(device: Any) -> str:
+    """Where Linux has the device's file."""
+    return f"/dev/bus/usb/{device.bus or 0:03d}/{device.address or 0:03d}"
+
+
+def _suspects(
+    node: str, processes: Iterable[Process], platform: str
+) -> Iterable[tuple[Process, str]]:
+    known = _KNOWN.get(platform, {})
+    for process in processes:
+        if node in process.open_files:
+            yield process, known.get(process.name, "close it")
+        elif process.name in known:
+            yield process, known[process.name]

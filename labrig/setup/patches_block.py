@@ -1,0 +1,166 @@
+"""Changing `patches:` in a person's protocol file, and nothing else in it.
+
+Only the characters of that one value are replaced, so that comments, order and spelling of all the
+rest stay as they were. What comes out is read back before it is handed out.
+"""
+
+import json
+import re
+from collections.abc import Iterator, Mapping
+from pathlib import Path
+
+import yaml
+
+from labrig.acquire import plugins
+from labrig.errors import UsageError
+from labrig.record.durable import write_durably
+from labrig.region import Region
+from labrig.yaml_file import parse_yaml
+
+KEY = "patches"
+#: Finer than a pixel of any live picture, and still readable.
+DECIMALS = 4
+INDENT = "  "
+
+_PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
+#: Words that some YAML reader takes for a truth value or for nothing.
+_WORDS = frozenset({"true", "false", "null", "yes", "no", "on", "off", "y", "n"})
+_REST_OF_LINE = re.compile(r"[ \t]*(?:#[^\r\n]*)?(?=\r?\n|\Z)")
+_COLON = re.compile(r"[ \t]*:[ \t]*")
+
+
+def write_patches(path: Path, patches: Mapping[str, Region]) -> None:
+    """Replace the patches in the protocol at `path`; it stays whole whatever happens.
+
+    Raises
+    ------
+    UsageError
+        The file cannot be changed without touching anything else, or would be no valid protocol.
+    DiskError
+        It cannot be written.
+    """
+    try:
+        text = path.read_bytes().decode("utf-8")
+    except (OSError, UnicodeDecodeError) as error:
+        raise UsageError(f"{path}: cannot be read as UTF-8 text ({error})") from None
+    changed = with_patches(text, patches, str(path))
+    # Beside it, because a protocol may name files relative to its own folder.
+    trial = path.with_name(f".{path.name}.trial.yaml")
+    try:
+        write_durably(trial, changed.encode("utf-8"))
+        plugins.read_protocol(trial)
+    except UsageError as error:
+        raise UsageError(str(error).replace(str(trial), str(path))) from None
+    finally:
+        trial.unlink(missing_ok=True)
+    write_durably(path.resolve(), changed.encode("utf-8"))  # a link stays one
+
+
+def with_patches(text: str, patches: Mapping[str, Region], source: str) -> str:
+    """The YAML `text` with `patches` as its patches.
+
+    Parameters
+    ----------
+    patches
+        By name; regions as fractions of the frame.
+    source
+        Names the text in messages.
+
+    Raises
+    ------
+    UsageError
+        Not YAML, or written so that the patches cannot be replaced alone.
+    """
+    before = parse_yaml(text, source)
+    wanted = {name: rounded(region) for name, region in patches.items()}
+    for candidate in _candidates(text, wanted):
+        try:
+            after = parse_yaml(candidate, source)
+        except UsageError:
+            continue
+        told = after.pop(KEY, None)
+        rest = {key: value for key, value in before.items() if key != KEY}
+        # Compared as text, because not-a-number is never equal to itself.
+        same = repr(after) == repr(rest) and list(told or ()) == list(wanted)
+        if same and all(tuple(told[name]) == region for name, region in wanted.items()):
+            return candidate
+    raise UsageError(
+        f"{source}: '{KEY}' is written so that it cannot be changed without touching the rest; "
+        f"write it by hand: {' '.join(_entries(wanted, '', ' '))}"
+    )
+
+
+def rounded(region: Region) -> Region:
+    """The region with edges rounded, so that it still ends inside the frame."""
+    x, y, width, height = region
+    left, top = round(x, DECIMALS), round(y, DECIMALS)
+    right, low = round(x + width, DECIMALS), round(y + height, DECIMALS)
+    return left, top, round(right - left, DECIMALS), round(low - top, DECIMALS)
+
+
+def _candidates(text: str, patches: Mapping[str, Region]) -> Iterator[str]:
+    """Texts that may be what is wanted, the best first; the caller reads them back."""
+    root = yaml.compose(text, Loader=yaml.SafeLoader)
+    if not isinstance(root, yaml.MappingNode) or root.flow_style:
+        return
+    newline = "\r\n" if "\r\n" in text else "\n"
+    indent = " " * root.start_mark.column
+    lines = [indent + line for line in _entries(patches, INDENT, newline)]
+    for key, value in root.value:
+        if key.value == KEY:
+            yield _replaced(text, key, value, "".join(lines))
+            return
+    block = f"{indent}{KEY}:{newline}" + "".join(lines)
+    end = _document_end(text)
+    ended = text[:end] + ("" if text[:end].endswith("\n") else newline)
+    yield ended + block + text[end:]
+    # A block of text at the end would swallow the line break that was added to it.
+    start = root.start_mark.index - root.start_mark.column
+    yield text[:start] + block + text[start:]
+
+
+def _entries(patches: Mapping[str, Region], indent: str, newline: str) -> list[str]:
+    return [
+        f"{indent}{_scalar(name)}: [{', '.join(f'{v:g}' for v in region)}]{newline}"
+        for name, region in patches.items()
+    ]
+
+
+def _scalar(name: str) -> str:
+    if _PLAIN.fullmatch(name) and name.lower() not in _WORDS:
+        return name
+    return json.dumps(name, ensure_ascii=False)  # double-quoted YAML reads the same escapes
+
+
+def _replaced(text: str, key: yaml.Node, value: yaml.Node, lines: str) -> str:
+    end = _end_of(value)
+    rest = _REST_OF_LINE.match(text, end)
+    if rest is None:
+        return ""  # something else follows on the line: not a value that can be taken out
+    newline = "\r\n" if "\r\n" in text else "\n"
+    after = text[rest.end() :].removeprefix(newline)
+    if value.start_mark.line > key.start_mark.line:
+        start = value.start_mark.index - value.start_mark.column
+        return text[:start] + lines + after
+    colon = _COLON.match(text, key.end_mark.index)
+    if colon is None:
+        return ""
+    # What was said behind the value is kept behind the key.
+    return text[: key.end_mark.index] + ":" + rest[0].rstrip() + newline + lines + after
+
+
+def _end_of(node: yaml.Node) -> int:
+    """Index behind the last character: a block's own end mark is where the next thing begins."""
+    if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
+        last = node.value[-1]
+        parts = last if isinstance(last, tuple) else (last,)
+        return max(_end_of(part) for part in parts)
+    return int(node.end_mark.index)
+
+
+def _document_end(text: str) -> int:
+    """Index at which a further key can be added: before `...`, else at the end."""
+    for event in yaml.parse(text, Loader=yaml.SafeLoader):
+        if isinstance(event, yaml.DocumentEndEvent) and event.explicit and event.start_mark:
+            return int(event.start_mark.index)
+    return len(text)

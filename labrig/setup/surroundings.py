@@ -1,0 +1,117 @@
+"""What the operating system tells of devices and programs; tests put their own in its place."""
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, Protocol
+
+PROCESSES = Path("/proc")
+_LISTING_S = 10.0
+
+
+class Port(Protocol):
+    """The part of pyserial's `ListPortInfo` that is used; None where the system does not know."""
+
+    device: str
+    description: str
+    vid: int | None
+    pid: int | None
+    serial_number: str | None
+
+
+@dataclass(frozen=True)
+class Process:
+    """A running program.
+
+    Attributes
+    ----------
+    name
+        Of its file, without the folder.
+    open_files
+        Device files that it holds, as far as this user may know.
+    """
+
+    pid: int
+    name: str
+    open_files: frozenset[str] = frozenset()
+
+
+@dataclass(frozen=True)
+class Surroundings:
+    """A PC.
+
+    Attributes
+    ----------
+    platform
+        As `sys.platform`.
+    ports
+        Lists serial ports.
+    usb_devices
+        Lists `usb.core.Device`; raises `usb.core.NoBackendError` without libusb.
+    processes
+        Lists programs.
+    """
+
+    platform: str
+    ports: Callable[[], Iterable[Port]]
+    usb_devices: Callable[[], Iterable[Any]]
+    processes: Callable[[], Iterable[Process]]
+
+    @classmethod
+    def of_this_pc(cls) -> "Surroundings":
+        """The PC that this runs on."""
+        listings: dict[str, Callable[[], Iterable[Process]]] = {
+            "linux": _linux_processes,
+            "darwin": _mac_processes,
+        }
+        processes = listings.get(sys.platform, tuple)
+        return cls(sys.platform, _serial_ports, _usb_devices, processes)
+
+
+def _serial_ports() -> Iterable[Port]:
+    from serial.tools import list_ports
+
+    return list_ports.comports()
+
+
+def _usb_devices() -> Iterable[Any]:
+    import usb.core
+
+    found: Iterable[Any] = usb.core.find(find_all=True)
+    return found
+
+
+def _linux_processes() -> Iterable[Process]:
+    for place in PROCESSES.glob("[0-9]*"):
+        try:
+            command = (place / "cmdline").read_bytes().split(b"\0")[0].decode(errors="replace")
+            yield Process(int(place.name), Path(command).name, _usb_files(place / "fd"))
+        except OSError:
+            continue  # it has ended meanwhile
+
+
+def _usb_files(descriptors: Path) -> frozenset[str]:
+    try:
+        targets = [str(entry.readlink()) for entry in descriptors.iterdir()]
+    except OSError:  # another user's, or ended
+        return frozenset()
+    return frozenset(target for target in targets if target.startswith("/dev/bus/usb/"))
+
+
+def _mac_processes() -> Iterable[Process]:
+    try:
+        listed = subprocess.run(
+            ["/bin/ps", "-axo", "pid=,comm="],
+            capture_output=True,
+            text=True,
+            errors="replace",
+            timeout=_LISTING_S,
+            check=True,
+        ).stdout
+    except (OSError, subprocess.SubprocessError):
+        return
+    for line in listed.splitlines():
+        pid, _, command = line.strip().partition(" ")
+        yield Process(int(pid), Path(command.strip()).name)

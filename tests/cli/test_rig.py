@@ -1,0 +1,172 @@
+"""`labrig rig list` and `labrig rig check` on the simulated rig, well and badly set."""
+
+import json
+from collections.abc import Callable
+from functools import partial
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from labrig import shipped
+from tests.conftest import Ended
+
+Report = dict[str, Any]
+Labrig = Callable[..., Ended]
+Make = Callable[..., Path]
+SetBody = Callable[..., None]
+
+
+@pytest.fixture
+def set_body(monkeypatch: pytest.MonkeyPatch) -> SetBody:
+    """Sets dial, lens switch and menus of the camera in the simulated room."""
+
+    def apply(**settings: Any) -> None:
+        opening, camera = shipped.load("sim.opening"), shipped.load("sim.camera")
+        body = camera.BodySettings(**settings)
+        monkeypatch.setattr(opening, "SimulatedCamera", partial(camera.SimulatedCamera, body=body))
+
+    return apply
+
+
+def device(report: Report, key: str) -> Report:
+    (found,) = [entry for entry in report["devices"] if entry["key"] == key]
+    assert isinstance(found, dict)
+    return found
+
+
+def test_a_good_rig_is_measured_and_fine(labrig: Labrig, make_rig: Make) -> None:
+    ended = labrig("rig", "check", make_rig())
+    assert (ended.code, ended.err) == (0, "")
+    for said in ("Numato", "5D Mark II", "switch on, read back", "frame_time", "safe state"):
+        assert said in ended.out
+
+
+def test_its_numbers_are_the_simulated_devices_own(labrig: Labrig, make_rig: Make) -> None:
+    report = json.loads(labrig("rig", "check", make_rig(), "--json").out)
+    assert (report["failures"], report["refusals"], report["unsafe"]) == ([], [], None)
+    camera = device(report, "camera")
+    assert len(device(report, "lamp")["measured"]) == 2
+    measured = {entry["what"]: entry["value"] for entry in camera["measured"]}
+    lag = next(value for what, value in measured.items() if what.startswith("release asked"))
+    assert float(lag.split()[0]) == pytest.approx(60, abs=3), "the rig file's, plus half a trip"
+    ready = next(value for what, value in measured.items() if what.startswith("exposure over"))
+    assert 200 < float(ready.split()[0]) < 400, "the body reads out for 200 ms"
+    assert camera["suggestions"] == [{"key": "frame_time", "value": "300 ms"}]
+    assert sum("dark frame" in what for what in measured) == 3
+    assert {finding["severity"] for finding in camera["findings"]} == {"fine"}
+
+
+def test_what_spoils_photometry_is_refused_with_its_place_in_the_menu(
+    labrig: Labrig, make_rig: Make, set_body: SetBody
+) -> None:
+    set_body(autofocus=True, long_exposure_noise_reduction=True)
+    ended = labrig("rig", "check", make_rig())
+    assert ended.code == 2
+    assert "not exercised" in ended.out
+    (line,) = ended.err.splitlines()
+    assert "lens to MF" in line
+    assert "C.Fn II (Image) → 1 Long exp. noise reduction → 0: Off" in line
+
+
+def test_a_run_is_refused_before_anything_moves(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, set_body: SetBody, tmp_path: Path
+) -> None:
+    set_body(highlight_tone_priority=True)
+    ended = labrig("run", make_protocol(), "--rig", make_rig(), "--runs", tmp_path / "runs")
+    assert ended.code == 2
+    assert "C.Fn II (Image) → 3 Highlight tone priority" in ended.err
+    assert "nothing was recorded" in ended.err
+    assert list((tmp_path / "runs").iterdir()) == []
+
+
+def test_a_warning_does_not_keep_a_run_from_starting(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, set_body: SetBody, tmp_path: Path
+) -> None:
+    """And a camera that switches itself off after a minute is kept awake through the charge."""
+    set_body(auto_power_off_s=60)
+    rig = make_rig()
+    assert labrig("rig", "check", rig).code == 0
+    ended = labrig(
+        "run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs", "--no-process"
+    )
+    assert ended.code == 0, ended.err
+
+
+def test_a_room_that_is_not_dark_is_said(labrig: Labrig, make_rig: Make) -> None:
+    rig = make_rig(sample="stickers", initial={"concentration": 0.9})
+    report = json.loads(labrig("rig", "check", rig, "--json").out)
+    (warned,) = [f for f in device(report, "camera")["findings"] if f["severity"] == "warn"]
+    assert "not dark" in warned["what"]
+
+
+def test_a_device_that_fails_is_shown_and_the_others_are_still_checked(
+    labrig: Labrig, make_rig: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    lamp = shipped.load("drivers.numato").NumatoRelay
+    monkeypatch.setattr(lamp, "is_on", lambda self: False)
+    ended = labrig("rig", "check", make_rig(), "--json")
+    assert ended.code == 3
+    assert "the lamp was switched on, it says otherwise" in ended.err
+    report = json.loads(ended.out)
+    assert len(device(report, "camera")["measured"]) > 3
+
+
+def test_a_fault_in_a_driver_is_one_line_too(
+    labrig: Labrig, make_rig: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    camera = shipped.load("drivers.ptp.camera").PtpCamera
+
+    def break_down(self: object) -> None:
+        raise KeyError("oops")
+
+    monkeypatch.setattr(camera, "shoot", break_down)
+    ended = labrig("rig", "check", make_rig())
+    assert ended.code == 3
+    assert "camera: its driver failed (KeyError('oops'))" in ended.err
+    assert "left in its safe state" in ended.out
+
+
+def test_an_unsafe_end_is_shown_beside_what_was_found(
+    labrig: Labrig, make_rig: Make, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    numato = shipped.load("drivers.numato").NumatoRelay
+    made_safe: list[int] = []
+
+    def fail_at_the_end(self: Any) -> None:
+        made_safe.append(1)
+        if len(made_safe) > 1:
+            raise shipped.load("drivers.numato").DeviceError("the relay is welded")
+
+    monkeypatch.setattr(numato, "make_safe", fail_at_the_end)
+    ended = labrig("rig", "check", make_rig(), "--json")
+    assert ended.code == 3
+    assert "the relay is welded" in ended.err
+    assert "switch off by hand" in json.loads(ended.out)["unsafe"]
+
+
+def test_a_device_that_is_not_there_is_one_line(
+    labrig: Labrig, make_rig: Make, tmp_path: Path
+) -> None:
+    path = make_rig()
+    rig = yaml.safe_load(path.read_text())
+    rig["devices"]["lamp"]["address"] = str(tmp_path / "ttyACM7")
+    path.write_text(yaml.safe_dump(rig))
+    ended = labrig("rig", "check", path)
+    assert ended.code == 3
+    assert len(ended.err.splitlines()) == 1
+
+
+def test_a_rig_that_does_not_exist(labrig: Labrig) -> None:
+    ended = labrig("rig", "check", "sin")
+    assert ended.code == 2
+    assert "did you mean 'sim'?" in ended.err
+
+
+def test_listing_needs_no_device(labrig: Labrig) -> None:
+    ended = labrig("rig", "list")
+    assert ended.code == 0
+    assert "serial ports:" in ended.out
+    found = json.loads(labrig("rig", "list", "--json").out)
+    assert set(found) == {"ports", "cameras", "notes"}

@@ -1,0 +1,67 @@
+"""The webcam that only aims, on files that OpenCV takes for a video device."""
+
+from pathlib import Path
+from typing import cast
+
+import cv2
+import numpy as np
+import pytest
+
+from drivers.uvc_preview import UvcPreview
+from labrig.acquire.connections import Connections
+from labrig.acquire.roles import ROLES, LiveView
+from labrig.errors import DeviceError
+
+
+def eye(address: str) -> UvcPreview:
+    nothing = cast(Connections, None)
+    return UvcPreview(address, UvcPreview.Settings(), nothing)
+
+
+@pytest.fixture
+def film(tmp_path: Path) -> str:
+    """Two pictures, one dark and one bright."""
+    for number, value in enumerate((40, 200)):
+        picture = np.full((48, 64, 3), value, np.uint8)
+        assert cv2.imwrite(str(tmp_path / f"frame{number:03d}.png"), picture)
+    return str(tmp_path / "frame%03d.png")
+
+
+def brightness(jpeg: bytes) -> float:
+    picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR)
+    assert picture is not None
+    assert picture.shape == (48, 64, 3)
+    return float(np.mean(picture))
+
+
+def test_shows_one_picture_after_the_other(film: str) -> None:
+    camera = eye(film)
+    assert isinstance(camera, LiveView)
+    assert ROLES["viewfinder"] is LiveView
+    assert brightness(camera.preview()) == pytest.approx(40, abs=1)
+    assert brightness(camera.preview()) == pytest.approx(200, abs=1)
+    camera.make_safe()
+    assert brightness(camera.preview()) == pytest.approx(40, abs=1), "opened anew"
+    camera.disconnect()
+
+
+def test_nothing_is_opened_before_somebody_looks() -> None:
+    camera = eye("uvc://97")
+    assert "uvc://97" in camera.identity()
+    camera.make_safe()
+    camera.disconnect()
+    with pytest.raises(DeviceError, match="cannot open uvc://97"):
+        camera.preview()
+
+
+def test_the_end_of_the_pictures_is_said(film: str) -> None:
+    camera = eye(film)
+    for _ in range(2):
+        camera.preview()
+    with pytest.raises(DeviceError, match="expected a picture"):
+        camera.preview()
+
+
+def test_an_address_without_a_number_is_refused() -> None:
+    with pytest.raises(DeviceError, match="uvc://0 for the first"):
+        eye("uvc://webcam")

@@ -1,0 +1,188 @@
+"""What is plugged in, on PCs that are made up: no test needs a device, libusb or a desktop."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+import pytest
+import usb.core
+import yaml
+
+from labrig.clock import VirtualClock
+from labrig.setup import Process, Surroundings, discover
+from labrig.setup import surroundings as surroundings_module
+from sim.camera import SimulatedCamera
+
+DRIVERS = ("numato_relay", "ptp_camera")
+
+
+@dataclass
+class Plugged:
+    device: str
+    description: str = "n/a"
+    vid: int | None = None
+    pid: int | None = None
+    serial_number: str | None = None
+
+
+class NoFilm:
+    def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
+        raise AssertionError("listing takes no photographs")
+
+    def preview(self, at_s: float) -> Any:
+        raise AssertionError("listing looks through no viewfinder")
+
+
+def cameras(count: int = 1) -> list[Any]:
+    """Simulated cameras, each on a bus of its own."""
+    made = [
+        SimulatedCamera(VirtualClock(), NoFilm(), serial=str(number), seed=1)
+        for number in range(count)
+    ]
+    return [usb.core.find(backend=camera.backend) for camera in made]
+
+
+def pc(
+    ports: Iterable[Plugged] = (),
+    usb_devices: Iterable[Any] = (),
+    processes: Iterable[Process] = (),
+    platform: str = "linux",
+) -> Surroundings:
+    return Surroundings(platform, lambda: ports, lambda: usb_devices, lambda: processes)
+
+
+def no_libusb() -> Iterable[Any]:
+    raise usb.core.NoBackendError("No backend available")
+
+
+def test_nothing_is_plugged_in() -> None:
+    found = discover(pc(), DRIVERS)
+    assert (found.ports, found.cameras, found.notes) == ((), (), ())
+
+
+def test_without_libusb_serial_ports_are_still_listed() -> None:
+    found = discover(Surroundings("win32", lambda: [Plugged("COM3")], no_libusb, tuple), DRIVERS)
+    assert [port.address for port in found.ports] == ["COM3"]
+    assert "libusb is not installed" in found.notes[0]
+
+
+@pytest.mark.parametrize(
+    ("port", "name", "has_driver"),
+    [
+        (
+            Plugged("COM4", "USB", 0x2A19, 0x0C05, "NLRL1"),
+            "Numato relay board (2a19:0c05, se",
+            True,
+        ),
+        (Plugged("COM5", "USB", 0x1A86, 0x7523), "CH340", False),
+        (Plugged("COM6", "USB", 0x1FFB, 0x008A), "Pololu", False),
+        (Plugged("COM7", "FT232R", 0x0403, 0x6001), "FTDI", False),
+        (Plugged("COM8", "Gadget", 0x1234, 0x5678), "Gadget (1234:5678), unknown", False),
+        (Plugged("COM1"), "not on USB", False),
+    ],
+    ids=lambda value: value.device if isinstance(value, Plugged) else None,
+)
+def test_serial_ports_are_told_by_their_usb_numbers(
+    port: Plugged, name: str, has_driver: bool
+) -> None:
+    (found,) = discover(pc([port]), DRIVERS).ports
+    assert found.address == port.device
+    assert name in found.name
+    assert bool(found.snippet) == has_driver
+
+
+def test_snippets_are_yaml_that_names_driver_and_address() -> None:
+    found = discover(pc([Plugged("COM4", "USB", 0x2A19, 0x0C05)], cameras()), DRIVERS)
+    devices = yaml.safe_load("\n".join(d.snippet for d in (*found.ports, *found.cameras)))
+    assert devices["lamp"] == {
+        "driver": "numato_relay", "address": "COM4", "relay": 0, "warm_up": "15 min",
+    }  # fmt: skip
+    assert devices["camera"]["driver"] == "ptp_camera"
+    assert devices["camera"]["address"] == "usb://04a9:3199"
+
+
+def test_a_driver_that_is_not_installed_gives_no_snippet() -> None:
+    (found,) = discover(pc([Plugged("COM4", "USB", 0x2A19, 0x0C05)]), ()).ports
+    assert found.snippet == ""
+
+
+def test_a_camera_is_named_and_left_free() -> None:
+    (device,) = cameras()
+    (found,) = discover(pc(usb_devices=[device]), DRIVERS).cameras
+    assert found.name == "Canon Inc. Canon Digital Camera"
+    assert found.hints == ()
+    usb.util.claim_interface(device, 0)
+
+
+def test_twins_without_serial_numbers_cannot_be_told_apart() -> None:
+    found = discover(pc(usb_devices=cameras(2)), DRIVERS)
+    assert all("unplug one" in camera.hints[0] for camera in found.cameras)
+
+
+@pytest.mark.parametrize(
+    ("platform", "process", "remedy"),
+    [
+        ("linux", Process(7, "gvfsd-gphoto2"), "gio mount -s gphoto2"),
+        ("linux", Process(7, "gvfs-gphoto2-volume-monitor"), "systemctl --user mask"),
+        ("linux", Process(7, "odd", frozenset({"/dev/bus/usb/001/001"})), "close it"),
+        ("darwin", Process(7, "ptpcamerad"), "killall ptpcamerad"),
+        ("darwin", Process(7, "PTPCamera"), "killall PTPCamera"),
+    ],
+    ids=lambda value: value.name if isinstance(value, Process) else None,
+)
+def test_what_may_hold_the_camera_and_how_to_free_it(
+    platform: str, process: Process, remedy: str
+) -> None:
+    around = pc(usb_devices=cameras(), processes=[Process(1, "init"), process], platform=platform)
+    (found,) = discover(around, DRIVERS).cameras
+    (hint,) = found.hints
+    assert process.name in hint
+    assert "7" in hint
+    assert remedy in hint
+
+
+@pytest.mark.parametrize(
+    ("platform", "remedy"), [("win32", "Zadig"), ("linux", "udev"), ("darwin", "plug it in")]
+)
+def test_a_camera_that_cannot_be_opened(
+    platform: str, remedy: str, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (device,) = cameras()
+
+    def refuse(dev: int) -> Any:
+        raise usb.core.USBError("Access denied (insufficient permissions)", -3, 13)
+
+    monkeypatch.setattr(device._ctx.backend, "open_device", refuse)
+    (found,) = discover(pc(usb_devices=[device], platform=platform), DRIVERS).cameras
+    assert "Access denied" in found.hints[0]
+    assert remedy in found.hints[0]
+    assert found.address == "usb://04a9:3199"
+
+
+def test_other_usb_devices_are_no_cameras() -> None:
+    class Mouse:
+        def __iter__(self) -> Any:
+            raise usb.core.USBError("Entity not found", -5, 2)
+
+    assert discover(pc(usb_devices=[Mouse()]), DRIVERS).cameras == ()
+
+
+def test_programs_are_read_from_proc(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    place = tmp_path / "42"
+    (place / "fd").mkdir(parents=True)
+    (place / "cmdline").write_bytes(b"/usr/libexec/gvfsd-gphoto2\0--spawner\0")
+    try:
+        (place / "fd" / "7").symlink_to("/dev/bus/usb/001/004")
+    except OSError:
+        pytest.skip("this user may not make links")
+    (tmp_path / "43").mkdir()
+    monkeypatch.setattr(surroundings_module, "PROCESSES", tmp_path)
+    assert list(surroundings_module._linux_processes()) == [
+        Process(42, "gvfsd-gphoto2", frozenset({"/dev/bus/usb/001/004"}))
+    ]
+
+
+def test_this_pc_can_be_looked_at() -> None:
+    found = discover(Surroundings.of_this_pc(), DRIVERS)
+    assert all(device.address for device in (*found.ports, *found.cameras))
