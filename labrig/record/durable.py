@@ -25,8 +25,7 @@ def write_durably(path: Path, data: bytes) -> None:
     except OSError as error:
         part.unlink(missing_ok=True)
         raise DiskError(
-            f"{path}: {len(data) / 1e6:.1f} MB cannot be written ({error.strerror}); free some "
-            "space, then `labrig resume` goes on from the last completed unit"
+            f"{path}: {len(data) / 1e6:.1f} MB cannot be written ({error.strerror}); make room"
         ) from None
 
 

@@ -44,8 +44,7 @@ class Journal:
             os.fsync(self._file.fileno())
         except OSError as error:
             raise DiskError(
-                f"{self.path}: the journal cannot be written ({error.strerror}); free some space, "
-                "then `labrig resume` goes on from the last completed unit"
+                f"{self.path}: the journal cannot be written ({error.strerror}); free some space"
             ) from None
 
     def close(self) -> None:
