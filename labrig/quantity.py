@@ -1,4 +1,4 @@
-"""Quantities as people write them: `90 min`, `320 ms`, `1/60 s`, `450 nm`, `0.7 %`, `25 MB`.
+"""Quantities as people write them: `90 min`, `320 ms`, `1/60 s`, `0.7 %`, `25 MB`.
 
 Each annotated type below turns such a text into a plain float in the named unit, so that inside
 labrig a name such as `exposure_s` says everything.
@@ -11,7 +11,6 @@ from typing import Annotated, Any
 from pydantic import BeforeValidator, PlainSerializer
 
 TIME_S = {"us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
-LENGTH_NM = {"nm": 1.0, "um": 1e3, "µm": 1e3}
 FRACTION = {"%": 0.01}
 SIZE_BYTES = {"B": 1.0, "kB": 1e3, "MB": 1e6, "GB": 1e9}
 
@@ -93,8 +92,6 @@ def word_or_duration(*words: str) -> BeforeValidator:
 
 #: Seconds, written with a unit of time.
 DurationS = Annotated[float, _validator(TIME_S, bare=False), _written("s")]
-#: Nanometres.
-WavelengthNm = Annotated[float, _validator(LENGTH_NM, bare=False), _written("nm")]
 #: A fraction, written as `0.7 %` or as a bare 0.007.
 Fraction = Annotated[float, _validator(FRACTION, bare=True)]
 #: Bytes.

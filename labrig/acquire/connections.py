@@ -19,9 +19,6 @@ class SerialPort(Protocol):
     def write(self, data: bytes, /) -> int | None:
         """Send all of `data`."""
 
-    def reset_input_buffer(self) -> None:
-        """Forget what has come in."""
-
     def close(self) -> None:
         """Release the port."""
 

@@ -38,9 +38,6 @@ class ScriptedPort:
         self._coming += [(now_s + 0.001 * n, answer[n : n + 1]) for n in range(len(answer))]
         return len(data)
 
-    def reset_input_buffer(self) -> None:
-        self._coming.clear()
-
     def close(self) -> None:
         pass
 
