@@ -7,7 +7,7 @@ import serial
 
 from labrig.acquire.connections import SerialPort
 from labrig.clock import Clock
-from labrig.errors import DeviceError
+from labrig.errors import DeviceLostError
 
 #: How often the line is looked at; USB serial adapters deliver once a millisecond at best.
 POLL_S = 0.002
@@ -41,7 +41,7 @@ class SerialLine:
 
         Raises
         ------
-        DeviceError
+        DeviceLostError
             `end` did not come in time; shows what came.
         """
         deadline_s = self._clock.now() + timeout_s
@@ -51,7 +51,7 @@ class SerialLine:
             if came.endswith(end):
                 break
             if self._clock.now() >= deadline_s:
-                raise DeviceError(
+                raise DeviceLostError(
                     f"{self._name} did not answer within {timeout_s:g} s: expected {end!r} at the "
                     f"end, got {came!r}; check its power, cable and address"
                 )
@@ -82,6 +82,6 @@ class SerialLine:
         except (serial.SerialException, OSError) as error:
             raise self._gone(error) from None
 
-    def _gone(self, error: Exception) -> DeviceError:
+    def _gone(self, error: Exception) -> DeviceLostError:
         said = " ".join(str(error).split())
-        return DeviceError(f"{self._name} is gone ({said}); plug it in again, then resume")
+        return DeviceLostError(f"{self._name} is gone ({said}); plug it in again")

@@ -20,6 +20,7 @@ from labrig.acquire.rig_file import DeviceEntry
 from labrig.acquire.roles import ROLES
 from labrig.clock import Clock, SystemClock
 from labrig.errors import DeviceError, UsageError
+from labrig.record import REAL_DISK, Disk
 from labrig.signals import interrupting
 from labrig.yaml_file import validate
 
@@ -43,6 +44,11 @@ class Bench:
     def seed(self) -> int | None:
         """Seed of everything random in a simulated rig; `None` on a real bench."""
         return None if self.room is None else self.room.seed
+
+    @property
+    def disk(self) -> Disk:
+        """The disk of the PC that the rig hangs on."""
+        return REAL_DISK if self.room is None else self.room.disk
 
     @contextmanager
     def devices(self) -> Iterator[Rig]:
@@ -165,14 +171,14 @@ class _Connections:
             self._ports[address] = port
         return self._ports[address]
 
-    def usb(self, address: str) -> Any:
+    def usb(self, address: str, serial_of: Callable[[Any], str] | None = None) -> Any:
         url = urlsplit(address)
         self._hold(address)
         if url.scheme == "sim":
             backend = None if self._room is None else self._room.usb(url.path.strip("/"))
             found = None if backend is None else usb.core.find(backend=backend)
         elif url.scheme == "usb":
-            found = self._find(address)
+            found = self._find(address, serial_of)
         else:
             raise UsageError(
                 f"'{address}' is no USB address; write usb://VENDOR:PRODUCT in hexadecimal, such "
@@ -200,7 +206,7 @@ class _Connections:
         self._stack.callback(connected.close)
         return connected
 
-    def _find(self, address: str) -> Any:
+    def _find(self, address: str, serial_of: Callable[[Any], str] | None) -> Any:
         url = urlsplit(address)
         try:
             vendor, product = (int(part, 16) for part in url.netloc.split(":"))
@@ -209,9 +215,12 @@ class _Connections:
                 f"'{address}' is no USB address; write usb://VENDOR:PRODUCT in hexadecimal, such "
                 "as usb://04a9:3199"
             ) from None
-        wanted = {"serial_number": url.path.strip("/")} if url.path.strip("/") else {}
+        serial = url.path.strip("/")
         try:
-            return usb.core.find(idVendor=vendor, idProduct=product, **wanted)
+            alike = list(usb.core.find(find_all=True, idVendor=vendor, idProduct=product))
+            if serial:
+                return _with_serial(alike, serial, serial_of)
+            return alike[0] if alike else None
         except usb.core.NoBackendError:
             raise DeviceError(
                 "libusb is not installed, so USB cameras cannot be reached; install libusb-1.0 "
@@ -243,6 +252,30 @@ class _Connections:
                 f"{address} is held by another labrig on this PC; wait until it has ended"
             ) from None
         self._stack.callback(lock.release)
+
+
+def _with_serial(alike: list[Any], serial: str, serial_of: Callable[[Any], str] | None) -> Any:
+    """The device with that serial number; those that tell none on the bus are asked in turn."""
+    others, problem = [], None
+    for device in sorted(alike, key=lambda device: not device.iSerialNumber):
+        try:
+            if device.iSerialNumber:
+                said = device.serial_number
+            else:
+                said = serial_of(device) if serial_of else ""
+        except DeviceError as failure:
+            problem = failure
+            continue
+        if said.strip().lstrip("0") == serial.lstrip("0"):
+            return device
+        others.append(said or "unknown")
+    if problem:
+        raise problem
+    if others:
+        raise DeviceError(
+            f"no device with the serial number {serial}; of this kind there are {', '.join(others)}"
+        )
+    return None
 
 
 def _host_and_port(address: str, default_port: int) -> tuple[str, int]:

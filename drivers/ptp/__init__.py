@@ -1,4 +1,4 @@
-"""Canon EOS cameras over PTP, on USB or in the network (PTP/IP)."""
+"""Cameras over PTP, on USB or in the network (PTP/IP): Canon EOS, and what is standard PTP."""
 
 from .camera import PtpCamera
 

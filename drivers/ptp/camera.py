@@ -1,44 +1,24 @@
-"""A Canon EOS on USB or in the network as labrig's camera."""
+"""A PTP camera on USB or in the network as labrig's camera."""
 
-from collections.abc import Callable, Sequence
+from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 
 from labrig.acquire.connections import Connections
 from labrig.acquire.findings import Finding
 from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
-from labrig.errors import DeviceError
+from labrig.errors import DeviceError, DeviceLostError
 
-from .device_info import DeviceInfo, parse_device_info
-from .eos_checks import findings
-from .eos_exposure import EosExposure
-from .eos_frames import EosFrames
-from .eos_protocol import (
-    FEW_SHOTS,
-    HOST_ROOM,
-    RAW_ONLY,
-    SINGLE_SHOT,
-    TO_HOST,
-    Eos,
-    Property,
-    lacking_operations,
-    number,
-)
-from .eos_release import LATE_PRESS_S, release_of
-from .eos_state import EosState
-from .eos_transfer import EosTransfer
-from .eos_viewfinder import EosViewfinder
-from .failures import RefusedError
-from .link import open_link
-from .ptp_codes import Standard
-from .session import CURT, Session
+from .body import Body
+from .eos_camera import EosCamera
+from .eos_protocol import lacking_operations
+from .opening import identify, open_link, open_session
+from .session import Session
 from .settings import PtpCameraSettings
+from .standard_camera import NEEDED, StandardCamera
 
 
 class PtpCamera:
-    """A Canon EOS, remotely controlled, which delivers its RAW frames to the PC only.
-
-    The button is held half pressed from `arm` on, so that `shoot` costs one short transaction
-    before the shutter moves. A frame whose `shoot` was broken off is discarded before the next.
+    """A camera in a PTP session, and the kind of body that it says it is.
 
     Parameters
     ----------
@@ -52,33 +32,28 @@ class PtpCamera:
     Raises
     ------
     DeviceError
-        No camera there, in use by another program, or not a remotely controllable EOS.
+        No camera there, in use by another program, or not one that can be remotely controlled.
     """
 
     Settings = PtpCameraSettings
 
     def __init__(self, address: str, settings: PtpCameraSettings, connections: Connections) -> None:
-        self._settings = settings
         self._clock = connections.clock
-        self._armed = False
-        with ExitStack() as undo:
-            self._link = open_link(address, connections)
-            undo.callback(self._link.close)
-            self._session = Session(self._link, self._clock)
-            self._state = EosState(self._session, self._clock, settings.answer_timeout)
-            self._exposure = EosExposure(self._state, settings)
-            left_behind = self._open_session()
-            undo.callback(self._take_leave)
-            self._info = self._ask_identity(address)
-            self._release = release_of(self._info, self._session)
-            transfer = EosTransfer(self._session, self._clock, self._info)
-            timeout_s = settings.transfer_timeout
-            self._viewfinder = EosViewfinder(self._session, self._state, self._clock, self._info)
-            self._frames = EosFrames(self._state, transfer, self._clock, timeout_s)
-            self._take_control()
+        with ExitStack() as leaving:
+            link = open_link(address, connections)
+            leaving.callback(link.close)
+            self._session = Session(link, self._clock)
+            left_behind = open_session(self._session)
+            leaving.callback(self._close_session)
+            self._info = identify(self._session)
+            self._body = self._body_for(address, settings)
+            leaving.callback(self._give_back)
             if left_behind:
-                self._release.let_go_blindly()
-            undo.pop_all()
+                self._body.take_over()
+            else:
+                self._body.take_control()
+            self._in_control = True
+            self._leaving = leaving.pop_all()
 
     @classmethod
     def declared_offers(cls, settings: PtpCameraSettings) -> CameraOffers:
@@ -97,19 +72,17 @@ class PtpCamera:
         DeviceError
             Nothing that the rig file allows, for example because its dial is not at M.
         """
-        self._state.refresh()
-        return self._exposure.offers()
+        return self._body.offers()
 
     def findings(self) -> Sequence[Finding]:
-        """How its dial, lens switch and menus are set.
+        """How its dial, lens switch and menus are set, as far as it tells.
 
         Raises
         ------
         DeviceError
             The camera does not answer.
         """
-        self._state.refresh()
-        return findings(self._state, self._settings.isos, self._info.operations)
+        return self._body.findings()
 
     def keep_awake(self) -> None:
         """Put off its automatic switching-off.
@@ -119,70 +92,37 @@ class PtpCamera:
         DeviceError
             The camera is gone.
         """
-        # one that refuses is awake, too
-        with suppress(RefusedError):
-            self._send_if_known(Eos.KeepDeviceOn)
+        self._body.keep_awake()
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
         """Set and read back; returns the settings in force, with the true shutter time.
-
-        Parameters
-        ----------
-        settings
-            The shutter time as offered, or as on the dial (1/60 s for the true 1/64 s).
 
         Raises
         ------
         DeviceError
             The camera does not offer them or did not take them.
         """
-        self._armed = False
-        self._release.let_go_half(self._busy_s())
-        self._frames.discard_abandoned()
-        self._exposure.apply(settings)
-        return self._exposure.in_force()
+        return self._body.configure(settings)
 
     def arm(self) -> None:
-        """Press half and hold; may take seconds where the lens focuses.
+        """Do all that can be done before the release.
 
         Raises
         ------
         DeviceError
             The camera does not get ready.
         """
-        if self._armed:
-            return
-        self._viewfinder.off()
-        self._frames.discard_abandoned()
-        shots = self._state.value(Property.shots_left)
-        if shots is not None and shots < FEW_SHOTS:
-            self._send_if_known(Eos.PCHDDCapacity, *HOST_ROOM)
-        self._send_if_known(Eos.KeepDeviceOn)
-        self._release.press_half()
-        self._armed = True
+        self._body.arm()
 
     def shoot(self) -> Frame:
         """Release now, wait for the exposure, transfer the frame.
-
-        The exposure begins in the middle of the release command's round trip, give or take half of
-        it, plus the measured `shutter_lag`.
 
         Raises
         ------
         DeviceError
             The camera did not release, or delivered no or another frame.
         """
-        self.arm()
-        self._armed = False
-        settings = self._exposure.in_force()
-        start_s = self._press(settings.exposure_s)
-        end_s = start_s + settings.exposure_s
-        self._frames.expect(end_s)
-        self._release.let_go_full(self._busy_s())
-        self._clock.sleep_until(end_s)
-        data, suffix = self._frames.fetch()
-        self._release.let_go_half(LATE_PRESS_S)
-        return Frame(data, suffix, start_s, end_s, settings)
+        return self._body.shoot()
 
     def preview(self) -> bytes:
         """One picture of the viewfinder, a JPEG; the first one starts it, `make_safe` stops it.
@@ -192,103 +132,67 @@ class PtpCamera:
         DeviceError
             The camera has no live view, does not start it, or sends no picture.
         """
-        self._armed = False
-        return self._viewfinder.picture()
+        return self._body.preview()
 
     def make_safe(self) -> None:
         """Bring the line back into step, let go of the button, viewfinder off, nothing pending.
 
-        An exposure that has begun runs to its end in the camera; its frame is discarded later.
-
         Raises
         ------
+        DeviceLostError
+            The camera is gone.
         DeviceError
             One of these could not be confirmed; all of them were tried.
         """
-        self._armed = False
-        steps: tuple[Callable[[], None], ...] = (
-            self._back_in_step,
-            lambda: self._release.let_go_full(self._busy_s()),
-            lambda: self._release.let_go_half(self._busy_s()),
-            self._frames.discard_offered,
-            self._viewfinder.off_whoever_switched_it_on,
-        )
-        problems: list[str] = []
+        problems: list[DeviceError] = []
         with self._clock.shielded():
-            for step in steps:
+            for step in (self._back_in_step, *self._body.steps_to_safety()):
                 try:
                     step()
                 except DeviceError as problem:
-                    problems.append(str(problem))
+                    problems.append(problem)
         if problems:
-            raise DeviceError("camera not known to be safe: " + "; ".join(dict.fromkeys(problems)))
+            self._in_control = False
+            is_lost = any(isinstance(problem, DeviceLostError) for problem in problems)
+            said = "; ".join(dict.fromkeys(map(str, problems)))
+            kind = DeviceLostError if is_lost else DeviceError
+            raise kind(f"camera not known to be safe: {said}")
 
     def disconnect(self) -> None:
         """Give the camera back to its own buttons and release it; never raises."""
         with self._clock.shielded():
-            try:
-                self._take_leave()
-            finally:
-                self._link.close()
+            self._leaving.close()
 
-    def _open_session(self) -> bool:
-        """Open the session, through a reset if need be; True if a dead program left one behind."""
-        try:
-            return self._session.open()
-        except DeviceError:
-            self._session.start_over()
-            return True
+    def _body_for(self, address: str, settings: PtpCameraSettings) -> Body:
+        known = self._info.operations
+        if not (lacking := lacking_operations(known)):
+            return EosCamera(self._session, self._clock, self._info, settings)
+        if known >= NEEDED:
+            return StandardCamera(self._session, self._clock, self._info, settings)
+        raise DeviceError(
+            f"camera {address}: expected a Canon EOS with remote release or a camera with "
+            f"InitiateCapture, got {self._info} without {', '.join(lacking)}, and without "
+            f"{', '.join(f'0x{op:X}' for op in sorted(NEEDED - known))}: set its USB mode to PC "
+            "remote, or use a camera that has them"
+        )
 
-    def _ask_identity(self, address: str) -> DeviceInfo:
-        info = parse_device_info(self._session.transact(Standard.GetDeviceInfo).data)
-        if lacking := lacking_operations(info.operations):
-            raise DeviceError(
-                f"camera {address}: expected a Canon EOS with remote release, got {info} without "
-                f"{', '.join(lacking)}: set its USB mode to PC remote, or use a camera that has it"
-            )
-        return info
-
-    def _take_control(self) -> None:
-        self._session.transact(Eos.SetRemoteMode, 1)
-        self._session.transact(Eos.SetEventMode, 1)
-        self._state.refresh()
-        if self._state.value(Property.drive_mode) is not None:
-            self._state.set(Property.drive_mode, number(SINGLE_SHOT))
-        self._state.set(Property.image_format, RAW_ONLY)
-        self._state.set(Property.destination, number(TO_HOST))
-        self._send_if_known(Eos.PCHDDCapacity, *HOST_ROOM)
-        self._state.refresh()
-
-    def _take_leave(self) -> None:
+    def _give_back(self) -> None:
         with suppress(DeviceError):
-            for step in (Eos.SetEventMode, Eos.SetRemoteMode):
-                with suppress(RefusedError):
-                    self._session.transact(step, 0, patience=CURT)
+            self._body.give_back()
+
+    def _close_session(self) -> None:
+        with suppress(DeviceError):
             self._session.close()
 
-    def _send_if_known(self, operation: Eos, *params: int) -> None:
-        if operation in self._info.operations:
-            self._session.transact(operation, *params)
-
-    def _press(self, exposure_s: float) -> float:
-        """Clock time at which the exposure began."""
-        # should it be broken off, nobody knows whether it has begun: assume so
-        self._frames.expect(self._clock.now() + LATE_PRESS_S + exposure_s)
-        try:
-            reply = self._release.press_full(exposure_s)
-        except RefusedError:
-            self._frames.expect_none()
-            raise
-        return (reply.sent_s + reply.answered_s) / 2 + self._settings.shutter_lag
-
     def _back_in_step(self) -> None:
-        try:
-            self._session.resynchronise()
-        except DeviceError:
-            self._session.start_over()
-            self._take_control()
-            self._release.let_go_blindly()
-
-    def _busy_s(self) -> float:
-        """How long the camera may be busy: to the end of an exposure, and a little more."""
-        return self._frames.exposing_for_s() + LATE_PRESS_S
+        """Give up what was broken off; where that does not help, or did not, begin anew."""
+        if self._in_control:
+            try:
+                self._session.resynchronise()
+            except DeviceError:
+                self._in_control = False
+            else:
+                return
+        self._session.start_over()
+        self._body.take_over()
+        self._in_control = True

@@ -1,9 +1,8 @@
 """The DeviceInfo dataset (PIMA 15740, 5.5.1): who the camera is and what it can do."""
 
-import struct
 from dataclasses import dataclass
 
-from .failures import MalformedError
+from .datasets import DatasetReader
 
 
 @dataclass(frozen=True)
@@ -12,8 +11,10 @@ class DeviceInfo:
 
     Attributes
     ----------
-    operations
-        Codes of the operations it knows.
+    operations, events, properties
+        Codes of the operations it knows, of the events it reports, of the properties it has.
+    capture_formats
+        Codes of the formats in which it can photograph.
     """
 
     manufacturer: str
@@ -21,6 +22,9 @@ class DeviceInfo:
     version: str
     serial: str
     operations: frozenset[int]
+    events: frozenset[int]
+    properties: frozenset[int]
+    capture_formats: frozenset[int]
 
     def __str__(self) -> str:
         maker = self.manufacturer.split(" ")[0]
@@ -38,39 +42,13 @@ def parse_device_info(data: bytes) -> DeviceInfo:
     MalformedError
         The dataset is cut short.
     """
-    reader = _Reader(data)
+    reader = DatasetReader(data, "DeviceInfo")
     reader.take(2 + 4 + 2)  # standard version, vendor extension and its version
     reader.text()  # vendor extension in words
     reader.take(2)  # functional mode
-    operations = reader.codes()
-    for _ in ("events", "properties", "capture formats", "image formats"):
-        reader.codes()
+    operations, events, properties, capture_formats = (frozenset(reader.codes()) for _ in range(4))
+    reader.codes()  # image formats
     manufacturer, model, version, serial = (reader.text() for _ in range(4))
-    return DeviceInfo(manufacturer, model, version, serial, frozenset(operations))
-
-
-class _Reader:
-    """Takes one field after the other."""
-
-    def __init__(self, data: bytes) -> None:
-        self._data = data
-        self._position = 0
-
-    def take(self, size: int) -> bytes:
-        piece = self._data[self._position : self._position + size]
-        if len(piece) < size:
-            raise MalformedError(
-                f"the camera's DeviceInfo is cut short at byte {len(self._data)}: "
-                "unplug it and plug it in again"
-            )
-        self._position += size
-        return piece
-
-    def codes(self) -> tuple[int, ...]:
-        (count,) = struct.unpack("<I", self.take(4))
-        return struct.unpack(f"<{count}H", self.take(2 * count))
-
-    def text(self) -> str:
-        units = self.take(2 * self.take(1)[0])
-        words = units.decode("utf-16-le", errors="replace").partition("\0")[0]
-        return "".join(letter for letter in words if letter.isprintable()).strip()
+    return DeviceInfo(
+        manufacturer, model, version, serial, operations, events, properties, capture_formats
+    )

@@ -4,53 +4,72 @@ Menus are named as a 5D Mark II shows them. Sources of codes: libgphoto2's ptp.h
 (exposure and focus modes, automatic switching-off in seconds); custom functions: `eos_custom`.
 """
 
-from collections.abc import Collection, Iterator
+from collections.abc import Iterable, Iterator
 
 from labrig.acquire.findings import Finding
 
-from .eos_codes import ISOS
+from .device_info import DeviceInfo
+from .eos_codes import BULB_TV, ISOS
 from .eos_custom import CustomFunction
-from .eos_protocol import MANUAL_EXPOSURE, Eos, Property
+from .eos_iso import NativeIsos, isos_of_model
+from .eos_protocol import BULB_EXPOSURE, MANUAL_EXPOSURE, Property
 from .eos_state import EosState
+from .settings import PtpCameraSettings
 
 MANUAL_FOCUS = 3
 AUTO_ISO = 0
 #: Values that stand for "never"; models with signed seconds write −1.
 NEVER_OFF = (0, 0xFFFFFFFF)
-#: Canon's sensors amplify in whole stops; thirds and what lies outside are computed afterwards.
-NATIVE_ISOS = (100, 200, 400, 800, 1600, 3200, 6400)
 
 _DIAL = {0: "P", 1: "Tv", 2: "Av", 4: "B", 7: "C1", 9: "the green square", 16: "C2", 17: "C3"}
 _BY_HAND = "look for yourself in the camera's menu"
 
 
-def findings(state: EosState, isos: Collection[int], operations: Collection[int]) -> list[Finding]:
+def findings(
+    state: EosState, settings: PtpCameraSettings, info: DeviceInfo, *, has_bulb: bool
+) -> list[Finding]:
     """All that can be told; the state's events must be fresh.
 
     Parameters
     ----------
-    isos
-        Sensitivities that the rig file allows.
-    operations
-        Codes of what the camera can do.
+    settings
+        The rig file's keys for this camera.
+    info
+        Its model, and what it can do.
+    has_bulb
+        Whether the PC can end an exposure.
     """
+    isos = settings.native_isos(info.model)
     return [
-        _exposure_mode(state.value(Property.exposure_mode)),
+        *_exposure_mode(state, wants_bulb=bool(settings.bulb_times_s), has_bulb=has_bulb),
         _focus(state.value(Property.focus_mode)),
-        _iso_in_force(state.value(Property.iso)),
-        *_rig_isos(isos),
-        _auto_power_off(state.value(Property.auto_power_off), Eos.KeepDeviceOn in operations),
+        _iso_in_force(state.value(Property.iso), isos),
+        *_native_isos(isos, info.model),
+        _auto_power_off(state.value(Property.auto_power_off)),
         *_custom_functions(state),
     ]
 
 
-def _exposure_mode(mode: int | None) -> Finding:
+def _exposure_mode(state: EosState, *, wants_bulb: bool, has_bulb: bool) -> Iterator[Finding]:
+    mode = state.value(Property.exposure_mode)
+    if mode == BULB_EXPOSURE and wants_bulb and has_bulb:
+        yield Finding(
+            "warn", "dial at B: exposures of 64 s and more only", "turn it to M for others"
+        )
+        return
     if mode is None:
-        return Finding("warn", "the camera does not tell its exposure mode", "turn its dial to M")
-    if mode != MANUAL_EXPOSURE:
+        yield Finding("warn", "the camera does not tell its exposure mode", "turn its dial to M")
+    elif mode != MANUAL_EXPOSURE:
         at = _DIAL.get(mode, f"mode {mode}")
-        return Finding("refuse", f"its dial is at {at}: it chooses exposures", "turn it to M")
-    return Finding("fine", "dial at M")
+        yield Finding("refuse", f"its dial is at {at}: it chooses exposures", "turn it to M")
+    else:
+        yield Finding("fine", "dial at M")
+    if wants_bulb and not (has_bulb and BULB_TV in state.choices(Property.shutter_time)):
+        yield Finding(
+            "warn",
+            "the rig file's longest_exposure asks for bulb, which the camera does not offer at M",
+            "turn its dial to B, if it has one, or set longest_exposure to 32 s",
+        )
 
 
 def _focus(mode: int | None) -> Finding:
@@ -65,29 +84,46 @@ def _focus(mode: int | None) -> Finding:
     return Finding("fine", "focus at MF")
 
 
-def _iso_in_force(code: int | None) -> Finding:
-    where = "ISO button above the display, a whole stop from 100 to 6400"
+def _iso_in_force(code: int | None, native: NativeIsos) -> Finding:
+    where = f"ISO button above the display, one of {_listed(native.values)}"
     if code is None:
         return Finding("warn", "the camera does not tell its ISO", where)
     if code == AUTO_ISO:
         return Finding("refuse", "automatic ISO is on: gain may change between frames", where)
-    if ISOS.get(code) not in NATIVE_ISOS:
+    if ISOS.get(code) not in native.values:
         said = f"ISO {ISOS[code]}" if code in ISOS else f"the ISO code 0x{code:X}"
         return Finding("refuse", f"{said} is not native: computed after digitising", where)
     return Finding("fine", f"ISO {ISOS[code]} is native")
 
 
-def _rig_isos(isos: Collection[int]) -> Iterator[Finding]:
-    if others := sorted(set(isos) - set(NATIVE_ISOS)):
+def _native_isos(native: NativeIsos, model: str) -> Iterator[Finding]:
+    """Who says so, where that leaves a doubt."""
+    listed = _listed(native.values)
+    if native.source == "assumed":
         yield Finding(
-            "refuse",
-            f"the rig file allows ISO {', '.join(map(str, others))}, which "
-            f"{'is' if len(others) == 1 else 'are'} not native: computed after digitising",
-            "leave it out of the camera's 'isos'",
+            "warn",
+            f"which ISOs of a {model or 'camera without a name'} are native is not known: {listed} "
+            "is assumed",
+            "write what you know into the camera's 'isos' in the rig file",
+        )
+    of_model = isos_of_model(model)
+    others = sorted(set(native.values) - set(of_model.values))
+    if native.source == "rig file" and others:
+        known = "is not known to be native" if of_model.source == "assumed" else "is not native"
+        yield Finding(
+            "warn",
+            f"the rig file allows ISO {_listed(others)}, which {known} in a {model}: computed "
+            "after digitising",
+            "leave it out of the camera's 'isos' unless you have measured it",
         )
 
 
-def _auto_power_off(after_s: int | None, can_be_kept_on: bool) -> Finding:
+def _listed(isos: Iterable[int]) -> str:
+    return ", ".join(map(str, isos))
+
+
+def _auto_power_off(after_s: int | None) -> Finding:
+    """It is kept awake, too, but a night's run is not staked on one of the two."""
     where = "Set-up 1 (yellow) → Auto power off → Off"
     if after_s is None:
         return Finding(
@@ -95,10 +131,7 @@ def _auto_power_off(after_s: int | None, can_be_kept_on: bool) -> Finding:
         )
     if after_s in NEVER_OFF:
         return Finding("fine", "auto power off is off")
-    what = f"it switches itself off after {after_s} s"
-    if can_be_kept_on:
-        return Finding("warn", f"{what}; labrig keeps it awake while a run goes on", where)
-    return Finding("refuse", f"{what} and cannot be kept awake over USB", where)
+    return Finding("refuse", f"it switches itself off when left alone for {after_s} s", where)
 
 
 def _custom_functions(state: EosState) -> Iterator[Finding]:

@@ -17,6 +17,10 @@ _STEP = {0: Fraction(0), 3: Fraction(1, 3), 4: Fraction(1, 2), 5: Fraction(2, 3)
 _TV_ZERO = 0x38
 #: 32 s ("30") and 1/8192 s ("1/8000").
 LONGEST_TV, SHORTEST_TV = 0x10, 0xA0
+#: The shutter stays open until it is told to close.
+BULB_TV = 0x0C
+#: Longer times than the dial's begin here, and double.
+SHORTEST_BULB_S = 64.0
 #: A dial label is at most 0.09 stop off the true time; neighbours are at least 1/6 stop apart.
 SAME_SHUTTER_STOPS = 0.1
 #: Neighbouring aperture labels differ by 6 % or more.
@@ -65,6 +69,16 @@ def third_stop_codes() -> tuple[int, ...]:
     """Tv codes in thirds of a stop, from the longest time to the shortest."""
     codes = range(LONGEST_TV, SHORTEST_TV + 1)
     return tuple(c for c in codes if (c - _TV_ZERO) % 8 in (0, 3, 5))
+
+
+def bulb_times_s(longest_s: float) -> tuple[float, ...]:
+    """Times offered at bulb, doubling from 64 s up to `longest_s` seconds."""
+    times_s = []
+    time_s = SHORTEST_BULB_S
+    while time_s <= longest_s:
+        times_s.append(time_s)
+        time_s *= 2
+    return tuple(times_s)
 
 
 def shutter_code(exposure_s: float, among: Iterable[int]) -> int | None:

@@ -1,5 +1,6 @@
 """The frames of an EOS: the one that is due, its fetching, and those that nobody wants any more."""
 
+import math
 import re
 
 from labrig.clock import Clock
@@ -13,6 +14,8 @@ from .session import USUAL
 
 _SUFFIX = re.compile(r"\.[a-z0-9]{1,5}")
 _JPEG_FORMAT = 0x3801
+#: So long after its end the frame of an exposure that a dead program began may still be offered.
+LEFT_OVER_S = 2.0
 
 
 class EosFrames:
@@ -38,6 +41,7 @@ class EosFrames:
         self._clock = clock
         self._timeout_s = timeout_s
         self._due_after_s: float | None = None
+        self._left_over_until_s = -math.inf
 
     def expect(self, exposure_end_s: float) -> None:
         """An exposure has begun, or may have, that ends at this clock time at the latest."""
@@ -46,6 +50,10 @@ class EosFrames:
     def expect_none(self) -> None:
         """No exposure is under way."""
         self._due_after_s = None
+
+    def expect_left_over(self) -> None:
+        """Another program's exposure may have ended just now."""
+        self._left_over_until_s = self._clock.now() + LEFT_OVER_S
 
     def exposing_for_s(self) -> float:
         """Seconds for which the camera may still expose."""
@@ -73,7 +81,7 @@ class EosFrames:
         return data, suffix
 
     def discard_abandoned(self) -> None:
-        """Wait for a frame that is due though nobody wants it, and discard all there are.
+        """Wait for frames that are due though nobody wants them, and discard all there are.
 
         Raises
         ------
@@ -84,6 +92,7 @@ class EosFrames:
             self._clock.sleep_until(self._due_after_s)
             self._wait()
             self._due_after_s = None
+        self._clock.sleep_until(self._left_over_until_s)
         self.discard_offered()
 
     def discard_offered(self) -> None:

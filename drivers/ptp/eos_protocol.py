@@ -8,7 +8,7 @@ import struct
 from collections.abc import Collection
 from enum import IntEnum
 
-from .eos_codes import F_NUMBERS, ISOS, shutter_time_s
+from .eos_codes import BULB_TV, F_NUMBERS, ISOS, shutter_time_s
 
 
 class Eos(IntEnum):
@@ -24,6 +24,9 @@ class Eos(IntEnum):
     TransferComplete = 0x9117
     PCHDDCapacity = 0x911A
     KeepDeviceOn = 0x911D
+    BulbStart = 0x9125
+    BulbEnd = 0x9126
+    RequestDevicePropValue = 0x9127
     RemoteReleaseOn = 0x9128
     RemoteReleaseOff = 0x9129
     GetViewFinderData = 0x9153
@@ -55,7 +58,8 @@ _NEEDED = (
     Eos.TransferComplete,
 )
 
-MANUAL_EXPOSURE = 3
+#: Exposure modes, as the dial stands: M, and the B that larger bodies have.
+MANUAL_EXPOSURE, BULB_EXPOSURE = 3, 4
 SINGLE_SHOT = 0
 TO_HOST = 4
 VIEWFINDER_OFF = 0
@@ -96,6 +100,8 @@ def value_text(prop: int, value: bytes) -> str:
     meaning = ""
     if prop == Property.shutter_time and (exposure_s := shutter_time_s(code)) is not None:
         meaning = f" ({exposure_s:g} s)" if exposure_s >= 0.3 else f" (1/{1 / exposure_s:.0f} s)"
+    elif prop == Property.shutter_time and code == BULB_TV:
+        meaning = " (bulb)"
     elif prop == Property.aperture and code in F_NUMBERS:
         meaning = f" (f/{F_NUMBERS[code]:g})"
     elif prop == Property.iso and code in ISOS:

@@ -21,9 +21,12 @@ _RESULTS = {
     7: "it believes there is no room for the frame: start again",
 }
 
+#: An operation and its parameters.
+Command = tuple[Eos, *tuple[int, ...]]
+
 
 class Stage(Enum):
-    """Where a stage of the button is, as far as is known."""
+    """Where something that can be held is, as far as is known."""
 
     UP = auto()
     #: A command was sent, and not answered with OK.
@@ -31,11 +34,89 @@ class Stage(Enum):
     DOWN = auto()
 
 
+class Held:
+    """Something that one command presses and another lets go of, after whatever has happened.
+
+    Parameters
+    ----------
+    session
+        Over which the camera is told.
+    press, let_go
+        The two commands.
+    """
+
+    def __init__(self, session: Session, press: Command, let_go: Command) -> None:
+        self._session = session
+        self._press = press
+        self._let_go = let_go
+        self._stage = Stage.UP
+
+    @property
+    def is_down(self) -> bool:
+        """Whether it is certainly held."""
+        return self._stage is Stage.DOWN
+
+    def press(self, patience: Patience) -> Reply:
+        """Press it.
+
+        Raises
+        ------
+        DeviceError
+            The camera did not say that it is down.
+        """
+        self._stage = Stage.UNKNOWN
+        reply = self._session.transact(*self._press, patience=patience)
+        self._stage = Stage.DOWN
+        return reply
+
+    def let_go(self, busy_s: float) -> Reply | None:
+        """Let go of it unless it is certainly up; a camera that exposes may be busy for `busy_s`.
+
+        Returns
+        -------
+        Reply | None
+            None if there was nothing to let go of.
+
+        Raises
+        ------
+        DeviceError
+            It may still be down.
+        """
+        before = self._stage
+        if before is Stage.UP:
+            return None
+        self._stage = Stage.UNKNOWN
+        reply = None
+        try:
+            reply = self._session.transact(*self._let_go, patience=Patience(FOCUS_S, busy_s))
+        except RefusedError as refusal:
+            if refusal.code == DEVICE_BUSY:
+                self._stage = before
+                raise
+            # a camera may refuse to let go of what is not down: refused twice, it is not
+            if before is Stage.DOWN:
+                raise
+        self._stage = Stage.UP
+        return reply
+
+    def doubt(self) -> None:
+        """What was pressed may not be down."""
+        self._stage = Stage.UNKNOWN
+
+    def let_go_blindly(self) -> None:
+        """Let go of what another program, or this one before a reset, may hold.
+
+        Raises
+        ------
+        DeviceError
+            It may still be down.
+        """
+        self.doubt()
+        self.let_go(LATE_PRESS_S)
+
+
 class Release(ABC):
     """Presses and lets go, and can let go after anything."""
-
-    def __init__(self, session: Session) -> None:
-        self._session = session
 
     @abstractmethod
     def press_half(self) -> None:
@@ -70,52 +151,35 @@ class TwoStageRelease(Release):
     """RemoteReleaseOn and Off: the first stage can be held, the second acts at once."""
 
     def __init__(self, session: Session) -> None:
-        super().__init__(session)
-        self._stages = {HALF: Stage.UP, FULL: Stage.UP}
+        self._half, self.full = (
+            Held(session, (Eos.RemoteReleaseOn, stage, 0), (Eos.RemoteReleaseOff, stage))
+            for stage in (HALF, FULL)
+        )
 
     def press_half(self) -> None:
-        if self._stages[HALF] is not Stage.DOWN:
-            self._press(HALF, Patience(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
+        if not self._half.is_down:
+            self._half.press(Patience(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
 
     def press_full(self, exposure_s: float) -> Reply:
         # some cameras answer when the shutter has closed
-        return self._press(FULL, Patience(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S))
+        return self.full.press(Patience(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S))
 
     def let_go_full(self, busy_s: float) -> None:
-        self._let_go(FULL, busy_s)
+        self.full.let_go(busy_s)
 
     def let_go_half(self, busy_s: float) -> None:
-        self._let_go(HALF, busy_s)
+        self._half.let_go(busy_s)
 
     def let_go_blindly(self) -> None:
-        self._stages = {HALF: Stage.UNKNOWN, FULL: Stage.UNKNOWN}
-        self._let_go(FULL, LATE_PRESS_S)
-        self._let_go(HALF, LATE_PRESS_S)
-
-    def _press(self, stage: int, patience: Patience) -> Reply:
-        self._stages[stage] = Stage.UNKNOWN
-        reply = self._session.transact(Eos.RemoteReleaseOn, stage, 0, patience=patience)
-        self._stages[stage] = Stage.DOWN
-        return reply
-
-    def _let_go(self, stage: int, busy_s: float) -> None:
-        before = self._stages[stage]
-        if before is Stage.UP:
-            return
-        self._stages[stage] = Stage.UNKNOWN
-        patience = Patience(answer_s=FOCUS_S, busy_s=busy_s)
-        try:
-            self._session.transact(Eos.RemoteReleaseOff, stage, patience=patience)
-        except RefusedError as refusal:
-            # a camera may refuse to let go of what is not down
-            if before is Stage.DOWN or refusal.code == DEVICE_BUSY:
-                self._stages[stage] = before
-                raise
-        self._stages[stage] = Stage.UP
+        self.full.let_go_blindly()
+        self._half.let_go_blindly()
 
 
 class OneStageRelease(Release):
     """RemoteRelease: presses and lets go by itself."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
 
     def press_half(self) -> None:
         pass

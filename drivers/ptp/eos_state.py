@@ -1,21 +1,30 @@
 """What an EOS says about itself, kept from its events; and setting its properties."""
 
+from collections.abc import Collection
+from contextlib import suppress
+
 from labrig.clock import Clock
 from labrig.errors import DeviceError
 
 from .eos_custom import CustomFunctions
-from .eos_events import ChoicesChanged, ObjectOffered, ValueChanged, parse_events
+from .eos_events import ChoicesChanged, Event, ObjectOffered, ValueChanged, parse_events
 from .eos_protocol import Eos, Property, property_dataset, value_text
-from .failures import MalformedError
+from .failures import MalformedError, RefusedError
 from .session import USUAL, Patience, Session
 
 POLL_PERIOD_S = 0.03
 #: A camera lists itself in a few answers; more than so many in a row is a babbling one.
 MOST_ANSWERS = 64
+#: Many times what fits into a camera's memory for the PC.
+MOST_OFFERED = 1000
+_KNOWN = frozenset(Property)
 
 
 class EosState:
     """Mirror of the camera's properties and of the frames that it offers.
+
+    What the camera last said of a property is in doubt from a set that was not confirmed, or an
+    answer that was lost, until it speaks of it again: it is then set anew.
 
     Parameters
     ----------
@@ -25,21 +34,27 @@ class EosState:
         On which is waited for it.
     settle_s
         Seconds within which it must have taken a setting.
+    operations
+        Codes of what the camera can do.
     """
 
-    def __init__(self, session: Session, clock: Clock, settle_s: float) -> None:
+    def __init__(
+        self, session: Session, clock: Clock, settle_s: float, operations: Collection[int]
+    ) -> None:
         self._session = session
         self._clock = clock
         self._settle_s = settle_s
+        self._can_be_asked = Eos.RequestDevicePropValue in operations
         self._values: dict[int, bytes] = {}
+        self._in_doubt: set[int] = set()
         self._choices: dict[int, tuple[int, ...]] = {}
-        self._offered: list[ObjectOffered] = []
+        self._offered: dict[int, ObjectOffered] = {}
         self.custom_functions = CustomFunctions()
 
     @property
     def offered(self) -> tuple[ObjectOffered, ...]:
         """Frames that wait in the camera, oldest first."""
-        return tuple(self._offered)
+        return tuple(self._offered.values())
 
     def value(self, prop: Property) -> int | None:
         """A numeric property, None if the camera never spoke of it."""
@@ -71,24 +86,29 @@ class EosState:
         DeviceError
             The camera does not answer, or not in the protocol's terms.
         """
-        patience = Patience(USUAL.answer_s, busy_s)
-        events = parse_events(self._session.transact(Eos.GetEvent, patience=patience).data)
+        events = self._events(Patience(USUAL.answer_s, busy_s))
         for event in events:
             match event:
-                case ValueChanged(prop, value):
+                case ValueChanged(prop, value) if prop in _KNOWN:
                     self._values[prop] = value
+                    self._in_doubt.discard(prop)
                     if prop == Property.custom_functions:
                         self.custom_functions.take(value)
-                case ChoicesChanged(prop, codes):
+                case ChoicesChanged(prop, codes) if prop in _KNOWN:
                     self._choices[prop] = codes
                 case ObjectOffered():
-                    if event.handle not in {known.handle for known in self._offered}:
-                        self._offered.append(event)
+                    self._offered.setdefault(event.handle, event)
+        if (many := len(self._offered)) > MOST_OFFERED:
+            self._offered.clear()
+            raise MalformedError(
+                f"expected at most {MOST_OFFERED} frames in the camera, it offers {many}: switch "
+                "it off and on"
+            )
         return bool(events)
 
     def forget(self, offered: ObjectOffered) -> None:
         """A frame no longer waits in the camera."""
-        self._offered.remove(offered)
+        del self._offered[offered.handle]
 
     def set(self, prop: Property, value: bytes) -> None:
         """Set a property unless it has the value already, and wait for the camera to say so.
@@ -100,11 +120,15 @@ class EosState:
         """
         if self._has(prop, value):
             return
+        self._in_doubt.add(prop)
         self._session.transact(Eos.SetDevicePropValueEx, data=property_dataset(prop, value))
         deadline_s = self._clock.now() + self._settle_s
+        ask_s = self._clock.now() + self._settle_s / 2
         self.refresh()
         while not self._has(prop, value):
             if self._clock.now() >= deadline_s:
+                if self._says(prop, value):
+                    return  # it took it, and reports nothing that it had before
                 said = self._values.get(prop)
                 raise DeviceError(
                     f"asked the camera for {prop.name.replace('_', ' ')} (0x{prop:X}) = "
@@ -113,9 +137,25 @@ class EosState:
                     "turn its dial to M, leave its menus, and try again"
                 )
             self._clock.sleep(POLL_PERIOD_S)
+            if self._can_be_asked and self._clock.now() >= ask_s:
+                with suppress(RefusedError):
+                    self._session.transact(Eos.RequestDevicePropValue, prop)
+                ask_s = deadline_s
             self.refresh()
 
+    def _events(self, patience: Patience) -> tuple[Event, ...]:
+        try:
+            return parse_events(self._session.transact(Eos.GetEvent, patience=patience).data)
+        except RefusedError:
+            raise
+        except DeviceError:
+            self._in_doubt.update(self._values)  # nobody knows what that answer said
+            raise
+
     def _has(self, prop: Property, value: bytes) -> bool:
-        """Whether the camera says so; models differ in how many zeros they write after a value."""
+        return prop not in self._in_doubt and self._says(prop, value)
+
+    def _says(self, prop: Property, value: bytes) -> bool:
+        """Models differ in how many zeros they write after a value."""
         said = self._values.get(prop)
         return said is not None and said.rstrip(b"\0") == value.rstrip(b"\0")

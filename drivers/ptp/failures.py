@@ -1,13 +1,13 @@
 """The ways in which talking to a camera fails; all of them are `DeviceError` to the outside."""
 
-from labrig.errors import DeviceError
+from labrig.errors import DeviceError, DeviceLostError
 
 
 class NoAnswerError(DeviceError):
     """The camera did not answer in time."""
 
 
-class UnpluggedError(DeviceError):
+class UnpluggedError(DeviceLostError):
     """The camera is gone: cable, battery or its own power saving."""
 
 

@@ -1,12 +1,13 @@
 """The network side: PTP/IP (CIPA DC-005), two TCP connections to one camera.
 
 The first carries transactions; the second their cancellation, the camera's questions whether the
-PC is still there, and events, which say nothing that an EOS does not say again when asked.
+PC is still there, and events.
 """
 
 import select
 import socket
 import struct
+from collections import deque
 from collections.abc import Callable
 
 from labrig.clock import Clock
@@ -32,6 +33,8 @@ _AROUND_DATA_BYTES = 12
 _SHORT_PACKET_BYTES = 1024
 #: While cancelling, data of any length may still be on its way.
 _MOST_PACKET_BYTES = 256 * 1024 * 1024
+#: An EOS reports without end what nobody listens to, because it says it again when asked.
+_MOST_EVENTS_KEPT = 256
 _REFUSALS = {
     1: "it does not know this PC: allow 'labrig' in its network menu",
     2: "another program uses it: close that",
@@ -62,6 +65,7 @@ class IpLink:
         self._clock = clock
         self._operation = 0
         self._streams: list[PacketStream] = []
+        self._events: deque[Packet] = deque(maxlen=_MOST_EVENTS_KEPT)
         self._introduce()
 
     def send(self, request: Container, data: bytes | None, doing: str) -> None:
@@ -108,6 +112,22 @@ class IpLink:
             )
         return Container(Kind.DATA, self._operation, transaction_id, bytes(data))
 
+    def event(self, timeout_s: float) -> Container | None:
+        """The next event, None if the camera reports none within `timeout_s`.
+
+        Raises
+        ------
+        DeviceError
+            The camera is gone, or what came is no event.
+        """
+        doing = "waiting for an event"
+        deadline_s = self._clock.now() + timeout_s
+        self._command(doing)
+        self._look_at_events(self._streams[1], doing)
+        while not self._events and self._take_in(doing, deadline_s):
+            self._look_at_events(self._streams[1], doing)
+        return ip_packets.event(self._events.popleft()) if self._events else None
+
     def cancel(self, transaction_id: int) -> None:
         """Have the camera give up `transaction_id` and forget what it still sends.
 
@@ -144,6 +164,7 @@ class IpLink:
         for stream in self._streams:
             stream.close()
         self._streams.clear()
+        self._events.clear()
 
     def _introduce(self) -> None:
         doing = "introducing this PC"
@@ -190,22 +211,28 @@ class IpLink:
             for stream in self._streams[1:]:
                 if stream is not wanted:
                     self._look_at_events(stream, doing)
-            for stream in self._streams:
-                stream.check(doing)
-            left_s = deadline_s - self._clock.now()
-            readable, _, _ = select.select(self._streams, [], [], max(0.0, left_s))
-            if left_s <= 0 or not readable:
+            if not self._take_in(doing, deadline_s):
                 raise NoAnswerError(
                     f"{self._name}: {doing}: no answer within {timeout_s:g} s: {LOOK_AT_NETWORK}"
                 )
-            for stream in readable:
-                stream.take_in()
         return packet
+
+    def _take_in(self, doing: str, deadline_s: float) -> bool:
+        """Receive what comes, on either connection; False if nothing does until then."""
+        for stream in self._streams:
+            stream.check(doing)
+        left_s = deadline_s - self._clock.now()
+        readable, _, _ = select.select(self._streams, [], [], max(0.0, left_s))
+        for stream in readable:
+            stream.take_in()
+        return left_s > 0 and bool(readable)
 
     def _look_at_events(self, stream: PacketStream, doing: str) -> None:
         while (packet := stream.next_packet(_SHORT_PACKET_BYTES)) is not None:
             if packet.kind == PacketKind.PING:
                 stream.write(ip_packets.encode(PacketKind.PONG), doing)
+            elif packet.kind == PacketKind.EVENT:
+                self._events.append(packet)
 
     def _piece(self, packet: Packet, transaction_id: int, doing: str) -> bytes:
         is_data = packet.kind in (PacketKind.DATA, PacketKind.END_DATA)

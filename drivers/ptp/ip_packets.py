@@ -129,11 +129,26 @@ def response(packet: Packet) -> Container:
     MalformedError
         Too short, or not whole parameters behind it.
     """
+    return _with_params(Kind.RESPONSE, packet)
+
+
+def event(packet: Packet) -> Container:
+    """The event container in an Event packet.
+
+    Raises
+    ------
+    MalformedError
+        Too short, or not whole parameters behind it.
+    """
+    return _with_params(Kind.EVENT, packet)
+
+
+def _with_params(kind: Kind, packet: Packet) -> Container:
     code, transaction_id = packet.fields("HI")
     params = packet.payload[6:]
     if len(params) % 4 or len(params) > 4 * MOST_PARAMETERS:
         raise MalformedError(
-            f"expected at most {MOST_PARAMETERS} parameters of 4 bytes in the camera's response, "
-            f"got '{params.hex(' ')}'"
+            f"expected at most {MOST_PARAMETERS} parameters of 4 bytes in the camera's "
+            f"{kind.name.lower()}, got '{params.hex(' ')}'"
         )
-    return Container(Kind.RESPONSE, code, transaction_id, params)
+    return Container(kind, code, transaction_id, params)

@@ -1,13 +1,8 @@
-"""What carries PTP containers between the PC and a camera, and which address is carried by what."""
+"""What carries PTP containers between the PC and a camera."""
 
 from typing import Protocol
-from urllib.parse import urlsplit
-
-from labrig.acquire.connections import Connections
 
 from .containers import Container
-from .ip_link import PORT, IpLink
-from .usb_link import UsbLink
 
 
 class Link(Protocol):
@@ -19,6 +14,9 @@ class Link(Protocol):
     def receive(self, doing: str, timeout_s: float, at_most_bytes: int) -> Container:
         """The next container with at most so much in it, within `timeout_s` a packet."""
 
+    def event(self, timeout_s: float) -> Container | None:
+        """The next event, None if the camera reports none within `timeout_s`."""
+
     def cancel(self, transaction_id: int) -> None:
         """Have the camera give up a transaction and forget what it still sends."""
 
@@ -27,16 +25,3 @@ class Link(Protocol):
 
     def close(self) -> None:
         """Let go of the camera; never raises."""
-
-
-def open_link(address: str, connections: Connections) -> Link:
-    """The link to the camera at `ptpip://host[:port]`, or at an address of a USB device.
-
-    Raises
-    ------
-    DeviceError
-        No camera there, or another program holds it.
-    """
-    if urlsplit(address).scheme == "ptpip":
-        return IpLink(lambda: connections.tcp(address, PORT), address, connections.clock)
-    return UsbLink(connections.usb(address), address, connections.clock)

@@ -21,6 +21,8 @@ from .ptp_codes import (
 
 SESSION_ID = 1
 LAST_TRANSACTION_ID = 0xFFFFFFFE
+#: SessionNotOpen and InvalidTransactionID: no later transaction would fare better.
+SESSION_LOST = (0x2003, 0x2004)
 #: Left-over containers of earlier transactions that are passed over before giving up.
 MOST_STALE = 32
 FIRST_BACK_OFF_S = 0.02
@@ -75,7 +77,8 @@ class Session:
     """Transactions over a link.
 
     A transaction broken off by an error or an interruption stays noted as under way; the next
-    one, or `resynchronise`, first has the camera give it up.
+    one, or `resynchronise`, first has the camera give it up. A camera that says that it knows no
+    such session, or counts its transactions otherwise, is not asked again before `start_over`.
     """
 
     def __init__(self, link: Link, clock: Clock) -> None:
@@ -83,6 +86,7 @@ class Session:
         self._clock = clock
         self._next_id = 0
         self._under_way: int | None = None
+        self._lost_by: int | None = None
 
     def open(self) -> bool:
         """Open the session; True if one was open already, left behind by a program that died.
@@ -151,6 +155,8 @@ class Session:
             answered_s = self._clock.now()
             if response.code == OK:
                 return Reply(response.params, incoming, sent_s, answered_s)
+            if response.code in SESSION_LOST:
+                self._lost_by = response.code
             if response.code != DEVICE_BUSY or answered_s >= deadline_s:
                 raise RefusedError(
                     f"expected 0x2001 OK from the camera to {operation_text(operation)}, "
@@ -160,6 +166,16 @@ class Session:
             self._clock.sleep(back_off_s)
             back_off_s = min(2 * back_off_s, LONGEST_BACK_OFF_S)
 
+    def event(self, timeout_s: float) -> Container | None:
+        """What the camera reports by itself next, None if nothing within `timeout_s`.
+
+        Raises
+        ------
+        DeviceError
+            The camera is gone, or reports nothing that can be understood.
+        """
+        return self._link.event(timeout_s)
+
     def resynchronise(self) -> None:
         """Have the camera give up a transaction that was broken off; nothing if there is none.
 
@@ -168,6 +184,11 @@ class Session:
         DeviceError
             The camera does not come back into step.
         """
+        if self._lost_by is not None:
+            raise DeviceError(
+                f"the camera has lost this session, it answered {response_text(self._lost_by)}: "
+                "start again"
+            )
         if self._under_way is not None:
             self._link.cancel(self._under_way)
             self._under_way = None
@@ -182,6 +203,7 @@ class Session:
         """
         self._link.reset()
         self._under_way = None
+        self._lost_by = None
         self.open()
 
     def _open(self) -> None:

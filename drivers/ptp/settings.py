@@ -7,7 +7,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from labrig.acquire.values import CameraOffers
 from labrig.quantity import DurationS, SizeBytes
 
-from .eos_codes import F_NUMBERS, ISOS, shutter_time_s, third_stop_codes
+from .eos_codes import F_NUMBERS, ISOS, bulb_times_s, shutter_time_s, third_stop_codes
+from .eos_iso import NativeIsos, isos_of_model
 
 
 class PtpCameraSettings(BaseModel):
@@ -19,10 +20,12 @@ class PtpCameraSettings(BaseModel):
         From the release to the begin of the exposure, as `labrig rig check` measured it.
     isos
         The sensor's native sensitivities; the camera's others (gain after digitising) stay unused.
+        What is written here goes before what `eos_iso` knows of an EOS.
     f_numbers
         Apertures of the lens; read from the camera when there is one.
     longest_exposure
-        Longer ones are not used; a true 32 s is the dial's 30 s.
+        Longer ones are not used; a true 32 s is the dial's 30 s. From 64 s on an EOS exposes at
+        bulb: 64 s, 128 s, … up to this.
     frame_time
         From the end of an exposure until its frame is on the PC and the next can begin.
     frame_size
@@ -36,7 +39,7 @@ class PtpCameraSettings(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     shutter_lag: Annotated[DurationS, Field(ge=0)] = 0.0
-    isos: Annotated[tuple[int, ...], Field(min_length=1)] = (100, 200, 400, 800, 1600)
+    isos: Annotated[tuple[int, ...], Field(min_length=1)] = isos_of_model("").values
     f_numbers: tuple[float, ...] = (2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
     longest_exposure: Annotated[DurationS, Field(gt=0)] = 32.0
     frame_time: Annotated[DurationS, Field(ge=0)] = 2.0
@@ -62,11 +65,25 @@ class PtpCameraSettings(BaseModel):
         """Whether `exposure_s` seconds are within `longest_exposure`."""
         return exposure_s <= self.longest_exposure * 1.0001
 
+    @property
+    def bulb_times_s(self) -> tuple[float, ...]:
+        """Times beyond the dial's, within `longest_exposure`; empty if it asks for none."""
+        return bulb_times_s(self.longest_exposure * 1.0001)
+
+    def native_isos(self, model: str) -> NativeIsos:
+        """What the rig file says is native, else what is known of the model."""
+        if "isos" in self.model_fields_set:
+            return NativeIsos(self.isos, "rig file")
+        return isos_of_model(model)
+
     def declared_offers(self) -> CameraOffers:
         """What a camera on these settings can be expected to offer, in thirds of a stop."""
         times_s = (shutter_time_s(code) for code in third_stop_codes())
         return CameraOffers(
-            exposures_s=tuple(sorted(t for t in times_s if t and self.allows_exposure(t))),
+            exposures_s=(
+                *sorted(t for t in times_s if t and self.allows_exposure(t)),
+                *self.bulb_times_s,
+            ),
             isos=self.isos,
             f_numbers=self.f_numbers,
             overhead_s=self.frame_time,

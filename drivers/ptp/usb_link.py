@@ -20,6 +20,7 @@ from .containers import HEADER_BYTES, Container, Kind, announced_length, decode,
 from .failures import MalformedError, NoAnswerError, StallError, UnpluggedError
 from .ptp_codes import DEVICE_BUSY, OK, response_text
 from .usb_errors import WAKE_UP, usb_errors_explained
+from .usb_events import EventAssembler
 from .usb_interface import claim_still_image
 
 CANCEL, RESET, STATUS = 0x64, 0x66, 0x67
@@ -67,6 +68,9 @@ class UsbLink:
         self._in = endpoints.bulk_in
         self._out = endpoints.bulk_out
         self._packet_bytes = endpoints.packet_bytes
+        self._interrupt = endpoints.interrupt_in
+        self._event_packet_bytes = endpoints.event_packet_bytes
+        self._events = EventAssembler()
 
     def send(self, request: Container, data: bytes | None, doing: str) -> None:
         """Send one command, and its data if it has some.
@@ -90,6 +94,41 @@ class UsbLink:
             Nothing came, it was cut short, it is longer than it says or than `at_most_bytes`.
         """
         return decode(self._read(doing, timeout_s, HEADER_BYTES + at_most_bytes))
+
+    def event(self, timeout_s: float) -> Container | None:
+        """The next event, None if the camera reports none within `timeout_s`.
+
+        Raises
+        ------
+        DeviceError
+            What came is no event, or the camera cannot report any.
+        """
+        doing = "waiting for an event"
+        if self._interrupt is None:
+            raise DeviceError(
+                f"camera {self._address}: {doing}: expected an interrupt endpoint on its PTP "
+                "interface, found none: this camera cannot say when a frame is there"
+            )
+        deadline_s = self._clock.now() + timeout_s
+        event, is_silent = None, True
+        # packet by packet: a longer read would go on to wait where a full packet is the last one
+        while event is None and (left_s := deadline_s - self._clock.now()) > 0:
+            try:
+                with self._named(doing):
+                    packet = self._device.read(
+                        self._interrupt, self._event_packet_bytes, _ms(left_s)
+                    )
+            except NoAnswerError:
+                break
+            except StallError:
+                with self._named("clearing a halted endpoint"):
+                    self._device.clear_halt(self._interrupt)
+                raise
+            is_silent = False
+            event = self._event_from(bytes(packet))
+        if is_silent:
+            self._events.discard()  # the rest of an event does not come so late
+        return event
 
     def cancel(self, transaction_id: int) -> None:
         """Have the camera give up `transaction_id`, forget what it still sends, wait until ready.
@@ -115,6 +154,7 @@ class UsbLink:
         """
         with self._named("resetting it"):
             self._control_out(RESET, b"")
+        self._events.discard()
         self._clear_halts()
         self._drain()
 
@@ -171,6 +211,16 @@ class UsbLink:
                 return bytes(self._device.read(self._in, size, _ms(timeout_s)))
         except StallError:
             self._clear_halts()
+            raise
+
+    def _event_from(self, packet: bytes) -> Container | None:
+        """The event that `packet` completes; behind what is none, nothing can be understood."""
+        try:
+            return self._events.feed(packet)
+        except MalformedError:
+            with suppress(NoAnswerError), self._named("discarding left-over events"):
+                for _ in range(MOST_DRAINED_BLOCKS):
+                    self._device.read(self._interrupt, self._event_packet_bytes, _ms(SILENCE_S))
             raise
 
     def _drain(self) -> None:

@@ -1,6 +1,7 @@
 """How a driver reaches its device: one resolver from address to transport."""
 
 import socket
+from collections.abc import Callable
 from typing import Any, Protocol
 
 from labrig.clock import Clock
@@ -39,8 +40,13 @@ class Connections(Protocol):
             There is no such port, or something else holds it.
         """
 
-    def usb(self, address: str) -> Any:
+    def usb(self, address: str, serial_of: Callable[[Any], str] | None = None) -> Any:
         """The `usb.core.Device` at `usb://vid:pid[/serial]` or `sim://room/device`.
+
+        Parameters
+        ----------
+        serial_of
+            Asks a device for its serial number that tells none on the bus, and releases it again.
 
         Raises
         ------

@@ -3,22 +3,25 @@
 from collections.abc import Callable
 from dataclasses import replace
 
-from labrig.acquire import Camera, Checkable, Device, Lamp, Rig
+from labrig.acquire import Camera, Checkable, Device, Lamp, LiveView, Rig
 from labrig.bench import Bench
 from labrig.clock import Clock
 from labrig.errors import DeviceError, LabrigError
 from labrig.setup.photographs import exercise_camera
+from labrig.setup.picture_stats import decode
 from labrig.setup.report import DeviceReport, Measured, RigReport, spread_ms
 
 #: Often enough to see a slow line, seldom enough not to wear the relay.
 SWITCHINGS = 3
+#: Key of the device that only aims; a camera in its place takes no photographs.
+VIEWFINDER = "viewfinder"
 
 
 def check_rig(stand: Bench) -> RigReport:
     """Open the rig, look at every device, bring it to its safe state.
 
-    The lamp is lit for some hundredths of a second, three times; the camera takes four frames. A
-    camera whose settings would spoil photometry takes none.
+    The lamp is lit for some hundredths of a second, three times; the camera takes four frames; a
+    viewfinder shows one picture. A camera whose settings would spoil photometry takes none.
 
     Raises
     ------
@@ -54,7 +57,9 @@ def _checked(key: str, device: Device, clock: Clock) -> DeviceReport:
             return replace(
                 report, measured=(Measured("not exercised", "first mend what is refused"),)
             )
-        if isinstance(device, Lamp):
+        if key == VIEWFINDER and isinstance(device, LiveView):
+            report = replace(report, measured=_look_through(device, clock))
+        elif isinstance(device, Lamp):
             report = replace(report, measured=_exercise_lamp(device, clock))
         elif isinstance(device, Camera):
             report = exercise_camera(report, device, clock)
@@ -79,6 +84,17 @@ def _exercise_lamp(lamp: Lamp, clock: Clock) -> tuple[Measured, ...]:
     return (
         Measured("switch on, read back", spread_ms(on_s)),
         Measured("switch off, read back", spread_ms(off_s)),
+    )
+
+
+def _look_through(viewfinder: LiveView, clock: Clock) -> tuple[Measured, ...]:
+    asked_s = clock.now()
+    jpeg = viewfinder.preview()
+    shown_s = clock.now() - asked_s
+    height, width, _ = decode(jpeg).shape
+    return (
+        Measured("live picture", f"{width} x {height} pixels, {len(jpeg) / 1e3:.1f} kB"),
+        Measured("until it was shown", f"{shown_s * 1e3:.0f} ms"),
     )
 
 

@@ -1,4 +1,6 @@
-"""A simulated Canon EOS 5D Mark II on a simulated USB cable, or on the loopback network.
+"""A simulated camera on a simulated USB cable, or on the loopback network.
+
+It is a Canon EOS 5D Mark II, or one that knows nothing but the PTP standard.
 
 `SimulatedCamera(...).backend` is given to pyusb, which then talks to it packet by packet;
 `PtpIpServer` serves `SimulatedCamera(...).responder` to any program on this PC.
@@ -10,5 +12,14 @@ from .faults import CameraFaults
 from .pace import Pace
 from .ptpip_server import PtpIpServer
 from .sensor import Sensor
+from .standard import StandardHabits
 
-__all__ = ["BodySettings", "CameraFaults", "Pace", "PtpIpServer", "Sensor", "SimulatedCamera"]
+__all__ = [
+    "BodySettings",
+    "CameraFaults",
+    "Pace",
+    "PtpIpServer",
+    "Sensor",
+    "SimulatedCamera",
+    "StandardHabits",
+]

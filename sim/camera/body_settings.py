@@ -1,75 +1,55 @@
-"""What somebody has set on the simulated camera's body by hand, and how the camera reports it."""
+"""What somebody has set on the simulated camera's body by hand: `simulation.camera` of a rig."""
 
-import struct
-from dataclasses import dataclass
+from typing import Annotated, Literal, Self
 
-#: Ids of custom functions.
-_LONG_EXPOSURE_NOISE, _HIGHLIGHT_PRIORITY, _MIRROR_LOCK_UP = 0x201, 0x203, 0x60F
+from pydantic import BaseModel, BeforeValidator, ConfigDict, Field, model_validator
 
-#: All functions of a 5D Mark II, group by group, in its order; the last has five values.
-_GROUPS = {
-    1: (0x101, 0x102, 0x103, 0x104, 0x105, 0x108, 0x10F),
-    2: (_LONG_EXPOSURE_NOISE, 0x202, _HIGHLIGHT_PRIORITY, 0x204, 0x205),
-    3: (0x505, 0x506, 0x50F, 0x510, 0x50E, _MIRROR_LOCK_UP, 0x508, 0x507),
-    4: (0x701, 0x702, 0x704, 0x706, 0x80B, 0x80F, 0x70B),
-}
-_SEVERAL_VALUES = {0x507: (0, 0xFF, 0, 0xFF, 0)}
+from labrig.quantity import DurationS
+
+from . import codes
+
+_CUSTOM_FUNCTIONS = ("long_exposure_noise_reduction", "highlight_tone_priority", "mirror_lock_up")
 
 
-@dataclass(frozen=True)
-class BodySettings:
+def _on_the_dial(iso: object) -> object:
+    if iso not in ("auto", *codes.ISO_LABELS):
+        raise ValueError(f"expected 'auto' or 100 to 6400 in thirds of a stop, got {iso!r}")
+    return iso
+
+
+class BodySettings(BaseModel):
     """Dial, lens switch and menus; as a careful person sets them for photometry.
 
     Attributes
     ----------
+    body
+        Which camera it is: a Canon EOS, or one that knows nothing but the PTP standard.
     exposure_mode
-        Where the dial stands: 3 is M.
+        Where the dial stands.
     autofocus
         The switch on the lens.
     iso
-        As the dial says it; None for automatic.
-    auto_power_off_s
-        Seconds without a word from the host after which the camera switches itself off; 0: never.
+        As the dial says it.
+    auto_power_off
+        Without a word from the host for so long, the camera switches itself off; 0: never.
     long_exposure_noise_reduction, highlight_tone_priority, mirror_lock_up
-        Custom functions; only reported, their effect is not simulated.
+        Custom functions of an EOS; only reported, their effect is not simulated.
     """
 
-    exposure_mode: int = 3
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    body: Literal["eos", "standard"] = "eos"
+    exposure_mode: Literal["P", "Tv", "Av", "M", "B"] = "M"
     autofocus: bool = False
-    iso: int | None = 100
-    auto_power_off_s: int = 0
+    iso: Annotated[Literal["auto"] | int, BeforeValidator(_on_the_dial)] = 100
+    auto_power_off: Annotated[DurationS, Field(ge=0)] = 0.0
     long_exposure_noise_reduction: bool = False
     highlight_tone_priority: bool = False
     mirror_lock_up: bool = False
 
-    def custom_function_blocks(self) -> tuple[bytes, ...]:
-        """The values of property 0xD1A0: a 5D Mark II reports every group by itself."""
-        switched_on = {
-            _LONG_EXPOSURE_NOISE: self.long_exposure_noise_reduction,
-            _HIGHLIGHT_PRIORITY: self.highlight_tone_priority,
-            _MIRROR_LOCK_UP: self.mirror_lock_up,
-        }
-        return tuple(
-            _block(
-                group,
-                {
-                    function: _SEVERAL_VALUES.get(
-                        function, (int(switched_on.get(function, False)),)
-                    )
-                    for function in functions
-                },
-            )
-            for group, functions in _GROUPS.items()
-        )
-
-
-def _block(group: int, functions: dict[int, tuple[int, ...]]) -> bytes:
-    numbers = [
-        number
-        for function, values in functions.items()
-        for number in (function, len(values), *values)
-    ]
-    group_bytes = 4 * (2 + len(numbers))
-    return struct.pack(
-        f"<{5 + len(numbers)}I", 12 + group_bytes, 1, group, group_bytes, len(functions), *numbers
-    )
+    @model_validator(mode="after")
+    def _functions_of_an_eos(self) -> Self:
+        switched_on = [name for name in _CUSTOM_FUNCTIONS if getattr(self, name)]
+        if self.body != "eos" and switched_on:
+            raise ValueError(f"expected 'body: eos' with {', '.join(switched_on)}")
+        return self

@@ -4,20 +4,33 @@ from labrig.clock import VirtualClock
 
 from .body_settings import BodySettings
 from .cable import Cable
+from .descriptors import UsbIdentity
+from .eos import EosBody
+from .eos_operations import EosOperations
 from .faults import CameraFaults
+from .objects import StoredObject
+from .operations import Operations
 from .power import AutoPowerOff
 from .responder import Responder
 from .sensor import Sensor
 from .shutter import Shutter
+from .standard import StandardBody, StandardHabits
+from .standard_operations import StandardOperations
 from .still_image import StillImageFunction
 from .usb_backend import CameraBackend
 
 _NO_FAULTS = CameraFaults()
 _WELL_SET = BodySettings()
+_USUAL = StandardHabits()
+
+#: EOS cameras tell their serial number in PTP's DeviceInfo only.
+_EOS_ON_USB = UsbIdentity(0x04A9, 0x3199, "Canon Inc.", "Canon Digital Camera")
+#: Ids that pid.codes keeps for tests.
+_STANDARD_IDS = (0x1209, 0x0001)
 
 
 class SimulatedCamera:
-    """A Canon EOS 5D Mark II whose sensor stands in a simulated room.
+    """A camera whose sensor stands in a simulated room: a Canon EOS 5D Mark II, or a standard one.
 
     Its state lives as long as this object: a second connection finds the session that the first
     one left open.
@@ -29,7 +42,7 @@ class SimulatedCamera:
     sensor
         Makes the RAW files, which are DNG.
     serial
-        Serial number in PTP's DeviceInfo; over USB an EOS camera tells none.
+        Serial number in PTP's DeviceInfo.
     seed
         Of the shutter's jitter.
     shutter_lag_s, shutter_jitter_s
@@ -37,7 +50,9 @@ class SimulatedCamera:
     faults
         What goes wrong.
     body
-        What somebody has set by hand.
+        Which camera it is, and what somebody has set by hand.
+    habits
+        Of the maker of a standard camera.
     """
 
     def __init__(
@@ -51,12 +66,22 @@ class SimulatedCamera:
         shutter_jitter_s: float = 0.002,
         faults: CameraFaults = _NO_FAULTS,
         body: BodySettings = _WELL_SET,
+        habits: StandardHabits = _USUAL,
     ) -> None:
         shutter = Shutter(clock, shutter_lag_s, shutter_jitter_s, seed)
-        self._responder = Responder(clock, sensor, shutter, serial, faults, body)
-        power = AutoPowerOff(clock, body.auto_power_off_s)
+        operations: Operations
+        if body.body == "eos":
+            eos = EosBody(clock, sensor, shutter, faults, body)
+            operations, self._objects = EosOperations(eos, serial), eos.objects
+            identity = _EOS_ON_USB
+        else:
+            standard = StandardBody(clock, sensor, shutter, faults, body, habits)
+            operations, self._objects = StandardOperations(standard, serial), standard.objects
+            identity = UsbIdentity(*_STANDARD_IDS, "labrig", operations.model, serial)
+        self._responder = Responder(operations)
+        power = AutoPowerOff(clock, body.auto_power_off, lambda: shutter.open_until_s)
         function = StillImageFunction(clock, self._responder, faults)
-        self._backend = CameraBackend(clock, function, Cable(clock, faults, power))
+        self._backend = CameraBackend(clock, function, Cable(clock, faults, power), identity)
 
     @property
     def backend(self) -> CameraBackend:
@@ -67,6 +92,11 @@ class SimulatedCamera:
     def responder(self) -> Responder:
         """The camera itself, for another transport."""
         return self._responder
+
+    @property
+    def files(self) -> tuple[StoredObject, ...]:
+        """What the camera keeps now, on cards and in memory."""
+        return self._objects.all()
 
     def lose_host(self) -> None:
         """The program that uses the camera is killed: the system closes its connections.

@@ -6,9 +6,10 @@ A dial says 1/60 s or f/5.6; the shutter does 2⁻⁶ s and the diaphragm 2^2.5.
 
 import math
 from fractions import Fraction
+from typing import Literal
 
 #: Sensitivity code of automatic ISO, and what a 5D Mark II takes for it with its dial at M.
-ISO_AUTO, _AUTO_AT_M = 0x00, 400
+ISO_AUTO, AUTO_AT_M = 0x00, 400
 #: Shutter code of the bulb setting.
 TV_BULB = 0x0C
 _TV_ONE_SECOND = 0x38
@@ -20,7 +21,7 @@ _THIRD_OF_EIGHTH = {0: 0, 3: 1, 5: 2}
 _EIGHTHS = tuple(_THIRD_OF_EIGHTH)
 
 #: The numbers on the dial from ISO 100 up in thirds of a stop.
-_ISO_LABELS = (
+ISO_LABELS = (
     *(100, 125, 160, 200, 250, 320, 400, 500, 640, 800),
     *(1000, 1250, 1600, 2000, 2500, 3200, 4000, 5000, 6400),
 )
@@ -38,9 +39,9 @@ AV_CODES = _codes(0x15, 0x50)
 ISO_CODES = _codes(_ISO_100, 0x78)
 
 
-def iso_code(iso: int | None) -> int:
-    """Code of a number on the dial; None for automatic."""
-    return ISO_AUTO if iso is None else ISO_CODES[_ISO_LABELS.index(iso)]
+def iso_code(iso: int | Literal["auto"]) -> int:
+    """Code of a number on the dial."""
+    return ISO_AUTO if iso == "auto" else ISO_CODES[ISO_LABELS.index(iso)]
 
 
 def _stops(code: int, zero: int) -> Fraction:
@@ -64,5 +65,10 @@ def f_number(av_code: int) -> float:
 def iso(iso_code: int) -> int:
     """Sensitivity as the dial says it."""
     if iso_code == ISO_AUTO:
-        return _AUTO_AT_M
-    return _ISO_LABELS[int(_stops(iso_code, _ISO_100) * 3)]
+        return AUTO_AT_M
+    return ISO_LABELS[int(_stops(iso_code, _ISO_100) * 3)]
+
+
+def true_f_number(label: float) -> float:
+    """Relative aperture behind a label in thirds of a stop: 2^2.5 behind f/5.6."""
+    return float(2.0 ** (round(6 * math.log2(label)) / 6))

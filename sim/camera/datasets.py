@@ -39,6 +39,7 @@ def ptp_time(wall_s: float) -> str:
 class DeviceInfo:
     """Who the camera is and what it understands."""
 
+    manufacturer: str
     model: str
     device_version: str
     serial: str
@@ -47,8 +48,7 @@ class DeviceInfo:
     properties: tuple[int, ...]
     capture_formats: tuple[int, ...]
     image_formats: tuple[int, ...]
-    manufacturer: str = "Canon Inc."
-    vendor_extension: int = 0xB
+    vendor_extension: int
 
     def encode(self) -> bytes:
         """The DeviceInfo dataset."""

@@ -1,11 +1,11 @@
-"""USB descriptors of a Canon EOS 5D Mark II in the shape that pyusb reads them."""
+"""USB descriptors of a still image camera in the shape that pyusb reads them."""
 
+from dataclasses import dataclass
 from types import SimpleNamespace
 
 from . import usb_errors
 from .still_image import BULK_IN, BULK_OUT, BULK_PACKET, INTERRUPT_IN, INTERRUPT_PACKET
 
-VENDOR_ID, PRODUCT_ID = 0x04A9, 0x3199
 CONFIGURATION_VALUE = 1
 _ENGLISH = 0x0409
 _STRING = 3
@@ -13,11 +13,21 @@ _STILL_IMAGE, _CAPTURE, _PTP = 6, 1, 1
 _BULK, _INTERRUPT = 2, 3
 _HIGH_SPEED = 3
 
-#: By index; EOS cameras have no serial number here, only in PTP's DeviceInfo.
-_STRINGS = {1: "Canon Inc.", 2: "Canon Digital Camera"}
+_MANUFACTURER, _PRODUCT, _SERIAL = 1, 2, 3
 
 
-def device(address: int) -> SimpleNamespace:
+@dataclass(frozen=True)
+class UsbIdentity:
+    """By what a device is known on the bus; one without a serial number has an empty one."""
+
+    vendor_id: int
+    product_id: int
+    manufacturer: str
+    product: str
+    serial: str = ""
+
+
+def device(address: int, identity: UsbIdentity) -> SimpleNamespace:
     """Device descriptor, and where the device is plugged in."""
     return SimpleNamespace(
         bLength=18,
@@ -27,12 +37,12 @@ def device(address: int) -> SimpleNamespace:
         bDeviceSubClass=0,
         bDeviceProtocol=0,
         bMaxPacketSize0=64,
-        idVendor=VENDOR_ID,
-        idProduct=PRODUCT_ID,
+        idVendor=identity.vendor_id,
+        idProduct=identity.product_id,
         bcdDevice=0x0002,
-        iManufacturer=1,
-        iProduct=2,
-        iSerialNumber=0,
+        iManufacturer=_MANUFACTURER,
+        iProduct=_PRODUCT,
+        iSerialNumber=_SERIAL if identity.serial else 0,
         bNumConfigurations=1,
         address=address,
         bus=1,
@@ -96,7 +106,7 @@ def endpoints() -> tuple[SimpleNamespace, ...]:
     )
 
 
-def string(index: int) -> bytes:
+def string(index: int, identity: UsbIdentity) -> bytes:
     """String descriptor of that index; the list of languages is number 0.
 
     Raises
@@ -104,10 +114,15 @@ def string(index: int) -> bytes:
     usb.core.USBError
         The camera has no such string and stalls the request.
     """
+    strings = {
+        _MANUFACTURER: identity.manufacturer,
+        _PRODUCT: identity.product,
+        _SERIAL: identity.serial,
+    }
     if index == 0:
         body = _ENGLISH.to_bytes(2, "little")
-    elif index in _STRINGS:
-        body = _STRINGS[index].encode("utf-16-le")
+    elif strings.get(index):
+        body = strings[index].encode("utf-16-le")
     else:
         raise usb_errors.stalled()
     return bytes((2 + len(body), _STRING)) + body

@@ -48,7 +48,7 @@ class EosBody:
     shutter
         Button and shutter.
     faults
-        `busy_releases` and `lost_event` are the body's.
+        `busy_releases`, the spans and `lost_event` are the body's.
     settings
         What somebody has set by hand.
     """
@@ -64,12 +64,13 @@ class EosBody:
         self._clock = clock
         self._sensor = sensor
         self._shutter = shutter
+        self._faults = faults
         self._busy_releases = faults.busy_releases
         self._event_to_lose = faults.lost_event
         self._focus_s = FOCUS_S if settings.autofocus else METERING_S
         self._host_shots = 0
         self._is_remote = False
-        self.objects = ObjectStore(clock)
+        self.objects = ObjectStore(clock, folder="100CANON", prefix="IMG")
         self.events = EventQueue(clock)
         self.viewfinder = Viewfinder(clock, sensor)
         self._properties = PropertyBank(self.objects.free_shots, settings)
@@ -196,9 +197,11 @@ class EosBody:
         if self._busy_releases:
             self._busy_releases -= 1
             return ResponseCode.DEVICE_BUSY
-        if not self._shutter.is_ready:
+        now_s = self._clock.now()
+        if not self._shutter.is_ready or self._faults.is_busy(now_s):
             return ResponseCode.DEVICE_BUSY
-        if self._properties.number(EosProperty.AVAILABLE_SHOTS) == 0:
+        no_room = self._properties.number(EosProperty.AVAILABLE_SHOTS) == 0
+        if no_room or self._faults.is_full(now_s):
             return ResponseCode.STORE_FULL
         settings = self._settings()
         timer_s = SELF_TIMER_S[Drive(self._properties.number(EosProperty.DRIVE_MODE))]
@@ -222,6 +225,7 @@ class EosBody:
             self._sensor, exposure.start_s, settings.exposure_s, settings.iso, settings.f_number
         )
         ready_s = exposure.end_s + READOUT_S
+        self.objects.begin_photograph()
         if settings.destination is Destination.HOST:
             stored = self.objects.add(_IN_MEMORY, ready_s, photograph)
             if self._event_to_lose:

@@ -11,6 +11,9 @@ class CameraFaults:
     ----------
     busy_releases
         So many full presses are answered DeviceBusy, whatever the state of the camera.
+    busy_spans_s, full_spans_s
+        (begin, end) on the clock between which every full press is answered DeviceBusy, or
+        StoreFull.
     stall_at
         Operation code whose data phase, or whose answer if it has none, stalls the pipes the
         first time. Data from the host is then not acted on.
@@ -27,9 +30,23 @@ class CameraFaults:
     """
 
     busy_releases: int = 0
+    busy_spans_s: tuple[tuple[float, float], ...] = ()
+    full_spans_s: tuple[tuple[float, float], ...] = ()
     stall_at: int | None = None
     timeout_once_at: int | None = None
     lost_event: bool = False
     unplug_at_s: float | None = None
     unplug_after_bytes: int | None = None
     replug_after_s: float | None = None
+
+    def is_busy(self, now_s: float) -> bool:
+        """Whether the camera has no time for a release now."""
+        return _within(self.busy_spans_s, now_s)
+
+    def is_full(self, now_s: float) -> bool:
+        """Whether the camera believes now that it has no room."""
+        return _within(self.full_spans_s, now_s)
+
+
+def _within(spans_s: tuple[tuple[float, float], ...], now_s: float) -> bool:
+    return any(begin_s <= now_s < end_s for begin_s, end_s in spans_s)

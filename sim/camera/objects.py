@@ -1,4 +1,4 @@
-"""What the camera keeps: photographs on the card, and those that wait in memory for the host."""
+"""What the camera keeps: photographs on cards, and those that wait in memory for the host."""
 
 from dataclasses import dataclass
 
@@ -8,8 +8,8 @@ from .datasets import ObjectInfo, ptp_time, storage_info
 from .sensor import Photograph
 from .vocabulary import ObjectFormat
 
-#: The one card.
-CARD_ID = 0x00010001
+#: The first card, and one more in another slot.
+CARD_ID, SECOND_CARD_ID = 0x00010001, 0x00020001
 _CARD_BYTES = 32_270_778_368
 _CARD_SHOTS = 999
 #: A 21-megapixel RAW file, as the camera reckons with it.
@@ -18,27 +18,44 @@ SHOT_BYTES = 25_800_000
 _DCIM, _FOLDER = 0x90000000, 0x90000001
 _FIRST_HANDLE = 0x91000001
 _ALL = 0xFFFFFFFF
+_SUFFIXES = {ObjectFormat.DNG: "DNG", ObjectFormat.JPEG: "JPG"}
 _IN_ROOT = 0xFFFFFFFF
 
 
 @dataclass(frozen=True)
 class StoredObject:
-    """One photograph in the camera; it can be seen from `available_s` on."""
+    """One file in the camera; it can be seen from `available_s` on."""
 
     handle: int
     storage_id: int
     name: str
     available_s: float
     photograph: Photograph
+    object_format: ObjectFormat = ObjectFormat.DNG
 
 
 class ObjectStore:
-    """Objects by handle, the folders DCIM and 100CANON among them."""
+    """Objects by handle, the folders of the first card among them.
 
-    def __init__(self, clock: Clock) -> None:
+    Parameters
+    ----------
+    clock
+        Time.
+    folder, prefix
+        Where the camera puts its photographs in DCIM, and how their names begin.
+    cards
+        Storage ids; a second card has no folders.
+    """
+
+    def __init__(
+        self, clock: Clock, folder: str, prefix: str, cards: tuple[int, ...] = (CARD_ID,)
+    ) -> None:
+        self.cards = cards
         self._clock = clock
+        self._folder = folder
+        self._prefix = prefix
         self._objects: dict[int, StoredObject] = {}
-        self._count = 0
+        self._count = self._files = 0
 
     @property
     def free_shots(self) -> int:
@@ -46,14 +63,28 @@ class ObjectStore:
         on_card = sum(item.storage_id == CARD_ID for item in self._objects.values())
         return _CARD_SHOTS - on_card
 
-    def add(self, storage_id: int, available_s: float, photograph: Photograph) -> StoredObject:
-        """Number and keep one photograph; `storage_id` 0 is the camera's memory."""
-        handle = _FIRST_HANDLE + self._count
+    def begin_photograph(self) -> None:
+        """All files from now on carry the next number."""
         self._count += 1
-        name = f"IMG_{self._count:04d}.DNG"
-        stored = StoredObject(handle, storage_id, name, available_s, photograph)
+
+    def add(
+        self,
+        storage_id: int,
+        available_s: float,
+        photograph: Photograph,
+        object_format: ObjectFormat = ObjectFormat.DNG,
+    ) -> StoredObject:
+        """Keep one file of a photograph; `storage_id` 0 is the camera's memory."""
+        handle = _FIRST_HANDLE + self._files
+        self._files += 1
+        name = f"{self._prefix}_{self._count:04d}.{_SUFFIXES[object_format]}"
+        stored = StoredObject(handle, storage_id, name, available_s, photograph, object_format)
         self._objects[handle] = stored
         return stored
+
+    def all(self) -> tuple[StoredObject, ...]:
+        """Every file that can be seen now."""
+        return tuple(stored for stored in self._objects.values() if self.find(stored.handle))
 
     def find(self, handle: int) -> StoredObject | None:
         """The photograph of that handle, if it is over and still there."""
@@ -64,7 +95,7 @@ class ObjectStore:
 
     def forget_transferred(self, stored: StoredObject) -> None:
         """The host has it: memory is free again, a card keeps its file."""
-        if stored.storage_id != CARD_ID:
+        if stored.storage_id not in self.cards:
             del self._objects[stored.handle]
 
     def forget_memory(self) -> None:
@@ -87,11 +118,11 @@ class ObjectStore:
         return handle in (_DCIM, _FOLDER)
 
     def has_storage(self, storage_id: int) -> bool:
-        """Whether that is the card, or all cards."""
-        return storage_id in (CARD_ID, _ALL)
+        """Whether that is a card, or all cards."""
+        return storage_id in (*self.cards, _ALL)
 
     def handles(self, object_format: int, parent: int) -> list[int] | None:
-        """Handles on the card as GetObjectHandles asks for them; None if `parent` is no folder."""
+        """Handles on cards as GetObjectHandles asks for them; None if `parent` is no folder."""
         tree = {_IN_ROOT: [_DCIM], _DCIM: [_FOLDER], _FOLDER: self._on_card()}
         tree[0] = [_DCIM, _FOLDER, *self._on_card()]
         if parent not in tree:
@@ -101,14 +132,14 @@ class ObjectStore:
     def info(self, handle: int) -> ObjectInfo | None:
         """ObjectInfo of a photograph or a folder."""
         if handle in (_DCIM, _FOLDER):
-            parent, name = (0, "DCIM") if handle == _DCIM else (_DCIM, "100CANON")
+            parent, name = (0, "DCIM") if handle == _DCIM else (_DCIM, self._folder)
             return ObjectInfo(CARD_ID, ObjectFormat.ASSOCIATION, 0, parent, name, "")
         stored = self.find(handle)
         if stored is None:
             return None
         return ObjectInfo(
             stored.storage_id,
-            ObjectFormat.DNG,
+            stored.object_format,
             len(stored.photograph.raw),
             self.parent(stored),
             stored.name,
@@ -127,8 +158,10 @@ class ObjectStore:
         return [
             handle
             for handle, stored in self._objects.items()
-            if stored.storage_id == CARD_ID and self.find(handle)
+            if stored.storage_id in self.cards and self.find(handle)
         ]
 
     def _format(self, handle: int) -> int:
-        return ObjectFormat.ASSOCIATION if self.is_folder(handle) else ObjectFormat.DNG
+        if self.is_folder(handle):
+            return ObjectFormat.ASSOCIATION
+        return self._objects[handle].object_format

@@ -5,11 +5,14 @@ from enum import IntEnum
 
 from . import codes
 from .body_settings import BodySettings
+from .custom_functions import custom_function_blocks
 from .events import record
 from .viewfinder import TO_PC
 from .vocabulary import EosEvent, EosProperty, ResponseCode
 
 _ONE_SHOT_FOCUS, _MANUAL_FOCUS = 0, 3
+#: Codes of exposure modes are their places here.
+_DIAL = ("P", "Tv", "Av", "M", "B")
 #: Type of an availability list; the only one that is an enumeration.
 _ENUMERATION = 3
 
@@ -68,15 +71,17 @@ class PropertyBank:
 
     def __init__(self, available_shots: int, settings: BodySettings) -> None:
         focus = _ONE_SHOT_FOCUS if settings.autofocus else _MANUAL_FOCUS
-        self._custom_functions = settings.custom_function_blocks()
+        self._custom_functions = custom_function_blocks(settings)
         self._values: dict[int, bytes] = {
             EosProperty.AV: struct.pack("<I", 0x30),
-            EosProperty.TV: struct.pack("<I", 0x68),
+            EosProperty.TV: struct.pack(
+                "<I", codes.TV_BULB if settings.exposure_mode == "B" else 0x68
+            ),
             EosProperty.ISO: struct.pack("<I", codes.iso_code(settings.iso)),
-            EosProperty.AE_MODE: struct.pack("<I", settings.exposure_mode),
+            EosProperty.AE_MODE: struct.pack("<I", _DIAL.index(settings.exposure_mode)),
             EosProperty.DRIVE_MODE: struct.pack("<I", Drive.SINGLE),
             EosProperty.FOCUS_MODE: struct.pack("<I", focus),
-            EosProperty.AUTO_POWER_OFF: struct.pack("<I", settings.auto_power_off_s),
+            EosProperty.AUTO_POWER_OFF: struct.pack("<I", round(settings.auto_power_off)),
             EosProperty.IMAGE_FORMAT: _RAW,
             EosProperty.CAPTURE_DESTINATION: struct.pack("<I", Destination.CARD),
             EosProperty.AVAILABLE_SHOTS: struct.pack("<I", available_shots),

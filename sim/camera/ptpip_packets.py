@@ -133,9 +133,9 @@ def response(code: int, transaction_id: int, params: tuple[int, ...] = ()) -> by
     )
 
 
-def event(code: int) -> bytes:
+def event(code: int, params: tuple[int, ...] = ()) -> bytes:
     """An event that belongs to no transaction."""
-    return packet(PacketType.EVENT, struct.pack("<HI", code, 0xFFFFFFFF))
+    return packet(PacketType.EVENT, struct.pack(f"<HI{len(params)}I", code, 0xFFFFFFFF, *params))
 
 
 def data_phase(transaction_id: int, data: bytes) -> Iterator[bytes]:

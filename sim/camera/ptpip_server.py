@@ -24,7 +24,6 @@ LOOPBACK = "127.0.0.1"
 #: Connections that have not said what they are for; the oldest makes way for a new one.
 _MOST_STRANGERS = 8
 _GUID = b"labrig simulated"
-_NAME = "Canon EOS 5D Mark II"
 _GUID_BYTES = 16
 #: Longer than the 39 letters of the standard, because libgphoto2 sends the PC's name as it is.
 _MOST_NAME_BYTES = 512
@@ -140,7 +139,8 @@ class PtpIpServer:
     def _report_events(self, now_s: float) -> None:
         host = self._host
         if host and host.event and self._responder.event_due_s() <= now_s:
-            host.event.put([ptpip.event(self._responder.take_event())])
+            event = self._responder.take_event()
+            host.event.put([ptpip.event(event.code, event.params)])
             self._send(host.event)
 
     def _advance(self, connection: Connection) -> None:
@@ -200,7 +200,7 @@ class PtpIpServer:
         self._hosts_so_far += 1
         self._host = _Host(self._hosts_so_far, connection, Transactions(self._responder))
         self._strangers.remove(connection)
-        return ptpip.init_command_ack(self._hosts_so_far, _GUID, _NAME)
+        return ptpip.init_command_ack(self._hosts_so_far, _GUID, self._responder.model)
 
     def _add_event_connection(self, connection: Connection, number: int) -> bytes:
         host = self._host

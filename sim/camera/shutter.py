@@ -76,6 +76,11 @@ class Shutter:
         return self._exposure.is_endless
 
     @property
+    def open_until_s(self) -> float:
+        """When the last exposure ends, or ended; infinity at bulb, −infinity before the first."""
+        return self._exposure.end_s
+
+    @property
     def is_ready(self) -> bool:
         """Whether a full press would be obeyed: nothing going on, not focusing, button up."""
         now_s = self._clock.now()

@@ -98,8 +98,10 @@ class StillImageFunction:
     def read_interrupt(self, room: int) -> memoryview:
         """One interrupt transfer, when one is due."""
         if not self._interrupt:
-            code = self._responder.take_event()
-            self._interrupt.put(encode_parameters(ContainerType.EVENT, code, _UNSOLICITED, ()))
+            event = self._responder.take_event()
+            self._interrupt.put(
+                encode_parameters(ContainerType.EVENT, event.code, _UNSOLICITED, event.params)
+            )
         return self._interrupt.take(room)
 
     def request_out(self, request: int, data: bytes) -> None:

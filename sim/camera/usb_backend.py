@@ -10,6 +10,7 @@ from labrig.clock import VirtualClock
 
 from . import descriptors, usb_errors
 from .cable import Cable
+from .descriptors import UsbIdentity
 from .still_image import BULK_IN, BULK_OUT, INTERRUPT_IN, StillImageFunction
 
 #: Request type, GET_DESCRIPTOR, and its kind.
@@ -36,10 +37,19 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         The camera's endpoints.
     cable
         Costs time, and can be pulled.
+    identity
+        By what the camera is known on the bus.
     """
 
-    def __init__(self, clock: VirtualClock, function: StillImageFunction, cable: Cable) -> None:
+    def __init__(
+        self,
+        clock: VirtualClock,
+        function: StillImageFunction,
+        cable: Cable,
+        identity: UsbIdentity,
+    ) -> None:
         super().__init__()
+        self._identity = identity
         self._clock = clock
         self._function = function
         self._cable = cable
@@ -63,7 +73,7 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
 
     def get_device_descriptor(self, dev: Any) -> SimpleNamespace:
         """Device descriptor."""
-        return descriptors.device(address=dev)
+        return descriptors.device(dev, self._identity)
 
     def get_configuration_descriptor(self, dev: Any, config: int) -> SimpleNamespace:
         """The one configuration; IndexError ends pyusb's walk."""
@@ -188,7 +198,7 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         if bmRequestType == _FROM_INTERFACE:
             answer = self._function.request_in(bRequest)
         elif (bmRequestType, bRequest, wValue >> 8) == _GET_STRING:
-            answer = descriptors.string(wValue & 0xFF)
+            answer = descriptors.string(wValue & 0xFF, self._identity)
         else:
             raise usb_errors.stalled()
         target = memoryview(data).cast("B")

@@ -1,4 +1,4 @@
-"""The numbers of PTP (ISO 15740) and of Canon's EOS extension that this camera knows."""
+"""The numbers of PTP (ISO 15740) and of Canon's EOS extension that these cameras know."""
 
 from enum import IntEnum
 
@@ -15,6 +15,7 @@ class Operation(IntEnum):
     GET_OBJECT_INFO = 0x1008
     GET_OBJECT = 0x1009
     DELETE_OBJECT = 0x100B
+    INITIATE_CAPTURE = 0x100E
     GET_DEVICE_PROP_DESC = 0x1014
     GET_DEVICE_PROP_VALUE = 0x1015
     SET_DEVICE_PROP_VALUE = 0x1016
@@ -51,9 +52,11 @@ class ResponseCode(IntEnum):
     INVALID_STORAGE_ID = 0x2008
     INVALID_OBJECT_HANDLE = 0x2009
     DEVICE_PROP_NOT_SUPPORTED = 0x200A
+    INVALID_OBJECT_FORMAT_CODE = 0x200B
     STORE_FULL = 0x200C
     OBJECT_WRITE_PROTECTED = 0x200D
     ACCESS_DENIED = 0x200F
+    STORE_NOT_AVAILABLE = 0x2013
     DEVICE_BUSY = 0x2019
     INVALID_PARENT_OBJECT = 0x201A
     INVALID_DEVICE_PROP_FORMAT = 0x201B
@@ -62,6 +65,30 @@ class ResponseCode(IntEnum):
     SESSION_ALREADY_OPEN = 0x201E
     TRANSACTION_CANCELLED = 0x201F
     EOS_OBJECT_NOT_READY = 0xA102
+
+
+class StandardEvent(IntEnum):
+    """Events of the standard."""
+
+    OBJECT_ADDED = 0x4002
+    STORE_FULL = 0x400A
+    CAPTURE_COMPLETE = 0x400D
+
+
+class StandardProperty(IntEnum):
+    """Device properties of the standard."""
+
+    BATTERY_LEVEL = 0x5001
+    COMPRESSION_SETTING = 0x5004
+    F_NUMBER = 0x5007
+    FOCUS_MODE = 0x500A
+    FLASH_MODE = 0x500C
+    EXPOSURE_TIME = 0x500D
+    EXPOSURE_PROGRAM_MODE = 0x500E
+    EXPOSURE_INDEX = 0x500F
+    CAPTURE_DELAY = 0x5012
+    STILL_CAPTURE_MODE = 0x5013
+    BURST_NUMBER = 0x5018
 
 
 class EosEvent(IntEnum):
@@ -105,4 +132,5 @@ class ObjectFormat(IntEnum):
     """Formats of the objects on the card."""
 
     ASSOCIATION = 0x3001
+    JPEG = 0x3801
     DNG = 0x3811

@@ -14,13 +14,13 @@ from contextlib import contextmanager
 from unittest.mock import patch
 
 from labrig.clock import VirtualClock
-from sim.camera import ptpip_server
+from sim.camera import BodySettings, ptpip_server
 from sim.camera.ptpip_connection import Connection
 from sim.camera.ptpip_packets import Packet, PacketType
 
 from . import transcript
-from .served import EPOCH_S, Film, served
-from .test_gphoto2_host import MOST_S, READY, TO_CARD, TO_HOST, command
+from .served import EOS, EPOCH_S, STANDARD, Film, served
+from .test_gphoto2_host import MOST_S, READY, STANDARD_READY, TO_CARD, TO_HOST, command
 from .transcript import CAMERA, COMMAND, EVENT, HOST, Line
 
 SESSIONS = {
@@ -29,8 +29,14 @@ SESSIONS = {
     "capture_to_host": (*READY, TO_HOST, "capture"),
     "capture_to_card": (*READY, TO_CARD, "capture"),
     "bulb": ("set:iso=200", "set:aperture=8", "set:shutterspeed=bulb", TO_CARD, "bulb:0.5"),
+    "standard_capture": (*STANDARD_READY, "capture"),
 }
 PICTURE_BYTES = 600
+
+
+def body_of(name: str) -> BodySettings:
+    """Which camera a session is with."""
+    return STANDARD if name.startswith("standard_") else EOS
 
 
 def _anonymous() -> bytes:
@@ -68,7 +74,7 @@ def recording(clock: VirtualClock) -> Iterator[list[Line]]:
 def record(name: str, steps: tuple[str, ...]) -> None:
     clock = VirtualClock(EPOCH_S)
     with recording(clock) as lines, tempfile.TemporaryDirectory() as home:
-        with served(Film(size=PICTURE_BYTES), clock) as server:
+        with served(Film(size=PICTURE_BYTES), clock, body_of(name)) as server:
             environment = os.environ | {"HOME": home, "LANG": "C"}
             subprocess.run(
                 command(server.port, *steps), env=environment, timeout=MOST_S, check=True

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from labrig.clock import Interrupted, SystemClock, VirtualClock
-from sim.camera import Pace, PtpIpServer, Sensor, SimulatedCamera
+from sim.camera import BodySettings, Pace, PtpIpServer, Sensor, SimulatedCamera
 
 EPOCH_S = 1_767_225_600.0
 #: A server that does not end by then hangs.
@@ -41,12 +41,17 @@ class Film:
         return raw
 
 
-def camera_on(clock: VirtualClock, film: Film) -> SimulatedCamera:
-    return SimulatedCamera(clock, film, serial="0730100001", seed=1)
+EOS, STANDARD = BodySettings(body="eos"), BodySettings(body="standard")
+
+
+def camera_on(clock: VirtualClock, film: Film, body: BodySettings = EOS) -> SimulatedCamera:
+    return SimulatedCamera(clock, film, serial="0730100001", seed=1, body=body)
 
 
 @contextmanager
-def served(film: Film, room_clock: VirtualClock | None = None) -> Iterator[PtpIpServer]:
+def served(
+    film: Film, room_clock: VirtualClock | None = None, body: BodySettings = EOS
+) -> Iterator[PtpIpServer]:
     """The camera behind a server; what goes wrong in the server's thread fails the test."""
     clock, room_clock = SystemClock(), room_clock or VirtualClock(EPOCH_S)
     failures: list[BaseException] = []
@@ -59,7 +64,7 @@ def served(film: Film, room_clock: VirtualClock | None = None) -> Iterator[PtpIp
         except BaseException as failure:
             failures.append(failure)
 
-    responder = camera_on(room_clock, film).responder
+    responder = camera_on(room_clock, film, body).responder
     with closing(PtpIpServer(responder, Pace(clock, room_clock).catch_up)) as server:
         thread = threading.Thread(target=serve, daemon=True)
         thread.start()

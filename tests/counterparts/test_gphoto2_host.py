@@ -18,7 +18,7 @@ from labrig.clock import VirtualClock
 from sim.room import Room
 from sim.simulation import Simulation
 
-from .served import EPOCH_S, Film, Taken, served
+from .served import EPOCH_S, STANDARD, Film, Taken, served
 
 pytestmark = pytest.mark.skipif(
     sys.platform == "win32", reason="python-gphoto2 is not made for Windows"
@@ -28,6 +28,8 @@ SCRIPT = Path(__file__).with_name("gphoto2_host.py")
 MOST_S = 60.0
 TO_HOST, TO_CARD = "set:capturetarget=Internal RAM", "set:capturetarget=Memory card"
 READY = ("set:iso=400", "set:aperture=4", "set:shutterspeed=1/4")
+#: A camera that knows the standard only tells seconds and the word of its property.
+STANDARD_READY = ("set:iso=400", "set:f-number=f/4", "set:shutterspeed=0.2500s")
 
 
 def command(port: int, *steps: str) -> list[str]:
@@ -120,6 +122,20 @@ def test_bulb(home: dict[str, str]) -> None:
     assert settings == [200, 8.0]
     assert exposure_s not in (0.0, 1 / 64), "as long as was asked, not as on the dial"
     assert picture["sha256"] == hashlib.sha256(film.delivered[0]).hexdigest()
+
+
+def test_a_camera_that_knows_the_standard_only(home: dict[str, str]) -> None:
+    film = Film(size=300_000)
+    with served(film, body=STANDARD) as server:
+        summary, *read_back, picture = gphoto2(
+            server.port, home, "summary", *STANDARD_READY, "capture"
+        )
+    for said in ("simulated PTP camera", "0730100001", "Generic Image Capture", "Exposure Time"):
+        assert said in summary
+    assert read_back == ["400", "f/4", "0.2500s"]
+    assert film.taken == [Taken(0.25, 400, 4.0)]
+    assert picture["sha256"] == hashlib.sha256(film.delivered[0]).hexdigest()
+    assert picture["name"] == "DSC_0001.DNG"
 
 
 def test_one_host_after_another_and_after_one_that_was_killed(home: dict[str, str]) -> None:

@@ -1,4 +1,4 @@
-"""Recorded sessions between libgphoto2 and an EOS: each side of this house meets the other's half.
+"""Recorded sessions of libgphoto2 with cameras: each side of this house meets the other's half.
 
 Made anew by `python -m tests.counterparts.record`.
 """
@@ -12,21 +12,24 @@ import pytest
 from drivers.ptp.containers import Kind, command
 from drivers.ptp.device_info import parse_device_info
 from drivers.ptp.eos_events import Event, ObjectOffered, parse_events
+from drivers.ptp.object_info import parse_object_info
+from drivers.ptp.ptp_codes import StandardEvent
 from labrig.clock import VirtualClock
 from sim.camera.ptpip_packets import Packet
 from sim.camera.ptpip_transactions import Transactions
 from tests.drivers.ptp.ip_wire import saying
 
 from . import transcript
-from .record import PICTURE_BYTES, SESSIONS
-from .served import EPOCH_S, Film, camera_on
+from .record import PICTURE_BYTES, SESSIONS, body_of
+from .served import EPOCH_S, STANDARD, Film, camera_on
 from .transcript import CAMERA, COMMAND, HOST, Line
 
 OPERATION_REQUEST, RESPONSE, EVENT, START_DATA, END_DATA = 6, 7, 8, 9, 12
-GET_DEVICE_INFO, GET_EVENT = 0x1001, 0x9116
+GET_DEVICE_INFO, GET_OBJECT_INFO, GET_EVENT = 0x1001, 0x1008, 0x9116
 #: Of what these carry every byte counts: the pictures.
 OF_OBJECTS = {0x1009, 0x101B, 0x9104, 0x9107}
-TAKES_A_PICTURE = {"capture_to_host", "capture_to_card", "bulb"}
+TAKES_A_PICTURE = {"capture_to_host", "capture_to_card", "bulb", "standard_capture"}
+SOON_S = 0.05
 
 recorded = pytest.mark.parametrize("path", transcript.paths(), ids=lambda path: path.stem)
 
@@ -49,7 +52,7 @@ def test_the_simulated_camera_answers_the_recorded_host(path: Path) -> None:
     lines = transcript.read(path)
     clock = VirtualClock(EPOCH_S)
     film = Film(size=PICTURE_BYTES)
-    responder = camera_on(clock, film).responder
+    responder = camera_on(clock, film, body_of(path.stem)).responder
     host = Transactions(responder)
     expected = deque(transactions(lines, CAMERA))
     opcode = 0
@@ -74,7 +77,9 @@ def test_the_simulated_camera_answers_the_recorded_host(path: Path) -> None:
 @recorded
 def test_our_initiator_understands_the_recorded_camera(path: Path) -> None:
     lines = transcript.read(path)
+    body = body_of(path.stem)
     events: list[Event] = []
+    sizes: set[int] = set()
     said = b"".join(line.packet for line in transactions(lines, CAMERA))
     on_event = b"".join(line.packet for line in lines if line.kind == EVENT)
     requests = [line for line in transactions(lines, HOST) if line.kind == OPERATION_REQUEST]
@@ -94,7 +99,16 @@ def test_our_initiator_understands_the_recorded_camera(path: Path) -> None:
                     events += parse_events(container.payload)
                 if opcode == GET_DEVICE_INFO:
                     info = parse_device_info(container.payload)
-                    assert "5D Mark II" in str(info)
-    offered = [event for event in events if isinstance(event, ObjectOffered)]
+                    assert camera_on(VirtualClock(), Film(), body).responder.model in str(info)
+                if opcode == GET_OBJECT_INFO:
+                    sizes.add(parse_object_info(container.payload).size_bytes)
+        reported = []
+        while (event := link.event(SOON_S)) is not None:
+            reported.append(event.code)
     pictures = 1 if path.stem in TAKES_A_PICTURE else 0
-    assert [event.size_bytes for event in offered] == [PICTURE_BYTES] * pictures
+    if body == STANDARD:
+        assert reported == [StandardEvent.ObjectAdded, StandardEvent.CaptureComplete] * pictures
+        assert PICTURE_BYTES in sizes
+    else:
+        offered = [event for event in events if isinstance(event, ObjectOffered)]
+        assert [event.size_bytes for event in offered] == [PICTURE_BYTES] * pictures

@@ -64,7 +64,7 @@ class Wired:
     def serial(self, address: str, baudrate: int) -> ScriptedPort:
         return self._port
 
-    def usb(self, address: str) -> None:
+    def usb(self, address: str, serial_of: object = None) -> None:
         raise AssertionError("no USB here")
 
     def tcp(self, address: str, default_port: int) -> NoReturn:

@@ -1,65 +1,18 @@
 """The PTP driver and the simulated camera, written apart from the same facts, meet here."""
 
-import hashlib
-from typing import Any, NoReturn
+from typing import Any
 
 import pytest
-import usb.core
 
 from drivers.ptp import PtpCamera
 from labrig.acquire import Camera, Checkable, ExposureSettings, KeptAwake, Rig, Session
-from labrig.acquire.connections import SerialPort
-from labrig.clock import Interrupted, VirtualClock
-from labrig.errors import DeviceError
+from labrig.clock import Interrupted
+from labrig.errors import DeviceError, DeviceLostError
 from sim.camera import BodySettings, CameraFaults, SimulatedCamera
+from tests.drivers.simulated import Picture, StoppingClock, Wired
 
 SETTINGS = ExposureSettings(1.0, 400, 4.0)
 BUSY, OPEN_SESSION, GET_EVENT, RELEASE_ON, GET_PARTIAL = 0x2019, 0x1002, 0x9116, 0x9128, 0x9107
-
-
-class Picture:
-    """A sensor whose files say what was exposed; sizes that end on packet borders included."""
-
-    def __init__(self, size: int) -> None:
-        self.size = size
-        self.taken: list[tuple[float, float]] = []
-
-    def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
-        self.taken.append((start_s, exposure_s))
-        text = f"{start_s:.6f} {exposure_s:.6f} {iso}".encode()
-        return hashlib.sha256(text).digest() * (self.size // 32) + b"x" * (self.size % 32)
-
-
-class StoppingClock(VirtualClock):
-    """Is interrupted at its n-th wait."""
-
-    waits_left = -1
-
-    def _pause_until(self, deadline_s: float) -> None:
-        self.waits_left -= 1
-        if self.waits_left == 0:
-            self.interrupt(2)
-        super()._pause_until(deadline_s)
-
-
-class Wired:
-    """Connections to one camera."""
-
-    def __init__(self, clock: VirtualClock, camera: SimulatedCamera) -> None:
-        self.clock = clock
-        self._camera = camera
-
-    def serial(self, address: str, baudrate: int) -> SerialPort:
-        raise AssertionError("no serial line here")
-
-    def usb(self, address: str) -> Any:
-        found = usb.core.find(backend=self._camera.backend)
-        if found is None:
-            raise DeviceError("no camera")
-        return found
-
-    def tcp(self, address: str, default_port: int) -> NoReturn:
-        raise AssertionError("no network here")
 
 
 def bench(
@@ -177,7 +130,7 @@ def test_unplugged_is_one_clear_line(after_bytes: int) -> None:
             driver.arm()
             driver.shoot()
 
-    with pytest.raises(DeviceError) as caught:
+    with pytest.raises(DeviceLostError) as caught:
         photograph()
     assert "\n" not in str(caught.value)
 
@@ -208,7 +161,7 @@ class Nobody:
 
 
 def test_a_camera_that_switches_itself_off_survives_a_charge_because_it_is_kept_awake() -> None:
-    clock, picture, _, driver = bench(body=BodySettings(auto_power_off_s=60))
+    clock, picture, _, driver = bench(body=BodySettings(auto_power_off="60 s"))
     assert isinstance(driver, KeptAwake)
     session = Session(Rig("bench", clock, {"camera": driver}, {}), Nobody(), Nobody())
     driver.configure(SETTINGS)
@@ -220,7 +173,7 @@ def test_a_camera_that_switches_itself_off_survives_a_charge_because_it_is_kept_
 
 
 def test_a_camera_left_alone_switches_itself_off_and_says_so_in_one_line() -> None:
-    clock, _, _, driver = bench(body=BodySettings(auto_power_off_s=60))
+    clock, _, _, driver = bench(body=BodySettings(auto_power_off="60 s"))
     driver.configure(SETTINGS)
     clock.sleep(61.0)
     with pytest.raises(DeviceError, match="automatic switching-off") as caught:
@@ -231,12 +184,12 @@ def test_a_camera_left_alone_switches_itself_off_and_says_so_in_one_line() -> No
 @pytest.mark.parametrize(
     ("body", "severity", "said"),
     [
-        (BodySettings(exposure_mode=2), "refuse", "dial is at Av"),
-        (BodySettings(exposure_mode=4), "refuse", "dial is at B"),
+        (BodySettings(exposure_mode="Av"), "refuse", "dial is at Av"),
+        (BodySettings(exposure_mode="B"), "refuse", "dial is at B"),
         (BodySettings(autofocus=True), "refuse", "lens to MF"),
-        (BodySettings(iso=None), "refuse", "automatic ISO"),
+        (BodySettings(iso="auto"), "refuse", "automatic ISO"),
         (BodySettings(iso=125), "refuse", "ISO 125 is not native"),
-        (BodySettings(auto_power_off_s=60), "warn", "Set-up 1 (yellow) → Auto power off → Off"),
+        (BodySettings(auto_power_off="60 s"), "refuse", "Set-up 1 (yellow) → Auto power off → Off"),
         (BodySettings(long_exposure_noise_reduction=True), "refuse", "C.Fn II (Image) → 1"),
         (BodySettings(highlight_tone_priority=True), "refuse", "C.Fn II (Image) → 3"),
         (BodySettings(mirror_lock_up=True), "refuse", "C.Fn III (Autofocus/Drive) → 6"),
@@ -254,3 +207,16 @@ def test_what_is_set_by_hand_is_found(body: BodySettings, severity: str, said: s
 def test_a_well_set_camera_is_fine() -> None:
     *_, driver = bench()
     assert {finding.severity for finding in driver.findings()} == {"fine"}
+
+
+def test_a_camera_that_has_lost_the_session_gets_another_on_the_way_to_the_safe_state() -> None:
+    _, picture, camera, driver = bench()
+    driver.configure(SETTINGS)
+    camera.responder.disconnect()
+    for code in ("0x2003 SessionNotOpen", "lost this session, it answered 0x2003"):
+        with pytest.raises(DeviceError, match=code):
+            driver.configure(ExposureSettings(0.5, 400, 4.0))
+    driver.make_safe()
+    driver.configure(SETTINGS)
+    driver.arm()
+    assert driver.shoot().data == picture.photograph(*picture.taken[-1], 400, 4.0)

@@ -117,7 +117,7 @@ def test_a_camera_is_named_and_left_free() -> None:
 
 def test_twins_without_serial_numbers_cannot_be_told_apart() -> None:
     found = discover(pc(usb_devices=cameras(2)), DRIVERS)
-    assert all("unplug one" in camera.hints[0] for camera in found.cameras)
+    assert all("append /SERIAL" in camera.hints[0] for camera in found.cameras)
 
 
 @pytest.mark.parametrize(

@@ -19,12 +19,13 @@ import pytest
 from labrig.acquire.plugins import read_protocol
 from labrig.clock import Interrupted, SystemClock
 from labrig.errors import DeviceError, UsageError
+from labrig.local_server import KINDS
 from labrig.region import CENTRE
 from labrig.setup.aimed_protocol import AimedProtocol
 from labrig.setup.live_pictures import LivePictures
 from labrig.setup.picture_stats import decode, picture_stats, sharpness
 from labrig.setup.view import hand_over
-from labrig.setup.view_server import PAGE, ViewServer
+from labrig.setup.view_server import PAGES, ViewServer
 from tests.conftest import Ended
 
 BLUE = {"patches": [{"name": "blue paint", "region": [0.1, 0.2, 0.3, 0.4]}]}
@@ -117,14 +118,14 @@ def browser(make_protocol: Callable[..., Path]) -> Iterator[Browser]:
 
 
 def test_the_page_is_whole_and_asks_nobody_else(browser: Browser) -> None:
-    for name, (_, kind) in PAGE.items():
+    for name, file in PAGES.items():
         answer = browser.ask(name)
         assert answer.status == 200
-        assert answer.kind == kind.partition(";")[0]
+        assert answer.kind == KINDS[file.suffix].partition(";")[0]
         assert b"http" not in answer.body
         assert "default-src 'self'" in answer.headers["Content-Security-Policy"]
     page = browser.ask("").body.decode()
-    for name in PAGE:
+    for name in PAGES:
         assert name in page or name == "view_regions.js"
 
 

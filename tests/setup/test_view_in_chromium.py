@@ -1,15 +1,12 @@
 """The live view as a person uses it: a real browser, regions drawn, named and written."""
 
 import os
-import shutil
 import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
 from selenium.webdriver import Chrome
-from selenium.webdriver.chrome.options import Options
-from selenium.webdriver.chrome.service import Service
 from selenium.webdriver.common.action_chains import ActionChains
 from selenium.webdriver.common.by import By
 from selenium.webdriver.common.keys import Keys
@@ -25,41 +22,9 @@ from labrig.setup.live_pictures import LivePictures
 from labrig.setup.view import hand_over
 from labrig.setup.view_server import ViewServer
 
-CHROMIUM, DRIVER = shutil.which("chromium"), shutil.which("chromedriver")
-FLAGS = (
-    "--headless",
-    "--no-sandbox",
-    "--disable-gpu",
-    "--disable-quic",
-    "--no-first-run",
-    "--disable-background-networking",
-    "--disable-component-update",
-    "--disable-sync",
-    "--disable-dev-shm-usage",
-)
 #: Where screenshots are kept for a person to look at.
 SCREENSHOTS = os.environ.get("LABRIG_SCREENSHOTS")
 PATIENCE_S = 30
-
-# In CI both are installed; there, their absence is a failure of this test.
-pytestmark = pytest.mark.skipif(
-    not (os.environ.get("CI") or (CHROMIUM and DRIVER)), reason="needs chromium and chromedriver"
-)
-
-
-@pytest.fixture
-def chromium(tmp_path: Path) -> Iterator[Chrome]:
-    options = Options()
-    assert CHROMIUM
-    options.binary_location = CHROMIUM
-    for flag in (*FLAGS, f"--user-data-dir={tmp_path / 'profile'}"):
-        options.add_argument(flag)
-    browser = Chrome(options, Service(DRIVER))
-    try:
-        browser.set_window_size(1200, 820)
-        yield browser
-    finally:
-        browser.quit()
 
 
 @pytest.fixture

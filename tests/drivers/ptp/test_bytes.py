@@ -161,6 +161,26 @@ class TestEvents:
             parse_events(bytes(raw[: data.draw(st.integers(0, len(raw)))]))
 
 
+def test_a_camera_that_babbles_costs_neither_time_nor_memory() -> None:
+    b = bench()
+    camera = b.connect()
+    many = (written(ValueChanged(prop, b"x" * 40)) for prop in range(0x20000, 0x28000))
+    b.toy.events.append(b"".join(many))
+    assert camera.offers().isos
+    files = (written(ObjectOffered(n, 0xB103, 1000, f"{n}.CR2")) for n in range(50_000))
+    b.toy.events.append(b"".join(files))
+    with pytest.raises(DeviceError, match="at most 1000 frames in the camera, it offers 50000"):
+        photograph(camera)
+    photograph(camera)
+
+
+def test_no_file_is_as_large_as_that() -> None:
+    b = bench()
+    b.toy.announced_extra_bytes = 1 << 31
+    with pytest.raises(DeviceError, match=r"at most 536870912 bytes, the camera announces 21474"):
+        photograph(b.connect())
+
+
 @quiet
 @given(st.binary(max_size=300))
 def test_any_device_info_is_one_line_or_a_device_error(data: bytes) -> None:

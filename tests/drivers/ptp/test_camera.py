@@ -1,19 +1,21 @@
 """What the camera offers, takes and delivers."""
 
+import errno
 import math
+from typing import Any
 
 import pytest
+import usb.core
 
 from drivers.ptp import PtpCamera
 from labrig.acquire.roles import Camera
 from labrig.acquire.values import CameraOffers, ExposureSettings
 from labrig.errors import DeviceError
 
-from .bench import SHORT, bench, photograph
+from .bench import SHORT, Bench, bench, photograph
 from .toy_eos import (
     FULL,
     HALF,
-    JPEG,
     OFF_FULL,
     OFF_HALF,
     OPERATIONS,
@@ -23,7 +25,7 @@ from .toy_eos import (
     choices_changed,
     u32,
 )
-from .usb_wire import TRANSACTION_S
+from .usb_wire import TRANSACTION_S, Wire
 
 WITHOUT_CHUNKS = [op for op in OPERATIONS if op != 0x9107]
 
@@ -171,6 +173,37 @@ def test_shoot_measures_the_press_that_succeeded() -> None:
     assert frame.data == b.toy.frame(1)
 
 
+class SlowWire(Wire):
+    """The camera answers a half press only when its lens is through with searching."""
+
+    searching_s = 0.0
+
+    def bulk_read(self, handle: Any, ep: int, intf: int, buff: Any, timeout: int) -> int:
+        assert isinstance(self.peer, ToyEos)
+        if self.to_host and self.searching_s and self.peer.log[-1][:2] == HALF:
+            waited_s = min(self.searching_s, timeout / 1e3)
+            self.searching_s -= waited_s
+            self.clock.spend(waited_s)
+            if self.searching_s > 0:
+                raise usb.core.USBTimeoutError("Operation timed out", -7, errno.ETIMEDOUT)
+        return super().bulk_read(handle, ep, intf, buff, timeout)
+
+
+@pytest.mark.parametrize(("searching_s", "is_patient"), [(8.0, True), (30.0, False)])
+def test_a_half_press_may_take_eight_seconds(searching_s: float, is_patient: bool) -> None:
+    b = bench()
+    wire = SlowWire(b.toy, b.wire.clock)
+    camera = Bench(b.toy, wire).connect()
+    camera.configure(SHORT)
+    wire.searching_s = searching_s
+    if is_patient:
+        camera.arm()
+        assert camera.shoot().data == b.toy.frame(1)
+        return
+    with pytest.raises(DeviceError, match=r"RemoteReleaseOn 0x9128 within 12 s: no answer"):
+        camera.arm()
+
+
 def test_shoot_sends_nothing_before_the_press_and_lets_go_in_order() -> None:
     b = bench()
     camera = b.connect()
@@ -206,6 +239,10 @@ def test_frames_of_any_size_by_any_operation(size: int, operation: int) -> None:
     b.toy.frame_bytes = size
     assert photograph(b.connect()).data == b.toy.frame(1)
     assert b.toy.stored == {}
+    parts = [key[2:] for key in b.toy.log if key[0] in (0x9107, 0x101B)]
+    assert parts == [
+        (at, min(1024**2, size - at)) for at in range(0, size, 1024**2) if operation != 0x9104
+    ]
 
 
 # what lies beyond an announced end is never asked for in chunks
@@ -230,13 +267,17 @@ def test_jpeg_is_no_frame() -> None:
     assert b.toy.is_idle
 
 
-def test_quality_that_cannot_be_raw_is_refused() -> None:
+@pytest.mark.parametrize(
+    ("prop", "said"), [(0xD120, "image format"), (0xD11C, "destination"), (0xD106, "drive mode")]
+)
+def test_what_is_not_taken_is_refused_because_it_is_read_back(prop: int, said: str) -> None:
     b = bench()
-    b.toy.stubborn.add(0xD120)
-    with pytest.raises(DeviceError, match="image format"):
+    b.toy.stubborn.add(prop)
+    before = b.toy.values[prop]
+    with pytest.raises(DeviceError, match=f"asked the camera for {said} .* it says"):
         b.connect()
     assert not b.wire.claimed
-    assert b.toy.values[0xD120] == JPEG
+    assert b.toy.values[prop] == before
 
 
 def test_a_frame_taken_by_hand_is_not_mistaken() -> None:
@@ -287,3 +328,11 @@ class TestOlderRelease:
         camera.make_safe()
         b.toy.release_result = 0
         assert photograph(camera).data == b.toy.frame(1)
+
+
+def test_a_camera_that_a_pc_cannot_release_is_refused_with_what_it_lacks() -> None:
+    b = bench(ToyEos((0x1001, 0x1002, 0x1003, 0x9110)))
+    with pytest.raises(DeviceError, match=r"0x9114.*0x910F.*0x100E.*USB mode") as caught:
+        b.connect()
+    assert "\n" not in str(caught.value)
+    assert not b.wire.claimed

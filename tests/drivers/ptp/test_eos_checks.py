@@ -90,18 +90,49 @@ def test_a_camera_that_tells_little_is_looked_at_by_hand() -> None:
     found = bench().connect().findings()
     assert [finding.what for finding in found if finding.severity == "refuse"] == []
     by_hand = [str(finding) for finding in found if finding.severity == "warn"]
-    assert len(by_hand) == 5
+    assert len(by_hand) == 6
     for place in ("lens to MF", "Auto power off", "C.Fn II (Image) → 1", "C.Fn III"):
         assert any(place in text for text in by_hand)
 
 
-def test_isos_of_the_rig_file_that_are_not_native_are_refused() -> None:
-    found = bench().connect(isos=[100, 125, 160]).findings()
-    (refused,) = [finding for finding in found if finding.severity == "refuse"]
-    assert "ISO 125, 160, which are not native" in refused.what
+@pytest.mark.parametrize(
+    ("model", "highest", "is_known"),
+    [
+        ("Canon EOS 30D", 1600, True),
+        ("Canon EOS 5D Mark II", 3200, True),
+        ("Canon EOS 6D", 6400, True),
+        ("Canon EOS R5", 1600, False),
+    ],
+)
+def test_native_isos_are_those_of_the_model(model: str, highest: int, is_known: bool) -> None:
+    toy = ToyEos()
+    toy.model = model
+    toy.lists[0xD103] = (0x00, *range(0x48, 0x89))
+    camera = bench(toy).connect()
+    isos = camera.offers().isos
+    assert isos == tuple(100 * 2**stop for stop in range(len(isos)))
+    assert isos[-1] == highest
+    warned = [found for found in camera.findings() if "ISOs of a" in found.what]
+    assert len(warned) == (not is_known)
+    assert all(model in found.what and "'isos'" in found.remedy for found in warned)
 
 
-@pytest.mark.parametrize(("seconds", "severity"), [(0, "fine"), (0xFFFFFFFF, "fine"), (60, "warn")])
+def test_what_the_rig_file_says_is_native_goes_before_it() -> None:
+    toy = ToyEos()
+    toy.model = "Canon EOS 5D Mark II"
+    toy.values[0xD103] = struct.pack("<I", 0x4B)  # ISO 125
+    (refused,) = [f for f in bench(toy).connect().findings() if f.severity == "refuse"]
+    assert "ISO 125 is not native" in refused.what
+    assert "ISO button" in refused.remedy
+    found = bench(toy).connect(isos=[100, 125, 160]).findings()
+    assert [finding for finding in found if finding.severity == "refuse"] == []
+    (warned,) = [finding for finding in found if "rig file" in finding.what]
+    assert "ISO 125, 160, which is not native in a Canon EOS 5D Mark II" in warned.what
+
+
+@pytest.mark.parametrize(
+    ("seconds", "severity"), [(0, "fine"), (0xFFFFFFFF, "fine"), (60, "refuse")]
+)
 def test_when_it_switches_itself_off(seconds: int, severity: str) -> None:
     toy = ToyEos()
     toy.values[0xD114] = struct.pack("<I", seconds)
@@ -109,15 +140,14 @@ def test_when_it_switches_itself_off(seconds: int, severity: str) -> None:
     (severity_of_it,) = {
         finding.severity
         for finding in found
-        if "off after" in finding.what or "auto power" in finding.what
+        if "switches itself off" in finding.what or "auto power" in finding.what
     }
     assert severity_of_it == severity
 
 
-def test_one_that_cannot_be_kept_awake_must_not_switch_itself_off() -> None:
+def test_one_that_cannot_be_kept_awake_is_left_alone() -> None:
     toy = ToyEos(tuple(code for code in OPERATIONS if code != 0x911D))
-    toy.values[0xD114] = struct.pack("<I", 60)
     camera = bench(toy).connect()
-    (finding,) = [found for found in camera.findings() if found.severity == "refuse"]
-    assert "cannot be kept awake" in finding.what
+    said = len(toy.log)
     camera.keep_awake()
+    assert len(toy.log) == said

@@ -1,16 +1,19 @@
 """Everything that can go wrong between a camera and a PC, at every step of a frame."""
 
 import errno
+from contextlib import suppress
+from typing import Any
 
 import pytest
 
 from drivers.ptp import PtpCamera
+from labrig.acquire.values import ExposureSettings
 from labrig.clock import Interrupted, VirtualClock
 from labrig.errors import DeviceError
 
-from .bench import SHORT, Bench, bench, photograph
-from .toy_eos import FULL, HALF, OFF_FULL, OFF_HALF, OPERATIONS, Fault, Key, ToyEos
-from .usb_wire import Wire
+from .bench import ADDRESS, SHORT, Bench, bench, photograph
+from .toy_eos import FULL, HALF, OFF_FULL, OFF_HALF, OPERATIONS, Fault, Key, ToyEos, u32
+from .usb_wire import OneDevice, Wire
 
 STEPS: dict[str, Key] = {
     "set property": (0x9110,),
@@ -112,6 +115,38 @@ def test_nothing_to_let_go_of_is_safe(step: Key, fault: Fault) -> None:
     with pytest.raises(DeviceError):
         photograph(camera)
     assert_usable(b, camera)
+
+
+@pytest.mark.parametrize("key", [(0x9116,), (0x9110,)], ids=["events", "set property"])
+@pytest.mark.parametrize("at", range(5))
+def test_what_a_lost_answer_said_is_not_believed_to_be_as_before(key: Key, at: int) -> None:
+    b = bench()
+    camera = b.connect()
+    camera.configure(SHORT)
+    b.toy.faults[key] = [*[Fault.LATE_LEFTOVER] * at, Fault.SILENT]
+    with suppress(DeviceError):
+        camera.configure(ExposureSettings(1.0, 100, 4.0))
+    b.toy.faults.clear()
+    camera.make_safe()
+    assert camera.configure(SHORT) == SHORT
+    assert [b.toy.values[prop] for prop in (0xD102, 0xD103, 0xD101)] == [
+        *map(u32, (0x68, 0x50, 0x30))
+    ]
+
+
+@pytest.mark.parametrize("operations", [OPERATIONS, (*OPERATIONS, 0x9127)], ids=["no", "yes"])
+def test_what_is_set_already_may_be_passed_over_in_silence(operations: tuple[int, ...]) -> None:
+    """A camera that can be asked (0x9127) is asked, any other believed when it answers OK."""
+    b = bench(ToyEos(operations))
+    b.toy.reports_changes_only = True
+    camera = b.connect()
+    camera.configure(SHORT)
+    b.toy.faults[(0x9116,)] = [Fault.SILENT]
+    with pytest.raises(DeviceError):
+        camera.configure(SHORT)
+    camera.make_safe()
+    assert camera.configure(SHORT) == SHORT
+    assert ((0x9127, 0xD102) in b.toy.log) == (0x9127 in operations)
 
 
 def test_make_safe_resets_a_camera_that_cannot_be_cancelled() -> None:
@@ -257,3 +292,20 @@ def test_ctrl_c_during_a_long_exposure_costs_no_wait_for_it() -> None:
     assert clock.now() < interrupted_s + 1.0
     assert_usable(b, camera)
     assert b.toy.exposures == 2
+
+
+class Asked(OneDevice):
+    """The bench asks every device for its serial number first, as it does with twins."""
+
+    def usb(self, address: str, serial_of: Any = None) -> Any:
+        device = super().usb(address)
+        assert serial_of(device) == "42"
+        return device
+
+
+@pytest.mark.parametrize("left_open", [False, True])
+def test_a_camera_that_was_asked_who_it_is_is_left_as_somebody_left_it(left_open: bool) -> None:
+    b = bench()
+    b.toy.session_open = left_open
+    PtpCamera(ADDRESS, PtpCamera.Settings(), Asked(b.wire))
+    assert (OFF_HALF in b.toy.log) is left_open, "a dead program may hold the button"

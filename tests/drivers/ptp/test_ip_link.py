@@ -19,9 +19,9 @@ from drivers.ptp.session import Patience, Session
 from labrig.acquire import ExposureSettings, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import SystemClock
-from labrig.errors import DeviceError, UsageError
+from labrig.errors import DeviceError, DeviceLostError, UsageError
 from tests.counterparts import transcript
-from tests.counterparts.served import Film, Taken, served
+from tests.counterparts.served import STANDARD, Film, Taken, served
 
 from .ip_wire import ACK, saying
 
@@ -62,6 +62,26 @@ def test_what_is_said_first() -> None:
     name = b"l\0a\0b\0r\0i\0g\0\0\0"
     assert on_command == bytes.fromhex("2a00000001000000") + ip_link.GUID + name + b"\0\0\1\0"
     assert on_event.hex() == "0c0000000300000001000000"
+
+
+def test_events_come_while_waiting_for_them_and_while_waiting_for_an_answer() -> None:
+    added = encode(PacketKind.EVENT, struct.pack("<HII", 0x4002, 7, 0x12))
+    over = encode(PacketKind.EVENT, struct.pack("<HI", 0x400D, 7))
+    with saying(response(OK, 3), added + encode(PacketKind.PING) + over) as camera:
+        link = camera.link()
+        link.send(command(0x100E, 3, ()), None, "x")
+        assert link.receive("x", SOON_S, 0).code == OK
+        first, second = link.event(SOON_S), link.event(SOON_S)
+        assert link.event(SOON_S) is None
+        camera.ends[1].sendall(added)
+        assert link.event(SOON_S) == first == Container(Kind.EVENT, 0x4002, 7, b"\x12\0\0\0")
+        assert second == Container(Kind.EVENT, 0x400D, 7)
+        camera.ends[1].sendall(encode(PacketKind.EVENT, b"abc"))
+        with pytest.raises(MalformedError, match="61 62 63"):
+            link.event(SOON_S)
+        camera.hang_up()
+        with pytest.raises(UnpluggedError):
+            link.event(SOON_S)
 
 
 def test_a_request_with_and_without_data() -> None:
@@ -209,6 +229,20 @@ def test_a_broken_connection_is_mended_on_the_way_to_the_safe_state(
             assert devices.camera.shoot().data == film.delivered[-1]
 
 
+def test_a_camera_that_knows_the_standard_only_photographs(rig: Callable[[str], Path]) -> None:
+    film = Film(size=300_000)
+    settings = ExposureSettings(0.25, 400, 4.0)
+    with served(film, body=STANDARD) as server:
+        path = rig(server.address)
+        with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
+            for _ in range(2):
+                assert devices.camera.configure(settings) == settings
+                frame = devices.camera.shoot()
+                assert frame.data == film.delivered[-1]
+                assert frame.settings == settings
+    assert film.taken == [Taken(0.25, 400, 4.0)] * 2
+
+
 def test_a_camera_that_is_switched_off_is_one_line(rig: Callable[[str], Path]) -> None:
     settings = ExposureSettings(1 / 4, 400, 4.0)
 
@@ -219,7 +253,7 @@ def test_a_camera_that_is_switched_off_is_one_line(rig: Callable[[str], Path]) -
                 power.close()
                 devices.camera.configure(settings)
 
-    with pytest.raises(DeviceError) as caught:
+    with pytest.raises(DeviceLostError) as caught:
         session()
     assert "\n" not in str(caught.value)
 

@@ -1,5 +1,6 @@
 """A toy EOS on the wire: enough of a camera to fail in every way that the driver must survive."""
 
+import math
 import struct
 from collections import defaultdict
 from enum import Enum, auto
@@ -14,6 +15,7 @@ OPERATIONS = (
 )  # fmt: skip
 HALF, FULL, OFF_HALF, OFF_FULL = (0x9128, 1), (0x9128, 2), (0x9129, 1), (0x9129, 2)
 RAW, JPEG = struct.pack("<5I", 1, 16, 6, 0, 4), struct.pack("<5I", 1, 16, 1, 0, 3)
+BULB = 0x0C
 DEVELOPING_S = 0.3
 
 Key = tuple[int, ...]
@@ -39,6 +41,7 @@ class ToyEos:
 
     def __init__(self, operations: tuple[int, ...] = OPERATIONS) -> None:
         self.operations = operations
+        self.model = "Canon EOS Toy"
         self.faults: defaultdict[Key, list[Fault]] = defaultdict(list)
         self.log: list[Key] = []
         self.values = {
@@ -51,6 +54,7 @@ class ToyEos:
             0xD103: (0x00, 0x48, 0x50, 0x78),
         }
         self.stubborn: set[int] = set()
+        self.reports_changes_only = False
         self.session_open = False
         self.next_id = 0
         self.buttons: set[int] = set()
@@ -62,6 +66,7 @@ class ToyEos:
         self.never_delivers = False
         self.refuses_idle_let_go = False
         self.release_result = 0
+        self.bulb_start_params: tuple[int, ...] = ()
         self.stored: dict[int, bytes] = {}
         self.events: list[bytes] = []
         self.status = OK
@@ -70,9 +75,14 @@ class ToyEos:
         self._unsent_data = b""
 
     @property
+    def at_bulb(self) -> bool:
+        """Whether the shutter is open until it is told to close."""
+        return self.exposing_until_s == math.inf
+
+    @property
     def is_idle(self) -> bool:
-        """Nobody holds the button, nothing is announced that could be fetched now."""
-        return not self.buttons and not self.stored
+        """Nobody holds button or shutter, nothing is announced that could be fetched now."""
+        return not self.buttons and not self.stored and not self.at_bulb
 
     def frame(self, number: int) -> bytes:
         """The bytes of the nth frame since power-on."""
@@ -110,6 +120,8 @@ class ToyEos:
             self._abort(wire)
             self.session_open = False
             self.buttons.clear()
+            if self.at_bulb:
+                self._end_bulb(wire.clock.now())
         else:
             assert request == 0x67
             if self.status == CANCELLED and not wire.halted:
@@ -192,8 +204,12 @@ class ToyEos:
             size, prop = struct.unpack_from("<II", incoming)
             assert size == len(incoming)
             if prop not in self.stubborn:
+                is_news = self.values[prop] != incoming[8:]
                 self.values[prop] = incoming[8:]
-                self.events.append(_value(prop, incoming[8:]))
+                if is_news or not self.reports_changes_only:
+                    self.events.append(_value(prop, incoming[8:]))
+        elif operation == 0x9127:
+            self.events.append(_value(params[0], self.values[params[0]]))
         elif operation in (0x9107, 0x101B):
             data = self.stored[params[0]][params[1] : params[1] + params[2]]
         elif operation == 0x9104:
@@ -212,6 +228,19 @@ class ToyEos:
             if self.refuses_idle_let_go and params[0] not in self.buttons:
                 return GENERAL_ERROR, (), None
             self.buttons.discard(params[0])
+            if params[0] == 2 and self.at_bulb:
+                self._end_bulb(now_s)
+        elif operation == 0x9125:
+            if self.values[0xD102] != u32(BULB):
+                return GENERAL_ERROR, (), None
+            if now_s < self.exposing_until_s:
+                return BUSY, (), None
+            self._expose(now_s)
+            result = self.bulb_start_params
+        elif operation == 0x9126:
+            if not self.at_bulb:
+                return GENERAL_ERROR, (), None
+            self._end_bulb(now_s)
         elif operation == 0x910F:
             result = (self.release_result,)
             if not self.release_result:
@@ -221,9 +250,13 @@ class ToyEos:
     def _expose(self, now_s: float) -> None:
         (code,) = struct.unpack("<I", self.values[0xD102])
         self.exposures += 1
-        self.exposing_until_s = now_s + 2.0 ** -((code - 0x38) / 8)
-        if not self.never_delivers:
+        self.exposing_until_s = math.inf if code == BULB else now_s + 2.0 ** -((code - 0x38) / 8)
+        if not self.never_delivers and not self.at_bulb:
             self._developing.append(self.exposing_until_s + DEVELOPING_S)
+
+    def _end_bulb(self, now_s: float) -> None:
+        self.exposing_until_s = now_s
+        self._developing.append(now_s + DEVELOPING_S)
 
     def offer(self, number: int) -> None:
         """Announce the nth frame."""
@@ -243,7 +276,7 @@ class ToyEos:
 
     def _device_info(self) -> bytes:
         codes = struct.pack(f"<I{len(self.operations)}H", len(self.operations), *self.operations)
-        texts = b"".join(map(_text, ("Canon Inc.", "Canon EOS Toy", "3-1.0.7", "42")))
+        texts = b"".join(map(_text, ("Canon Inc.", self.model, "3-1.0.7", "42")))
         head = struct.pack("<HIH", 100, 0xB, 200) + b"\0" + bytes(2)
         return head + codes + bytes(16) + texts
 

@@ -12,7 +12,7 @@ import usb.core
 from labrig.acquire.connections import SerialPort
 from labrig.clock import VirtualClock
 
-PACKET = 512
+PACKET, INTERRUPT_PACKET = 512, 8
 BULK_IN, BULK_OUT, INTERRUPT_IN = 0x81, 0x02, 0x83
 TRANSACTION_S = 0.0005
 #: Far more than any test needs: a driver that gets here hangs.
@@ -29,7 +29,68 @@ class Peer(Protocol):
         """A class request; for one that reads, the answer."""
 
 
-class Wire(usb.backend.IBackend):  # type: ignore[misc]
+class StillImageDevice(usb.backend.IBackend):  # type: ignore[misc]
+    """What pyusb asks of a bus with one still image device on it when it opens that."""
+
+    def enumerate_devices(self) -> list[int]:
+        return [1]
+
+    def get_device_descriptor(self, device: Any) -> SimpleNamespace:
+        return SimpleNamespace(
+            bLength=18, bDescriptorType=1, bcdUSB=0x0200, bDeviceClass=0, bDeviceSubClass=0,
+            bDeviceProtocol=0, bMaxPacketSize0=64, idVendor=0x04A9, idProduct=0x3199,
+            bcdDevice=2, iManufacturer=0, iProduct=0, iSerialNumber=0, bNumConfigurations=1,
+            address=5, bus=1, port_number=1, port_numbers=(1,), speed=3,
+        )  # fmt: skip
+
+    def get_configuration_descriptor(self, device: Any, config: int) -> SimpleNamespace:
+        if config != 0:
+            raise IndexError
+        return SimpleNamespace(
+            bLength=9, bDescriptorType=2, wTotalLength=39, bNumInterfaces=1,
+            bConfigurationValue=1, iConfiguration=0, bmAttributes=0xC0, bMaxPower=1,
+            extra_descriptors=[],
+        )  # fmt: skip
+
+    def get_interface_descriptor(
+        self, device: Any, intf: int, alt: int, config: int
+    ) -> SimpleNamespace:
+        if (intf, alt, config) != (0, 0, 0):
+            raise IndexError
+        return SimpleNamespace(
+            bLength=9, bDescriptorType=4, bInterfaceNumber=0, bAlternateSetting=0,
+            bNumEndpoints=3, bInterfaceClass=6, bInterfaceSubClass=1, bInterfaceProtocol=1,
+            iInterface=0, extra_descriptors=[],
+        )  # fmt: skip
+
+    def get_endpoint_descriptor(
+        self, device: Any, ep: int, intf: int, alt: int, config: int
+    ) -> SimpleNamespace:
+        interrupt = (INTERRUPT_IN, 3, INTERRUPT_PACKET)
+        kinds = (interrupt, (BULK_IN, 2, PACKET), (BULK_OUT, 2, PACKET))
+        address, kind, size = kinds[ep]
+        return SimpleNamespace(
+            bLength=7, bDescriptorType=5, bEndpointAddress=address, bmAttributes=kind,
+            wMaxPacketSize=size, bInterval=0, bRefresh=0, bSynchAddress=0, extra_descriptors=[],
+        )  # fmt: skip
+
+    def open_device(self, device: Any) -> int:
+        return 1
+
+    def close_device(self, handle: Any) -> None:
+        pass
+
+    def get_configuration(self, handle: Any) -> int:
+        return 1
+
+    def claim_interface(self, handle: Any, intf: int) -> None:
+        pass
+
+    def release_interface(self, handle: Any, intf: int) -> None:
+        pass
+
+
+class Wire(StillImageDevice):
     """pyusb backend; lets the virtual clock pass as a bus would."""
 
     def __init__(self, peer: Peer, clock: VirtualClock) -> None:
@@ -37,6 +98,8 @@ class Wire(usb.backend.IBackend):  # type: ignore[misc]
         self.peer = peer
         self.clock = clock
         self.to_host: deque[bytes] = deque()
+        self.interrupts: deque[bytes] = deque()
+        self.interrupt_is_halted = False
         self.sends_empty_packets = True
         self.halted = False
         self.unplugged = False
@@ -76,6 +139,18 @@ class Wire(usb.backend.IBackend):  # type: ignore[misc]
         buff[: len(received)] = array("B", received)
         return len(received)
 
+    def intr_read(self, handle: Any, ep: int, intf: int, buff: Any, timeout: int) -> int:
+        self._check(ep, INTERRUPT_IN)
+        assert len(buff) == INTERRUPT_PACKET, "a longer read would wait for one more packet"
+        if self.interrupt_is_halted:
+            raise usb.core.USBError("Pipe error", -9, errno.EPIPE)
+        if not self.interrupts:
+            self.clock.spend(timeout / 1e3)
+            raise usb.core.USBTimeoutError("Operation timed out", -7, errno.ETIMEDOUT)
+        packet = self.interrupts.popleft()
+        buff[: len(packet)] = array("B", packet)
+        return len(packet)
+
     def ctrl_transfer(
         self, handle: Any, kind: int, request: int, value: int, index: int, data: Any, timeout: int
     ) -> int:
@@ -92,6 +167,9 @@ class Wire(usb.backend.IBackend):  # type: ignore[misc]
     def clear_halt(self, handle: Any, ep: int) -> None:
         if self.unplugged:
             raise usb.core.USBError("No such device", -4, errno.ENODEV)
+        if ep == INTERRUPT_IN:
+            self.interrupt_is_halted = False
+            return
         assert ep in (BULK_IN, BULK_OUT)
         self.halted = False
 
@@ -105,58 +183,6 @@ class Wire(usb.backend.IBackend):  # type: ignore[misc]
             raise usb.core.USBError("No such device", -4, errno.ENODEV)
         if self.halted and ep != 0:
             raise usb.core.USBError("Pipe error", -9, errno.EPIPE)
-
-    # what pyusb asks when it opens a device
-
-    def enumerate_devices(self) -> list[int]:
-        return [1]
-
-    def get_device_descriptor(self, device: Any) -> SimpleNamespace:
-        return SimpleNamespace(
-            bLength=18, bDescriptorType=1, bcdUSB=0x0200, bDeviceClass=0, bDeviceSubClass=0,
-            bDeviceProtocol=0, bMaxPacketSize0=64, idVendor=0x04A9, idProduct=0x3199,
-            bcdDevice=2, iManufacturer=0, iProduct=0, iSerialNumber=0, bNumConfigurations=1,
-            address=5, bus=1, port_number=1, port_numbers=(1,), speed=3,
-        )  # fmt: skip
-
-    def get_configuration_descriptor(self, device: Any, config: int) -> SimpleNamespace:
-        if config != 0:
-            raise IndexError
-        return SimpleNamespace(
-            bLength=9, bDescriptorType=2, wTotalLength=39, bNumInterfaces=1,
-            bConfigurationValue=1, iConfiguration=0, bmAttributes=0xC0, bMaxPower=1,
-            extra_descriptors=[],
-        )  # fmt: skip
-
-    def get_interface_descriptor(
-        self, device: Any, intf: int, alt: int, config: int
-    ) -> SimpleNamespace:
-        if (intf, alt, config) != (0, 0, 0):
-            raise IndexError
-        return SimpleNamespace(
-            bLength=9, bDescriptorType=4, bInterfaceNumber=0, bAlternateSetting=0,
-            bNumEndpoints=3, bInterfaceClass=6, bInterfaceSubClass=1, bInterfaceProtocol=1,
-            iInterface=0, extra_descriptors=[],
-        )  # fmt: skip
-
-    def get_endpoint_descriptor(
-        self, device: Any, ep: int, intf: int, alt: int, config: int
-    ) -> SimpleNamespace:
-        kinds = ((INTERRUPT_IN, 3, 8), (BULK_IN, 2, PACKET), (BULK_OUT, 2, PACKET))
-        address, kind, size = kinds[ep]
-        return SimpleNamespace(
-            bLength=7, bDescriptorType=5, bEndpointAddress=address, bmAttributes=kind,
-            wMaxPacketSize=size, bInterval=0, bRefresh=0, bSynchAddress=0, extra_descriptors=[],
-        )  # fmt: skip
-
-    def open_device(self, device: Any) -> int:
-        return 1
-
-    def close_device(self, handle: Any) -> None:
-        pass
-
-    def get_configuration(self, handle: Any) -> int:
-        return 1
 
     def claim_interface(self, handle: Any, intf: int) -> None:
         if self.claim_errno is not None:
@@ -181,7 +207,7 @@ class OneDevice:
     def serial(self, address: str, baudrate: int) -> SerialPort:
         raise AssertionError("a camera has no serial port")
 
-    def usb(self, address: str) -> Any:
+    def usb(self, address: str, serial_of: object = None) -> Any:
         return self._device
 
     def tcp(self, address: str, default_port: int) -> NoReturn:

@@ -7,7 +7,7 @@ from typing import Any
 import usb.core
 
 from labrig.clock import VirtualClock
-from sim.camera import BodySettings, CameraFaults, SimulatedCamera
+from sim.camera import BodySettings, CameraFaults, SimulatedCamera, StandardHabits
 
 IN, OUT, KNOCK = 0x81, 0x02, 0x83
 PACKET = 512
@@ -56,6 +56,7 @@ class Bench:
         seed: int = 1,
         faults: CameraFaults | None = None,
         body: BodySettings | None = None,
+        habits: StandardHabits | None = None,
     ) -> None:
         self.clock = VirtualClock(epoch_s=1_767_225_600.0)
         self.film = Film(self.clock, raw)
@@ -66,10 +67,11 @@ class Bench:
             seed=seed,
             faults=faults or CameraFaults(),
             body=body or BodySettings(),
+            habits=habits or StandardHabits(),
         )
 
     def host(self) -> "Host":
-        return Host(self.clock, usb.core.find(backend=self.camera.backend, idVendor=0x04A9))
+        return Host(self.clock, usb.core.find(backend=self.camera.backend))
 
     def ready(self, destination: int = TO_HOST) -> "Host":
         """A host in a session that has read the flood and is told of every file."""
@@ -156,6 +158,13 @@ class Host:
             records.append((code, rest[8:size]))
             rest = rest[size:]
         raise AssertionError("no end record")
+
+    def knock(self, timeout_s: float = 10.0) -> tuple[int, ...]:
+        """The next event on the interrupt endpoint: code and parameters."""
+        received = bytes(self.device.read(KNOCK, 64, round(timeout_s * 1000)))
+        length, kind, code, _ = struct.unpack_from("<IHHI", received)
+        assert (length, kind) == (len(received), 4)
+        return (code, *struct.unpack(f"<{(length - 12) // 4}I", received[12:]))
 
     def values(self) -> dict[int, int]:
         """Properties that were reported to have changed, if they are numbers."""

@@ -242,7 +242,7 @@ def test_the_camera_answers_without_usb_as_well() -> None:
     data = struct.pack("<III", 12, TV, 0x60)
     assert responder.transaction(0x9110, 3, (), data).code == OK
     assert responder.event_due_s() == bench.clock.now()
-    assert responder.take_event() == 0xC101
+    assert responder.take_event() == (0xC101, ())
     code, params, records = responder.transaction(0x9116, 4, ())
     assert (code, params) == (OK, ())
     assert records is not None

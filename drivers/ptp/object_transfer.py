@@ -1,0 +1,73 @@
+"""Fetching a file from a camera, in pieces if it can, so that Ctrl-C is heard between them."""
+
+from enum import IntEnum
+
+from labrig.clock import Clock
+from labrig.errors import DeviceError
+
+from .session import Patience, Session
+
+PIECE_BYTES = 1024 * 1024
+#: Some times the largest RAW file there is: what announces more is damaged.
+MOST_FILE_BYTES = 512 * 1024 * 1024
+#: A camera that still develops or writes is busy for seconds.
+PATIENT = Patience(answer_s=10.0, busy_s=10.0)
+
+
+class ObjectTransfer:
+    """Fetches files.
+
+    Parameters
+    ----------
+    session
+        Over which they come.
+    clock
+        On which is looked for Ctrl-C.
+    whole
+        Operation that sends all of a file.
+    part
+        Operation that sends a part of it: handle, offset, size; None if there is none.
+    """
+
+    def __init__(
+        self, session: Session, clock: Clock, whole: IntEnum, part: IntEnum | None
+    ) -> None:
+        self._session = session
+        self._clock = clock
+        self._whole = whole
+        self._part = part
+
+    def fetch(self, handle: int, name: str, size_bytes: int) -> bytes:
+        """The file's bytes.
+
+        Raises
+        ------
+        DeviceError
+            The camera announces more than any file has, sends more or fewer bytes than it
+            announced, or fails to send.
+        """
+        if size_bytes > MOST_FILE_BYTES:
+            raise DeviceError(
+                f"expected a file of at most {MOST_FILE_BYTES} bytes, the camera announces "
+                f"{size_bytes} for {name}: take the frame again"
+            )
+        received = bytearray()
+        while len(received) < size_bytes:
+            missing = size_bytes - len(received)
+            size = missing if self._part is None else min(PIECE_BYTES, missing)
+            piece = self._piece(handle, len(received), size)
+            if len(piece) != size:
+                raise DeviceError(
+                    f"expected {size} bytes of {name} from byte {len(received)} of {size_bytes} "
+                    f"announced, the camera sent {len(piece)}: take the frame again"
+                )
+            received += piece
+            self._clock.sleep(0.0)
+        return bytes(received)
+
+    def _piece(self, handle: int, offset: int, size: int) -> bytes:
+        if self._part is None:
+            asked: tuple[IntEnum, *tuple[int, ...]] = (self._whole, handle)
+        else:
+            asked = (self._part, handle, offset, size)
+        return self._session.transact(*asked, patience=PATIENT, most_bytes=size).data

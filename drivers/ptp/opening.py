@@ -1,0 +1,71 @@
+"""From a rig file's address to the camera that is meant."""
+
+from typing import Any
+from urllib.parse import urlsplit
+
+from labrig.acquire.connections import Connections
+from labrig.clock import Clock
+from labrig.errors import DeviceError
+
+from .device_info import DeviceInfo, parse_device_info
+from .ip_link import PORT, IpLink
+from .link import Link
+from .ptp_codes import Standard
+from .session import Session
+from .usb_link import UsbLink
+
+
+def open_link(address: str, connections: Connections) -> Link:
+    """The link to the camera at `ptpip://host[:port]`, or at an address of a USB device.
+
+    Raises
+    ------
+    DeviceError
+        No camera there, or another program holds it.
+    """
+    clock = connections.clock
+    if urlsplit(address).scheme == "ptpip":
+        return IpLink(lambda: connections.tcp(address, PORT), address, clock)
+    device = connections.usb(address, lambda twin: _serial_number(twin, address, clock))
+    return UsbLink(device, address, clock)
+
+
+def open_session(session: Session) -> bool:
+    """Open a session, through a reset if need be; True if a dead program left one behind.
+
+    Raises
+    ------
+    DeviceError
+        The camera does not open one.
+    """
+    try:
+        return session.open()
+    except DeviceError:
+        session.start_over()
+        return True
+
+
+def identify(session: Session) -> DeviceInfo:
+    """Ask a camera who it is.
+
+    Raises
+    ------
+    DeviceError
+        It does not answer, or not in the protocol's terms.
+    """
+    return parse_device_info(session.transact(Standard.GetDeviceInfo).data)
+
+
+def _serial_number(device: Any, address: str, clock: Clock) -> str:
+    """What a camera says in PTP that tells its serial number nowhere else, such as a Canon."""
+    link = UsbLink(device, address, clock)
+    try:
+        session = Session(link, clock)
+        was_left_open = open_session(session)
+        serial = identify(session).serial
+        # whoever takes the camera over must find that somebody left it as it is
+        if not was_left_open:
+            session.close()
+        return serial
+    finally:
+        link.close()
