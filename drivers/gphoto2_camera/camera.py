@@ -1,0 +1,269 @@
+"""A camera behind libgphoto2 as labrig's camera."""
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+
+from labrig.acquire.connections import Connections
+from labrig.acquire.findings import Finding
+from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.errors import DeviceError, DeviceLostError
+
+from .address import port_path
+from .checks import findings
+from .exposure import Exposure
+from .failures import BusyError
+from .frames import Frames
+from .library import POLL_PERIOD_S, Library
+from .preparation import prepare
+from .process import require_gphoto2
+from .release import Release, release_of
+from .settings import Gphoto2CameraSettings
+
+#: Canon and Nikon alone have it; with others the live view ends with the next frame.
+VIEWFINDER = "viewfinder"
+#: Busy at the full press is common; a frame later than so much belongs to no decay.
+LATE_PRESS_S = 3.0
+
+
+class Gphoto2Camera:
+    """Any camera that libgphoto2 can set and release.
+
+    Parameters
+    ----------
+    address
+        `usb://vid:pid[/serial]` or `ptpip://host[:port]`.
+    settings
+        The rig file's keys for this camera.
+    connections
+        Finds the USB device, dials the network; has the clock.
+
+    Raises
+    ------
+    UsageError
+        The extra is not installed, or the rig is a simulated one.
+    DeviceError
+        No camera there, in use by another program, or not one that can be set to RAW.
+    """
+
+    Settings = Gphoto2CameraSettings
+
+    _release: Release
+    _exposure: Exposure
+
+    def __init__(
+        self, address: str, settings: Gphoto2CameraSettings, connections: Connections
+    ) -> None:
+        require_gphoto2()
+        self._clock = connections.clock
+        self._settings = settings
+        self._library = Library(self._clock, port_path(address, connections), address)
+        self._frames = Frames(self._library, self._clock, settings.transfer_timeout)
+        self._armed: ExposureSettings | None = None
+        self._is_viewing = False
+        with ExitStack() as leaving:
+            leaving.callback(self._library.close)
+            self._take_control()
+            self._version = self._library.version()
+            self._leaving = leaving.pop_all()
+
+    @classmethod
+    def declared_offers(cls, settings: Gphoto2CameraSettings) -> CameraOffers:
+        """What planning without the camera assumes."""
+        return settings.declared_offers()
+
+    def identity(self) -> str:
+        """Maker, model, serial number and firmware as the camera gives them, and what drives it."""
+        told = self._library.at_connect
+        maker, model = self._maker(), told("cameramodel") or "camera"
+        is_named_twice = maker != "" and maker.split()[0] in model
+        parts = [
+            model if is_named_twice else f"{maker} {model}".strip(),
+            f"serial {told('serialnumber') or 'unknown'}",
+            f"firmware {told('deviceversion') or 'unknown'}",
+            f"released by libgphoto2 {self._version}, {self._release.words}",
+        ]
+        return ", ".join(parts)
+
+    def offers(self) -> CameraOffers:
+        """What it can be set to, as it is now.
+
+        Raises
+        ------
+        DeviceError
+            Nothing that the rig file allows, for example because its dial is not at M.
+        """
+        return self._exposure.offers()
+
+    def findings(self) -> Sequence[Finding]:
+        """How it is set, as far as libgphoto2 tells.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer.
+        """
+        return findings(self._library, self._release, self._maker())
+
+    def keep_awake(self) -> None:
+        """Look for events, by which libgphoto2 keeps a camera on.
+
+        Raises
+        ------
+        DeviceError
+            The camera is gone.
+        """
+        self._frames.discard_reported()
+
+    def configure(self, settings: ExposureSettings) -> ExposureSettings:
+        """Set and read back; returns the settings in force, with the true shutter time.
+
+        Parameters
+        ----------
+        settings
+            The shutter time as offered, or as on the dial (1/60 s for the true 1/64 s).
+
+        Raises
+        ------
+        DeviceError
+            The camera does not offer them or did not take them.
+        """
+        self._disarm()
+        self._frames.discard_abandoned()
+        self._exposure.apply(settings)
+        return self._exposure.in_force()
+
+    def arm(self) -> None:
+        """Do all that can be done before the release.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not get ready.
+        """
+        if self._armed is not None:
+            return
+        self._viewfinder_off()
+        self._frames.discard_abandoned()
+        in_force = self._exposure.in_force()
+        self._release.get_ready()
+        self._armed = in_force
+
+    def shoot(self) -> Frame:
+        """Release now, wait for the exposure, transfer the frame.
+
+        The exposure begins in the middle of the time in which the camera may have obeyed, plus the
+        measured `shutter_lag`.
+
+        Raises
+        ------
+        DeviceError
+            The camera did not release, or delivered no or another frame.
+        """
+        self.arm()
+        settings, self._armed = self._armed, None
+        assert settings is not None
+        start_s = self._press(settings.exposure_s)
+        end_s = start_s + settings.exposure_s
+        self._frames.expect(end_s)
+        self._release.let_go_full(self._busy_s())
+        self._clock.sleep_until(end_s)
+        data, suffix = self._frames.fetch()
+        self._release.let_go(LATE_PRESS_S)
+        return Frame(data, suffix, start_s, end_s, settings)
+
+    def preview(self) -> bytes:
+        """One picture of the live view, a JPEG; the first one starts it, `make_safe` stops it.
+
+        Raises
+        ------
+        DeviceError
+            The camera has no live view, or sends no picture.
+        """
+        self._disarm()
+        self._is_viewing = True
+        return self._library.preview()
+
+    def make_safe(self) -> None:
+        """Bring libgphoto2 back into step, let go of the button, live view off, nothing pending.
+
+        An exposure that has begun runs to its end in the camera; its frame is passed over later.
+
+        Raises
+        ------
+        DeviceLostError
+            The camera is gone.
+        DeviceError
+            One of these could not be confirmed; the others were tried.
+        """
+        problems: list[DeviceError] = []
+        with self._clock.shielded():
+            for step in (
+                self._back_in_step,
+                self._disarm,
+                self._viewfinder_off,
+                self._frames.discard_reported,
+            ):
+                try:
+                    step()
+                except DeviceLostError as problem:
+                    problems.append(problem)
+                    break
+                except DeviceError as problem:
+                    problems.append(problem)
+        if problems:
+            is_lost = any(isinstance(problem, DeviceLostError) for problem in problems)
+            said = "; ".join(dict.fromkeys(map(str, problems)))
+            kind = DeviceLostError if is_lost else DeviceError
+            raise kind(f"camera not known to be safe: {said}")
+
+    def disconnect(self) -> None:
+        """Give the camera back to its own buttons and release it; never raises."""
+        with self._clock.shielded():
+            self._leaving.close()
+
+    def _take_control(self) -> None:
+        """Connect and set what a PC must have set, whatever was before."""
+        self._library.connect()
+        self._armed = None
+        self._is_viewing = False
+        self._release = release_of(
+            self._library, self._clock, self._maker(), self._settings.release
+        )
+        self._exposure = Exposure(self._library, self._settings)
+        prepare(self._library, self._settings.answer_timeout)
+
+    def _back_in_step(self) -> None:
+        if not self._library.settle():
+            self._take_control()
+
+    def _disarm(self) -> None:
+        self._armed = None
+        self._release.let_go(self._busy_s())
+
+    def _viewfinder_off(self) -> None:
+        if self._is_viewing and self._library.has(VIEWFINDER):
+            self._library.set(VIEWFINDER, "0")
+        self._is_viewing = False
+
+    def _press(self, exposure_s: float) -> float:
+        """Clock time at which the exposure began."""
+        deadline_s = self._clock.now() + LATE_PRESS_S
+        while True:
+            # should it be broken off, nobody knows whether it has begun: assume so
+            self._frames.expect(self._clock.now() + LATE_PRESS_S + exposure_s)
+            try:
+                obeyed = self._release.press(exposure_s)
+            except BusyError:
+                self._frames.expect_none()
+                if self._clock.now() >= deadline_s:
+                    raise
+                self._clock.sleep(POLL_PERIOD_S)
+            else:
+                return (obeyed.begin_s + obeyed.end_s) / 2 + self._settings.shutter_lag
+
+    def _busy_s(self) -> float:
+        """How long the camera may be busy: to the end of an exposure, and a little more."""
+        return self._frames.exposing_for_s() + LATE_PRESS_S
+
+    def _maker(self) -> str:
+        return self._library.at_connect("manufacturer") or ""

@@ -1,0 +1,38 @@
+"""How libgphoto2 fails, and what to do about it; all of it is `DeviceError` to the outside."""
+
+from labrig.errors import DeviceError, DeviceLostError
+
+#: libgphoto2's own numbers, gphoto2-result.h and gphoto2-port-result.h.
+GENERAL, NOT_SUPPORTED, IO, TIMEOUT = -1, -6, -7, -10
+IO_READ, IO_WRITE, USB_FIND, USB_CLAIM, IO_LOCK = -34, -35, -52, -53, -60
+MODEL_NOT_FOUND, CAMERA_BUSY = -105, -110
+
+_GONE = (IO, IO_READ, IO_WRITE, USB_FIND)
+
+_LOOK = "look at its cable or network, its battery, and whether it has switched itself off"
+_ADVICE = {
+    NOT_SUPPORTED: "libgphoto2 cannot do this with this camera",
+    TIMEOUT: "switch it off and on",
+    USB_CLAIM: "another program holds it; 'labrig rig list' says which and how to make it let go",
+    IO_LOCK: "another program holds it; 'labrig rig list' says which and how to make it let go",
+    MODEL_NOT_FOUND: "libgphoto2 knows no camera there; set its USB mode to PTP or PC remote",
+    CAMERA_BUSY: "wait until its card lamp is off, leave its menus, and try again",
+}
+_ELSE = "set its dial to M and its lens to MF, leave its menus, and try again"
+
+
+class BusyError(DeviceError):
+    """The camera is not ready yet."""
+
+
+class UnspecifiedError(DeviceError):
+    """Anything: also what is said first when the line breaks."""
+
+
+def failure(context: str, code: int, text: str) -> DeviceError:
+    """The error for what libgphoto2 answered; `context` says who it was and what for."""
+    said = f"{context}: libgphoto2 says '{text}' ({code})"
+    if code in _GONE:
+        return DeviceLostError(f"{said}: {_LOOK}")
+    kind = {CAMERA_BUSY: BusyError, GENERAL: UnspecifiedError}.get(code, DeviceError)
+    return kind(f"{said}: {_ADVICE.get(code, _ELSE)}")

@@ -1,0 +1,193 @@
+"""One camera as libgphoto2 shows it: named settings with labels for values, events, files."""
+
+from typing import Any, NamedTuple
+
+from labrig.clock import Clock
+from labrig.errors import DeviceError
+
+from .failures import UnspecifiedError
+from .process import HelperProcess
+
+#: Some cameras on the network ask their owner first.
+CONNECT_S = 30.0
+#: libgphoto2's own time-out for a transaction is 20 s.
+USUAL_S = 25.0
+#: A slow lens keeps a 5D Mark II from answering for 8 s (libgphoto2).
+RELEASE_S = 12.0
+#: Whoever wants the safe state does not wait longer for what was under way.
+SETTLE_S = 3.0
+#: Between two tries of what the camera is not ready for.
+POLL_PERIOD_S = 0.01
+#: So short that nothing but what is there already is found.
+AT_ONCE_S = 0.02
+
+
+class Span(NamedTuple):
+    """Between these two times of the clock something happened, in seconds."""
+
+    begin_s: float
+    end_s: float
+
+
+class Setting(NamedTuple):
+    """The label of a setting's value and those that it may have; none if it is not a choice."""
+
+    value: str
+    choices: tuple[str, ...]
+
+
+class Library:
+    """libgphoto2 connected with one camera.
+
+    Parameters
+    ----------
+    clock
+        On which it is waited for.
+    path
+        libgphoto2's name of the port: `usb:001,004`, `ptpip:192.168.1.20`.
+    name
+        What messages call the camera.
+    """
+
+    def __init__(self, clock: Clock, path: str, name: str) -> None:
+        self._clock = clock
+        self._path = path
+        self._name = name
+        self._process = HelperProcess(clock, name)
+        self._values: dict[str, str] = {}
+
+    def connect(self) -> None:
+        """Connect, or connect anew.
+
+        Raises
+        ------
+        DeviceError
+            No camera there that libgphoto2 knows, or another program holds it.
+        """
+        self._process.start()
+        self._values = self._process.ask("connecting", CONNECT_S, "connect", self._path)
+
+    def close(self) -> None:
+        """Let go of the camera; never raises."""
+        self._process.end()
+
+    def settle(self) -> bool:
+        """Whether it is ready for the next request, whatever was interrupted."""
+        return self._process.settle(SETTLE_S)
+
+    def version(self) -> str:
+        """That of libgphoto2."""
+        return str(self._ask("asking for its version", USUAL_S, "version"))
+
+    def at_connect(self, name: str) -> str | None:
+        """Value of a setting when it was connected; None if it has no such setting."""
+        return self._values.get(name)
+
+    def has(self, name: str) -> bool:
+        """Whether the camera has a setting of that name."""
+        return name in self._values
+
+    def first_of(self, names: tuple[str, ...]) -> str | None:
+        """The first of `names` that this camera has: they differ from make to make."""
+        return next((name for name in names if name in self._values), None)
+
+    def get(self, name: str) -> Setting:
+        """A setting as it is now.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer.
+        """
+        return Setting(*self._ask(f"reading its {name}", USUAL_S, "get", name))
+
+    def set(self, name: str, value: str, within_s: float = USUAL_S) -> Span:
+        """Set, without reading back; when that was sent and answered.
+
+        Raises
+        ------
+        BusyError
+            Not now.
+        DeviceError
+            The camera does not take it.
+        """
+        doing = f"setting its {name} to {value}"
+        return Span(*self._ask(doing, within_s, "set", name, value))
+
+    def set_surely(self, name: str, value: str, within_s: float) -> None:
+        """Set what is not set already, and read back until the camera says so.
+
+        Raises
+        ------
+        DeviceError
+            It did not take it within `within_s` seconds.
+        """
+        if self.get(name).value == value:
+            return
+        self.set(name, value)
+        deadline_s = self._clock.now() + within_s
+        while (said := self.get(name).value) != value:
+            if self._clock.now() >= deadline_s:
+                raise DeviceError(
+                    f"camera {self._name}: asked for {name} {value}, it stays at {said}: turn its "
+                    "dial to M, leave its menus and try again"
+                )
+            self._clock.sleep(POLL_PERIOD_S)
+
+    def trigger(self, exposure_s: float) -> Span:
+        """Photograph; when libgphoto2 began and when it was done.
+
+        Raises
+        ------
+        BusyError
+            Not now.
+        DeviceError
+            The camera does not release.
+        """
+        within_s = RELEASE_S + exposure_s  # with some it waits for the end of the exposure
+        return Span(*self._ask("releasing", within_s, "trigger"))
+
+    def next_file(self, within_s: float, transfer_s: float = USUAL_S) -> tuple[str, str] | None:
+        """Folder and name of the next file; None if none is reported within `within_s` seconds.
+
+        Parameters
+        ----------
+        transfer_s
+            Some are transferred before they are reported: seconds that this may take.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer.
+        """
+        found: tuple[str, str] | None = self._ask(
+            "waiting for its frame", within_s + transfer_s, "next_file", within_s
+        )
+        return found
+
+    def read(self, folder: str, name: str, within_s: float) -> bytes:
+        """The bytes of a file.
+
+        Raises
+        ------
+        DeviceError
+            They did not all come.
+        """
+        return bytes(self._ask(f"transferring {name}", within_s, "read", folder, name))
+
+    def preview(self) -> bytes:
+        """One picture of the live view, a JPEG.
+
+        Raises
+        ------
+        DeviceError
+            The camera sends none.
+        """
+        return bytes(self._ask("live view", USUAL_S, "preview"))
+
+    def _ask(self, doing: str, within_s: float, request: str, *arguments: Any) -> Any:
+        try:
+            return self._process.ask(doing, within_s, request, *arguments)
+        except UnspecifiedError:
+            self._process.ask(doing, USUAL_S, "next_file", 0.0)  # is it still there?
+            raise

@@ -1,0 +1,77 @@
+"""What a rig file can say about a camera behind libgphoto2."""
+
+from collections.abc import Iterable
+from typing import Annotated, Literal
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.acquire.values import CameraOffers
+from labrig.quantity import DurationS, SizeBytes
+
+#: In thirds of a stop, from 32 s down to 1/8192 s.
+_LONGEST_THIRDS, _SHORTEST_THIRDS = 15, -39
+
+Positive = Annotated[DurationS, Field(gt=0)]
+
+
+class Gphoto2CameraSettings(BaseModel):
+    """Keys of the rig file beside `driver` and `address`.
+
+    Attributes
+    ----------
+    shutter_lag
+        From the camera's obeying the release to the begin of the exposure; measure it.
+    release
+        `button`: half and full press apart, so that nothing but the shutter follows the second.
+        `trigger`: libgphoto2 does both, which takes 0.15 to 0.5 s. By default the better one that
+        the camera has.
+    isos
+        The sensor's native sensitivities; the camera's others (gain after digitising) stay unused.
+    f_numbers
+        Apertures of the lens, for planning; read from the camera when there is one.
+    longest_exposure
+        Longer ones are not used; a true 32 s is the dial's 30 s.
+    frame_time
+        From the end of an exposure until its frame is on the PC and the next can begin.
+    frame_size
+        Of one RAW file, for planning disk space.
+    transfer_timeout
+        From the end of an exposure until its frame must be on the PC.
+    answer_timeout
+        Until the camera must have taken a setting.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    shutter_lag: Annotated[DurationS, Field(ge=0)] = 0.0
+    release: Literal["button", "trigger"] | None = None
+    isos: Annotated[tuple[Annotated[int, Field(gt=0)], ...], Field(min_length=1)] = (
+        100, 200, 400, 800, 1600,
+    )  # fmt: skip
+    f_numbers: tuple[Annotated[float, Field(gt=0)], ...] = (2.8, 4.0, 5.6, 8.0, 11.0, 16.0)
+    longest_exposure: Positive = 32.0
+    frame_time: Annotated[DurationS, Field(ge=0)] = 2.0
+    frame_size: Annotated[SizeBytes, Field(gt=0)] = 30e6
+    transfer_timeout: Positive = 30.0
+    answer_timeout: Positive = 5.0
+
+    def allows_exposure(self, exposure_s: float) -> bool:
+        """Whether `exposure_s` seconds are within `longest_exposure`."""
+        return exposure_s <= self.longest_exposure * 1.0001
+
+    def declared_offers(self) -> CameraOffers:
+        """What planning without the camera assumes: shutter times in thirds of a stop."""
+        times_s = (2.0 ** (n / 3) for n in range(_SHORTEST_THIRDS, _LONGEST_THIRDS + 1))
+        return self.offers(filter(self.allows_exposure, times_s), self.isos, self.f_numbers)
+
+    def offers(
+        self, exposures_s: Iterable[float], isos: Iterable[int], f_numbers: Iterable[float]
+    ) -> CameraOffers:
+        """Offers with this file's costs of a frame."""
+        return CameraOffers(
+            exposures_s=tuple(sorted(set(exposures_s))),
+            isos=tuple(sorted(set(isos))),
+            f_numbers=tuple(sorted(set(f_numbers))),
+            overhead_s=self.frame_time,
+            frame_bytes=round(self.frame_size),
+        )
