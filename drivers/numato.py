@@ -9,7 +9,7 @@ import re
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire.connections import Connections
-from labrig.errors import DeviceError
+from labrig.errors import DeviceError, DeviceLostError
 
 from .serial_line import SerialLine
 
@@ -18,6 +18,9 @@ BAUDRATE = 19200
 ANSWER_TIMEOUT_S = 1.0
 #: Longer than any pause inside an answer.
 QUIET_S = 0.03
+#: Before it is given up that a lamp could be switched off.
+SAFE_TRIES = 5
+RETRY_S = 1.0
 _CHANNELS = "0123456789ABCDEFGHIJKLMNOPQRSTUV"
 
 
@@ -47,7 +50,8 @@ class NumatoRelay:
         self._relay = settings.relay
         port = connections.serial(address, BAUDRATE)
         self._name = f"the Numato board at {address}"
-        self._line = SerialLine(port, connections.clock, self._name)
+        self._clock = connections.clock
+        self._line = SerialLine(port, self._clock, self._name)
         self._resynchronise()
 
     def identity(self) -> str:
@@ -68,9 +72,17 @@ class NumatoRelay:
         return self._read() == "on"
 
     def make_safe(self) -> None:
-        """Bring the line back into step, then off."""
-        self._resynchronise()
-        self.off()
+        """Bring the line back into step, then off; again if the board does not answer at once."""
+        for tries_left in reversed(range(SAFE_TRIES)):
+            try:
+                self._resynchronise()
+                self.off()
+            except DeviceLostError:
+                if not tries_left:
+                    raise
+                self._clock.sleep(RETRY_S)
+            else:
+                return
 
     def disconnect(self) -> None:
         """The port belongs to the connections, which close it."""
@@ -103,8 +115,9 @@ class NumatoRelay:
         came = self._line.read_until(b">", ANSWER_TIMEOUT_S)
         lines = re.split(r"[\r\n]+", came.decode("ascii", errors="replace").removesuffix(">"))
         if lines[0] != command:
-            raise DeviceError(
-                f"{self._name} did not echo '{command}': got {came!r}; is it a Numato board?"
+            raise DeviceLostError(
+                f"{self._name} did not echo '{command}': got {came!r}; is it a Numato board, and "
+                "its cable well?"
             )
         return " ".join(line for line in lines[1:] if line)
 

@@ -29,6 +29,10 @@ class DeviceError(LabrigError):
     exit_code = 3
 
 
+class DeviceLostError(DeviceError):
+    """A device that is gone: unplugged, switched off, asleep; it may come back."""
+
+
 class DataError(LabrigError):
     """Data that cannot be used; what was recorded is kept."""
 

@@ -3,27 +3,29 @@
 After Nalbach et al., Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.4.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
-from pydantic import BaseModel, ConfigDict, Field, PlainSerializer, model_validator
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import (
     LAMP_OFF,
     LAMP_ON,
+    CameraOffers,
     ExposureSettings,
     ProtocolModel,
     Session,
     Shoot,
-    Timed,
     Unit,
     at,
 )
-from labrig.quantity import DurationS, Fraction, duration_text, word_or_duration
+from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
+from labrig.reduce import FrameMeasurement
 from labrig.region import CENTRE, Region
 
-from .metering import DecayMeter, Schedule, glow
+from .metering import DecayMeter, Look, Schedule, glow, look
+from .watching import Watcher
 
 #: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.
 DARKS_PER_EXPOSURE = 4
@@ -55,23 +57,18 @@ class Plateau(BaseModel):
     at_most: DurationS = Field(7200.0, gt=0)
 
 
-Written = PlainSerializer(lambda value: value if isinstance(value, str) else f"{value!r} s")
-
-
 class Decay(ProtocolModel):
     """The decay protocol; see `decay.yaml` for what each key means."""
 
     protocol: Literal["decay"] = "decay"
-    charge: Annotated[float | Literal["plateau"], word_or_duration("plateau"), Written] = 5400.0
+    charge: Annotated[float | Literal["plateau"], WordOrDuration("plateau")] = 5400.0
     plateau: Plateau = Plateau()
     every: DurationS = Field(5.0, gt=0)
     duration: DurationS = Field(180.0, gt=0, alias="for")
     first: DurationS = Field(0.5, ge=0)
     repeats: int = Field(1, ge=1)
     camera: CameraSettings = CameraSettings()
-    exposure: Annotated[
-        float | Literal["auto", "grow"], word_or_duration("auto", "grow"), Written
-    ] = "auto"
+    exposure: Annotated[float | Literal["auto", "grow"], WordOrDuration("auto", "grow")] = "auto"
     grow_at_most: float = Field(16.0, ge=1)
     dark: Literal["frames", "background"] = "frames"
     background: Region | None = None
@@ -119,10 +116,77 @@ class Decay(ProtocolModel):
         """Camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
-    def longest_exposure_s(self, session: Session) -> float:
+    def longest_exposure_s(self, offers: CameraOffers) -> float:
         """Longest offered shutter time that fits between two frames."""
-        offers = session.rig.camera.offers()
         return offers.exposure_at_most(self.every - offers.overhead_s - MARGIN_S)
+
+    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+        """Shutter time of each dark frame."""
+        if isinstance(self.exposure, float):
+            exposures_s = [offers.exposure_near(self.exposure)]
+        else:
+            longest_s = self.longest_exposure_s(offers)
+            exposures_s = [offers.exposure_at_most(longest_s * part) for part in (1 / 64, 1 / 4, 1)]
+        return [exposure_s for exposure_s in exposures_s for _ in range(DARKS_PER_EXPOSURE)]
+
+    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+        """Begin after lamp off and shutter time of each metering frame; for `grow`, to the end."""
+        longest_s = self.longest_exposure_s(offers)
+        pause_s = offers.overhead_s + MARGIN_S
+        ladder, at_s = [], self.first
+        for share in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
+            exposure_s = offers.exposure_at_most(longest_s * share)
+            ladder.append((at_s, exposure_s))
+            at_s += exposure_s + pause_s
+        if self.exposure == "grow":
+            while at_s < self.duration:
+                for share in (1 / 16, 1):
+                    exposure_s = offers.exposure_at_most(longest_s * share)
+                    ladder.append((at_s, exposure_s))
+                    at_s += exposure_s + pause_s
+                at_s *= 1.5
+        return ladder
+
+    def schedule(
+        self,
+        offers: CameraOffers,
+        looks: Sequence[Look],
+        warn: Callable[[str], None],
+    ) -> Schedule:
+        """Frames of a decay; their shutter times rest on the metering's, unless they are given."""
+        times_s = self.frame_times_s()
+        if isinstance(self.exposure, float):
+            return Schedule.constant(times_s, offers.exposure_near(self.exposure))
+        growth = self.grow_at_most if self.exposure == "grow" else 1.0
+        longest_s = self.longest_exposure_s(offers)
+        return DecayMeter(looks).schedule(times_s, offers, longest_s, growth, warn)
+
+    def expected_schedule(
+        self,
+        offers: CameraOffers,
+        expected: Callable[[float, float], Sequence[FrameMeasurement]],
+        warn: Callable[[str], None],
+    ) -> Schedule:
+        """What `schedule` will come to, before anything is measured.
+
+        Parameters
+        ----------
+        expected
+            What a frame of the glow will show in each patch, from its begin after lamp off and its
+            shutter time in seconds.
+        """
+        looks = [Look(*at, expected(*at)) for at in self.meter_ladder(offers)]
+        return self.schedule(offers, looks, warn)
+
+    def short_settings(self, session: Session) -> list[ExposureSettings]:
+        """For a closer look at what clips."""
+        ladder = self.meter_ladder(session.rig.camera.offers())[:3]
+        return [self.settings(exposure_s) for _, exposure_s in ladder]
+
+    def watcher(self, session: Session, unit: str) -> Watcher:
+        """Holds a unit's frames against what should have happened."""
+        background = self.background if self.dark == "background" else None
+        return Watcher(session, unit, list(self.patches.values()), background)
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
         """Lamp on for that long, for its own warm-up at the least."""
@@ -140,16 +204,11 @@ class DarkUnit:
     def run(self, session: Session) -> None:
         """Warm the camera up, then photograph darkness."""
         session.wait_until_warm("camera")
-        for exposure_s in self._exposures_s(session):
-            for _ in range(DARKS_PER_EXPOSURE):
-                session.perform(Shoot("dark", self.protocol.settings(exposure_s)))
-
-    def _exposures_s(self, session: Session) -> list[float]:
-        offers = session.rig.camera.offers()
-        if isinstance(self.protocol.exposure, float):
-            return [offers.exposure_near(self.protocol.exposure)]
-        longest_s = self.protocol.longest_exposure_s(session)
-        return [offers.exposure_at_most(longest_s * share) for share in (1 / 64, 1 / 4, 1)]
+        for exposure_s in self.protocol.dark_exposures_s(session.rig.camera.offers()):
+            session.perform(Shoot("dark", self.protocol.settings(exposure_s)))
+        self.protocol.watcher(session, self.name).insist_on_darkness(
+            self.protocol.short_settings(session)
+        )
 
 
 @dataclass(frozen=True)
@@ -166,25 +225,19 @@ class MeterUnit:
         self.protocol.charge_sample(
             session, min(charge if isinstance(charge, float) else METER_CHARGE_S, METER_CHARGE_S)
         )
-        session.run_sequence([at(0.0, LAMP_OFF), *self._ladder(session)])
-
-    def _ladder(self, session: Session) -> list[Timed]:
-        offers = session.rig.camera.offers()
-        longest_s = self.protocol.longest_exposure_s(session)
-        pause_s = offers.overhead_s + MARGIN_S
-        ladder, at_s = [], self.protocol.first
-        for share in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
-            exposure_s = offers.exposure_at_most(longest_s * share)
-            ladder.append(at(at_s, Shoot("meter", self.protocol.settings(exposure_s))))
-            at_s += exposure_s + pause_s
-        if self.protocol.exposure == "grow":
-            while at_s < self.protocol.duration:
-                for share in (1 / 16, 1):
-                    exposure_s = offers.exposure_at_most(longest_s * share)
-                    ladder.append(at(at_s, Shoot("meter", self.protocol.settings(exposure_s))))
-                    at_s += exposure_s + pause_s
-                at_s *= 1.5
-        return ladder
+        ladder = self.protocol.meter_ladder(session.rig.camera.offers())
+        session.run_sequence(
+            [
+                at(0.0, LAMP_OFF),
+                *(
+                    at(time_s, Shoot("meter", self.protocol.settings(exposure_s)))
+                    for time_s, exposure_s in ladder
+                ),
+            ]
+        )
+        self.protocol.watcher(session, self.name).insist_on_glow(
+            self.protocol.short_settings(session)
+        )
 
 
 @dataclass(frozen=True)
@@ -213,20 +266,23 @@ class DecayUnit:
                 ),
             ]
         )
+        watcher = self.protocol.watcher(session, self.name)
+        watcher.tell_of_delays(schedule.times_s)
+        watcher.insist_on_decay(self.protocol.short_settings(session))
 
     def _schedule(self, session: Session) -> Schedule:
         protocol, offers = self.protocol, session.rig.camera.offers()
-        times_s = protocol.frame_times_s()
-        if isinstance(protocol.exposure, float):
-            return Schedule.constant(times_s, offers.exposure_near(protocol.exposure))
-        longest_s = protocol.longest_exposure_s(session)
+        regions = list(protocol.patches.values())
 
         def decide() -> Schedule:
-            meter = DecayMeter(session.frames("meter"), list(protocol.patches.values()))
-            growth = protocol.grow_at_most if protocol.exposure == "grow" else 1.0
-            return meter.schedule(times_s, offers, longest_s, growth, session.warn)
+            looks = [look(frame, regions) for frame in session.frames("meter")]
+            return protocol.schedule(offers, looks, session.warn)
 
-        return session.choose("exposure", decide, Schedule.constant(times_s, longest_s))
+        if isinstance(protocol.exposure, float):
+            return protocol.schedule(offers, [], session.warn)
+        longest_s = protocol.longest_exposure_s(offers)
+        worst = Schedule.constant(protocol.frame_times_s(), longest_s)
+        return session.choose("exposure", decide, worst)
 
     def _charge(self, session: Session, exposure_s: float) -> None:
         if isinstance(self.protocol.charge, float):
@@ -274,7 +330,10 @@ class DaylightUnit:
         offers = session.rig.camera.offers()
         session.perform(LAMP_ON)
         session.wait(LAMP_SETTLES_S, "lamp settles")
-        for wanted_s in DAYLIGHT_EXPOSURES_S:
-            exposure_s = offers.exposure_at_most(wanted_s)
-            session.perform(Shoot("daylight", self.protocol.settings(exposure_s)))
-        session.perform(LAMP_OFF)
+        under_lamp = [
+            self.protocol.settings(offers.exposure_at_most(wanted_s))
+            for wanted_s in DAYLIGHT_EXPOSURES_S
+        ]
+        for settings in under_lamp:
+            session.perform(Shoot("daylight", settings))
+        self.protocol.watcher(session, self.name).switch_off(under_lamp)

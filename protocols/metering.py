@@ -12,7 +12,7 @@ import numpy.typing as npt
 from labrig.acquire import CameraOffers
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
-from labrig.reduce import ChannelStats, measure, read_raw
+from labrig.reduce import ChannelStats, FrameMeasurement, measure, read_raw
 from labrig.region import Region
 
 FloatArray = npt.NDArray[np.float64]
@@ -54,6 +54,21 @@ class Schedule:
 
 
 @dataclass(frozen=True)
+class Look:
+    """A frame of a metering unit, measured in every patch; `start_s` has any zero they share."""
+
+    start_s: float
+    exposure_s: float
+    patches: Sequence[FrameMeasurement]
+
+
+def look(frame: FrameRecord, regions: Sequence[Region]) -> Look:
+    """Measure a frame that was taken."""
+    raw = read_raw(frame.path)
+    return Look(frame.start_time, frame.exposure_s, [measure(raw, region) for region in regions])
+
+
+@dataclass(frozen=True)
 class _Reading:
     """One frame in which the glow is seen and nothing clips."""
 
@@ -68,31 +83,28 @@ class DecayMeter:
 
     Parameters
     ----------
-    frames
-        Frames of the unit, in order; the first one begins when a decay's first one does.
-    regions
-        Patches; in each frame the brightest one decides.
+    looks
+        Frames of the unit, in order; the first one begins when a decay's first one does. In each
+        the brightest patch decides.
     """
 
-    def __init__(self, frames: Sequence[FrameRecord], regions: Sequence[Region]) -> None:
+    def __init__(self, looks: Sequence[Look]) -> None:
         self._range_dn = math.inf
         self._readings: list[_Reading] = []
         self._shortest_clipped = False
-        for frame in frames:
-            raw = read_raw(frame.path)
-            self._range_dn = min(self._range_dn, raw.white - max(raw.black))
-            channels = [
-                channel for region in regions for channel in measure(raw, region).channels.values()
-            ]
-            self._take(frame, frame.start_time - frames[0].start_time, channels)
+        for seen in looks:
+            one = seen.patches[0]
+            self._range_dn = min(self._range_dn, one.white - max(one.black))
+            channels = [channel for patch in seen.patches for channel in patch.channels.values()]
+            self._take(seen.start_s - looks[0].start_s, seen.exposure_s, channels)
 
-    def _take(self, frame: FrameRecord, time_s: float, channels: list[ChannelStats]) -> None:
+    def _take(self, time_s: float, exposure_s: float, channels: list[ChannelStats]) -> None:
         if any(channel.saturated > 0 for channel in channels):
             self._shortest_clipped |= not self._readings
             return
         brightest = max(channels, key=lambda channel: channel.mean)
         if brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN):
-            rate = brightest.mean / frame.exposure_s
+            rate = brightest.mean / exposure_s
             self._readings.append(_Reading(time_s, rate, brightest.mean, brightest.peak))
 
     def schedule(

@@ -14,8 +14,6 @@ LIVE_PIXELS = 1056
 LIVE_EXPOSURE_S = 1 / 30
 LIVE_ISO = 1600
 LIVE_F_NUMBER = 4.0
-#: The room light's irradiance at the sample over the warm lamp's.
-ROOM_LIGHT = 8e-3
 #: Scatter of the live picture's pixels: lines are skipped, so it is noisier than a photograph.
 NOISE_FACTOR = 3.0
 #: Electrons that are white on the display, at `LIVE_ISO`.

@@ -98,28 +98,25 @@ class Lamp:
 
     settings: LampSettings
     phases: tuple[_Phase, ...]
-    dead: bool = False
 
     @classmethod
-    def found(cls, settings: LampSettings, on: bool, dead: bool = False) -> Self:
+    def found(cls, settings: LampSettings, on: bool) -> Self:
         """A lamp that has been on (and is warm), or off (and is cold), for long at time zero."""
-        burning = on and not dead
-        settled_k = BURNING_K if burning else ROOM_K
-        return cls(settings, (_Phase(0.0, on, float(burning), settled_k, None),), dead)
+        settled_k = BURNING_K if on else ROOM_K
+        return cls(settings, (_Phase(0.0, on, float(on), settled_k, None),))
 
     @property
     def on(self) -> bool:
-        """Whether the lamp is switched on (a dead one may be)."""
+        """Whether the lamp is switched on."""
         return self.phases[-1].powered
 
     def switched(self, on: bool, at_s: float) -> "Lamp":
         """The lamp after one more switch; switching to what it is already does nothing."""
         if on == self.on:
             return self
-        heated = on and not self.dead
-        settled_k = BURNING_K if heated else ROOM_K
+        settled_k = BURNING_K if on else ROOM_K
         settling = solve_ivp(
-            lambda _, t: [_warming_k_per_s(t[0], heated)],
+            lambda _, t: [_warming_k_per_s(t[0], on)],
             (at_s, at_s + SETTLED_S),
             [self.temperature_k(at_s)],
             method="DOP853",
@@ -189,7 +186,7 @@ class Lamp:
     def _warmth(self, time_s: float) -> float:
         """Newton's law for the housing, 0 cold to 1 warm."""
         phase = self._phase(time_s)
-        goal = float(phase.powered and not self.dead)
+        goal = float(phase.powered)
         elapsed_s = max(time_s - phase.start_s, 0.0)
         return goal + (phase.warmth - goal) * math.exp(-elapsed_s / self.settings.warm_up)
 

@@ -1,8 +1,8 @@
 """A simulated room with its doors open: boards on serial lines, a camera on USB."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
-from datetime import UTC, datetime
+from dataclasses import replace
 from typing import Any
 
 import usb.backend
@@ -11,9 +11,11 @@ from labrig.clock import VirtualClock
 from labrig.yaml_file import validate
 
 from . import protocol_sim
-from .boards import NumatoBoard
+from .boards import NumatoBoard, SerialCable
 from .camera import SimulatedCamera
-from .protocol_sim import Board
+from .camera.faults import CameraFaults
+from .disk import SimulatedDisk
+from .faults import Fault, When, given
 from .room import Room
 from .simulation import Simulation
 
@@ -32,9 +34,30 @@ class OpenRoom:
         self.seed = simulation.seed
         self.room = Room(simulation, clock)
         relays = NumatoBoard(RELAYS, self._relay_moved)
-        relays.states[LAMP_RELAY] = self.room.lamp_on
-        self.boards: dict[str, Board] = {"relays": relays}
-        self.camera = SimulatedCamera(clock, self.room, serial="0730100001", seed=simulation.seed)
+        relays.states[LAMP_RELAY] = simulation.initial.lamp == "on"
+        faults = simulation.faults
+        self.boards = {
+            "relays": SerialCable(
+                relays,
+                clock,
+                unplugged=given(fault.relays_unplugged for fault in faults),
+                silent=given(fault.relays_silent for fault in faults),
+                echo_lost=given(fault.relays_echo_lost for fault in faults),
+            )
+        }
+        self.camera = SimulatedCamera(
+            clock,
+            self.room,
+            serial="0730100001",
+            seed=simulation.seed,
+            faults=_camera_faults(faults),
+            body=simulation.camera,
+        )
+        self.disk = SimulatedDisk(
+            clock,
+            full=given(fault.disk_full for fault in faults),
+            slow=given(fault.disk_slow for fault in faults),
+        )
 
     def usb(self, device: str) -> usb.backend.IBackend | None:
         """The USB bus on which `device` is alone; `None` if there is no such device."""
@@ -56,20 +79,38 @@ def open_room(
     source
         Path of the rig file, for messages.
     not_before_s
-        Seconds since 1970; the room's epoch is moved there if it is earlier.
+        Seconds since 1970; the room's epoch is moved there if it is earlier. Faults keep to their
+        time on the wall.
 
     Raises
     ------
     UsageError
         The description does not fit.
     """
-    simulation = validate(content, Simulation, f"{source}, simulation")
-    if simulation.epoch.timestamp() < not_before_s:
-        later = datetime.fromtimestamp(not_before_s, UTC)
-        simulation = simulation.model_copy(update={"epoch": later})
-    room = OpenRoom(simulation, VirtualClock(simulation.epoch.timestamp()))
+    simulation = validate(content, Simulation, f"{source}, simulation").opened_at(not_before_s)
+    room = OpenRoom(simulation, VirtualClock(simulation.wall_at_opening_s))
     protocol_sim.open_door(NAME, room)
     try:
         yield room
     finally:
         protocol_sim.close_door(NAME)
+
+
+def _camera_faults(faults: Sequence[Fault]) -> CameraFaults:
+    """What befalls the camera; its cable can be pulled once."""
+    found = CameraFaults(
+        busy_spans_s=_spans_s(given(fault.camera_busy for fault in faults)),
+        full_spans_s=_spans_s(given(fault.camera_full for fault in faults)),
+    )
+    for out in given(fault.camera_unplugged for fault in faults):
+        found = replace(
+            found,
+            unplug_at_s=out.at if out.after_bytes is None else None,
+            unplug_after_bytes=out.after_bytes,
+            replug_after_s=out.lasting,
+        )
+    return found
+
+
+def _spans_s(whens: Sequence[When]) -> tuple[tuple[float, float], ...]:
+    return tuple((when.at, when.until) for when in whens)

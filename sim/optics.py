@@ -21,7 +21,7 @@ from .phosphor import band_cells
 
 FloatArray = NDArray[np.float64]
 
-CURVES = "canon_eos_5d_mark_ii.json"
+CURVES = "canon_eos_5d_mark_ii"
 CHANNELS = ("R", "G", "B")
 
 #: Three published sets of this camera's curves, peak-normalised, differ by 0.02–0.06 RMS.
@@ -30,6 +30,9 @@ DISAGREEMENT_RMS = (0.022, 0.058)
 KNOTS_NM: FloatArray = np.arange(340.0, 840.0, 40.0)
 #: Share of it that is stray light and dark error, added where the curve itself is nearly zero.
 ADDED = 0.05
+
+#: Strengths of the random difference to look up to: one of them reaches the disagreement.
+STRENGTHS = (1.0, 2.0, 4.0, 8.0, 16.0)
 
 #: Photo-electrons a second and pixel at f/1 for 1 nm of radiance 1 in Table 1's scale at
 #: sensitivity 1. Chosen: blue paint just after a long charge fills half of the range at ISO 400,
@@ -64,18 +67,35 @@ class CameraCurves:
         return self.glow_electrons_per_s(REFLECTED * lamp_exposure, f_number)
 
 
-def shipped_curves() -> CameraCurves:
-    """The curves as measured, on the simulator's grid."""
-    path = shipped.folder("config") / "optics" / CURVES
-    table = json.loads(path.read_text(encoding="utf-8"))["spectral_data"]["data"]["main"]
-    wavelength_nm = np.array([float(key) for key in table])
-    values = np.array(list(table.values()))
-    return CameraCurves(np.maximum(PchipInterpolator(wavelength_nm, values)(WAVELENGTH_NM).T, 0.0))
+def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
+    """A camera's curves as measured, on the simulator's grid; 0 where they were not.
+
+    Parameters
+    ----------
+    name_or_path
+        Shipped name, or a file in rawtoaces' format.
+
+    Raises
+    ------
+    UsageError
+        No such file, or not such a file.
+    """
+    path = shipped.find("config/optics", "camera", name_or_path)
+    try:
+        table = json.loads(path.read_text(encoding="utf-8"))["spectral_data"]["data"]["main"]
+        wavelength_nm = np.array([float(key) for key in table])
+        values = np.array(list(table.values()), dtype=np.float64).reshape(-1, len(CHANNELS))
+        curves = PchipInterpolator(wavelength_nm, values, extrapolate=False)(WAVELENGTH_NM).T
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise UsageError(
+            f"{path}: expected camera curves in rawtoaces' format, got none ({error!r})"
+        ) from None
+    return CameraCurves(np.maximum(np.nan_to_num(curves), 0.0))
 
 
 def bent_curves(rng: np.random.Generator) -> CameraCurves:
     """The curves as this simulated camera has them."""
-    return CameraCurves(np.array([_bent(row, rng) for row in shipped_curves().sensitivity]))
+    return CameraCurves(np.array([_bent(row, rng) for row in measured_curves().sensitivity]))
 
 
 def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
@@ -95,7 +115,8 @@ def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
         difference = (normalised(strength) - curve / peak)[seen]
         return float(np.sqrt(np.mean(difference**2))) - goal
 
-    result: FloatArray = peak * normalised(brentq(excess, 0.0, 1.0, xtol=1e-6))
+    enough = next(strength for strength in STRENGTHS if excess(strength) > 0)
+    result: FloatArray = peak * normalised(brentq(excess, 0.0, enough, xtol=1e-6))
     return result
 
 

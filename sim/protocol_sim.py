@@ -4,6 +4,8 @@ The registry of open rooms is the one module-level state in labrig: pyserial han
 nothing but the URL.
 """
 
+import errno
+import os
 from typing import Protocol
 from urllib.parse import urlsplit
 
@@ -11,16 +13,11 @@ import serial
 
 from labrig.clock import VirtualClock
 
+from .boards import SerialCable
+
 #: A byte on a USB CDC line; a board's thinking time before it answers.
 BYTE_S = 20e-6
 ANSWER_S = 1.5e-3
-
-
-class Board(Protocol):
-    """The far end of a serial line."""
-
-    def receive(self, data: bytes) -> bytes:
-        """What it sends back for these bytes."""
 
 
 class SerialRoom(Protocol):
@@ -31,8 +28,8 @@ class SerialRoom(Protocol):
         """Time in the room."""
 
     @property
-    def boards(self) -> dict[str, Board]:
-        """Boards by the device part of their address."""
+    def boards(self) -> dict[str, SerialCable]:
+        """Boards on their cables, by the device part of their address."""
 
 
 _ROOMS: dict[str, SerialRoom] = {}
@@ -51,17 +48,23 @@ def close_door(name: str) -> None:
 
 
 class Serial(serial.SerialBase):
-    """A serial port whose other end is an emulated board."""
+    """A serial port whose other end is an emulated board; pulled out, it fails as Linux' does."""
 
     def open(self) -> None:
         """Connect to the board that the URL names."""
         url = urlsplit(self.portstr or "")
         room = _ROOMS.get(url.netloc)
-        board = None if room is None else room.boards.get(url.path.strip("/"))
-        if room is None or board is None:
+        cable = None if room is None else room.boards.get(url.path.strip("/"))
+        if room is None or cable is None:
             raise serial.SerialException(f"there is no board at {self.portstr}")
+        if not cable.is_plugged:
+            missing = OSError(errno.ENOENT, os.strerror(errno.ENOENT), self.portstr)
+            raise serial.SerialException(
+                errno.ENOENT, f"could not open port {self.portstr}: {missing}"
+            )
         self._clock = room.clock
-        self._board = board
+        self._cable = cable
+        self._plugging = cable.plugging
         self._incoming: list[tuple[float, int]] = []
         self.is_open = True
 
@@ -75,11 +78,15 @@ class Serial(serial.SerialBase):
     @property
     def in_waiting(self) -> int:
         """Bytes that have arrived by now."""
+        if self._is_gone:
+            raise _input_output_error()
         now_s = self._clock.now()
         return sum(1 for due_s, _ in self._incoming if due_s <= now_s)
 
     def read(self, size: int = 1, /) -> bytes:
         """Up to `size` bytes that have arrived."""
+        if self._is_gone:
+            raise serial.SerialException(f"read failed: {_input_output_error()}")
         count = min(size, self.in_waiting)
         taken, self._incoming = self._incoming[:count], self._incoming[count:]
         self._clock.spend(BYTE_S * count)
@@ -88,9 +95,11 @@ class Serial(serial.SerialBase):
     def write(self, data: bytes, /) -> int:  # type: ignore[override]
         """Send `data`; the answer arrives byte by byte, a little later."""
         self._clock.spend(BYTE_S * len(data))
+        if self._is_gone:
+            raise serial.SerialException(f"write failed: {_input_output_error()}")
         last_s = self._incoming[-1][0] if self._incoming else 0.0
         due_s = max(last_s, self._clock.now() + ANSWER_S)
-        for byte in self._board.receive(bytes(data)):
+        for byte in self._cable.carry(bytes(data)):
             due_s += BYTE_S
             self._incoming.append((due_s, byte))
         return len(data)
@@ -98,3 +107,11 @@ class Serial(serial.SerialBase):
     def reset_input_buffer(self) -> None:
         """Forget what has arrived."""
         self._incoming = self._incoming[self.in_waiting :]
+
+    @property
+    def _is_gone(self) -> bool:
+        return not self._cable.is_plugged or self._plugging != self._cable.plugging
+
+
+def _input_output_error() -> OSError:
+    return OSError(errno.EIO, os.strerror(errno.EIO))

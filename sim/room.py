@@ -13,17 +13,20 @@ from labrig.region import region_pixels
 from .aiming import (
     LIVE_EXPOSURE_S,
     LIVE_F_NUMBER,
-    ROOM_LIGHT,
     developed,
     live_stride,
 )
+from .circuit import LampCircuit
 from .dng import Shot, encode_dng
-from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
+from .faults import given
+from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
+from .lights import Lights, room_light_spectrum
 from .optics import (
     CLOTH_REFLECTANCE,
     SAMPLE_REFLECTANCE,
     bent_curves,
     emission,
+    measured_curves,
     vignetting,
 )
 from .phosphor import phosphor
@@ -65,13 +68,24 @@ class Room:
         self._names = [material.name for material in materials]
         self._phosphor = phosphor(materials, charges, simulation.lamp.irradiance)
         self._emission = np.concatenate([emission(material) for material in materials])
-        self._lamp = Lamp.found(
-            simulation.lamp, simulation.initial.lamp == "on", "lamp_dead" in simulation.faults
+        self._circuit = LampCircuit(
+            simulation.lamp, simulation.initial.lamp == "on", simulation.faults, clock
         )
-        self._curves = bent_curves(self._rng(CURVES_STREAM))
+        self._left_on = given(fault.light_left_on for fault in simulation.faults)
         sensor = simulation.sensor
+        self._curves = (
+            bent_curves(self._rng(CURVES_STREAM))
+            if sensor.curves is None
+            else measured_curves(sensor.curves)
+        )
         falloff = vignetting(sensor.height, sensor.width)
-        self._sensor = Sensor(self._rng(SENSOR_STREAM), falloff, sensor.flicker)
+        self._sensor = Sensor(
+            self._rng(SENSOR_STREAM),
+            falloff,
+            sensor.flicker,
+            crosstalk=sensor.crosstalk,
+            row_noise=sensor.row_noise,
+        )
         self._sensor_temperature = SensorTemperature()
         self._places = self._painted()
         # Where the samples have been followed to, by time. The past cannot change, so they stay
@@ -81,12 +95,12 @@ class Room:
 
     @property
     def lamp_on(self) -> bool:
-        """Whether the lamp is switched on."""
-        return self._lamp.on
+        """Whether the lamp has current, whatever register and bulb say."""
+        return self._circuit.closed
 
     def switch_lamp(self, on: bool) -> None:
-        """Switch the lamp now."""
-        self._lamp = self._lamp.switched(on, self._clock.now())
+        """Ask the lamp's relay to switch now."""
+        self._circuit.ask(on)
 
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
         """The DNG of an exposure that is over.
@@ -109,8 +123,9 @@ class Room:
                 f"expected an exposure between 0 s and {self._clock.now()} s (now), "
                 f"got {start_s} s to {end_s} s"
             )
-        _, glow_s = self._phosphor.evolve(self._level_at(start_s), start_s, end_s, self._lamp)
-        light = self._simulation.lamp.irradiance * self._lamp.exposure(start_s, end_s)
+        lights = self._lights()
+        _, glow_s = self._phosphor.evolve(self._level_at(start_s), start_s, end_s, lights)
+        light = self._simulation.lamp.irradiance * lights.exposure(start_s, end_s)
         mosaic = self._sensor.expose(
             self._electrons(glow_s, light, f_number)[self._places],
             exposure_s,
@@ -126,10 +141,11 @@ class Room:
         That light is for the eye only: it does not charge the samples.
         """
         start_s = max(at_s - LIVE_EXPOSURE_S, 0.0)
-        _, glow_s = self._phosphor.evolve(self._level_at(start_s), start_s, at_s, self._lamp)
-        light = self._lamp.exposure(start_s, at_s)
+        lights = self._lights()
+        _, glow_s = self._phosphor.evolve(self._level_at(start_s), start_s, at_s, lights)
+        light = lights.exposure(start_s, at_s)
         if self._simulation.room_light:
-            light = light + ROOM_LIGHT * (at_s - start_s) * filament_spectrum(BURNING_K)
+            light = light + (at_s - start_s) * room_light_spectrum()
         electrons = self._electrons(glow_s, self._simulation.lamp.irradiance * light, LIVE_F_NUMBER)
         step = 2 * live_stride(*self._places.shape)
         patch = self._places[::step, ::step] // 4
@@ -141,12 +157,13 @@ class Room:
 
     def truth(self, iso: int = 400, f_number: float = 4.0) -> Truth:
         """What a perfect fit of the decay after the last lamp-off would find."""
-        off_s = self._lamp.last_switch_off(self._clock.now())
+        lamp = self._circuit.lamp
+        off_s = lamp.last_switch_off(self._clock.now())
         level = effective = None
         if off_s is not None:
             level = self._level_at(off_s)
             dark_s = off_s + SETTLED_S
-            after, _ = self._phosphor.evolve(level, off_s, dark_s, self._lamp.until(off_s))
+            after, _ = self._phosphor.evolve(level, off_s, dark_s, lamp.until(off_s))
             effective = after * np.exp(self._phosphor.k_r_per_s * SETTLED_S)
         electrons_per_s = self._curves.glow_electrons_per_s(self._radiance_at_one(), f_number)
         return Truth(
@@ -165,6 +182,9 @@ class Room:
         """`truth()` as a JSON file, next to a run, for tests."""
         self.truth().write(path)
 
+    def _lights(self) -> Lights:
+        return Lights(self._circuit.lamp, self._left_on)
+
     def _rng(self, *stream: int) -> np.random.Generator:
         return np.random.default_rng([self._simulation.seed, *stream])
 
@@ -172,7 +192,7 @@ class Room:
         """Concentrations of all states at a time, shape (states,)."""
         last = bisect_right(self._known_s, time_s) - 1
         level, _ = self._phosphor.evolve(
-            self._known_levels[last], self._known_s[last], time_s, self._lamp
+            self._known_levels[last], self._known_s[last], time_s, self._lights()
         )
         self._known_s.insert(last + 1, time_s)
         self._known_levels.insert(last + 1, level)

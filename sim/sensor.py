@@ -92,9 +92,23 @@ class Sensor:
         Vignetting.
     flicker
         1 σ scatter of all light between frames: shutter, aperture, lamp.
+    crosstalk
+        Share of a pixel's charge that shows in each of its four neighbours instead: capacitance
+        between pixels, which blurs the noise with the picture (A. C. Moore, Z. Ninkov, W. J.
+        Forrest, Optical Engineering 45, 2006).
+    row_noise
+        1 σ of what reading a row adds to all of its pixels, in multiples of a pixel's read noise.
     """
 
-    def __init__(self, rng: np.random.Generator, falloff: FloatArray, flicker: float) -> None:
+    def __init__(
+        self,
+        rng: np.random.Generator,
+        falloff: FloatArray,
+        flicker: float,
+        *,
+        crosstalk: float = 0.0,
+        row_noise: float = 0.0,
+    ) -> None:
         height, width = falloff.shape
         response = falloff * (1 + PRNU * rng.standard_normal((height, width)))
         self._response: Float32Array = response.astype(np.float32)
@@ -105,6 +119,8 @@ class Sensor:
         self.hot_pixels: NDArray[np.intp] = rng.choice(height * width, count, replace=False)
         self._hot = HOT_MEDIAN * np.exp(HOT_SIGMA * rng.standard_normal(count))
         self._flicker = flicker
+        self._crosstalk = crosstalk
+        self._row_noise = row_noise
 
     def expose(
         self,
@@ -143,13 +159,26 @@ class Sensor:
         np.minimum(electrons, 4 * full_well, out=electrons)
         electrons = _shot_noise(electrons, rng)
         np.minimum(electrons, full_well, out=electrons)
+        if self._crosstalk:
+            electrons = _shared_with_neighbours(electrons, self._crosstalk)
         electrons *= np.float32(1 / gain)
         noise = rng.standard_normal(electrons.shape, dtype=np.float32)
+        if self._row_noise:
+            rows = rng.standard_normal((len(noise), 1), dtype=np.float32)
+            noise += np.float32(self._row_noise) * rows
         noise *= np.float32(read_noise_electrons(iso) / gain)
         electrons += noise
         electrons += self._zero_dn
         electrons += np.float32(0.5)
         return np.clip(electrons, 0, MAX_DN).astype(np.uint16)
+
+
+def _shared_with_neighbours(electrons: Float32Array, share: float) -> Float32Array:
+    """Each pixel less `share` for each of its four neighbours; beyond the border lies its like."""
+    bordered = np.pad(electrons, 1, mode="edge")
+    around = bordered[:-2, 1:-1] + bordered[2:, 1:-1] + bordered[1:-1, :-2] + bordered[1:-1, 2:]
+    shared: Float32Array = electrons * np.float32(1 - 4 * share) + np.float32(share) * around
+    return shared
 
 
 def _shot_noise(expected: Float32Array, rng: np.random.Generator) -> Float32Array:

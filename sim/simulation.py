@@ -1,31 +1,29 @@
 """The `simulation:` section of a rig file: what stands in the simulated dark room."""
 
 from datetime import UTC, datetime
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, Self
 
-from pydantic import AfterValidator, AwareDatetime, BaseModel, BeforeValidator, ConfigDict, Field
+from pydantic import (
+    AfterValidator,
+    AwareDatetime,
+    BaseModel,
+    BeforeValidator,
+    ConfigDict,
+    Field,
+    field_validator,
+)
 
 from labrig.quantity import DurationS, Fraction
 from labrig.region import Region
-from labrig.yaml_file import did_you_mean
 
-#: Named set-ups that go wrong on purpose, and what each does.
-FAULTS = {"lamp_dead": "the lamp's relay switches, but nothing lights up"}
+from .camera import BodySettings
+from .faults import Fault, given
 
 #: Where one sample lies when no region is given.
 MIDDLE: Region = (0.1, 0.1, 0.8, 0.8)
 
 #: A level below 1: only infinite light would reach 1 itself.
 Charge = Annotated[float, Field(ge=0, lt=1)]
-
-
-def _known_fault(name: str) -> str:
-    if name not in FAULTS:
-        raise ValueError(
-            f"expected the name of a simulated fault, got '{name}'; "
-            f"{did_you_mean(name, list(FAULTS))}"
-        )
-    return name
 
 
 def _even(pixels: int) -> int:
@@ -62,11 +60,27 @@ class Patch(_Part):
 
 
 class SensorSettings(_Part):
-    """The simulated camera's sensor; `flicker` is the 1 σ scatter of light between frames."""
+    """The simulated camera's sensor.
+
+    Attributes
+    ----------
+    flicker
+        1 σ scatter of all light between frames.
+    crosstalk
+        Share of a pixel's charge that shows in each of its four neighbours instead.
+    row_noise
+        1 σ of what reading a row adds to all of its pixels, in multiples of a pixel's read noise.
+    curves
+        The camera's spectral sensitivity, a file in rawtoaces' format; null: the shipped one of a
+        Canon EOS 5D Mark II, bent by as much as laboratories disagree about it.
+    """
 
     width: Pixels = 1404
     height: Pixels = 936
     flicker: Fraction = 0.007
+    crosstalk: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
+    row_noise: Annotated[Fraction, Field(ge=0)] = 0.0
+    curves: str | None = None
 
 
 class LampSettings(_Part):
@@ -112,26 +126,65 @@ class Simulation(_Part):
         The patches; in YAML also the name of a single material, in the middle of the frame.
     initial_charge
         As `Patch.initial_charge`, for patches that do not say.
+    camera
+        Which body the camera has, and how somebody has set it.
     epoch
         Wall-clock time at which the room's clock stands at zero.
     seed
         Of everything random: camera curves, hot pixels, noise.
+    faults
+        What goes wrong, and when, see `sim.faults`.
     room_light
         Whether the room's own light is on while somebody aims through the viewfinder; photographs
         are always taken without it.
     """
 
-    sample: Annotated[tuple[Patch, ...], BeforeValidator(_alone), Field(min_length=1)]
+    sample: Annotated[
+        tuple[Patch, ...],
+        BeforeValidator(_alone, json_schema_input_type=str | tuple[Patch, ...]),
+        Field(min_length=1),
+    ]
     initial_charge: Charge | None = None
     sensor: SensorSettings = SensorSettings()
+    camera: BodySettings = BodySettings()
     epoch: Annotated[AwareDatetime, Field(ge=datetime(1970, 1, 1, tzinfo=UTC))] = datetime(
         2026, 1, 1, tzinfo=UTC
     )
     seed: Annotated[int, Field(ge=0)] = 1
     initial: InitialState = InitialState()
-    faults: tuple[Annotated[str, AfterValidator(_known_fault)], ...] = ()
+    faults: tuple[Fault, ...] = ()
     lamp: LampSettings = LampSettings()
     room_light: bool = True
+
+    @field_validator("faults")
+    @classmethod
+    def _one_camera_cable(cls, faults: tuple[Fault, ...]) -> tuple[Fault, ...]:
+        if len(given(fault.camera_unplugged for fault in faults)) > 1:
+            raise ValueError("expected 'camera_unplugged' once: the simulated cable comes out once")
+        return faults
+
+    def opened_at(self, wall_s: float) -> Self:
+        """The same room opened at `wall_s`, seconds since 1970, if its epoch is earlier."""
+        later_s = wall_s - self.epoch.timestamp()
+        if later_s <= 0:
+            return self
+        return self.model_copy(
+            update={
+                "epoch": datetime.fromtimestamp(wall_s, UTC),
+                "faults": tuple(fault.seen_from(later_s) for fault in self.faults),
+            }
+        )
+
+    @property
+    def wall_at_opening_s(self) -> float:
+        """What the PC's clock says when the room is opened, seconds since 1970."""
+        ahead = given(fault.clock_ahead for fault in self.faults)
+        back = given(fault.clock_back for fault in self.faults)
+        return (
+            self.epoch.timestamp()
+            + sum(step.by for step in ahead if step.is_on(0.0))
+            - sum(step.by for step in back if step.is_on(0.0))
+        )
 
     @property
     def patches(self) -> tuple[Patch, ...]:

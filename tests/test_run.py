@@ -19,9 +19,10 @@ from labrig.acquire.plugins import read_protocol
 from labrig.bench import Bench, open_bench
 from labrig.clock import Clock, Interrupted, VirtualClock
 from labrig.errors import DeviceError
+from labrig.filling import fill
 from labrig.record import RunFolder, read_run
 from labrig.record.journal import read_journal
-from labrig.run import Recording, fill
+from labrig.run import Recording
 from tests.acquire.fakes import Watching
 
 UNITS = ["dark", "decay-1", "decay-2"]

@@ -1,7 +1,8 @@
 """The plan: the protocol's own code run on devices that only take the time they would need."""
 
+import json
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field
+from dataclasses import asdict, dataclass, field
 from typing import TypeVar
 
 from labrig.acquire import plugins
@@ -41,7 +42,7 @@ class Plan:
     units: tuple[str, ...]
     unit_ends_s: tuple[float, ...]
     frames: int
-    frame_bytes: int
+    offers: CameraOffers
 
     @property
     def duration_s(self) -> float:
@@ -51,7 +52,7 @@ class Plan:
     @property
     def size_bytes(self) -> int:
         """What the frames will take on disk."""
-        return self.frames * self.frame_bytes
+        return self.frames * self.offers.frame_bytes
 
     def lines(self) -> list[str]:
         """The timeline as `@t (+dt) device action`, a heading per unit."""
@@ -66,6 +67,17 @@ class Plan:
             )
             before_s = step.at_s
         return out
+
+    def to_json(self) -> str:
+        """The timeline for a program."""
+        content = {
+            "units": self.units,
+            "duration_s": self.duration_s,
+            "frames": self.frames,
+            "size_bytes": self.size_bytes,
+            "steps": [asdict(step) for step in self.steps],
+        }
+        return json.dumps(content, ensure_ascii=False)
 
 
 def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
@@ -100,7 +112,7 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
         tuple(unit.name for unit in units),
         tuple(ends),
         recorder.frame_count,
-        offers.frame_bytes,
+        offers,
     )
 
 
@@ -182,9 +194,6 @@ class _PlanRecorder:
 
     def warn(self, text: str) -> None:
         self._note(self.clock.now(), "-", f"warning: {text}", 0.0)
-
-    def frame(self, purpose: str, settings: ExposureSettings) -> None:
-        pass
 
     def _note(self, at_s: float, device: str, action: str, late_s: float) -> None:
         if late_s > TOLERANCE_S:

@@ -5,7 +5,7 @@ from typing import cast
 
 from labrig.acquire.roles import Camera, Device, Lamp
 from labrig.clock import Clock
-from labrig.errors import DeviceError, LabrigError, ProtocolError
+from labrig.errors import DeviceError, DeviceLostError, LabrigError, ProtocolError
 
 
 class Rig:
@@ -61,8 +61,10 @@ class Rig:
         ------
         DeviceError
             Some device could not confirm its safe state; names all of them.
+        DeviceLostError
+            All of those are gone, and may come back.
         """
-        failures = []
+        failures, gone = [], True
         with self.clock.shielded():
             for key, device in self.devices.items():
                 try:
@@ -70,8 +72,9 @@ class Rig:
                 except Exception as error:
                     said = str(error) if isinstance(error, LabrigError) else repr(error)
                     failures.append(f"{key}: {said}")
+                    gone = gone and isinstance(error, DeviceLostError)
         if failures:
-            raise DeviceError(
+            raise (DeviceLostError if gone else DeviceError)(
                 "the safe state is not confirmed; switch off by hand: " + "; ".join(failures)
             )
 

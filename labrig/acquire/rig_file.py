@@ -1,7 +1,7 @@
 """The rig file: which driver at which address, and how long each device takes to warm up."""
 
 from pathlib import Path
-from typing import Any
+from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -42,6 +42,9 @@ class RigFile(BaseModel):
     name: str
     devices: dict[str, DeviceEntry] = Field(min_length=1)
     optics: Optics = Optics()
+    on_finish: Literal["bell"] | tuple[str, ...] | None = Field(
+        None, description="when a run has ended: bell, or a command as a list of words"
+    )
     simulation: dict[str, Any] | None = Field(
         None, description="only in a simulated rig: what is in the simulated room"
     )

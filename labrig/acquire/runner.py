@@ -20,6 +20,9 @@ class RunObserver(Observer, Protocol):
     def unit(self, name: str, number: int, total: int) -> None:
         """A unit begins."""
 
+    def frame(self, record: FrameRecord) -> None:
+        """A frame was kept."""
+
 
 def run_units(
     units: Sequence[Unit],
@@ -41,18 +44,25 @@ def run_units(
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
-        recorder = _Recorder(rig.clock, writer, frames)
+        recorder = _Recorder(rig.clock, writer, frames, observer)
         unit.run(Session(rig, recorder, observer))
         writer.stop("success")
         frames = recorder.kept
 
 
 class _Recorder:
-    """Turns the rig's times into wall times and passes all on to the attempt."""
+    """Turns the rig's times into wall times and passes all on to the attempt; tells of frames."""
 
-    def __init__(self, clock: Clock, writer: AttemptWriter, kept: Sequence[FrameRecord]) -> None:
+    def __init__(
+        self,
+        clock: Clock,
+        writer: AttemptWriter,
+        kept: Sequence[FrameRecord],
+        observer: RunObserver,
+    ) -> None:
         self._clock = clock
         self._writer = writer
+        self._observer = observer
         self.kept = list(kept)
 
     def acted(self, device: str, action: str, start_s: float, end_s: float, late_s: float) -> None:
@@ -74,6 +84,7 @@ class _Recorder:
             late_s=late_s,
         )
         self.kept.append(record)
+        self._observer.frame(record)
 
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
         return [frame for frame in self.kept if frame.purpose == purpose]

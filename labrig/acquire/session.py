@@ -6,6 +6,7 @@ The same code runs on a bench and in the planner: only devices, clock and record
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
+from functools import cached_property
 from typing import Protocol, TypeVar
 
 from labrig.acquire.rig import Rig
@@ -86,9 +87,6 @@ class Observer(Protocol):
     def doing(self, what: str, until_s: float | None = None) -> None:
         """Something that takes a while begins."""
 
-    def frame(self, purpose: str, settings: ExposureSettings) -> None:
-        """A frame was kept."""
-
     def warn(self, text: str) -> None:
         """Something a person should know."""
 
@@ -162,13 +160,16 @@ class Session:
 
     def _sleep_until(self, deadline_s: float) -> None:
         """Wait, and keep from falling asleep what would."""
-        sleepy = {k: d for k, d in self.rig.devices.items() if isinstance(d, KeptAwake)}
-        while sleepy and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
+        while self._sleepy and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
             self.clock.sleep(AWAKE_PERIOD_S)
-            for key, device in sleepy.items():
+            for key, device in self._sleepy.items():
                 with _device_errors(key):
                     device.keep_awake()
         self.clock.sleep_until(deadline_s)
+
+    @cached_property
+    def _sleepy(self) -> dict[str, KeptAwake]:
+        return {k: d for k, d in self.rig.devices.items() if isinstance(d, KeptAwake)}
 
     def _prepare(self, action: Action) -> None:
         if not isinstance(action, Shoot):
@@ -187,7 +188,6 @@ class Session:
             with _device_errors("camera"):
                 frame = self.rig.camera.shoot()
             self._recorder.photographed(action.purpose, frame, late_s)
-            self._observer.frame(action.purpose, frame.settings)
             return
         self._observer.doing(f"lamp {action}")
         lamp, start_s = self.rig.lamp, self.clock.now()

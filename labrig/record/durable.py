@@ -1,12 +1,14 @@
 """Files that are either whole or not there."""
 
 import os
+from contextlib import suppress
 from pathlib import Path
 
 from labrig.errors import DiskError
+from labrig.record.disk import REAL_DISK, Disk
 
 
-def write_durably(path: Path, data: bytes) -> None:
+def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
     """Write `data` to `path` by way of `.part`, on the disk before the name appears.
 
     Raises
@@ -16,16 +18,15 @@ def write_durably(path: Path, data: bytes) -> None:
     """
     part = path.with_name(path.name + ".part")
     try:
-        with part.open("wb") as file:
-            file.write(data)
-            file.flush()
-            os.fsync(file.fileno())
+        with part.open("wb", buffering=0) as file:
+            disk.write(file, data)
         part.replace(path)
         _sync_folder(path.parent)
     except OSError as error:
-        part.unlink(missing_ok=True)
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
         raise DiskError(
-            f"{path}: {len(data) / 1e6:.1f} MB cannot be written ({error.strerror}); make room"
+            f"{path}: {len(data) / 1e6:.2g} MB cannot be written ({error.strerror}); make room"
         ) from None
 
 

@@ -18,6 +18,8 @@ class FrameRecord:
         Measured begin and end of the exposure.
     late_s
         How long after its planned time it began.
+    disk_s
+        How long it took to be on the disk, during which nothing else was done.
     """
 
     path: Path
@@ -31,6 +33,7 @@ class FrameRecord:
     start_time: float
     end_time: float
     late_s: float
+    disk_s: float = 0.0
 
 
 @dataclass(frozen=True)

@@ -9,6 +9,7 @@ from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 from labrig.errors import DataError, DiskError
+from labrig.record.disk import REAL_DISK, Disk
 
 Document = tuple[str, dict[str, Any]]
 
@@ -24,28 +25,38 @@ class JournalContent:
 class Journal:
     """Appends documents durably: when `append` returns, the line survives a power cut.
 
-    Opening an existing journal cuts off a torn last line: it was never acknowledged.
+    A torn last line, of a crash or of a full disk, is cut off before the next one is written: it
+    was never acknowledged.
     """
 
-    def __init__(self, path: Path) -> None:
+    def __init__(self, path: Path, disk: Disk = REAL_DISK) -> None:
         self.path = path
+        self._disk = disk
         try:
-            _cut_torn_line(path)
-            self._file: BinaryIO = path.open("ab")
+            self._file: BinaryIO = path.open("a+b", buffering=0)
+            self._file.seek(0)
+            self._acknowledged = self._file.read().rfind(b"\n") + 1
         except OSError as error:
             raise DiskError(f"{path}: the journal cannot be opened ({error})") from None
 
+    @property
+    def size_bytes(self) -> int:
+        """Of all acknowledged lines."""
+        return self._acknowledged
+
     def append(self, name: str, doc: Mapping[str, Any]) -> None:
         """Write `{"name": name, "doc": doc}` and wait until the disk has it."""
-        line = json.dumps({"name": name, "doc": doc}, ensure_ascii=False, allow_nan=False)
+        text = json.dumps({"name": name, "doc": doc}, ensure_ascii=False, allow_nan=False)
+        line = text.encode() + b"\n"
         try:
-            self._file.write(line.encode() + b"\n")
-            self._file.flush()
-            os.fsync(self._file.fileno())
+            if os.fstat(self._file.fileno()).st_size > self._acknowledged:
+                self._file.truncate(self._acknowledged)
+            self._disk.write(self._file, line)
         except OSError as error:
             raise DiskError(
                 f"{self.path}: the journal cannot be written ({error.strerror}); free some space"
             ) from None
+        self._acknowledged += len(line)
 
     def close(self) -> None:
         """Release the file."""
@@ -80,8 +91,8 @@ def read_journal(path: Path) -> JournalContent:
     documents: list[Document] = []
     for number, line in enumerate(lines, start=1):
         try:
-            entry = json.loads(line)
-            documents.append((entry["name"], entry["doc"]))
+            entry = json.loads(line, parse_constant=_refuse)
+            documents.append((str(entry["name"]), dict(entry["doc"])))
         except (ValueError, KeyError, TypeError):
             raise DataError(
                 f"{path}, line {number}: expected a journal document, got {line[:40]!r}; "
@@ -90,12 +101,6 @@ def read_journal(path: Path) -> JournalContent:
     return JournalContent(documents, torn)
 
 
-def _cut_torn_line(path: Path) -> None:
-    if not path.exists():
-        return
-    raw = path.read_bytes()
-    whole = raw.rfind(b"\n") + 1
-    if whole < len(raw):
-        with path.open("r+b") as file:
-            file.truncate(whole)
-            os.fsync(file.fileno())
+def _refuse(constant: str) -> None:
+    """NaN and infinity, which JSON does not have and a journal never holds."""
+    raise ValueError(constant)

@@ -1,12 +1,21 @@
 """Reading a run folder back: which units completed, and what they hold."""
 
-from dataclasses import dataclass, field
+import os
+from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, TypeVar
+
+from pydantic import TypeAdapter, ValidationError
 
 from labrig.errors import DataError
 from labrig.record.frames import ActionRecord, FrameRecord
 from labrig.record.journal import Document, read_journal
+
+#: End of the year 9999 in seconds since 1970: no calendar reaches further.
+LATEST = 253_402_300_799.0
+
+Recorded = TypeVar("Recorded", FrameRecord, ActionRecord)
+_FRAME, _ACTION = TypeAdapter(FrameRecord), TypeAdapter(ActionRecord)
 
 
 @dataclass(frozen=True)
@@ -53,25 +62,28 @@ class RunRecord:
         ]
 
 
-def read_run(folder: Path) -> RunRecord:
-    """Read the journal of the run in `folder`.
+def read_run(run: str | os.PathLike[str]) -> RunRecord:
+    """Read the journal of the run in the folder `run`.
 
     Raises
     ------
     DataError
-        Not a run folder, or its journal is damaged.
+        Not a run folder, or its journal is damaged or was edited into something that does not fit.
     """
-    content = read_journal(folder / "journal.jsonl")
+    folder = Path(run)
+    path = folder / "journal.jsonl"
+    content = read_journal(path)
     attempts: dict[str, Attempt] = {}
     streams: dict[str, tuple[str, str]] = {}
     last_time = 0.0
-    for name, doc in content.documents:
-        last_time = max(last_time, float(doc.get("time", 0.0)))
+    for number, (name, doc) in enumerate(content.documents, start=1):
         try:
+            last_time = max(last_time, _seconds(doc.get("time", 0.0)))
             _take(folder, (name, doc), attempts, streams)
         except (KeyError, TypeError, ValueError) as error:
             raise DataError(
-                f"{folder}: the journal holds a '{name}' document that does not fit ({error!r})"
+                f"{path}, line {number}: a '{name}' document that does not fit ({_said(error)}); "
+                "the file was changed after the run"
             ) from None
     return RunRecord(folder, list(attempts.values()), content.torn, last_time)
 
@@ -84,25 +96,54 @@ def _take(
 ) -> None:
     name, doc = document
     if name == "start":
-        attempts[doc["uid"]] = Attempt(uid=doc["uid"], unit=doc["unit"], start=doc)
+        attempts[doc["uid"]] = _opened(doc)
     elif name == "descriptor":
         streams[doc["uid"]] = (doc["run_start"], doc["name"])
     elif name == "stop":
-        opened = attempts[doc["run_start"]]
-        attempts[doc["run_start"]] = Attempt(
-            uid=opened.uid,
-            unit=opened.unit,
-            start=opened.start,
-            exit_status=doc["exit_status"],
-            reason=doc.get("reason", ""),
-            frames=opened.frames,
-            actions=opened.actions,
-        )
+        attempts[doc["run_start"]] = _closed(attempts[doc["run_start"]], doc)
     elif name == "event":
         run_uid, stream = streams[doc["descriptor"]]
         attempt, data = attempts[run_uid], dict(doc["data"])
         if stream == "frames":
             path = folder / data.pop("frame")
-            attempt.frames.append(FrameRecord(path=path, unit=attempt.unit, **data))
+            frame = _FRAME.validate_python({**data, "path": path, "unit": attempt.unit})
+            attempt.frames.append(_dated(frame))
         elif stream == "actions":
-            attempt.actions.append(ActionRecord(unit=attempt.unit, **data))
+            action = _ACTION.validate_python({**data, "unit": attempt.unit})
+            attempt.actions.append(_dated(action))
+
+
+def _opened(doc: dict[str, Any]) -> Attempt:
+    if not isinstance(doc["unit"], str) or not isinstance(doc.get("devices", {}), dict):
+        raise TypeError("'unit' or 'devices' is of another kind")
+    _seconds(doc["time"])
+    return Attempt(uid=doc["uid"], unit=doc["unit"], start=doc)
+
+
+def _closed(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
+    held = {"frames": len(attempt.frames), "actions": len(attempt.actions)}
+    for stream, number in dict(doc.get("num_events", {})).items():
+        if stream in held and held[stream] != number:
+            raise ValueError(f"it counts {number} {stream}, there are {held[stream]}")
+    return replace(attempt, exit_status=doc["exit_status"], reason=doc.get("reason", ""))
+
+
+def _dated(record: Recorded) -> Recorded:
+    _seconds(record.start_time)
+    _seconds(record.end_time)
+    return record
+
+
+def _seconds(time: float) -> float:
+    """`time`, if it is one of a calendar's."""
+    if not 0 <= time <= LATEST:
+        raise ValueError(f"{time} is no time in seconds since 1970")
+    return float(time)
+
+
+def _said(error: Exception) -> str:
+    """What is wrong, in a few words."""
+    if isinstance(error, ValidationError):
+        problem = error.errors(include_url=False)[0]
+        return f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}"
+    return f"{error} is not there" if isinstance(error, KeyError) else str(error)

@@ -1,6 +1,7 @@
 """The run folder: what was asked, what happened, every frame; made once, then only added to."""
 
 import re
+import shutil
 import uuid
 from collections.abc import Callable, Mapping
 from datetime import UTC, datetime
@@ -12,6 +13,8 @@ from filelock import FileLock, Timeout
 
 from labrig.errors import DiskError, UsageError
 from labrig.record.attempt import AttemptWriter
+from labrig.record.disk import REAL_DISK, Disk
+from labrig.record.durable import write_durably
 from labrig.record.journal import Journal
 from labrig.record.reading import RunRecord, read_run
 
@@ -27,26 +30,31 @@ class RunFolder:
         The folder, with `protocol.yaml` and `rig.yaml` in it.
     seed
         `None` for random uids; a number makes them, and so the journal's bytes, repeatable.
+    disk
+        Takes frames and journal.
     """
 
-    def __init__(self, path: Path, seed: int | None = None) -> None:
+    def __init__(self, path: Path, seed: int | None = None, disk: Disk = REAL_DISK) -> None:
         self.path = path
         self._seed = seed
+        self._disk = disk
         self._lock = FileLock(path / ".lock")
         try:
             self._lock.acquire(timeout=0)
         except Timeout:
             raise UsageError(f"{path}: another labrig is writing to this run") from None
-        self._documents = 0
-        journal = path / _JOURNAL
-        if journal.exists():
-            self._documents = journal.read_bytes().count(b"\n")
         self._frame_number = _highest_frame(path / "frames")
-        self._journal = Journal(journal)
+        self._journal = Journal(path / _JOURNAL, disk)
 
     @classmethod
     def create(
-        cls, runs: Path, name: str, started: float, texts: Mapping[str, str], seed: int | None
+        cls,
+        runs: Path,
+        name: str,
+        started: float,
+        texts: Mapping[str, str],
+        seed: int | None,
+        disk: Disk = REAL_DISK,
     ) -> Self:
         """Make a new run folder `<runs>/<time>_<name>`, `-2` and so on if that is taken.
 
@@ -62,14 +70,20 @@ class RunFolder:
         try:
             runs.mkdir(parents=True, exist_ok=True)
             path = _make_new(runs, wanted)
-            (path / "frames").mkdir()
-            for file_name, text in texts.items():
-                (path / file_name).write_text(text, encoding="utf-8", newline="\n")
         except OSError as error:
             raise DiskError(
                 f"{runs}: a run folder cannot be made there ({error.strerror}); give another --runs"
             ) from None
-        return cls(path, seed)
+        try:
+            (path / "frames").mkdir()
+            for file_name, text in texts.items():
+                write_durably(path / file_name, text.encode(), disk)
+            return cls(path, seed, disk)
+        except (OSError, DiskError) as error:
+            shutil.rmtree(path, ignore_errors=True)
+            raise DiskError(
+                f"{runs}: a run folder cannot be made there ({error}); give another --runs"
+            ) from None
 
     def read(self) -> RunRecord:
         """What the journal says so far."""
@@ -87,6 +101,7 @@ class RunFolder:
             wall,
             self._new_uid,
             metadata,
+            self._disk,
         )
 
     def close_open_attempts(
@@ -132,10 +147,10 @@ class RunFolder:
         self.close()
 
     def _new_uid(self) -> str:
-        self._documents += 1
         if self._seed is None:
             return str(uuid.uuid4())
-        return str(uuid.uuid5(uuid.NAMESPACE_OID, f"labrig {self._seed} {self._documents}"))
+        place = self._journal.size_bytes
+        return str(uuid.uuid5(uuid.NAMESPACE_OID, f"labrig {self._seed} {place}"))
 
     def _next_frame_number(self) -> int:
         self._frame_number += 1

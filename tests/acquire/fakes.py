@@ -4,6 +4,7 @@ from collections.abc import Callable
 
 from labrig.acquire import CameraOffers, ExposureSettings, Frame
 from labrig.clock import VirtualClock
+from labrig.record import FrameRecord
 
 Note = Callable[[str], None]
 
@@ -89,8 +90,8 @@ class Watching:
     def doing(self, what: str, until_s: float | None = None) -> None:
         self.told.append(what)
 
-    def frame(self, purpose: str, settings: ExposureSettings) -> None:
-        self.told.append(f"kept {purpose}")
+    def frame(self, record: FrameRecord) -> None:
+        self.told.append(f"kept {record.purpose}")
 
     def warn(self, text: str) -> None:
         self.told.append(f"warning: {text}")

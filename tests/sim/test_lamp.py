@@ -86,9 +86,3 @@ def test_past_is_not_changed_by_later_switches() -> None:
     assert np.array_equal(later.irradiance(10.05), lamp.irradiance(10.05))
     assert (lamp.last_switch_off(9.0), later.last_switch_off(20.5)) == (None, 10.0)
     assert later.switched(False, 22.0) is later
-
-
-def test_dead_lamp_stays_dark() -> None:
-    lamp = Lamp.found(LampSettings(), on=False, dead=True).switched(True, 1.0)
-    assert lamp.on
-    assert lamp.exposure(0.0, 100.0).max() < 1e-20

@@ -6,13 +6,13 @@ import pytest
 from labrig.errors import UsageError
 from labrig.material.file import Material, State, read_material
 from sim.lamp import CELL_NM, WAVELENGTH_NM
-from sim.optics import CameraCurves, bent_curves, emission, shipped_curves, vignetting
+from sim.optics import CameraCurves, bent_curves, emission, measured_curves, vignetting
 from sim.phosphor import band_cells
 
 
 @pytest.mark.parametrize("seed", range(8))
 def test_curves_are_bent_by_2_to_6_percent(seed: int) -> None:
-    true = shipped_curves().sensitivity
+    true = measured_curves().sensitivity
     bent = bent_curves(np.random.default_rng(seed)).sensitivity
     assert bent.min() >= 0
     assert bent.max(axis=1) == pytest.approx(true.max(axis=1))
@@ -26,7 +26,7 @@ def test_curves_are_bent_by_2_to_6_percent(seed: int) -> None:
 
 
 def test_shipped_curves_peak_where_the_camera_does() -> None:
-    peaks_nm = WAVELENGTH_NM[shipped_curves().sensitivity.argmax(axis=1)]
+    peaks_nm = WAVELENGTH_NM[measured_curves().sensitivity.argmax(axis=1)]
     assert peaks_nm == pytest.approx([600, 520, 460], abs=15)
 
 

@@ -186,6 +186,58 @@ def test_a_dead_lamp_charges_nothing() -> None:
     assert middle(shoot(room, clock)) == pytest.approx(0, abs=3)
 
 
+def test_a_bulb_blows_and_makes_contact_again() -> None:
+    room, clock = make_room(faults=[{"lamp_dead": {"at": "60 s", "for": "30 s"}}])
+    room.switch_lamp(True)
+    lit = []
+    for at_s in (50.0, 80.0, 100.0):
+        clock.spend(at_s - clock.now())
+        lit.append(middle(shoot(room, clock, exposure_s=2**-6, iso=100, f_number=5.6)).max() > 1000)
+        assert room.lamp_on, "the relay feeds it all the time"
+    assert lit == [True, False, True]
+
+
+def test_a_dead_contact_feeds_nothing() -> None:
+    room, clock = make_room(faults=[{"relay_dead": {"at": "10 s", "for": "10 s"}}])
+    room.switch_lamp(True)
+    fed = []
+    for at_s in (5.0, 15.0, 25.0):
+        clock.spend(at_s - clock.now())
+        fed.append(room.lamp_on)
+    assert fed == [True, False, True]
+
+
+def test_a_welded_contact_stays_closed_until_it_lets_go() -> None:
+    room, clock = make_room(faults=[{"relay_welded": {"at": "10 s", "for": "50 s"}}])
+    fed = []
+    for at_s, asked in ((0, True), (5, False), (15, None), (20, True), (30, False), (61, None)):
+        clock.spend(at_s - clock.now())
+        if asked is not None:
+            room.switch_lamp(asked)
+        fed.append(room.lamp_on)
+    assert fed == [True, False, False, True, True, False], "welding alone does not close it"
+
+
+def test_a_contact_that_was_welded_before_the_room_was_opened_is_closed() -> None:
+    simulation = Simulation.model_validate({**SMALL, "faults": [{"relay_welded": {"at": "10 s"}}]})
+    later = simulation.opened_at(simulation.epoch.timestamp() + 20.0)
+    room = Room(later, VirtualClock(later.epoch.timestamp()))
+    assert room.lamp_on
+    room.switch_lamp(False)
+    assert room.lamp_on
+
+
+def test_light_left_on_is_photographed_and_charges() -> None:
+    room, clock = make_room(faults=[{"light_left_on": {"at": "10 s", "for": "600 s"}}])
+    seen = []
+    for at_s in (5.0, 300.0, 611.0):
+        clock.spend(at_s - clock.now())
+        seen.append(middle(shoot(room, clock, exposure_s=2**-4)).max())
+    assert seen[0] == pytest.approx(0, abs=3)
+    assert 500 < seen[1] < 10_000
+    assert 5 < seen[2] < 0.2 * seen[1]
+
+
 def test_a_residual_glow_can_be_set() -> None:
     room, clock = make_room(initial={"concentration": 0.5})
     assert middle(shoot(room, clock)).max() > 5000

@@ -1,5 +1,6 @@
 """The `simulation:` section: defaults that suffice, and mistakes that are named."""
 
+import math
 from pathlib import Path
 
 import pytest
@@ -49,6 +50,43 @@ def test_written_and_read_is_the_same(tmp_path: Path) -> None:
     assert read_model(tmp_path / "simulation.yaml", Simulation) == simulation
 
 
+FAULTS = """
+sample: bottle
+epoch: 2026-01-01T00:00:00Z
+faults:
+  - lamp_dead
+  - relays_unplugged: {at: 10 min, for: 20 s}
+  - clock_ahead: {at: 5 min, by: 1 h}
+  - clock_back: {at: 2 h, by: 10 min}
+"""
+
+
+def test_faults_have_names_and_times(tmp_path: Path) -> None:
+    simulation = parsed(FAULTS)
+    dead, unplugged, *_ = simulation.faults
+    assert dead.lamp_dead is not None
+    assert (dead.lamp_dead.at, dead.lamp_dead.until) == (0.0, math.inf)
+    assert unplugged.relays_unplugged is not None
+    assert [unplugged.relays_unplugged.is_on(t) for t in (599, 600, 619, 620)] == [
+        False, True, True, False,
+    ]  # fmt: skip
+    write_yaml(tmp_path / "simulation.yaml", simulation)
+    assert read_model(tmp_path / "simulation.yaml", Simulation) == simulation
+
+
+def test_faults_keep_to_the_wall_when_a_room_is_opened_later() -> None:
+    simulation = parsed(FAULTS)
+    opened_s = simulation.epoch.timestamp()
+    assert simulation.opened_at(opened_s - 10) is simulation
+    assert simulation.wall_at_opening_s == opened_s
+    later = simulation.opened_at(opened_s + 610)
+    unplugged = later.faults[1].relays_unplugged
+    assert unplugged is not None
+    assert (unplugged.is_on(0.0), unplugged.is_on(10.0)) == (True, False)
+    assert later.wall_at_opening_s == opened_s + 610 + 3600, "the PC's clock was put forward"
+    assert simulation.opened_at(opened_s + 7200).wall_at_opening_s == opened_s + 7200 + 3000
+
+
 @pytest.mark.parametrize(
     ("text", "said"),
     [
@@ -56,6 +94,17 @@ def test_written_and_read_is_the_same(tmp_path: Path) -> None:
         ("sample: []", "at least 1 item"),
         ("sample: [{materal: bottle}]", "did you mean 'material'?"),
         ("{sample: bottle, faults: [lamp_ded]}", "did you mean 'lamp_dead'?"),
+        ("{sample: bottle, faults: [lamp_dead: {att: 5 s}]}", "did you mean 'at'?"),
+        ("{sample: bottle, faults: [lamp_dead: {at: 5}]}", "a quantity with its unit"),
+        ("{sample: bottle, faults: [{lamp_dead: , relay_dead: }]}", "one fault in each item"),
+        (
+            "{sample: bottle, faults: [disk_full: {at: 5 s, after_bytes: 3}]}",
+            "expected 'at' or 'after_bytes', got both",
+        ),
+        (
+            "{sample: bottle, faults: [camera_unplugged, camera_unplugged: {at: 5 s}]}",
+            "comes out once",
+        ),
         ("{sample: bottle, sensor: {width: 97}}", "expected an even number of pixels"),
         ("{sample: bottle, initial: {lamp: perhaps}}", "'off' or 'on', got 'perhaps'"),
         ("{sample: bottle, initial_charge: 1}", "less than 1, got '1'"),

@@ -1,0 +1,195 @@
+"""Fills a run folder: unit after unit, and once more where a device was lost and came back."""
+
+import signal
+from collections import Counter
+from collections.abc import Callable, Sequence
+from contextlib import AbstractContextManager
+from dataclasses import dataclass, field
+from importlib.metadata import version
+from typing import Any, Protocol
+
+from labrig.acquire import Checkable, Plan, ProtocolModel, Rig, RunObserver, Unit, run_units
+from labrig.bench import Bench
+from labrig.clock import Clock, Interrupted
+from labrig.errors import (
+    DataError,
+    DeviceError,
+    DeviceLostError,
+    DiskError,
+    LabrigError,
+    ProtocolError,
+)
+from labrig.quantity import duration_text
+from labrig.record import RunFolder
+from labrig.signals import interrupting
+
+#: How long a lost device is waited for: somebody has to notice and walk to the bench.
+COMES_BACK_S = 300.0
+LOOK_PERIOD_S = 2.0
+#: A unit that has lost a device so often is not going to get through.
+MOST_LOSSES = 3
+
+
+class Watch(Protocol):
+    """Tells a person what is going on: given the plan, the units already complete, the clock."""
+
+    def __call__(
+        self, plan: Plan, done: Sequence[str], clock: Clock
+    ) -> AbstractContextManager[RunObserver]:
+        """The observer of one run."""
+
+
+def fill(
+    folder: RunFolder, protocol: ProtocolModel, stand: Bench, laid_out: Plan, watch: Watch
+) -> None:
+    """Do all units that `folder` lacks; a unit cut off by a crash or a lost device is done again.
+
+    Raises
+    ------
+    Interrupted, LabrigError
+        After the safe state was reached; the text says what is kept and how to go on.
+    """
+    dead = folder.close_open_attempts(
+        stand.clock.wall, "abort", "labrig ended before this attempt did; closed at resume"
+    )
+    record = folder.read()
+    done = record.completed()
+    # More signals while the attempt is being closed must not cut that short.
+    with interrupting(stand.clock), watch(laid_out, list(done), stand.clock) as observer:
+        for unit in dead:
+            observer.warn(f"the unit {unit} was cut off and is done again")
+        if record.last_time > stand.clock.wall():
+            observer.warn(
+                "the clock of this PC was set back since the run began: times of day in its journal "
+                "go back, durations are right"
+            )
+        units = protocol.units()
+        if all(unit.name in done for unit in units):
+            return
+        metadata = {
+            "protocol": protocol.protocol,
+            "sample": protocol.sample.name,
+            "labrig_version": version("labrig"),
+        }
+
+        def use(rig: Rig) -> None:
+            _refuse_what_spoils(rig)
+            devices = rig.identities()
+            _tell_what_was_exchanged(folder, devices, observer)
+            run_units(
+                units, rig, folder, observer, {**metadata, "rig": rig.name, "devices": devices}
+            )
+
+        try:
+            _Reconnecting(stand, folder, observer).run(use)
+        except Interrupted as stop:
+            _close(folder, stand, "abort", f"signal {stop.signum}")
+            name = signal.Signals(stop.signum).name
+            raise Interrupted(
+                stop.signum, f"stopped by {name}, safe state reached; {_kept(folder, units)}"
+            ) from None
+        except LabrigError as error:
+            _close(folder, stand, "fail", str(error))
+            error.args = (f"{error}; {_kept(folder, units)}",)
+            raise
+
+
+@dataclass
+class _Reconnecting:
+    """Connects, and connects again when a device was lost: unplugged, asleep, switched off."""
+
+    stand: Bench
+    folder: RunFolder
+    observer: RunObserver
+    losses: Counter[str] = field(default_factory=Counter)
+
+    def run(self, use: Callable[[Rig], None]) -> None:
+        """Have `use` do what is left to do, on devices that are all there.
+
+        Raises
+        ------
+        DeviceError
+            A device was missing from the start, did not come back, or was lost too often.
+        """
+        lost: DeviceLostError | None = None
+        back_by_s = 0.0
+        while True:
+            connected = False
+            try:
+                with self.stand.devices() as rig:
+                    connected = True
+                    use(rig)
+                return
+            except DeviceError as error:
+                if connected and isinstance(error, DeviceLostError) and not _stopped(error):
+                    lost, back_by_s = error, self.stand.clock.now() + COMES_BACK_S
+                    self._give_up_units(error)
+                elif connected or lost is None:
+                    raise
+                elif self.stand.clock.now() >= back_by_s:
+                    raise lost from error
+            self.stand.clock.sleep(LOOK_PERIOD_S)
+
+    def _give_up_units(self, error: DeviceLostError) -> None:
+        """Close what was under way, so that it is done again; not for ever."""
+        units = self.folder.close_open_attempts(self.stand.clock.wall, "fail", str(error))
+        self.losses.update(units or ["between units"])
+        if max(self.losses.values()) >= MOST_LOSSES:
+            raise error
+        again = "".join(f"; the unit {unit} is done again" for unit in units)
+        self.observer.warn(
+            f"{error}; waiting up to {duration_text(COMES_BACK_S)} for it to come back{again}"
+        )
+
+
+def _stopped(error: BaseException) -> bool:
+    """Whether somebody asked to stop, and the way to the safe state then met `error`."""
+    before = error.__context__
+    return before is not None and (isinstance(before, Interrupted) or _stopped(before))
+
+
+def _refuse_what_spoils(rig: Rig) -> None:
+    """Raise `ProtocolError` if a device is set so that its data could not be trusted."""
+    spoilers = [
+        f"{key}: {finding}"
+        for key, device in rig.devices.items()
+        if isinstance(device, Checkable)
+        for finding in device.findings()
+        if finding.severity == "refuse"
+    ]
+    if spoilers:
+        raise ProtocolError("this would spoil the measurement: " + "; ".join(spoilers))
+
+
+def _tell_what_was_exchanged(
+    folder: RunFolder, devices: dict[str, str], observer: RunObserver
+) -> None:
+    """Dark frames of one camera are none for another."""
+    before: dict[str, Any] = {}
+    for attempt in folder.read().completed().values():
+        before |= attempt.start.get("devices", {})
+    for key, identity in devices.items():
+        if before.get(key, identity) != identity:
+            observer.warn(
+                f"{key}: completed units of this run were made with {before[key]}, now it is "
+                f"{identity}; their frames do not belong together"
+            )
+
+
+def _close(folder: RunFolder, stand: Bench, exit_status: str, reason: str) -> None:
+    """Close the attempt; a full disk must not hide why the run ended."""
+    try:
+        folder.close_open_attempts(stand.clock.wall, exit_status, reason)
+    except (DiskError, DataError):
+        return
+
+
+def _kept(folder: RunFolder, units: Sequence[Unit]) -> str:
+    record = folder.read()
+    if not record.attempts:
+        return "nothing was recorded"
+    done = len(record.completed())
+    return (
+        f"{done} of {len(units)} units are complete and kept; go on with: "
+        f"labrig resume {folder.path}"
+    )

@@ -1,0 +1,210 @@
+"""Whether what is photographed after lamp off is a glow: seen, fading, as bright as expected.
+
+The relay only says what its register holds. That the lamp lit, and that it went out, is seen in
+the frames.
+"""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import Enum
+
+import numpy as np
+import numpy.typing as npt
+
+from labrig.errors import DeviceError
+
+from .darkness import clips, levels
+from .metering import Look
+
+FloatArray = npt.NDArray[np.float64]
+
+#: A glow is seen when it is so many standard uncertainties and so many counts above darkness.
+SEEN_SIGMA = 5.0
+SEEN_DN = 1.0
+#: In so many seconds every phosphor that was just charged fades by more than two per cent.
+LEAST_S = 10.0
+FADED = 0.02
+#: And by so much between two looks `LOOK_AGAIN_S` apart, that are taken in doubt.
+FADED_IN_DOUBT = 0.05
+LOOK_AGAIN_S = 60.0
+#: Noise of the two levels compared, above which nothing can be said.
+MOST_NOISE = 0.01
+#: So many shutter times at the begin of the metering's ladder are too short for any glow to clip.
+SHORT = 3
+#: A glow that stays level in the second half of a decay at more than this share of its first frame
+#: may be another light.
+LINGERING = 0.2
+#: A glow below this share of what it was before was not charged like that.
+WEAK = 0.5
+
+
+class Afterglow(Enum):
+    """What the frames after lamp off show."""
+
+    FADING = "fading"
+    LINGERING = "fading to a level that stays"
+    CLIPPED = "too bright to see it fade"
+    ABSENT = "no glow"
+    WEAK = "weaker than before"
+    STEADY = "not fading"
+
+    def __str__(self) -> str:
+        return self.value
+
+    def insist(self, warn: Callable[[str], None]) -> None:
+        """Refuse what is no decay of a charged sample, and tell of what looks wrong.
+
+        Raises
+        ------
+        DeviceError
+            Says what to look at.
+        """
+        if self in _REFUSED:
+            raise DeviceError(_REFUSED[self])
+        if self in _TOLD:
+            warn(_TOLD[self])
+
+
+_REFUSED = {
+    Afterglow.ABSENT: "nothing glows after the charge: the lamp did not light (check its bulb, its "
+    "plug and the contact of its relay), or the patches hold nothing that glows at these settings "
+    "(raise camera.iso or open the aperture)",
+    Afterglow.STEADY: "what the camera sees does not fade after lamp off: the lamp still burns "
+    "although its relay reads off (pull its plug, the contact may be welded), or another light "
+    "is on",
+}
+
+
+_TOLD = {
+    Afterglow.WEAK: "the glow is less than half of what it was before: the lamp may have gone out "
+    "while charging or stayed on too long before (check its bulb and its relay), or lamp, sample "
+    "or camera was moved; amplitudes are not to be trusted",
+    Afterglow.LINGERING: "the second half of the decay stays at one level: a light may have come "
+    "on, or a state lives much longer than the decay was recorded",
+}
+
+
+@dataclass(frozen=True)
+class Glow:
+    """One frame after lamp off, in DN per second of all channels of all patches, above darkness.
+
+    Attributes
+    ----------
+    at_s
+        Middle of the exposure, after the planned begin of the first frame.
+    """
+
+    at_s: float
+    exposure_s: float
+    rate: FloatArray
+    sigma: FloatArray
+    clips: bool
+
+    @property
+    def brightest(self) -> float:
+        """Rate of the brightest channel of the brightest patch."""
+        return float(self.rate.max())
+
+    @property
+    def seen(self) -> bool:
+        """Whether there is any light."""
+        least = np.maximum(SEEN_SIGMA * self.sigma, SEEN_DN / self.exposure_s)
+        return self.clips or bool(np.any(self.rate > least))
+
+
+def glow(seen: Look, dark: FloatArray, zero_s: float) -> Glow:
+    """What `seen` shows above the level `dark`, of shape (patches, channels), in DN."""
+    sigma = np.array([[c.sigma for c in patch.channels.values()] for patch in seen.patches])
+    return Glow(
+        at_s=seen.start_s + seen.exposure_s / 2 - zero_s,
+        exposure_s=seen.exposure_s,
+        rate=((levels(seen) - dark) / seen.exposure_s).ravel(),
+        sigma=(sigma / seen.exposure_s).ravel(),
+        clips=clips(seen),
+    )
+
+
+def dark_level(darks: Sequence[Look], exposure_s: float) -> FloatArray:
+    """Level of dark frames of that shutter time, straight between those that were taken."""
+    times_s = sorted({look.exposure_s for look in darks})
+    mean = np.array(
+        [
+            np.mean([levels(look) for look in darks if look.exposure_s == time_s], axis=0)
+            for time_s in times_s
+        ]
+    )
+    return np.apply_along_axis(lambda level: np.interp(exposure_s, times_s, level), 0, mean)
+
+
+def metered(glows: Sequence[Glow]) -> Afterglow:
+    """What a ladder of exposures shows, by rising shutter time."""
+    if not any(glow.seen for glow in glows):
+        return Afterglow.ABSENT
+    if any(glow.clips for glow in glows[:SHORT]):
+        return Afterglow.CLIPPED
+    return Afterglow.FADING
+
+
+def decayed(
+    first: Sequence[Glow], middle: Glow, last: Sequence[Glow], before: Sequence[Glow]
+) -> Afterglow:
+    """What some frames of a decay show.
+
+    Parameters
+    ----------
+    first, middle, last
+        Where in the decay they were taken.
+    before
+        Of the metering, or of an earlier decay: what the first frame is held against.
+    """
+    start, end = first[0], last[-1]
+    if not any(glow.seen for glow in first):
+        return Afterglow.ABSENT
+    if end.clips:
+        return Afterglow.CLIPPED
+    if start.clips:
+        return Afterglow.FADING
+    if start.brightest < WEAK * _expected(start, before):
+        return Afterglow.WEAK
+    if _is_steady(first, last, FADED):
+        return Afterglow.STEADY
+    lingers = end.brightest > LINGERING * start.brightest and _is_steady([middle], last, FADED)
+    return Afterglow.LINGERING if lingers else Afterglow.FADING
+
+
+def looked_at(looks: Sequence[Glow], again: Sequence[Glow]) -> Afterglow:
+    """What looks in doubt show, and the same shutter times after a while."""
+    pairs = [pair for pair in zip(looks, again, strict=True) if not pair[0].clips]
+    if not pairs:
+        return Afterglow.STEADY
+    before, after = pairs[-1]
+    steady = after.clips or _is_steady([before], [after], FADED_IN_DOUBT)
+    return Afterglow.STEADY if steady else Afterglow.FADING
+
+
+def went_out(lit: Glow, after: Glow) -> bool:
+    """Whether a frame after lamp off is darker than the same under the lamp."""
+    brightest = int(np.argmax(lit.rate))
+    if lit.clips or not lit.seen:
+        return not after.clips
+    return bool(after.rate[brightest] < (1 - FADED) * lit.rate[brightest])
+
+
+def _is_steady(first: Sequence[Glow], last: Sequence[Glow], faded: float) -> bool:
+    """Whether it is certain that the brightest channel has not faded by so much."""
+    brightest = int(np.argmax(first[0].rate))
+    before = float(np.mean([glow.rate[brightest] for glow in first]))
+    after = float(np.mean([glow.rate[brightest] for glow in last]))
+    noise = max(float(glow.sigma[brightest]) for glow in (*first, *last))
+    long_enough = last[-1].at_s - first[0].at_s > LEAST_S
+    return long_enough and noise < MOST_NOISE * before and after > (1 - faded) * before
+
+
+def _expected(first: Glow, before: Sequence[Glow]) -> float:
+    """Rate of the brightest channel at that time, log-linear between what was seen before; or 0."""
+    brightest = int(np.argmax(first.rate))
+    seen = [glow for glow in before if glow.seen and not glow.clips and glow.rate[brightest] > 0]
+    if not seen:
+        return 0.0
+    log_rate = np.log([glow.rate[brightest] for glow in seen])
+    return float(np.exp(np.interp(first.at_s, [glow.at_s for glow in seen], log_rate)))

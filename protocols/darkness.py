@@ -1,0 +1,148 @@
+"""Whether it is dark before anything is charged: what the dark frames say about light."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+import numpy.typing as npt
+
+from labrig.errors import DataError, DeviceError
+from labrig.quantity import duration_text
+
+from .metering import Look
+
+FloatArray = npt.NDArray[np.float64]
+
+#: No camera's black level is off by more, as a share of the range between black and white.
+BLACK_ERROR = 0.005
+#: No sensor makes more in the dark, per second at ISO 100, as a share of the range: 10 electrons
+#: of some 60 000. A 5D Mark II comes to that at 50 °C.
+DARK_CURRENT_PER_S = 2e-4
+#: From this share of the range on it is no leak or last glow that a dark frame takes care of.
+BRIGHT = 0.25
+#: A glow is known by fading by so much along the dark frames; shutters flicker by a third of it.
+FADED = 0.03
+#: A frame in which so many pixels clip is no longer a measurement; hot pixels are fewer.
+CLIPPED = 0.01
+
+
+@dataclass(frozen=True)
+class Darkness:
+    """What is left of light.
+
+    Attributes
+    ----------
+    light
+        Share of the range that it fills in `exposure_s` seconds, beyond what a sensor makes in the
+        dark: 0 is dark, 1 clips.
+    exposure_s
+        Longest shutter time of the dark frames.
+    fades
+        Whether it gets less from frame to frame, as a glow does and a lamp does not.
+    """
+
+    light: float
+    exposure_s: float
+    fades: bool
+
+    def __str__(self) -> str:
+        if not self.light:
+            return "dark"
+        fading = ", fading" if self.fades else ""
+        return f"{self.light:.1%} of the range in {duration_text(self.exposure_s)}{fading}"
+
+    @property
+    def is_bright(self) -> bool:
+        """Whether dark frames cannot take care of it."""
+        return self.light >= BRIGHT
+
+    @property
+    def is_doubtful(self) -> bool:
+        """Whether it may be a lamp, or a glow that fades too slowly for these frames."""
+        return self.is_bright and not self.fades
+
+    def insist(self, warn: Callable[[str], None]) -> None:
+        """Refuse to go on where nothing could be measured, and tell of what is merely untidy.
+
+        Raises
+        ------
+        DeviceError
+            A light is on: the lamp may be, and then nobody is safe.
+        DataError
+            The sample still glows too brightly.
+        """
+        if self.is_doubtful:
+            raise DeviceError(
+                f"the dark frames are not dark ({self}) and do not fade: a light is on in the "
+                "room, or the lamp burns although its relay reads off: look, switch it off or "
+                "pull its plug"
+            )
+        if self.is_bright:
+            raise DataError(
+                f"the sample still glows too brightly for dark frames ({self}); leave it in the "
+                "dark for longer"
+            )
+        if self.light and self.fades:
+            warn(
+                f"the sample still glows from earlier ({self}): the dark frames hold some of it; "
+                "longer in the dark before a run is better"
+            )
+        elif self.light:
+            warn(
+                f"the dark frames are not dark ({self}): some light is left, or the sample still "
+                "glows; it is subtracted as long as it stays the same"
+            )
+
+
+DARK = Darkness(0.0, 0.0, fades=False)
+
+
+def darkness(looks: Sequence[Look], iso: int) -> Darkness:
+    """What dark frames show beyond what a sensor makes without light.
+
+    The level of the shortest exposure is taken as black, so that no wrong black level in a file
+    and no hot pixel looks like light; with one exposure, what the file calls black.
+    """
+    shortest_s = min(look.exposure_s for look in looks)
+    longest_s = max(look.exposure_s for look in looks)
+    open_s = max((look.exposure_s for look in looks if not clips(look)), default=0.0)
+    if not open_s:
+        return Darkness(1.0, longest_s, fades=False)
+    shortest = [look for look in looks if look.exposure_s == shortest_s]
+    black = _black(shortest, others=shortest_s < open_s)
+    series = [levels(look) - black for look in looks if look.exposure_s == open_s]
+    brightest = np.argmax(series[0])
+    level = np.array([each.flat[brightest] for each in series]) / range_dn(looks[0])
+    half = max(len(level) // 2, 1)
+    fades = bool(level[-half:].mean() < (1 - FADED) * level[:half].mean())
+    light = float(level.mean()) if open_s == longest_s else 1.0
+    if light < BLACK_ERROR + DARK_CURRENT_PER_S * longest_s * iso / 100:
+        return DARK
+    return Darkness(light, longest_s, fades)
+
+
+def _black(shortest: Sequence[Look], others: bool) -> FloatArray:
+    """Level without light, in DN above what the file calls black."""
+    mean: FloatArray = np.mean([levels(look) for look in shortest], axis=0)
+    told = max(shortest[0].patches[0].black) > 0
+    return mean if others or not told else np.zeros_like(mean)
+
+
+def levels(look: Look) -> FloatArray:
+    """Means in DN above black, shape (patches, channels)."""
+    return np.array([[c.mean for c in patch.channels.values()] for patch in look.patches])
+
+
+def clips(look: Look) -> bool:
+    """Whether some channel of some patch is too bright for its shutter time."""
+    return any(
+        channel.saturated > CLIPPED * channel.n
+        for patch in look.patches
+        for channel in patch.channels.values()
+    )
+
+
+def range_dn(look: Look) -> float:
+    """From black to white."""
+    one = look.patches[0]
+    return one.white - max(one.black)

@@ -1,0 +1,223 @@
+"""Holds the frames of a unit against what lamp, relay, room and disk should have done."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field, replace
+from pathlib import Path
+
+import numpy as np
+
+from labrig.acquire import LAMP_OFF, ExposureSettings, Session, Shoot, at
+from labrig.errors import DeviceError
+from labrig.quantity import duration_text
+from labrig.record import FrameRecord
+from labrig.region import Region
+
+from .afterglow import (
+    LOOK_AGAIN_S,
+    Afterglow,
+    Glow,
+    dark_level,
+    decayed,
+    glow,
+    looked_at,
+    metered,
+    went_out,
+)
+from .darkness import DARK, Darkness, darkness, levels
+from .metering import Look, look
+
+#: A lamp has gone dark by then; a halogen lamp takes a third of it.
+LAMP_GONE_S = 1.0
+#: Frames that begin so late are told of; a PC's own tails are shorter.
+LATE_S = 0.1
+
+
+@dataclass(frozen=True)
+class Watcher:
+    """Judges by what was recorded and nothing else, so that a resumed run judges alike.
+
+    Attributes
+    ----------
+    session, unit
+        The unit's session, and its name.
+    patches
+        Where the samples lie.
+    background
+        A region that never glows, where it takes the place of dark frames.
+    """
+
+    session: Session
+    unit: str
+    patches: Sequence[Region]
+    background: Region | None
+    _looks: dict[Path, Look] = field(default_factory=dict)
+
+    def insist_on_darkness(self, shorter: Sequence[ExposureSettings]) -> None:
+        """Refuse to charge where the dark frames of this unit show that a light is on.
+
+        Parameters
+        ----------
+        shorter
+            For a closer look in doubt.
+
+        Raises
+        ------
+        DeviceError, DataError
+            As `Darkness.insist`.
+        """
+
+        def decide() -> Darkness:
+            frames = self._own("dark")
+            longest_s = max(frame.exposure_s for frame in frames)
+            longest = [frame for frame in frames if frame.exposure_s == longest_s]
+            looks = [self._look(frame) for frame in (*_one_each(frames), *longest[1:])]
+            return darkness(looks, frames[0].iso)
+
+        found = self.session.choose("light before charging", decide, worst=DARK)
+        if found.is_doubtful:
+            found = replace(found, fades=self._closer_look(shorter) is Afterglow.FADING)
+        found.insist(self.session.warn)
+
+    def insist_on_glow(self, shorter: Sequence[ExposureSettings]) -> None:
+        """Refuse a metering after which nothing glows, or something does not fade.
+
+        Raises
+        ------
+        DeviceError
+            As `Afterglow.insist`.
+        """
+        self._insist(lambda: metered(self._glows(self._own("meter"))), shorter)
+
+    def insist_on_decay(self, shorter: Sequence[ExposureSettings]) -> None:
+        """Refuse a decay that is none; as `insist_on_glow`."""
+
+        def decide() -> Afterglow:
+            frames = self._own("decay")
+            middle = len(frames) // 2
+            some = min(2, middle)
+            chosen = [*frames[:some], frames[middle], *frames[-some:]]
+            glows = self._glows(chosen)
+            return decayed(glows[:some], glows[some], glows[some + 1 :], self._before())
+
+        self._insist(decide, shorter)
+
+    def switch_off(self, under_lamp: Sequence[ExposureSettings]) -> None:
+        """Switch the lamp off after photographs under it, and see that it has gone out.
+
+        Parameters
+        ----------
+        under_lamp
+            Of the photographs, by rising exposure.
+
+        Raises
+        ------
+        DeviceError
+            It is as bright as before.
+        """
+
+        def longest_open() -> ExposureSettings:
+            lit = zip(under_lamp, self._glows(self._own("daylight")), strict=True)
+            fitting = [settings for settings, seen in lit if not seen.clips]
+            return fitting[-1] if fitting else under_lamp[0]
+
+        def gone_out() -> bool:
+            lit = self._own("daylight")[under_lamp.index(compared)]
+            return went_out(*self._glows([lit, *self._own("look")]))
+
+        compared = self.session.choose("frame to compare with", longest_open, under_lamp[-1])
+        look_again = Shoot("look", compared)
+        self.session.run_sequence([at(0.0, LAMP_OFF), at(LAMP_GONE_S, look_again)])
+        if not self.session.choose("lamp has gone out", gone_out, worst=True):
+            raise DeviceError(
+                "it is as bright after lamp off as before: the lamp still burns although its relay "
+                "reads off (pull its plug, the contact may be welded), or it did not light at all"
+            )
+
+    def tell_of_delays(self, times_s: Sequence[float]) -> None:
+        """Say if frames of the decay began late, and whether the disk was why.
+
+        Parameters
+        ----------
+        times_s
+            When each was to begin after lamp off.
+        """
+        frames = self._own("decay")
+        if not frames:
+            return  # the plan takes none
+        # A busy camera releases late, though it was asked in time: the begins themselves count.
+        lags_s = np.array([frame.start_time for frame in frames]) - times_s
+        lamp_off_s = min(lag_s - frame.late_s for lag_s, frame in zip(lags_s, frames, strict=True))
+        late_s = lags_s - lamp_off_s
+        if late_s.max() <= LATE_S:
+            return
+        said = (
+            f"{np.count_nonzero(late_s > LATE_S)} of {len(frames)} frames began late, up to "
+            f"{duration_text(float(late_s.max()))}"
+        )
+        disk_s = max(frame.disk_s for frame in frames)
+        if disk_s > LATE_S:
+            said += (
+                f": the disk cannot keep up, it took up to {duration_text(disk_s)} for a frame "
+                "(use another disk, or leave more time between frames)"
+            )
+        self.session.warn(f"{said}; all are kept, with the times at which they were taken")
+
+    def _insist(self, decide: Callable[[], Afterglow], shorter: Sequence[ExposureSettings]) -> None:
+        found = self.session.choose("after lamp off", decide, worst=Afterglow.FADING)
+        if found is Afterglow.CLIPPED:
+            found = self._closer_look(shorter)
+        found.insist(self.session.warn)
+
+    def _closer_look(self, shorter: Sequence[ExposureSettings]) -> Afterglow:
+        """Whether it fades: the same frames, and again after a while."""
+
+        def decide() -> Afterglow:
+            glows = self._glows(self._own("look"))
+            return looked_at(glows[: len(shorter)], glows[len(shorter) :])
+
+        self._shoot(shorter)
+        self.session.wait(LOOK_AGAIN_S, "is it a lamp, or does it fade?")
+        self._shoot(shorter)
+        return self.session.choose("a closer look", decide, worst=Afterglow.FADING)
+
+    def _shoot(self, settings: Sequence[ExposureSettings]) -> None:
+        for one in settings:
+            self.session.perform(Shoot("look", one))
+
+    def _own(self, purpose: str) -> list[FrameRecord]:
+        return [frame for frame in self.session.frames(purpose) if frame.unit == self.unit]
+
+    def _before(self) -> list[Glow]:
+        """Of the metering, else the begin of the first decay that is complete."""
+        metering, decays = self.session.frames("meter"), self.session.frames("decay")
+        if not metering and decays[0].unit == self.unit:
+            return []
+        return self._glows(metering or decays[:2])
+
+    def _glows(self, frames: Sequence[FrameRecord]) -> list[Glow]:
+        """Times count from the planned begin of the first of them."""
+        zero_s = frames[0].start_time - frames[0].late_s
+        darks = [self._look(frame) for frame in _one_each(self.session.frames("dark"))]
+        if darks and darkness(darks, frames[0].iso).light:
+            darks = []  # they hold an earlier glow
+        return [self._glow(frame, darks, zero_s) for frame in frames]
+
+    def _glow(self, frame: FrameRecord, darks: Sequence[Look], zero_s: float) -> Glow:
+        seen = self._look(frame)
+        if self.background is not None:
+            without = Look(seen.start_s, seen.exposure_s, seen.patches[:-1])
+            return glow(without, levels(seen)[-1], zero_s)
+        dark = dark_level(darks, frame.exposure_s) if darks else np.zeros(levels(seen).shape)
+        return glow(seen, dark, zero_s)
+
+    def _look(self, frame: FrameRecord) -> Look:
+        """At a frame, the background last if there is one; once, since reading takes a second."""
+        if frame.path not in self._looks:
+            regions = self.patches if self.background is None else [*self.patches, self.background]
+            self._looks[frame.path] = look(frame, regions)
+        return self._looks[frame.path]
+
+
+def _one_each(frames: Sequence[FrameRecord]) -> list[FrameRecord]:
+    """The first frame of each shutter time."""
+    return list({frame.exposure_s: frame for frame in reversed(frames)}.values())

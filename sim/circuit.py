@@ -1,0 +1,82 @@
+"""From the register of the relay board to the filament: a contact, a bulb, and what ails them."""
+
+from collections.abc import Sequence
+
+from labrig.clock import VirtualClock
+
+from .faults import Fault, When, given
+from .lamp import Lamp
+from .simulation import LampSettings
+
+
+class LampCircuit:
+    """The lamp behind its relay.
+
+    Nothing runs in the background: what has become of contact and bulb is worked out when
+    somebody asks.
+
+    Parameters
+    ----------
+    settings
+        Of the lamp.
+    asked_on
+        What the register says when the room is opened.
+    faults
+        `lamp_dead`, `relay_dead` and `relay_welded` are the circuit's.
+    clock
+        The room's.
+    """
+
+    def __init__(
+        self, settings: LampSettings, asked_on: bool, faults: Sequence[Fault], clock: VirtualClock
+    ) -> None:
+        self._clock = clock
+        self._bulb_dead = given(fault.lamp_dead for fault in faults)
+        self._dead = given(fault.relay_dead for fault in faults)
+        self._welded = given(fault.relay_welded for fault in faults)
+        changes = {
+            time_s
+            for when in (*self._bulb_dead, *self._dead, *self._welded)
+            for time_s in (when.at, when.until)
+        }
+        self._changes_s = sorted(time_s for time_s in changes if time_s > 0)
+        self._asked_on = asked_on
+        # Welded before the room was opened: it was closed then, and has not let go.
+        self._closed = any(when.at < 0 and when.is_on(0.0) for when in self._welded)
+        self._closed = self._contact(0.0)
+        self._lamp = Lamp.found(settings, self._closed and not _any(self._bulb_dead, 0.0))
+
+    @property
+    def closed(self) -> bool:
+        """Whether the contact is closed now: whether the lamp has current, if its bulb is whole."""
+        self._follow()
+        return self._closed
+
+    @property
+    def lamp(self) -> Lamp:
+        """The lamp with its history up to now."""
+        self._follow()
+        return self._lamp
+
+    def ask(self, on: bool) -> None:
+        """The board's register changes now."""
+        self._follow()
+        self._asked_on = on
+        self._settle(self._clock.now())
+
+    def _follow(self) -> None:
+        while self._changes_s and self._changes_s[0] <= self._clock.now():
+            self._settle(self._changes_s.pop(0))
+
+    def _settle(self, time_s: float) -> None:
+        self._closed = self._contact(time_s)
+        burning = self._closed and not _any(self._bulb_dead, time_s)
+        self._lamp = self._lamp.switched(burning, time_s)
+
+    def _contact(self, time_s: float) -> bool:
+        stuck = self._closed and _any(self._welded, time_s)
+        return stuck or (self._asked_on and not _any(self._dead, time_s))
+
+
+def _any(whens: Sequence[When], time_s: float) -> bool:
+    return any(when.is_on(time_s) for when in whens)

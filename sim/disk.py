@@ -1,0 +1,61 @@
+"""The disk of the PC in the simulated room: the real one, behind what ails it."""
+
+import errno
+import os
+from collections.abc import Sequence
+from typing import BinaryIO
+
+from labrig.clock import VirtualClock
+
+from .faults import AfterBytes, Slowness
+
+
+class SimulatedDisk:
+    """Writes durably to the real disk, as slowly and as much as the faults allow.
+
+    Parameters
+    ----------
+    clock
+        The room's.
+    full
+        When no byte more fits; with `after_bytes`, a write is cut off at that byte.
+    slow
+        When each write takes its time.
+    """
+
+    def __init__(
+        self, clock: VirtualClock, full: Sequence[AfterBytes], slow: Sequence[Slowness]
+    ) -> None:
+        self._clock = clock
+        self._full = list(full)
+        self._slow = slow
+        self._written_bytes = 0
+
+    def write(self, file: BinaryIO, data: bytes) -> None:
+        """Append to an unbuffered file and wait until the disk has it.
+
+        Raises
+        ------
+        OSError
+            ENOSPC; what still fitted is in the file.
+        """
+        now_s = self._clock.now()
+        self._clock.spend(sum(slow.takes for slow in self._slow if slow.is_on(now_s)))
+        fits = self._fits(len(data))
+        file.write(data[:fits])
+        os.fsync(file.fileno())
+        self._written_bytes += fits
+        if fits < len(data):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+    def _fits(self, wanted: int) -> int:
+        """How many of so many bytes the disk has room for."""
+        now_s, fits = self._clock.now(), wanted
+        for number, full in enumerate(self._full):
+            if full.after_bytes is None:
+                fits = 0 if full.is_on(now_s) else fits
+            elif self._written_bytes + wanted > full.after_bytes:
+                fits = min(fits, full.after_bytes - self._written_bytes)
+                # From here on it is full until somebody makes room.
+                self._full[number] = full.model_copy(update={"at": now_s, "after_bytes": None})
+        return fits

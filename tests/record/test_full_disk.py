@@ -1,0 +1,120 @@
+"""A disk that takes part of what it is given: nothing acknowledged is lost, nothing torn kept."""
+
+import errno
+import itertools
+import os
+from collections.abc import Callable
+from pathlib import Path
+from typing import BinaryIO
+
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from labrig.errors import DiskError
+from labrig.record import RunFolder, read_run
+from labrig.record.attempt import AttemptWriter
+from labrig.record.journal import Journal, read_journal
+
+STARTED = 1_767_225_600.0
+
+
+class SmallDisk:
+    """Has room for so many bytes, and for any number again when somebody has made room."""
+
+    def __init__(self, room: float) -> None:
+        self.room = room
+
+    def write(self, file: BinaryIO, data: bytes) -> None:
+        fits = int(min(self.room, len(data)))
+        file.write(data[:fits])
+        self.room -= fits
+        if fits < len(data):
+            raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
+
+
+def photograph(writer: AttemptWriter, data: bytes) -> None:
+    writer.frame(
+        data, ".dng", purpose="decay", exposure_s=1.0, iso=400, f_number=4.0,
+        start_time=STARTED, end_time=STARTED + 1, late_s=0.0,
+    )  # fmt: skip
+
+
+def times_until_full(act: Callable[[int], None]) -> int:
+    for number in itertools.count():
+        try:
+            act(number)
+        except DiskError as error:
+            assert "No space left" in str(error)
+            return number
+    raise AssertionError
+
+
+@given(room=st.integers(0, 300))
+def test_a_line_that_was_cut_off_does_not_spoil_the_next(
+    tmp_path_factory: pytest.TempPathFactory, room: int
+) -> None:
+    path = tmp_path_factory.mktemp("run") / "journal.jsonl"
+    disk = SmallDisk(room)
+    with Journal(path, disk) as journal:
+        written = times_until_full(lambda number: journal.append("event", {"number": number}))
+        assert len(read_journal(path).documents) == written
+        disk.room = 1e9
+        journal.append("stop", {})
+    content = read_journal(path)
+    assert [name for name, _ in content.documents] == ["event"] * written + ["stop"]
+    assert not content.torn
+
+
+@settings(max_examples=40)
+@given(room=st.integers(0, 9000))
+def test_wherever_the_disk_fills_up_the_run_can_be_resumed(
+    tmp_path_factory: pytest.TempPathFactory, room: int
+) -> None:
+    runs = tmp_path_factory.mktemp("runs")
+    clock = itertools.count(int(STARTED))
+    disk = SmallDisk(1e9)
+    with RunFolder.create(runs, "test", STARTED, {"protocol.yaml": "a: 1\n"}, 1, disk) as folder:
+        disk.room = room
+        writers: list[AttemptWriter] = []
+
+        def go_on(number: int) -> None:
+            if number == 0:
+                writers.append(folder.attempt("decay-1", lambda: next(clock), {}))
+            else:
+                photograph(writers[0], bytes(700))
+
+        done = times_until_full(go_on)
+    assert list((folder.path / "frames").glob("*.part")) == []
+    with RunFolder(folder.path, 1) as again:
+        again.close_open_attempts(lambda: next(clock), "abort", "full")
+        writer = again.attempt("decay-1", lambda: next(clock), {})
+        photograph(writer, b"redone")
+        writer.stop("success")
+    record = read_run(folder.path)
+    cut_off = [len(attempt.frames) for attempt in record.attempts if not attempt.completed]
+    assert cut_off == ([done - 1] if done else [])
+    assert [frame.path.read_bytes() for frame in record.frames("decay")] == [b"redone"]
+    uids = [doc["uid"] for _, doc in read_journal(folder.path / "journal.jsonl").documents]
+    assert len(set(uids)) == len(uids)
+
+
+def test_no_half_made_run_folder_is_left(tmp_path: Path) -> None:
+    with pytest.raises(DiskError, match="a run folder cannot be made there"):
+        RunFolder.create(tmp_path, "test", STARTED, {"protocol.yaml": "a: 1\n"}, 1, SmallDisk(3))
+    assert list(tmp_path.iterdir()) == []
+
+
+def test_how_long_the_disk_took_is_recorded(tmp_path: Path) -> None:
+    now_s = [STARTED]
+
+    class SlowDisk(SmallDisk):
+        def write(self, file: BinaryIO, data: bytes) -> None:
+            now_s[0] += 2.5
+            super().write(file, data)
+
+    disk = SlowDisk(1e9)
+    with RunFolder.create(tmp_path, "test", STARTED, {}, 1, disk) as folder:
+        photograph(folder.attempt("decay-1", lambda: now_s[0], {}), b"x")
+        (attempt,) = folder.read().attempts
+    assert [frame.disk_s for frame in attempt.frames] == [2.5]

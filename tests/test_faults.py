@@ -1,0 +1,335 @@
+"""What happens on the bench when something fails: exit code, line, what is kept, the lamp."""
+
+import subprocess
+import sys
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from datetime import UTC, datetime
+from hashlib import sha256
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from labrig.bench import Bench, open_bench
+from labrig.clock import SystemClock
+from labrig.record import RunRecord, read_run
+from labrig.record.journal import read_journal
+from labrig.yaml_file import read_yaml
+from tests.conftest import Ended
+
+Make = Callable[..., Path]
+Labrig = Callable[..., Ended]
+
+
+@pytest.fixture
+def protocol(make_protocol: Make) -> Path:
+    return make_protocol(charge="30 s", exposure="1/4 s", **{"for": "20 s"})
+
+
+@pytest.fixture
+def metered(make_protocol: Make) -> Path:
+    return make_protocol("metered.yaml", charge="60 s", exposure="auto", daylight=True,
+                         **{"for": "20 s"})  # fmt: skip
+
+
+@pytest.fixture
+def rig(make_rig: Make) -> Callable[..., Path]:
+    """A bench that is warm in a moment, with these faults."""
+
+    def write(*faults: Any, **simulation: Any) -> Path:
+        path = make_rig(faults=list(faults), **simulation)
+        content = yaml.safe_load(path.read_text())
+        content["devices"]["lamp"]["warm_up"] = "5 s"
+        content["devices"]["camera"]["warm_up"] = "5 s"
+        path.write_text(yaml.safe_dump(content))
+        return path
+
+    return write
+
+
+@pytest.fixture
+def stands(monkeypatch: pytest.MonkeyPatch) -> list[Bench]:
+    """All benches that were opened: their rooms know whether the lamp burns."""
+    opened: list[Bench] = []
+
+    @contextmanager
+    def remembered(*arguments: Any, **keys: Any) -> Iterator[Bench]:
+        with open_bench(*arguments, **keys) as stand:
+            opened.append(stand)
+            yield stand
+
+    monkeypatch.setattr("labrig.run.open_bench", remembered)
+    return opened
+
+
+def lamp_is_on(stand: Bench) -> bool:
+    assert stand.room is not None
+    return stand.room.room.lamp_on
+
+
+def complaint(ended: Ended) -> str:
+    """The one line, or nothing."""
+    lines = [line for line in ended.err.splitlines() if not line.startswith("[")]
+    assert len(lines) == (ended.code != 0), ended.err
+    return "".join(lines)
+
+
+def recorded(runs: Path) -> RunRecord:
+    """The one run, all of whose acknowledged frames are there and what they were."""
+    (folder,) = runs.iterdir()
+    record = read_run(folder)
+    for attempt in record.attempts:
+        for frame in attempt.frames:
+            assert sha256(frame.path.read_bytes()).hexdigest() == frame.sha256
+    return record
+
+
+def without_faults(run: Path) -> None:
+    """Somebody mends what is broken."""
+    content = read_yaml(run / "rig.yaml")
+    content["simulation"] |= {"faults": [], "initial": {"lamp": "off"}}
+    (run / "rig.yaml").write_text(yaml.safe_dump(content))
+
+
+@pytest.fixture
+def moment(labrig: Labrig, rig: Make, tmp_path: Path) -> Callable[..., float]:
+    """When a lamp is switched in an undisturbed run of a protocol, seconds after the epoch."""
+
+    def find(protocol: Path, unit: str, action: str) -> float:
+        runs = tmp_path / "undisturbed"
+        assert labrig("run", protocol, "--rig", rig(), "--runs", runs, "--no-process").code == 0
+        actions = recorded(runs).completed()[unit].actions
+        epoch = datetime(2026, 1, 1, tzinfo=UTC).timestamp()
+        return next(each.start_time - epoch for each in actions if each.action == action)
+
+    return find
+
+
+@pytest.mark.parametrize(
+    ("fault", "code", "said", "kept"),
+    [
+        ("lamp_dead", 3, "the lamp did not light", ["dark"]),
+        ("relay_dead", 3, "the contact of its relay", ["dark"]),
+        ("light_left_on", 3, "a light is on in the room, or the lamp burns", []),
+        ("camera_busy", 3, "DeviceBusy", []),
+        ("camera_full", 3, "StoreFull", []),
+        ({"relays_unplugged": {"at": "30 s"}}, 3, "switch off by hand", ["dark"]),
+        ({"relays_silent": {"at": "30 s"}}, 3, "switch off by hand", ["dark"]),
+        ({"relays_echo_lost": {"at": "30 s"}}, 3, "did not echo", ["dark"]),
+        ({"camera_unplugged": {"at": "30 s"}}, 3, "gone", ["dark"]),
+        ({"disk_full": {"at": "30 s"}}, 5, "No space left on device", ["dark"]),
+    ],
+    ids=str,
+)
+def test_a_fault_that_stays_ends_the_run_which_goes_on_when_it_is_mended(
+    labrig: Labrig,
+    rig: Make,
+    protocol: Path,
+    stands: list[Bench],
+    tmp_path: Path,
+    fault: Any,
+    code: int,
+    said: str,
+    kept: list[str],
+) -> None:
+    runs = tmp_path / "runs"
+    ended = labrig("run", protocol, "--rig", rig(fault), "--runs", runs, "--no-process")
+    assert ended.code == code, ended.err
+    line = complaint(ended)
+    assert said in line
+    before = recorded(runs)
+    assert f"labrig resume {before.folder}" in line
+    assert list(before.completed()) == kept
+    # A full disk has no room for the line that closes the attempt either: that is done at resume.
+    assert before.attempts[-1].exit_status == (None if code == 5 else "fail")
+    out_of_reach = "switch off by hand" in line and fault != {"relays_echo_lost": {"at": "30 s"}}
+    assert lamp_is_on(stands[-1]) == (out_of_reach and "lamp:" in line)
+    without_faults(before.folder)
+    again = labrig("resume", before.folder, "--no-process")
+    assert again.code == 0, again.err
+    after = recorded(runs)
+    assert list(after.completed()) == ["dark", "decay-1"]
+    for name in kept:
+        assert after.completed()[name].uid == before.completed()[name].uid
+    assert not lamp_is_on(stands[-1])
+
+
+@pytest.mark.parametrize(
+    ("fault", "said"),
+    [
+        ({"relays_silent": {"at": "30 s", "for": "60 s"}}, "the unit decay-1 is done again"),
+        ({"relays_echo_lost": {"at": "30 s", "for": "30 s"}}, "the unit decay-1 is done again"),
+        ({"relays_unplugged": {"at": "30 s", "for": "60 s"}}, "the unit decay-1 is done again"),
+        ({"camera_unplugged": {"after_bytes": 90_000, "for": "5 s"}}, "is done again"),
+        ({"camera_busy": {"at": "42 s", "for": "2.5 s"}}, "1 of 4 frames began late"),
+        ({"disk_slow": {"takes": "3 s"}}, "the disk cannot keep up, it took up to 3 s for a frame"),
+        ({"lamp_dead": {"at": "1 s", "for": "5 s"}}, ""),
+        ({"clock_back": {"at": "30 s"}}, ""),
+    ],
+    ids=str,
+)
+def test_a_fault_that_passes_costs_time_and_no_data(
+    labrig: Labrig,
+    rig: Make,
+    protocol: Path,
+    stands: list[Bench],
+    tmp_path: Path,
+    fault: Any,
+    said: str,
+) -> None:
+    ended = labrig("run", protocol, "--rig", rig(fault), "--runs", tmp_path / "runs",
+                   "--no-process")  # fmt: skip
+    assert ended.code == 0, ended.err
+    warned = [line for line in ended.err.splitlines() if "warning" in line]
+    assert any(said in line for line in warned) if said else not warned
+    record = recorded(tmp_path / "runs")
+    assert list(record.completed()) == ["dark", "decay-1"]
+    assert len(record.frames("decay")) == 4
+    times = [doc["time"] for _, doc in read_journal(record.folder / "journal.jsonl").documents]
+    assert times == sorted(times)
+    assert not lamp_is_on(stands[-1])
+
+
+def test_late_frames_are_in_the_record(
+    labrig: Labrig, rig: Make, protocol: Path, tmp_path: Path
+) -> None:
+    runs = tmp_path / "runs"
+    slow = {"disk_slow": {"takes": "3 s"}}
+    assert labrig("run", protocol, "--rig", rig(slow), "--runs", runs, "--no-process").code == 0
+    frames = recorded(runs).frames("decay")
+    assert all(frame.disk_s == pytest.approx(3.0, abs=1e-3) for frame in frames)
+    gaps_s = [b.start_time - a.start_time for a, b in pairwise(frames)]
+    assert min(gaps_s) > 6.0, "frame and line each took 3 s; frames were planned every 5 s"
+    late_s = [frame.late_s for frame in frames]
+    assert late_s == sorted(late_s)
+    assert late_s[0] > 2.0
+
+
+def test_a_bulb_that_blows_while_charging_is_seen_in_the_first_frame(
+    labrig: Labrig, rig: Make, metered: Path, moment: Callable[..., float], tmp_path: Path
+) -> None:
+    off_s = moment(metered, "decay-1", "off")
+    blown = {"lamp_dead": {"at": f"{off_s - 40} s"}}
+    ended = labrig("run", metered, "--rig", rig(blown), "--runs", tmp_path / "runs", "--no-process")
+    assert ended.code == 0, ended.err
+    assert "warning: the glow is less than half of what it was before" in ended.err
+
+
+@pytest.mark.parametrize("unit", ["meter", "decay-1", "daylight"])
+def test_a_welded_relay_is_seen_by_the_camera(
+    labrig: Labrig,
+    rig: Make,
+    metered: Path,
+    moment: Callable[..., float],
+    stands: list[Bench],
+    tmp_path: Path,
+    unit: str,
+) -> None:
+    """The register reads off, and the driver believes it."""
+    welded = {"relay_welded": {"at": f"{moment(metered, unit, 'on') + 1} s"}}
+    runs = tmp_path / "runs"
+    ended = labrig("run", metered, "--rig", rig(welded), "--runs", runs, "--no-process")
+    assert ended.code == 3
+    assert "pull its plug" in complaint(ended)
+    assert unit not in recorded(runs).completed()
+    assert lamp_is_on(stands[-1])
+    (run,) = runs.iterdir()
+    without_faults(run)
+    assert labrig("resume", run, "--no-process").code == 0
+    assert not lamp_is_on(stands[-1])
+
+
+def test_a_lamp_that_burns_before_the_run_is_seen_before_it_charges(
+    labrig: Labrig, rig: Make, protocol: Path, stands: list[Bench], tmp_path: Path
+) -> None:
+    bench = rig("relay_welded", initial={"lamp": "on"})
+    ended = labrig("run", protocol, "--rig", bench, "--runs", tmp_path / "runs", "--no-process")
+    assert ended.code == 3
+    assert "the lamp burns although its relay reads off" in complaint(ended)
+    (attempt,) = recorded(tmp_path / "runs").attempts
+    assert attempt.unit == "dark"
+
+
+@pytest.mark.parametrize(
+    ("concentration", "code", "said"), [(0.5, 4, "still glows too brightly"), (0.02, 0, "glows")]
+)
+def test_a_glow_from_earlier_is_not_taken_for_a_lamp(
+    labrig: Labrig,
+    rig: Make,
+    protocol: Path,
+    tmp_path: Path,
+    concentration: float,
+    code: int,
+    said: str,
+) -> None:
+    bench = rig(initial={"lamp": "off", "concentration": concentration}, sample="stickers")
+    ended = labrig("run", protocol, "--rig", bench, "--runs", tmp_path / "runs", "--no-process")
+    assert ended.code == code, ended.err
+    assert said in ended.err
+    assert "lamp burns" not in ended.err
+
+
+def test_a_light_switched_on_during_the_decay_is_seen(
+    labrig: Labrig, rig: Make, protocol: Path, moment: Callable[..., float], tmp_path: Path
+) -> None:
+    light = {"light_left_on": {"at": f"{moment(protocol, 'decay-1', 'off') + 8} s"}}
+    ended = labrig("run", protocol, "--rig", rig(light), "--runs", tmp_path / "runs",
+                   "--no-process")  # fmt: skip
+    assert ended.code == 3
+    assert "another light is on" in complaint(ended)
+
+
+def test_times_of_faults_are_the_walls_so_that_what_is_over_stays_over(
+    labrig: Labrig, rig: Make, protocol: Path, tmp_path: Path
+) -> None:
+    runs = tmp_path / "runs"
+    bench = rig({"camera_busy": {"at": "43 s", "for": "10 s"}})
+    assert labrig("run", protocol, "--rig", bench, "--runs", runs, "--no-process").code == 3
+    (run,) = runs.iterdir()
+    assert "DeviceBusy" in read_run(run).attempts[-1].reason
+    assert labrig("resume", run, "--no-process").code == 0
+
+
+@pytest.mark.parametrize(("step", "warned"), [("clock_back", True), ("clock_ahead", False)])
+def test_a_clock_that_was_stepped_between_run_and_resume_harms_nothing(
+    labrig: Labrig, rig: Make, protocol: Path, tmp_path: Path, step: str, warned: bool
+) -> None:
+    runs = tmp_path / "runs"
+    bench = rig({"camera_busy": {"at": "43 s", "for": "10 s"}}, {step: {"at": "20 s", "by": "1 h"}})
+    assert labrig("run", protocol, "--rig", bench, "--runs", runs, "--no-process").code == 3
+    before = recorded(runs)
+    ended = labrig("resume", before.folder)
+    assert ended.code == 0, ended.err
+    assert ("was set back" in ended.err) is warned
+    stepped_s = recorded(runs).attempts[-1].start["time"] - before.last_time
+    assert stepped_s == pytest.approx(-3600 if warned else 3600, abs=60)
+    times_s = [
+        float(line.split(",")[0])
+        for line in (before.folder / "result" / "series.csv").read_text().splitlines()[1:]
+    ]
+    assert times_s == pytest.approx([0.56, 5.56, 10.56, 15.56], abs=0.02)
+
+
+def test_a_clock_that_is_stepped_does_not_bend_a_running_one(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    clock = SystemClock()
+    before = clock.wall()
+    monkeypatch.setattr("time.time", lambda: 0.0)
+    assert 0.0 <= clock.wall() - before < 60.0
+
+
+def test_faults_at_moments_that_nobody_chose() -> None:
+    """Few of the many that can be run by hand."""
+    done = subprocess.run(
+        [sys.executable, "-m", "tests.acceptance.faults_at_any_moment", "--trials", "20"],
+        cwd=Path(__file__).parent.parent,
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stdout + done.stderr
+    assert "0 of 20 went wrong" in done.stdout
