@@ -12,11 +12,14 @@ in Marquardt's method*, IMM-REP-1999-05; Å. Björck, *Numerical methods for lea
 (1996).
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import lapack
 
 from labrig.errors import FitError
 
@@ -30,6 +33,9 @@ SEARCH_STEP = 1e-7
 #: Relative step above which a stopped search has not converged.
 CONVERGED_STEP = 1e-6
 INITIAL_DAMPING = 1e-3
+#: The damping falls to this share at most after a step that does what it promised; Nielsen's 1/3
+#: takes half as many steps again.
+LEAST_RELIEF = 1 / 10
 POLISH_STEPS = 60
 POLISH_PATIENCE = 3
 
@@ -146,16 +152,67 @@ def _evaluate(residuals: Residuals, x: FloatArray) -> _Point:
 
 def _free(point: _Point, low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
     """Parameters that no bound holds: inside the box, or pulled back into it by the gradient."""
-    if np.all((low < point.x) & (point.x < high)):
-        return np.ones(point.x.shape, dtype=np.bool_)
+    inside = (low < point.x) & (point.x < high)
+    if inside.all():
+        return inside
     gradient = point.jacobian.T @ point.residuals
     held = ((point.x <= low) & (gradient >= 0)) | ((point.x >= high) & (gradient <= 0))
     return ~held
 
 
-def _column_norms(jacobian: FloatArray) -> FloatArray:
-    norms: FloatArray = np.sqrt(np.einsum("ij,ij->j", jacobian, jacobian))
-    return np.where(norms > 0, norms, 1.0)
+def _column_norms(columns: FloatArray) -> FloatArray:
+    norms: FloatArray = np.sqrt(np.einsum("ij,ij->j", columns, columns))
+    return norms if norms.all() else np.where(norms > 0, norms, 1.0)
+
+
+def _length(vector: FloatArray) -> float:
+    return math.sqrt(float(vector @ vector))
+
+
+@cache
+def _upper(rows: int, columns: int) -> FloatArray:
+    """1 on the diagonal and above it, else 0."""
+    return np.triu(np.ones((rows, columns)))
+
+
+class _Linearised:
+    """The linear problem about a point, turned so that p rows say what m rows of J and r said.
+
+    Attributes
+    ----------
+    triangle
+        (p, p) R of J = Q R; fewer rows if m < p.
+    turned
+        (p,) Qᵀ r.
+    norms
+        (p,) lengths of the columns of J, 1 where they are 0.
+    """
+
+    def __init__(self, point: _Point) -> None:
+        m, p = point.jacobian.shape
+        columns = np.empty((m, p + 1), order="F")
+        columns[:, :p], columns[:, p] = point.jacobian, point.residuals
+        rows = min(m, p)
+        factors = lapack.dgeqrf(columns, overwrite_a=True)[0][:rows]
+        self.triangle: FloatArray = factors[:, :p] * _upper(rows, p)
+        self.turned: FloatArray = factors[:, p]
+        self.norms = _column_norms(self.triangle)
+
+    def directions(
+        self, free: NDArray[np.bool_], scale: FloatArray
+    ) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """The free columns of J over `scale`, decomposed into singular values.
+
+        Returns
+        -------
+        (k,) the values s, (k, p) their directions v in units of the parameters, and (k,) r along
+        them: the undamped step is −Σ_i (r_i/s_i) v_i.
+        """
+        scaled = self.triangle * (free / scale)
+        u, s, vt, _ = lapack.dgesdd(scaled[:, free], full_matrices=0)
+        in_parameters = np.zeros((len(s), len(scale)))
+        in_parameters[:, free] = vt
+        return s, in_parameters / scale, self.turned @ u
 
 
 def _damped_search(
@@ -166,35 +223,35 @@ def _damped_search(
     max_iterations: int,
     tolerance: float,
 ) -> tuple[_Point, int]:
-    scale = _column_norms(point.jacobian)
+    scale = np.zeros_like(point.x)
     damping, growth, evaluations = INITIAL_DAMPING, 2.0, 1
     while evaluations < max_iterations:
         free = _free(point, low, high)
         if not free.any():
             break
+        local = _Linearised(point)
         # Moré: scales never shrink, so that a flat stretch does not set a parameter loose.
-        scale = np.maximum(scale, _column_norms(point.jacobian))
-        u, s, vt = np.linalg.svd(point.jacobian[:, free] / scale[free], full_matrices=False)
-        projected = s * (u.T @ point.residuals)
+        scale = np.maximum(scale, local.norms)
+        s, directions, along = local.directions(free, scale)
+        length = _length(point.x * scale) + EPSILON
         accepted = False
         while not accepted and evaluations < max_iterations:
-            step = np.zeros_like(point.x)
-            step[free] = -(vt.T @ (projected / (s * s + damping * s[0] ** 2))) / scale[free]
-            trial_x = np.clip(point.x + step, low, high)
+            step = -(s * along / (s * s + damping * s[0] ** 2)) @ directions
+            trial_x = np.minimum(np.maximum(point.x + step, low), high)
             step = trial_x - point.x
-            size = np.linalg.norm(step * scale) / (np.linalg.norm(point.x * scale) + EPSILON)
+            size = _length(step * scale) / length
             if size < EPSILON:
                 return point, evaluations
             trial = _evaluate(residuals, trial_x)
             evaluations += 1
-            change = point.jacobian @ step
-            promised = -float(2 * point.residuals @ change + change @ change)
+            change = local.triangle @ step
+            promised = -float((2 * local.turned + change) @ change)
             gain = (point.chi2 - trial.chi2) / promised if promised > 0 else -1.0
-            accepted = bool(
-                trial.chi2 < point.chi2 and gain > 1e-4 and np.all(np.isfinite(trial.jacobian))
+            accepted = (
+                trial.chi2 < point.chi2 and gain > 1e-4 and bool(np.isfinite(trial.jacobian).all())
             )
             if accepted:
-                damping *= max(1 / 3, 1 - (2 * min(gain, 1.0) - 1) ** 3)
+                damping *= max(LEAST_RELIEF, 1 - (2 * min(gain, 1.0) - 1) ** 3)
                 growth = 2.0
                 point = trial
             else:
@@ -217,21 +274,19 @@ def _polish(
         free = _free(point, low, high)
         if not free.any():
             return point, 0.0
-        scale = _column_norms(point.jacobian)
-        u, s, vt = np.linalg.svd(point.jacobian[:, free] / scale[free], full_matrices=False)
+        local = _Linearised(point)
+        s, directions, along = local.directions(free, local.norms)
         kept = s > _rank_tolerance(point.jacobian) * s[0]
-        step = np.zeros_like(point.x)
-        along = (u.T @ point.residuals)[kept] / s[kept]
-        step[free] = -(vt[kept].T @ along) / scale[free]
-        size = float(np.linalg.norm(step * scale) / (np.linalg.norm(point.x * scale) + EPSILON))
+        step = -(along[kept] / s[kept]) @ directions[kept]
+        size = _length(step * local.norms) / (_length(point.x * local.norms) + EPSILON)
         idle = 0 if size < 0.9 * least else idle + 1
         least = min(least, size)
         if idle == POLISH_PATIENCE or size < max(tolerance, EPSILON):
             break
-        trial = _evaluate(residuals, np.clip(point.x + step, low, high))
+        trial = _evaluate(residuals, np.minimum(np.maximum(point.x + step, low), high))
         # χ² itself is rounded: near the minimum only the step can tell progress.
         descends = trial.chi2 <= point.chi2 * (1 + 1e-6) or size < 1e-8
-        if not (descends and np.all(np.isfinite(trial.jacobian))):
+        if not (descends and np.isfinite(trial.jacobian).all()):
             break
         point = trial
     return point, least
@@ -241,21 +296,30 @@ def _rank_tolerance(jacobian: FloatArray) -> float:
     return float(max(jacobian.shape)) * EPSILON
 
 
-def _result(
-    point: _Point, low: FloatArray, high: FloatArray, iterations: int, converged: bool
-) -> LeastSquaresFit:
-    scale = _column_norms(point.jacobian)
-    _, s, vt = np.linalg.svd(point.jacobian / scale, full_matrices=False)
-    kept = s > _rank_tolerance(point.jacobian) * s[0]
-    rank = int(np.count_nonzero(kept))
+def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(JᵀJ)⁻¹ of J (m, p), as in `LeastSquaresFit.covariance`.
+
+    With it, (p,), the singular values of J with its columns scaled to length 1.
+    """
+    scale = _column_norms(jacobian)
+    _, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
+    kept = s > _rank_tolerance(jacobian) * s[0]
     inverse = vt[kept].T / s[kept]
     covariance = (inverse @ inverse.T) / np.outer(scale, scale)
-    if rank < len(scale):
+    if not kept.all() or len(kept) < len(scale):
         seen = np.einsum("ij,ij->j", vt[kept], vt[kept])
         unseen = seen < 1 - np.sqrt(EPSILON)
         covariance[unseen, :] = 0.0
         covariance[:, unseen] = 0.0
         covariance[unseen, unseen] = np.inf
+    return covariance, s
+
+
+def _result(
+    point: _Point, low: FloatArray, high: FloatArray, iterations: int, converged: bool
+) -> LeastSquaresFit:
+    covariance, s = parameter_covariance(point.jacobian)
+    rank = int(np.count_nonzero(s > _rank_tolerance(point.jacobian) * s[0]))
     return LeastSquaresFit(
         parameters=point.x,
         covariance=covariance,

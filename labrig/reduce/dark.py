@@ -4,8 +4,10 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
+import numpy.typing as npt
 
 from labrig.errors import DataError
+from labrig.reduce.histogram import histogram
 from labrig.reduce.noise import Floats
 from labrig.reduce.outliers import OUTLIER_SIGMAS
 from labrig.reduce.planes import PixelMask
@@ -142,8 +144,16 @@ def _bright(dark: RawFrame) -> PixelMask:
         for column in range(side):
             here = (slice(row, None, side), slice(column, None, side))
             plane = np.ascontiguousarray(dark.mosaic[here])
-            excess = plane.astype(np.float32) - np.asarray(cv2.medianBlur(plane, 5))
-            deviation = 1.4826 * float(np.median(np.abs(excess)))
+            usual = cv2.medianBlur(plane, 5)
+            deviation = 1.4826 * _median(histogram(np.asarray(cv2.absdiff(plane, usual))))
             # Whole numbers: a quiet sensor's median deviation may be 0 though it is not silent.
-            bright[here] = excess > OUTLIER_SIGMAS * max(deviation, 1.0)
+            limit = int(OUTLIER_SIGMAS * max(deviation, 1.0))
+            bright[here] = np.asarray(cv2.subtract(plane, usual)) > limit
     return bright
+
+
+def _median(counts: npt.NDArray[np.int64]) -> float:
+    """Of whole numbers that occur so many times: 0, 1, …"""
+    up_to = np.cumsum(counts)
+    middle = np.searchsorted(up_to, [(up_to[-1] + 1) // 2, up_to[-1] // 2 + 1])
+    return float(middle.mean())

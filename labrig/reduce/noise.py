@@ -186,7 +186,10 @@ def _autocovariance(tiles: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
     limit = 5 * np.sqrt(_robust_variance(np.abs(residual)) + ROUNDING_VARIANCE)
     clean = np.all(np.abs(residual) <= limit[:, np.newaxis], axis=1)
     square = residual.reshape(-1, TILE, TILE)
-    found = np.stack([(a * b).mean(axis=(1, 2)) for a, b in _shifted(square)], axis=1)
+    products = [
+        np.einsum("nyx,nyx->n", a, b) / (a.shape[1] * a.shape[2]) for a, b in _shifted(square)
+    ]
+    found = np.stack(products, axis=1)
     return found @ inverse.T, clean
 
 

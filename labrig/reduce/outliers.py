@@ -44,12 +44,14 @@ def isolated_outliers(
         kernel[(down + 1) * side, (right + 1) * side] = 1
     greatest = np.asarray(cv2.dilate(window, kernel))
     excess = np.asarray(cv2.subtract(window, greatest))
-    levels = np.arange(65536, dtype=np.float64)
-    quietest = np.min([noise.variance_at(levels) for noise in noises.values()], axis=0)
-    limit = _ABOVE_ALL_SIGMAS * np.sqrt(quietest)
+
+    def limit(levels: Floats) -> Floats:
+        quietest = np.min([noise.variance_at(levels) for noise in noises.values()], axis=0)
+        return np.asarray(_ABOVE_ALL_SIGMAS * np.sqrt(quietest))
+
     # Compared with one number, then by level, then by the noise of their own plane: few are left.
-    passed = np.flatnonzero(excess > int(limit[int(window.min())]))
-    passed = passed[excess.ravel()[passed] > limit[greatest.ravel()[passed]]]
+    passed = np.flatnonzero(excess > int(limit(np.array(float(window.min())))))
+    passed = passed[excess.ravel()[passed] > limit(greatest.ravel()[passed].astype(np.float64))]
     y, x = np.divmod(passed, window.shape[1])
     level = greatest[y, x].astype(np.float64)
     alone = excess[y, x] > _ABOVE_ALL_SIGMAS * _deviation(

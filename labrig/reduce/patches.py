@@ -11,9 +11,10 @@ from labrig.errors import DataError
 from labrig.reduce.channels import FrameMeasurement, measure
 from labrig.reduce.dark import SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
 from labrig.reduce.noise import Floats
+from labrig.reduce.pairs import paired_sigma, strip_deviations
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
-from labrig.reduce.series import Series, add_flag
+from labrig.reduce.series import Series, add_flag, is_usable
 from labrig.region import Region
 
 #: Share of a patch's pixels that may be saturated before its mean is too small.
@@ -48,23 +49,32 @@ class SeriesFrame:
     flag: str = ""
 
 
+@dataclass(frozen=True, eq=False)
+class _View:
+    """A region of a frame: what is in it, and how its strips (C, strips) deviate from its mean."""
+
+    measured: FrameMeasurement
+    strips: Floats
+
+
 @dataclass(frozen=True)
 class _Shot:
-    """A frame, measured in every patch and in the background, if there is one."""
+    """A frame, seen in every patch and in the background, if there is one."""
 
     frame: SeriesFrame
-    patches: Mapping[str, FrameMeasurement]
-    background: FrameMeasurement | None
+    patches: Mapping[str, _View]
+    background: _View | None
 
     @property
     def iso(self) -> float:
         """NaN where neither the run nor the file says."""
-        return _first(self.frame.iso, *(m.iso for m in self.patches.values()))
+        return _first(self.frame.iso, *(view.measured.iso for view in self.patches.values()))
 
     @property
     def f_number(self) -> float:
         """NaN where neither the run nor the file says."""
-        return _first(self.frame.f_number, *(m.f_number for m in self.patches.values()))
+        views = self.patches.values()
+        return _first(self.frame.f_number, *(view.measured.f_number for view in views))
 
 
 def reduce_series(
@@ -136,14 +146,14 @@ def _shot(
     raw = read_raw(frame.path)
     return _Shot(
         frame,
-        {name: _measured(raw, region, hot, frame.path) for name, region in patches.items()},
-        _measured(raw, background, hot, frame.path) if background else None,
+        {name: _view(raw, region, hot, frame.path) for name, region in patches.items()},
+        _view(raw, background, hot, frame.path) if background else None,
     )
 
 
-def _measured(raw: RawFrame, region: Region, hot: PixelMask | None, path: Path) -> FrameMeasurement:
+def _view(raw: RawFrame, region: Region, hot: PixelMask | None, path: Path) -> _View:
     try:
-        return measure(raw, region, hot)
+        return _View(measure(raw, region, hot), strip_deviations(raw, region, hot))
     except DataError as error:
         raise type(error)(f"{path}: {error}") from None
 
@@ -170,12 +180,23 @@ def _patch_series(
     name: str, shots: Sequence[_Shot], models: Mapping[tuple[str, float], DarkModel]
 ) -> Series:
     exposure_s = np.array([shot.frame.exposure_s for shot in shots])
-    level, sigma = _levels([shot.patches[name] for shot in shots])
+    t_s = np.array([shot.frame.t_s for shot in shots])
+    unit = tuple(shot.frame.unit for shot in shots)
+    flags = tuple(_flag(shot, name) for shot in shots)
+
+    def noise(views: Sequence[_View], light: Floats, sigma: Floats) -> Floats:
+        strips = np.stack([view.strips for view in views])
+        usable = np.array([is_usable(flag) for flag in flags])
+        return paired_sigma(strips, light, sigma, t_s, unit, usable)
+
+    views = [shot.patches[name] for shot in shots]
+    level, sigma = _levels(views)
     dark, dark_sigma = np.zeros_like(level), np.full_like(level, np.nan)
     backgrounds = [shot.background for shot in shots if shot.background is not None]
     if backgrounds:
-        dark, of_frame = _levels(backgrounds)
-        sigma, dark_sigma = np.hypot(sigma, of_frame), np.zeros_like(level)
+        dark, dark_noise = _levels(backgrounds)
+        dark_noise = noise(backgrounds, np.zeros_like(dark), dark_noise)
+        dark_sigma = np.zeros_like(level)
     elif models:
         for row, shot in enumerate(shots):
             model = models.get((name, _key(shot.iso)))
@@ -187,41 +208,44 @@ def _patch_series(
             dark[row], of_model = model.dark_level(shot.frame.exposure_s)
             drift = ONE_DEGREE * np.abs(model.current(shot.frame.exposure_s))
             dark_sigma[row] = np.hypot(of_model, drift)
+    sigma = noise(views, level - dark, sigma)
+    if backgrounds:
+        sigma = np.hypot(sigma, dark_noise)
     per_second = exposure_s[:, np.newaxis]
     sigma = sigma / per_second
     return Series(
-        t_s=np.array([shot.frame.t_s for shot in shots]),
+        t_s=t_s,
         exposure_s=exposure_s,
         values=(level - dark) / per_second,
         sigma=sigma,
         # One number for all frames: as the offset acts on a fit, most where weights are highest.
         dark_sigma=np.average(dark_sigma / per_second, axis=0, weights=1 / np.square(sigma)),
-        channels=tuple(shots[0].patches[name].channels),
+        channels=tuple(views[0].measured.channels),
         iso=np.array([shot.iso for shot in shots]),
         f_number=np.array([shot.f_number for shot in shots]),
         frame=tuple(shot.frame.path.name for shot in shots),
-        unit=tuple(shot.frame.unit for shot in shots),
-        flag=tuple(_flag(shot, name) for shot in shots),
+        unit=unit,
+        flag=flags,
         region=name,
     )
 
 
-def _levels(measurements: Sequence[FrameMeasurement]) -> tuple[Floats, Floats]:
-    """Means and their sigma in DN, each of shape (n, C)."""
-    kinds = {tuple(m.channels) for m in measurements}
+def _levels(views: Sequence[_View]) -> tuple[Floats, Floats]:
+    """Means and what each frame by itself says of their sigma in DN, each of shape (n, C)."""
+    kinds = {(view.measured.width, view.measured.height, *view.measured.channels) for view in views}
     if len(kinds) > 1:
-        raise DataError(f"expected frames of one sensor, got channels {sorted(kinds)}")
-    pairs = [[(c.mean, c.sigma) for c in m.channels.values()] for m in measurements]
+        raise DataError(f"expected frames of one sensor and size, got {sorted(kinds)}")
+    pairs = [[(c.mean, c.sigma) for c in view.measured.channels.values()] for view in views]
     mean, sigma = np.moveaxis(np.array(pairs), 2, 0)
     return mean, sigma
 
 
 def _flag(shot: _Shot, name: str) -> str:
-    regions = [shot.patches[name], *([shot.background] if shot.background else [])]
+    views = [shot.patches[name], *([shot.background] if shot.background else [])]
     clipped = any(
         stats.saturated > CLIPPED_SHARE * stats.n
-        for region in regions
-        for stats in region.channels.values()
+        for view in views
+        for stats in view.measured.channels.values()
     )
     return add_flag(shot.frame.flag, "clipped") if clipped else shot.frame.flag
 

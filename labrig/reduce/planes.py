@@ -6,7 +6,7 @@ from typing import TypeAlias
 import numpy as np
 import numpy.typing as npt
 
-from labrig.reduce.histogram import histogram
+from labrig.reduce.histogram import counted
 from labrig.reduce.noise import TILE, Floats, PlaneNoise, plane_noise
 from labrig.reduce.outliers import isolated_outliers
 from labrig.reduce.raw import RawFrame
@@ -59,11 +59,8 @@ def count_planes(
             slice(x + (column - x) % side, x + width, side),
         )
         plane = np.ascontiguousarray(raw.mosaic[here])
-        counts = histogram(plane)
-        if hot is not None:
-            counts -= np.bincount(plane[hot[here]], minlength=len(counts))
-        level = np.flatnonzero(counts)
-        count = counts[level].astype(np.float64)
+        level, pixels = counted(plane, None if hot is None else hot[here])
+        count = pixels.astype(np.float64)
         position = side * row + column
         found.append(
             PlaneCount(

@@ -71,7 +71,7 @@ class Series:
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
         """Shape (n,): rows that no flag excludes."""
-        return np.array([EXCLUDING.isdisjoint(flag.split(FLAG_JOINER)) for flag in self.flag])
+        return np.array([is_usable(flag) for flag in self.flag])
 
     def take(self, rows: npt.NDArray[np.intp], region: str | None = None) -> "Series":
         """The given rows, in that order, as of `region` if that is given."""
@@ -191,6 +191,11 @@ def _check_texts(series: Series) -> None:
 
 def _is_plain(text: str) -> bool:
     return text.isprintable() and text == text.strip()
+
+
+def is_usable(flag: str) -> bool:
+    """Whether no word in `flag` excludes its row."""
+    return EXCLUDING.isdisjoint(flag.split(FLAG_JOINER))
 
 
 def add_flag(flag: str, word: str) -> str:

@@ -2,6 +2,7 @@
 
 import csv
 import math
+import os
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -29,7 +30,7 @@ class _Table:
     lines: tuple[int, ...]
 
 
-def read_series(path: Path) -> list[Series]:
+def read_series(path: str | os.PathLike[str]) -> list[Series]:
     """The series in a table, one for each region and unit in it, in order of appearance.
 
     The header may be missing: then the columns are time, value and perhaps sigma. `#` begins a
@@ -44,7 +45,7 @@ def read_series(path: Path) -> list[Series]:
         A number that is not finite, a missing value, or no rows.
     """
     try:
-        text = path.read_text(encoding="utf-8-sig")
+        text = Path(path).read_text(encoding="utf-8-sig")
     except FileNotFoundError:
         raise UsageError(f"{path}: no such file") from None
     except (OSError, UnicodeDecodeError) as error:

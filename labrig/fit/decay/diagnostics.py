@@ -15,8 +15,13 @@ FEWEST_FOR_ORDER = 8
 ILL_DETERMINED = 0.3
 #: Two log rates closer than this many σ are one as far as the data know.
 APART_SIGMAS = 3.0
-RISING_SIGMAS = 5.0
+BELOW_ZERO_SIGMAS = 5.0
 OFFSET_SIGMAS = 4.0
+#: A frame is named that lies this many robust standard deviations off the others …
+OUTLIER_SIGMAS = 7.0
+#: … and that many of what the noise allows; so many frames at most.
+OUTLIER_OWN_SIGMAS = 3.0
+MOST_NAMED = 2
 
 
 @dataclass(frozen=True)
@@ -25,6 +30,8 @@ class Misfit:
 
     Attributes
     ----------
+    t_s
+        (n,) when the frames began, rising.
     frames
         (n,) residual along the signal by rising time, unit variance.
     frame_dof
@@ -35,6 +42,7 @@ class Misfit:
         Degrees of freedom of the noise's own estimate; inf if σ and flicker were given.
     """
 
+    t_s: FloatArray
     frames: FloatArray
     frame_dof: float
     colour_chi2: float
@@ -54,7 +62,8 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
     remedy
         What to try if the shape is wrong.
     """
-    warnings = []
+    warnings = _outlier_warnings(misfit)
+    disturbed = bool(warnings)
     p_order = order_p_value(misfit.frames)
     if p_order < MISFIT_LEVEL:
         subject = "1 exponential does" if n_states == 1 else f"{n_states} exponentials do"
@@ -64,7 +73,7 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
         )
     frame_chi2 = float(misfit.frames @ misfit.frames)
     frame_p = _excess_p_value(frame_chi2, misfit.frame_dof, misfit.noise_dof)
-    if frame_p < MISFIT_LEVEL <= p_order:
+    if frame_p < MISFIT_LEVEL <= p_order and not disturbed:
         factor = np.sqrt(frame_chi2 / misfit.frame_dof)
         warnings.append(
             f"frames scatter {factor:.2g} times as much as σ and flicker explain; every σ given "
@@ -77,6 +86,21 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
             "each channel, or fit the channels one by one"
         )
     return warnings
+
+
+def _outlier_warnings(misfit: Misfit) -> list[str]:
+    """Single frames that the others do not explain."""
+    size = np.abs(misfit.frames)
+    if len(size) < FEWEST_FOR_ORDER:
+        return []
+    # The median does not mind the outlier, whatever σ and flicker were made of it.
+    usual = 1.4826 * float(np.median(size))
+    far = np.flatnonzero((size > OUTLIER_SIGMAS * usual) & (size > OUTLIER_OWN_SIGMAS))
+    return [
+        f"the frame at {misfit.t_s[row]:.4g} s lies {size[row] / max(usual, 1e-3):.0f} times as "
+        "far off the curve as the others do: look at it, leave it out if something disturbed it"
+        for row in far[np.argsort(-size[far])][:MOST_NAMED]
+    ]
 
 
 def order_p_value(residuals: FloatArray) -> float:
@@ -128,6 +152,7 @@ def state_warnings(
     warnings = []
     sigma = np.sqrt(np.diag(log_rate_covariance))
     slowest, fastest = rate_bounds_per_s
+    lifetime_s = 1 / states[-1].k_r_per_s
     for number, state in enumerate(states, start=1):
         rate = f"k{number} = {state.k_r_per_s:.3g} /s"
         if state.k_r_sigma_per_s == 0:
@@ -143,9 +168,10 @@ def state_warnings(
                 "closer together, or leave the first one out if the lamp still glowed"
             )
         elif sigma[number - 1] > ILL_DETERMINED:
+            long_lived = number == len(states) and lifetime_s > span_s
             warnings.append(
                 f"{rate} is known to {100 * sigma[number - 1]:.0f} % only: "
-                "ask for fewer states or take more light"
+                + ("record longer" if long_lived else "ask for fewer states or take more light")
             )
     for number in range(1, len(states)):
         fast, slow = number - 1, number
@@ -159,8 +185,8 @@ def state_warnings(
             warnings.append(
                 f"k{number} and k{number + 1} cannot be told apart: ask for one state fewer"
             )
-    lifetime_s = 1 / states[-1].k_r_per_s
-    if lifetime_s > span_s:
+    held = states[-1].k_r_sigma_per_s == 0
+    if lifetime_s > span_s and not held and sigma[-1] <= ILL_DETERMINED:
         warnings.append(
             f"the slowest state lives {lifetime_s:.3g} s, longer than the {span_s:.4g} s recorded: "
             "record longer to be sure of it"
@@ -180,8 +206,8 @@ def offset_warnings(
     ]
 
 
-def rising_warning(signal: FloatArray, information: FloatArray) -> list[str]:
-    """Whether the last quarter of the frames is brighter than the first.
+def rise_in_sigmas(signal: FloatArray, information: FloatArray) -> float:
+    """How much brighter the last quarter of the frames is than the first.
 
     Parameters
     ----------
@@ -189,18 +215,24 @@ def rising_warning(signal: FloatArray, information: FloatArray) -> list[str]:
         (n,) common signal of the channels by rising time, and its inverse variance.
     """
     quarter = max(len(signal) // 4, 1)
+    first, first_variance = _mean(signal[:quarter], information[:quarter])
+    last, last_variance = _mean(signal[-quarter:], information[-quarter:])
+    return float((last - first) / np.sqrt(first_variance + last_variance))
 
-    def mean(part: slice) -> tuple[float, float]:
-        total = float(information[part].sum())
-        return (
-            (float(signal[part] @ information[part]) / total, 1 / total) if total else (0.0, np.inf)
-        )
 
-    first, first_variance = mean(slice(None, quarter))
-    last, last_variance = mean(slice(-quarter, None))
-    if last - first > RISING_SIGMAS * np.sqrt(first_variance + last_variance):
-        return [
-            "the signal rises: check that the lamp was off and that times and values belong "
-            "together"
-        ]
-    return []
+def below_zero_warnings(signal: FloatArray, information: FloatArray) -> list[str]:
+    """Whether the last quarter of the frames is darker than darkness; as `rise_in_sigmas`."""
+    quarter = max(len(signal) // 4, 1)
+    last, variance = _mean(signal[-quarter:], information[-quarter:])
+    if last > -BELOW_ZERO_SIGMAS * np.sqrt(variance):
+        return []
+    return [
+        f"the signal falls below zero, by {-last / np.sqrt(variance):.0f} σ in the last quarter of "
+        "the frames: too much was subtracted, check the dark level or fit an offset (offset_sigma)"
+    ]
+
+
+def _mean(signal: FloatArray, information: FloatArray) -> tuple[float, float]:
+    """Weighted mean and its variance."""
+    total = float(information.sum())
+    return (float(signal @ information) / total, 1 / total) if total else (0.0, np.inf)

@@ -33,6 +33,12 @@ ALTERNATIONS_IF_GIVEN = 2
 FLICKER_ITERATIONS = 12
 #: Share of the bright frames' information that the curve must leave to the flicker.
 LEAST_SPARE = 1e-6
+#: Scale of what is known of any flicker beforehand, a half-Cauchy distribution (A. Gelman, Bayesian
+#: Analysis 1, 2006): shutters, apertures and lamps scatter by 0.5-1 %, some by a multiple of it.
+USUAL_FLICKER = 0.01
+#: Values of ρ by which its uncertainty is propagated, and the grid they are taken from.
+LIKELY_FLICKERS = 16
+FLICKER_GRID = 200
 #: Degrees of freedom below which the estimated flicker is not to be relied on.
 FEWEST_NOISE_DOF = 4.0
 
@@ -54,6 +60,8 @@ class Envelope:
     flicker, flicker_sigma
         Relative, common to the channels of a frame; with fewer than `FEWEST_NOISE_DOF` degrees of
         freedom one σ(ρ²) more than the estimate.
+    likely_flickers
+        (m,) values of ρ equally likely after the measurement; the one given.
     noise_scale
         Scatter in units of σ; 1 unless σ was not given.
     """
@@ -64,6 +72,7 @@ class Envelope:
     dof: float
     flicker: float
     flicker_sigma: float
+    likely_flickers: FloatArray
     noise_scale: float
 
 
@@ -81,8 +90,9 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     offsets = np.zeros_like(weights)
     signal = np.zeros_like(series.values)
     if len(weights) == 1 and flicker == 0 and series.sigma_given:
-        return Envelope(signal, weights, offsets, series.n_frames, 0.0, 0.0, 1.0)
+        return Envelope(signal, weights, offsets, series.n_frames, 0.0, 0.0, np.zeros(1), 1.0)
     rho, rho_sigma, noise_scale = 0.0, 0.0, 1.0
+    likely = np.array([flicker or 0.0])
     for _ in range(ALTERNATIONS if flicker is None else ALTERNATIONS_IF_GIVEN):
         data = whitened(series, signal, rho)
         curve, offsets, leverage = _monotone_curve(data, weights)
@@ -93,13 +103,13 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
         if not signal.any():
             raise FitError(NO_DECAY)
         if flicker is None:
-            rho, rho_sigma, dof = _flicker(series, signal, offsets, leverage)
+            rho, rho_sigma, dof, likely = _flicker(series, signal, offsets, leverage)
         else:
             rho = flicker
     if not series.sigma_given:
         left = series.inverse_sigma * (series.values - signal - offsets)
         noise_scale = float(np.sqrt((left**2).sum() / dof))
-    return Envelope(signal, weights, offsets, dof, rho, rho_sigma, noise_scale)
+    return Envelope(signal, weights, offsets, dof, rho, rho_sigma, likely, noise_scale)
 
 
 def _first_weights(series: DecaySeries) -> FloatArray:
@@ -151,8 +161,8 @@ def _channel_weights(
 
 def _flicker(
     series: DecaySeries, signal: FloatArray, offsets: FloatArray, leverage: FloatArray
-) -> tuple[float, float, float]:
-    """ρ, its σ and its degrees of freedom from the frames' common scatter about the curve.
+) -> tuple[float, float, float, FloatArray]:
+    """ρ, its σ, its degrees of freedom and likely values, from the frames' common scatter.
 
     Along the signal's direction a frame scatters with variance V = 1 + ρ² B, B = |s/σ|², of which
     the curve followed the share `leverage` (n,). ρ² is the restricted maximum of the likelihood
@@ -188,4 +198,17 @@ def _flicker(
     flicker = float(np.sqrt(variance))
     # Near zero the square root is not linear: then √σ(ρ²) is the scale of what ρ could be.
     sigma = min(variance_sigma / (2 * max(flicker, 1e-30)), float(np.sqrt(variance_sigma)))
-    return flicker, sigma, dof
+    return flicker, sigma, dof, _likely_flickers(brightness2, along2, spare)
+
+
+def _likely_flickers(brightness2: FloatArray, along2: FloatArray, spare: FloatArray) -> FloatArray:
+    """Values of ρ at equal steps of its posterior probability, arguments as in `_flicker`."""
+    # Dense near zero, where a small ρ already tells.
+    rho = MOST_FLICKER * np.linspace(0, 1, FLICKER_GRID) ** 2
+    variance = 1 + np.multiply.outer(rho**2, brightness2)
+    log_likelihood = -0.5 * (np.log(variance) @ spare + (along2 / variance).sum(axis=1))
+    density = np.exp(log_likelihood - log_likelihood.max()) / (1 + (rho / USUAL_FLICKER) ** 2)
+    share = density * np.gradient(rho)
+    below = np.cumsum(share) - share / 2
+    steps = (np.arange(LIKELY_FLICKERS) + 0.5) / LIKELY_FLICKERS
+    return np.interp(steps, below / share.sum(), rho)

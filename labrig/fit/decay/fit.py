@@ -7,13 +7,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.fit.decay.assembly import Evidence, assemble
+from labrig.fit.decay.assembly import assemble
 from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.result import DecayFit
 from labrig.fit.decay.rivals import RIVALS, Rival, fit_rival, fitted_rival
 from labrig.fit.decay.selection import CLEAR_BIC, Candidate, bic, choose_states
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.states import StatesFit, refit
+from labrig.fit.decay.verdict import Evidence, refuse_if_constant, refuse_if_rising
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
 
@@ -85,6 +86,7 @@ def fit_decay(
         scale = max(smooth.noise_scale, EXACT)
         series = replace(series, inverse_sigma=series.inverse_sigma / scale)
     data = whitened(series, smooth.signal, smooth.flicker)
+    refuse_if_rising(data, smooth.weights)
     noise_estimated = flicker is None or not series.sigma_given
     noise_dof = smooth.dof if noise_estimated else np.inf
     chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
@@ -92,6 +94,7 @@ def fit_decay(
     best = min(rivals, key=lambda rival: rival.bic)
     best_wins = best.bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
     data, chosen = _reweighted(data, chosen, smooth.flicker)
+    refuse_if_constant(chosen, data)
     return assemble(
         data,
         chosen,

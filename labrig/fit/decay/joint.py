@@ -11,7 +11,12 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit.decay.whitening import WhitenedSeries
-from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
+from labrig.fit.least_squares import (
+    FloatArray,
+    LeastSquaresFit,
+    least_squares,
+    parameter_covariance,
+)
 
 #: Shape parameters (q,) → h (n,) and its Jacobian (n, q).
 Shape = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
@@ -157,9 +162,18 @@ class JointProblem:
         return residuals, jacobian
 
 
-def weight_sigma(fit: JointFit) -> FloatArray:
-    """σ of the channel weights (C,); 0 for the one that is held."""
+def covariance_under(data: WhitenedSeries, shape: Shape, fit: JointFit) -> FloatArray:
+    """Covariance of the parameters of `fit` if the noise is as in `data`."""
+    others = [c for c in range(len(fit.weights)) if c != fit.brightest]
+    problem = JointProblem(data, shape, len(fit.shape), others)
+    _, jacobian = problem.residuals(fit.least_squares.parameters)
+    return parameter_covariance(jacobian)[0]
+
+
+def weight_sigma(fit: JointFit, covariance: FloatArray) -> FloatArray:
+    """σ of the channel weights (C,), 0 for the one that is held; `covariance` (p, p) of all."""
     n_shape, others = len(fit.shape), np.arange(len(fit.weights)) != fit.brightest
     sigma = np.zeros(len(fit.weights))
-    sigma[others] = fit.least_squares.sigma[n_shape : n_shape + np.count_nonzero(others)]
+    variances = np.diag(covariance)[n_shape : n_shape + np.count_nonzero(others)]
+    sigma[others] = np.sqrt(variances)
     return sigma

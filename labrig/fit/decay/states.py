@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import FitError
-from labrig.fit.decay.joint import JointFit, Shape, fit_jointly
+from labrig.fit.decay.joint import JointFit, Shape, covariance_under, fit_jointly
 from labrig.fit.decay.search import projection, search_rates
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.shapes import exponential_means_and_slopes
@@ -59,6 +59,16 @@ class StatesFit:
         """(n,) in the order of `log_rates`."""
         shape = self.joint.shape
         return np.concatenate([shape[1 : 2 * self.n_free : 2], shape[2 * self.n_free :]])
+
+    def dof(self, data: WhitenedSeries) -> int:
+        """Values measured, and the offsets' priors, minus parameters."""
+        n_priors = len(data.target) - data.values.size
+        return data.series.n_values + n_priors - self.joint.n_parameters
+
+    def covariance_under(self, data: WhitenedSeries) -> FloatArray:
+        """Of the parameters of `joint`, if the noise is as in `data`."""
+        shape = exponentials(data.series, self.n_free, self.fixed)
+        return covariance_under(data, shape, self.joint)
 
     @property
     def vanished(self) -> NDArray[np.bool_]:

@@ -1,0 +1,184 @@
+"""What speaks for and against a fit: refusals, and the warnings in its result."""
+
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.errors import FitError
+from labrig.fit.decay.diagnostics import (
+    Misfit,
+    below_zero_warnings,
+    misfit_warnings,
+    offset_warnings,
+    rise_in_sigmas,
+    state_warnings,
+)
+from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
+from labrig.fit.decay.result import DecayState
+from labrig.fit.decay.rivals import Rival
+from labrig.fit.decay.selection import Candidate
+from labrig.fit.decay.states import StatesFit
+from labrig.fit.decay.whitening import WhitenedSeries
+from labrig.fit.least_squares import FloatArray
+
+RISING_SIGMAS = 5.0
+#: A rate this close to the slowest one searched, in log k, has come to rest there.
+AT_BOUND = 1e-3
+
+
+@dataclass(frozen=True)
+class Evidence:
+    """What led to the fit chosen.
+
+    Attributes
+    ----------
+    noise, noise_dof
+        The envelope; its degrees of freedom if σ or flicker come from it, else inf.
+    candidates, rivals
+        What was tried.
+    better_rival
+        The rival that does clearly better than exponentials, if one does.
+    asked, max_states, n_fixed
+        As the user had it.
+    """
+
+    noise: Envelope
+    noise_dof: float
+    candidates: tuple[Candidate, ...]
+    rivals: tuple[Rival, ...]
+    better_rival: Rival | None
+    asked: int | None
+    max_states: int
+    n_fixed: int
+
+
+def refuse_if_rising(data: WhitenedSeries, weights: FloatArray) -> None:
+    """No fit of a decay to what grows.
+
+    Raises
+    ------
+    FitError
+        The last quarter of the frames is clearly brighter than the first.
+    """
+    rise = rise_in_sigmas(*_common_signal(data, weights, np.zeros_like(weights)))
+    if rise > RISING_SIGMAS:
+        raise FitError(
+            "expected a signal that decays, got one that rises: its last quarter is brighter than "
+            f"its first by {rise:.0f} σ; was the lamp off, do times and values belong together?"
+        )
+
+
+def refuse_if_constant(fit: StatesFit, data: WhitenedSeries) -> None:
+    """No rate for what does not change.
+
+    Raises
+    ------
+    FitError
+        There is one state, and its rate is the slowest one searched.
+    """
+    slowest, _ = data.series.log_rate_bounds
+    if fit.n_states == fit.n_free == 1 and fit.log_rates[0] < slowest + AT_BOUND:
+        raise FitError(
+            "expected a signal that decays, got one that is constant within its noise for "
+            f"{data.series.span_s:.4g} s; was the sample charged, is it the dark level or stray "
+            "light that is seen? Else record longer"
+        )
+
+
+def warnings_about(
+    data: WhitenedSeries,
+    fit: StatesFit,
+    states: tuple[DecayState, ...],
+    log_rate_covariance: FloatArray,
+    evidence: Evidence,
+) -> list[str]:
+    """What to distrust, in one line each.
+
+    Parameters
+    ----------
+    data
+        As whitened for `fit`.
+    fit, states
+        The fit, and its states in the user's units by falling rate.
+    log_rate_covariance
+        (n, n) of log k of `states`.
+    evidence
+        What led to the fit.
+    """
+    series, joint = data.series, fit.joint
+    warnings = []
+    if not series.sigma_given:
+        scatter = np.sqrt(joint.chi2 / max(fit.dof(data), 1)) * series.peak
+        scatter /= series.inverse_sigma.max()
+        warnings.append(
+            f"σ was not given: taken as {scatter:.3g} for all values, from their scatter; "
+            "give each value's σ for the right weights"
+        )
+    if fit.dof(data) <= 0:
+        warnings.append(
+            "there are no more values than parameters: nothing is left to test the fit with; "
+            "record more frames"
+        )
+    if evidence.noise_dof < FEWEST_NOISE_DOF:
+        warnings.append(
+            f"flicker was estimated from {max(evidence.noise_dof, 1):.0f} frames' worth of bright "
+            "signal: give a flicker measured elsewhere, or record more frames while it is bright"
+        )
+    wanted = evidence.asked or evidence.n_fixed
+    if fit.n_states < wanted:
+        warnings.append(
+            f"{wanted} states were asked for, the data support {fit.n_states}: "
+            "the others' amplitude is zero; ask for fewer or take more light"
+        )
+    rival = evidence.better_rival
+    if rival is not None:
+        n = evidence.candidates[-1].n_states
+        warnings.append(
+            f"a {rival.name} {rival.formula} fits better than {n} exponential"
+            f"{'s' if n > 1 else ''}: the rates are descriptive only, "
+            "do not extrapolate them beyond the times recorded"
+        )
+    more = (
+        "allow more states"
+        if fit.n_states < evidence.max_states
+        else "look for another law of decay"
+    )
+    warnings += misfit_warnings(
+        _misfit(data, fit, evidence), fit.n_states, f"{more}, and check background and times"
+    )
+    warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
+    warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
+    low, high = series.log_rate_bounds
+    return warnings + state_warnings(
+        states,
+        log_rate_covariance,
+        series.span_s,
+        (float(np.exp(low)) / series.span_s, float(np.exp(high)) / series.span_s),
+    )
+
+
+def _common_signal(
+    data: WhitenedSeries, weights: FloatArray, offsets: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(n,) what the channels together say of the signal without `offsets`, and its 1/variance."""
+    unit = data.constant(weights)
+    information = np.einsum("fc,fc->f", unit, unit)
+    values = data.values - data.constant(offsets)
+    common = np.einsum("fc,fc->f", unit, values) / np.where(information > 0, information, 1.0)
+    return common, information
+
+
+def _misfit(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> Misfit:
+    series, joint = data.series, fit.joint
+    frames, _ = joint.frame_residuals(data)
+    n_frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
+    along, across = joint.followed(data)
+    residuals = joint.least_squares.residuals[: series.values.size]
+    return Misfit(
+        t_s=(series.t + series.start) * series.span_s,
+        frames=frames,
+        frame_dof=n_frames - along,
+        colour_chi2=max(float(residuals @ residuals - frames @ frames), 0.0),
+        colour_dof=series.n_values - n_frames - across,
+        noise_dof=evidence.noise_dof,
+    )

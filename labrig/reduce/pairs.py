@@ -1,0 +1,144 @@
+"""Temporal noise of a patch's mean, from pairs of successive frames.
+
+What differs between two frames of the same patch, apart from its brightness, is noise: whatever
+stands still cancels (the sample's structure, its edges, each pixel's own response). So a pair tells
+what a single frame (`labrig.reduce.noise`) cannot: noise that the pixels of a row share, and that
+of a patch too small to be told from its surroundings. It is the photon transfer from pairs of
+Janesick (2007) and EMVA 1288, on strips as wide as the patch instead of single pixels: the scatter
+of a strip contains the correlation of all pixels in it.
+"""
+
+from collections.abc import Sequence
+from itertools import combinations
+
+import numpy as np
+import numpy.typing as npt
+
+from labrig.reduce.noise import Floats
+from labrig.reduce.planes import PixelMask
+from labrig.reduce.raw import RawFrame
+from labrig.region import Region, region_pixels
+
+#: Strips of a patch, if it has that many rows of each colour.
+STRIPS = 16
+#: Degrees of freedom from which the pairs go before what each frame says: they then know σ to 10 %.
+FEWEST_DOF = 50
+#: Brightness in σ of the mean from which the frames of a pair are brought to the same; what does
+#: not stand out of the noise has no structure that does.
+SCALED_SIGMAS = 5.0
+#: Least share of the σ that a frame by itself says: frames without noise are no measurement of it.
+LEAST_SHARE = 0.1
+#: Rounds in which the weights follow the noise found.
+REWEIGHTINGS = 4
+
+
+def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Floats:
+    """Means of strips over the width of a region, less the region's mean; shape (C, strips), DN.
+
+    Parameters
+    ----------
+    raw
+        The frame.
+    region
+        Where.
+    hot
+        Shape (height, width): pixels to leave out.
+    """
+    x, y, width, height = region_pixels(region, raw.width, raw.height)
+    side = raw.cfa_side
+    strips = max(1, min(STRIPS, height // side))
+    total, count = np.zeros((2, len(raw.channels), strips))
+    for position, letter in enumerate(raw.cfa):
+        row, column = divmod(position, side)
+        here = (
+            slice(y + (row - y) % side, y + height, side),
+            slice(x + (column - x) % side, x + width, side),
+        )
+        plane = raw.mosaic[here]
+        if len(plane) < strips:
+            continue
+        kept = np.ones(plane.shape, bool) if hot is None else ~hot[here]
+        pixels = kept.sum(axis=1)
+        light = plane.sum(axis=1, dtype=np.int64, where=kept) - raw.black[position] * pixels
+        starts = np.arange(strips) * len(plane) // strips
+        channel = raw.channels.index(letter)
+        total[channel] += np.add.reduceat(light, starts)
+        count[channel] += np.add.reduceat(pixels, starts)
+    means = total / np.maximum(count, 1)
+    return np.asarray(means - means.mean(axis=1, keepdims=True))
+
+
+def paired_sigma(
+    deviations: Floats,
+    light: Floats,
+    sigma: Floats,
+    t_s: Floats,
+    unit: Sequence[str],
+    usable: npt.NDArray[np.bool_],
+) -> Floats:
+    """Standard uncertainty in DN of the means of a patch, shape (n, C), unit by unit.
+
+    Parameters
+    ----------
+    deviations
+        Shape (n, C, strips), of `strip_deviations`.
+    light
+        Shape (n, C), the means above the dark level.
+    sigma
+        Shape (n, C), what each frame by itself says; kept where pairs are too few.
+    t_s, unit, usable
+        Shape (n,) each: when, in which unit, and whether the frame can be in a pair.
+    """
+    found = sigma.copy()
+    for one in dict.fromkeys(unit):
+        rows = np.array([row for row, name in enumerate(unit) if name == one])
+        paired = np.flatnonzero(usable[rows])
+        paired = paired[np.argsort(t_s[rows[paired]], kind="stable")]
+        if (len(paired) - 1) * (deviations.shape[2] - 1) < FEWEST_DOF:
+            continue
+        for channel in range(sigma.shape[1]):
+            found[rows, channel] = _photon_transfer(
+                deviations[rows, channel], light[rows, channel], sigma[rows, channel], paired
+            )
+    return found
+
+
+def _photon_transfer(
+    deviations: Floats, light: Floats, sigma: Floats, paired: npt.NDArray[np.intp]
+) -> Floats:
+    """σ of the means of one channel, shape (n,), from the `paired` frames in order of time.
+
+    The variance is A + B·light + C·light², all ≥ 0: reading, photons, and what is proportional to
+    the light but not common to the patch.
+    """
+    strips = deviations.shape[1]
+    one, other = paired[:-1], paired[1:]
+    light = np.maximum(light, 0)
+    bright = light[one] > SCALED_SIGMAS * sigma[one]
+    scale = np.where(bright, light[other] / np.where(bright, light[one], 1.0), 1.0)
+    difference = deviations[other] - scale[:, np.newaxis] * deviations[one]
+    scatter = np.square(difference).sum(axis=1) / (strips - 1) / strips
+    terms = np.stack([np.ones_like(light), light, np.square(light)], axis=1)
+    design = terms[other] + np.square(scale)[:, np.newaxis] * terms[one]
+    variance = np.square(sigma)
+    least = LEAST_SHARE**2 * variance
+    for _ in range(REWEIGHTINGS):
+        expected = variance[other] + np.square(scale) * variance[one]
+        coefficients = _nonnegative(design / expected[:, np.newaxis], scatter / expected)
+        variance = np.maximum(terms @ coefficients, least)
+    return np.sqrt(variance)
+
+
+def _nonnegative(design: Floats, target: Floats) -> Floats:
+    """Least squares with coefficients ≥ 0 for a few columns: the best of all sets of them."""
+    lengths = np.linalg.norm(design, axis=0)
+    columns = design / np.where(lengths > 0, lengths, 1.0)
+    best, least = np.zeros(len(lengths)), np.inf
+    for size in range(1, len(lengths) + 1):
+        for chosen in map(list, combinations(range(len(lengths)), size)):
+            found, *_ = np.linalg.lstsq(columns[:, chosen], target)
+            left = float(np.square(target - columns[:, chosen] @ found).sum())
+            if left < least and found.min() >= 0:
+                best, least = np.zeros(len(lengths)), left
+                best[chosen] = found / np.where(lengths[chosen] > 0, lengths[chosen], 1.0)
+    return best
