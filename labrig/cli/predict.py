@@ -1,0 +1,207 @@
+"""`labrig plan --predict`: what a protocol's fits will know, and what would halve that."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from rich.table import Table
+
+    from labrig.predict import PatchPrediction, Prediction, Remedy
+    from labrig.run import Recording
+
+PredictOption = Annotated[
+    list[str] | None,
+    typer.Option(
+        "--predict",
+        metavar="[PATCH=]MATERIAL",
+        help="Expected σ of its rates, instead of the timeline: a shipped material, a file, or "
+        "RUN/result/material.yaml, which knows camera and brightness. Repeatable.",
+    ),
+]
+LikeOption = Annotated[
+    Path | None,
+    typer.Option("--like", help="With --predict: an earlier run, for camera and flicker."),
+]
+MeteredOption = Annotated[
+    str | None,
+    typer.Option(
+        "--metered",
+        help="With --predict, if no run tells how bright the material is: what metering chooses "
+        "for the first frame, such as '0.5 s'.",
+    ),
+]
+
+#: Shares of the variance that are worth a word.
+WORTH_SAYING = 0.1
+#: σ of a rate or an amplitude beyond which it is hardly known.
+HARDLY_KNOWN = 0.5
+#: Where the fit itself will report this many times the σ by which rates scatter, that is said.
+OVERSTATED = 1.3
+#: Differences in lab time below this share of it are none.
+SAME_TIME = 0.005
+
+
+def predict_and_tell(
+    recording: "Recording",
+    materials: list[str],
+    like: Path | None,
+    metered: str | None,
+    *,
+    json: bool,
+) -> None:
+    """Predict for a protocol that fits its rig, and print that."""
+    from labrig.optics import read_camera
+    from labrig.predict import Sources, predict
+
+    camera = recording.rig.optics.camera
+    response = None if camera is None else read_camera(camera)
+    sources = Sources.parse(materials, like, metered, response)
+    prediction = predict(
+        recording.protocol, recording.plan, recording.rig, str(recording.rig_source), sources
+    )
+    if json:
+        typer.echo(prediction.to_json())
+    else:
+        _tell(prediction, recording.plan.duration_s)
+
+
+def _tell(prediction: "Prediction", duration_s: float) -> None:
+    from rich.console import Console
+
+    console = Console(highlight=False)
+    for patch in prediction.patches:
+        console.print(_states(prediction, patch))
+        for line in _doubts(prediction, patch):
+            console.print(f"! {line}", style="yellow")
+        if any(remedy.helps for remedy in prediction.remedies):
+            console.print(_remedies(prediction, patch, duration_s))
+    useless = [remedy.change.says for remedy in prediction.remedies if not remedy.helps]
+    if useless:
+        console.print(f"no help: {', '.join(useless)}")
+    for line in prediction.warnings:
+        console.print(f"! {line}", style="yellow")
+    for line in prediction.notes:
+        console.print(line, style="dim")
+
+
+def _states(prediction: "Prediction", patch: str) -> "Table":
+    from rich.table import Table
+
+    from labrig.fit.decay.result import with_uncertainty
+
+    found = prediction.patches[patch]
+    table = Table(title=_title(prediction, patch), title_justify="left")
+    for heading in ("state", "k_r / s⁻¹", "σ", "σ of amplitude", "noise"):
+        table.add_column(heading)
+    for i, rate in enumerate(found.k_r_per_s):
+        table.add_row(
+            str(i + 1),
+            with_uncertainty(rate, found.k_r_sigma_per_s[i]),
+            _percent(found.k_r_sigma_per_s[i] / rate),
+            _percent(found.amplitude_sigma_dn_per_s[i] / found.amplitude_dn_per_s[i]),
+            _noise(found, i),
+        )
+    return table
+
+
+def _title(prediction: "Prediction", patch: str) -> str:
+    shortest, longest = (f"{f(prediction.exposures_s):.3g} s" for f in (min, max))
+    exposures = shortest if shortest == longest else f"{shortest} to {longest}"
+    frames = f"{len(prediction.exposures_s)} frames of {exposures}"
+    decays = "" if prediction.decays == 1 else f", {prediction.decays} decays"
+    clipped = prediction.patches[patch].clipped
+    lost = f", {clipped} of them clipped" if clipped else ""
+    return f"{prediction.materials[patch]} on '{patch}': {frames}{decays}{lost}"
+
+
+def _noise(found: "PatchPrediction", state: int) -> str:
+    shares = {source: part[state] for source, part in found.budget.items()}
+    largest = sorted(shares, key=lambda source: -shares[source])
+    return ", ".join(
+        f"{source} {100 * shares[source]:.0f} %"
+        for source in largest
+        if shares[source] >= WORTH_SAYING
+    )
+
+
+def _doubts(prediction: "Prediction", patch: str) -> list[str]:
+    """What the fit will not tell, and which change makes it."""
+    found, said = prediction.patches[patch], []
+    if not found.tells_all_states:
+        able = [remedy for remedy in prediction.remedies if remedy.patches[patch].tells_all_states]
+        cheapest = min(able, key=lambda remedy: remedy.extra_time_s, default=None)
+        would = f"'{cheapest.change.says}' would" if cheapest else "nothing below is enough"
+        said.append(
+            f"the fit will not tell these {len(found.k_r_per_s)} states apart for sure: it sees "
+            f"all of them with a chance of {100 * found.chance_of_all_states:.0f} %, and their "
+            f"rates {found.least_apart:.1f} σ from each other; {would}"
+        )
+    for i, rate in enumerate(found.k_r_per_s):
+        of_rate = found.k_r_sigma_per_s[i] / rate
+        of_amplitude = found.amplitude_sigma_dn_per_s[i] / found.amplitude_dn_per_s[i]
+        if max(of_rate, of_amplitude) > HARDLY_KNOWN:
+            said.append(
+                f"state {i + 1} is hardly known: its rate to {_percent(of_rate)}, its amplitude "
+                f"to {_percent(of_amplitude)}"
+            )
+    overstated = max(
+        reported / sigma
+        for reported, sigma in zip(
+            found.k_r_reported_sigma_per_s, found.k_r_sigma_per_s, strict=True
+        )
+    )
+    if overstated > OVERSTATED:
+        said.append(
+            f"few frames are bright enough to tell the flicker from: not knowing it, the fit will "
+            f"report some {overstated:.1f} times this σ"
+        )
+    return said
+
+
+def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table":
+    from rich.table import Table
+
+    found = prediction.patches[patch]
+    count = len(found.k_r_per_s)
+    table = Table(title="what would halve it", title_justify="left")
+    table.add_column("change")
+    for heading in ("σ",) if count == 1 else [f"σ {i + 1}" for i in range(count)]:
+        table.add_column(heading, justify="right", no_wrap=True)
+    table.add_column("σ ×", justify="right", no_wrap=True)
+    if not found.tells_all_states:
+        table.add_column("tells all", justify="right", no_wrap=True)
+    table.add_column("lab time", justify="right", no_wrap=True)
+    for remedy in prediction.remedies:
+        if not remedy.helps:
+            continue
+        after = remedy.patches[patch]
+        table.add_row(
+            remedy.change.says,
+            *(
+                _percent(sigma / rate)
+                for sigma, rate in zip(after.k_r_sigma_per_s, after.k_r_per_s, strict=True)
+            ),
+            f"{remedy.gain:.2f}",
+            *([] if found.tells_all_states else ["yes" if after.tells_all_states else "no"]),
+            _extra_time(remedy, duration_s),
+            style="bold" if remedy.halves else "",
+        )
+    return table
+
+
+def _extra_time(remedy: "Remedy", duration_s: float) -> str:
+    from labrig.quantity import duration_text
+
+    if abs(remedy.extra_time_s) < SAME_TIME * duration_s:
+        return "same"
+    sign = "+" if remedy.extra_time_s > 0 else "−"
+    return f"{sign} {duration_text(abs(remedy.extra_time_s))}"
+
+
+def _percent(share: float) -> str:
+    if not share < 10:
+        return "> 1000 %"
+    percent = 100 * share
+    return f"{percent:.0f} %" if percent >= 100 else f"{percent:.2g} %"

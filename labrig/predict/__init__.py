@@ -1,0 +1,8 @@
+"""What a protocol will know before it is run: uncertainties, and what would halve them."""
+
+from labrig.predict.known import Sources
+from labrig.predict.patch import PatchPrediction
+from labrig.predict.prediction import Prediction, predict
+from labrig.predict.remedies import Remedy
+
+__all__ = ["PatchPrediction", "Prediction", "Remedy", "Sources", "predict"]

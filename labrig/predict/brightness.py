@@ -1,0 +1,90 @@
+"""How bright a sample is: as measured on this bench, else as bright as its exposure says."""
+
+from collections.abc import Mapping
+
+import numpy as np
+
+from labrig.acquire import CameraOffers
+from labrig.errors import UsageError
+from labrig.material import Material
+from labrig.optics import CameraResponse
+from labrig.predict.camera import CameraFigures
+from labrig.predict.expectation import Bench, PredictableProtocol, expected_schedule
+from labrig.predict.glow import Glow, measured_amplitudes, radiated, rates
+from labrig.predict.reference import Reference
+
+#: Range of brightness searched, DN/s, and how often it is halved.
+DIMMEST, BRIGHTEST = 1e-3, 1e9
+BISECTIONS = 50
+#: Exposures come in thirds of a stop: half of one up is the middle of those metered alike.
+HALF_A_THIRD_STOP = 2 ** (1 / 6)
+
+
+def measured_glow(material: Material, reference: Reference | None) -> Glow | None:
+    """The glow of a material that `reference` measured; None for any other."""
+    amplitude = measured_amplitudes(material)
+    if reference is None or amplitude is None:
+        return None
+    return Glow(
+        rates(material),
+        amplitude,
+        reference.channel_weights,
+        reference.camera.iso,
+        reference.f_number,
+    )
+
+
+def relative_glow(
+    material: Material,
+    protocol: PredictableProtocol,
+    camera: CameraFigures,
+    response: CameraResponse | None,
+) -> Glow:
+    """The glow of a material but for its brightness, which is 1 in all.
+
+    Raises
+    ------
+    UsageError
+        How strong its states are relative to each other is not known.
+    """
+    charge_s = protocol.charge if isinstance(protocol.charge, float) else np.inf
+    weights: Mapping[str, float] = {}
+    amplitude = measured_amplitudes(material)
+    if amplitude is None and len(material.states) == 1:
+        amplitude = np.ones(1)
+    if (radiation := radiated(material, response, charge_s)) is not None:
+        amplitude, weights = radiation
+    if amplitude is None or not amplitude.sum() > 0:
+        raise UsageError(
+            f"{material.name}: expected 'amplitude' or 'reradiation' of every state, to know how "
+            "strong they are relative to each other, got neither"
+        )
+    if set(weights) != set(camera.channel_shares):
+        # Of an unknown colour only the channel with most pixels is counted on.
+        weights = {max(camera.channel_shares, key=lambda name: camera.channel_shares[name]): 1.0}
+    settings = protocol.camera
+    return Glow(
+        rates(material), amplitude / amplitude.sum(), weights, settings.iso, settings.f_number
+    )
+
+
+def brightness_metered_as(
+    metered: PredictableProtocol, offers: CameraOffers, bench: Bench, exposure_s: float
+) -> float:
+    """By what to multiply the glows of `bench` so that metering chooses `exposure_s` at first.
+
+    Parameters
+    ----------
+    metered
+        The protocol with `exposure: auto`.
+    """
+    wanted_s = min(exposure_s, metered.longest_exposure_s(offers)) * 0.999
+    seen = bench.seen_with(metered.camera)
+    low, high = np.log(DIMMEST), np.log(BRIGHTEST)
+    for _ in range(BISECTIONS):
+        middle = (low + high) / 2
+        brighter = {patch: glow.brighter(np.exp(middle)) for patch, glow in seen.glows.items()}
+        trial = Bench(seen.camera, seen.flicker, brighter)
+        schedule = expected_schedule(metered, offers, trial, lambda _: None)
+        low, high = (middle, high) if schedule.exposures_s[0] >= wanted_s else (low, middle)
+    return float(np.exp(low)) / HALF_A_THIRD_STOP

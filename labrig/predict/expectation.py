@@ -1,0 +1,205 @@
+"""From a protocol to the fit that it will allow: schedule, frames, noise, information."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+from typing import Protocol, cast
+
+import numpy as np
+
+from labrig.acquire import CameraOffers, ProtocolModel
+from labrig.errors import ProtocolError, UsageError
+from labrig.predict.camera import CameraFigures
+from labrig.predict.frames import dark_frames, glow_frames
+from labrig.predict.glow import Glow
+from labrig.predict.information import Information, information
+from labrig.predict.series import ExpectedSeries, expected_series, repeated
+from labrig.reduce import FrameMeasurement
+from labrig.reduce.patches import CLIPPED_SHARE
+from labrig.region import Region
+
+
+class Schedule(Protocol):
+    """When each frame of a decay begins after lamp off, and its shutter time."""
+
+    times_s: Sequence[float]
+    exposures_s: Sequence[float]
+
+
+class CameraSettings(Protocol):
+    """What a protocol sets the camera to."""
+
+    iso: int
+    f_number: float | None
+
+
+class PredictableProtocol(Protocol):
+    """What of a decay protocol decides what its fit will know."""
+
+    patches: dict[str, Region]
+    dark: str
+    background: Region | None
+    camera: CameraSettings
+    charge: float | str
+    exposure: float | str
+    every: float
+    duration: float
+    repeats: int
+    states: str | int
+
+    def longest_exposure_s(self, offers: CameraOffers) -> float:
+        """Longest shutter time that fits between two frames."""
+
+    def dark_exposures_s(self, offers: CameraOffers) -> Sequence[float]:
+        """Shutter time of each dark frame."""
+
+    def expected_schedule(
+        self,
+        offers: CameraOffers,
+        expected: Callable[[float, float], Sequence[FrameMeasurement]],
+        warn: Callable[[str], None],
+    ) -> Schedule:
+        """The frames of a decay as its metering will choose them."""
+
+
+def predictable(protocol: ProtocolModel) -> PredictableProtocol:
+    """`protocol` as one whose fit can be predicted.
+
+    Raises
+    ------
+    UsageError
+        It records no decay.
+    """
+    if protocol.protocol != "decay":
+        raise UsageError(
+            f"--predict: expected a protocol that records a decay, got '{protocol.protocol}', of "
+            "which no rates are fitted"
+        )
+    return cast(PredictableProtocol, protocol)
+
+
+@dataclass(frozen=True, eq=False)
+class Bench:
+    """What is known, or assumed, before anything is measured.
+
+    Attributes
+    ----------
+    camera
+        At some ISO; what it is at others follows.
+    flicker
+        ρ of all light between frames.
+    glows
+        What each predicted patch will shine like.
+    """
+
+    camera: CameraFigures
+    flicker: float
+    glows: Mapping[str, Glow]
+
+    def seen_with(self, settings: CameraSettings) -> "Bench":
+        """The same at a protocol's settings."""
+        glows = {
+            patch: glow.seen_at(settings.iso, settings.f_number)
+            for patch, glow in self.glows.items()
+        }
+        return Bench(self.camera.at_iso(settings.iso), self.flicker, glows)
+
+
+@dataclass(frozen=True, eq=False)
+class Expectation:
+    """What one protocol will measure and find.
+
+    Attributes
+    ----------
+    exposures_s
+        Of the frames of one decay.
+    series, found
+        By patch: the fit's data, and what it will know.
+    clipped
+        By patch: frames of one decay that clip and are left out.
+    states_chosen
+        Whether the fit is to find out how many states there are.
+    warnings
+        Of the protocol's own metering, and of what it asks of the fit.
+    """
+
+    exposures_s: tuple[float, ...]
+    series: Mapping[str, ExpectedSeries]
+    found: Mapping[str, Information]
+    clipped: Mapping[str, int]
+    states_chosen: bool
+    warnings: tuple[str, ...]
+
+
+def expect(protocol: PredictableProtocol, offers: CameraOffers, bench: Bench) -> Expectation:
+    """Predict every patch of `bench`.
+
+    Raises
+    ------
+    ProtocolError
+        Too few frames of a patch are left that do not clip.
+    """
+    bench = bench.seen_with(protocol.camera)
+    warnings: list[str] = []
+    schedule = expected_schedule(protocol, offers, bench, warnings.append)
+    series, clipped = {}, {}
+    for patch, glow in bench.glows.items():
+        series[patch], clipped[patch] = _series(protocol, offers, bench, patch, schedule)
+        if protocol.states not in ("auto", len(glow.k_r_per_s)):
+            warnings.append(
+                f"{patch}: the protocol asks for {protocol.states} states, the material has "
+                f"{len(glow.k_r_per_s)}; predicted is a fit of {len(glow.k_r_per_s)}"
+            )
+    return Expectation(
+        exposures_s=tuple(schedule.exposures_s),
+        series=series,
+        found={patch: information(one) for patch, one in series.items()},
+        clipped=clipped,
+        states_chosen=protocol.states == "auto",
+        warnings=tuple(warnings),
+    )
+
+
+def expected_schedule(
+    protocol: PredictableProtocol,
+    offers: CameraOffers,
+    bench: Bench,
+    warn: Callable[[str], None],
+) -> Schedule:
+    """What the protocol's metering makes of the glows of `bench`, given at its settings."""
+
+    def expected(t_s: float, exposure_s: float) -> list[FrameMeasurement]:
+        at = np.array([t_s]), np.array([exposure_s])
+        return [
+            glow_frames(glow, bench.camera, protocol.patches[patch], *at).measurements()[0]
+            for patch, glow in bench.glows.items()
+        ]
+
+    return protocol.expected_schedule(offers, expected, warn)
+
+
+def _series(
+    protocol: PredictableProtocol,
+    offers: CameraOffers,
+    bench: Bench,
+    patch: str,
+    schedule: Schedule,
+) -> tuple[ExpectedSeries, int]:
+    """What the fit of `patch` will be given, and how many frames of a decay clip."""
+    camera, region, glow = bench.camera, protocol.patches[patch], bench.glows[patch]
+    t_s, exposure_s = np.array(schedule.times_s), np.array(schedule.exposures_s)
+    frames = glow_frames(glow, camera, region, t_s, exposure_s)
+    darks = background = None
+    if protocol.dark == "background" and protocol.background is not None:
+        background = dark_frames(camera, protocol.background, frames.channels, exposure_s)
+    else:
+        darks_s = np.array(protocol.dark_exposures_s(offers))
+        darks = dark_frames(camera, region, frames.channels, darks_s)
+    one = expected_series(glow, t_s, frames, darks, background, bench.flicker)
+    kept = np.asarray((frames.saturated <= CLIPPED_SHARE).all(axis=1))
+    clipped = int(np.count_nonzero(~kept))
+    if len(kept) - clipped < 2 * len(glow.k_r_per_s):
+        raise ProtocolError(
+            f"{patch}: {clipped} of {len(kept)} frames will clip, so that too few are left to fit; "
+            "expose for less (or exposure: auto), or lower camera.iso"
+        )
+    return repeated(one, kept, protocol.repeats), clipped

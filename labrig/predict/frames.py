@@ -1,0 +1,139 @@
+"""What frames will show, before they are taken."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import ndtr
+
+from labrig.fit.decay.shapes import exponential_means
+from labrig.fit.least_squares import FloatArray
+from labrig.predict.camera import CameraFigures
+from labrig.predict.glow import Glow
+from labrig.reduce import ChannelStats, FrameMeasurement
+from labrig.reduce.noise import ROUNDING_VARIANCE
+from labrig.region import Region
+
+#: Standard deviations above the mean at which a normal variate has its 99.5 % quantile.
+PEAK_SIGMAS = 2.576
+
+
+@dataclass(frozen=True, eq=False)
+class ExpectedFrames:
+    """n frames of one region in C channels, in DN above black.
+
+    Attributes
+    ----------
+    camera
+        At the ISO of the frames.
+    channels
+        C names.
+    pixels
+        (C,) of the region in each channel.
+    exposure_s
+        (n,) shutter times.
+    light_dn
+        (n, C) mean of what the sample sends.
+    """
+
+    camera: CameraFigures
+    channels: tuple[str, ...]
+    pixels: FloatArray
+    exposure_s: FloatArray
+    light_dn: FloatArray
+
+    @property
+    def dark_dn(self) -> FloatArray:
+        """(n, 1) mean of the dark current."""
+        return self.exposure_s[:, np.newaxis] * self.camera.dark_dn_per_s
+
+    @property
+    def photon_variance(self) -> FloatArray:
+        """(n, C) of the mean, DN²: the light's share."""
+        return self.light_dn / self.camera.electrons_per_dn / self.pixels
+
+    @property
+    def read_variance(self) -> FloatArray:
+        """(n, C) of the mean, DN²: what reading the pixels adds."""
+        of_pixel = max(self.camera.read_noise_dn**2, ROUNDING_VARIANCE)
+        return np.broadcast_to(of_pixel / self.pixels, self.light_dn.shape)
+
+    @property
+    def dark_variance(self) -> FloatArray:
+        """(n, C) of the mean, DN²: the dark current's electrons."""
+        return self.dark_dn / self.camera.electrons_per_dn / self.pixels
+
+    @property
+    def variance(self) -> FloatArray:
+        """(n, C) of the mean, DN², flicker left out."""
+        return self.photon_variance + self.read_variance + self.dark_variance
+
+    @property
+    def saturated(self) -> FloatArray:
+        """(n, C) share of the pixels that clip."""
+        brightest = self.light_dn * self.camera.unevenness + self.dark_dn
+        deviation = np.sqrt(self.variance * self.pixels)
+        return np.asarray(ndtr((brightest - self.camera.range_dn) / deviation))
+
+    def measurements(self) -> list[FrameMeasurement]:
+        """Each frame as `labrig.reduce.measure` would see it."""
+        camera = self.camera
+        mean = np.minimum(self.light_dn + self.dark_dn, camera.range_dn)
+        deviation = np.sqrt(self.variance * self.pixels)
+        peak = self.light_dn * camera.unevenness + self.dark_dn + PEAK_SIGMAS * deviation
+        sigma, saturated = np.sqrt(self.variance), self.saturated * self.pixels
+
+        def channel(row: int, c: int) -> ChannelStats:
+            return ChannelStats(
+                mean=float(mean[row, c]),
+                sigma=float(sigma[row, c]),
+                std=float(deviation[row, c]),
+                peak=float(min(peak[row, c], camera.range_dn)),
+                n=round(self.pixels[c]),
+                saturated=round(saturated[row, c]),
+                hot=0,
+            )
+
+        return [
+            FrameMeasurement(
+                channels={name: channel(row, c) for c, name in enumerate(self.channels)},
+                cfa="",
+                black=(0.0,),
+                white=camera.range_dn,
+                width=camera.width,
+                height=camera.height,
+                exposure_s=float(exposure_s),
+                iso=camera.iso,
+                f_number=None,
+                make=None,
+                model=None,
+            )
+            for row, exposure_s in enumerate(self.exposure_s)
+        ]
+
+
+def glow_frames(
+    glow: Glow, camera: CameraFigures, region: Region, t_s: FloatArray, exposure_s: FloatArray
+) -> ExpectedFrames:
+    """Frames of `glow` that begin at `t_s` (n,) after lamp off."""
+    decay = exponential_means(glow.k_r_per_s, t_s, exposure_s) @ glow.amplitude
+    light_dn = np.multiply.outer(exposure_s * decay, np.array([*glow.weights.values()]))
+    return _frames(camera, region, tuple(glow.weights), exposure_s, light_dn)
+
+
+def dark_frames(
+    camera: CameraFigures, region: Region, channels: tuple[str, ...], exposure_s: FloatArray
+) -> ExpectedFrames:
+    """Frames of a region that sends no light."""
+    light_dn = np.zeros((len(exposure_s), len(channels)))
+    return _frames(camera, region, channels, exposure_s, light_dn)
+
+
+def _frames(
+    camera: CameraFigures,
+    region: Region,
+    channels: tuple[str, ...],
+    exposure_s: FloatArray,
+    light_dn: FloatArray,
+) -> ExpectedFrames:
+    pixels = np.array([camera.pixels(region, name) for name in channels])
+    return ExpectedFrames(camera, channels, pixels, exposure_s, light_dn)

@@ -1,0 +1,143 @@
+"""How bright a material glows: from its file, as far as that tells."""
+
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labrig.errors import UsageError
+from labrig.fit.least_squares import FloatArray
+from labrig.material import Material, State
+from labrig.optics import CameraResponse
+from labrig.optics.camera import CHANNELS
+
+#: A fit tells no more states apart; with more, a file describes something like a power law.
+MOST_STATES = 3
+
+
+@dataclass(frozen=True, eq=False)
+class Glow:
+    """Σ_i a_i e^(−k_i t) times one weight per channel, as a camera at `iso` and `f_number` sees it.
+
+    Attributes
+    ----------
+    k_r_per_s
+        (m,) rates, falling.
+    amplitude
+        (m,) at lamp off in the brightest channel, DN/s.
+    weights
+        Channel → weight, maximum 1.
+    """
+
+    k_r_per_s: FloatArray
+    amplitude: FloatArray
+    weights: Mapping[str, float]
+    iso: float
+    f_number: float | None
+
+    def seen_at(self, iso: float, f_number: float | None) -> "Glow":
+        """The same glow at other settings; an aperture that is not known stays as it is."""
+        light = 1.0
+        if self.f_number is not None and f_number is not None:
+            light = (self.f_number / f_number) ** 2
+        return replace(
+            self,
+            amplitude=self.amplitude * light * iso / self.iso,
+            iso=iso,
+            f_number=f_number,
+        )
+
+    def brighter(self, factor: float) -> "Glow":
+        """The same glow, `factor` times as bright."""
+        return replace(self, amplitude=self.amplitude * factor)
+
+
+def check_states(material: Material) -> None:
+    """Refuse a material whose states a decay cannot tell apart.
+
+    Raises
+    ------
+    UsageError
+        More states than a fit tells apart, or two with the same rate.
+    """
+    rates = sorted((state.k_r_per_s for state in material.states), reverse=True)
+    if len(rates) > MOST_STATES:
+        raise UsageError(
+            f"{material.name}: expected at most {MOST_STATES} states, got {len(rates)}; no decay "
+            "tells so many apart (such a list stands for a power law, which has no rates to "
+            "predict)"
+        )
+    if len(set(rates)) < len(rates):
+        raise UsageError(
+            f"{material.name}: two states have the same rate, {max(rates):g} /s; join them"
+        )
+
+
+def measured_amplitudes(material: Material) -> FloatArray | None:
+    """(m,) amplitudes by falling rate, in the file's own unit; None if one is missing."""
+    amplitudes = [state.amplitude for state in by_falling_rate(material)]
+    if any(amplitude is None for amplitude in amplitudes):
+        return None
+    return np.array(amplitudes, dtype=np.float64)
+
+
+def by_falling_rate(material: Material) -> Sequence[State]:
+    """The states as fits list them."""
+    return sorted(material.states, key=lambda state: -state.k_r_per_s)
+
+
+def rates(material: Material) -> FloatArray:
+    """(m,) k_r in 1/s, falling."""
+    return np.array([state.k_r_per_s for state in by_falling_rate(material)])
+
+
+def radiated(
+    material: Material, response: CameraResponse | None, charge_s: float
+) -> tuple[FloatArray, dict[str, float]] | None:
+    """Relative amplitudes Λ_i k_r,i r_i(0), (m,) by falling rate, and channel weights.
+
+    None where some state's Λ is not known. Without `response` the weights are empty.
+
+    Parameters
+    ----------
+    charge_s
+        Length of the charge; infinite for one until the plateau.
+    """
+    states = by_falling_rate(material)
+    if material.bands_nm is None or any(state.reradiation is None for state in states):
+        return None
+    edges = np.array(material.bands_nm)
+    bands = np.array([state.reradiation for state in states])
+    emitted = bands * (rates(material) * _concentrations(material, charge_s))[:, np.newaxis]
+    if response is None:
+        return emitted @ np.diff(edges), {}
+    wavelength = response.wavelength_nm
+    band = np.searchsorted(edges, wavelength, side="right") - 1
+    inside = (band >= 0) & (band < len(edges) - 1)
+    spectra = np.where(inside, emitted[:, np.clip(band, 0, len(edges) - 2)], 0.0)
+    values = np.array([response.response(spectrum) for spectrum in spectra])
+    together = values.sum(axis=0)
+    if not together.max() > 0:
+        return None
+    weights = dict(zip(CHANNELS, (together / together.max()).tolist(), strict=True))
+    return values[:, int(np.argmax(together))], weights
+
+
+def _concentrations(material: Material, charge_s: float) -> FloatArray:
+    """(m,) r(0) as the file has it; else what its k_e reach under even light; else 1, as the paper.
+
+    The irradiance is taken to be the same in all bands and of the length to which the file's k_e
+    belong.
+    """
+    states = by_falling_rate(material)
+    if all(state.r0 is not None for state in states):
+        return np.array([state.r0 for state in states], dtype=np.float64)
+    norm = material.irradiance_norm
+    if norm is None or any(state.k_e_per_s is None for state in states):
+        return np.ones(len(states))
+    k_e = np.array([state.k_e_per_s for state in states])
+    kappa = k_e.sum(axis=1) * norm.value / math.sqrt(k_e.shape[1])
+    total = kappa + rates(material)
+    concentrations: FloatArray = kappa / total * -np.expm1(-total * charge_s)
+    return concentrations

@@ -1,0 +1,212 @@
+"""What is known before a measurement, and what has to be assumed; each said in a line."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Self
+
+from labrig import shipped
+from labrig.acquire import CameraOffers, ProtocolModel
+from labrig.errors import UsageError
+from labrig.material import Material, read_material
+from labrig.optics import CameraResponse
+from labrig.predict.brightness import brightness_metered_as, measured_glow, relative_glow
+from labrig.predict.camera import TYPICAL_FLICKER, CameraFigures, typical_camera
+from labrig.predict.expectation import Bench, PredictableProtocol, predictable
+from labrig.predict.glow import Glow, check_states
+from labrig.predict.reference import Reference, read_reference, result_places, run_of
+from labrig.predict.variants import changed
+from labrig.quantity import TIME_S, parse
+from labrig.yaml_file import did_you_mean
+
+#: Where the first exposure has to be assumed: this share of the longest, so that it may grow.
+FIRST_EXPOSURE_SHARE = 1 / 8
+
+
+@dataclass(frozen=True)
+class Sources:
+    """What a prediction is to rest on.
+
+    Attributes
+    ----------
+    materials
+        Patch → name or path of its material; the patch "" is the only one there is.
+    like
+        Folder of an earlier run on the same bench.
+    first_exposure_s
+        What metering chooses for the first frame; None if that is not known.
+    response
+        Of the rig's camera.
+    """
+
+    materials: Mapping[str, str]
+    like: Path | None = None
+    first_exposure_s: float | None = None
+    response: CameraResponse | None = None
+
+    @classmethod
+    def parse(
+        cls,
+        materials: Sequence[str],
+        like: Path | None,
+        metered: str | None,
+        response: CameraResponse | None,
+    ) -> Self:
+        """From the texts of a command line: `MATERIAL`, or `PATCH=MATERIAL` for each patch.
+
+        Raises
+        ------
+        UsageError
+            A patch stands twice, or `metered` is no duration.
+        """
+        try:
+            first_exposure_s = None if metered is None else parse(metered, TIME_S)
+        except ValueError as error:
+            raise UsageError(f"--metered: {error}") from None
+        named: dict[str, str] = {}
+        for text in materials:
+            patch, _, material = text.rpartition("=")
+            if patch in named:
+                raise UsageError(
+                    "--predict: expected one material for each patch, got two for "
+                    f"{patch or 'the only one'}; write --predict PATCH=MATERIAL"
+                )
+            named[patch] = material
+        return cls(named, like, first_exposure_s, response)
+
+
+@dataclass(frozen=True, eq=False)
+class Known:
+    """The bench with its samples.
+
+    Attributes
+    ----------
+    materials
+        Names by patch.
+    brightness_known
+        Patches whose amplitudes are as measured; the others' are as assumed.
+    notes
+        Where the figures come from, in lines for a person.
+    """
+
+    bench: Bench
+    materials: Mapping[str, str]
+    brightness_known: frozenset[str]
+    notes: tuple[str, ...]
+
+
+def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) -> Known:
+    """Camera, flicker and glows: from earlier runs, else what is typical.
+
+    Raises
+    ------
+    UsageError
+        No such patch, material or run, or a material of which no decay can be predicted.
+    """
+    protocol = predictable(model)
+    files = _by_patch(protocol, sources.materials)
+    materials = {patch: read_material(name) for patch, name in files.items()}
+    for material in materials.values():
+        check_states(material)
+    like = None if sources.like is None else _like(sources.like, next(iter(files)))
+    own = {patch: _own_run(name, materials[patch], like) for patch, name in files.items()}
+    reference = like or next((run for run in own.values() if run is not None), None)
+    camera = typical_camera(offers, protocol.camera.iso) if reference is None else reference.camera
+    flicker = None if reference is None else reference.flicker
+    measured = {
+        patch: glow
+        for patch, material in materials.items()
+        if (glow := measured_glow(material, own[patch])) is not None
+    }
+    relative = {
+        patch: relative_glow(material, protocol, camera, sources.response)
+        for patch, material in materials.items()
+        if patch not in measured
+    }
+    bench = Bench(camera, flicker or TYPICAL_FLICKER, {**measured, **relative})
+    notes = [_camera_note(camera, reference), _flicker_note(flicker)]
+    if relative:
+        factor, note = _brightness(model, offers, bench, measured, relative, sources)
+        brighter = {patch: glow.brighter(factor) for patch, glow in relative.items()}
+        bench = replace(bench, glows={**measured, **brighter})
+        notes.append(note)
+    else:
+        notes.append("brightness: measured in that run")
+    return Known(
+        bench,
+        {patch: material.name for patch, material in materials.items()},
+        frozenset(measured),
+        tuple(notes),
+    )
+
+
+def _by_patch(protocol: PredictableProtocol, materials: Mapping[str, str]) -> dict[str, str]:
+    """Materials by the protocol's own patches."""
+    patches = list(protocol.patches)
+    found = {}
+    for name, material in materials.items():
+        if not name and len(patches) > 1:
+            raise UsageError(
+                f"--predict: the protocol has {len(patches)} patches ({', '.join(patches)}); say "
+                f"which one: --predict {patches[0]}={material}"
+            )
+        patch = name or patches[0]
+        if patch not in patches:
+            raise UsageError(
+                f"--predict: no patch is called '{patch}'; {did_you_mean(patch, patches)}"
+            )
+        found[patch] = material
+    return found
+
+
+def _like(run: Path, patch: str) -> Reference:
+    places = result_places(run)
+    return read_reference(places.get(patch, next(iter(places.values()))))
+
+
+def _own_run(name: str, material: Material, like: Reference | None) -> Reference | None:
+    """The run that measured a material: the one around its file, or the one given."""
+    place = shipped.find("config/materials", "material", name).parent
+    if (place / "fit.json").is_file() and run_of(place) is not None:
+        return read_reference(place)
+    measured_in = None if material.provenance is None else material.provenance.run
+    return like if like is not None and like.run == measured_in else None
+
+
+def _brightness(
+    model: ProtocolModel,
+    offers: CameraOffers,
+    bench: Bench,
+    measured: Mapping[str, Glow],
+    relative: Mapping[str, Glow],
+    sources: Sources,
+) -> tuple[float, str]:
+    """By what to multiply the glows of unknown brightness, and why."""
+    if measured:
+        brightest = max(float(glow.amplitude.sum()) for glow in measured.values())
+        return brightest, f"brightness of {', '.join(relative)}: assumed, as the brightest measured"
+    protocol = predictable(model)
+    exposure_s, said = sources.first_exposure_s, "as --metered says"
+    if exposure_s is None and isinstance(protocol.exposure, float):
+        exposure_s, said = protocol.exposure, "assumed, as suits the protocol's exposure"
+    elif exposure_s is None:
+        longest_s = protocol.longest_exposure_s(offers)
+        exposure_s = offers.exposure_at_most(longest_s * FIRST_EXPOSURE_SHARE)
+        said = "assumed; say --metered"
+    metered = predictable(changed(model, {"exposure": "auto"}))
+    factor = brightness_metered_as(metered, offers, bench, exposure_s)
+    return factor, f"brightness: metering chooses {exposure_s:.3g} s at first ({said})"
+
+
+def _camera_note(camera: CameraFigures, reference: Reference | None) -> str:
+    source = "typical; --like RUN knows" if reference is None else f"measured in {reference.run}"
+    return (
+        f"camera: {camera.width} x {camera.height} pixels, {camera.electrons_per_dn:.3g} electrons "
+        f"a DN and {camera.read_noise_electrons:.2g} of read noise at ISO {camera.iso:g} ({source})"
+    )
+
+
+def _flicker_note(measured: float | None) -> str:
+    if measured is None:
+        return f"flicker from frame to frame: {100 * TYPICAL_FLICKER:.2g} % (typical)"
+    return f"flicker from frame to frame: {100 * measured:.2g} % (measured there)"

@@ -1,0 +1,195 @@
+"""What an earlier run says about bench and camera: noise, flicker, brightness."""
+
+import json
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from labrig.acquire import plugins
+from labrig.errors import DataError, UsageError
+from labrig.fit.nonnegative import nonnegative_least_squares
+from labrig.predict.camera import (
+    TYPICAL_DARK_ELECTRONS_PER_S,
+    TYPICAL_ELECTRONS_PER_DN,
+    CameraFigures,
+)
+from labrig.predict.expectation import predictable
+from labrig.predict.frames import PEAK_SIGMAS
+from labrig.record import FrameRecord, RunRecord, read_run
+from labrig.reduce import FrameMeasurement, Series, fit_dark, measure, read_raw, read_series
+from labrig.region import Region
+from labrig.yaml_file import read_yaml
+
+#: A flicker known worse than this is not taken over.
+FLICKER_KNOWN = 0.2
+#: Dark frames looked at, of the shortest and of the longest exposures.
+DARKS_EACH = 2
+
+
+@dataclass(frozen=True)
+class Reference:
+    """An earlier run on the same bench, with the same camera.
+
+    Attributes
+    ----------
+    run
+        Name of its folder.
+    camera
+        As its frames show it, at the ISO to which the amplitudes of its materials belong.
+    f_number
+        To which they belong, too.
+    flicker
+        ρ; None where the run does not tell it.
+    channel_weights
+        Of the patch looked at, maximum 1.
+    """
+
+    run: str
+    camera: CameraFigures
+    f_number: float | None
+    flicker: float | None
+    channel_weights: Mapping[str, float]
+
+
+def result_places(run: Path) -> dict[str, Path]:
+    """Where the fits of `run` lie, by patch; under "" if it has one patch only.
+
+    Raises
+    ------
+    UsageError
+        There is none.
+    """
+    result = run / "result"
+    found = sorted(result.glob("**/fit.json"))
+    if not found:
+        raise UsageError(f"{run}: expected a run with a fit in its result folder, got none")
+    return {"" if path.parent == result else path.parent.name: path.parent for path in found}
+
+
+def run_of(place: Path) -> Path | None:
+    """The run folder in whose result `place` lies."""
+    return next((up for up in place.resolve().parents if (up / "journal.jsonl").is_file()), None)
+
+
+def read_reference(place: Path) -> Reference:
+    """What the run with the result in `place` tells.
+
+    Raises
+    ------
+    UsageError
+        There is no such run.
+    DataError
+        A file of it is missing or damaged.
+    """
+    folder = run_of(place)
+    if folder is None:
+        raise UsageError(f"{place}: expected the result folder of a run, got no run around it")
+    run, fit = read_run(folder), _read_fit(place / "fit.json")
+    series = read_series(place / "series.csv")[0]
+    region = _region(folder, series.region)
+    frame = _first_usable(run, series)
+    seen = measure(read_raw(frame.path), region)
+    weights: dict[str, float] = fit["channel_weights"]
+    brightest = seen.channels[max(weights, key=lambda name: weights[name])]
+    noise_dn = PEAK_SIGMAS * brightest.sigma * np.sqrt(brightest.n)
+    darks = _darks(run, region)
+    gain, read_noise_dn = _photon_transfer(series, seen, darks)
+    gain = gain or TYPICAL_ELECTRONS_PER_DN * 100 / frame.iso
+    dark_dn_per_s = _dark_current(darks)
+    pixels = sum(stats.n for stats in seen.channels.values())
+    return Reference(
+        run=folder.name,
+        camera=CameraFigures(
+            width=seen.width,
+            height=seen.height,
+            iso=frame.iso,
+            electrons_per_dn=gain,
+            read_noise_electrons=read_noise_dn * gain,
+            dark_electrons_per_s=(
+                TYPICAL_DARK_ELECTRONS_PER_S if dark_dn_per_s is None else dark_dn_per_s * gain
+            ),
+            range_dn=seen.white - max(seen.black),
+            unevenness=float(max((brightest.peak - noise_dn) / brightest.mean, 1.0)),
+            channel_shares={name: stats.n / pixels for name, stats in seen.channels.items()},
+        ),
+        f_number=frame.f_number,
+        flicker=fit["flicker"] if fit["flicker_sigma"] < FLICKER_KNOWN * fit["flicker"] else None,
+        channel_weights=weights,
+    )
+
+
+def _region(folder: Path, patch: str) -> Region:
+    """Where the patch was when it was processed, or else where the protocol has it."""
+    protocol = predictable(plugins.read_protocol(folder / "protocol.yaml"))
+    processed = folder / "result" / "provenance.yaml"
+    patches = read_yaml(processed)["patches"] if processed.is_file() else protocol.patches
+    region: Region = patches.get(patch) or next(iter(patches.values()))
+    return region
+
+
+def _read_fit(path: Path) -> dict[str, Any]:
+    try:
+        fit: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
+        return {key: fit[key] for key in ("channel_weights", "flicker", "flicker_sigma")}
+    except (OSError, ValueError, TypeError, KeyError) as error:
+        raise DataError(
+            f"{path}: expected fit.json of a decay ({error!r}); make it again with: labrig process"
+        ) from None
+
+
+def _first_usable(run: RunRecord, series: Series) -> FrameRecord:
+    usable = {name for name, good in zip(series.frame, series.usable, strict=True) if good}
+    for frame in run.frames("decay"):
+        if frame.path.name in usable:
+            return frame
+    raise DataError(f"{run.folder}: expected a usable frame of a decay, got none; take another run")
+
+
+def _darks(run: RunRecord, region: Region) -> list[FrameMeasurement]:
+    """Dark frames of the shortest and the longest exposures."""
+    darks = sorted(run.frames("dark"), key=lambda frame: frame.exposure_s)
+    if len(darks) > 2 * DARKS_EACH:
+        darks = darks[:DARKS_EACH] + darks[-DARKS_EACH:]
+    return [
+        replace(measure(read_raw(dark.path), region), exposure_s=dark.exposure_s) for dark in darks
+    ]
+
+
+def _photon_transfer(
+    series: Series, seen: FrameMeasurement, darks: Sequence[FrameMeasurement]
+) -> tuple[float, float]:
+    """Electrons a DN and read noise in DN, from the line of variance over mean (Janesick 2007).
+
+    0 electrons a DN where the frames are all too dark to tell.
+    """
+    pixels = np.array([seen.channels[name].n for name in series.channels])
+    exposure_s = series.exposure_s[:, np.newaxis]
+    in_dark = [channel for dark in darks for channel in dark.channels.values()]
+    mean = np.append(
+        (series.values * exposure_s)[series.usable], [channel.mean for channel in in_dark]
+    )
+    variance = np.append(
+        (pixels * np.square(series.sigma * exposure_s))[series.usable],
+        [channel.n * channel.sigma**2 for channel in in_dark],
+    )
+    design = np.stack([mean, np.ones_like(mean)], axis=1) / variance[:, np.newaxis]
+    slope, at_zero = nonnegative_least_squares(design, np.ones_like(mean))
+    return float(1 / slope) if slope > 0 else 0.0, float(np.sqrt(at_zero))
+
+
+def _dark_current(darks: Sequence[FrameMeasurement]) -> float | None:
+    """DN/s of a pixel; at most that much if all dark frames have one exposure, None without any."""
+    if not darks:
+        return None
+    stats = [list(dark.channels.values()) for dark in darks]
+    exposure_s = np.array([dark.exposure_s for dark in darks], dtype=np.float64)
+    model = fit_dark(
+        exposure_s,
+        np.array([[channel.mean for channel in row] for row in stats]),
+        np.array([[channel.sigma for channel in row] for row in stats]),
+    )
+    longest_s = float(exposure_s.max())
+    return max(float(np.median(model.current(longest_s))) / longest_s, 0.0)
