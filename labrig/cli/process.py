@@ -22,12 +22,24 @@ def process(
     states: Annotated[
         int | None, typer.Option("--states", min=1, max=3, help="Number of states to fit.")
     ] = None,
+    rate: Annotated[
+        list[float] | None,
+        typer.Option("--rate", help="A rate in 1/s that is known and held. Repeatable."),
+    ] = None,
+    camera: Annotated[
+        str | None, typer.Option("--camera", help="Other camera curves, for the report's colours.")
+    ] = None,
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
-    """Reduce, fit and report a run again; earlier results are kept as result-1, result-2, …"""
+    """Reduce, fit and report a run again, and say what changed.
+
+    An earlier result that differs is kept as result-1, result-2, …
+    """
     from labrig.process import Choices
 
-    process_and_tell(run, Choices.parse(roi or [], exclude or [], states), json=json)
+    process_and_tell(
+        run, Choices.parse(roi or [], exclude or [], states, rate or [], camera), json=json
+    )
     typer.echo(run)
 
 
@@ -44,4 +56,6 @@ def process_and_tell(run: Path, choices: "Choices | None" = None, *, json: bool)
         typer.echo(f"warning: {warning}", err=True)
     for name, fit in result.fits.items():
         typer.echo(f"{name}\n{fit}")
+    for number, line in enumerate(result.changes):
+        typer.echo(f"  {line}" if number else line)
     typer.echo(f"report: {result.report}")

@@ -1,5 +1,6 @@
 """What is asked of a run's processing: by its protocol, and by a person who wants it otherwise."""
 
+import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
@@ -51,26 +52,41 @@ class Choices:
         Frames to leave out, by file name or number.
     states
         Number of states; None leaves it to the protocol.
+    fixed_rates_per_s
+        Rates known from elsewhere, which take part and are held; they count as states.
+    camera
+        Other camera curves than the rig file names, for the report's colours.
     """
 
     regions: Mapping[str, Region] = field(default_factory=dict)
     excluded: frozenset[str] = frozenset()
     states: int | None = None
+    fixed_rates_per_s: tuple[float, ...] = ()
+    camera: str | None = None
 
     @classmethod
-    def parse(cls, regions: Sequence[str], excluded: Sequence[str], states: int | None) -> Self:
+    def parse(
+        cls,
+        regions: Sequence[str],
+        excluded: Sequence[str],
+        states: int | None = None,
+        fixed_rates_per_s: Sequence[float] = (),
+        camera: str | None = None,
+    ) -> Self:
         """From the texts of a command line: `NAME=x,y,w,h` or `x,y,w,h`, frame numbers or names.
 
         Raises
         ------
         UsageError
-            A region that is none.
+            A region or a rate that is none.
         """
+        if wrong := [rate for rate in fixed_rates_per_s if not 0 < rate < math.inf]:
+            raise UsageError(f"--rate: expected a rate > 0 in 1/s, got {wrong[0]}")
         named = {}
         for text in regions:
             name, _, numbers = text.rpartition("=")
             named[name] = parse_region(numbers)
-        return cls(named, frozenset(excluded), states)
+        return cls(named, frozenset(excluded), states, tuple(fixed_rates_per_s), camera)
 
     def patches(self, protocol: DecayProtocol) -> dict[str, Region]:
         """The protocol's patches, moved where a person wants them.
@@ -110,4 +126,4 @@ class Choices:
 
 
 def _names(frame: FrameRecord) -> set[str]:
-    return {frame.path.name, frame.path.stem, str(int(frame.path.stem))}
+    return {frame.path.name, frame.path.stem, frame.path.stem.lstrip("0")}

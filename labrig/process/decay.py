@@ -1,17 +1,24 @@
 """A decay run, from its folder to its result: the way of a photon's number, in one function."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
 from labrig.acquire import read_rig_file
 from labrig.errors import FitError
+from labrig.export import write_nexus
 from labrig.fit import DecayFit
 from labrig.process.choices import Choices, DecayProtocol, read_decay_protocol
-from labrig.process.page import run_report
-from labrig.process.result_folder import replaced_result, write_patch
+from labrig.process.page import camera_response, run_name, run_report
+from labrig.process.provenance import provenance
+from labrig.process.result_folder import (
+    new_result,
+    put_in_place,
+    write_patch,
+    write_provenance,
+)
 from labrig.process.series_fit import fit_series
-from labrig.process.timed_frames import dark_frames, decay_frames, timing_warnings
+from labrig.process.timed_frames import intact_frames, timing_warnings
 from labrig.record import read_run
 from labrig.reduce import Series, reduce_patches
 from labrig.report import write_report
@@ -22,78 +29,109 @@ class Result:
     """What came out of a run; series and fits by the name of their patch.
 
     Each fit has warnings of its own; `run_warnings` are about everything before the fits.
+    `changes` says in some lines what is other than in the result before, if there was one.
     """
 
     report: Path
     series: Mapping[str, Series]
     fits: Mapping[str, DecayFit]
     run_warnings: tuple[str, ...]
+    changes: tuple[str, ...]
 
 
 def process_run(folder: Path, choices: Choices | None = None) -> Result:
     """Reduce and fit the run in `folder`, write `result/` and the report in it.
 
-    Earlier results are kept as `result-1`, `result-2`, …
+    A `result` that comes out any different from the one before takes its place; that one is kept
+    as `result-1`, `result-2`, …
 
     Raises
     ------
     UsageError
         Not a run folder, or a choice that does not fit it.
     DataError
-        No decay is complete, or a frame was changed after the run.
+        No decay is complete, or a frame is missing or was changed after the run.
     FitError
         No patch could be fitted; series and report are written all the same.
     """
     folder, choices = Path(folder), choices or Choices()
     protocol, rig = read_decay_protocol(folder), read_rig_file(folder / "rig.yaml")
     run = read_run(folder)
-    choices.check([frame for attempt in run.completed().values() for frame in attempt.frames])
+    recorded = [frame for attempt in run.completed().values() for frame in attempt.frames]
+    choices.check(recorded)
 
     patches = choices.patches(protocol)
-    series = reduce_patches(
-        decay_frames(run, choices),
-        patches,
-        dark_frames(run, choices),
-        protocol.background if protocol.dark == "background" else None,
+    background = protocol.background if protocol.dark == "background" else None
+    frames = intact_frames(run, choices)
+    series = reduce_patches(frames.decay, patches, frames.dark, background)
+    states = choices.states or _asked_states(protocol)
+    fits = _fit_all(series, states, choices.fixed_rates_per_s)
+    camera, unknown_camera = camera_response(rig, choices.camera)
+    run_warnings = (
+        *timing_warnings(run),
+        *frames.warnings,
+        *unknown_camera,
+        *_clipping_warnings(series),
     )
-    fits = _fit_all(series, choices.states or _asked_states(protocol))
-    run_warnings = (*timing_warnings(run), *_clipping_warnings(series))
     warnings = (*run_warnings, *_fit_warnings(fits))
 
-    with replaced_result(folder) as made:
-        for name, fit in fits.items():
-            place = made if len(fits) == 1 else made / name
-            material = protocol.sample.name if len(fits) == 1 else name
-            write_patch(place, series[name], fit, material, folder.name)
-        page = run_report(run, protocol, rig, patches, series, fits, warnings)
-        write_report(made / "report.html", page)
+    made = new_result(folder)
+    write_provenance(
+        made,
+        provenance(
+            protocol,
+            choices,
+            patches,
+            background,
+            frames,
+            recorded,
+            camera.name if camera else None,
+        ),
+    )
+    for name, fit in fits.items():
+        place = made if len(fits) == 1 else made / name
+        material = protocol.sample.name if len(fits) == 1 else name
+        write_patch(place, series[name], fit, material, run_name(run))
+    page = run_report(
+        run, protocol, rig, patches, series, fits, warnings, frames.daylight, camera, states
+    )
+    write_report(made / "report.html", page)
+    write_nexus(made / "run.nxs", run, page)
+    changes = put_in_place(made)
 
     report = folder / "result" / "report.html"
     fitted = {name: fit for name, fit in fits.items() if isinstance(fit, DecayFit)}
     if not fitted:
         raise FitError(f"{'; '.join(map(str, fits.values()))}; the run is kept, see {report}")
-    return Result(report, series, fitted, run_warnings)
+    return Result(report, series, fitted, run_warnings, changes)
 
 
-def _fit_all(series: Mapping[str, Series], states: int | None) -> dict[str, DecayFit | str]:
+def _fit_all(
+    series: Mapping[str, Series], states: int | None, fixed_rates_per_s: Sequence[float]
+) -> dict[str, DecayFit | str]:
     """Fits by patch. Shutter and aperture flicker alike for all patches of a frame, so the patch
     that tells their flicker best tells it for those that are dim or fade within a few frames.
     """
-    fits = {name: _fit(one, states, None) for name, one in series.items()}
+    fits = {name: _fit(one, states, fixed_rates_per_s, None) for name, one in series.items()}
     measured = [fit for fit in fits.values() if isinstance(fit, DecayFit) and fit.flicker > 0]
     if len(fits) == 1 or not measured:
         return fits
     best = min(measured, key=lambda fit: fit.flicker_sigma / fit.flicker)
     return {
-        name: fit if fit is best else _fit(series[name], states, best.flicker)
+        name: (fit if fit is best else _fit(series[name], states, fixed_rates_per_s, best.flicker))
         for name, fit in fits.items()
     }
 
 
-def _fit(series: Series, states: int | None, flicker: float | None) -> DecayFit | str:
+def _fit(
+    series: Series,
+    states: int | None,
+    fixed_rates_per_s: Sequence[float],
+    flicker: float | None,
+) -> DecayFit | str:
     """The fit, or why there is none."""
     try:
-        return fit_series(series, states, flicker=flicker)
+        return fit_series(series, states, flicker=flicker, fixed_rates_per_s=fixed_rates_per_s)
     except FitError as error:
         return str(error)
 

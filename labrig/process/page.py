@@ -1,14 +1,16 @@
 """What the report of a decay run shows."""
 
 from collections.abc import Mapping, Sequence
-from datetime import UTC, datetime
 from importlib.metadata import version
 
 from labrig.acquire import RigFile
+from labrig.errors import UsageError
 from labrig.fit import DecayFit
-from labrig.optics import read_camera
+from labrig.optics import CameraResponse, read_camera
 from labrig.process.choices import DecayProtocol
-from labrig.record import RunRecord
+from labrig.process.history import charges_s, interruptions, written_time
+from labrig.process.provenance import library_versions
+from labrig.record import FrameRecord, RunRecord
 from labrig.reduce import Series
 from labrig.region import Region
 from labrig.report import DeviceLine, GlowPhotograph, PatchReport, RunReport
@@ -25,17 +27,20 @@ def run_report(
     series: Mapping[str, Series],
     fits: Mapping[str, DecayFit | str],
     warnings: Sequence[str],
+    daylight: Sequence[FrameRecord] = (),
+    camera: CameraResponse | None = None,
+    states: int | None = None,
 ) -> RunReport:
-    """Gather it all from the run and its results."""
+    """Gather it all from the run and its results; `states` is what was asked for."""
     attempts = list(run.completed().values())
     first = attempts[0].start
     identities: Mapping[str, str] = first.get("devices", {})
     sample = protocol.sample.model_dump(exclude={"name"}, exclude_none=True)
     return RunReport(
         title=protocol.sample.name,
-        run=run.folder.name,
-        started=_written(first["time"]),
-        ended=_written(run.last_time),
+        run=run_name(run),
+        started=written_time(first["time"]),
+        ended=written_time(run.last_time),
         rig=rig.name,
         simulated=rig.simulation is not None,
         labrig_version=version("labrig"),
@@ -51,10 +56,36 @@ def run_report(
         rig_text=(run.folder / "rig.yaml").read_text(encoding="utf-8"),
         frames=tuple(frame for attempt in attempts for frame in attempt.frames),
         warnings=tuple(warnings),
-        daylight=tuple(run.frames("daylight")),
+        daylight=tuple(daylight),
         glow=_glow(run, next(iter(series.values()))),
-        camera=None if rig.optics.camera is None else read_camera(rig.optics.camera),
+        camera=camera,
+        libraries=tuple(library_versions().items()),
+        charges_s=charges_s(run),
+        background=protocol.background if protocol.dark == "background" else None,
+        states=states,
+        interruptions=interruptions(run),
+        notes=_notes(run),
     )
+
+
+def run_name(run: RunRecord) -> str:
+    """The name of its folder, whatever path leads there."""
+    return run.folder.resolve().name
+
+
+def camera_response(rig: RigFile, instead: str | None) -> tuple[CameraResponse | None, list[str]]:
+    """The curves asked for `instead`, or the rig's with a warning if they are not here.
+
+    They colour the report's pictures; no number rests on them.
+    """
+    if instead is not None:
+        return read_camera(instead), []
+    if rig.optics.camera is None:
+        return None, []
+    try:
+        return read_camera(rig.optics.camera), []
+    except UsageError as error:
+        return None, [f"colours in the report are the camera's own: {error}"]
 
 
 def _glow(run: RunRecord, series: Series) -> tuple[GlowPhotograph, ...]:
@@ -66,6 +97,7 @@ def _glow(run: RunRecord, series: Series) -> tuple[GlowPhotograph, ...]:
     return tuple(GlowPhotograph(frames[first.frame[row]], float(first.t_s[row])) for row in chosen)
 
 
-def _written(seconds: float) -> str:
-    """Seconds since 1970 as a person reads them."""
-    return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
+def _notes(run: RunRecord) -> str:
+    """What `labrig note` has written."""
+    path = run.folder / "notes.md"
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""

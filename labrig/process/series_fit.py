@@ -26,6 +26,7 @@ def fit_series(
     states: int | None = None,
     offset_sigma: ArrayLike | None = None,
     flicker: float | None = None,
+    fixed_rates_per_s: Sequence[float] = (),
 ) -> DecayFit:
     """Fit the usable rows of `series`.
 
@@ -39,6 +40,8 @@ def fit_series(
         left uncertain in each channel.
     flicker
         Relative scatter common to the channels of a frame; None measures it.
+    fixed_rates_per_s
+        Rates that take part and are held; they count as states.
 
     Raises
     ------
@@ -63,6 +66,7 @@ def fit_series(
         n_states=states,
         offset_sigma=offset_sigma,
         flicker=flicker,
+        fixed_rates=fixed_rates_per_s,
     )
     if all(state.amplitude < SEEN_SIGMA * state.amplitude_sigma for state in fit.states):
         raise FitError(

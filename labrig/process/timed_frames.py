@@ -1,6 +1,7 @@
-"""From the journal to frames with their measured times after lamp off."""
+"""From the journal to frames that are as they were recorded, with their times after lamp off."""
 
-from collections.abc import Iterator
+from collections.abc import Mapping
+from dataclasses import dataclass
 from hashlib import sha256
 
 from labrig.errors import DataError
@@ -10,37 +11,79 @@ from labrig.reduce import SeriesFrame, add_flag
 
 #: A frame later than this after its planned time is worth a warning; its measured time is used.
 LATE_S = 0.05
+#: What the numbers are made of; a run can do without its other frames.
+MEASURED = ("decay", "dark")
+#: Damaged frames named in a message.
+MOST_NAMED = 4
 
 
-def decay_frames(run: RunRecord, choices: Choices) -> list[SeriesFrame]:
-    """Frames of all completed decays, timed from the lamp-off before them.
+@dataclass(frozen=True)
+class IntactFrames:
+    """Frames of completed units, those left out that are missing or were changed.
+
+    Attributes
+    ----------
+    decay, dark
+        To be reduced; excluded decay frames are flagged, excluded dark ones left out.
+    daylight
+        To be shown.
+    warnings
+        About frames that cannot be shown.
+    """
+
+    decay: list[SeriesFrame]
+    dark: list[SeriesFrame]
+    daylight: list[FrameRecord]
+    warnings: list[str]
+
+
+def intact_frames(run: RunRecord, choices: Choices) -> IntactFrames:
+    """Every frame held against its checksum; decays timed from the lamp-off before them.
 
     Raises
     ------
     DataError
-        No decay is complete, or a frame is missing or damaged and not excluded.
+        No decay is complete, or a frame is missing or was changed and is not excluded.
     """
     frames = [
+        frame
+        for attempt in run.completed().values()
+        for frame in attempt.frames
+        if frame.purpose in (*MEASURED, "daylight")
+    ]
+    damaged = {frame: damage for frame in frames if (damage := _damage(frame))}
+    refused = {
+        frame: damage
+        for frame, damage in damaged.items()
+        if frame.purpose in MEASURED and not choices.excludes(frame)
+    }
+    if refused:
+        raise DataError(f"{run.folder}: {_told(refused)}")
+    decay = [
         _timed(frame, _lamp_off_time(attempt, frame), choices)
         for attempt in run.completed().values()
-        for frame in _intact(attempt, "decay", choices)
+        for frame in attempt.frames
+        if frame.purpose == "decay" and frame not in damaged
     ]
-    if not frames:
+    if not decay:
         raise DataError(
             f"{run.folder}: no decay is complete, so there is nothing to fit; go on with: "
             f"labrig resume {run.folder}"
         )
-    return frames
-
-
-def dark_frames(run: RunRecord, choices: Choices) -> list[SeriesFrame]:
-    """Dark frames that count."""
-    return [
-        SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
-        for attempt in run.completed().values()
-        for frame in _intact(attempt, "dark", choices)
-        if not choices.excludes(frame)
-    ]
+    return IntactFrames(
+        decay=decay,
+        dark=[
+            SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
+            for frame in run.frames("dark")
+            if frame not in damaged and not choices.excludes(frame)
+        ],
+        daylight=[frame for frame in run.frames("daylight") if frame not in damaged],
+        warnings=[
+            f"{frame.path.name} {damage}; the report does without it"
+            for frame, damage in damaged.items()
+            if frame.purpose == "daylight"
+        ],
+    )
 
 
 def timing_warnings(run: RunRecord) -> list[str]:
@@ -61,21 +104,26 @@ def timing_warnings(run: RunRecord) -> list[str]:
     return warnings
 
 
-def _intact(attempt: Attempt, purpose: str, choices: Choices) -> Iterator[FrameRecord]:
-    for frame in attempt.frames:
-        if frame.purpose != purpose:
-            continue
-        if _is_intact(frame):
-            yield frame
-        elif not choices.excludes(frame):
-            raise DataError(
-                f"{frame.path}: the frame is missing or was changed after the run (its checksum "
-                f"differs); restore it from a copy, or leave it out: --exclude {frame.path.name}"
-            )
+def _damage(frame: FrameRecord) -> str:
+    """What is wrong with the file, nothing if it is as recorded."""
+    try:
+        content = frame.path.read_bytes()
+    except OSError as error:
+        return "is missing" if not frame.path.exists() else f"cannot be read ({error.strerror})"
+    if sha256(content).hexdigest() != frame.sha256:
+        return "was changed after the run (its checksum differs)"
+    return ""
 
 
-def _is_intact(frame: FrameRecord) -> bool:
-    return frame.path.is_file() and sha256(frame.path.read_bytes()).hexdigest() == frame.sha256
+def _told(damaged: Mapping[FrameRecord, str]) -> str:
+    """In one line, with what to do."""
+    named = list(damaged.items())[:MOST_NAMED]
+    more = f" and {len(damaged) - len(named)} more are damaged" if len(damaged) > len(named) else ""
+    leave_out = " ".join(f"--exclude {frame.path.name}" for frame, _ in named)
+    return (
+        f"{', '.join(f'{frame.path.name} {damage}' for frame, damage in named)}{more}; restore "
+        f"from a copy, or leave out: {leave_out}"
+    )
 
 
 def _timed(frame: FrameRecord, lamp_off_time: float, choices: Choices) -> SeriesFrame:

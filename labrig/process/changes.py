@@ -1,0 +1,166 @@
+"""What changed from one result of a run to the next, in a few lines for people."""
+
+import json
+import math
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
+
+from labrig.errors import UsageError
+from labrig.report.written_numbers import plus_minus, rounded
+from labrig.yaml_file import read_yaml
+
+#: Moves of less than this share of a parameter's σ, and changes of σ by less, are not worth a word.
+WORTH_SAYING = 0.01
+
+Parameters = dict[str, tuple[float, float]]
+
+
+@dataclass(frozen=True)
+class _Move:
+    """A parameter in two fits: each its value and σ."""
+
+    name: str
+    before: tuple[float, float]
+    after: tuple[float, float]
+
+    @property
+    def in_sigma(self) -> float:
+        """How far the value moved, in σ of before; infinite if it was held both times."""
+        moved, sigma = self.after[0] - self.before[0], self.before[1] or self.after[1]
+        if moved == 0:
+            return 0.0
+        return moved / sigma if sigma > 0 else math.copysign(math.inf, moved)
+
+    @property
+    def worth_saying(self) -> bool:
+        """Whether value or σ are other than before, beyond rounding."""
+        resized = not math.isclose(self.before[1], self.after[1], rel_tol=WORTH_SAYING)
+        return resized or abs(self.in_sigma) >= WORTH_SAYING
+
+    def __str__(self) -> str:
+        """`k_r 1 0.0320 ± 0.0001 → 0.0321 ± 0.0001 (+1.0 σ)`."""
+        moved = f"{self.in_sigma:+.2g}".replace("-", "−")
+        by = f" ({moved} σ)" if math.isfinite(self.in_sigma) else ""
+        return f"{self.name} {plus_minus(*self.before)} → {plus_minus(*self.after)}{by}"
+
+
+def changes(before: Path, after: Path) -> tuple[str, ...]:
+    """What is other in the result folder `after` than in `before`; nothing if every byte is alike.
+
+    Files that only `before` has (a person may have put them there) do not count.
+    """
+    files = sorted(path.relative_to(after) for path in after.rglob("*") if path.is_file())
+    other = [file for file in files if not _alike(before / file, after / file)]
+    if not other:
+        return ()
+    settings = list(_other_settings(_settings(before), _settings(after)))
+    numbers = list(_other_numbers(_fits(before), _fits(after)))
+    if not numbers:
+        numbers = [f"the numbers are the same; other in {', '.join(map(str, other))}"]
+    elif not settings:
+        numbers.append("nothing that is recorded explains it: labrig's code, or the computer?")
+    return (*settings, *numbers)
+
+
+def _alike(one: Path, other: Path) -> bool:
+    return one.is_file() and one.read_bytes() == other.read_bytes()
+
+
+def _settings(result: Path) -> dict[str, str]:
+    """`provenance.yaml`, one text a key; without one, nothing is known."""
+    try:
+        return dict(_flat(read_yaml(result / "provenance.yaml"), ""))
+    except UsageError:
+        return {}
+
+
+def _flat(content: Mapping[str, Any], place: str) -> Iterator[tuple[str, str]]:
+    for key, value in content.items():
+        if isinstance(value, dict):
+            yield from _flat(value, f"{place}{key} ")
+        elif isinstance(value, list):
+            yield f"{place}{key}", ", ".join(map(str, value)) or "none"
+        else:
+            yield f"{place}{key}", "none" if value is None else str(value)
+
+
+def _other_settings(before: Mapping[str, str], after: Mapping[str, str]) -> Iterator[str]:
+    if not before:
+        yield "what the earlier one was made with is not recorded"
+        return
+    for key in dict.fromkeys([*before, *after]):
+        old, new = before.get(key, "none"), after.get(key, "none")
+        if old != new:
+            yield f"{key}: {old} → {new}"
+
+
+def _fits(result: Path) -> dict[str, Parameters]:
+    """The parameters of each patch's fit, by the name of its folder; unreadable ones are left out.
+
+    A run with one patch has its fit in the result folder itself, under the name "".
+    """
+    fits = {}
+    for path in sorted(result.rglob("fit.json")):
+        try:
+            fits[path.parent.name if path.parent != result else ""] = _parameters(path)
+        except (OSError, ValueError, KeyError, TypeError):
+            continue
+    return fits
+
+
+def _parameters(path: Path) -> Parameters:
+    """Value and σ of every parameter in a fit.json; JSON has null for an infinite σ."""
+    fit = json.loads(path.read_text(encoding="utf-8"))
+    found: dict[str, tuple[Any, Any]] = {}
+    for number, state in enumerate(fit["states"], start=1):
+        found[f"k_r {number}"] = state["k_r_per_s"], state["k_r_sigma_per_s"]
+        found[f"a {number}"] = state["amplitude"], state["amplitude_sigma"]
+    for name, key in (("weight", "channel_weights"), ("offset", "offsets")):
+        for channel, value in fit[key].items():
+            found[f"{name} {channel}"] = value, fit[f"{key}_sigma"][channel]
+    found["flicker"] = fit["flicker"], fit["flicker_sigma"]
+    return {
+        name: (float(value), math.inf if sigma is None else float(sigma))
+        for name, (value, sigma) in found.items()
+    }
+
+
+def _other_numbers(
+    before: Mapping[str, Parameters], after: Mapping[str, Parameters]
+) -> Iterator[str]:
+    for patch in dict.fromkeys([*before, *after]):
+        said = f"{patch}: " if patch else ""
+        old, new = before.get(patch), after.get(patch)
+        if old is None or new is None:
+            yield f"{said}{'not fitted before' if old is None else 'fitted before, not now'}"
+        elif old.keys() != new.keys():
+            yield f"{said}{_states(old)} → {_states(new)}"
+        else:
+            moves = [_Move(name, old[name], new[name]) for name in old]
+            moves = [move for move in moves if move.worth_saying]
+            if moves:
+                yield said + "; ".join(_told(moves))
+            elif old != new:
+                yield f"{said}every parameter within {WORTH_SAYING:g} σ"
+
+
+def _told(moves: list[_Move]) -> Iterator[str]:
+    """Rates, amplitudes and what was held one by one, the rest in a few words."""
+    rest = []
+    for move in moves:
+        if move.name.startswith(("k_r", "a ")) or math.isinf(move.in_sigma):
+            yield str(move)
+        else:
+            rest.append(move)
+    if rest:
+        most = max(rest, key=lambda move: abs(move.in_sigma))
+        furthest = rounded(abs(most.in_sigma), 2)
+        yield f"{', '.join(move.name for move in rest)} by at most {furthest} σ"
+
+
+def _states(parameters: Parameters) -> str:
+    """`2 states (k_r 0.3 ± 0.1, 0.01 ± 0.001 1/s)`."""
+    rates = [plus_minus(*pair) for name, pair in parameters.items() if name.startswith("k_r")]
+    return f"{len(rates)} state{'s' if len(rates) > 1 else ''} (k_r {', '.join(rates)} 1/s)"

@@ -1,0 +1,170 @@
+"""A decay of two states: labrig against lmfit and SciPy, same data, same weights, same answer."""
+
+from collections.abc import Callable
+from itertools import combinations
+from typing import Any
+
+import lmfit  # type: ignore[import-untyped]
+import numpy as np
+import numpy.typing as npt
+import pytest
+from scipy.optimize import curve_fit
+
+from labrig.fit.least_squares import least_squares
+from labrig.process import fit_series
+from labrig.reduce import Series
+
+Floats = npt.NDArray[np.float64]
+Against = Callable[..., None]
+
+NAMES = ("k1", "a1", "k2", "a2")
+TRUTH = np.array([0.06, 3000.0, 0.011, 800.0])
+#: What a person reads off a plot.
+START = np.array([0.1, 2000.0, 0.02, 500.0])
+EXPOSURE_S = 1.0
+T_S: Floats = 0.5 + 5.0 * np.arange(60, dtype=np.float64)
+#: Most that two answers may differ by, in σ of each parameter.
+AGREE_SIGMA = 1e-4
+
+
+def model(t_s: Floats, k1: float, a1: float, k2: float, a2: float) -> Floats:
+    """Mean over each exposure."""
+    means, _ = means_and_slopes(np.array([k1, k2]), t_s)
+    return np.asarray(means @ np.array([a1, a2]))
+
+
+def jacobian(t_s: Floats, k1: float, a1: float, k2: float, a2: float) -> Floats:
+    means, slopes = means_and_slopes(np.array([k1, k2]), t_s)
+    columns = np.empty((len(t_s), 4))
+    columns[:, 0::2], columns[:, 1::2] = slopes * np.array([a1, a2]), means
+    return columns
+
+
+def means_and_slopes(rates: Floats, t_s: Floats) -> tuple[Floats, Floats]:
+    decayed = np.exp(-np.multiply.outer(t_s, rates))
+    turn = rates * EXPOSURE_S
+    mean = -np.expm1(-turn) / turn
+    slope = (np.exp(-turn) - mean) / rates
+    return decayed * mean, decayed * (slope - mean * t_s[:, np.newaxis])
+
+
+@pytest.fixture(scope="module")
+def data() -> tuple[Floats, Floats]:
+    """Values and their σ."""
+    light = model(T_S, *TRUTH)
+    sigma = np.sqrt(4.0 + light / 20)
+    return light + sigma * np.random.default_rng(5).normal(size=len(T_S)), sigma
+
+
+def labrig_core(y: Floats, sigma: Floats, start: Floats = START) -> Floats:
+    def residuals(x: Floats) -> tuple[Floats, Floats]:
+        means, slopes = means_and_slopes(x[0::2], T_S)
+        columns = np.empty((len(T_S), 4))
+        columns[:, 0::2], columns[:, 1::2] = slopes * x[1::2], means
+        return (means @ x[1::2] - y) / sigma, columns / sigma[:, np.newaxis]
+
+    return least_squares(residuals, start, lower=1e-9).parameters
+
+
+def lmfit_leastsq(
+    y: Floats, sigma: Floats, start: Floats = START, analytic: bool = False
+) -> tuple[Floats, float]:
+    """As its manual does it: parameters with a bound, residuals over σ."""
+
+    def residuals(parameters: lmfit.Parameters) -> Floats:
+        return np.asarray((model(T_S, *parameters.valuesdict().values()) - y) / sigma)
+
+    def slopes(parameters: lmfit.Parameters) -> Floats:
+        return np.asarray(jacobian(T_S, *parameters.valuesdict().values()) / sigma[:, np.newaxis])
+
+    parameters = lmfit.Parameters()
+    for name, value in zip(NAMES, start, strict=True):
+        parameters.add(name, value, min=0)
+    how: dict[str, Any] = {"Dfun": slopes} if analytic else {}
+    result = lmfit.Minimizer(residuals, parameters).leastsq(**how)
+    return np.array(list(result.params.valuesdict().values())), float(result.chisqr)
+
+
+def scipy_curve_fit(
+    y: Floats, sigma: Floats, bounded: bool, analytic: bool, start: Floats = START
+) -> Floats:
+    how: dict[str, Any] = {"jac": jacobian} if analytic else {}
+    if bounded:
+        how["bounds"] = (0, np.inf)
+    found, _ = curve_fit(model, T_S, y, start, sigma, absolute_sigma=True, **how)
+    return np.asarray(found)
+
+
+def sigmas(y: Floats, sigma: Floats) -> Floats:
+    """Of the parameters, at the answer."""
+    columns = jacobian(T_S, *labrig_core(y, sigma)) / sigma[:, np.newaxis]
+    return np.asarray(np.sqrt(np.diag(np.linalg.inv(columns.T @ columns))))
+
+
+def test_solver_from_the_same_start(data: tuple[Floats, Floats], against: Against) -> None:
+    y, sigma = data
+    peers: dict[str, Callable[[], Floats]] = {
+        "lmfit leastsq, bounds": lambda: lmfit_leastsq(y, sigma)[0],
+        "lmfit leastsq, bounds, Jacobian": lambda: lmfit_leastsq(y, sigma, analytic=True)[0],
+        "curve_fit trf, bounds": lambda: scipy_curve_fit(y, sigma, True, False),
+        "curve_fit trf, bounds, Jacobian": lambda: scipy_curve_fit(y, sigma, True, True),
+        "curve_fit lm": lambda: scipy_curve_fit(y, sigma, False, False),
+        "curve_fit lm, Jacobian": lambda: scipy_curve_fit(y, sigma, False, True),
+    }
+    answer, uncertain = labrig_core(y, sigma), sigmas(y, sigma)
+    for name, peer in peers.items():
+        assert (np.abs(peer() - answer) < AGREE_SIGMA * uncertain).all(), name
+    against(
+        lambda: labrig_core(y, sigma),
+        peers,
+        rounds=50,
+        what="2 states, 60 frames: solver, good start",
+    )
+
+
+def best_of_starts(fit: Callable[[Floats], tuple[Floats, float]], y: Floats) -> Floats:
+    """From every pair of six rates over what the times can tell, the best."""
+    rates = np.geomspace(1 / (50 * T_S[-1]), 10 / (T_S[1] - T_S[0]), 6)[::-1]
+    found = [
+        fit(np.array([fast, y[0] / 2, slow, y[0] / 2])) for fast, slow in combinations(rates, 2)
+    ]
+    return min(found, key=lambda pair: pair[1])[0]
+
+
+def test_cold(data: tuple[Floats, Floats], against: Against) -> None:
+    """Nothing is known but the data; labrig fits its two rival laws of decay as well."""
+    y, sigma = data
+    n = len(T_S)
+    series = Series(
+        t_s=T_S,
+        exposure_s=np.full(n, EXPOSURE_S),
+        values=y[:, np.newaxis],
+        sigma=sigma[:, np.newaxis],
+        dark_sigma=np.zeros(1),
+        channels=("G",),
+        iso=np.full(n, np.nan),
+        f_number=np.full(n, np.nan),
+        frame=("",) * n,
+        unit=("",) * n,
+        flag=("",) * n,
+    )
+
+    def cold() -> Floats:
+        fit = fit_series(series, states=2, flicker=0.0)
+        return np.array([x for s in fit.states for x in (s.k_r_per_s, s.amplitude)])
+
+    def from_grid() -> Floats:
+        return best_of_starts(lambda start: lmfit_leastsq(y, sigma, start), y)
+
+    uncertain = sigmas(y, sigma)
+    assert (np.abs(cold() - labrig_core(y, sigma)) < AGREE_SIGMA * uncertain).all()
+    assert (np.abs(from_grid() - cold()) < AGREE_SIGMA * uncertain).all()
+    against(
+        cold,
+        {
+            "lmfit leastsq, best of 15 starts": from_grid,
+            "lmfit leastsq, one good start": lambda: lmfit_leastsq(y, sigma),
+        },
+        rounds=15,
+        what="2 states, 60 frames: start, fit, rivals, diagnosis",
+    )

@@ -1,0 +1,101 @@
+"""A result is made again bit for bit: elsewhere, in another process, under another clock."""
+
+import os
+import shutil
+import subprocess
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import yaml
+
+from tests.conftest import Ended
+
+Labrig = Callable[..., Ended]
+Make = Callable[..., Path]
+
+PROCESS_ALL = """
+import sys
+from labrig.cli.ending import guarded
+sys.exit(max(guarded(["process", run]) for run in sys.argv[1:]))
+"""
+PATCHES = {"left": [8, 12, 32, 40], "right": [52, 12, 32, 40]}
+
+
+def contents(folder: Path) -> dict[str, bytes]:
+    files = (path for path in folder.rglob("*") if path.is_file())
+    return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
+
+
+def test_a_result_is_made_again_bit_for_bit(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
+) -> None:
+    one = make_protocol("one.yaml", daylight=True, **{"for": "40 s"})
+    two = make_protocol("two.yaml", patches=PATCHES, repeats=2, **{"for": "30 s"})
+    results, moved = [], []
+    for place, protocol in (("one", one), ("two", two)):
+        ended = labrig("run", protocol, "--rig", make_rig(), "--runs", tmp_path / place)
+        assert ended.code == 0, ended.err
+        results.append(contents(ended.run_folder / "result"))
+        shutil.rmtree(ended.run_folder / "result")
+        (tmp_path / "an other" / place).mkdir(parents=True)
+        moved.append(Path(shutil.move(ended.run_folder, tmp_path / "an other" / place)))
+    names = {
+        "fit.json", "material.yaml", "provenance.yaml", "report.html", "run.nxs", "series.csv"
+    }  # fmt: skip
+    assert names == {name for name in results[0] if not name.startswith("figures/")}
+    assert {"left/series.csv", "right/material.yaml", "report.html"} < set(results[1])
+    done = subprocess.run(
+        [sys.executable, "-c", PROCESS_ALL, ".", os.path.relpath(moved[1], moved[0])],
+        cwd=moved[0],
+        env=os.environ | {"PYTHONHASHSEED": "11", "TZ": "Asia/Kathmandu", "LC_ALL": "C"},
+        capture_output=True,
+        text=True,
+        check=False,
+    )
+    assert done.returncode == 0, done.stderr
+    assert [contents(run / "result") for run in moved] == results
+
+
+def test_processing_again_says_so_and_keeps_one_result(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
+) -> None:
+    ended = labrig("run", make_protocol(), "--rig", make_rig(), "--runs", tmp_path / "runs")
+    assert "result before" not in ended.out
+    run = ended.run_folder
+    before = contents(run / "result")
+    (run / "result" / "my plot.png").write_bytes(b"a person's own")
+    assert "the same result as before\n" in labrig("process", run).out
+    assert not (run / "result-1").exists()
+
+    frame = "000007.dng"
+    said = labrig("process", run, "--exclude", frame).out
+    assert "kept as result-1:" in said
+    assert f"  excluded: none → {frame}\n" in said
+    assert "  frames decay: 12 → 11\n" in said
+    (line,) = (line for line in said.splitlines() if line.startswith("  k_r 1 "))
+    assert " σ); a 1 " in line
+    assert contents(run / "result-1").items() >= before.items()
+
+    said = labrig("process", run, "--states", "2", "--roi", "20,20,30,30").out
+    assert "  states: auto → 2\n" in said
+    assert "  patches sample: " in said
+    assert "1 state (k_r" in said
+    assert "→ 2 states (k_r" in said
+    said = labrig("process", run, "--rate", "0.05").out
+    assert "  fixed_rates_per_s: none → 0.05\n" in said
+    assert "0.05 (held)" in said
+    assert labrig("process", run, "--rate", "-1").code == 2
+    assert labrig("process", run, "--camera", "leica").code == 2
+    # A person clears away what is old; what was later still counts as later.
+    shutil.rmtree(run / "result-1")
+    assert "kept as result-4:" in labrig("process", run).out
+    assert contents(run / "result") == before
+
+    provenance = run / "result" / "provenance.yaml"
+    content = yaml.safe_load(provenance.read_text())
+    content["libraries"]["numpy"] = "1.26.0"
+    provenance.write_text(yaml.safe_dump(content))
+    said = labrig("process", run).out
+    assert "  libraries numpy: 1.26.0 → " in said
+    assert "  the numbers are the same; other in provenance.yaml\n" in said

@@ -1,0 +1,80 @@
+"""Two labrigs, two real processes, one relay board: the first has it until it ends, even by -9."""
+
+import os
+import signal
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import pytest
+
+from sim.boards import NumatoBoard
+
+pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
+
+RIG = """
+name: half a bench
+devices:
+  lamp: {{driver: numato_relay, address: "{address}", relay: 3}}
+"""
+PATIENCE_S = 60.0
+
+
+@dataclass
+class Wired:
+    """A board at a terminal device; `lit` is set when somebody switches its lamp on."""
+
+    address: str
+    lit: threading.Event = field(default_factory=threading.Event)
+
+
+@pytest.fixture
+def wired() -> Iterator[Wired]:
+    ours, theirs = pty.openpty()
+    wired = Wired(os.ttyname(theirs))
+
+    def switched(relay: int, on: bool) -> None:
+        if on:
+            wired.lit.set()
+
+    board = NumatoBoard(8, switched)
+
+    def serve() -> None:
+        while True:
+            try:
+                os.write(ours, board.receive(os.read(ours, 100)))
+            except OSError:
+                return
+
+    threading.Thread(target=serve, daemon=True).start()
+    yield wired
+    os.close(theirs)
+    os.close(ours)
+
+
+def test_the_second_is_refused_and_the_lock_dies_with_the_first(
+    wired: Wired, tmp_path: Path
+) -> None:
+    rig = tmp_path / "rig.yaml"
+    rig.write_text(RIG.format(address=wired.address))
+    command = [sys.executable, "-m", "labrig", "rig", "check", str(rig)]
+    first = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
+    try:
+        assert wired.lit.wait(PATIENCE_S), "the first labrig has the board"
+        first.send_signal(signal.SIGSTOP)
+        second = subprocess.run(command, capture_output=True, text=True, check=False)
+        assert second.returncode == 2
+        assert second.stdout == ""
+        assert second.stderr == (
+            f"labrig: {wired.address} is held by another labrig on this PC; wait until it has "
+            "ended\n"
+        )
+    finally:
+        first.kill()
+        first.communicate()
+    third = subprocess.run(command, capture_output=True, text=True, check=False)
+    assert third.returncode == 0, third.stderr
+    assert "Numato" in third.stdout
