@@ -25,6 +25,8 @@ if TYPE_CHECKING:
     from labrig.errors import FrameError as FrameError
     from labrig.errors import LabrigError as LabrigError
     from labrig.errors import UsageError as UsageError
+    from labrig.export import read_dataset as read_dataset
+    from labrig.export import to_tiled as to_tiled
     from labrig.fit import DecayFit as DecayFit
     from labrig.fit import fit_decay as fit_decay
     from labrig.material import Material as Material
@@ -65,12 +67,14 @@ _HOME = {
     "plan": "acquire",
     "process_run": "process",
     "read_camera": "optics",
+    "read_dataset": "export",
     "read_material": "material",
     "read_protocol": "acquire.plugins",
     "read_raw": "reduce",
     "read_rig_file": "acquire",
     "read_run": "record",
     "read_series": "reduce",
+    "to_tiled": "export",
     "write_material": "material",
 }
 

@@ -8,7 +8,14 @@ import math
 import re
 from typing import Annotated, Any
 
-from pydantic import BeforeValidator, PlainSerializer
+from pydantic import (
+    BeforeValidator,
+    GetCoreSchemaHandler,
+    GetJsonSchemaHandler,
+    PlainSerializer,
+    WithJsonSchema,
+)
+from pydantic_core import core_schema
 
 TIME_S = {"us": 1e-6, "µs": 1e-6, "ms": 1e-3, "s": 1.0, "min": 60.0, "h": 3600.0}
 FRACTION = {"%": 0.01}
@@ -71,28 +78,61 @@ def _written(unit: str) -> PlainSerializer:
     return PlainSerializer(lambda value: f"{value!r} {unit}", return_type=str)
 
 
-def word_or_duration(*words: str) -> BeforeValidator:
-    """Accepts one of `words`, or a duration in seconds written with its unit."""
+def _schema(units: dict[str, float], bare: bool) -> WithJsonSchema:
+    """For editors: what may be written, as a JSON Schema."""
+    known = "|".join(sorted(units, key=len, reverse=True))
+    text = {
+        "type": "string",
+        "pattern": rf"^\s*(\d+(\.\d*)?([eE][-+]?\d+)?|\.\d+)(\s*/\s*\d+(\.\d+)?)?\s*({known})\s*$",
+        "description": f"a number with its unit: {', '.join(units)}",
+    }
+    return WithJsonSchema({"anyOf": [text, {"type": "number"}]} if bare else text, "validation")
 
-    def validate(value: Any) -> Any:
-        if isinstance(value, str) and value not in words:
-            try:
-                return parse(value, TIME_S)
-            except ValueError as error:
-                raise ValueError(f"expected {' or '.join(words)}, or a duration; {error}") from None
+
+class WordOrDuration:
+    """Annotation: one of `words`, or a duration in seconds written with its unit."""
+
+    def __init__(self, *words: str) -> None:
+        self._words = words
+
+    def __get_pydantic_core_schema__(
+        self, source: Any, handler: GetCoreSchemaHandler
+    ) -> core_schema.CoreSchema:
+        return core_schema.no_info_before_validator_function(
+            self._validate,
+            handler(source),
+            serialization=core_schema.plain_serializer_function_ser_schema(
+                lambda value: value if isinstance(value, str) else f"{value!r} s"
+            ),
+        )
+
+    def __get_pydantic_json_schema__(
+        self, schema: core_schema.CoreSchema, handler: GetJsonSchemaHandler
+    ) -> dict[str, Any]:
+        duration = _schema(TIME_S, bare=False).json_schema
+        return {"anyOf": [{"enum": list(self._words)}, duration]}
+
+    def _validate(self, value: Any) -> Any:
+        expected = " or ".join(self._words)
         if not isinstance(value, str):
             raise ValueError(
-                f"expected {' or '.join(words)}, or a duration with its unit such as '5 s', "
-                f"got '{value}'"
+                f"expected {expected}, or a duration with its unit such as '5 s', got '{value}'"
             )
-        return value
-
-    return BeforeValidator(validate)
+        if value in self._words:
+            return value
+        try:
+            return parse(value, TIME_S)
+        except ValueError as error:
+            raise ValueError(f"expected {expected}, or a duration; {error}") from None
 
 
 #: Seconds, written with a unit of time.
-DurationS = Annotated[float, _validator(TIME_S, bare=False), _written("s")]
+DurationS = Annotated[
+    float, _validator(TIME_S, bare=False), _written("s"), _schema(TIME_S, bare=False)
+]
 #: A fraction, written as `0.7 %` or as a bare 0.007.
-Fraction = Annotated[float, _validator(FRACTION, bare=True)]
+Fraction = Annotated[float, _validator(FRACTION, bare=True), _schema(FRACTION, bare=True)]
 #: Bytes.
-SizeBytes = Annotated[float, _validator(SIZE_BYTES, bare=False), _written("B")]
+SizeBytes = Annotated[
+    float, _validator(SIZE_BYTES, bare=False), _written("B"), _schema(SIZE_BYTES, bare=False)
+]

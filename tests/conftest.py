@@ -5,6 +5,7 @@ import signal
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
 from pathlib import Path
+from typing import TYPE_CHECKING
 
 import pytest
 import yaml
@@ -13,6 +14,9 @@ from hypothesis import settings
 from labrig import shipped
 from labrig.cli.ending import guarded
 from labrig.signals import STOP_SIGNALS
+
+if TYPE_CHECKING:
+    from selenium.webdriver import Chrome
 
 # In CI the same examples every time, so that a red run is about the change; new ones elsewhere.
 settings.register_profile("ci", derandomize=True, deadline=None)
@@ -83,3 +87,14 @@ def make_protocol(tmp_path: Path) -> Callable[..., Path]:
         return path
 
     return write
+
+
+@pytest.fixture
+def chromium(tmp_path: Path) -> Iterator["Chrome"]:
+    """A real browser."""
+    from tests.chromium import IS_MISSING, browser
+
+    if IS_MISSING:
+        pytest.skip("needs chromium and chromedriver")
+    with browser(tmp_path / "profile") as chrome:
+        yield chrome

@@ -2,7 +2,7 @@
 
 import typer
 
-from labrig.cli import fit, frame, process, protocol, rig, run, sim
+from labrig.cli import fit, frame, process, protocol, rig, run, runs, schema, sim, watch
 
 app = typer.Typer(
     help="From a lab bench to a measured phosphorescent or fluorescent material.",
@@ -16,9 +16,13 @@ app.command("plan")(run.plan)
 app.command("resume")(run.resume)
 app.command("process")(process.process)
 app.command("frame")(frame.frame)
+app.command("note")(runs.note)
+app.command("watch")(watch.watch)
+app.command("schema")(schema.schema)
 app.add_typer(fit.app, name="fit")
 app.add_typer(protocol.app, name="protocol")
 app.add_typer(rig.app, name="rig")
+app.add_typer(runs.app, name="runs")
 app.add_typer(sim.app, name="sim")
 
 

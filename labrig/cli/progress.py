@@ -1,17 +1,28 @@
 """What is happening, what comes next, how much lab time is left."""
 
+import shutil
 import sys
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
+from pathlib import Path
 
-from rich.console import Console
+import numpy as np
+from numpy.typing import NDArray
+from rich.color import Color
+from rich.console import Console, Group
 from rich.live import Live
+from rich.style import Style
 from rich.table import Table
 from rich.text import Text
 
 from labrig.acquire import ExposureSettings, Plan, RunObserver
 from labrig.clock import Clock
 from labrig.quantity import duration_text
+from labrig.record import FrameRecord
+from labrig.watch.glances import Glances, Seen
+
+#: Of the last frame, in characters.
+THUMBNAIL_WIDTH = 48
 
 
 @contextmanager
@@ -33,7 +44,11 @@ def progress(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObser
         return
     console = Console(stderr=True)
     with Live(console=console, refresh_per_second=4, transient=True) as live:
-        yield LiveProgress(state, live, console)
+        shown = LiveProgress(state, live, console)
+        try:
+            yield shown
+        finally:
+            shown.close()
 
 
 class _State:
@@ -107,10 +122,12 @@ class PlainProgress:
         if until_s is not None:
             self._say(f"{what}; next: {self._state.next_step()}")
 
-    def frame(self, purpose: str, settings: ExposureSettings) -> None:
+    def frame(self, record: FrameRecord) -> None:
         """Say that a frame was kept."""
         self._state.frames += 1
-        self._say(f"frame {self._state.frames} of {self._state.plan.frames}: {purpose}, {settings}")
+        settings = ExposureSettings(record.exposure_s, record.iso, record.f_number)
+        number = f"frame {self._state.frames} of {self._state.plan.frames}"
+        self._say(f"{number}: {record.purpose}, {settings}")
 
     def warn(self, text: str) -> None:
         """Say a warning."""
@@ -128,6 +145,8 @@ class LiveProgress:
         self._state = state
         self._console = console
         self._total = len(state.plan.units)
+        self._run: Path | None = None
+        self._glances: Glances | None = None
         live.update(self)
 
     def unit(self, name: str, number: int, total: int) -> None:
@@ -138,27 +157,71 @@ class LiveProgress:
         """Something begins."""
         self._state.doing, self._state.until_s = what, until_s
 
-    def frame(self, purpose: str, settings: ExposureSettings) -> None:
-        """A frame was kept."""
+    def frame(self, record: FrameRecord) -> None:
+        """A frame was kept: have it looked at, by another process."""
         self._state.frames += 1
+        if self._glances is None:
+            self._run = record.path.parents[1]
+            self._glances = Glances(self._run, THUMBNAIL_WIDTH)
+        self._glances.ask(record.path.name)
+
+    def close(self) -> None:
+        """No more frames come."""
+        if self._glances is not None:
+            self._glances.close()
 
     def warn(self, text: str) -> None:
         """A warning stays on the screen above the table."""
         self._console.print(Text(f"warning: {text}", style="yellow"))
 
-    def __rich__(self) -> Table:
-        """The table as it is now."""
+    def __rich__(self) -> Group:
+        """All of it as it is now."""
+        seen = None if self._glances is None else self._glances.latest
+        if seen is None:
+            return Group(self._table(None))
+        return Group(self._table(seen), thumbnail(seen.picture))
+
+    def _table(self, seen: Seen | None) -> Table:
         state = self._state
         table = Table.grid(padding=(0, 2))
-        table.add_row(Text("unit", style="dim"), f"{state.unit}  ({state.number} of {self._total})")
+        table.add_row(_dim("unit"), f"{state.unit}  ({state.number} of {self._total})")
         countdown = ""
         if state.until_s is not None:
             countdown = f"  ({_countdown(state.until_s - state.clock.now())} to go)"
-        table.add_row(Text("now", style="dim"), Text(state.doing + countdown, style="bold"))
-        table.add_row(Text("next", style="dim"), state.next_step())
-        table.add_row(Text("frames", style="dim"), f"{state.frames} of {state.plan.frames}")
-        table.add_row(Text("lab time left", style="dim"), _countdown(state.left_s()))
+        table.add_row(_dim("now"), Text(state.doing + countdown, style="bold"))
+        table.add_row(_dim("next"), state.next_step())
+        table.add_row(_dim("frames"), f"{state.frames} of {state.plan.frames}{self._disk()}")
+        table.add_row(_dim("lab time left"), _countdown(state.left_s()))
+        for patch, values in ({} if seen is None else seen.values).items():
+            shown = "  ".join(f"{channel} {mean:.1f}" for channel, mean in values.items())
+            clipped = "  clipped" if seen is not None and patch in seen.clipped else ""
+            table.add_row(_dim(patch), Text(f"{shown} DN{clipped}", "red" if clipped else ""))
         return table
+
+    def _disk(self) -> str:
+        if self._run is None:
+            return ""
+        return f", {shutil.disk_usage(self._run).free / 1e9:.1f} GB free"
+
+
+def thumbnail(picture: NDArray[np.uint8]) -> Text:
+    """A picture in half blocks, two pixels above each other in a character."""
+    rows = [
+        Text("").join(
+            Text("▀", Style(color=_colour(above), bgcolor=_colour(below)))
+            for above, below in zip(top, bottom, strict=True)
+        )
+        for top, bottom in zip(picture[0:-1:2], picture[1::2], strict=False)
+    ]
+    return Text("\n").join(rows)
+
+
+def _colour(rgb: NDArray[np.uint8]) -> Color:
+    return Color.from_rgb(*(int(level) for level in rgb))
+
+
+def _dim(text: str) -> Text:
+    return Text(text, style="dim")
 
 
 def _countdown(seconds: float) -> str:

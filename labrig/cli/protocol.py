@@ -1,4 +1,7 @@
-"""`labrig protocol`: what protocols there are."""
+"""`labrig protocol`: what protocols there are, and a file of one's own to begin with."""
+
+from pathlib import Path
+from typing import Annotated
 
 import typer
 
@@ -11,10 +14,33 @@ def list_protocols() -> None:
     from labrig import shipped
     from labrig.acquire import plugins
 
-    for path in sorted(shipped.folder("protocols").glob("*.yaml")):
+    for path in shipped.names("protocols").values():
         model = plugins.read_protocol(path)
         said = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("#").strip()
         typer.echo(f"{path.stem:16} ({model.protocol})  {said}")
+
+
+@app.command("new")
+def new_protocol(
+    name: Annotated[str, typer.Argument(help="A shipped protocol, see 'labrig protocol list'.")],
+    file: Annotated[
+        Path | None, typer.Argument(help="Where to put it.", show_default="./my-NAME.yaml")
+    ] = None,
+) -> None:
+    """Put a commented protocol file in place, to be changed; nothing is overwritten."""
+    from labrig import shipped
+    from labrig.errors import DiskError, UsageError
+
+    text = shipped.find("protocols", "protocol", name).read_text(encoding="utf-8")
+    path = file or Path(f"my-{name}.yaml")
+    try:
+        with path.open("x", encoding="utf-8", newline="\n") as new:
+            new.write(text)
+    except FileExistsError:
+        raise UsageError(f"{path} is there already; give the new file another name") from None
+    except OSError as error:
+        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    typer.echo(f"{path} is yours to change; then: labrig plan ./{path} --rig sim")
 
 
 @app.callback()

@@ -5,7 +5,9 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_tell
 from labrig.clock import Interrupted
+from labrig.errors import UsageError
 
 if TYPE_CHECKING:
     from labrig.run import Recording
@@ -33,17 +35,41 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
+    from labrig.cli.at_end import told_at_end
     from labrig.cli.progress import progress
 
-    _finish(_prepared(protocol, rig, runs).record(progress), no_process, json)
-
-
-def plan(protocol: Protocol, rig: RigOption, runs: Runs = Path("runs")) -> None:
-    """Print what a protocol will do, how long it takes and what it needs; touch nothing."""
     recording = _prepared(protocol, rig, runs)
-    for line in recording.plan.lines():
-        typer.echo(line)
-    typer.echo(recording.summary())
+    with told_at_end(recording.rig.on_finish) as ending:
+        folder = recording.record(progress)
+        _finish(folder, no_process, json)
+        ending.message = str(folder)
+
+
+def plan(
+    protocol: Protocol,
+    rig: RigOption,
+    runs: Runs = Path("runs"),
+    predict: PredictOption = None,
+    like: LikeOption = None,
+    metered: MeteredOption = None,
+    json: Json = False,
+) -> None:
+    """Print what a protocol will do, how long it takes and what it needs; touch nothing.
+
+    With --predict: how well it will know the rates of a material, and what would halve their σ.
+    """
+    recording = _prepared(protocol, rig, runs)
+    if predict:
+        predict_and_tell(recording, predict, like, metered, json=json)
+    elif like or metered:
+        raise UsageError("--like and --metered go with --predict MATERIAL; name the material, too")
+    elif json:
+        typer.echo(recording.plan.to_json())
+    else:
+        for line in recording.plan.lines():
+            typer.echo(line)
+    if not json:
+        typer.echo(recording.summary())
 
 
 def resume(
@@ -52,10 +78,15 @@ def resume(
     json: Json = False,
 ) -> None:
     """Go on with a run that was interrupted: completed units are kept, the rest is done."""
+    from labrig.acquire import read_rig_file
+    from labrig.cli.at_end import told_at_end
     from labrig.cli.progress import progress
     from labrig.run import resume_run
 
-    _finish(resume_run(run, progress), no_process, json)
+    rig = run / "rig.yaml"
+    with told_at_end(read_rig_file(rig).on_finish if rig.is_file() else None) as ending:
+        _finish(resume_run(run, progress), no_process, json)
+        ending.message = str(run)
 
 
 def _prepared(protocol: str, rig: str, runs: Path) -> "Recording":

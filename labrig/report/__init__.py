@@ -4,6 +4,7 @@ from labrig.report.content import (
     DECAY_ASSUMPTIONS,
     DeviceLine,
     GlowPhotograph,
+    Interruption,
     PatchReport,
     RunReport,
 )
@@ -13,6 +14,7 @@ __all__ = [
     "DECAY_ASSUMPTIONS",
     "DeviceLine",
     "GlowPhotograph",
+    "Interruption",
     "PatchReport",
     "RunReport",
     "write_report",

@@ -50,6 +50,15 @@ class GlowPhotograph:
 
 
 @dataclass(frozen=True)
+class Interruption:
+    """An attempt at a unit that did not count: when it began, and why it ended."""
+
+    unit: str
+    began: str
+    reason: str
+
+
+@dataclass(frozen=True)
 class PatchReport:
     """One patch of the sample.
 
@@ -87,8 +96,8 @@ class RunReport:
         Name of the rig.
     simulated
         Whether the rig is a simulated one; the page says so.
-    labrig_version
-        Of the processing.
+    labrig_version, libraries
+        Of the processing; libraries by name and version.
     patches
         One or more.
     sample
@@ -103,6 +112,16 @@ class RunReport:
         Photographs of the glow by rising time, six or so, all of one decay.
     camera
         Sensitivity of the camera, for colours; None if not known.
+    charges_s
+        How long the lamp shone before each decay, as measured.
+    background
+        The region whose level was subtracted from each frame; None if dark frames served for that.
+    states
+        The number of states asked for; None if the data decided.
+    interruptions
+        Attempts that failed, by time.
+    notes
+        What a person had to say afterwards.
     assumptions
         What the numbers rest on, one sentence or two each.
     """
@@ -124,4 +143,10 @@ class RunReport:
     daylight: tuple[FrameRecord, ...] = ()
     glow: tuple[GlowPhotograph, ...] = ()
     camera: CameraResponse | None = None
+    libraries: tuple[tuple[str, str], ...] = ()
+    charges_s: tuple[float, ...] = ()
+    background: Region | None = None
+    states: int | None = None
+    interruptions: tuple[Interruption, ...] = ()
+    notes: str = ""
     assumptions: tuple[str, ...] = field(default=DECAY_ASSUMPTIONS)

@@ -1,83 +1,47 @@
 """A decay as measured and fitted, on a linear and on a logarithmic scale."""
 
-from dataclasses import dataclass
+import math
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.lines import Line2D
-from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
+from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from labrig.fit import DecayFit
 from labrig.reduce import Series
 from labrig.report.figure_style import (
+    DASHED,
     INK,
+    LEFT_PT,
     MARKERS,
     MUTED,
     PAPER,
-    SMALL_PT,
     channel_colour,
+    error_bars,
     new_figure,
     place,
+    points,
 )
+from labrig.report.fitted_curve import fitted_curve, middles_s
+from labrig.report.legend import BAND_OPACITY, legend_above, lined, marked, shaded
+from labrig.report.log_axis import mark_decades
 from labrig.report.written_numbers import power_of_ten, rounded
 
 FloatArray = NDArray[np.float64]
 
 TIME_LABEL = "Time after lamp off / s"
 SIGNAL_LABEL = "Signal / (DN/s)"
-HEIGHT_PT = 272.0
-CURVE_POINTS = 240
+HEIGHT_PT = 256.0
 #: A logarithmic axis begins at this share of the noise at the end of the decay, and spans no more
 #: than so many decades: below is nothing but the noise's chance zeros.
 SHARE_OF_NOISE = 0.5
 MOST_DECADES = 6.0
+#: Highest values from here to there are written without a power of ten.
+PLAIN_FROM, PLAIN_TO = 0.02, 1e5
 #: Values left out of the fit are shown up to this many times the highest fitted one.
 LEFT_OUT_SHOWN = 3.0
-
-
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """The fit as a line.
-
-    Parameters
-    ----------
-    t_s
-        Shape (m,): middles of exposures.
-    total
-        Shape (m, C), what frames there would measure.
-    states
-        Shape (m, n): each state in the brightest channel, offset left out.
-    brightest
-        That channel's number.
-    """
-
-    t_s: FloatArray
-    total: FloatArray
-    states: FloatArray
-    brightest: int
-
-
-def middles_s(series: Series) -> FloatArray:
-    """Middle of each exposure after lamp off, where its value is drawn."""
-    return series.t_s + series.exposure_s / 2
-
-
-def fitted_curve(series: Series, fit: DecayFit) -> Curve:
-    """`fit` along the times of `series`, for the exposures that frames had around them."""
-    order = np.argsort(series.t_s, kind="stable")
-    known_t, known_exposure = series.t_s[order], series.exposure_s[order]
-    t_s = np.linspace(known_t[0], known_t[-1], CURVE_POINTS)
-    exposure_s = np.interp(t_s, known_t, known_exposure)
-    middle_s = t_s + exposure_s / 2
-    states = [state.amplitude * np.exp(-state.k_r_per_s * middle_s) for state in fit.states]
-    return Curve(
-        t_s=middle_s,
-        total=fit.predict(t_s, exposure_s),
-        states=np.stack(states, axis=1),
-        brightest=fit.brightest,
-    )
 
 
 def linear_decay(series: Series, fit: DecayFit | None) -> Figure:
@@ -87,7 +51,11 @@ def linear_decay(series: Series, fit: DecayFit | None) -> Figure:
     highest, lowest = max(_highest(series), 0.0), min(float(_used(series).min()), 0.0)
     room = 0.06 * (highest - lowest) or 1.0
     axes.set_ylim(lowest - (room if lowest < 0 else 0.0), highest + room)
-    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
+    exponent = _common_exponent(highest)
+    unit = 10.0**exponent
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value / unit)))
+    if exponent:
+        axes.set_ylabel(f"Signal / ({power_of_ten(exponent)} DN/s)")
     _legend(figure, series, fit)
     return figure
 
@@ -99,9 +67,7 @@ def logarithmic_decay(series: Series, fit: DecayFit | None) -> Figure:
     _draw(axes, series, fit)
     low, high = log_axis_ends(series)
     axes.set_ylim(low, high)
-    axes.yaxis.set_major_locator(LogLocator(numticks=8))
-    axes.yaxis.set_major_formatter(FuncFormatter(decade_text))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    mark_decades(axes)
     for number, name in enumerate(series.channels):
         below = series.values[:, number] < low
         if below.any():
@@ -137,18 +103,19 @@ def log_axis_ends(series: Series) -> tuple[float, float]:
     return min(low, highest / 10), highest * 1.6
 
 
-def decade_text(value: float, _: int | None) -> str:
-    """A decade's tick: `0.01` to `10000`, beyond that a power of ten."""
-    exponent = round(np.log10(value))
-    return f"{value:g}" if -3 <= exponent <= 4 else power_of_ten(exponent)
-
-
 def _axes() -> tuple[Figure, Axes]:
     figure = new_figure(HEIGHT_PT)
-    axes = place(figure, left=62, bottom=38, right=12, top=30)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     axes.set_xlabel(TIME_LABEL)
     axes.set_ylabel(SIGNAL_LABEL)
     return figure, axes
+
+
+def _common_exponent(highest: float) -> int:
+    """The power of ten in the unit of an axis, so that its ticks are short."""
+    if PLAIN_FROM <= highest < PLAIN_TO or highest <= 0:
+        return 0
+    return 3 * math.floor(math.log10(highest) / 3)
 
 
 def _used(series: Series) -> FloatArray:
@@ -165,86 +132,48 @@ def _highest(series: Series) -> float:
 def _draw(axes: Axes, series: Series, fit: DecayFit | None) -> None:
     t_s, usable = middles_s(series), series.usable
     for number, name in enumerate(series.channels):
+        marker = MARKERS[number % len(MARKERS)]
         colour = channel_colour(name, number)
+        sigma = np.nan_to_num(series.sigma[:, number])
+        error_bars(axes, t_s, series.values[:, number], sigma, colour)
         for rows, face in ((usable, colour), (~usable, PAPER)):
-            if rows.any():
-                axes.errorbar(
-                    t_s[rows],
-                    series.values[rows, number],
-                    yerr=np.nan_to_num(series.sigma[rows, number]),
-                    linestyle="none",
-                    marker=MARKERS[number % len(MARKERS)],
-                    markersize=3.8,
-                    markerfacecolor=face,
-                    markeredgecolor=colour,
-                    markeredgewidth=0.9,
-                    ecolor=colour,
-                    elinewidth=0.9,
-                    zorder=3,
-                )
+            points(axes, t_s[rows], series.values[rows, number], marker, colour, face)
     if fit is not None:
         curve = fitted_curve(series, fit)
         for number, name in enumerate(series.channels):
             axes.plot(
                 curve.t_s, curve.total[:, number], color=channel_colour(name, number), linewidth=1.2
             )
+        if np.isfinite(curve.sigma).all():
+            middle = curve.total[:, fit.brightest]
+            axes.fill_between(
+                curve.t_s,
+                middle - curve.sigma,
+                middle + curve.sigma,
+                color=_brightest_colour(fit),
+                alpha=BAND_OPACITY,
+                linewidth=0,
+            )
         if fit.n_states > 1:
-            axes.plot(curve.t_s, curve.states, color=INK, linewidth=0.9, linestyle=(0, (4, 2.5)))
+            axes.plot(curve.t_s, curve.states, color=INK, linewidth=0.9, linestyle=DASHED)
     last = float(t_s.max())
     axes.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
 
 
+def _brightest_colour(fit: DecayFit) -> str:
+    return channel_colour(fit.channels[fit.brightest], fit.brightest)
+
+
 def _legend(figure: Figure, series: Series, fit: DecayFit | None) -> None:
-    """In a row above the axes, so that it covers nothing."""
-    handles = [
-        Line2D(
-            [],
-            [],
-            linestyle="none",
-            marker=MARKERS[number % len(MARKERS)],
-            markersize=5,
-            color=channel_colour(name, number),
-            label=name,
-        )
+    entries: list[Artist] = [
+        marked(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
         for number, name in enumerate(series.channels)
     ]
     if fit is not None:
-        handles.append(Line2D([], [], color=MUTED, linewidth=1.2, label="fit"))
+        brightest = series.channels[fit.brightest]
+        entries += [lined("fit", MUTED), shaded("± 1 σ", _brightest_colour(fit))]
         if fit.n_states > 1:
-            brightest = series.channels[fit.brightest]
-            handles.append(
-                Line2D(
-                    [],
-                    [],
-                    color=INK,
-                    linewidth=0.9,
-                    linestyle=(0, (4, 2.5)),
-                    label=f"each state, {brightest}",
-                )
-            )
+            entries.append(lined(f"each state, {brightest}", INK, DASHED, width=0.9))
     if not series.usable.all():
-        handles.append(
-            Line2D(
-                [],
-                [],
-                linestyle="none",
-                marker="o",
-                markersize=5,
-                markerfacecolor=PAPER,
-                markeredgecolor=MUTED,
-                label="left out",
-            )
-        )
-    figure.legend(
-        handles=handles,
-        loc="upper left",
-        bbox_to_anchor=(54 / 420, 1.0),
-        ncols=min(len(handles), 6),
-        frameon=False,
-        fontsize=SMALL_PT,
-        labelcolor=INK,
-        handlelength=1.6,
-        handletextpad=0.4,
-        columnspacing=1.3,
-        borderaxespad=0.4,
-    )
+        entries.append(marked("left out", "o", MUTED, PAPER))
+    legend_above(figure, entries, columns=7)

@@ -1,23 +1,32 @@
-"""How figures look, and how they get into the page: as SVG whose colours are the page's.
+"""How figures look."""
 
-Colours are CSS variables with the light scheme's colour as fallback, so that one figure serves the
-light scheme, the dark one and print. Text stays text: it takes the page's font and can be searched.
-"""
-
-import re
 from collections.abc import Iterator
 from contextlib import contextmanager
-from html import escape
-from io import BytesIO
+from typing import TypeAlias
 
 import matplotlib.style
+import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
 
 #: Figures are this wide in points, so that 10 pt is legible at half a desktop's or a phone's width.
 WIDTH_PT = 420.0
 FONT_PT = 10.5
 SMALL_PT = 9.5
+#: Left margin of axes, so that figures below one another are in line.
+LEFT_PT = 62.0
+
+#: Left between a label and the figure's edge.
+EDGE_PT = 3.0
+
+LineStyle: TypeAlias = str | tuple[float, tuple[float, ...]]
+DASHED: LineStyle = (0, (4, 2.5))
+LONG_DASHED: LineStyle = (0, (8, 3))
+DOTTED: LineStyle = (0, (1, 2))
+DASH_DOTTED: LineStyle = (0, (5, 2, 1, 2))
 
 INK, MUTED, RULE, PAPER, SHADE = "#1d2329", "#5f6b76", "#dde2e6", "#fefefe", "#e9eff4"
 #: Colours of the channels of a camera, and of other channels in turn.
@@ -25,7 +34,8 @@ CHANNEL = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 OTHER_CHANNELS = ("#7a4fb5", "#b06a00", "#0f7f8a", "#a8326e", "#4f5b66")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
 
-_VARIABLES = {
+#: Name of the page's variable for each colour, which has another value in the dark scheme.
+VARIABLES = {
     INK: "ink",
     MUTED: "muted",
     RULE: "rule",
@@ -38,6 +48,7 @@ _VARIABLES = {
 _SETTINGS = {
     "svg.fonttype": "none",
     "svg.hashsalt": "labrig",
+    "pdf.fonttype": 42,  # TrueType: some publishers refuse the default, Type 3
     "font.family": "DejaVu Sans",  # comes with matplotlib: the same widths everywhere
     "font.size": FONT_PT,
     "axes.unicode_minus": True,
@@ -71,7 +82,10 @@ def place(
     top: float,
     share_x: Axes | None = None,
 ) -> Axes:
-    """Axes with margins in points from the figure's left, bottom, right and top edge."""
+    """Axes with margins in points from the figure's left, bottom, right and top edge.
+
+    Labels stand at the figure's edge, so that those of several axes are in line.
+    """
     width, height = figure.get_size_inches() * 72
     axes = figure.add_axes(
         (left / width, bottom / height, 1 - (left + right) / width, 1 - (bottom + top) / height),
@@ -84,40 +98,46 @@ def place(
         axes.spines[side].set_color(MUTED)
     axes.tick_params(colors=MUTED, labelsize=SMALL_PT, length=3.5, which="both")
     axes.tick_params(length=2, which="minor")
-    axes.xaxis.label.set_color(INK)
-    axes.yaxis.label.set_color(INK)
+    axes.xaxis.label.set(color=INK, verticalalignment="bottom")
+    axes.yaxis.label.set(color=INK, verticalalignment="top")
+    # Placing them by hand saves matplotlib the measuring of all ticks.
+    axes.xaxis.set_label_coords(0.5, (EDGE_PT - bottom) / (height - bottom - top))
+    axes.yaxis.set_label_coords((EDGE_PT - left) / (width - left - right), 0.5)
     axes.grid(True, color=RULE, linewidth=0.7)
     axes.set_axisbelow(True)
     return axes
 
 
-def svg(figure: Figure, name: str, described: str) -> str:
-    """The figure as an `<svg>` element.
+def points(
+    axes: Axes,
+    x: FloatArray,
+    y: FloatArray,
+    marker: str,
+    colour: str,
+    face: str,
+    size: float = 3.8,
+) -> None:
+    """Measured values; hollow where `face` is the paper's colour."""
+    axes.plot(
+        x,
+        y,
+        linestyle="none",
+        marker=marker,
+        markersize=size,
+        markerfacecolor=face,
+        markeredgecolor=colour,
+        markeredgewidth=0.9,
+        zorder=3,
+    )
 
-    Parameters
-    ----------
-    figure
-        Made within `figure_style`.
-    name
-        Unique on the page; letters, digits and hyphens.
-    described
-        What it shows, for those who cannot see it.
-    """
-    buffer = BytesIO()
-    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    figure.savefig(buffer, format="svg", metadata=nothing)
-    text = buffer.getvalue().decode("utf-8")
-    text = text[text.index("<svg") :].strip()
-    body = text.split(">", 1)[1]
-    width, height = figure.get_size_inches() * 72
-    # Its style sheet would hold for the whole page, which has one of its own.
-    body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", body, flags=re.DOTALL)
-    body = re.sub(r" font-family: [^;\"]*;", "", body)
-    # Ids are unique in a figure, not in a page of figures.
-    body = re.sub(r'\bid="', f'id="{name}-', body)
-    body = body.replace("url(#", f"url(#{name}-").replace('xlink:href="#', f'href="#{name}-')
-    for colour, variable in _VARIABLES.items():
-        body = body.replace(colour, f"var(--{variable}, {colour})")
-    body = re.sub(r">\s+<", "><", body)
-    label = escape(described)
-    return f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{label}">{body}'
+
+def error_bars(axes: Axes, x: FloatArray, y: FloatArray, sigma: FloatArray, colour: str) -> None:
+    """Bars of ± 1 σ, all in one path: as single ones they would be half of the file."""
+    gap = np.full_like(y, np.nan)
+    axes.plot(
+        np.repeat(x, 3),
+        np.stack([y - sigma, y + sigma, gap], axis=1).ravel(),
+        color=colour,
+        linewidth=0.9,
+        solid_capstyle="butt",
+    )

@@ -1,39 +1,50 @@
 """The report: one HTML file that needs nothing else."""
 
+import re
+from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup
+from markupsafe import Markup, escape
 
 from labrig.errors import DiskError
 from labrig.fit import DecayFit
+from labrig.quantity import duration_text
 from labrig.record.frames import FrameRecord
 from labrig.report import parameters
 from labrig.report.colours import Screen, screen_for
 from labrig.report.content import PatchReport, RunReport
 from labrig.report.decay_figures import linear_decay, logarithmic_decay, values_below_axis
-from labrig.report.figure_style import figure_style, svg
-from labrig.report.photographs import daylight_picture, glow_pictures
+from labrig.report.figure_style import figure_style
+from labrig.report.methods import REFERENCES, UNKNOWN, methods
+from labrig.report.noise_budget import noise_budget
+from labrig.report.noise_figure import noise_figure
+from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
+from labrig.report.plates import Plate, Plates
 from labrig.report.residual_figure import residual_figure
 from labrig.report.run_figures import overview_figures, timing_figure
+from labrig.report.stability import Repeat, repeats
 from labrig.report.swatches import Swatch, swatches
-from labrig.report.timing import FrameTiming, frame_timings
-from labrig.report.written_numbers import rounded
+from labrig.report.timing import Lateness, frame_timings, lateness
+from labrig.report.written_numbers import plus_minus, rounded
 
-TEMPLATE, STYLE = "report.html.j2", "report.css"
+TEMPLATE, STYLE, SCRIPT = "report.html.j2", "report.css", "report.js"
 #: With more patches than this, photographs show their numbers and not their names.
 NAMES_ON_PHOTOGRAPH = 3
+_SYMBOL = re.compile(r"\b([a-z])_([a-z])\b")
 
 
 @dataclass(frozen=True)
 class _Figures:
-    """SVG elements of one patch; residuals are empty without a fit."""
+    """Of one patch: residuals only with a fit, noise only where σ is known; its parts by name."""
 
-    linear: Markup
-    logarithmic: Markup
-    residuals: Markup
+    linear: Plate
+    logarithmic: Plate
+    residuals: Plate | None
+    noise: Plate | None
+    noise_parts: tuple[str, ...]
     below_axis: int
 
 
@@ -48,37 +59,43 @@ class _Patch:
     n_usable: int
     figures: _Figures
     swatches: tuple[Swatch, ...]
-    #: Small figure for comparison; empty if there is only one patch.
-    overview: Markup
-
-
-@dataclass(frozen=True)
-class _Timing:
-    """Lateness of the frames in a sentence's numbers and a figure."""
-
-    figure: Markup
-    n_frames: int
-    median_ms: str
-    worst_ms: str
-    worst_frame: str
+    repeats: tuple[Repeat, ...]
+    #: Small figure for comparison; None if there is only one patch.
+    overview: Plate | None
 
 
 def write_report(path: Path, report: RunReport) -> None:
-    """Write `report` to `path`; the same report gives the same bytes.
+    """Write `report` to `path`, and its figures for print into a folder `figures` beside it.
+
+    The same report gives the same bytes.
 
     Raises
     ------
     DiskError
         `path` cannot be written.
     """
-    text = _page(report)
+    screen = screen_for(report.camera)
+    with figure_style(), Plates(f"{report.title}, {report.run}") as plates:
+        patches = _patches(report, screen, plates)
+        timings = frame_timings(report.frames, report.patches)
+        timing = None
+        if timings:
+            timing = plates.add(timing_figure(timings), "timing", "Lateness of the frames")
+    text = _page(report, screen, patches, lateness(timings), timing)
     try:
         path.write_text(text, encoding="utf-8", newline="\n")
+        plates.write(path.parent)
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
 
 
-def _page(report: RunReport) -> str:
+def _page(
+    report: RunReport,
+    screen: Screen,
+    patches: Sequence[_Patch],
+    late: Lateness | None,
+    timing: Plate | None,
+) -> str:
     folder = Path(__file__).parent
     environment = Environment(
         loader=FileSystemLoader(folder),
@@ -93,20 +110,26 @@ def _page(report: RunReport) -> str:
         paper_rows=parameters.paper_rows,
         candidate_rows=parameters.candidate_rows,
         why_so_many_states=parameters.why_so_many_states,
+        duration_text=duration_text,
+        plus_minus=plus_minus,
         rounded=rounded,
         utc=_utc,
     )
-    screen = screen_for(report.camera)
-    with figure_style():
-        patches = _patches(report, screen)
-        timing = _timing(frame_timings(report.frames, report.patches))
+    environment.filters["indexed"] = _indexed
+    photographed = [photograph.frame for photograph in report.glow]
     return environment.get_template(TEMPLATE).render(
         report=report,
-        # The style sheet is labrig's own; escaping it would break its selectors.
+        # Style sheet and script are labrig's own; escaping them would break them.
         style=Markup((folder / STYLE).read_text(encoding="utf-8")),
+        script=Markup((folder / SCRIPT).read_text(encoding="utf-8")),
         warnings=_warnings(report),
         patches=patches,
+        late=late,
         timing=timing,
+        repeated=list(dict.fromkeys(one.unit for item in patches for one in item.repeats)),
+        methods=methods(report, sensor_of(photographed), late),
+        references=REFERENCES,
+        unknown=UNKNOWN,
         daylight=daylight_picture(report.daylight, report.patches, screen),
         glow=glow_pictures(report.glow, screen),
         colours_known=screen.known,
@@ -127,58 +150,61 @@ def _warnings(report: RunReport) -> list[str]:
     ]
 
 
-def _patches(report: RunReport, screen: Screen) -> list[_Patch]:
-    small = [Markup("")] * len(report.patches)
+def _patches(report: RunReport, screen: Screen, plates: Plates) -> list[_Patch]:
+    small: list[Plate | None] = [None] * len(report.patches)
     if len(report.patches) > 1:
         small = [
-            Markup(svg(figure, f"overview-{number}", f"Decay of {patch.name}"))
+            plates.add(figure, f"overview-{number}-{patch.name}", f"Decay of {patch.name}")
             for number, (figure, patch) in enumerate(
                 zip(overview_figures(report.patches), report.patches, strict=True), start=1
             )
         ]
     return [
-        _Patch(
-            number=number,
-            patch=patch,
-            fit=patch.fit if isinstance(patch.fit, DecayFit) else None,
-            failure=patch.fit if isinstance(patch.fit, str) else "",
-            n_usable=int(patch.series.usable.sum()),
-            figures=_figures(number, patch),
-            swatches=swatches(patch.series, screen),
-            overview=overview,
-        )
+        _patch(number, patch, screen, plates, overview)
         for number, (patch, overview) in enumerate(zip(report.patches, small, strict=True), start=1)
     ]
 
 
-def _figures(number: int, patch: PatchReport) -> _Figures:
-    series = patch.series
+def _patch(
+    number: int, patch: PatchReport, screen: Screen, plates: Plates, overview: Plate | None
+) -> _Patch:
     fit = patch.fit if isinstance(patch.fit, DecayFit) else None
-    linear, logarithmic = linear_decay(series, fit), logarithmic_decay(series, fit)
-    left = Markup("")
+    return _Patch(
+        number=number,
+        patch=patch,
+        fit=fit,
+        failure=patch.fit if isinstance(patch.fit, str) else "",
+        n_usable=int(patch.series.usable.sum()),
+        figures=_figures(f"{number}-{patch.name}", patch, fit, plates),
+        swatches=swatches(patch.series, screen),
+        repeats=repeats(patch.series, fit) if fit else (),
+        overview=overview,
+    )
+
+
+def _figures(which: str, patch: PatchReport, fit: DecayFit | None, plates: Plates) -> _Figures:
+    series, name = patch.series, patch.name
+    linear = plates.add(linear_decay(series, fit), f"linear-{which}", f"{name}, linear")
+    logarithmic = plates.add(
+        logarithmic_decay(series, fit), f"logarithmic-{which}", f"{name}, logarithmic"
+    )
+    left = noise = budget = None
     if fit is not None:
-        figure = residual_figure(series, fit)
-        left = Markup(svg(figure, f"residuals-{number}", f"Residuals of the fit to {patch.name}"))
-    return _Figures(
-        linear=Markup(svg(linear, f"linear-{number}", f"{patch.name}, linear")),
-        logarithmic=Markup(svg(logarithmic, f"log-{number}", f"{patch.name}, logarithmic")),
-        residuals=left,
-        below_axis=values_below_axis(series),
-    )
+        left = plates.add(
+            residual_figure(series, fit), f"residuals-{which}", f"Residuals of the fit to {name}"
+        )
+        budget = noise_budget(series, fit)
+        if budget is not None:
+            noise = plates.add(
+                noise_figure(budget), f"noise-{which}", f"Uncertainty of the values of {name}"
+            )
+    parts = tuple(budget.visible()) if budget else ()
+    return _Figures(linear, logarithmic, left, noise, parts, values_below_axis(series))
 
 
-def _timing(timings: tuple[FrameTiming, ...]) -> _Timing | None:
-    if not timings:
-        return None
-    worst = max(timings, key=lambda timing: abs(timing.late_s))
-    late_s = sorted(timing.late_s for timing in timings)
-    return _Timing(
-        figure=Markup(svg(timing_figure(timings), "timing", "Lateness of the frames")),
-        n_frames=len(timings),
-        median_ms=rounded(1e3 * late_s[len(late_s) // 2], 2),
-        worst_ms=rounded(1e3 * worst.late_s, 2),
-        worst_frame=worst.frame,
-    )
+def _indexed(text: str) -> Markup:
+    """Symbols such as `k_i` with their index below the line."""
+    return Markup(_SYMBOL.sub(r"<i>\1</i><sub><i>\2</i></sub>", str(escape(text))))
 
 
 def _utc(frame: FrameRecord) -> str:

@@ -14,13 +14,11 @@ from labrig.reduce import RawFrame, read_raw
 from labrig.region import region_pixels
 from labrig.report.colours import Screen, encoded, into_gamut
 from labrig.report.content import GlowPhotograph, PatchReport
+from labrig.report.pictures import Picture, binned, is_grey, jpeg, saturated_cells, small
 from labrig.report.written_numbers import exposure_text, rounded
-
-Picture = NDArray[np.float32]
 
 DAYLIGHT_WIDTH = 1000
 GLOW_WIDTH = 420
-JPEG_QUALITY = 88
 #: Share of pixels that may be saturated in a daylight photograph that counts as well exposed.
 BLOWN_SHARE = 0.002
 #: Share of saturated pixels from which a spot is shown as saturated.
@@ -31,6 +29,15 @@ BRIGHT_QUANTILE = 0.995
 DAYLIGHT_BRIGHT = 0.8
 #: Noise brightened more than this tells nothing.
 MOST_BRIGHTENED = 4096.0
+
+
+@dataclass(frozen=True)
+class Sensor:
+    """What took the frames, as its files say: the camera's name and the frame's size in pixels."""
+
+    camera: str
+    width: int
+    height: int
 
 
 @dataclass(frozen=True)
@@ -70,6 +77,16 @@ class GlowPicture:
     blown: bool
 
 
+def sensor_of(frames: Sequence[FrameRecord]) -> Sensor | None:
+    """As the first of `frames` says that can be read; None if none can."""
+    for frame in frames:
+        raw = _read(frame.path)
+        if raw is not None:
+            make = raw.make if raw.make and raw.make not in (raw.model or "") else None
+            return Sensor(" ".join(filter(None, (make, raw.model))), raw.width, raw.height)
+    return None
+
+
 def daylight_picture(
     frames: Sequence[FrameRecord], patches: Sequence[PatchReport], screen: Screen
 ) -> Daylight | None:
@@ -89,15 +106,15 @@ def daylight_picture(
     if best is None:
         return None
     frame, raw = best
-    linear = into_gamut(_on_screen(raw, _small(_binned(raw), DAYLIGHT_WIDTH), screen.lamp_lit))
+    linear = into_gamut(_on_screen(raw, small(binned(raw), DAYLIGHT_WIDTH), screen.lamp_lit))
     # How well it was exposed does not matter here: what is bright should look bright.
     linear *= DAYLIGHT_BRIGHT / max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
     height, width = linear.shape[:2]
     balance = "white balanced for a halogen lamp" if screen.known else "in raw colours"
-    if _is_grey(raw):
+    if is_grey(raw):
         balance = "from a monochrome sensor"
     return Daylight(
-        source=_jpeg(encoded(linear)),
+        source=_data_uri(encoded(linear)),
         width=width,
         height=height,
         marks=_marks(patches, raw, width, height),
@@ -111,10 +128,10 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
     for photograph in photographs:
         raw = _read(photograph.frame.path)
         if raw is not None:
-            small = _small(_binned(raw), GLOW_WIDTH)
-            blown = (_small(_blown(raw), GLOW_WIDTH) > BLOWN_LOOKS)[..., np.newaxis]
+            picture = small(binned(raw), GLOW_WIDTH)
+            blown = (small(saturated_cells(raw), GLOW_WIDTH) > BLOWN_LOOKS)[..., np.newaxis]
             gathered = _light_gathered(photograph.frame)
-            linear = into_gamut(_on_screen(raw, small / gathered, screen.glow))
+            linear = into_gamut(_on_screen(raw, picture / gathered, screen.glow))
             shown.append((photograph, linear, blown))
     if not shown:
         return ()
@@ -126,8 +143,8 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
         pictures.append(
             GlowPicture(
                 t_s=photograph.t_s,
-                source=_jpeg(encoded(np.where(blown, 1.0, linear / full))),
-                brightened_source=_jpeg(encoded(np.where(blown, 1.0, linear * factor / full))),
+                source=_data_uri(encoded(np.where(blown, 1.0, linear / full))),
+                brightened_source=_data_uri(encoded(np.where(blown, 1.0, linear * factor / full))),
                 brightened=rounded(factor, 2),
                 blown=bool(blown.any()),
             )
@@ -148,69 +165,13 @@ def _light_gathered(frame: FrameRecord) -> float:
     return frame.exposure_s * frame.iso / (frame.f_number or 1.0) ** 2
 
 
-def _is_grey(raw: RawFrame) -> bool:
-    return len(raw.channels) == 1
-
-
 def _on_screen(raw: RawFrame, picture: Picture, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """`picture` by the camera's colour `matrix`, or as it is where there are no colours."""
-    return np.asarray(picture @ (np.eye(3) if _is_grey(raw) else matrix).T)
+    return np.asarray(picture @ (np.eye(3) if is_grey(raw) else matrix).T)
 
 
-def _cell(raw: RawFrame) -> int:
-    """Side of the cells of the CFA that become a pixel each; 2 if there is no CFA."""
-    return max(raw.cfa_side, 2)
-
-
-def _binned(raw: RawFrame) -> Picture:
-    """R, G, B of every cell above black, 1 = saturated, shape (height / 2, width / 2, 3) of Bayer.
-
-    Binning and not demosaicing: the picture is shown smaller anyway, and nothing is invented.
-    """
-    side = _cell(raw)
-    rows, columns = raw.height // side, raw.width // side
-    picture = np.zeros((rows, columns, 3), np.float32)
-    times = side**2 // len(raw.cfa)
-    colours, black = raw.cfa * times, raw.black * times
-    for position, colour in enumerate(colours):
-        y, x = divmod(position, side)
-        plane = raw.mosaic[y : side * rows : side, x : side * columns : side]
-        scale = 1 / colours.count(colour) / (raw.white - black[position])
-        shown = (plane - np.float32(black[position])) * np.float32(scale)
-        for channel in range(3) if _is_grey(raw) else ["RGB".index(colour)]:
-            picture[..., channel] += shown
-    return picture
-
-
-def _blown(raw: RawFrame) -> Picture:
-    """1 where one of the pixels of a cell is saturated, else 0."""
-    side = _cell(raw)
-    rows, columns = raw.height // side, raw.width // side
-    cells = (raw.mosaic[: side * rows, : side * columns] >= raw.white).reshape(
-        rows, side, columns, side
-    )
-    return np.asarray(cells.any(axis=(1, 3)), dtype=np.float32)
-
-
-def _small(picture: Picture, width: int) -> Picture:
-    """Averaged down to `width` or a little less; never enlarged."""
-    import cv2  # takes a tenth of a second to load
-
-    height_in, width_in = picture.shape[:2]
-    if width_in <= width:
-        return picture
-    size = (width, max(1, round(height_in * width / width_in)))
-    return np.asarray(cv2.resize(picture, size, interpolation=cv2.INTER_AREA))
-
-
-def _jpeg(rgb: NDArray[np.uint8]) -> str:
-    """As a data URI."""
-    import cv2
-
-    good, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
-    if not good:
-        raise RuntimeError("OpenCV could not encode a JPEG")
-    return "data:image/jpeg;base64," + base64.b64encode(data.tobytes()).decode("ascii")
+def _data_uri(rgb: NDArray[np.uint8]) -> str:
+    return "data:image/jpeg;base64," + base64.b64encode(jpeg(rgb)).decode("ascii")
 
 
 def _marks(

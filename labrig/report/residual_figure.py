@@ -9,22 +9,26 @@ from numpy.typing import NDArray
 
 from labrig.fit import DecayFit
 from labrig.reduce import Series
-from labrig.report.decay_figures import TIME_LABEL, middles_s
+from labrig.report.decay_figures import TIME_LABEL
 from labrig.report.figure_style import (
     INK,
+    LEFT_PT,
     MARKERS,
     MUTED,
     PAPER,
     SHADE,
     channel_colour,
+    error_bars,
     new_figure,
     place,
+    points,
 )
+from labrig.report.fitted_curve import middles_s
 from labrig.report.written_numbers import rounded
 
 FloatArray = NDArray[np.float64]
 
-HEIGHT_PT = 290.0
+HEIGHT_PT = 268.0
 LOW_HEIGHT_PT = 200.0
 BAND = 2.0
 #: Beyond this many σ a residual is drawn at the edge of the figure.
@@ -74,25 +78,17 @@ def residual_figure(series: Series, fit: DecayFit) -> Figure:
     left = residuals(series, fit)
     several = len(series.channels) > 1
     figure = new_figure(HEIGHT_PT if several else LOW_HEIGHT_PT)
-    upper = place(figure, left=62, bottom=142 if several else 38, right=12, top=14)
+    upper = place(figure, left=LEFT_PT, bottom=136 if several else 38, right=12, top=14)
     t_s, usable = middles_s(series), series.usable
     last = float(t_s.max())
     upper.axhspan(-BAND, BAND, color=SHADE, linewidth=0)
     upper.axhline(0, color=MUTED, linewidth=0.8)
     cut = np.clip(left.normalised, -FARTHEST, FARTHEST)
     for number, name in enumerate(series.channels):
+        marker = MARKERS[number % len(MARKERS)]
         colour = channel_colour(name, number)
         for rows, face in ((usable, colour), (~usable, PAPER)):
-            upper.plot(
-                t_s[rows],
-                cut[rows, number],
-                linestyle="none",
-                marker=MARKERS[number % len(MARKERS)],
-                markersize=3.6,
-                markerfacecolor=face,
-                markeredgecolor=colour,
-                markeredgewidth=0.9,
-            )
+            points(upper, t_s[rows], cut[rows, number], marker, colour, face, size=3.6)
     reach = float(np.abs(cut[usable]).max()) if usable.any() else BAND
     upper.set_ylim(-max(reach * 1.1, 3.2), max(reach * 1.1, 3.2))
     upper.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
@@ -101,21 +97,14 @@ def residual_figure(series: Series, fit: DecayFit) -> Figure:
         upper.set_xlabel(TIME_LABEL)
         return figure
     upper.tick_params(labelbottom=False)
-    lower = place(figure, left=62, bottom=38, right=12, top=166, share_x=upper)
+    lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=150, share_x=upper)
     lower.axhspan(-200 * fit.flicker, 200 * fit.flicker, color=SHADE, linewidth=0)
     lower.axhline(0, color=MUTED, linewidth=0.8)
     known = left.common_sigma <= max(COMMON_SIGMA, 3 * np.nanmin(left.common_sigma))
     shown = known & usable if (known & usable).any() else known
-    lower.errorbar(
-        t_s[shown],
-        100 * left.common[shown],
-        yerr=100 * left.common_sigma[shown],
-        linestyle="none",
-        marker="o",
-        markersize=3.2,
-        color=INK,
-        elinewidth=0.9,
-    )
+    common, common_sigma = 100 * left.common[shown], 100 * left.common_sigma[shown]
+    error_bars(lower, t_s[shown], common, common_sigma, INK)
+    points(lower, t_s[shown], common, "o", INK, INK, size=2.6)
     reach = max(
         float(np.max(np.abs(left.common[shown]) + left.common_sigma[shown])), 2.4 * fit.flicker
     )
@@ -123,5 +112,4 @@ def residual_figure(series: Series, fit: DecayFit) -> Figure:
     lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
     lower.set_ylabel("In common / %")
     lower.set_xlabel(TIME_LABEL)
-    figure.align_ylabels([upper, lower])
     return figure

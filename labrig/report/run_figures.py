@@ -4,27 +4,27 @@ from collections.abc import Sequence
 
 import numpy as np
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter, LogLocator, MaxNLocator, NullFormatter, NullLocator
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from labrig.fit import DecayFit
 from labrig.report.content import PatchReport
 from labrig.report.decay_figures import (
     TIME_LABEL,
-    decade_text,
-    fitted_curve,
     log_axis_ends,
-    middles_s,
 )
 from labrig.report.figure_style import (
     INK,
+    LEFT_PT,
     MARKERS,
     MUTED,
     OTHER_CHANNELS,
-    SMALL_PT,
     channel_colour,
     new_figure,
     place,
 )
+from labrig.report.fitted_curve import fitted_curve, middles_s
+from labrig.report.legend import legend_above, marked
+from labrig.report.log_axis import mark_decades
 from labrig.report.timing import FrameTiming
 from labrig.report.written_numbers import rounded
 
@@ -43,18 +43,15 @@ def overview_figures(patches: Sequence[PatchReport]) -> list[Figure]:
 
 def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> Figure:
     figure = new_figure(SMALL_HEIGHT_PT, SMALL_WIDTH_PT)
-    axes = place(figure, left=50, bottom=32, right=6, top=6)
+    axes = place(figure, left=50, bottom=32, right=14, top=6)
     axes.set_yscale("log", nonpositive="clip")
     axes.set_ylim(low, high)
     axes.set_xlim(-0.03 * last_s, 1.03 * last_s)
     axes.xaxis.set_major_locator(MaxNLocator(4))
-    axes.yaxis.set_major_locator(LogLocator(numticks=6))
-    axes.yaxis.set_minor_locator(NullLocator())
-    axes.yaxis.set_major_formatter(FuncFormatter(decade_text))
-    axes.yaxis.set_minor_formatter(NullFormatter())
+    mark_decades(axes, most=6)
     axes.tick_params(labelsize=SMALL_FONT_PT, pad=2)
-    axes.set_xlabel("Time / s", fontsize=SMALL_FONT_PT, labelpad=1)
-    axes.set_ylabel("DN/s", fontsize=SMALL_FONT_PT, labelpad=1)
+    axes.set_xlabel("Time / s", fontsize=SMALL_FONT_PT)
+    axes.set_ylabel("DN/s", fontsize=SMALL_FONT_PT)
     series = patch.series
     curve = fitted_curve(series, patch.fit) if isinstance(patch.fit, DecayFit) else None
     for number, name in enumerate(series.channels):
@@ -78,18 +75,21 @@ def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
     units = list(dict.fromkeys(timing.unit for timing in timings))
     several = 1 < len(units) <= len(MARKERS)
     figure = new_figure(TIMING_HEIGHT_PT)
-    axes = place(figure, left=62, bottom=38, right=12, top=46 if several else 14)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46 if several else 14)
     axes.axhline(0, color=MUTED, linewidth=0.8)
+    entries = []
     for number, unit in enumerate(units):
         of_unit = [timing for timing in timings if timing.unit == unit]
+        marker = MARKERS[number % len(MARKERS)]
+        colour = INK if number == 0 else OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
+        entries.append(marked(unit, marker, colour))
         axes.plot(
             [timing.t_s for timing in of_unit],
             [1e3 * timing.late_s for timing in of_unit],
             linestyle="none",
-            marker=MARKERS[number % len(MARKERS)],
+            marker=marker,
             markersize=3.6,
-            color=INK if number == 0 else OTHER_CHANNELS[number % len(OTHER_CHANNELS)],
-            label=unit,
+            color=colour,
         )
     late_ms = np.array([1e3 * timing.late_s for timing in timings])
     reach = max(float(np.abs(late_ms).max()), 0.1)
@@ -98,13 +98,5 @@ def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
     axes.set_xlabel(TIME_LABEL)
     axes.set_ylabel("Late by / ms")
     if several:
-        figure.legend(
-            loc="upper left",
-            bbox_to_anchor=(54 / 420, 1.0),
-            ncols=min(len(units), 4),
-            frameon=False,
-            fontsize=SMALL_PT,
-            labelcolor=INK,
-            borderaxespad=0.2,
-        )
+        legend_above(figure, entries, columns=4)
     return figure

@@ -3,10 +3,13 @@
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
 from labrig.reduce import Series
 from labrig.report.colours import Screen, css_colour, into_gamut
 from labrig.report.written_numbers import rounded
+
+FloatArray = NDArray[np.float64]
 
 #: As many as stand side by side on a desktop with a legible time below each.
 MOST_SWATCHES = 18
@@ -27,11 +30,17 @@ class Swatch:
         CSS colour, all times on one exposure; black where there is nothing but noise.
     hue
         CSS colour at full brightness; empty where noise hides it.
+    measured
+        What was measured: `R 170, G 4200, B 7700 DN/s`.
+    fills
+        Whether this is the one that just fills the display.
     """
 
     time: str
     glow: str
     hue: str
+    measured: str
+    fills: bool
 
 
 def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
@@ -55,6 +64,13 @@ def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
             time=rounded(float(series.t_s[row]), 3),
             glow=css_colour(colour / full),
             hue=css_colour(colour / peak) if visible else "",
+            measured=_written(series.values[row]),
+            fills=peak == full,
         )
         for row, colour, peak, visible in zip(rows, linear, brightest, seen, strict=True)
     )
+
+
+def _written(values: FloatArray) -> str:
+    pairs = zip(_RGB, values, strict=True)
+    return ", ".join(f"{name} {rounded(float(value), 3)}" for name, value in pairs) + " DN/s"

@@ -2,10 +2,11 @@
 
 import json
 from collections.abc import Callable
-from functools import partial
 from pathlib import Path
 from typing import Any
 
+import cv2
+import numpy as np
 import pytest
 import yaml
 
@@ -15,19 +16,6 @@ from tests.conftest import Ended
 Report = dict[str, Any]
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
-SetBody = Callable[..., None]
-
-
-@pytest.fixture
-def set_body(monkeypatch: pytest.MonkeyPatch) -> SetBody:
-    """Sets dial, lens switch and menus of the camera in the simulated room."""
-
-    def apply(**settings: Any) -> None:
-        opening, camera = shipped.load("sim.opening"), shipped.load("sim.camera")
-        body = camera.BodySettings(**settings)
-        monkeypatch.setattr(opening, "SimulatedCamera", partial(camera.SimulatedCamera, body=body))
-
-    return apply
 
 
 def device(report: Report, key: str) -> Report:
@@ -58,23 +46,41 @@ def test_its_numbers_are_the_simulated_devices_own(labrig: Labrig, make_rig: Mak
     assert {finding["severity"] for finding in camera["findings"]} == {"fine"}
 
 
+SPOILERS: dict[str, tuple[dict[str, object], str]] = {
+    "long-exposure noise reduction": (
+        {"long_exposure_noise_reduction": True},
+        "C.Fn II (Image) → 1 Long exp. noise reduction → 0: Off",
+    ),
+    "highlight priority": (
+        {"highlight_tone_priority": True},
+        "C.Fn II (Image) → 3 Highlight tone priority → 0: Disable",
+    ),
+    "mirror lock-up": ({"mirror_lock_up": True}, "C.Fn III (Autofocus/Drive) → 6 Mirror lockup"),
+    "autofocus": ({"autofocus": True}, "set the switch on the lens to MF"),
+    "auto-off": ({"auto_power_off": "60 s"}, "Set-up 1 (yellow) → Auto power off → Off"),
+    "auto-ISO": ({"iso": "auto"}, "ISO button above the display"),
+    "ISO that is computed": ({"iso": 6400}, "ISO button above the display, one of 100, 200"),
+    "ISO in between": ({"iso": 125}, "ISO button above the display, one of 100, 200"),
+    "dial": ({"exposure_mode": "Av"}, "turn it to M"),
+}
+
+
+@pytest.mark.parametrize(("camera", "where"), SPOILERS.values(), ids=SPOILERS)
 def test_what_spoils_photometry_is_refused_with_its_place_in_the_menu(
-    labrig: Labrig, make_rig: Make, set_body: SetBody
+    labrig: Labrig, make_rig: Make, camera: dict[str, object], where: str
 ) -> None:
-    set_body(autofocus=True, long_exposure_noise_reduction=True)
-    ended = labrig("rig", "check", make_rig())
+    ended = labrig("rig", "check", make_rig(camera=camera))
     assert ended.code == 2
     assert "not exercised" in ended.out
     (line,) = ended.err.splitlines()
-    assert "lens to MF" in line
-    assert "C.Fn II (Image) → 1 Long exp. noise reduction → 0: Off" in line
+    assert where in line
 
 
 def test_a_run_is_refused_before_anything_moves(
-    labrig: Labrig, make_rig: Make, make_protocol: Make, set_body: SetBody, tmp_path: Path
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
 ) -> None:
-    set_body(highlight_tone_priority=True)
-    ended = labrig("run", make_protocol(), "--rig", make_rig(), "--runs", tmp_path / "runs")
+    rig = make_rig(camera={"highlight_tone_priority": True})
+    ended = labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs")
     assert ended.code == 2
     assert "C.Fn II (Image) → 3 Highlight tone priority" in ended.err
     assert "nothing was recorded" in ended.err
@@ -82,12 +88,15 @@ def test_a_run_is_refused_before_anything_moves(
 
 
 def test_a_warning_does_not_keep_a_run_from_starting(
-    labrig: Labrig, make_rig: Make, make_protocol: Make, set_body: SetBody, tmp_path: Path
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
 ) -> None:
-    """And a camera that switches itself off after a minute is kept awake through the charge."""
-    set_body(auto_power_off_s=60)
     rig = make_rig()
-    assert labrig("rig", "check", rig).code == 0
+    content = yaml.safe_load(rig.read_text())
+    content["devices"]["camera"]["isos"] = [100, 125, 400]
+    rig.write_text(yaml.safe_dump(content))
+    report = json.loads(labrig("rig", "check", rig, "--json").out)
+    warned = [f for f in device(report, "camera")["findings"] if f["severity"] == "warn"]
+    assert ["ISO 125, which is not native" in finding["what"] for finding in warned] == [True]
     ended = labrig(
         "run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs", "--no-process"
     )
@@ -170,3 +179,38 @@ def test_listing_needs_no_device(labrig: Labrig) -> None:
     assert "serial ports:" in ended.out
     found = json.loads(labrig("rig", "list", "--json").out)
     assert set(found) == {"ports", "cameras", "notes"}
+
+
+def with_viewfinder(path: Path, address: str) -> Path:
+    rig = yaml.safe_load(path.read_text())
+    rig["devices"]["viewfinder"] = {"driver": "uvc_preview", "address": address}
+    path.write_text(yaml.safe_dump(rig))
+    return path
+
+
+def test_a_viewfinder_is_looked_through_once(
+    labrig: Labrig, make_rig: Make, tmp_path: Path
+) -> None:
+    assert cv2.imwrite(str(tmp_path / "film000.png"), np.full((48, 64, 3), 90, np.uint8))
+    ended = labrig(
+        "rig", "check", with_viewfinder(make_rig(), str(tmp_path / "film%03d.png")), "--json"
+    )
+    assert (ended.code, ended.err) == (0, "")
+    viewfinder = device(json.loads(ended.out), "viewfinder")
+    assert "for aiming only" in viewfinder["identity"]
+    assert viewfinder["failure"] is None
+    (picture, _) = viewfinder["measured"]
+    assert picture["what"] == "live picture"
+    assert picture["value"].startswith("64 x 48 pixels, ")
+
+
+def test_a_viewfinder_that_shows_nothing_fails_and_the_camera_is_still_checked(
+    labrig: Labrig, make_rig: Make
+) -> None:
+    ended = labrig("rig", "check", with_viewfinder(make_rig(), "uvc://97"), "--json")
+    assert ended.code == 3
+    (line,) = ended.err.splitlines()
+    assert "viewfinder: cannot open uvc://97" in line
+    report = json.loads(ended.out)
+    assert device(report, "viewfinder")["measured"] == []
+    assert len(device(report, "camera")["measured"]) > 3

@@ -11,12 +11,13 @@ from matplotlib.figure import Figure
 from labrig.fit import DecayFit
 from labrig.reduce import Series
 from labrig.report.decay_figures import (
-    fitted_curve,
     linear_decay,
     logarithmic_decay,
     values_below_axis,
 )
-from labrig.report.figure_style import figure_style, svg
+from labrig.report.figure_style import figure_style
+from labrig.report.fitted_curve import fitted_curve
+from labrig.report.plates import Plates
 from labrig.report.residual_figure import residual_figure, residuals
 from labrig.report.run_figures import overview_figures, timing_figure
 from labrig.report.timing import FrameTiming
@@ -135,8 +136,8 @@ def test_overviews_share_their_axes() -> None:
 
 def test_svg_follows_the_page_and_not_the_users_settings() -> None:
     def drawn() -> str:
-        with figure_style():
-            return svg(linear_decay(SERIES, FIT), "a", 'Decay of "x" <b>')
+        with figure_style(), Plates("test") as plates:
+            return plates.add(linear_decay(SERIES, FIT), "a", 'Decay of "x" <b>').element
 
     plain = drawn()
     with mpl.rc_context({"font.size": 30, "svg.fonttype": "path", "axes.grid": False}):

@@ -1,0 +1,176 @@
+"""One line a run: what it was, how far it came, what it found."""
+
+from collections.abc import Iterator
+from dataclasses import dataclass
+from datetime import UTC, date, datetime
+from fnmatch import fnmatchcase
+from pathlib import Path
+from typing import Literal, get_args
+
+from filelock import FileLock, Timeout
+
+from labrig.acquire import plugins
+from labrig.catalogue.results import PatchResult, read_results
+from labrig.errors import DataError, LabrigError, UsageError
+from labrig.record import read_run
+from labrig.yaml_file import did_you_mean, read_yaml
+
+#: `running`: a labrig is writing to it now; `unfinished`: units are left to do; `recorded`: all
+#: units are there, nothing was fitted; `damaged`: its journal cannot be read.
+State = Literal["running", "unfinished", "recorded", "processed", "damaged"]
+STATES: tuple[State, ...] = get_args(State)
+
+
+@dataclass(frozen=True)
+class RunSummary:
+    """What a run folder holds.
+
+    Attributes
+    ----------
+    began
+        Of its first attempt, UTC; None before there is one.
+    done, units
+        Completed units, and all; None where the protocol is not installed here.
+    frames
+        Of completed units.
+    """
+
+    folder: Path
+    sample: str
+    protocol: str
+    began: datetime | None
+    state: State
+    done: int
+    units: int | None
+    frames: int
+    results: tuple[PatchResult, ...]
+
+
+@dataclass(frozen=True)
+class Wanted:
+    """Which runs: sample and protocol by a pattern such as `blue*`, days inclusive and in UTC."""
+
+    sample: str = "*"
+    protocol: str = "*"
+    since: date = date.min
+    until: date = date.max
+    state: str | None = None
+
+    def __post_init__(self) -> None:
+        if self.state is not None and self.state not in STATES:
+            raise UsageError(f"--state {self.state}: {did_you_mean(self.state, STATES)}")
+
+    def admits(self, run: RunSummary) -> bool:
+        """Whether `run` is wanted; one that never began is of no day."""
+        day = None if run.began is None else run.began.date()
+        unbounded = (self.since, self.until) == (date.min, date.max)
+        return (
+            fnmatchcase(run.sample.casefold(), self.sample.casefold())
+            and fnmatchcase(run.protocol.casefold(), self.protocol.casefold())
+            and (unbounded if day is None else self.since <= day <= self.until)
+            and self.state in (None, run.state)
+        )
+
+
+def list_runs(runs: Path, wanted: Wanted) -> list[RunSummary]:
+    """The wanted runs in a folder, oldest first.
+
+    Raises
+    ------
+    UsageError
+        There is no such folder.
+    """
+    if not runs.is_dir():
+        raise UsageError(f"{runs}: no such folder; give the one with the run folders as --runs")
+    found = [summarise(path) for path in _run_folders(runs)]
+    return [run for run in found if wanted.admits(run)]
+
+
+def find_run(run: Path, runs: Path) -> Path:
+    """The folder of a run: a path, the name of a folder in `runs` or its beginning, or `last`.
+
+    Raises
+    ------
+    UsageError
+        There is none, or several begin so.
+    """
+    if (run / "protocol.yaml").is_file():
+        return run
+    here = list(_run_folders(runs)) if runs.is_dir() else []
+    if str(run) == "last" and here:
+        return here[-1]
+    fitting = [path for path in here if path.name == str(run)] or [
+        path for path in here if path.name.startswith(str(run))
+    ]
+    if len(fitting) == 1:
+        return fitting[0]
+    said = f"{len(fitting)} runs begin so, write more of the name" if fitting else "no such run"
+    raise UsageError(f"{run}: {said}; see: labrig runs --runs {runs}")
+
+
+def summarise(folder: Path) -> RunSummary:
+    """What the run in `folder` holds; whatever cannot be read is told as its state."""
+    sample, protocol, units = _asked(folder)
+    try:
+        record, results = read_run(folder), read_results(folder)
+    except DataError:
+        has_journal = (folder / "journal.jsonl").exists()
+        state: State = "damaged" if has_journal else "unfinished"
+        return RunSummary(folder, sample, protocol, None, state, 0, units, 0, ())
+    done = record.completed()
+    return RunSummary(
+        folder=folder,
+        sample=sample,
+        protocol=protocol,
+        began=(
+            datetime.fromtimestamp(record.attempts[0].start["time"], UTC)
+            if record.attempts
+            else None
+        ),
+        state=_state(folder, units is not None and len(done) == units, bool(results)),
+        done=len(done),
+        units=units,
+        frames=sum(len(attempt.frames) for attempt in done.values()),
+        results=results,
+    )
+
+
+def _run_folders(runs: Path) -> Iterator[Path]:
+    return (path.parent for path in sorted(runs.glob("*/protocol.yaml")))
+
+
+def _asked(folder: Path) -> tuple[str, str, int | None]:
+    """Sample, protocol, number of units."""
+    try:
+        content = read_yaml(folder / "protocol.yaml")
+    except UsageError:
+        return "?", "?", None
+    sample = content.get("sample")
+    name = sample.get("name", "?") if isinstance(sample, dict) else "?"
+    try:
+        units = len(plugins.read_protocol(folder / "protocol.yaml").units())
+    except LabrigError:
+        units = None
+    return str(name), str(content.get("protocol", "?")), units
+
+
+def _state(folder: Path, is_complete: bool, has_results: bool) -> State:
+    if is_being_written(folder):
+        return "running"
+    if not is_complete:
+        return "unfinished"
+    return "processed" if has_results else "recorded"
+
+
+def is_being_written(folder: Path) -> bool:
+    """Whether a labrig has the run open now."""
+    lock = folder / ".lock"
+    if not lock.exists():
+        return False
+    try:
+        with FileLock(lock, timeout=0):
+            return False
+    except Timeout:
+        return True
+    except OSError:  # somebody else's folder: only its owner writes there
+        return False

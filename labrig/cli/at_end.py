@@ -1,0 +1,65 @@
+"""What the rig file wants done when a run has ended, however it ended: a bell, a command."""
+
+import os
+import subprocess
+import sys
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+
+from labrig.clock import Interrupted
+from labrig.errors import LabrigError
+
+#: Nobody waits for longer for a message to be sent.
+COMMAND_TIMEOUT_S = 30.0
+
+
+@dataclass
+class Ending:
+    """What there is to tell at the end."""
+
+    message: str = ""
+
+
+@contextmanager
+def told_at_end(on_finish: str | Sequence[str] | None) -> Iterator[Ending]:
+    """Tell whoever waits, when what is inside has ended; devices are safe by then.
+
+    Parameters
+    ----------
+    on_finish
+        `bell`, or a command and its arguments. The command finds in its environment
+        `LABRIG_STATUS` (`done`, `interrupted`, `failed`) and `LABRIG_MESSAGE`, one line.
+    """
+    ending = Ending()
+    try:
+        yield ending
+    except Interrupted as stop:
+        _tell(on_finish, "interrupted", str(stop))
+        raise
+    except LabrigError as error:
+        _tell(on_finish, "failed", str(error))
+        raise
+    _tell(on_finish, "done", ending.message)
+
+
+def _tell(on_finish: str | Sequence[str] | None, status: str, message: str) -> None:
+    if on_finish == "bell":
+        print("\a", end="", file=sys.stderr, flush=True)
+    elif on_finish:
+        _call(on_finish, {"LABRIG_STATUS": status, "LABRIG_MESSAGE": message})
+
+
+def _call(command: Sequence[str], said: dict[str, str]) -> None:
+    """A command that fails is worth a warning, not more: the run is over and kept."""
+    try:
+        subprocess.run(
+            list(command),
+            env=os.environ | said,
+            stdin=subprocess.DEVNULL,
+            stdout=subprocess.DEVNULL,
+            timeout=COMMAND_TIMEOUT_S,
+            check=True,
+        )
+    except (OSError, subprocess.SubprocessError) as error:
+        print(f"labrig: warning: on_finish: {' '.join(str(error).split())}", file=sys.stderr)

@@ -1,0 +1,217 @@
+"""`labrig runs` and `labrig note`: what was measured, and what there is to say about it."""
+
+from datetime import datetime
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from labrig.catalogue import Comparison, PatchResult, RunSummary
+
+app = typer.Typer(help="The runs in a folder.")
+
+Runs = Annotated[Path, typer.Option("--runs", help="Where the run folders are.")]
+Run = Annotated[Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")]
+Sample = Annotated[str, typer.Option(help="Only samples of this name; * stands for anything.")]
+Protocol = Annotated[str, typer.Option(help="Only runs of this protocol.")]
+Since = Annotated[
+    datetime | None,
+    typer.Option(formats=["%Y-%m-%d"], help="Only runs of this day or later."),
+]
+Until = Annotated[
+    datetime | None, typer.Option(formats=["%Y-%m-%d"], help="Only runs of this day or earlier.")
+]
+State = Annotated[
+    str | None, typer.Option(help="running, unfinished, recorded, processed or damaged.")
+]
+Json = Annotated[bool, typer.Option("--json", help="Print as JSON.")]
+
+_STYLES = {"running": "bold", "unfinished": "yellow", "damaged": "red", "processed": "green"}
+
+
+@app.callback(invoke_without_command=True)
+def runs(context: typer.Context) -> None:
+    """The runs in a folder: list (the default), show one, compare two."""
+    if context.invoked_subcommand is None:
+        list_them()
+
+
+@app.command("list")
+def list_them(
+    runs: Runs = Path("runs"),
+    sample: Sample = "*",
+    protocol: Protocol = "*",
+    since: Since = None,
+    until: Until = None,
+    state: State = None,
+    json: Json = False,
+) -> None:
+    """One line a run: when, which sample, how far it came, which rates."""
+    from datetime import date
+
+    from labrig.catalogue import Wanted, list_runs
+
+    wanted = Wanted(
+        sample,
+        protocol,
+        since.date() if since else date.min,
+        until.date() if until else date.max,
+        state,
+    )
+    found = list_runs(runs, wanted)
+    if json:
+        _print_json([_summary_json(run) for run in found])
+    elif found:
+        _print_runs(found)
+    else:
+        typer.echo(f"no such runs in {runs}")
+
+
+@app.command("show")
+def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
+    """All there is to know of one run, its notes and earlier results included."""
+    from labrig.catalogue import find_run, read_notes, summarise
+
+    folder = find_run(run, runs)
+    summary, notes = summarise(folder), read_notes(folder)
+    if json:
+        _print_json({**_summary_json(summary), "notes": notes})
+        return
+    typer.echo(f"{folder}")
+    typer.echo(f"  {summary.protocol} of {summary.sample}, {_when(summary)} UTC, {summary.state}")
+    typer.echo(f"  {_progress(summary)} units, {summary.frames} frames")
+    for result in _result_folders(folder):
+        _tell_results(folder, result)
+    report = folder / "result" / "report.html"
+    if report.is_file():
+        typer.echo(f"  report: {report}")
+    if notes:
+        typer.echo("\n" + notes.rstrip())
+
+
+@app.command("compare")
+def compare(
+    a: Run,
+    b: Run,
+    runs: Runs = Path("runs"),
+    reference: Annotated[
+        str | None,
+        typer.Option(help="A patch with a steady source; ties the amplitudes of two days."),
+    ] = None,
+    json: Json = False,
+) -> None:
+    """Two runs of a sample: rates with σ, and whether they differ."""
+    from dataclasses import asdict
+
+    from labrig.catalogue import compare_runs, find_run
+
+    comparison = compare_runs(find_run(a, runs), find_run(b, runs), reference)
+    if json:
+        patches = [{**asdict(patch), "verdict": patch.verdict} for patch in comparison.patches]
+        _print_json({**asdict(comparison), "patches": patches})
+    else:
+        _print_comparison(comparison)
+
+
+def note(
+    run: Run,
+    text: Annotated[str, typer.Argument(help="What there is to say; Markdown if you like.")],
+    runs: Runs = Path("runs"),
+) -> None:
+    """Add a note to a run: what you saw, what was odd. Kept in notes.md in its folder."""
+    from labrig.catalogue import add_note, find_run
+    from labrig.clock import SystemClock
+
+    typer.echo(add_note(find_run(run, runs), text, SystemClock().wall()))
+
+
+def _print_runs(found: list["RunSummary"]) -> None:
+    from rich.console import Console
+    from rich.table import Table
+    from rich.text import Text
+
+    table = Table(box=None, pad_edge=False)
+    for title in ("began (UTC)", "sample", "protocol", "state", "units", "k_r in 1/s"):
+        table.add_column(title, overflow="fold")
+    for run in found:
+        table.add_row(
+            _when(run),
+            run.sample,
+            run.protocol,
+            Text(run.state, style=_STYLES.get(run.state, "")),
+            _progress(run),
+            "\n".join(_rates(result) for result in run.results),
+        )
+    Console().print(table)
+
+
+def _print_comparison(comparison: "Comparison") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    from labrig.report.written_numbers import plus_minus
+
+    for key, of_a, of_b in comparison.asked:
+        typer.echo(f"asked differently: {key}: {of_a} | {of_b}")
+    for name in comparison.missing:
+        typer.echo(f"only in one of them: {name or 'sample'}")
+    for patch in comparison.patches:
+        table = Table(box=None, pad_edge=False, title=f"{patch.patch}: {patch.verdict}")
+        table.title_justify = "left"
+        for title in ("", "A", "B", "B - A in σ"):
+            table.add_column(title)
+        for one in patch.differences:
+            table.add_row(
+                f"{one.quantity} in {one.unit}",
+                plus_minus(one.a.value, one.a.sigma),
+                plus_minus(one.b.value, one.b.sigma),
+                f"{one.pull:+.1f}",
+            )
+        Console().print(table)
+
+
+def _tell_results(folder: Path, result: str) -> None:
+    from labrig.catalogue import read_results
+
+    for patch in read_results(folder, result):
+        typer.echo(f"  {result}: {_rates(patch)} /s")
+        for warning in patch.warnings:
+            typer.echo(f"    warning: {warning}")
+
+
+def _result_folders(folder: Path) -> list[str]:
+    """The latest result first, then the earlier ones from new to old."""
+    earlier = sorted(
+        (path.name for path in folder.glob("result-*") if path.name[7:].isdecimal()),
+        key=lambda name: -int(name[7:]),
+    )
+    return ["result", *earlier]
+
+
+def _rates(result: "PatchResult") -> str:
+    from labrig.report.written_numbers import plus_minus
+
+    rates = ",  ".join(plus_minus(rate.value, rate.sigma) for rate in result.rates)
+    return f"{result.name}: {rates}" if result.name else rates
+
+
+def _when(run: "RunSummary") -> str:
+    return "–" if run.began is None else f"{run.began:%Y-%m-%d %H:%M}"
+
+
+def _progress(run: "RunSummary") -> str:
+    return f"{run.done} of {'?' if run.units is None else run.units}"
+
+
+def _summary_json(run: "RunSummary") -> dict[str, object]:
+    from dataclasses import asdict
+
+    began = None if run.began is None else run.began.isoformat()
+    return {**asdict(run), "folder": str(run.folder), "began": began}
+
+
+def _print_json(content: object) -> None:
+    import json
+
+    typer.echo(json.dumps(content, ensure_ascii=False, default=str))

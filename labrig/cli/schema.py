@@ -1,0 +1,16 @@
+"""`labrig schema`: what editors need to complete and check a YAML file."""
+
+from typing import Annotated
+
+import typer
+
+
+def schema(
+    kind: Annotated[str, typer.Argument(help="protocol, rig or material")],
+) -> None:
+    """Print the JSON Schema of a kind of file, for editors."""
+    import json
+
+    from labrig.schema import schema as schema_of
+
+    typer.echo(json.dumps(schema_of(kind), indent=2, ensure_ascii=False))

@@ -1,0 +1,36 @@
+"""`labrig watch`: a run while it happens, in the browser."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+
+def watch(
+    run: Annotated[
+        Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
+    ] = Path("last"),
+    runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
+    port: Annotated[
+        int, typer.Option("--port", help="On 127.0.0.1; 0 for any free one.", min=0, max=65535)
+    ] = 0,
+    no_browser: Annotated[
+        bool, typer.Option("--no-browser", help="Only print the page's address.")
+    ] = False,
+) -> None:
+    """A page for the screen outside the dark room: live decay, timeline, state. Ctrl-C ends it."""
+    from labrig.catalogue import find_run
+    from labrig.clock import SystemClock
+    from labrig.signals import interrupting
+    from labrig.watch.watching import watch_run
+
+    def tell(url: str) -> None:
+        typer.echo(url)
+        if not no_browser:
+            import webbrowser
+
+            webbrowser.open(url)
+
+    clock = SystemClock()
+    with interrupting(clock):
+        watch_run(find_run(run, runs), port, clock, tell)

@@ -1,0 +1,144 @@
+"""run.nxs: a run and its result in one NeXus file that opens on the decay.
+
+Base classes as in the NeXus manual (manual.nexusformat.org/classes/base_classes); no application
+definition describes a decay.
+"""
+
+from datetime import UTC, datetime
+from pathlib import Path
+
+import h5py
+import numpy as np
+
+from labrig.errors import DiskError
+from labrig.export.hdf5 import add_group, add_note, add_number, add_text
+from labrig.export.nexus_decay import add_decays, add_fit, valid_names
+from labrig.record import RunRecord
+from labrig.report import DeviceLine, RunReport
+
+YAML = "application/yaml"
+#: NeXus classes of the devices that have one.
+DEVICE_CLASSES = {"camera": "NXdetector", "lamp": "NXsource", "leds": "NXsource"}
+
+
+def write_nexus(path: Path, run: RunRecord, report: RunReport) -> None:
+    """Write a run and what its report shows; from the same objects, so with the same numbers.
+
+    The bytes follow from the run and labrig's version; nothing in them is of the moment of writing.
+
+    Parameters
+    ----------
+    path
+        The file, such as `result/run.nxs`.
+    run
+        The run, with one completed unit at the least.
+    report
+        Its patches with their series and fits.
+
+    Raises
+    ------
+    DiskError
+        The file cannot be written.
+    """
+    try:
+        # Nobody else has the file yet, and a network drive may know no locks.
+        with h5py.File(path, "w", locking=False) as file:
+            file.attrs["NX_class"] = "NXroot"
+            file.attrs["creator"] = "labrig"
+            file.attrs["creator_version"] = report.labrig_version
+            file.attrs["default"] = "entry"
+            _add_entry(file, run, report)
+    except OSError as error:
+        raise DiskError(f"{path}: cannot be written ({error})") from None
+
+
+def _add_entry(file: h5py.File, run: RunRecord, report: RunReport) -> None:
+    start_time = _start_time(run)
+    entry = add_group(file, "entry", "NXentry")
+    add_text(entry, "title", report.title)
+    add_text(entry, "experiment_identifier", report.run)
+    simulated = " in a simulated dark room" if report.simulated else ""
+    add_text(entry, "experiment_description", f"phosphorescent decay{simulated}")
+    add_text(entry, "start_time", _iso(start_time))
+    add_text(entry, "end_time", _iso(run.last_time))
+    program = add_text(entry, "program_name", "labrig")
+    program.attrs["version"] = report.labrig_version
+    add_note(entry, "protocol", report.protocol_text, YAML, "protocol.yaml")
+    add_note(entry, "rig", report.rig_text, YAML, "rig.yaml")
+    versions = [f"{name} {version}" for name, version in report.libraries]
+    add_note(entry, "libraries", "\n".join(versions), "text/plain")
+    if report.warnings:
+        add_note(entry, "warnings", "\n".join(report.warnings), "text/plain")
+
+    sample = add_group(entry, "sample", "NXsample")
+    add_text(sample, "name", report.title)
+    if report.sample:
+        lines = [f"{what}: {value}" for what, value in report.sample]
+        add_text(sample, "description", "\n".join(lines))
+
+    instrument = add_group(entry, "instrument", "NXinstrument")
+    add_text(instrument, "name", report.rig)
+    for device in report.devices:
+        _add_device(instrument, device, run, start_time)
+    names = valid_names([patch.name for patch in report.patches])
+    for name, patch in zip(names, report.patches, strict=True):
+        add_decays(entry, name, patch)
+        add_fit(entry, name, patch, report.labrig_version)
+
+
+def _add_device(
+    instrument: h5py.Group, device: DeviceLine, run: RunRecord, start_time: float
+) -> None:
+    group = add_group(instrument, device.role, DEVICE_CLASSES.get(device.role, "NXcollection"))
+    add_text(group, "name", device.role)
+    add_text(group, "description", device.identity)
+    if device.role == "camera":
+        _add_frames(group, run, start_time)
+    if device.role == "lamp":
+        _add_switching(group, run, start_time)
+
+
+def _add_frames(camera: h5py.Group, run: RunRecord, start_time: float) -> None:
+    """Every frame of completed units: when, how, and how to know the file again."""
+    frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
+    seconds = np.array([(frame.start_time, frame.end_time) for frame in frames]) - start_time
+    add_number(camera, "count_time", [frame.exposure_s for frame in frames], "s")
+    for name, column in zip(("start_time", "stop_time"), seconds.T, strict=True):
+        add_number(camera, name, column, "s").attrs["start"] = _iso(start_time)
+    kept = add_group(camera, "frames", "NXcollection")
+    add_text(kept, "file_name", [f"frames/{frame.path.name}" for frame in frames])
+    add_text(kept, "sha256", [frame.sha256 for frame in frames])
+    add_number(kept, "size", [frame.size_bytes for frame in frames], "byte")
+    add_text(kept, "purpose", [frame.purpose for frame in frames])
+    add_text(kept, "unit", [frame.unit for frame in frames])
+    add_number(kept, "iso", [frame.iso for frame in frames])
+    add_number(
+        kept,
+        "f_number",
+        [np.nan if frame.f_number is None else frame.f_number for frame in frames],
+    )
+    add_number(kept, "late", [frame.late_s for frame in frames], "s")
+
+
+def _add_switching(lamp: h5py.Group, run: RunRecord, start_time: float) -> None:
+    """When the lamp went on and off: the history of the sample's charge."""
+    switched = [
+        action
+        for attempt in run.completed().values()
+        for action in attempt.actions
+        if action.device == "lamp" and action.action in ("on", "off")
+    ]
+    log = add_group(lamp, "switched", "NXlog")
+    middles = [(action.start_time + action.end_time) / 2 - start_time for action in switched]
+    add_number(log, "time", middles, "s").attrs["start"] = _iso(start_time)
+    add_number(log, "value", np.array([action.action == "on" for action in switched], np.int8))
+    add_text(log, "description", "1: on, 0: off")
+
+
+def _start_time(run: RunRecord) -> float:
+    return float(next(iter(run.completed().values())).start["time"])
+
+
+def _iso(seconds: float) -> str:
+    """Seconds since 1970 as ISO 8601."""
+    return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="microseconds")

@@ -1,0 +1,206 @@
+"""Pages served to this PC alone: `labrig rig view`, `labrig watch`.
+
+Bound to 127.0.0.1; other programs' pages are kept out by a secret in the path, by the Host header
+(a foreign name that resolves to 127.0.0.1 would otherwise do) and by asking for JSON, which a
+foreign page cannot send without being allowed to.
+"""
+
+import json
+import secrets
+import threading
+from collections.abc import Iterator, Mapping
+from contextlib import contextmanager
+from http import HTTPStatus
+from http.server import BaseHTTPRequestHandler, ThreadingHTTPServer
+from pathlib import Path
+from typing import Any, ClassVar
+from urllib.parse import parse_qs, urlsplit
+
+from labrig.errors import DiskError, LabrigError, UsageError
+
+LOOPBACK = "127.0.0.1"
+MOST_BODY_BYTES = 64 * 1024
+#: Nothing from anywhere else, and not inside another page.
+CONTENT_POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'"
+KINDS = {
+    ".html": "text/html; charset=utf-8",
+    ".css": "text/css; charset=utf-8",
+    ".js": "text/javascript; charset=utf-8",
+}
+
+
+class LocalServer(ThreadingHTTPServer):
+    """Answers browsers on this PC.
+
+    Parameters
+    ----------
+    port
+        0 for any free one.
+    conversation
+        Answers on one connection.
+
+    Raises
+    ------
+    UsageError
+        The port is taken.
+    """
+
+    daemon_threads = True
+    # A browser keeps connections open for minutes; leaving must not wait for them.
+    block_on_close = False
+
+    def __init__(self, port: int, conversation: type["LocalConversation"]) -> None:
+        self.token = secrets.token_urlsafe(18)
+        try:
+            super().__init__((LOOPBACK, port), conversation)
+        except (OSError, OverflowError) as error:
+            raise UsageError(
+                f"port {port} cannot be used ({error}); leave --port away for any free one"
+            ) from None
+        self.names = {f"{name}:{self.server_port}" for name in (LOOPBACK, "localhost")}
+
+    @property
+    def url(self) -> str:
+        """Where the page is, the secret included."""
+        return f"http://{LOOPBACK}:{self.server_port}/{self.token}/"
+
+    @contextmanager
+    def running(self) -> Iterator[None]:
+        """Answer in a thread of its own."""
+        thread = threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True)
+        thread.start()
+        try:
+            yield
+        finally:
+            self.shutdown()
+            self.server_close()
+            thread.join()
+
+
+class LocalConversation(BaseHTTPRequestHandler):
+    """One connection of a browser."""
+
+    server: LocalServer
+    protocol_version = "HTTP/1.1"
+    #: A connection on which nothing is asked for so long is given up.
+    timeout: ClassVar[int] = 60
+    #: Path → file beside the class's module.
+    pages: ClassVar[Mapping[str, Path]] = {}
+
+    def answer(self, path: str) -> None:
+        """Answer a GET of what is no page."""
+        self.refuse(HTTPStatus.NOT_FOUND, "no such thing here")
+
+    def do_GET(self) -> None:
+        """A page, or whatever else there is to get."""
+        path = self.path_behind_secret()
+        if path is None:
+            return
+        try:
+            if path in self.pages:
+                page = self.pages[path]
+                self.send(HTTPStatus.OK, KINDS[page.suffix], page.read_bytes())
+            else:
+                self.answer(path)
+        except LabrigError as error:
+            self.refuse(HTTPStatus.BAD_REQUEST, str(error))
+
+    def accept(self, path: str, body: bytes) -> None:
+        """Do what a POST asks for."""
+        self.refuse(HTTPStatus.NOT_FOUND, "there is nothing to write here")
+
+    def do_POST(self) -> None:
+        """Whatever can be written."""
+        body = self.body()
+        path = self.path_behind_secret()
+        if path is None:
+            return
+        try:
+            self.accept(path, body)
+        except DiskError as error:
+            self.refuse(HTTPStatus.INSUFFICIENT_STORAGE, str(error))
+        except LabrigError as error:
+            self.refuse(HTTPStatus.BAD_REQUEST, str(error))
+
+    def path_behind_secret(self) -> str | None:
+        """Path behind the secret, or None after having refused."""
+        if self.headers.get("Host", "") not in self.server.names:
+            self.refuse(HTTPStatus.FORBIDDEN, f"this page is called {LOOPBACK} only")
+            return None
+        token, slash, path = urlsplit(self.path).path.removeprefix("/").partition("/")
+        if not slash or not secrets.compare_digest(token.encode(), self.server.token.encode()):
+            self.refuse(HTTPStatus.FORBIDDEN, "use the whole address that labrig printed")
+            return None
+        return path
+
+    def query(self, key: str) -> str | None:
+        """Value of a key behind the question mark, the last one if it stands several times."""
+        values = parse_qs(urlsplit(self.path).query).get(key)
+        return values[-1] if values else None
+
+    def body(self) -> bytes:
+        """What was sent along, read even if it is refused: the connection goes on."""
+        length = self.headers.get("Content-Length", "")
+        if not length.isdecimal() or int(length) > MOST_BODY_BYTES:
+            self.close_connection = True
+            return b""
+        return self.rfile.read(int(length))
+
+    def json_object(self, body: bytes) -> dict[str, Any]:
+        """The JSON object in `body`.
+
+        Raises
+        ------
+        UsageError
+            It is none, or not sent as one.
+        """
+        kind = self.headers.get("Content-Type", "").partition(";")[0].strip().lower()
+        if kind != "application/json":
+            raise UsageError(f"expected application/json, got {kind or 'nothing'}")
+        try:
+            content = json.loads(body)
+        except (ValueError, RecursionError) as error:
+            raise UsageError(f"expected JSON, got something else ({error})") from None
+        if not isinstance(content, dict):
+            raise UsageError("expected a JSON object")
+        return content
+
+    def refuse(self, status: HTTPStatus, text: str) -> None:
+        """Say in a line why not."""
+        self.send_json(status, {"error": " ".join(text.split())})
+
+    def send_json(self, status: HTTPStatus, content: Mapping[str, Any]) -> None:
+        """Send `content`."""
+        self.send(status, "application/json", json.dumps(content).encode())
+
+    def send(
+        self,
+        status: HTTPStatus,
+        kind: str,
+        data: bytes,
+        more: Mapping[str, str] | None = None,
+    ) -> None:
+        """Send `data` of that kind, with further headers."""
+        self.send_response(status)
+        for name, value in (
+            ("Content-Type", kind),
+            ("Content-Length", str(len(data))),
+            ("Cache-Control", "no-store"),
+            ("Content-Security-Policy", CONTENT_POLICY),
+            ("Referrer-Policy", "no-referrer"),
+            ("X-Content-Type-Options", "nosniff"),
+            *(more or {}).items(),
+        ):
+            self.send_header(name, value)
+        self.end_headers()
+        self.wfile.write(data)
+
+    def handle(self) -> None:
+        """As inherited; a browser that goes away in the middle is no fault."""
+        try:
+            super().handle()
+        except ConnectionError:
+            self.close_connection = True
+
+    def log_message(self, format: str, *args: Any) -> None:
+        """Nothing: the address, which has the secret in it, is not written anywhere."""

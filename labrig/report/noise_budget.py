@@ -1,0 +1,106 @@
+"""Where the uncertainty of a value comes from, over the course of a decay."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.fit import DecayFit, nonnegative_least_squares
+from labrig.reduce import Series
+
+FloatArray = NDArray[np.float64]
+
+#: Terms of the photon-transfer line: constant, ∝ light, ∝ light².
+_TERMS = 3
+#: Parts below this share of the whole are not worth their line.
+LEAST_SHARE = 0.03
+#: Signal over σ below which a frame has nothing to relate σ to.
+LEAST_SIGNAL = 1e-3
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseBudget:
+    """Standard uncertainties of the brightest channel, relative to its fitted signal.
+
+    Parameters
+    ----------
+    t_s
+        Shape (n,): middle of the exposures, rising.
+    photons, reading, uneven
+        Shape (n,): what grows as the root of the light, what is there without light, and what is
+        proportional to it but differs over the patch. Their sum in quadrature is the series' σ.
+    flicker
+        Shape (n,): common to the channels of a frame, as fitted.
+    dark_level
+        Shape (n,): of the level that was subtracted, common to all frames; 0 if not known.
+    """
+
+    t_s: FloatArray
+    photons: FloatArray
+    reading: FloatArray
+    uneven: FloatArray
+    flicker: FloatArray
+    dark_level: FloatArray
+
+    @property
+    def together(self) -> FloatArray:
+        """Of one value, shape (n,)."""
+        return np.sqrt(np.square(list(self._parts().values())).sum(axis=0))
+
+    def visible(self) -> dict[str, FloatArray]:
+        """The parts that somewhere are worth a line, by their names."""
+        worth = LEAST_SHARE * self.together
+        return {name: part for name, part in self._parts().items() if np.any(part > worth)}
+
+    def _parts(self) -> dict[str, FloatArray]:
+        return {
+            "photons": self.photons,
+            "reading": self.reading,
+            "uneven light": self.uneven,
+            "flicker": self.flicker,
+            "dark level": self.dark_level,
+        }
+
+
+def noise_budget(series: Series, fit: DecayFit) -> NoiseBudget | None:
+    """Of the frames of the first decay that were fitted; None if they are too few, or σ unknown."""
+    brightest = fit.brightest
+    signal = fit.predict(series.t_s, series.exposure_s)[:, brightest] - fit.offset
+    # Comparisons with an unknown σ are false.
+    rows = np.flatnonzero(series.usable & (signal > LEAST_SIGNAL * series.sigma[:, brightest]))
+    if len(rows) <= _TERMS:
+        return None
+    used, signal = series.take(rows), signal[rows]
+    parts = np.sqrt(noise_parts(used, brightest, signal)) / signal[:, np.newaxis]
+    first = np.flatnonzero(np.array(used.unit) == used.unit[0])
+    first = first[np.argsort(used.t_s[first], kind="stable")]
+    dark_sigma = np.nan_to_num(used.dark_sigma[brightest])
+    return NoiseBudget(
+        t_s=(used.t_s + used.exposure_s / 2)[first],
+        photons=parts[first, 1],
+        reading=parts[first, 0],
+        uneven=parts[first, 2],
+        flicker=np.full(len(first), fit.flicker),
+        dark_level=dark_sigma / signal[first],
+    )
+
+
+def noise_parts(series: Series, channel: int, signal: FloatArray) -> FloatArray:
+    """The variances of one channel's values in three parts, shape (n, 3), in the values' unit².
+
+    The noise of a frame's mean is a photon-transfer line, σ² = A + B·light + C·light² in DN²: of
+    reading, of photons, and of light that flickers unevenly (Janesick 2007). The line through all
+    frames says in which proportions each frame's σ² is shared out, by its `signal`, shape (n,).
+    """
+    exposure_s = np.where(series.exposure_s > 0, series.exposure_s, 1.0)
+    variance = np.square(series.sigma[:, channel] * exposure_s)
+    terms = _terms(series.values[:, channel] * exposure_s)
+    line = nonnegative_least_squares(terms / variance[:, np.newaxis], np.ones_like(variance))
+    shares = _terms(signal * exposure_s) * line
+    shares /= shares.sum(axis=1, keepdims=True)
+    return np.asarray(shares * np.square(series.sigma[:, channel, np.newaxis]))
+
+
+def _terms(light: FloatArray) -> FloatArray:
+    light = np.maximum(light, 0.0)
+    return np.stack([np.ones_like(light), light, light**2], axis=1)

@@ -1,0 +1,111 @@
+"""JSON Schemas of the files that people write, so that an editor completes and checks them."""
+
+import inspect
+import operator
+import re
+from collections.abc import Callable, Iterator
+from functools import reduce
+from typing import Annotated, Any, Literal
+
+from pydantic import BaseModel, Field, TypeAdapter, create_model
+from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
+from pydantic_core import core_schema
+
+from labrig import shipped
+from labrig.acquire import RigFile, plugins
+from labrig.acquire.rig_file import DeviceEntry
+from labrig.acquire.roles import ROLES
+from labrig.errors import UsageError
+from labrig.material import Material
+from labrig.yaml_file import did_you_mean
+
+KINDS = ("protocol", "rig", "material")
+
+
+def schema(kind: str) -> dict[str, Any]:
+    """The JSON Schema of a `protocol`, a `rig` or a `material` file, as YAML loads it.
+
+    Raises
+    ------
+    UsageError
+        There is no such kind of file.
+    """
+    if kind not in KINDS:
+        raise UsageError(f"there is no schema of '{kind}'; {did_you_mean(kind, KINDS)}")
+    makers: dict[str, Callable[[], Any]] = {"protocol": _protocol, "rig": _rig}
+    written = makers[kind]() if kind in makers else Material
+    made = TypeAdapter(written).json_schema(by_alias=True, schema_generator=_Described)
+    return {"$schema": _Described.schema_dialect, **made, "title": f"labrig {kind}"}
+
+
+def _protocol() -> Any:
+    """One of the registered protocols; its key `protocol` says which."""
+    names = plugins.names(plugins.PROTOCOLS)
+    return _one_of("protocol", [plugins.load(plugins.PROTOCOLS, name, "schema") for name in names])
+
+
+def _rig() -> Any:
+    """A rig file whose devices have the keys of the driver that each names."""
+    names = plugins.names(plugins.DRIVERS)
+    drivers = {name: plugins.load(plugins.DRIVERS, name, "schema") for name in names}
+    entries = {name: _entry(name, driver.Settings) for name, driver in drivers.items()}
+    roles: dict[str, Any] = {}
+    for role, kind in ROLES.items():
+        fitting = [entries[name] for name, driver in drivers.items() if issubclass(driver, kind)]
+        if fitting:
+            summary = inspect.cleandoc(kind.__doc__ or "").splitlines()[0]
+            roles[role] = (_one_of("driver", fitting), Field(None, description=summary))
+    devices = create_model("Devices", __config__={"extra": "forbid"}, **roles)
+    simulation = shipped.load("sim.simulation").Simulation
+    return create_model(
+        "Rig",
+        __base__=RigFile,
+        __doc__=RigFile.__doc__,
+        devices=(devices, ...),
+        simulation=(simulation | None, None),
+    )
+
+
+def _entry(driver: str, settings: type[BaseModel]) -> type[BaseModel]:
+    """A device entry of one driver."""
+    shared: dict[str, Any] = {
+        name: (field.annotation, field) for name, field in DeviceEntry.model_fields.items()
+    }
+    own: dict[str, Any] = shared | {"driver": (Literal[driver], ...)}
+    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **own)
+
+
+def _one_of(key: str, models: list[type[BaseModel]]) -> Any:
+    if len(models) == 1:
+        return models[0]
+    return Annotated[reduce(operator.or_, models), Field(discriminator=key)]
+
+
+class _Described(GenerateJsonSchema):
+    """Keys are described as the models' docstrings do; a default has the written form or none."""
+
+    def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
+        made = super().model_schema(schema)
+        documented = inspect.cleandoc(schema["cls"].__doc__ or "")
+        made["description"] = documented.partition("\n\n")[0]
+        texts = dict(_attributes(documented))
+        for name, field in schema["cls"].model_fields.items():
+            place: dict[str, Any] = made.get("properties", {}).get(field.alias or name, {})
+            if name in texts:
+                place["description"] = texts[name]
+        return made
+
+    def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
+        made = super().default_schema(schema)
+        default = made.get("default")
+        if default is None or (made.get("type") == "string") != isinstance(default, str):
+            made.pop("default", None)
+        return made
+
+
+def _attributes(documented: str) -> Iterator[tuple[str, str]]:
+    """Name and text of each entry in a numpy docstring's section of attributes."""
+    _, _, section = documented.partition("Attributes\n----------\n")
+    for names, text in re.findall(r"^(\w[\w, ]*)\n((?:    .*\n?|\n(?=    ))+)", section, re.M):
+        for name in names.split(","):
+            yield name.strip(), " ".join(text.split())

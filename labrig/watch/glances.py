@@ -1,0 +1,111 @@
+"""Looks at frames in a process of its own, so that the one that runs the rig keeps its time."""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import TextIO
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.acquire import plugins
+from labrig.errors import LabrigError
+from labrig.watch.glance import glance
+
+
+@dataclass(frozen=True)
+class Seen:
+    """A frame that was looked at: its values as in `Glance`, its picture (height, width, 3)."""
+
+    name: str
+    values: dict[str, dict[str, float]]
+    clipped: tuple[str, ...]
+    picture: NDArray[np.uint8]
+
+
+class Glances:
+    """Asks for frames of one run to be looked at; the answer comes when it comes.
+
+    Parameters
+    ----------
+    run
+        The run folder.
+    width
+        Of the pictures, in pixels.
+    """
+
+    def __init__(self, run: Path, width: int) -> None:
+        self.latest: Seen | None = None
+        # Ctrl-C on a terminal goes to all of a group: this one ends when it is told to.
+        self._process = subprocess.Popen(
+            [sys.executable, "-m", "labrig.watch.glances", str(run), str(width)],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.DEVNULL,
+            text=True,
+            encoding="utf-8",
+            start_new_session=os.name != "nt",
+            creationflags=getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+        )
+        assert self._process.stdin is not None
+        assert self._process.stdout is not None
+        self._questions, self._answers = self._process.stdin, self._process.stdout
+        self._listening = threading.Thread(target=self._listen, daemon=True)
+        self._listening.start()
+
+    def ask(self, name: str) -> None:
+        """Have the frame of that name looked at."""
+        try:
+            self._questions.write(f"{name}\n")
+            self._questions.flush()
+        except OSError:  # it has died: a run goes on without pictures
+            return
+
+    def close(self) -> None:
+        """Let it end."""
+        self._process.kill()
+        self._process.wait()
+        self._listening.join()
+        self._answers.close()
+        try:
+            self._questions.close()
+        except OSError:
+            return
+
+    def _listen(self) -> None:
+        for line in self._answers:
+            said = json.loads(line)
+            picture = np.frombuffer(bytes.fromhex(said.pop("pixels")), np.uint8)
+            self.latest = Seen(
+                name=said["name"],
+                values=said["values"],
+                clipped=tuple(said["clipped"]),
+                picture=picture.reshape(said["shape"]),
+            )
+
+
+def answer(run: Path, width: int, names: Iterable[str], out: TextIO) -> None:
+    """Look at the frames that are named, one JSON line each; what cannot be read is left out."""
+    patches = getattr(plugins.read_protocol(run / "protocol.yaml"), "patches", {})
+    for name in names:
+        try:
+            seen = glance(run / "frames" / name.strip(), patches, width)
+        except LabrigError:
+            continue
+        said = {
+            "name": name.strip(),
+            "values": seen.values,
+            "clipped": seen.clipped,
+            "shape": seen.picture.shape,
+            "pixels": seen.picture.tobytes().hex(),
+        }
+        print(json.dumps(said), file=out, flush=True)
+
+
+if __name__ == "__main__":
+    answer(Path(sys.argv[1]), int(sys.argv[2]), sys.stdin, sys.stdout)

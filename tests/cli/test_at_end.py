@@ -1,0 +1,93 @@
+"""Somebody outside the dark room is told when a run has ended."""
+
+import json
+import sys
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+import yaml
+
+from tests.conftest import Ended
+
+Labrig = Callable[..., Ended]
+Make = Callable[..., Path]
+
+NOTES = (
+    "import json, os, sys; "
+    "json.dump({k: v for k, v in os.environ.items() if k.startswith('LABRIG_')},"
+    " open(sys.argv[1], 'w'))"
+)
+
+
+def telling(make_rig: Make, command: object, **simulation: object) -> Path:
+    path = make_rig(**simulation)
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"on_finish": command}))
+    return path
+
+
+@pytest.mark.parametrize(
+    ("faults", "code", "status"), [([], 0, "done"), ([{"camera_unplugged": {}}], 3, "failed")]
+)
+def test_a_command_is_told_how_it_ended(
+    labrig: Labrig,
+    make_rig: Make,
+    make_protocol: Make,
+    tmp_path: Path,
+    faults: list[object],
+    code: int,
+    status: str,
+) -> None:
+    told = tmp_path / "told.json"
+    rig = telling(make_rig, [sys.executable, "-c", NOTES, str(told)], faults=faults)
+    ended = labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path / "runs")
+    assert ended.code == code
+    said = json.loads(told.read_text())
+    assert said["LABRIG_STATUS"] == status
+    assert said["LABRIG_MESSAGE"] in (ended.out if code == 0 else ended.err)
+    assert said["LABRIG_MESSAGE"]
+
+
+def test_a_bell_rings_and_resumed_runs_ring_it_too(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
+) -> None:
+    rig = telling(make_rig, "bell")
+    ended = labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path, "--no-process")
+    assert ended.err.count("\a") == 1
+    assert labrig("resume", ended.run_folder, "--no-process").err.count("\a") == 1
+
+
+def test_a_command_that_fails_costs_a_warning_only(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
+) -> None:
+    rig = telling(make_rig, ["no-such-command-anywhere"])
+    ended = labrig("run", make_protocol(), "--rig", rig, "--runs", tmp_path, "--no-process")
+    assert ended.code == 0
+    assert "labrig: warning: on_finish" in ended.err
+
+
+def test_a_new_protocol_file_is_commented_and_every_comment_in_it_is_true(
+    labrig: Labrig, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    assert labrig("protocol", "new", "decay").code == 0
+    again = labrig("protocol", "new", "decay")
+    assert (again.code, len(again.err.splitlines())) == (2, 1)
+    written = (tmp_path / "my-decay.yaml").read_text()
+    lines = written.splitlines()
+    choices = [n for n, line in enumerate(lines) if is_choice(line)]
+    assert len(choices) > 5
+    for number in choices:
+        line = lines[number].replace("# ", "", 1)
+        key = line.split(":")[0]
+        others = [other for other in lines if not other.startswith(f"{key}:")]
+        extra = ["background: [0.0, 0.0, 0.06, 0.06]"] if line == "dark: background" else []
+        (tmp_path / "changed.yaml").write_text("\n".join([*others, *extra, line]))
+        ended = labrig("plan", "./changed.yaml", "--rig", "sim")
+        assert ended.code == 0, (line, ended.err)
+
+
+def is_choice(line: str) -> bool:
+    """A whole key that is commented out."""
+    head, _, _ = line.removeprefix("# ").partition(":")
+    return line.startswith("# ") and head.isidentifier() and ": " in line

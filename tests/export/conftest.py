@@ -1,0 +1,81 @@
+"""Runs to export: recorded on a simulated bench and processed, once for all tests."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass
+from pathlib import Path
+
+import pytest
+import yaml
+
+from labrig import shipped
+from labrig.acquire import Plan, RunObserver, read_rig_file
+from labrig.clock import Clock
+from labrig.process import process_run
+from labrig.process.choices import read_decay_protocol
+from labrig.process.page import run_report
+from labrig.record import read_run
+from labrig.report import RunReport
+from labrig.run import Recording
+from tests.acquire.fakes import Watching
+
+#: The rest of the frame stays dark.
+SAMPLE = [{"material": "blue-paint", "region": [0.25, 0.25, 0.5, 0.5]}]
+NO_FIT = "nothing glows"
+
+
+@dataclass(frozen=True)
+class Finished:
+    """A processed run and what its report shows."""
+
+    folder: Path
+    report: RunReport
+
+
+@pytest.fixture(scope="session")
+def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    """Two decays of one patch called `sample`."""
+    return finish(tmp_path_factory.mktemp("one"), repeats=2)
+
+
+@pytest.fixture(scope="session")
+def with_dark_patch(tmp_path_factory: pytest.TempPathFactory) -> Finished:
+    """Two patches with names that are none in NeXus; of one there is no fit."""
+    patches = {"Öl, 2 %": [0.3, 0.3, 0.4, 0.4], "Öl? 2 %": [0.0, 0.0, 0.2, 0.2]}
+    return finish(tmp_path_factory.mktemp("two"), patches=patches)
+
+
+def finish(folder: Path, **keys: object) -> Finished:
+    """A short decay."""
+    rig = yaml.safe_load((shipped.folder("config") / "sim.yaml").read_text())
+    rig["simulation"] |= {"sensor": {"width": 96, "height": 64}, "sample": SAMPLE}
+    rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    protocol = {
+        "protocol": "decay",
+        "sample": {"name": "Glühfarbe", "batch": "7"},
+        "charge": "10 min",
+        "for": "40 s",
+        "exposure": "1 s",
+    }
+    paths = {}
+    for name, content in (("rig", rig), ("protocol", protocol | keys)):
+        paths[name] = folder / f"{name}.yaml"
+        paths[name].write_text(yaml.safe_dump(content))
+    run = Recording.prepare(paths["protocol"], paths["rig"], folder / "runs").record(quietly)
+    result = process_run(run)
+    asked = read_decay_protocol(run)
+    report = run_report(
+        read_run(run),
+        asked,
+        read_rig_file(run / "rig.yaml"),
+        asked.patches,
+        result.series,
+        {name: result.fits.get(name, NO_FIT) for name in result.series},
+        result.run_warnings,
+    )
+    return Finished(run, report)
+
+
+@contextmanager
+def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+    yield Watching()

@@ -1,0 +1,117 @@
+"""The JSON Schemas say of a file what labrig itself says of it."""
+
+import copy
+import json
+from collections.abc import Callable, Iterator
+from pathlib import Path
+from typing import Any
+
+import pytest
+from jsonschema import Draft202012Validator
+
+from labrig import shipped
+from labrig.schema import KINDS, schema
+from labrig.yaml_file import read_yaml
+from tests.conftest import Ended
+
+SHIPPED = [
+    (kind, path)
+    for kind, place in (
+        ("protocol", "protocols"),
+        ("rig", "config"),
+        ("material", "config/materials"),
+    )
+    for path in shipped.names(place).values()
+]
+#: Mappings whose keys are names that a person chooses.
+FREE = ("patches",)
+
+
+@pytest.fixture(scope="module")
+def validators() -> dict[str, Draft202012Validator]:
+    made = {kind: schema(kind) for kind in KINDS}
+    for one in made.values():
+        Draft202012Validator.check_schema(one)
+    return {kind: Draft202012Validator(one) for kind, one in made.items()}
+
+
+@pytest.mark.parametrize(("kind", "path"), SHIPPED, ids=[path.stem for _, path in SHIPPED])
+def test_what_is_shipped_is_valid_and_every_misspelt_key_is_not(
+    kind: str, path: Path, validators: dict[str, Draft202012Validator]
+) -> None:
+    content = read_yaml(path)
+    validators[kind].validate(content)
+    places = list(keys(content))
+    assert places
+    for place in places:
+        assert not validators[kind].is_valid(misspelt(content, place)), place
+
+
+@pytest.mark.parametrize(
+    ("kind", "changes"),
+    [
+        ("protocol", {"every": 5}),
+        ("protocol", {"every": "5 apples"}),
+        ("protocol", {"charge": "platform"}),
+        ("protocol", {"states": 4}),
+        ("rig", {"devices": {"lamp": {"driver": "nobodys_relay", "address": "COM3"}}}),
+        ("rig", {"devices": {"lamp": {"driver": "numato_relay", "relay": 0}}}),
+        ("rig", {"devices": {"lamp": {"driver": "ptp_camera", "address": "COM3"}}}),
+        ("rig", {"simulation": {"sample": "blue-paint", "faults": ["lamp_daed"]}}),
+        ("rig", {"simulation": {"sample": "blue-paint", "faults": [{"lamp_dead": {"at": 5}}]}}),
+        ("material", {"kind": "gas"}),
+        ("material", {"states": []}),
+    ],
+)
+def test_what_labrig_refuses_an_editor_underlines(
+    kind: str, changes: dict[str, Any], validators: dict[str, Draft202012Validator]
+) -> None:
+    name = {"protocol": "protocols/decay", "rig": "config/sim"}.get(kind)
+    content = read_yaml(shipped.ROOT / f"{name or 'config/materials/blue-paint'}.yaml")
+    assert not validators[kind].is_valid(content | changes)
+
+
+@pytest.mark.parametrize(
+    "faults", [["lamp_dead"], [{"camera_unplugged": {"at": "5 min", "for": "20 s"}}]]
+)
+def test_what_labrig_takes_an_editor_takes(
+    faults: list[Any], validators: dict[str, Draft202012Validator]
+) -> None:
+    rig = read_yaml(shipped.folder("config") / "sim.yaml")
+    rig["simulation"]["faults"] = faults
+    validators["rig"].validate(rig)
+
+
+def test_keys_are_explained(validators: dict[str, Draft202012Validator]) -> None:
+    camera = validators["rig"].schema["$defs"]["ptp_camera"]["properties"]
+    assert "rig check" in camera["shutter_lag"]["description"]
+    assert validators["rig"].schema["properties"]["devices"]
+
+
+def test_the_command_prints_it(labrig: Callable[..., Ended]) -> None:
+    ended = labrig("schema", "rig")
+    assert ended.code == 0
+    assert json.loads(ended.out)["title"] == "labrig rig"
+    refused = labrig("schema", "rigg")
+    assert (refused.code, len(refused.err.splitlines())) == (2, 1)
+    assert "did you mean 'rig'" in refused.err
+
+
+def keys(content: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:
+    if isinstance(content, dict):
+        for key, value in content.items():
+            if not place or place[-1] not in FREE:
+                yield (*place, key)
+            yield from keys(value, (*place, key))
+    elif isinstance(content, list):
+        for number, value in enumerate(content):
+            yield from keys(value, (*place, number))
+
+
+def misspelt(content: Any, place: tuple[Any, ...]) -> Any:
+    changed = copy.deepcopy(content)
+    inner = changed
+    for part in place[:-1]:
+        inner = inner[part]
+    inner[f"{place[-1]}x"] = inner.pop(place[-1])
+    return changed
