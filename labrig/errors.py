@@ -24,9 +24,16 @@ class ProtocolError(UsageError):
 
 
 class DeviceError(LabrigError):
-    """A device that did not answer, or answered something else."""
+    """A device that did not answer, or answered something else.
+
+    Attributes
+    ----------
+    unsafe
+        Keys of the devices that could not confirm their safe state.
+    """
 
     exit_code = 3
+    unsafe: tuple[str, ...] = ()
 
 
 class DeviceLostError(DeviceError):

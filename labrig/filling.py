@@ -9,6 +9,7 @@ from importlib.metadata import version
 from typing import Any, Protocol
 
 from labrig.acquire import Checkable, Plan, ProtocolModel, Rig, RunObserver, Unit, run_units
+from labrig.acquire.roles import LIGHTS
 from labrig.bench import Bench
 from labrig.clock import Clock, Interrupted
 from labrig.errors import (
@@ -60,8 +61,8 @@ def fill(
             observer.warn(f"the unit {unit} was cut off and is done again")
         if record.last_time > stand.clock.wall():
             observer.warn(
-                "the clock of this PC was set back since the run began: times of day in its journal "
-                "go back, durations are right"
+                "the clock of this PC was set back since the run began: times of day in its "
+                "journal go back, durations are right"
             )
         units = protocol.units()
         if all(unit.name in done for unit in units):
@@ -109,17 +110,24 @@ class _Reconnecting:
         Raises
         ------
         DeviceError
-            A device was missing from the start, did not come back, or was lost too often.
+            A device was missing from the start, did not come back, or was lost too often; or
+            somebody stopped waiting for it.
         """
         lost: DeviceLostError | None = None
         back_by_s = 0.0
         while True:
             connected = False
             try:
+                if lost is not None:
+                    self.stand.clock.sleep(LOOK_PERIOD_S)
                 with self.stand.devices() as rig:
                     connected = True
                     use(rig)
                 return
+            except Interrupted:
+                if connected or lost is None or LIGHTS.isdisjoint(lost.unsafe):
+                    raise
+                raise lost from None  # nobody knows whether the light is off
             except DeviceError as error:
                 if connected and isinstance(error, DeviceLostError) and not _stopped(error):
                     lost, back_by_s = error, self.stand.clock.now() + COMES_BACK_S
@@ -128,7 +136,6 @@ class _Reconnecting:
                     raise
                 elif self.stand.clock.now() >= back_by_s:
                     raise lost from error
-            self.stand.clock.sleep(LOOK_PERIOD_S)
 
     def _give_up_units(self, error: DeviceLostError) -> None:
         """Close what was under way, so that it is done again; not for ever."""

@@ -4,36 +4,28 @@ After Nalbach et al., Practical Capture and Reproduction of Phosphorescent Appea
 """
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass
 from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import (
-    LAMP_OFF,
     LAMP_ON,
     CameraOffers,
     ExposureSettings,
     ProtocolModel,
     Session,
-    Shoot,
     Unit,
-    at,
 )
 from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.reduce import FrameMeasurement
 from labrig.region import CENTRE, Region
 
-from .metering import DecayMeter, Look, Schedule, glow, look
+from .decay_units import DarkUnit, DaylightUnit, DecayUnit, MeterUnit
+from .metering import DecayMeter, Look, Schedule
 from .watching import Watcher
 
 #: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.
 DARKS_PER_EXPOSURE = 4
-#: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.
-METER_CHARGE_S = 600.0
-#: Shutter times of the daylight photograph: one of them is right whatever the lamp.
-DAYLIGHT_EXPOSURES_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8)
-LAMP_SETTLES_S = 5.0
 #: Left free between a frame and the next deadline: setting the camera, half-pressing it.
 MARGIN_S = 0.5
 
@@ -192,148 +184,3 @@ class Decay(ProtocolModel):
         """Lamp on for that long, for its own warm-up at the least."""
         session.perform(LAMP_ON)
         session.wait(max(duration_s, session.rig.warm_up_s("lamp")), "charging")
-
-
-@dataclass(frozen=True)
-class DarkUnit:
-    """Dark frames at the exposures to come, before anything glows."""
-
-    protocol: Decay
-    name: str = "dark"
-
-    def run(self, session: Session) -> None:
-        """Warm the camera up, then photograph darkness."""
-        session.wait_until_warm("camera")
-        for exposure_s in self.protocol.dark_exposures_s(session.rig.camera.offers()):
-            session.perform(Shoot("dark", self.protocol.settings(exposure_s)))
-        self.protocol.watcher(session, self.name).insist_on_darkness(
-            self.protocol.short_settings(session)
-        )
-
-
-@dataclass(frozen=True)
-class MeterUnit:
-    """A shorter charge whose glow says how long to expose."""
-
-    protocol: Decay
-    name: str = "meter"
-
-    def run(self, session: Session) -> None:
-        """Charge, lamp off, a ladder of exposures; for `grow`, then on along the decay."""
-        session.wait_until_warm("camera")
-        charge = self.protocol.charge
-        self.protocol.charge_sample(
-            session, min(charge if isinstance(charge, float) else METER_CHARGE_S, METER_CHARGE_S)
-        )
-        ladder = self.protocol.meter_ladder(session.rig.camera.offers())
-        session.run_sequence(
-            [
-                at(0.0, LAMP_OFF),
-                *(
-                    at(time_s, Shoot("meter", self.protocol.settings(exposure_s)))
-                    for time_s, exposure_s in ladder
-                ),
-            ]
-        )
-        self.protocol.watcher(session, self.name).insist_on_glow(
-            self.protocol.short_settings(session)
-        )
-
-
-@dataclass(frozen=True)
-class DecayUnit:
-    """One charge and the decay after it."""
-
-    protocol: Decay
-    number: int
-
-    @property
-    def name(self) -> str:
-        """`decay-1`, `decay-2`, …"""
-        return f"decay-{self.number}"
-
-    def run(self, session: Session) -> None:
-        """Charge, lamp off, one frame every `every` seconds."""
-        session.wait_until_warm("camera")
-        schedule = self._schedule(session)
-        self._charge(session, schedule.exposures_s[0])
-        session.run_sequence(
-            [
-                at(0.0, LAMP_OFF),
-                *(
-                    at(time_s, Shoot("decay", self.protocol.settings(exposure_s)))
-                    for time_s, exposure_s in schedule.frames()
-                ),
-            ]
-        )
-        watcher = self.protocol.watcher(session, self.name)
-        watcher.tell_of_delays(schedule.times_s)
-        watcher.insist_on_decay(self.protocol.short_settings(session))
-
-    def _schedule(self, session: Session) -> Schedule:
-        protocol, offers = self.protocol, session.rig.camera.offers()
-        regions = list(protocol.patches.values())
-
-        def decide() -> Schedule:
-            looks = [look(frame, regions) for frame in session.frames("meter")]
-            return protocol.schedule(offers, looks, session.warn)
-
-        if isinstance(protocol.exposure, float):
-            return protocol.schedule(offers, [], session.warn)
-        longest_s = protocol.longest_exposure_s(offers)
-        worst = Schedule.constant(protocol.frame_times_s(), longest_s)
-        return session.choose("exposure", decide, worst)
-
-    def _charge(self, session: Session, exposure_s: float) -> None:
-        if isinstance(self.protocol.charge, float):
-            self.protocol.charge_sample(session, self.protocol.charge)
-            return
-        rule = self.protocol.plateau
-        self.protocol.charge_sample(session, rule.check_every)
-        charged_s = rule.check_every
-        while charged_s < rule.at_most:
-            look = Shoot("plateau", self.protocol.settings(exposure_s))
-            session.run_sequence([at(0.0, LAMP_OFF), at(self.protocol.first, look)])
-            session.perform(LAMP_ON)
-            if session.choose("plateau reached", lambda: self._level(session), worst=False):
-                session.wait(LAMP_SETTLES_S, "lamp settles, charge topped up")
-                return
-            session.wait(rule.check_every, "charging")
-            charged_s += rule.check_every
-        session.warn(
-            f"the glow still grows after {duration_text(rule.at_most)} of charge; amplitudes are "
-            "below saturation (raise plateau.at_most)"
-        )
-
-    def _level(self, session: Session) -> bool:
-        """Whether every patch grew by less than the rule allows since the last look."""
-        looks = [frame for frame in session.frames("plateau") if frame.unit == self.name]
-        if len(looks) < 2:
-            return False
-        before, now = (
-            [glow(frame.path, region) for region in self.protocol.patches.values()]
-            for frame in looks[-2:]
-        )
-        limit = 1 + self.protocol.plateau.growth
-        return all(new <= old * limit for old, new in zip(before, now, strict=True))
-
-
-@dataclass(frozen=True)
-class DaylightUnit:
-    """What the samples look like under the lamp."""
-
-    protocol: Decay
-    name: str = "daylight"
-
-    def run(self, session: Session) -> None:
-        """Lamp on, a ladder of short exposures, lamp off."""
-        offers = session.rig.camera.offers()
-        session.perform(LAMP_ON)
-        session.wait(LAMP_SETTLES_S, "lamp settles")
-        under_lamp = [
-            self.protocol.settings(offers.exposure_at_most(wanted_s))
-            for wanted_s in DAYLIGHT_EXPOSURES_S
-        ]
-        for settings in under_lamp:
-            session.perform(Shoot("daylight", settings))
-        self.protocol.watcher(session, self.name).switch_off(under_lamp)

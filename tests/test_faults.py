@@ -1,5 +1,7 @@
 """What happens on the bench when something fails: exit code, line, what is kept, the lamp."""
 
+import os
+import signal
 import subprocess
 import sys
 from collections.abc import Callable, Iterator
@@ -13,7 +15,9 @@ from typing import Any
 import pytest
 import yaml
 
+from labrig.acquire import read_rig_file
 from labrig.bench import Bench, open_bench
+from labrig.cli.progress import PlainProgress
 from labrig.clock import SystemClock
 from labrig.record import RunRecord, read_run
 from labrig.record.journal import read_journal
@@ -301,16 +305,46 @@ def test_a_clock_that_was_stepped_between_run_and_resume_harms_nothing(
     bench = rig({"camera_busy": {"at": "43 s", "for": "10 s"}}, {step: {"at": "20 s", "by": "1 h"}})
     assert labrig("run", protocol, "--rig", bench, "--runs", runs, "--no-process").code == 3
     before = recorded(runs)
-    ended = labrig("resume", before.folder)
+    ended = labrig("resume", before.folder, "--no-process")
     assert ended.code == 0, ended.err
     assert ("was set back" in ended.err) is warned
-    stepped_s = recorded(runs).attempts[-1].start["time"] - before.last_time
+    attempt = recorded(runs).completed()["decay-1"]
+    stepped_s = attempt.start["time"] - before.last_time
     assert stepped_s == pytest.approx(-3600 if warned else 3600, abs=60)
-    times_s = [
-        float(line.split(",")[0])
-        for line in (before.folder / "result" / "series.csv").read_text().splitlines()[1:]
-    ]
+    off = next(action for action in attempt.actions if action.action == "off")
+    times_s = [frame.start_time - off.start_time for frame in attempt.frames]
     assert times_s == pytest.approx([0.56, 5.56, 10.56, 15.56], abs=0.02)
+
+
+def test_a_board_that_is_silent_for_a_moment_is_asked_again(rig: Make) -> None:
+    bench = rig({"relays_silent": {"at": "10 s", "for": "4 s"}})
+    with open_bench(read_rig_file(bench), str(bench)) as stand, stand.devices() as devices:
+        devices.lamp.on()
+        stand.clock.sleep_until(10.5)
+        devices.lamp.make_safe()
+        assert not lamp_is_on(stand)
+
+
+def test_who_stops_waiting_for_a_lost_relay_is_told_that_the_lamp_may_be_on(
+    labrig: Labrig,
+    rig: Make,
+    protocol: Path,
+    stands: list[Bench],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    warn = PlainProgress.warn
+
+    def impatient(self: PlainProgress, text: str) -> None:
+        warn(self, text)
+        os.kill(os.getpid(), signal.SIGINT)
+
+    monkeypatch.setattr(PlainProgress, "warn", impatient)
+    bench = rig({"relays_unplugged": {"at": "30 s"}})
+    ended = labrig("run", protocol, "--rig", bench, "--runs", tmp_path / "runs", "--no-process")
+    assert lamp_is_on(stands[-1])
+    assert ended.code == 3
+    assert "switch off by hand: lamp" in complaint(ended)
 
 
 def test_a_clock_that_is_stepped_does_not_bend_a_running_one(

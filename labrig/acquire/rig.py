@@ -64,19 +64,22 @@ class Rig:
         DeviceLostError
             All of those are gone, and may come back.
         """
-        failures, gone = [], True
+        failures, gone = {}, True
         with self.clock.shielded():
             for key, device in self.devices.items():
                 try:
                     device.make_safe()
                 except Exception as error:
                     said = str(error) if isinstance(error, LabrigError) else repr(error)
-                    failures.append(f"{key}: {said}")
+                    failures[key] = f"{key}: {said}"
                     gone = gone and isinstance(error, DeviceLostError)
         if failures:
-            raise (DeviceLostError if gone else DeviceError)(
-                "the safe state is not confirmed; switch off by hand: " + "; ".join(failures)
+            refusal = (DeviceLostError if gone else DeviceError)(
+                "the safe state is not confirmed; switch off by hand: "
+                + "; ".join(failures.values())
             )
+            refusal.unsafe = tuple(failures)
+            raise refusal
 
     def disconnect(self) -> None:
         """Release every device."""

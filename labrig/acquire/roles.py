@@ -142,3 +142,6 @@ ROLES: dict[str, type] = {
     "viewfinder": LiveView,
     "spectrometer": Spectrometer,
 }
+
+#: Those that give light: somebody has to know if one of them may be on.
+LIGHTS = frozenset({"lamp", "leds"})

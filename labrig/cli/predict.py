@@ -37,8 +37,6 @@ MeteredOption = Annotated[
 WORTH_SAYING = 0.1
 #: σ of a rate or an amplitude beyond which it is hardly known.
 HARDLY_KNOWN = 0.5
-#: Where the fit itself will report this many times the σ by which rates scatter, that is said.
-OVERSTATED = 1.3
 #: Differences in lab time below this share of it are none.
 SAME_TIME = 0.005
 
@@ -146,17 +144,6 @@ def _doubts(prediction: "Prediction", patch: str) -> list[str]:
                 f"state {i + 1} is hardly known: its rate to {_percent(of_rate)}, its amplitude "
                 f"to {_percent(of_amplitude)}"
             )
-    overstated = max(
-        reported / sigma
-        for reported, sigma in zip(
-            found.k_r_reported_sigma_per_s, found.k_r_sigma_per_s, strict=True
-        )
-    )
-    if overstated > OVERSTATED:
-        said.append(
-            f"few frames are bright enough to tell the flicker from: not knowing it, the fit will "
-            f"report some {overstated:.1f} times this σ"
-        )
     return said
 
 

@@ -77,8 +77,10 @@ def brightness_metered_as(
     ----------
     metered
         The protocol with `exposure: auto`.
+    exposure_s
+        May be longer than the time between frames allows: the glow is dimmer by as much.
     """
-    wanted_s = min(exposure_s, metered.longest_exposure_s(offers)) * 0.999
+    reached_s = min(exposure_s, metered.longest_exposure_s(offers))
     seen = bench.seen_with(metered.camera)
     low, high = np.log(DIMMEST), np.log(BRIGHTEST)
     for _ in range(BISECTIONS):
@@ -86,5 +88,7 @@ def brightness_metered_as(
         brighter = {patch: glow.brighter(np.exp(middle)) for patch, glow in seen.glows.items()}
         trial = Bench(seen.camera, seen.flicker, brighter)
         schedule = expected_schedule(metered, offers, trial, lambda _: None)
-        low, high = (middle, high) if schedule.exposures_s[0] >= wanted_s else (low, middle)
-    return float(np.exp(low)) / HALF_A_THIRD_STOP
+        low, high = (
+            (middle, high) if schedule.exposures_s[0] >= 0.999 * reached_s else (low, middle)
+        )
+    return float(np.exp(low)) / HALF_A_THIRD_STOP * reached_s / exposure_s

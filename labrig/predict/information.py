@@ -27,13 +27,10 @@ class Information:
         (2m, 2m); infinite variances where the frames say nothing.
     budget
         By source, (2m,) its share of each variance; they add up to 1.
-    leverage
-        (n,) how much of each frame's common scatter the fit follows.
     """
 
     covariance: FloatArray
     budget: Mapping[str, FloatArray]
-    leverage: FloatArray
 
     @property
     def sigma(self) -> FloatArray:
@@ -50,7 +47,7 @@ def information(series: ExpectedSeries) -> Information:
     design = np.zeros((len(values) + len(priors), slopes.shape[2]))
     design[: len(values)] = values
     design[len(values) :, slopes.shape[2] - len(priors) :] = np.diag(1 / priors)
-    estimator, left, unseen = _pseudo_inverse(design)
+    estimator, unseen = _pseudo_inverse(design)
     # What a deviation of each value, and of each offset by its σ, does to the parameters.
     by_value = np.einsum(
         "pfc,fcd->pfd", estimator[:, : len(values)].reshape(-1, *signal.shape), whitening
@@ -67,17 +64,12 @@ def information(series: ExpectedSeries) -> Information:
     covariance[unseen, unseen] = np.inf
     asked = slice(0, 2 * len(series.k_r_per_s))
     total = np.sum(list(parts.values()), axis=0)
-    along = np.einsum("fcd,fd->fc", whitening, signal)
-    length = np.linalg.norm(along, axis=1, keepdims=True)
-    along /= np.where(length > 0, length, 1.0)
-    followed = left[: len(values)].reshape(*signal.shape, -1)
     return Information(
         covariance=covariance[asked, asked],
         budget={
             source: (part / np.where(total > 0, total, 1.0))[asked]
             for source, part in parts.items()
         },
-        leverage=np.square(np.einsum("fc,fcq->fq", along, followed)).sum(axis=1),
     )
 
 
@@ -108,12 +100,12 @@ def _slopes(series: ExpectedSeries) -> tuple[FloatArray, FloatArray]:
     return slopes, np.multiply.outer(curve, weights)
 
 
-def _pseudo_inverse(design: FloatArray) -> tuple[FloatArray, FloatArray, NDArray[np.bool_]]:
-    """(p, n) of `design` (n, p); (n, rank) what it spans; (p,) parameters it does not determine."""
+def _pseudo_inverse(design: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """(p, n) of `design` (n, p), and (p,) which parameters it does not determine."""
     scale = np.linalg.norm(design, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     u, s, vt = np.linalg.svd(design / scale, full_matrices=False)
     kept = s > max(design.shape) * EPSILON * s[0]
     inverse = (vt[kept].T / s[kept]) @ u[:, kept].T / scale[:, np.newaxis]
     seen = np.einsum("ij,ij->j", vt[kept], vt[kept])
-    return inverse, u[:, kept], seen < 1 - np.sqrt(EPSILON)
+    return inverse, seen < 1 - np.sqrt(EPSILON)

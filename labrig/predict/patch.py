@@ -11,7 +11,6 @@ from labrig.fit.decay.diagnostics import APART_SIGMAS
 from labrig.fit.least_squares import FloatArray
 from labrig.predict.detection import chance_of_all_states
 from labrig.predict.expectation import Expectation
-from labrig.predict.own_noise import reported_sigma
 
 #: Chance of telling all states from which on there is nothing to say.
 SURE = 0.95
@@ -26,11 +25,7 @@ class PatchPrediction:
     k_r_per_s, amplitude_dn_per_s
         (m,) as put in.
     k_r_sigma_per_s, amplitude_sigma_dn_per_s
-        (m,) standard uncertainties: what fits of many runs will scatter by; infinite where the
-        frames say nothing.
-    k_r_reported_sigma_per_s
-        (m,) what the fit itself will give as σ: larger where it has few frames to tell the
-        flicker from.
+        (m,) standard uncertainties; infinite where the frames say nothing.
     budget
         By source of noise, (m,) share of each rate's variance.
     chance_of_all_states
@@ -45,7 +40,6 @@ class PatchPrediction:
     k_r_sigma_per_s: tuple[float, ...]
     amplitude_dn_per_s: tuple[float, ...]
     amplitude_sigma_dn_per_s: tuple[float, ...]
-    k_r_reported_sigma_per_s: tuple[float, ...]
     budget: Mapping[str, tuple[float, ...]]
     chance_of_all_states: float
     least_apart: float
@@ -63,7 +57,6 @@ class PatchPrediction:
                 {
                     "k_r_per_s": self.k_r_per_s[i],
                     "k_r_sigma_per_s": _finite(self.k_r_sigma_per_s[i]),
-                    "k_r_reported_sigma_per_s": _finite(self.k_r_reported_sigma_per_s[i]),
                     "amplitude_dn_per_s": self.amplitude_dn_per_s[i],
                     "amplitude_sigma_dn_per_s": _finite(self.amplitude_sigma_dn_per_s[i]),
                     "noise": {source: part[i] for source, part in self.budget.items()},
@@ -98,7 +91,6 @@ def predicted_patches(expected: Expectation) -> dict[str, PatchPrediction]:
             k_r_sigma_per_s=tuple(found.sigma[0::2].tolist()),
             amplitude_dn_per_s=tuple(series.amplitude.tolist()),
             amplitude_sigma_dn_per_s=tuple(found.sigma[1::2].tolist()),
-            k_r_reported_sigma_per_s=tuple(reported_sigma(series, found)[0::2].tolist()),
             budget={source: tuple(part[0::2].tolist()) for source, part in found.budget.items()},
             chance_of_all_states=chance_of_all_states(series) if expected.states_chosen else 1.0,
             least_apart=_least_apart(series.k_r_per_s, found.covariance[0::2, 0::2]),

@@ -67,6 +67,7 @@ def fit_series(
         offset_sigma=offset_sigma,
         flicker=flicker,
         fixed_rates=fixed_rates_per_s,
+        repeats=usable.unit,
     )
     if all(state.amplitude < SEEN_SIGMA * state.amplitude_sigma for state in fit.states):
         raise FitError(

@@ -2,7 +2,7 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass
-from hashlib import sha256
+from hashlib import file_digest
 
 from labrig.errors import DataError
 from labrig.process.choices import Choices
@@ -107,12 +107,11 @@ def timing_warnings(run: RunRecord) -> list[str]:
 def _damage(frame: FrameRecord) -> str:
     """What is wrong with the file, nothing if it is as recorded."""
     try:
-        content = frame.path.read_bytes()
+        with frame.path.open("rb") as file:
+            checksum = file_digest(file, "sha256").hexdigest()
     except OSError as error:
         return "is missing" if not frame.path.exists() else f"cannot be read ({error.strerror})"
-    if sha256(content).hexdigest() != frame.sha256:
-        return "was changed after the run (its checksum differs)"
-    return ""
+    return "" if checksum == frame.sha256 else "was changed after the run (its checksum differs)"
 
 
 def _told(damaged: Mapping[FrameRecord, str]) -> str:

@@ -14,8 +14,8 @@ three:
   in all tiles and gone at longer lags: structure varies and reaches far, shared noise does not.
 
 Two things one frame cannot tell. Structure as fine as a pixel all over the region counts as
-noise: the variance comes out too large. Noise shared by whole rows does not: too small; it shows
-in the scatter of dark frames.
+noise: the variance comes out too large. Noise shared by whole rows does not: too small. Pairs of
+frames tell both (`labrig.reduce.pairs`).
 """
 
 from dataclasses import dataclass
@@ -159,19 +159,28 @@ def _photon_line(level: Floats, variance: Floats) -> tuple[float, float]:
     one with the least capped misfit, in logarithms: tiles with structure, however many at one
     brightness and however rough, pull no more than the cap.
     """
-    groups = np.array_split(np.argsort(level, kind="stable"), max(1, min(16, len(level) // 6)))
-    x = np.array([np.median(level[group]) for group in groups])
-    y = np.array([np.median(variance[group]) for group in groups])
-    one, other = np.triu_indices(len(groups), k=1)
+    x, y = _medians_of_groups(level, variance, max(1, min(16, len(level) // 6)))
+    one, other = np.triu_indices(len(x), k=1)
     rising = (x[other] > x[one]) & (y[other] > y[one])
     one, other = one[rising], other[rising]
-    slope = np.append((y[other] - y[one]) / (x[other] - x[one]), np.zeros(len(groups)))
+    slope = np.append((y[other] - y[one]) / (x[other] - x[one]), np.zeros(len(x)))
     intercept = np.append(y[one], y) - slope * np.append(x[one], x)
     slope, intercept = slope[intercept >= 0], intercept[intercept >= 0]
     line = intercept[:, np.newaxis] + slope[:, np.newaxis] * level
     misfit = np.log((variance + ROUNDING_VARIANCE) / (line + ROUNDING_VARIANCE))
     best = int(np.argmin(np.minimum(np.abs(misfit), _MISFIT_CAP).sum(axis=1)))
     return float(intercept[best]), float(slope[best])
+
+
+def _medians_of_groups(level: Floats, variance: Floats, groups: int) -> tuple[Floats, Floats]:
+    """Medians of both in groups of like level, as equal in number as can be; shape (groups,)."""
+    rising = np.argsort(level, kind="stable")
+    sizes = np.full(groups, len(level) // groups)
+    sizes[: len(level) % groups] += 1
+    within = variance[rising][np.lexsort((variance[rising], np.repeat(np.arange(groups), sizes)))]
+    first = np.cumsum(sizes) - sizes
+    low, high = first + (sizes - 1) // 2, first + sizes // 2
+    return (level[rising][low] + level[rising][high]) / 2, (within[low] + within[high]) / 2
 
 
 def _autocovariance(tiles: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:

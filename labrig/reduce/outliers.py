@@ -49,8 +49,9 @@ def isolated_outliers(
         quietest = np.min([noise.variance_at(levels) for noise in noises.values()], axis=0)
         return np.asarray(_ABOVE_ALL_SIGMAS * np.sqrt(quietest))
 
-    # Compared with one number, then by level, then by the noise of their own plane: few are left.
-    passed = np.flatnonzero(excess > int(limit(np.array(float(window.min())))))
+    # By a row's darkest, then by level, then by the noise of their own plane: few are left.
+    least = np.minimum(limit(window.min(axis=1).astype(np.float64)), 65535).astype(np.uint16)
+    passed = np.flatnonzero(excess > least[:, np.newaxis])
     passed = passed[excess.ravel()[passed] > limit(greatest.ravel()[passed].astype(np.float64))]
     y, x = np.divmod(passed, window.shape[1])
     level = greatest[y, x].astype(np.float64)

@@ -2,6 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
@@ -24,6 +25,8 @@ CLIPPED_SHARE = 0.001
 ONE_DEGREE = 2 ** (1 / 6) - 1
 #: Dark frames held in memory at once, to look for hot pixels.
 _DARKS_FOR_HOT = 5
+#: Frames in memory at once otherwise; only one is ever being decoded.
+_FRAMES_AT_ONCE = 2
 
 
 @dataclass(frozen=True)
@@ -108,7 +111,8 @@ def reduce_patches(
     background
         A dark region of the frames themselves, whose level is subtracted instead.
 
-    Frames with more than 0.1 % of a patch saturated are flagged `clipped`, not dropped.
+    Frames with more than 0.1 % of a patch saturated are flagged `clipped`, not dropped. Sigma comes
+    from pairs of successive frames of a unit, if there are enough, else from each frame alone.
 
     Raises
     ------
@@ -120,7 +124,7 @@ def reduce_patches(
     if not frames or not patches:
         raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
     hot = _hot(darks)
-    shots = [_shot(frame, patches, background, hot) for frame in frames]
+    shots = _shots(frames, patches, background, hot)
     _check_settings(shots)
     models = {} if background else _dark_models(darks, patches, hot)
     return {name: _patch_series(name, shots, models) for name in patches}
@@ -133,6 +137,17 @@ def _hot(darks: Sequence[SeriesFrame]) -> PixelMask | None:
     if len(longest) < 2:
         return None
     return hot_pixels([read_raw(dark.path) for dark in longest[:_DARKS_FOR_HOT]])
+
+
+def _shots(
+    frames: Sequence[SeriesFrame],
+    patches: Mapping[str, Region],
+    background: Region | None,
+    hot: PixelMask | None,
+) -> list[_Shot]:
+    """All `frames` in order; one is decoded while another is measured."""
+    with ThreadPoolExecutor(_FRAMES_AT_ONCE) as pool:
+        return list(pool.map(lambda frame: _shot(frame, patches, background, hot), frames))
 
 
 def _shot(
@@ -163,8 +178,7 @@ def _dark_models(
 ) -> dict[tuple[str, float], DarkModel]:
     """Dark level by patch and ISO."""
     by_iso: dict[float, list[_Shot]] = defaultdict(list)
-    for dark in darks:
-        shot = _shot(dark, patches, None, hot)
+    for shot in _shots(darks, patches, None, hot):
         by_iso[_key(shot.iso)].append(shot)
     return {
         (name, iso): fit_dark(

@@ -73,4 +73,4 @@ def _sigma(fit: DecayFit, t_s: FloatArray, exposure_s: FloatArray) -> FloatArray
     jacobian[:, 0:-1:2] = amplitudes * slopes / rates
     jacobian[:, 1:-1:2] = means
     variance = np.einsum("mp,pq,mq->m", jacobian, fit.covariance, jacobian)
-    return np.sqrt(np.maximum(variance, 0.0))
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))

@@ -49,9 +49,7 @@ def lined(
     label: str, colour: str, style: LineStyle = "-", width: float = 1.2, opacity: float = 1.0
 ) -> Line2D:
     """An entry for a curve."""
-    return Line2D(
-        [], [], color=colour, linestyle=style, linewidth=width, alpha=opacity, label=label
-    )
+    return Line2D([], [], color=colour, ls=style, linewidth=width, alpha=opacity, label=label)
 
 
 def shaded(label: str, colour: str) -> Patch:

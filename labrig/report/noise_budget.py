@@ -45,7 +45,7 @@ class NoiseBudget:
     @property
     def together(self) -> FloatArray:
         """Of one value, shape (n,)."""
-        return np.sqrt(np.square(list(self._parts().values())).sum(axis=0))
+        return np.asarray(np.sqrt(np.square(list(self._parts().values())).sum(axis=0)))
 
     def visible(self) -> dict[str, FloatArray]:
         """The parts that somewhere are worth a line, by their names."""

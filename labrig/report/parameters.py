@@ -67,7 +67,7 @@ def quality_rows(fit: DecayFit) -> list[Row]:
     if several:
         flicker = plus_minus(100 * fit.flicker, 100 * fit.flicker_sigma)
         rows.append(Row("Flicker of a frame", "%", (flicker,)))
-    chi2 = f"{rounded(fit.reduced_chi2, 3)} with {fit.dof} degrees of freedom"
+    chi2 = f"{rounded(fit.reduced_chi2, 3)} ({fit.dof} dof)"
     return [*rows, Row("Reduced χ²", "", (chi2,))]
 
 

@@ -75,7 +75,7 @@ class Plates:
         error: BaseException | None,
         trace: TracebackType | None,
     ) -> None:
-        self._pdf.close()
+        self._pdf.close()  # type: ignore[no-untyped-call]
 
     def add(self, figure: Figure, name: str, described: str) -> Plate:
         """Draw `figure`.
@@ -91,7 +91,7 @@ class Plates:
         drawn = _drawn(figure)
         self._files[f"{name}.svg"] = _file(drawn)
         figure.patch.set(visible=True, facecolor="white")
-        self._pdf.savefig(figure)
+        self._pdf.savefig(figure)  # type: ignore[no-untyped-call]
         return Plate(
             element=Markup(_element(drawn, figure, name, described)),
             svg_link=f"{FOLDER}/{name}.svg",

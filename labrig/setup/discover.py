@@ -132,7 +132,7 @@ def _camera(device: Any, around: Surroundings, has_twin: bool) -> Found:
     if has_twin and serial:
         address += f"/{serial}"
     elif has_twin:
-        hints.append("there are several of this model: append /SERIAL, as labrig rig check shows it")
+        hints.append("there are several of this model: append /SERIAL, see labrig rig check")
     words = [] if refused else [_text(device, device.iManufacturer), _text(device, device.iProduct)]
     usb.util.dispose_resources(device)
     return Found(

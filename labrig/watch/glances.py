@@ -13,9 +13,7 @@ from typing import TextIO
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.acquire import plugins
 from labrig.errors import LabrigError
-from labrig.watch.glance import glance
 
 
 @dataclass(frozen=True)
@@ -91,6 +89,10 @@ class Glances:
 
 def answer(run: Path, width: int, names: Iterable[str], out: TextIO) -> None:
     """Look at the frames that are named, one JSON line each; what cannot be read is left out."""
+    # only in the process that looks: the one that runs the rig starts without what this loads
+    from labrig.acquire import plugins
+    from labrig.watch.glance import glance
+
     patches = getattr(plugins.read_protocol(run / "protocol.yaml"), "patches", {})
     for name in names:
         try:

@@ -82,7 +82,8 @@ class PatchNoise:
     def covariance(self, signal_dn: FloatArray) -> FloatArray:
         """(n, 3, 3) in DN² of means (n, 3) of `signal_dn`, flicker left out."""
         electrons = np.linalg.solve(self.mixing, signal_dn.T * self.gain)
-        return self.dark + np.einsum("cde,ef->fcd", self.photons, electrons) / self.gain**2
+        photons = np.einsum("cde,ef->fcd", self.photons, electrons) / self.gain**2
+        return np.asarray(self.dark + photons)
 
 
 def rate_bound(

@@ -196,7 +196,8 @@ def _judge(ending: Ending, faults: list[str], stop: Stop | None, insist: Any) ->
     insist("Traceback" not in said and "fault in labrig" not in said, said)
     if not ending.lamp_on:
         return
-    by_hand = "switch off by hand" in said or "pull its plug" in said
+    told = ("switch off by hand", "pull its plug", "cannot open the serial port")
+    by_hand = any(text in said for text in told)
     # That a relay is welded is only seen once a unit has been photographed to its end.
     cut_short = ending.code in (130, 143) or (ending.code != 0 and len(faults) > 1)
     unseen = "relay_welded" in faults and cut_short

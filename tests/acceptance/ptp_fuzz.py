@@ -76,7 +76,7 @@ class Tally:
     texts: dict[str, str] = field(default_factory=dict)
     failures: dict[str, list[str]] = field(default_factory=dict)
     sessions: int = 0
-    gave_up: int = 0
+    gave_up: list[int] = field(default_factory=list)
     longest_s: float = 0.0
 
     def refuse(self, error: DeviceError) -> None:
@@ -97,8 +97,8 @@ def _template(text: str) -> str:
     return re.sub(r"[0-9a-f]{2}( [0-9a-f]{2})+|(0x)?[0-9A-F]*\d[0-9A-Fx]*|'[^']*'", "#", text)
 
 
-def session(rng: random.Random, way: Way, tally: Tally) -> None:
-    """One session with harm done, then what must work all the same."""
+def session(rng: random.Random, way: Way, tally: Tally) -> bool:
+    """One session with harm done, then what must work all the same; False if the driver gave up."""
     clock, film = VirtualClock(EPOCH_S), LiveFilm(size=rng.choice(SIZES))
     body = rng.choice((EOS, EOS, STANDARD))
     harming, harmless = Mutator(rng, rng.choice(SHARES)), Mutator(rng, 0.0)
@@ -111,15 +111,17 @@ def session(rng: random.Random, way: Way, tally: Tally) -> None:
             assert clock.now() < MOST_SESSION_S, f"{clock.now():.0f} s of lab time"
             harming.stop()
             clock.spend(PAUSE_S)
+            gave_up = False
             if camera is not None:
                 frame = _mended(camera)
                 assert frame in (None, *film.delivered[-1:]), "another frame"
-                tally.gave_up += frame is None
+                gave_up = frame is None
                 camera.disconnect()
             camera = _connect(address, line)
             assert _photograph(camera) == film.delivered[-1], "another frame"
             camera.make_safe()
             camera.disconnect()
+            return not gave_up
     finally:
         tally.sessions += 1
         tally.cases += harming.cases
@@ -196,7 +198,8 @@ def fuzz(name: str, cases: int, seed: int, only: int | None) -> Tally:
     tally, number = Tally(), only or 0
     while tally.cases.total() < cases:
         try:
-            session(random.Random(f"{seed}/{name}/{number}"), WAYS[name], tally)
+            if not session(random.Random(f"{seed}/{name}/{number}"), WAYS[name], tally):
+                tally.gave_up.append(number)
         except Exception as failure:
             again = f"--seed {seed} --way '{name}' --session {number}"
             tally.fail(f"{failure!r}"[:300], again)
@@ -224,7 +227,7 @@ def main() -> None:
         peak_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss / 1024
         print(
             f"{name:25} {tally.cases.total():7} cases, {tally.sessions:6} sessions, "
-            f"{tally.gave_up} given up, longest {tally.longest_s:4.0f} s, "
+            f"{len(tally.gave_up)} given up {tally.gave_up[:4]}, longest {tally.longest_s:4.0f} s, "
             f"memory {peak_mb:4.0f} MB, {perf_counter() - began_s:4.0f} s, "
             f"{len(tally.failures)} kinds of failures"
         )

@@ -1,6 +1,6 @@
 """Ratios of labrig to its peers, measured turn by turn in one run; no time is ever asserted.
 
-    pytest tests/benchmarks --benchmark-only
+    pytest tests/benchmarks --benchmark-only -n 0
 
 prints pytest-benchmark's own table and, below it, one line for each peer.
 """
@@ -10,7 +10,7 @@ import os
 import statistics
 import time
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
+from dataclasses import asdict, dataclass
 from typing import Any
 
 import pytest
@@ -19,18 +19,35 @@ Run = Callable[[], object]
 
 
 @dataclass(frozen=True)
-class Line:
-    """Medians of what was done and of the peer doing the same, in seconds for each of `what`."""
+class Times:
+    """Median of all rounds, and the shortest: what it takes if nobody else wants the computer."""
 
-    what: str
-    peer: str
-    ours_s: float
-    peer_s: float
+    median_s: float
+    least_s: float
 
     def __str__(self) -> str:
-        ours, peer = self.ours_s, self.peer_s
-        said = f"{peer / ours:.1f} x faster" if ours < peer else f"{ours / peer:.2f} x as long"
-        return f"{self.what:<58}{_text(ours):>10}   {self.peer:<44}{_text(peer):>10}   {said}"
+        return f"{_text(self.median_s):>8} {'(' + _text(self.least_s) + ')':<10}"
+
+
+@dataclass(frozen=True)
+class Line:
+    """What was done and the peer doing the same."""
+
+    what: str
+    ours: Times
+    peer: str
+    theirs: Times
+
+    def __str__(self) -> str:
+        ratios = [
+            self.ours.median_s / self.theirs.median_s,
+            self.ours.least_s / self.theirs.least_s,
+        ]
+        said = "{:.3g} ({:.3g})".format(*ratios)
+        return f"{self.what:<56}{self.ours}  {self.peer:<40}{self.theirs}  {said}"
+
+
+_HEAD = f"{'median (least) of':<56}{'labrig':<21}{'peer':<42}{'its':<19}  labrig / peer"
 
 
 _LINES = pytest.StashKey[list[Line]]()
@@ -45,10 +62,9 @@ def against(benchmark: Any, request: pytest.FixtureRequest) -> Callable[..., Non
     lines = request.config.stash.setdefault(_LINES, [])
 
     def measure(
-        ours: Run, peers: Mapping[str, Run], *, rounds: int, what: str = "", each: int = 1
+        ours: Run, peers: Mapping[str, Run], *, rounds: int, what: str, each: int = 1
     ) -> None:
         """`each`: how many things one call does."""
-        what = what or request.node.name.removeprefix("test_").replace("_", " ")
         contenders = {"": ours, **peers}
         times_s: dict[str, list[float]] = {name: [] for name in contenders}
         for name in contenders:
@@ -59,17 +75,11 @@ def against(benchmark: Any, request: pytest.FixtureRequest) -> Callable[..., Non
                 began_s = time.perf_counter()
                 run()
                 times_s[name].append((time.perf_counter() - began_s) / each)
-        median_s = {name: statistics.median(times) for name, times in times_s.items()}
-        least_s = {name: min(times) for name, times in times_s.items()}
-        for name in peers:
-            lines.append(Line(what, name, median_s[""], median_s[name]))
-        benchmark.extra_info.update(
-            rounds=rounds,
-            each=each,
-            median_s={name or "labrig": value for name, value in median_s.items()},
-            least_s={name or "labrig": value for name, value in least_s.items()},
-            ratios={name: median_s[name] / median_s[""] for name in peers},
-        )
+        found = {name: Times(statistics.median(s), min(s)) for name, s in times_s.items()}
+        lines.extend(Line(what, found[""], name, found[name]) for name in peers)
+        benchmark.extra_info |= {
+            name or "labrig": {"rounds": rounds, **asdict(times)} for name, times in found.items()
+        }
         benchmark.pedantic(ours, rounds=min(rounds, 5))
 
     return measure
@@ -80,7 +90,8 @@ def pytest_terminal_summary(terminalreporter: pytest.TerminalReporter) -> None:
     lines = terminalreporter.config.stash.get(_LINES, [])
     if lines:
         load = f", load {os.getloadavg()[0]:.1f}" if hasattr(os, "getloadavg") else ""
-        terminalreporter.section(f"labrig against its peers, medians, {os.cpu_count()} CPUs{load}")
+        terminalreporter.section(f"labrig against its peers, {os.cpu_count()} CPUs{load}")
+        terminalreporter.write_line(_HEAD)
         for line in lines:
             terminalreporter.write_line(str(line))
 

@@ -172,3 +172,46 @@ def test_growing_exposures_improve_the_slow_rate() -> None:
         return fit.states[1].k_r_sigma_per_s
 
     assert sigma(0.25) / sigma(growing_s) > 2
+
+
+def test_flicker_known_from_few_bright_frames_is_known_badly_and_counted_so() -> None:
+    """A state that is gone after five frames: what flicker could be is in σ, and not twice."""
+    truth = ((0.2, 1.0),)
+    fits = _fits(truths.exponentials(*truth), range(60))
+    pulls = _pulls(fits, truth)
+    error = [fit.states[0].k_r_per_s - 0.2 for fit in fits]
+    sigma = [fit.states[0].k_r_sigma_per_s for fit in fits]
+    # σ of the ratio: 9 %.
+    assert 0.85 < np.sqrt(np.mean(np.square(sigma)) / np.mean(np.square(error))) < 1.35
+    assert np.abs(pulls).max() < 4
+
+
+@pytest.mark.parametrize("n_channels", [1, 3])
+def test_repeats_reach_levels_of_their_own(n_channels: int) -> None:
+    """Three charges under a lamp that ages: no flicker is made of it."""
+    weights = truths.RGB_WEIGHTS[-n_channels:] / truths.RGB_WEIGHTS[-n_channels:].max()
+    true_levels = np.array([1.05, 1.0, 0.95])
+    fits = []
+    for seed in range(15):
+        seen = [
+            truths.observe(truths.exponentials(*DOUBLE), 1000 + 10 * seed + i, weights=weights)
+            for i in range(3)
+        ]
+        values = [one.values * level for one, level in zip(seen, true_levels, strict=True)]
+        fits.append(
+            fit_decay(
+                np.concatenate([one.t_s for one in seen]),
+                np.concatenate(values),
+                np.concatenate([one.sigma for one in seen]),
+                exposure_s=seen[0].exposure_s[0],
+                channels="RGB"[:n_channels],
+                flicker=None,
+                repeats=np.repeat(["first", "second", "third"], 37).tolist(),
+            )
+        )
+    levels = np.array([fit.levels for fit in fits])
+    np.testing.assert_allclose(levels.mean(axis=0), true_levels, atol=0.001)
+    assert np.sqrt(np.mean([fit.flicker**2 for fit in fits])) == pytest.approx(0.007, rel=0.15)
+    assert all(fit.n_states == 2 and not fit.warnings for fit in fits)
+    assert 0.6 < np.std(_pulls(fits, DOUBLE)) < 1.4
+    assert "levels   first 1.0" in str(fits[0])

@@ -13,8 +13,17 @@ STRD = Path(__file__).parents[3] / "shared" / "data" / "decay" / "nist_strd"
 CERTIFIED_DIGITS = 9
 
 
+needs_strd = pytest.mark.skipif(not STRD.is_dir(), reason="no ../shared/data beside the checkout")
+
+
 @pytest.mark.shared_data
-@pytest.mark.skipif(not STRD.is_dir(), reason="no ../shared/data beside the checkout")
+@needs_strd
+def test_no_reference_set_is_left_out() -> None:
+    assert {path.stem for path in STRD.glob("*.dat")} == set(strd.MODELS)
+
+
+@pytest.mark.shared_data
+@needs_strd
 @pytest.mark.parametrize("start", [0, 1])
 @pytest.mark.parametrize("name", strd.MODELS)
 def test_certified_digits(name: str, start: int) -> None:

@@ -72,10 +72,10 @@ def test_the_run_that_follows_finds_what_was_predicted(labrig: Labrig, measured:
     said = predicted(labrig, measured)
     run = run_in(measured)
     taken = [frame.exposure_s for frame in read_run(run).frames("decay")]
-    assert said["exposures_s"] == pytest.approx(taken), "the metering itself was asked"
+    assert said["exposures_s"] == pytest.approx(taken, rel=0.27), "within a third of a stop"
     (found,) = json.loads((run / "result" / "fit.json").read_text())["states"]
     (state,) = said["patches"]["sample"]["states"]
-    assert state["k_r_reported_sigma_per_s"] == pytest.approx(found["k_r_sigma_per_s"], rel=0.25)
+    assert state["k_r_sigma_per_s"] == pytest.approx(found["k_r_sigma_per_s"], rel=0.25)
     assert state["amplitude_sigma_dn_per_s"] == pytest.approx(found["amplitude_sigma"], rel=0.25)
     assert said["patches"]["sample"]["brightness_known"]
     assert sum(state["noise"].values()) == pytest.approx(1)
@@ -106,7 +106,7 @@ def test_remedies_are_what_the_changed_protocol_itself_is_predicted_to_know(
         assert remedies[change]["gain"] == pytest.approx(sigma(itself) / sigma(base))
     gains = [remedy["gain"] for remedy in base["remedies"]]
     assert gains == sorted(gains)
-    assert remedies["exposure: grow"]["gain"] < 0.3
+    assert remedies["exposure: grow"]["gain"] < 0.4
     assert 0.5 <= remedies["repeats: 4"]["gain"] < 0.75, "dark frames are not taken anew"
     assert remedies["repeats: 4"]["extra_time_s"] == pytest.approx(3 * (900 + 104), rel=0.02)
 
@@ -127,6 +127,20 @@ def test_an_earlier_run_lends_its_camera_to_other_materials(labrig: Labrig, meas
     assert len(like["patches"]["sample"]["states"]) == 2
     few, many = (said["patches"]["sample"]["states"][0]["noise"] for said in (like, alone))
     assert few["photons"] > many["photons"], "a small sensor has less light to count"
+
+
+def test_a_glow_too_dim_for_the_time_between_frames_is_known_less_well(labrig: Labrig) -> None:
+    dim, dimmer = (
+        json.loads(
+            labrig(
+                "plan", "decay", "--rig", "sim", "--predict", "bottle", "--metered", metered,
+                "--json",
+            ).out
+        )
+        for metered in ("3 s", "30 s")
+    )  # fmt: skip
+    assert dim["exposures_s"] == dimmer["exposures_s"]
+    assert sigma(dimmer) > 1.5 * sigma(dim)
 
 
 @pytest.mark.parametrize("columns", [80, 120])

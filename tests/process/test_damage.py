@@ -102,7 +102,7 @@ def places(content: Any, above: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...
             yield from places(inner, (*above, key))
 
 
-ODD = (None, "x", -1, math.inf, math.nan, 1e300, [], {}, True)
+ODD: tuple[object, ...] = (None, "x", -1, math.inf, math.nan, 1e300, [], {}, True)
 
 
 @settings(max_examples=150)

@@ -1,7 +1,7 @@
 """The page: everything is on it, nothing is fetched, nothing breaks it."""
 
 import re
-from dataclasses import replace
+from dataclasses import dataclass, replace
 from html.parser import HTMLParser
 from pathlib import Path
 
@@ -10,7 +10,7 @@ import pytest
 
 from labrig.errors import DiskError
 from labrig.fit import DecayFit
-from labrig.report import PatchReport, RunReport, write_report
+from labrig.report import Interruption, PatchReport, RunReport, write_report
 from labrig.report.parameters import quality_rows
 from labrig.report.written_numbers import plus_minus
 
@@ -60,9 +60,25 @@ def written(folder: Path, report: RunReport) -> str:
     return (folder / "report.html").read_text(encoding="utf-8")
 
 
-def test_all_numbers_are_on_the_page(tmp_path: Path) -> None:
-    report = run_report(tmp_path)
-    page = Page(written(tmp_path, report))
+@dataclass(frozen=True)
+class Made:
+    """A report that was written."""
+
+    report: RunReport
+    folder: Path
+    text: str
+
+
+@pytest.fixture(scope="module")
+def plain(tmp_path_factory: pytest.TempPathFactory) -> Made:
+    """A report without anything special."""
+    folder = tmp_path_factory.mktemp("plain")
+    report = run_report(folder)
+    return Made(report, folder, written(folder, report))
+
+
+def test_all_numbers_are_on_the_page(plain: Made) -> None:
+    report, page = plain.report, Page(plain.text)
     fit = report.patches[0].fit
     assert isinstance(fit, DecayFit)
     assert fit.n_states == 2
@@ -86,6 +102,9 @@ def test_all_numbers_are_on_the_page(tmp_path: Path) -> None:
         "cannot be told apart by a decay alone",
         "No warnings.",
         f"{101:064x}",
+        "σ of a value",
+        "Methods",
+        "doi:10.1111/cgf.13136",
         "1/64 s",
     ):
         assert expected in page.text
@@ -110,14 +129,13 @@ def test_offsets_are_one_row_a_channel_if_any_is_fitted() -> None:
     assert [row.values for row in quality_rows(fit) if row.quantity == "Offset"] == [("0 (held)",)]
 
 
-def test_nothing_is_fetched(tmp_path: Path) -> None:
-    text = written(tmp_path, run_report(tmp_path))
-    page = Page(text)
+def test_nothing_is_fetched(plain: Made) -> None:
+    text, page = plain.text, Page(plain.text)
     beside = {ref.partition("#")[0] for ref in page.references if ref.startswith("figures/")}
-    assert beside == {f"figures/{path.name}" for path in (tmp_path / "figures").iterdir()}
+    assert beside == {f"figures/{path.name}" for path in (plain.folder / "figures").iterdir()}
     others = set(page.references) - {ref for ref in page.references if ref.startswith("figures/")}
     assert all(reference.startswith(("#", "data:image/")) for reference in others)
-    for forbidden in ("http:", "https:", "@import", "src=\"figures", "<link", "@font-face"):
+    for forbidden in ("http:", "https:", "@import", 'src="figures', "<link", "@font-face"):
         assert forbidden not in text
 
 
@@ -152,15 +170,40 @@ def test_what_people_type_stays_text(tmp_path: Path) -> None:
     assert evil in Page(text).text
 
 
-def test_the_same_report_gives_the_same_bytes(tmp_path: Path) -> None:
-    report = run_report(tmp_path)
-    assert written(tmp_path, report) == written(tmp_path, report)
+def test_the_same_report_gives_the_same_bytes(plain: Made, tmp_path: Path) -> None:
+    assert written(tmp_path, plain.report) == plain.text
+    for path in (plain.folder / "figures").iterdir():
+        assert (tmp_path / "figures" / path.name).read_bytes() == path.read_bytes()
 
 
-def test_a_simulated_rig_says_so(tmp_path: Path) -> None:
-    report = run_report(tmp_path)
-    assert "simulated rig" not in written(tmp_path, report)
-    assert "simulated rig" in written(tmp_path, replace(report, simulated=True))
+def test_what_a_run_has_besides_is_shown(plain: Made, tmp_path: Path) -> None:
+    assert "simulated rig" not in plain.text
+    for section in ("Notes", "What was cut off and done again", "Repeats"):
+        assert f"{section}</h" not in plain.text
+    series = decay_series()
+    unit = ("decay-1",) * 15 + ("decay-2",) * 15
+    page = Page(
+        written(
+            tmp_path,
+            replace(
+                plain.report,
+                simulated=True,
+                patches=(patch(replace(series, unit=unit)),),
+                notes="## today\n\na <b>note</b>\n",
+                charges_s=(5400.0,),
+                interruptions=(Interruption("decay-2", "2026-01-01 00:40:00 UTC", "unplugged"),),
+            ),
+        )
+    )
+    for expected in (
+        "simulated rig",
+        "## today\n\na <b>note</b>",
+        "1 h 30 min",
+        "unplugged",
+        "decay-2",
+        "Repeats",
+    ):
+        assert expected in page.text
 
 
 def clipped_series() -> PatchReport:
@@ -212,10 +255,10 @@ def test_a_missing_fit_is_warned_of_once(tmp_path: Path) -> None:
     assert "1 warning" in page.text
 
 
-def test_eleven_patches(tmp_path: Path) -> None:
-    patches = [patch(decay_series(seed=n, name=f"paint {n}")) for n in range(11)]
+def test_many_patches(tmp_path: Path) -> None:
+    patches = [patch(decay_series(seed=n, name=f"paint {n}")) for n in range(5)]
     page = Page(written(tmp_path, run_report(tmp_path, patches)))
-    for number in range(1, 12):
+    for number in range(1, 6):
         assert f"patch-{number}" in page.ids
         assert any(one.startswith(f"overview-{number}-") for one in page.ids)
         assert page.text.count(f"paint {number - 1}") >= 3

@@ -1,5 +1,8 @@
 """The simulated camera's curves differ from the shipped ones as laboratories do."""
 
+import json
+from pathlib import Path
+
 import numpy as np
 import pytest
 
@@ -25,9 +28,31 @@ def test_curves_are_bent_by_2_to_6_percent(seed: int) -> None:
     assert np.abs(np.diff(difference, 2, axis=1)).max() < 0.015
 
 
+def test_a_smooth_difference_is_made_strong_enough() -> None:
+    """Seed 282 draws one so flat that it hardly bends the curves."""
+    true = measured_curves().sensitivity
+    bent = bent_curves(np.random.default_rng(282)).sensitivity
+    seen = (WAVELENGTH_NM > 400) & (WAVELENGTH_NM < 700)
+    difference = ((bent - true) / true.max(axis=1, keepdims=True))[:, seen]
+    assert np.all(np.sqrt((difference**2).mean(axis=1)) > 0.02)
+
+
 def test_shipped_curves_peak_where_the_camera_does() -> None:
     peaks_nm = WAVELENGTH_NM[measured_curves().sensitivity.argmax(axis=1)]
     assert peaks_nm == pytest.approx([600, 520, 460], abs=15)
+
+
+def test_a_camera_of_another_laboratory(tmp_path: Path) -> None:
+    curves = {str(nm): [max(0.0, 1 - abs(nm - peak) / 90) for peak in (610, 540, 450)]
+              for nm in range(400, 701, 10)}  # fmt: skip
+    path = tmp_path / "own.json"
+    path.write_text(json.dumps({"spectral_data": {"data": {"main": curves}}}))
+    own = measured_curves(str(path)).sensitivity
+    assert WAVELENGTH_NM[own.argmax(axis=1)] == pytest.approx([610, 540, 450], abs=3)
+    assert not own[:, WAVELENGTH_NM > 700].any(), "not measured there"
+    path.write_text('{"spectral_data": {"data": {"main": {"400": [1, 2]}}}}')
+    with pytest.raises(UsageError, match="expected camera curves in rawtoaces' format"):
+        measured_curves(str(path))
 
 
 def test_bands_are_joined_smoothly() -> None:

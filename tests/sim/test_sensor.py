@@ -105,3 +105,34 @@ def test_sensor_warms_by_itself_and_by_exposing() -> None:
 def test_noise_belongs_to_the_frame(steady: Sensor) -> None:
     assert np.array_equal(exposed(steady, 100.0, 1), exposed(steady, 100.0, 1))
     assert not np.array_equal(exposed(steady, 100.0, 1), exposed(steady, 100.0, 2))
+
+
+def test_crosstalk_keeps_the_light_and_shares_the_noise() -> None:
+    sensor = Sensor(np.random.default_rng(5), np.ones(SHAPE), flicker=0.0, crosstalk=0.05)
+    one, two = (exposed(sensor, 9000.0, i).astype(float) for i in (1, 2))
+    assert one.mean() - BLACK_DN == pytest.approx(9000 / gain_electrons_per_dn(400), rel=0.002)
+    noise = (one - two) / np.sqrt(2)
+    correlation = np.mean(noise[:, 1:] * noise[:, :-1]) / noise.var()
+    # Kernel 0.8 in the middle, 0.05 around: (2 · 0.8 · 0.05) / (0.8² + 4 · 0.05²).
+    assert correlation == pytest.approx(0.08 / 0.65, abs=0.02)
+
+
+def test_crosstalk_reaches_the_neighbours_of_a_point() -> None:
+    sensor = Sensor(np.random.default_rng(5), np.ones(SHAPE), flicker=0.0, crosstalk=0.05)
+    light = np.zeros(SHAPE, dtype=np.float32)
+    light[100, 150] = 10_000.0
+    mosaic = sensor.expose(light, 0.01, 400, COOL_C, np.random.default_rng(1)).astype(float)
+    signal = (mosaic - BLACK_DN) * gain_electrons_per_dn(400)
+    assert signal[100, 150] == pytest.approx(8000, rel=0.05)
+    for row, column in ((99, 150), (101, 150), (100, 149), (100, 151)):
+        assert signal[row, column] == pytest.approx(500, abs=50)
+    assert abs(signal[99, 149]) < 50
+
+
+def test_rows_share_the_noise_of_their_readout() -> None:
+    sensor = Sensor(np.random.default_rng(5), np.ones(SHAPE), flicker=0.0, row_noise=0.5)
+    one, two = (exposed(sensor, 0.0, i, 400).astype(float) for i in (1, 2))
+    difference = (one - two) / np.sqrt(2)
+    read_dn = read_noise_electrons(400) / gain_electrons_per_dn(400)
+    assert difference.mean(axis=1).std() == pytest.approx(0.5 * read_dn, rel=0.2)
+    assert difference.mean(axis=0).std() == pytest.approx(read_dn / np.sqrt(SHAPE[0]), rel=0.2)

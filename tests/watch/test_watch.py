@@ -20,7 +20,7 @@ from labrig.cli.progress import thumbnail
 from labrig.errors import UsageError
 from labrig.record import read_run
 from labrig.report.pictures import jpeg
-from labrig.watch import Following
+from labrig.watch.following import Following
 from labrig.watch.glances import Glances
 from labrig.watch.server import News, WatchServer
 from labrig.yaml_file import read_yaml, yaml_text

@@ -31,7 +31,8 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     )
     weights_sigma = weight_sigma(joint, own)
     residuals = np.empty_like(series.values)
-    residuals[series.order] = series.values - fit.signal(series) - joint.offsets
+    left = series.values - fit.signal(series) - joint.offsets
+    residuals[series.order] = left * series.frame_levels
     brightest = [*range(2 * fit.n_states), 2 * fit.n_states + int(np.argmax(joint.weights))]
     normalised = np.empty_like(series.values)
     n_values = series.values.size
@@ -45,6 +46,8 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         channel_weights_sigma=tuple(weights_sigma.tolist()),
         offsets=tuple((joint.offsets * series.peak).tolist()),
         offsets_sigma=tuple(sigma[2 * fit.n_states :].tolist()),
+        repeats=series.repeats,
+        levels=tuple(series.levels.tolist()),
         flicker=evidence.noise.flicker,
         flicker_sigma=evidence.noise.flicker_sigma,
         chi2=joint.chi2,

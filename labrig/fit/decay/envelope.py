@@ -31,6 +31,8 @@ MOST_FLICKER = 0.1
 ALTERNATIONS = 5
 ALTERNATIONS_IF_GIVEN = 2
 FLICKER_ITERATIONS = 12
+#: All frames' signal in σ below which it is nothing but noise.
+LEAST_BRIGHTNESS = 4.0
 #: Share of the bright frames' information that the curve must leave to the flicker.
 LEAST_SPARE = 1e-6
 #: Scale of what is known of any flicker beforehand, a half-Cauchy distribution (A. Gelman, Bayesian
@@ -49,6 +51,8 @@ class Envelope:
 
     Attributes
     ----------
+    series
+        What it is of, with the repeats of a decay brought to the same level.
     signal
         (n, C) without offset.
     weights
@@ -66,6 +70,7 @@ class Envelope:
         Scatter in units of σ; 1 unless σ was not given.
     """
 
+    series: DecaySeries
     signal: FloatArray
     weights: FloatArray
     offsets: FloatArray
@@ -77,9 +82,9 @@ class Envelope:
 
 
 def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
-    """Curve, channel weights and, if `flicker` is None, the flicker; by turns.
+    """Curve, channel weights, levels of the repeats and, if `flicker` is None, it; by turns.
 
-    One channel with noise given needs none of these: the envelope is then flat.
+    One channel of one decay with noise given needs none of these: the envelope is then flat.
 
     Raises
     ------
@@ -89,8 +94,10 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     weights = _first_weights(series)
     offsets = np.zeros_like(weights)
     signal = np.zeros_like(series.values)
-    if len(weights) == 1 and flicker == 0 and series.sigma_given:
-        return Envelope(signal, weights, offsets, series.n_frames, 0.0, 0.0, np.zeros(1), 1.0)
+    lone = len(weights) == len(series.repeats) == 1
+    if lone and flicker == 0 and series.sigma_given:
+        n_frames = series.n_frames
+        return Envelope(series, signal, weights, offsets, n_frames, 0.0, 0.0, np.zeros(1), 1.0)
     rho, rho_sigma, noise_scale = 0.0, 0.0, 1.0
     likely = np.array([flicker or 0.0])
     for _ in range(ALTERNATIONS if flicker is None else ALTERNATIONS_IF_GIVEN):
@@ -99,8 +106,11 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
         dof = max(series.n_frames - float(leverage.sum()), 1.0)
         if len(weights) > 1:
             weights, curve = _channel_weights(data, curve, offsets)
+        if len(series.repeats) > 1:
+            series = series.relevelled(_gains(data, curve, weights, offsets))
         signal = np.multiply.outer(curve, weights)
-        if not signal.any():
+        brightness = float(np.linalg.norm(signal * series.inverse_sigma))
+        if brightness == 0 or (series.sigma_given and brightness < LEAST_BRIGHTNESS):
             raise FitError(NO_DECAY)
         if flicker is None:
             rho, rho_sigma, dof, likely = _flicker(series, signal, offsets, leverage)
@@ -109,7 +119,7 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     if not series.sigma_given:
         left = series.inverse_sigma * (series.values - signal - offsets)
         noise_scale = float(np.sqrt((left**2).sum() / dof))
-    return Envelope(signal, weights, offsets, dof, rho, rho_sigma, likely, noise_scale)
+    return Envelope(series, signal, weights, offsets, dof, rho, rho_sigma, likely, noise_scale)
 
 
 def _first_weights(series: DecaySeries) -> FloatArray:
@@ -157,6 +167,24 @@ def _channel_weights(
     if brightest == 0:
         return np.ones_like(weights), curve
     return weights / brightest, curve * brightest
+
+
+def _gains(
+    data: WhitenedSeries, curve: FloatArray, weights: FloatArray, offsets: FloatArray
+) -> FloatArray:
+    """What the values after each charge are to be divided by to follow one curve, mean level 1.
+
+    A lamp that ages or a sample that is warmer charges to another level, yet decays alike. Taken
+    for noise of the frames, the difference would be a flicker that there is not.
+    """
+    series = data.series
+    model = data.constant(weights) * curve[:, None]
+    seen = (model * (data.values - data.constant(offsets))).sum(axis=1)
+    gains = np.bincount(series.repeat, seen) / np.maximum(
+        np.bincount(series.repeat, (model**2).sum(axis=1)), np.finfo(float).tiny
+    )
+    levels = series.levels * np.where(gains > 0, gains, 1.0)
+    return np.asarray(levels / levels.mean() / series.levels)
 
 
 def _flicker(

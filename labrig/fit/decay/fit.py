@@ -39,6 +39,7 @@ def fit_decay(
     offset_sigma: ArrayLike = 0.0,
     flicker: float | None = 0.0,
     fixed_rates: Sequence[float] = (),
+    repeats: Sequence[str] | None = None,
 ) -> DecayFit:
     """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al. sec. 4.4).
 
@@ -71,17 +72,21 @@ def fit_decay(
         the frames about the best monotone curve, whatever the number of states.
     fixed_rates
         Rates in 1/s that take part and are held; they count as states.
+    repeats
+        (n,) name of the charge that each frame follows: all decay alike, each from a level of its
+        own. None: there was one.
 
     Raises
     ------
     FitError
         Data from which no decay can be had.
     """
-    series = decay_series(t_s, values, sigma, exposure_s, channels, offset_sigma)
+    series = decay_series(t_s, values, sigma, exposure_s, channels, offset_sigma, repeats)
     fixed = _log_rates(fixed_rates, series.span_s)
     numbers = _numbers_of_states(series, n_states, max_states, len(fixed))
     _check_flicker(series, flicker)
     smooth = envelope(series, flicker)
+    series = smooth.series
     if not series.sigma_given:
         scale = max(smooth.noise_scale, EXACT)
         series = replace(series, inverse_sigma=series.inverse_sigma / scale)

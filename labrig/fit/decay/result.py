@@ -46,6 +46,8 @@ class DecayFit:
         Names, weights (maximum 1, which is held), their σ.
     offsets, offsets_sigma
         Of the channels, in the values' units; σ 0 if held at 0.
+    repeats, levels
+        Names of the charges, and how bright the decay after each was over their mean.
     flicker, flicker_sigma
         Relative noise common to the channels of a frame; σ 0 if given.
     chi2, dof
@@ -74,6 +76,8 @@ class DecayFit:
     channel_weights_sigma: tuple[float, ...]
     offsets: tuple[float, ...]
     offsets_sigma: tuple[float, ...]
+    repeats: tuple[str, ...]
+    levels: tuple[float, ...]
     flicker: float
     flicker_sigma: float
     chi2: float
@@ -151,6 +155,7 @@ class DecayFit:
             "offset_sigma": self.offset_sigma,
             "offsets": self._by_channel(self.offsets),
             "offsets_sigma": self._by_channel(self.offsets_sigma),
+            "levels": dict(zip(self.repeats, self.levels, strict=True)),
             "flicker": self.flicker,
             "flicker_sigma": self.flicker_sigma,
             "chi2": self.chi2,
@@ -180,6 +185,9 @@ class DecayFit:
         lines.append(f"weights  {self._written(self.channel_weights, self.channel_weights_sigma)}")
         if any(self.offsets_sigma):
             lines.append(f"offsets  {self._written(self.offsets, self.offsets_sigma)}")
+        if len(self.repeats) > 1:
+            pairs = zip(self.repeats, self.levels, strict=True)
+            lines.append(f"levels   {', '.join(f'{name} {level:.4f}' for name, level in pairs)}")
         if self.flicker or self.flicker_sigma:
             percent = with_uncertainty(100 * self.flicker, 100 * self.flicker_sigma)
             lines.append(f"flicker  {percent} %")

@@ -1,7 +1,7 @@
 """A decay as measured, checked and brought to order 1."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -40,8 +40,10 @@ class DecaySeries:
         What times and values were divided by.
     order
         (n,) the frames as given, by rising time.
-    channels
-        C names.
+    repeat, levels
+        (n,) number of the charge a frame follows, (r,) what the values after each were divided by.
+    channels, repeats
+        C and r names.
     sigma_given
         False if σ is a scale still to be estimated.
     """
@@ -55,7 +57,10 @@ class DecaySeries:
     span_s: float
     peak: float
     order: NDArray[np.intp]
+    repeat: NDArray[np.intp]
+    levels: FloatArray
     channels: tuple[str, ...]
+    repeats: tuple[str, ...]
     sigma_given: bool
 
     @property
@@ -67,6 +72,21 @@ class DecaySeries:
     def n_values(self) -> int:
         """Values measured."""
         return int(np.count_nonzero(self.inverse_sigma))
+
+    @property
+    def frame_levels(self) -> FloatArray:
+        """(n, 1) what the values of each frame were divided by."""
+        return self.levels[self.repeat][:, None]
+
+    def relevelled(self, gains: FloatArray) -> "DecaySeries":
+        """With the values after each charge divided by their gain (r,) > 0."""
+        of_frame = gains[self.repeat][:, None]
+        return replace(
+            self,
+            values=self.values / of_frame,
+            inverse_sigma=self.inverse_sigma * of_frame,
+            levels=self.levels * gains,
+        )
 
     @property
     def fitted_offsets(self) -> NDArray[np.intp]:
@@ -91,6 +111,7 @@ def decay_series(
     exposure_s: ArrayLike,
     channels: Sequence[str],
     offset_sigma: ArrayLike,
+    repeats: Sequence[str] | None = None,
 ) -> DecaySeries:
     """Check, sort and scale; arguments as `labrig.fit.decay.fit_decay` takes them.
 
@@ -110,6 +131,10 @@ def decay_series(
             f"expected values of {len(t)} frames in {len(names)} channel(s) "
             f"({', '.join(names)}), got shape {np.shape(values)}; give one row per frame"
         )
+    of_frame = [""] * len(t) if repeats is None else list(repeats)
+    if len(of_frame) != len(t):
+        raise FitError(f"expected {len(t)} repeats, got {len(of_frame)}; give one per frame")
+    repeat_names = tuple(dict.fromkeys(of_frame))
     inverse_sigma = _inverse_sigma(sigma, y)
     prior_sigma = _prior_sigma(offset_sigma, len(names))
     measured = inverse_sigma > 0
@@ -150,7 +175,10 @@ def decay_series(
         span_s=span,
         peak=peak,
         order=order,
+        repeat=np.array([repeat_names.index(name) for name in of_frame])[order],
+        levels=np.ones(len(repeat_names)),
         channels=names,
+        repeats=repeat_names,
         sigma_given=sigma is not None,
     )
 

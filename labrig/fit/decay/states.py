@@ -61,9 +61,10 @@ class StatesFit:
         return np.concatenate([shape[1 : 2 * self.n_free : 2], shape[2 * self.n_free :]])
 
     def dof(self, data: WhitenedSeries) -> int:
-        """Values measured, and the offsets' priors, minus parameters."""
+        """Values measured, and the offsets' priors, minus parameters and levels of repeats."""
         n_priors = len(data.target) - data.values.size
-        return data.series.n_values + n_priors - self.joint.n_parameters
+        n_levels = len(data.series.repeats) - 1
+        return data.series.n_values + n_priors - self.joint.n_parameters - n_levels
 
     def covariance_under(self, data: WhitenedSeries) -> FloatArray:
         """Of the parameters of `joint`, if the noise is as in `data`."""

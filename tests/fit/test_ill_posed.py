@@ -1,0 +1,129 @@
+"""Data from which no decay, or not the one asked for, can be had: one line says so."""
+
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass, field
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from tests.conftest import Ended
+from tests.fit import truths
+
+Labrig = Callable[..., Ended]
+
+T = truths.TIMES_S
+NOISE = np.random.default_rng(3).normal(size=len(T))
+DECAY = 100 * np.exp(-0.02 * T)
+
+
+def with_frame(row: int, value: float) -> truths.FloatArray:
+    """A decay in which one frame was disturbed."""
+    return np.where(np.arange(len(T)) == row, value, DECAY + 0.3 * NOISE)
+
+
+@dataclass(frozen=True)
+class Case:
+    """A table, what is asked, and what is said."""
+
+    name: str
+    values: truths.FloatArray
+    sigma: float
+    said: str
+    options: Sequence[str] = ()
+    t_s: truths.FloatArray = field(default_factory=T.copy)
+
+
+REFUSED = [
+    Case("all zeros", 0 * T, 1.0, "expected a positive signal"),
+    Case("all below zero", -DECAY, 1.0, "expected a positive signal"),
+    Case("noise", NOISE, 1.0, "did the lamp light"),
+    Case("constant", 100 + NOISE, 1.0, "constant within its noise for 180 s"),
+    Case("rising", 100 + T / 2 + NOISE, 1.0, "got one that rises"),
+    Case("one point", DECAY[:1], 1.0, "times of two or more frames", (), T[:1]),
+    Case(
+        "too few for what is asked",
+        DECAY[:3],
+        1.0,
+        "at least 4 frames for 2 state(s), got 3",
+        ("--states", "2"),
+        T[:3],
+    ),
+    Case("NaN", with_frame(5, np.nan), 1.0, "line 7: expected a finite number for 'value'"),
+    Case("infinity", with_frame(5, np.inf), 1.0, "line 7: expected a finite number for 'value'"),
+    Case("NaN in time", DECAY, 1.0, "finite number for 't_s'", (), np.where(T > 60, np.nan, T)),
+]
+WARNED = [
+    Case(
+        "two rates as good as one",
+        100 * np.exp(-0.022 * T) + 100 * np.exp(-0.018 * T) + 0.3 * NOISE,
+        0.3,
+        "k1 and k2 cannot be told apart: ask for one state fewer",
+        ("--states", "2"),
+    ),
+    Case(
+        "slow rate that could be zero",
+        100 * np.exp(-0.05 * T) + 5 * np.exp(-0.0005 * T) + 0.3 * NOISE,
+        0.3,
+        "% only: record longer",
+    ),
+    Case(
+        "longer than recorded",
+        100 * np.exp(-0.002 * T) + 0.3 * NOISE,
+        0.3,
+        "longer than the 180 s recorded",
+    ),
+    Case(
+        "as many parameters as points",
+        DECAY[:2],
+        1.0,
+        "no more values than parameters",
+        (),
+        T[:2],
+    ),
+    Case(
+        "too much subtracted",
+        100 * np.exp(-0.05 * T) - 20 + NOISE,
+        1.0,
+        "falls below zero, by",
+    ),
+    Case("a flash", with_frame(15, 104.0), 0.3, "the frame at 75.3 s lies"),
+    Case("a frame in the dark", with_frame(20, 0.0), 0.3, "the frame at 100.3 s lies"),
+    Case("a disturbed tail", with_frame(34, 8.0), 0.3, "the frame at 170.3 s lies"),
+]
+
+
+def fitted(labrig: Labrig, folder: Path, case: Case, *options: str) -> Ended:
+    rows = [f"{t},{value},{case.sigma}" for t, value in zip(case.t_s, case.values, strict=True)]
+    (folder / "decay.csv").write_text("\n".join(["t_s,value,sigma", *rows]) + "\n")
+    return labrig("fit", "decay", folder / "decay.csv", *case.options, *options)
+
+
+@pytest.mark.parametrize("flicker", ["auto", "0"])
+@pytest.mark.parametrize("case", REFUSED, ids=lambda case: case.name)
+def test_what_is_no_decay_is_refused_in_one_line(
+    labrig: Labrig, tmp_path: Path, case: Case, flicker: str
+) -> None:
+    ended = fitted(labrig, tmp_path, case, "--flicker", flicker)
+    assert ended.code == 4
+    assert ended.out == ""
+    assert len(ended.err.splitlines()) == 1
+    assert case.said in ended.err
+
+
+@pytest.mark.parametrize("flicker", ["auto", "0"])
+@pytest.mark.parametrize("case", WARNED, ids=lambda case: case.name)
+def test_what_the_data_do_not_hold_is_said(
+    labrig: Labrig, tmp_path: Path, case: Case, flicker: str
+) -> None:
+    ended = fitted(labrig, tmp_path, case, "--flicker", flicker)
+    assert ended.code == 0, ended.err
+    warnings = [line for line in ended.out.splitlines() if line.startswith("! ")]
+    assert sum(case.said in line for line in warnings) == 1, warnings
+    assert not any("frames scatter" in line for line in warnings), "of one cause, one warning"
+
+
+def test_a_good_decay_is_not_complained_about(labrig: Labrig, tmp_path: Path) -> None:
+    ended = fitted(labrig, tmp_path, Case("good", DECAY + 0.3 * NOISE, 0.3, ""))
+    assert ended.code == 0
+    assert "!" not in ended.out
