@@ -19,6 +19,9 @@ Make = Callable[..., Path]
 EXPONENTIAL = [name for name in shipped.names("config/materials") if name != "power-law"]
 #: Small, yet large enough that flicker and not the pixels' noise rules, as on a real sensor.
 SENSOR = {"width": 384, "height": 256}
+#: Of 45 comparisons: at 3 σ every fifth change of the room's random numbers would fail one. How
+#: often rates are within 1 and 2 σ: `python -m tests.acceptance.coverage_pipeline`.
+MOST_SIGMAS = 4.5
 TABLE_1 = [name for name in EXPONENTIAL if not name.startswith("double-")]
 
 
@@ -34,15 +37,15 @@ def measured(labrig: Labrig, tmp_path: Path, rig: Path, protocol: str) -> Path:
 
 
 @pytest.mark.parametrize("name", EXPONENTIAL)
-def test_every_rate_is_within_3_sigma_and_the_states_are_as_many_as_there_are(
+def test_every_rate_is_within_its_sigma_and_the_states_are_as_many_as_there_are(
     labrig: Labrig, make_rig: Make, tmp_path: Path, name: str
 ) -> None:
     fit = fit_of(measured(labrig, tmp_path, make_rig(sample=name, sensor=SENSOR), "decay"))
     true = sorted((state.k_r_per_s for state in read_material(name).states), reverse=True)
     assert fit["n_states"] == len(true)
     for state, k_r_per_s in zip(fit["states"], true, strict=True):
-        assert abs(state["k_r_per_s"] - k_r_per_s) < 3 * state["k_r_sigma_per_s"]
-        assert state["k_r_sigma_per_s"] < 0.15 * k_r_per_s, "3 σ of nothing prove nothing"
+        assert abs(state["k_r_per_s"] - k_r_per_s) < MOST_SIGMAS * state["k_r_sigma_per_s"]
+        assert state["k_r_sigma_per_s"] < 0.1 * k_r_per_s, "a σ of nothing proves nothing"
 
 
 def test_a_power_law_is_flagged(labrig: Labrig, make_rig: Make, tmp_path: Path) -> None:
@@ -63,5 +66,6 @@ def test_eleven_patches_in_one_charge_give_the_rates_of_one_by_one(
         (one,), (other,) = fit_of(alone)["states"], fit_of(together, name)["states"]
         (true,) = read_material(name).states
         sigma = (one["k_r_sigma_per_s"] ** 2 + other["k_r_sigma_per_s"] ** 2) ** 0.5
-        assert abs(one["k_r_per_s"] - other["k_r_per_s"]) < 3 * sigma, name
-        assert abs(other["k_r_per_s"] - true.k_r_per_s) < 3 * other["k_r_sigma_per_s"], name
+        assert abs(one["k_r_per_s"] - other["k_r_per_s"]) < MOST_SIGMAS * sigma, name
+        error = abs(other["k_r_per_s"] - true.k_r_per_s)
+        assert error < MOST_SIGMAS * other["k_r_sigma_per_s"], name
