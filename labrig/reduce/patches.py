@@ -10,7 +10,7 @@ import numpy as np
 
 from labrig.errors import DataError
 from labrig.reduce.channels import FrameMeasurement, measure
-from labrig.reduce.dark import SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
+from labrig.reduce.dark import HOT_FRAMES, SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
 from labrig.reduce.noise import Floats
 from labrig.reduce.pairs import paired_sigma, strip_deviations
 from labrig.reduce.planes import PixelMask
@@ -123,20 +123,22 @@ def reduce_patches(
     """
     if not frames or not patches:
         raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
-    hot = _hot(darks)
-    shots = _shots(frames, patches, background, hot)
+    longest = _read_longest(darks)
+    hot = hot_pixels(list(longest.values())) if longest else None
+    models = {} if background else _dark_models(darks, patches, hot, longest)
+    longest.clear()  # five frames of 42 MB that nobody needs any more
+    shots = _shots(frames, patches, background, hot, {})
     _check_settings(shots)
-    models = {} if background else _dark_models(darks, patches, hot)
     return {name: _patch_series(name, shots, models) for name in patches}
 
 
-def _hot(darks: Sequence[SeriesFrame]) -> PixelMask | None:
-    """Hot pixels in the longest darks, if they are enough to tell."""
+def _read_longest(darks: Sequence[SeriesFrame]) -> dict[Path, RawFrame]:
+    """Some of the longest darks; none if they are too few to tell hot pixels."""
     longest_s = max((dark.exposure_s for dark in darks), default=0.0)
     longest = [dark for dark in darks if dark.exposure_s >= longest_s * (1 - SAME_EXPOSURE)]
-    if len(longest) < 2:
-        return None
-    return hot_pixels([read_raw(dark.path) for dark in longest[:_DARKS_FOR_HOT]])
+    if len(longest) < HOT_FRAMES:
+        return {}
+    return {dark.path: read_raw(dark.path) for dark in longest[:_DARKS_FOR_HOT]}
 
 
 def _shots(
@@ -144,21 +146,27 @@ def _shots(
     patches: Mapping[str, Region],
     background: Region | None,
     hot: PixelMask | None,
+    read: Mapping[Path, RawFrame],
 ) -> list[_Shot]:
-    """All `frames` in order; one is decoded while another is measured."""
+    """All `frames` in order; one is decoded, unless it is `read`, while another is measured."""
+
+    def shot(frame: SeriesFrame) -> _Shot:
+        raw = read.get(frame.path) or read_raw(frame.path)
+        return _shot(frame, raw, patches, background, hot)
+
     with ThreadPoolExecutor(_FRAMES_AT_ONCE) as pool:
-        return list(pool.map(lambda frame: _shot(frame, patches, background, hot), frames))
+        return list(pool.map(shot, frames))
 
 
 def _shot(
     frame: SeriesFrame,
+    raw: RawFrame,
     patches: Mapping[str, Region],
     background: Region | None,
     hot: PixelMask | None,
 ) -> _Shot:
     if not frame.exposure_s > 0:
         raise DataError(f"{frame.path}: expected an exposure above 0 s, got {frame.exposure_s}")
-    raw = read_raw(frame.path)
     return _Shot(
         frame,
         {name: _view(raw, region, hot, frame.path) for name, region in patches.items()},
@@ -174,11 +182,14 @@ def _view(raw: RawFrame, region: Region, hot: PixelMask | None, path: Path) -> _
 
 
 def _dark_models(
-    darks: Sequence[SeriesFrame], patches: Mapping[str, Region], hot: PixelMask | None
+    darks: Sequence[SeriesFrame],
+    patches: Mapping[str, Region],
+    hot: PixelMask | None,
+    read: Mapping[Path, RawFrame],
 ) -> dict[tuple[str, float], DarkModel]:
     """Dark level by patch and ISO."""
     by_iso: dict[float, list[_Shot]] = defaultdict(list)
-    for shot in _shots(darks, patches, None, hot):
+    for shot in _shots(darks, patches, None, hot, read):
         by_iso[_key(shot.iso)].append(shot)
     return {
         (name, iso): fit_dark(

@@ -64,7 +64,7 @@ def quality_rows(fit: DecayFit) -> list[Row]:
         ]
     else:
         rows.append(Row("Offset", "DN/s", (plus_minus(fit.offset, fit.offset_sigma),)))
-    if several:
+    if several or fit.flicker > 0:
         flicker = plus_minus(100 * fit.flicker, 100 * fit.flicker_sigma)
         rows.append(Row("Flicker of a frame", "%", (flicker,)))
     chi2 = f"{rounded(fit.reduced_chi2, 3)} ({fit.dof} dof)"

@@ -1,11 +1,10 @@
 """Ratios of labrig to its peers, measured turn by turn in one run; no time is ever asserted.
 
-    pytest tests/benchmarks --benchmark-only -n 0
+    pytest tests/benchmarks -n 0 --benchmark-only
 
 prints pytest-benchmark's own table and, below it, one line for each peer.
 """
 
-import gc
 import os
 import statistics
 import time
@@ -71,7 +70,6 @@ def against(benchmark: Any, request: pytest.FixtureRequest) -> Callable[..., Non
             contenders[name]()  # imports, caches, plans
         for _ in range(rounds):
             for name, run in contenders.items():
-                gc.collect()
                 began_s = time.perf_counter()
                 run()
                 times_s[name].append((time.perf_counter() - began_s) / each)

@@ -105,10 +105,15 @@ def places(content: Any, above: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...
 ODD: tuple[object, ...] = (None, "x", -1, math.inf, math.nan, 1e300, [], {}, True)
 
 
+@pytest.fixture(scope="module")
+def edited_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return Path(shutil.copytree(FROZEN, tmp_path_factory.mktemp("edited") / "run"))
+
+
 @settings(max_examples=150)
 @given(data=st.data())
 def test_an_edited_journal_is_one_line_or_still_makes_sense(
-    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+    edited_run: Path, data: st.DataObject
 ) -> None:
     number = data.draw(st.integers(0, len(LINES) - 1))
     document = json.loads(LINES[number])
@@ -120,12 +125,11 @@ def test_an_edited_journal_is_one_line_or_still_makes_sense(
         del inner[key]
     else:
         inner[key] = data.draw(st.sampled_from(ODD))
-    run = tmp_path_factory.mktemp("run")
-    (run / "frames").symlink_to(FROZEN / "frames")
+    lines = [*LINES[:number], json.dumps(document), *LINES[number + 1 :]]
     try:
-        frames = frames_of(run, [*LINES[:number], json.dumps(document), *LINES[number + 1 :]])
+        frames = frames_of(edited_run, lines)
     except LabrigError as error:
-        assert str(run) in str(error)
+        assert str(edited_run) in str(error)
         assert "\n" not in str(error)
     else:
         assert all(math.isfinite(frame.t_s) for frame in frames.decay)
