@@ -9,10 +9,11 @@ from .vocabulary import EosEvent, ObjectFormat, Operation, PtpProperty, Response
 _STILL_CAMERA = 1
 _MODEL = "Canon EOS 5D Mark II"
 _CANON = 0xB
-#: What an open shutter leaves answerable: being asked, and by the standard being identified.
-_WHILE_EXPOSING = frozenset({Operation.EOS_GET_EVENT, Operation.GET_DEVICE_INFO})
-#: And what ends a bulb exposure.
-_WHILE_BULB = frozenset({Operation.EOS_REMOTE_RELEASE_OFF, Operation.EOS_BULB_END})
+#: What an open shutter leaves answerable: being asked, by the standard being identified, and the
+#: finger off the button, which libgphoto2's trigger takes for granted at any EOS.
+_WHILE_EXPOSING = frozenset(
+    {Operation.EOS_GET_EVENT, Operation.GET_DEVICE_INFO, Operation.EOS_REMOTE_RELEASE_OFF}
+)
 
 
 def _text(data: bytes) -> str | None:
@@ -72,7 +73,7 @@ class EosOperations:
         """Whether this operation has to wait for the end of an exposure."""
         if not self._body.is_exposing or opcode in _WHILE_EXPOSING:
             return False
-        return not (self._body.bulb_is_open and opcode in _WHILE_BULB)
+        return not (self._body.bulb_is_open and opcode == Operation.EOS_BULB_END)
 
     def forget_host(self) -> None:
         """The session is over."""
