@@ -11,7 +11,7 @@ from labrig.errors import DeviceError, DeviceLostError
 from .address import port_path
 from .checks import findings
 from .exposure import Exposure
-from .failures import BusyError
+from .failures import BusyError, PerhapsReleasedError
 from .frames import Frames
 from .library import POLL_PERIOD_S, Library
 from .preparation import prepare
@@ -23,6 +23,8 @@ from .settings import Gphoto2CameraSettings
 VIEWFINDER = "viewfinder"
 #: Busy at the full press is common; a frame later than so much belongs to no decay.
 LATE_PRESS_S = 3.0
+#: So often a release of which nobody knows whether it happened; what comes of it is passed over.
+_UNSURE_TRIES = 3
 
 
 class Gphoto2Camera:
@@ -248,6 +250,7 @@ class Gphoto2Camera:
     def _press(self, exposure_s: float) -> float:
         """Clock time at which the exposure began."""
         deadline_s = self._clock.now() + LATE_PRESS_S
+        tries_left = _UNSURE_TRIES
         while True:
             # should it be broken off, nobody knows whether it has begun: assume so
             self._frames.expect(self._clock.now() + LATE_PRESS_S + exposure_s)
@@ -258,6 +261,11 @@ class Gphoto2Camera:
                 if self._clock.now() >= deadline_s:
                     raise
                 self._clock.sleep(POLL_PERIOD_S)
+            except PerhapsReleasedError:
+                tries_left -= 1
+                if not tries_left:
+                    raise
+                self._frames.discard_abandoned()
             else:
                 return (obeyed.begin_s + obeyed.end_s) / 2 + self._settings.shutter_lag
 

@@ -25,6 +25,10 @@ class BusyError(DeviceError):
     """The camera is not ready yet."""
 
 
+class PerhapsReleasedError(DeviceError):
+    """The camera was busy before its release, or after it: nobody knows."""
+
+
 class UnspecifiedError(DeviceError):
     """Anything: also what is said first when the line breaks."""
 

@@ -3,9 +3,9 @@
 from typing import Protocol
 
 from labrig.clock import Clock
-from labrig.errors import DeviceError, UsageError
+from labrig.errors import UsageError
 
-from .failures import BusyError
+from .failures import BusyError, PerhapsReleasedError
 from .library import POLL_PERIOD_S, RELEASE_S, Library, Span
 
 #: Canon EOS alone have it.
@@ -32,7 +32,7 @@ class Release(Protocol):
         ------
         BusyError
             No exposure has begun.
-        DeviceError
+        PerhapsReleasedError
             Nobody knows whether one has.
         """
 
@@ -111,7 +111,7 @@ class TriggerRelease:
             called = self._library.trigger(exposure_s)
         except BusyError as busy:
             # it may be the letting go that was refused, after the release
-            raise DeviceError(str(busy)) from None
+            raise PerhapsReleasedError(str(busy)) from None
         if "canon" in self._maker:  # waits for the lens, presses, returns
             return Span(called.end_s, called.end_s)
         if "nikon" in self._maker:  # presses, waits for the end of the exposure

@@ -154,10 +154,17 @@ def test_busy_may_mean_that_it_has_released_all_the_same(toy: ToyBench) -> None:
     described = {"files": [NEF, second], "busy": 1}
     with toy.connected({}, described, clock=FastClock()) as camera:
         camera.configure(SETTINGS)
+        assert camera.shoot().data == TIFF[::-1], "the first one has no known beginning"
+        assert toy.log().count("trigger") == 2
+
+
+def test_a_camera_that_stays_busy(toy: ToyBench) -> None:
+    with toy.connected({}, {"files": [NEF] * 4, "busy": 3}, clock=FastClock()) as camera:
+        camera.configure(SETTINGS)
         with pytest.raises(DeviceError, match=r"wait until its card lamp is off"):
             camera.shoot()
         camera.make_safe()
-        assert camera.shoot().data == TIFF[::-1]
+        assert camera.shoot().data == bytes.fromhex(NEF[1])
 
 
 def test_live_view_is_switched_off_again(toy: ToyBench) -> None:
