@@ -1,0 +1,194 @@
+"""Excitation rates, re-radiation rates and how far the sample was charged, from all that glowed.
+
+Nalbach et al. (sec. 4.6) fit k_e band by band with r_i(0) = 1 assumed. Here decay and excitation
+are fitted together, with nothing assumed about the level: how the charging curve bends tells how
+near it is to saturation, and so what is Λ and what is r(0).
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+
+from labrig.errors import FitError
+from labrig.fit.excitation.levels import levels_at_off
+from labrig.fit.excitation.problem import ExcitationProblem, Rates, Uncertain
+from labrig.fit.excitation.result import ExcitationFit, ExcitedState, LevelAtOff
+from labrig.fit.excitation.series import ChargingSeries, bands_of
+from labrig.fit.excitation.start import starts
+from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
+
+#: The flicker's covariance is taken from the fit so often; the second changes nothing visible.
+WHITENINGS = 2
+#: Relative step small enough, of a start and of the end.
+ROUGH, FINE = 1e-3, 1e-8
+MAX_ITERATIONS = 60
+#: Known worse than this, an amplitude is an order of magnitude.
+LEVEL_KNOWN = 0.3
+#: χ² above this says that something is not as assumed.
+LARGE_CHI2 = 1.5
+
+
+def fit_excitation(
+    series: Sequence[ChargingSeries],
+    k_r_per_s: ArrayLike,
+    shares: ArrayLike,
+    uncertain: Uncertain | None = None,
+) -> ExcitationFit:
+    """Fit all series together.
+
+    Parameters
+    ----------
+    series
+        The first one's irradiance is the E to which k_e belongs.
+    k_r_per_s, shares
+        (N,) rates to start from and each state's part of the glow, such as a decay fit found.
+    uncertain
+        What else scatters; nothing by default.
+
+    Raises
+    ------
+    FitError
+        Series that do not go together, or no glow.
+    """
+    series = [one.checked() for one in series]
+    bands_of(series)
+    uncertain = uncertain or Uncertain()
+    rates = np.asarray(k_r_per_s, dtype=np.float64)
+    reference = _brightest(series)
+    problem = ExcitationProblem(series, len(rates), reference, uncertain)
+    begin = starts(problem, rates, np.asarray(shares, dtype=np.float64), reference)
+    found = min((_least(problem, problem.pack(start), ROUGH) for start in begin), key=_chi2)
+    for _ in range(WHITENINGS):
+        problem.rewhiten(found.parameters)
+        found = _least(problem, found.parameters, FINE)
+    return _result(problem, found, reference, uncertain)
+
+
+def _brightest(series: Sequence[ChargingSeries]) -> int:
+    """Channel that says most."""
+    snr = np.zeros(series[0].values.shape[2])
+    for one in series:
+        snr += np.nansum(np.where(one.sigma > 0, one.values / one.sigma, 0.0), axis=(0, 1))
+    if not snr.max() > 0:
+        raise FitError("expected sites that glow after a charge, got none; did the lamp light?")
+    return int(np.argmax(snr))
+
+
+def _least(problem: ExcitationProblem, start: FloatArray, tolerance: float) -> LeastSquaresFit:
+    return least_squares(
+        problem.residuals,
+        start,
+        lower=problem.lower(),
+        max_iterations=MAX_ITERATIONS,
+        tolerance=tolerance,
+    )
+
+
+def _chi2(fit: LeastSquaresFit) -> float:
+    return fit.chi2
+
+
+def _result(
+    problem: ExcitationProblem, found: LeastSquaresFit, reference: int, uncertain: Uncertain
+) -> ExcitationFit:
+    n, bands = problem.states, problem.bands
+    rates, theta = problem.unpack(found.parameters), found.parameters
+    own = 2 * n + n * bands
+    scale = np.ones(len(theta))
+    scale[:n] = rates.k_r_per_s
+    covariance = found.covariance * np.outer(scale, scale)
+    whole = covariance[:own, :own].copy()
+    # E enters k_e one to one, band by band, whatever is measured.
+    for band in range(bands):
+        by_light = np.zeros(own)
+        by_light[2 * n + band :: bands] = rates.k_e_per_s[:, band]
+        whole += uncertain.irradiance**2 * np.outer(by_light, by_light)
+    sigma = np.sqrt(np.diag(whole))
+    order = np.argsort(-rates.k_r_per_s, kind="stable")
+    k_e_sigma = sigma[2 * n :].reshape(n, bands)
+    states = tuple(
+        ExcitedState(
+            float(rates.k_r_per_s[i]),
+            float(sigma[i]),
+            float(rates.amplitude[i]),
+            float(sigma[n + i]),
+            rates.k_e_per_s[i],
+            k_e_sigma[i],
+        )
+        for i in order
+    )
+    weights_sigma = np.zeros(len(rates.weights))
+    others = [c for c in range(len(rates.weights)) if c != reference]
+    weights_sigma[others] = np.sqrt(np.diag(covariance)[own : own + len(others)])
+    kept = np.concatenate(
+        [order, n + order, *(2 * n + i * bands + np.arange(bands) for i in order)]
+    )
+    at_off = _at_off(problem, rates, covariance[:own, :own], order)
+    return ExcitationFit(
+        states=states,
+        channel_weights=rates.weights,
+        channel_weights_sigma=weights_sigma,
+        at_off=at_off,
+        chi2=found.chi2,
+        dof=problem.n_values + len(problem.prior_sigma) - found.rank,
+        covariance=whole[np.ix_(kept, kept)],
+        warnings=tuple(_warnings(problem, found, states)),
+        residuals=problem.plain_residuals(theta),
+    )
+
+
+def _at_off(
+    problem: ExcitationProblem, rates: Rates, covariance: FloatArray, order: NDArray[np.intp]
+) -> tuple[LevelAtOff, ...]:
+    """The brightest lamp-off of every series, σ by linear propagation."""
+    n, bands = problem.states, problem.bands
+    found = []
+    for one in problem.lit(rates):
+        level = levels_at_off(one, rates.k_r_per_s, rates.k_e_per_s)
+        glow = level.value @ rates.amplitude
+        charge, site = np.unravel_index(int(np.argmax(glow)), glow.shape)
+        r0, a = level.value[charge, site], rates.amplitude
+        gradient = np.zeros((n, 2 * n + n * bands))
+        for i in range(n):
+            gradient[i, i] = level.by_k_r[charge, site, i]
+            gradient[i, 2 * n + i * bands : 2 * n + (i + 1) * bands] = level.by_k_e[charge, site, i]
+        amplitude_gradient = a[:, None] * gradient
+        amplitude_gradient[:, n : 2 * n] += np.diag(r0)
+        sigmas = [
+            np.sqrt(np.einsum("ij,jk,ik->i", by, covariance, by))
+            for by in (gradient, amplitude_gradient)
+        ]
+        found.append(
+            LevelAtOff(
+                one.name,
+                int(charge),
+                int(site),
+                r0[order],
+                sigmas[0][order],
+                (a * r0)[order],
+                sigmas[1][order],
+            )
+        )
+    return tuple(found)
+
+
+def _warnings(
+    problem: ExcitationProblem, found: LeastSquaresFit, states: Sequence[ExcitedState]
+) -> list[str]:
+    said = []
+    if not found.converged:
+        said.append("the fit still creeps: rates and levels may trade off; charge for longer")
+    worst = max(state.amplitude_sigma / max(state.amplitude, 1e-300) for state in states)
+    if worst > LEVEL_KNOWN:
+        said.append(
+            f"how far the sample was charged is known to {100 * worst:.0f} % only, as are Λ and "
+            "r(0): charge for longer or with more light, so that the glow stops growing"
+        )
+    reduced = found.chi2 / max(problem.n_values - found.rank, 1)
+    if reduced > LARGE_CHI2:
+        said.append(
+            f"reduced χ² is {reduced:.2g}: the rate equation or the noise is not as assumed; look "
+            "at the residuals of each charge"
+        )
+    return said

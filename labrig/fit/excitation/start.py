@@ -1,0 +1,80 @@
+"""Where the fit of an excitation starts: one state for all, charged by a few guesses."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from labrig.fit.excitation.levels import levels
+from labrig.fit.excitation.problem import ExcitationProblem, Rates
+from labrig.fit.excitation.series import ChargingSeries
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.nonnegative import nonnegative_least_squares
+
+#: Level of the brightest site: how far charging has gone is what the fit knows least at first.
+GUESSED_LEVELS = (0.05, 0.2, 0.5, 0.9)
+#: Decades of κ over k_r looked at, and how many.
+KAPPA_OVER_K_R = np.geomspace(1e-5, 1e3, 65)
+
+
+def starts(
+    problem: ExcitationProblem, k_r_per_s: FloatArray, shares: FloatArray, reference: int
+) -> Iterator[Rates]:
+    """One start per guessed level.
+
+    Parameters
+    ----------
+    k_r_per_s, shares
+        (N,) rates and what each state contributes to the glow, as a decay shows them.
+    reference
+        The brightest channel.
+    """
+    shares = shares / shares.sum()
+    peak = max(float(np.nanmax(one.values[..., reference])) for one in problem.series)
+    mean_rate = float(shares @ k_r_per_s)
+    for guess in GUESSED_LEVELS:
+        total = peak / guess
+        found = [_kappa(one, mean_rate, total, reference) for one in problem.series]
+        kappa, design = np.concatenate(found), _irradiances(problem)
+        k_e = nonnegative_least_squares(design, kappa)
+        # A state that decays faster charges no further by the same light.
+        yield Rates(
+            k_r_per_s,
+            total * shares,
+            np.outer(k_r_per_s / mean_rate, np.maximum(k_e, 1e-3 * k_e.max())),
+            _weights(problem, reference),
+            np.zeros(len(problem.series)),
+            np.zeros(sum(len(one.charges) for one in problem.series)),
+        )
+
+
+def _irradiances(problem: ExcitationProblem) -> FloatArray:
+    return np.concatenate([one.irradiance for one in problem.series])
+
+
+def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: int) -> FloatArray:
+    """(P,) κ of every site that explains its glow best, of one state of amplitude `total`."""
+    bands = series.irradiance.shape[1]
+    grid = ChargingSeries(
+        series.name,
+        series.charges,
+        series.rise,
+        series.fade,
+        np.outer(KAPPA_OVER_K_R * k_r_per_s, np.ones(bands)) / bands,
+        series.values,
+        series.sigma,
+    )
+    glow = total * levels(grid, np.array([k_r_per_s]), np.ones((1, bands))).value[..., 0]
+    values, sigma = series.values[..., reference], series.sigma[..., reference]
+    measured = np.isfinite(values) & np.isfinite(sigma)
+    weight = np.where(measured, 1 / np.where(measured, sigma, 1.0) ** 2, 0.0)
+    misfit = np.nan_to_num(values)[:, :, None] - glow[:, None, :]
+    chi2 = np.einsum("fp,fpg->pg", weight, misfit**2)
+    best: FloatArray = KAPPA_OVER_K_R[np.argmin(chi2, axis=1)] * k_r_per_s
+    return best
+
+
+def _weights(problem: ExcitationProblem, reference: int) -> FloatArray:
+    """(C,) of the channels over the reference, from all values."""
+    totals = sum(np.nansum(one.values, axis=(0, 1)) for one in problem.series)
+    weights: FloatArray = np.maximum(totals / totals[reference], 0)
+    return weights

@@ -1,0 +1,174 @@
+"""Charged samples as the simulated lamp and phosphor make them: DOP853, a cooling filament.
+
+The fit knows none of it: it is told when the lamp was switched, what irradiance each band has, and
+how the lamp fades, band by band; not that the blue of a band fades before its red.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.fit.excitation import Charge, ChargingSeries, Transient
+from labrig.material import Material, read_material
+from sim.lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
+from sim.phosphor import Phosphor, band_cells, phosphor
+from sim.simulation import LampSettings
+
+FloatArray = NDArray[np.float64]
+
+#: From lamp-off until the door stands still.
+DOOR_S = 0.6
+RISE_S: FloatArray = np.linspace(0.0, 1.0, 33)
+FADE_S: FloatArray = np.linspace(0.0, 0.5, 33)
+STEADY = filament_spectrum(BURNING_K)
+#: Channels relative to the brightest.
+WEIGHTS: FloatArray = np.array([0.3, 1.0, 0.7])
+#: Signal of a fully charged sample in the brightest channel.
+FULL = 3000.0
+
+
+def lvf_windows(centres_nm: FloatArray, fwhm_nm: float = 25.0, peak: float = 0.45) -> FloatArray:
+    """(P, 160) what a linear variable filter lets through at each place; it leaks a little."""
+    width = fwhm_nm / 2.3548
+    line: FloatArray = np.exp(-0.5 * ((WAVELENGTH_NM - centres_nm[:, None]) / width) ** 2)
+    return peak * line + 1e-4
+
+
+@dataclass
+class Bench:
+    """One material under one lamp.
+
+    Attributes
+    ----------
+    material
+        With excitation rates.
+    irradiance
+        Of the lamp, in multiples of the norm.
+    flicker
+        Of every photograph.
+    photons
+        Of a signal of 1.
+    """
+
+    material: Material
+    irradiance: float = 4.0
+    flicker: float = 0.005
+    read_noise: float = 0.3
+    photons: float = 20.0
+    lamp: LampSettings = field(default_factory=LampSettings)
+    seed: int = 1
+
+    def __post_init__(self) -> None:
+        self.random = np.random.default_rng(self.seed)
+
+    def irradiances(self, windows: FloatArray) -> FloatArray:
+        """(P, 8) E of the bands, as the material's norm has it."""
+        assert self.material.bands_nm is not None
+        assert self.material.irradiance_norm is not None
+        cells = band_cells(self.material.bands_nm)
+        scale = self.material.irradiance_norm.value / np.linalg.norm(cells @ STEADY)
+        per_band: FloatArray = self.irradiance * scale * (windows * STEADY) @ cells.T
+        return per_band
+
+    def transient(self, on: bool) -> Transient:
+        """Rise or fade as measured, band by band."""
+        assert self.material.bands_nm is not None
+        cells, t_s = band_cells(self.material.bands_nm), RISE_S if on else FADE_S
+        steady = self.lamp.model_copy(update={"warm_up_deficit": 0.0})
+        lamp = Lamp.found(steady, on=not on).switched(on, 0.0)
+        light = np.array([cells @ lamp.irradiance(t) for t in t_s])
+        return Transient.sampled(t_s, light / (cells @ STEADY))
+
+    def series(
+        self,
+        name: str,
+        windows: FloatArray,
+        charges_s: Sequence[float],
+        wait_s: float = 300.0,
+        shots: int = 12,
+        every_s: float = 7.0,
+        exposure_s: float = 0.5,
+    ) -> ChargingSeries:
+        """Charges one after another, photographs after each, a wait in the dark before the next."""
+        lamp, charges, at_s = Lamp.found(self.lamp, on=False), [], 10.0
+        for duration_s in charges_s:
+            off_s = at_s + duration_s
+            start_s: FloatArray = off_s + DOOR_S + every_s * np.arange(float(shots))
+            lamp = lamp.switched(True, at_s).switched(False, off_s)
+            # as a photodiode shows it once the filament is hot: the housing warms slowly
+            hot_s = at_s + RISE_S[-1]
+            brightness = lamp.exposure(hot_s, off_s).sum() / STEADY.sum() / (off_s - hot_s)
+            lasting = np.full(shots, exposure_s)
+            charges.append(Charge(at_s, off_s, start_s, lasting, brightness=float(brightness)))
+            at_s = off_s + wait_s
+        glow = self._glow(windows, lamp, charges)
+        values = np.multiply.outer(glow, WEIGHTS)
+        sigma = np.sqrt(self.read_noise**2 + values / (self.photons * exposure_s))
+        values = values * (1 + self.flicker * self.random.normal(size=(len(values), 1, 1)))
+        values = values + sigma * self.random.normal(size=values.shape)
+        return ChargingSeries(
+            name,
+            tuple(charges),
+            self.transient(on=True),
+            self.transient(on=False),
+            self.irradiances(windows),
+            values,
+            sigma,
+        )
+
+    def amplitudes(self) -> FloatArray:
+        """(N,) signal of each state when fully charged."""
+        rates = np.array([state.k_r_per_s for state in self.material.states])
+        part = np.array([sum(state.reradiation or (1.0,)) for state in self.material.states])
+        total: FloatArray = FULL * rates * part / (rates * part).sum()
+        return total
+
+    def level_at_off(self, windows: FloatArray, charge_s: float) -> FloatArray:
+        """(N,) of the first place after one charge, traced back in the dark to lamp-off."""
+        lamp = Lamp.found(self.lamp, on=False).switched(True, 10.0)
+        off_s = 10.0 + charge_s
+        samples = self._samples(windows[:1])
+        dark_s = off_s + SETTLED_S
+        nothing = np.zeros(len(samples.k_r_per_s))
+        level, _ = samples.evolve(nothing, 0.0, dark_s, lamp.switched(False, off_s))
+        back: FloatArray = level * np.exp(samples.k_r_per_s * SETTLED_S)
+        return back
+
+    def _samples(self, windows: FloatArray) -> Phosphor:
+        bare = phosphor([self.material], [None], self.irradiance)
+        states, sites = len(bare.k_r_per_s), len(windows)
+        return Phosphor(
+            np.tile(bare.k_r_per_s, sites),
+            (windows[:, None, :] * bare.excitation).reshape(sites * states, -1),
+            np.repeat(np.arange(sites), states),
+        )
+
+    def _glow(self, windows: FloatArray, lamp: Lamp, charges: Sequence[Charge]) -> FloatArray:
+        """(n, P) mean over each exposure."""
+        samples, sites = self._samples(windows), len(windows)
+        level, since_s = np.zeros(len(samples.k_r_per_s)), 0.0
+        found = []
+        for charge in charges:
+            for start_s, exposure_s in zip(charge.start_s, charge.exposure_s, strict=True):
+                level, _ = samples.evolve(level, since_s, start_s, lamp)
+                since_s = start_s + exposure_s
+                level, collected = samples.evolve(level, start_s, since_s, lamp)
+                mean = collected.reshape(sites, -1) / exposure_s
+                found.append(mean @ self.amplitudes())
+        return np.array(found)
+
+
+def two_states() -> Material:
+    """Two states that excite differently, both in Table 1's range."""
+    blue = read_material("blue-paint")
+    rates = {
+        0.08: (0.06, 0.12, 0.02, 0.004, 0.001, 0.0, 0.0, 0.0),
+        0.015: (0.02, 0.03, 0.01, 0.003, 0.0005, 0.0, 0.0, 0.0),
+    }
+    states = tuple(
+        blue.states[0].model_copy(update={"k_r_per_s": k_r, "k_e_per_s": k_e})
+        for k_r, k_e in rates.items()
+    )
+    return blue.model_copy(update={"name": "two states", "states": states})

@@ -1,0 +1,209 @@
+"""Excitation rates from samples that the fit's own formulae did not charge."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from labrig.errors import FitError
+from labrig.fit.excitation import Charge, ChargingSeries, ExcitationFit, Transient, Uncertain
+from labrig.fit.excitation import fit_excitation as fit
+from labrig.fit.excitation.levels import levels, levels_at_off
+from labrig.fit.excitation.problem import ExcitationProblem, Rates
+from labrig.material import Material, read_material
+from tests.fit.charged_samples import DOOR_S, Bench, lvf_windows, two_states
+
+LVF = lvf_windows(np.linspace(405, 695, 12))
+BARE = np.ones((1, 160))
+CHARGES_S = (8, 32, 64, 128, 256)
+LAMP = 0.01
+
+
+def measured(bench: Bench) -> list[ChargingSeries]:
+    """The bare lamp first: its irradiance is E."""
+    bare = bench.series("bare lamp", BARE, [1800.0], shots=30, every_s=6.0)
+    return [bare, bench.series("through LVF", LVF, CHARGES_S)]
+
+
+def fitted(bench: Bench, series: list[ChargingSeries]) -> ExcitationFit:
+    rates = 1.1 * np.array([state.k_r_per_s for state in bench.material.states])
+    return fit(series, rates, bench.amplitudes(), Uncertain(bench.flicker, LAMP))
+
+
+@pytest.mark.parametrize(
+    "material",
+    [read_material("blue-paint"), read_material("purple-paint"), two_states()],
+    ids=lambda material: str(material.name),
+)
+def test_rates_and_levels_of_a_material(material: Material) -> None:
+    bench = Bench(material)
+    found = fitted(bench, measured(bench))
+    assert found.warnings == ()
+    assert 0.9 < found.reduced_chi2 < 1.1
+    true_level = bench.level_at_off(BARE, 1800.0)
+    bare = found.at_off[0]
+    assert np.abs(bare.r0 - true_level).max() < 3 * bare.r0_sigma.max()
+    for state, truth, full in zip(found.states, material.states, bench.amplitudes(), strict=True):
+        assert abs(state.k_r_per_s - truth.k_r_per_s) < 3 * state.k_r_sigma_per_s
+        assert abs(state.amplitude - full) < 3 * state.amplitude_sigma
+        assert state.amplitude_sigma < 0.03 * full
+        k_e = np.array(truth.k_e_per_s)
+        assert (np.abs(state.k_e_per_s - k_e) < 3 * state.k_e_sigma_per_s + 1e-5).all()
+        strong = k_e >= 0.002
+        assert state.seen[strong].all()
+        assert state.k_e_per_s[strong] == pytest.approx(k_e[strong], rel=0.15)
+        assert (k_e[~strong] < state.k_e_upper_per_s[~strong] + 1e-5).all()
+
+
+def test_a_glow_left_from_the_charge_before_is_reckoned_with() -> None:
+    """The same within its σ, without hours of waiting in between."""
+    bench = Bench(read_material("white-paint"))
+    rate = bench.material.states[0].k_r_per_s
+    hurried = bench.series("through LVF", LVF, CHARGES_S[::-1], wait_s=80.0, shots=10)
+    assert np.exp(-rate * 80.0) > 0.02
+    bare, _ = measured(bench)
+    (state,) = fitted(bench, [bare, hurried]).states
+    k_e = np.array(bench.material.states[0].k_e_per_s)
+    assert (np.abs(state.k_e_per_s - k_e) < 3 * state.k_e_sigma_per_s + 1e-5).all()
+
+
+def test_ignoring_the_fade_after_short_charges_would_be_seen() -> None:
+    bench = Bench(read_material("green-paint"), flicker=0.0, read_noise=0.01, photons=1e5)
+    bare = bench.series("bare lamp", BARE, [100.0], shots=30, every_s=1.0)
+    brief = bench.series("through LVF", LVF, (1.5, 2.0, 3.0), shots=6, every_s=1.0)
+    dark_at_once = Transient.none(brief.irradiance.shape[1])
+    (right,) = fitted(bench, [bare, brief]).states
+    (wrong,) = fitted(bench, [replace(one, fade=dark_at_once) for one in (bare, brief)]).states
+    assert abs(right.k_e_per_s[0] - 0.1) < 3 * right.k_e_sigma_per_s[0]
+    assert wrong.k_e_per_s[0] > 1.03 * right.k_e_per_s[0]
+
+
+def test_saturation_taken_for_granted_as_in_the_paper() -> None:
+    """Λ is then what the decay shows, and k_e absorbs what the level was wrong by."""
+    bench = Bench(read_material("blue-paint"))
+    bare, lvf = measured(bench)
+    (charge,) = bare.charges
+    granted = replace(bare, charges=(replace(charge, saturated=True),))
+    joint, paper = fitted(bench, [bare, lvf]), fitted(bench, [granted, lvf])
+    assert paper.at_off[0].r0 == pytest.approx([1.0])
+    assert paper.states[0].amplitude == pytest.approx(joint.at_off[0].amplitude[0], rel=0.01)
+    assert paper.states[0].k_e_per_s[1] > 1.5 * joint.states[0].k_e_per_s[1]
+
+
+def test_weak_light_leaves_the_level_unknown_and_says_so() -> None:
+    bench = Bench(read_material("blue-paint"), irradiance=0.02)
+    found = fitted(bench, measured(bench))
+    assert any("known to" in said and "charge for longer" in said for said in found.warnings)
+    assert (
+        found.at_off[0].amplitude_sigma[0] / found.at_off[0].amplitude[0]
+        < found.states[0].amplitude_sigma / found.states[0].amplitude / 5
+    ), "a is measured, Λ and r(0) are not"
+
+
+def test_a_sample_that_is_no_phosphor_of_these_states_is_told() -> None:
+    bench = Bench(two_states())
+    series = measured(bench)
+    found = fit(series, [0.03], [1.0], Uncertain(bench.flicker, LAMP))
+    assert found.reduced_chi2 > 2
+    assert any("reduced χ²" in said for said in found.warnings)
+
+
+def test_irradiance_known_badly_goes_into_every_rate() -> None:
+    bench = Bench(read_material("blue-paint"))
+    series = measured(bench)
+    alone = fitted(bench, series).states[0]
+    rough = fit(series, [0.03], [1.0], Uncertain(bench.flicker, LAMP, irradiance=0.05)).states[0]
+    expected = np.hypot(alone.k_e_sigma_per_s, 0.05 * alone.k_e_per_s)
+    assert rough.k_e_sigma_per_s == pytest.approx(expected, rel=1e-3)
+    assert rough.k_r_sigma_per_s == pytest.approx(alone.k_r_sigma_per_s, rel=1e-3)
+
+
+def test_values_not_measured_and_fresh_samples() -> None:
+    bench = Bench(read_material("blue-paint"))
+    bare, lvf = measured(bench)
+    values = lvf.values.copy()
+    values[::3, 2] = np.nan
+    fresh = tuple(replace(charge, fresh=True) for charge in lvf.charges)
+    found = fitted(bench, [bare, replace(lvf, values=values, charges=fresh)])
+    assert found.dof < fitted(bench, [bare, lvf]).dof
+    assert np.isnan(found.residuals[1][0, 2]).all()
+    assert found.states[0].k_e_per_s[1] == pytest.approx(0.05, rel=0.1)
+
+
+def test_the_jacobian_is_that_of_the_residuals() -> None:
+    bench = Bench(two_states())
+    series = measured(bench)
+    problem = ExcitationProblem(series, 2, 1, Uncertain(0.005, 0.01, scale=0.02))
+    random = np.random.default_rng(3)
+    rates = Rates(
+        np.array([0.07, 0.02]),
+        np.array([2500.0, 500.0]),
+        random.uniform(0.001, 0.1, (2, 8)),
+        np.array([0.3, 1.0, 0.7]),
+        np.array([0.0, 0.01]),
+        np.full(6, 0.005),
+    )
+    theta = problem.pack(rates)
+    problem.rewhiten(theta)
+    _, jacobian = problem.residuals(theta)
+    for column in range(len(theta) - 6):
+        h = 1e-6 * max(abs(theta[column]), 1e-3)
+        up, down = theta.copy(), theta.copy()
+        up[column] += h
+        down[column] -= h
+        slope = (problem.residuals(up)[0] - problem.residuals(down)[0]) / (2 * h)
+        assert slope == pytest.approx(
+            jacobian[:, column], rel=1e-4, abs=1e-5 * np.abs(jacobian[:, column]).max()
+        )
+
+
+def test_levels_do_not_depend_on_how_a_wait_is_cut() -> None:
+    bench = Bench(two_states(), flicker=0.0)
+    series = bench.series("through LVF", LVF, (16, 64))
+    first, second = series.charges
+    pointless = Charge(first.off_s + 100, first.off_s + 102, np.zeros(0), np.zeros(0), 0.0)
+    cut = replace(series, charges=(first, pointless, second))
+    k_r = np.array([0.08, 0.015])
+    k_e = np.array([state.k_e_per_s for state in bench.material.states])
+    assert levels(cut, k_r, k_e).value == pytest.approx(levels(series, k_r, k_e).value, rel=1e-12)
+    assert len(levels_at_off(cut, k_r, k_e).value) == 3
+
+
+BAD = {
+    "before the lamp has faded": lambda one: replace(
+        one, charges=(replace(one.charges[0], start_s=one.charges[0].start_s - DOOR_S),)
+    ),
+    "outlast the lamp's rise": lambda one: replace(
+        one, charges=(replace(one.charges[0], on_s=one.charges[0].off_s - 0.5),)
+    ),
+    "expected 'on' before 'off'": lambda one: replace(
+        one, charges=(replace(one.charges[0], on_s=1e9),)
+    ),
+    "photographs of 1 sites": lambda one: replace(one, values=one.values[:5]),
+    "irradiances of 0 or more": lambda one: replace(one, irradiance=-one.irradiance),
+    "got none": lambda one: replace(one, values=np.full_like(one.values, np.nan)),
+}
+
+
+@pytest.mark.parametrize("said", BAD)
+def test_series_that_cannot_be(said: str) -> None:
+    bench = Bench(read_material("blue-paint"))
+    (bare, _) = measured(bench)
+    expected = "after the lamp has faded" if said.startswith("before") else said
+    with pytest.raises(FitError, match=expected):
+        fitted(bench, [BAD[said](bare)])
+
+
+def test_nothing_glows() -> None:
+    bench = Bench(read_material("blue-paint"))
+    (bare, _) = measured(bench)
+    with pytest.raises(FitError, match="did the lamp light"):
+        fitted(bench, [replace(bare, values=-np.abs(bare.values))])
+    with pytest.raises(FitError, match="same bands"):
+        fitted(bench, [])
+
+
+def test_transients_that_are_none() -> None:
+    for t_s, left in (([0.0], [[1.0]]), ([0.1, 0.2], [[1.0], [0.0]]), ([0.0, 0.1], [1.0, 0.0])):
+        with pytest.raises(FitError, match="that rise from 0 s"):
+            Transient.sampled(t_s, left)
