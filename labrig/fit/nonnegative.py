@@ -1,7 +1,8 @@
 """Linear least squares with coefficients ≥ 0.
 
-SciPy's own `nnls` aborts the process on an empty matrix and may stop short of the minimum (scipy
-issues 24861 and 25389), which a measurement cannot afford.
+SciPy's `nnls` is fast, but aborts the process on an empty matrix and may stop short of the minimum
+(scipy issues 24861 and 25389), which a measurement cannot afford: its answer is taken only if it
+meets the conditions of Kuhn and Tucker, else the minimum is found here.
 
 References
 ----------
@@ -10,12 +11,13 @@ C. L. Lawson, R. J. Hanson, *Solving least squares problems* (1974), chapter 23.
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.optimize import nnls
 
 from labrig.fit.least_squares import EPSILON, FloatArray
 
 
 def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatArray:
-    """Minimise ‖A x − b‖ over x ≥ 0, by Lawson and Hanson's active sets.
+    """Minimise ‖A x − b‖ over x ≥ 0.
 
     Parameters
     ----------
@@ -29,23 +31,48 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
     (n,) x, exactly 0 where the bound holds it.
     """
     norms = np.sqrt(np.einsum("ij,ij->j", design, design))
-    columns = design / np.where(norms > 0, norms, 1.0)
-    n = columns.shape[1]
-    solution, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
-    # A column that gains nothing but rounding is not asked again until another one has.
-    refused = norms == 0
+    lengths = np.where(norms > 0, norms, 1.0)
+    columns = design / lengths
     # Dot products of m terms carry this much rounding.
     least_gain = 10 * max(len(target), 1) * EPSILON * float(np.linalg.norm(target))
+    solution = _quickly(columns, target, least_gain)
+    if solution is None:
+        solution = _by_active_sets(columns, target, least_gain)
+    return solution / lengths
+
+
+def _quickly(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray | None:
+    """What SciPy finds, if it is the minimum."""
+    if not columns.size:
+        return None
+    try:
+        found: FloatArray = nnls(columns, target)[0]
+    except RuntimeError:  # too many steps
+        return None
+    gain = columns.T @ (target - columns @ found)
+    is_minimum = gain.max() <= least_gain and np.abs(gain[found > 0]).max(initial=0) <= least_gain
+    return found if is_minimum else None
+
+
+def _by_active_sets(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray:
+    """Lawson and Hanson's algorithm for columns of length 1 (or 0), each set solved by itself."""
+    n = columns.shape[1]
+    solution, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
+    empty = ~columns.any(axis=0)
+    # A column that gains nothing but rounding is not asked again until another one has.
+    refused = empty
     residual = target
     for _ in range(3 * n):
         gain = np.where(used | refused, -np.inf, columns.T @ residual)
-        new = int(np.argmax(gain)) if n else 0
-        if n == 0 or gain[new] <= least_gain:
+        new = int(np.argmax(gain))
+        if gain[new] <= least_gain:
             break
         used[new] = True
         trial = _solve(columns, target, used)
         if trial[new] <= 0:
-            used[new], refused[new] = False, True
+            used[new] = False
+            refused = refused.copy()
+            refused[new] = True
             continue
         while (falling := np.flatnonzero(used & (trial <= 0))).size:
             # Go towards the trial until the first coefficient reaches zero; do without that one.
@@ -55,9 +82,9 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
             used &= solution > 0
             solution[~used] = 0.0
             trial = _solve(columns, target, used)
-        solution, refused = trial, norms == 0
+        solution, refused = trial, empty
         residual = target - columns @ solution
-    return solution / np.where(norms > 0, norms, 1.0)
+    return solution
 
 
 def _solve(columns: FloatArray, target: FloatArray, used: NDArray[np.bool_]) -> FloatArray:

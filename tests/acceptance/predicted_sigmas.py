@@ -161,7 +161,8 @@ def main() -> None:
             folder = Path(place) / str(number)
             folder.mkdir()
             if case.material not in materials:
-                pilot = Case(case.material, "pilot", case.states, PILOT)
+                keys = {**PILOT, "states": case.states}
+                pilot = Case(case.material, "pilot", case.states, keys)
                 made = run(folder, pilot, PILOT_DAY)
                 materials[case.material] = made / "result" / "material.yaml"
             said = predicted(folder, case, materials[case.material])

@@ -168,3 +168,63 @@ def test_cold(data: tuple[Floats, Floats], against: Against) -> None:
         rounds=15,
         what="2 states, 60 frames: start, fit, rivals, diagnosis",
     )
+
+
+WEIGHTS, OFFSETS, OFFSET_SIGMA = np.array([0.3, 1.0, 0.6]), np.array([0.5, -0.3, 0.2]), 0.5
+
+
+def lmfit_three_channels(y: Floats, sigma: Floats, start: Floats) -> tuple[Floats, float]:
+    """Rates and amplitudes common to the channels, weights bounded, offsets with their prior."""
+
+    def residuals(parameters: lmfit.Parameters) -> Floats:
+        *states, red, blue, r, g, b = parameters.valuesdict().values()
+        offsets = np.array([r, g, b])
+        light = np.multiply.outer(model(T_S, *states), [red, 1.0, blue])
+        return np.concatenate([((light + offsets - y) / sigma).ravel(), offsets / OFFSET_SIGMA])
+
+    parameters = lmfit.Parameters()
+    for name, value in zip((*NAMES, "red", "blue"), (*start, 0.5, 0.5), strict=True):
+        parameters.add(name, value, min=0)
+    for name in ("offset_r", "offset_g", "offset_b"):
+        parameters.add(name, 0.0)
+    result = lmfit.Minimizer(residuals, parameters).leastsq()
+    return np.array(list(result.params.valuesdict().values()))[:4], float(result.chisqr)
+
+
+def test_three_channels_cold(against: Against) -> None:
+    """As a camera gives it: three channels that share their rates."""
+    light = np.multiply.outer(model(T_S, *TRUTH), WEIGHTS)
+    sigma = np.sqrt(4.0 + light / 20)
+    y = light + OFFSETS + sigma * np.random.default_rng(5).normal(size=light.shape)
+    n = len(T_S)
+    series = Series(
+        t_s=T_S,
+        exposure_s=np.full(n, EXPOSURE_S),
+        values=y,
+        sigma=sigma,
+        dark_sigma=np.full(3, OFFSET_SIGMA),
+        channels=("R", "G", "B"),
+        iso=np.full(n, np.nan),
+        f_number=np.full(n, np.nan),
+        frame=("",) * n,
+        unit=("",) * n,
+        flag=("",) * n,
+    )
+
+    def cold() -> Floats:
+        fit = fit_series(series, states=2, flicker=0.0)
+        return np.array([x for s in fit.states for x in (s.k_r_per_s, s.amplitude)])
+
+    def from_grid() -> Floats:
+        return best_of_starts(lambda start: lmfit_three_channels(y, sigma, start), y[:, 1])
+
+    assert from_grid() == pytest.approx(cold(), rel=1e-4)
+    against(
+        cold,
+        {
+            "lmfit leastsq, best of 15 starts": from_grid,
+            "lmfit leastsq, one good start": lambda: lmfit_three_channels(y, sigma, START),
+        },
+        rounds=15,
+        what="2 states, 60 frames x 3 channels: all of it",
+    )
