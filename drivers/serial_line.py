@@ -59,16 +59,41 @@ class SerialLine:
                 self._clock.sleep(POLL_S)
         return came
 
-    def drain(self, quiet_s: float, timeout_s: float) -> None:
-        """Read and forget what comes until the line is quiet for `quiet_s`."""
+    def read_exactly(self, count: int, timeout_s: float) -> bytes:
+        """The next `count` bytes.
+
+        Raises
+        ------
+        DeviceLostError
+            They did not come in time; shows what came.
+        """
+        deadline_s = self._clock.now() + timeout_s
+        came = b""
+        while len(came) < count:
+            came += self._read_one()
+            if len(came) == count:
+                break
+            if self._clock.now() >= deadline_s:
+                raise DeviceLostError(
+                    f"{self._name} did not answer within {timeout_s:g} s: expected {count} bytes, "
+                    f"got {came!r}; check its power, cable and address"
+                )
+            if not self._waiting():
+                self._clock.sleep(POLL_S)
+        return came
+
+    def drain(self, quiet_s: float, timeout_s: float) -> bytes:
+        """What comes until the line is quiet for `quiet_s`."""
         deadline_s = self._clock.now() + timeout_s
         quiet_since_s = self._clock.now()
+        came = b""
         while self._clock.now() - quiet_since_s < quiet_s and self._clock.now() < deadline_s:
             if self._waiting():
-                self._read_one()
+                came += self._read_one()
                 quiet_since_s = self._clock.now()
             else:
                 self._clock.sleep(POLL_S)
+        return came
 
     def _read_one(self) -> bytes:
         try:

@@ -16,6 +16,7 @@ from filelock import FileLock, Timeout
 from labrig import shipped
 from labrig.acquire import Device, Rig, RigFile, plugins
 from labrig.acquire.connections import SerialPort
+from labrig.acquire.rig import in_safe_order
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.acquire.roles import ROLES
 from labrig.clock import Clock, SystemClock
@@ -74,8 +75,8 @@ class Bench:
             rig = Rig(self.file.name, self.clock, {}, warm_up_s)
             stack.callback(rig.disconnect)
             stack.callback(rig.make_safe)
-            for key, entry in self.file.devices.items():
-                rig.devices[key] = _open(key, entry, connections, self.source)
+            for key in in_safe_order(self.file.devices):
+                rig.devices[key] = _open(key, self.file.devices[key], connections, self.source)
                 rig.devices[key].make_safe()
             yield rig
 

@@ -22,6 +22,7 @@ from labrig.region import CENTRE, Region
 
 from .decay_units import DarkUnit, DaylightUnit, DecayUnit, MeterUnit
 from .metering import DecayMeter, Look, Schedule
+from .patch_names import Patches
 from .watching import Watcher
 
 #: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.
@@ -64,7 +65,7 @@ class Decay(ProtocolModel):
     grow_at_most: float = Field(16.0, ge=1)
     dark: Literal["frames", "background"] = "frames"
     background: Region | None = None
-    patches: dict[str, Region] = Field({"sample": CENTRE}, min_length=1)
+    patches: Patches = Field({"sample": CENTRE}, min_length=1)
     daylight: bool = False
     states: Literal["auto", 1, 2, 3] = "auto"
 

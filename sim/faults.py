@@ -55,7 +55,7 @@ class AfterBytes(When):
 
 
 class Slowness(When):
-    """`takes`: seconds for each write."""
+    """`takes`: seconds for each write, or for the whole way of a door."""
 
     takes: DurationS = 2.0
 
@@ -93,6 +93,10 @@ class Fault(_Part):
         The board hears nothing and says nothing.
     relays_echo_lost
         The board obeys, but its echo is lost on the way.
+    door_stuck
+        The trap door stays where it is, whatever its servo is told; then it swings on.
+    door_slow
+        The trap door, or its servo, is slow to move.
     camera_unplugged
         The camera's cable is pulled, and put back.
     camera_busy
@@ -118,6 +122,8 @@ class Fault(_Part):
     relays_unplugged: When | None = None
     relays_silent: When | None = None
     relays_echo_lost: When | None = None
+    door_stuck: When | None = None
+    door_slow: Slowness | None = None
     camera_unplugged: AfterBytes | None = None
     camera_busy: When | None = None
     camera_full: When | None = None

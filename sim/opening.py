@@ -11,7 +11,7 @@ from labrig.clock import VirtualClock
 from labrig.yaml_file import validate
 
 from . import protocol_sim
-from .boards import NumatoBoard, SerialCable
+from .boards import HandsBoard, LcusBoard, MaestroBoard, NumatoBoard, SerialCable
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
 from .disk import SimulatedDisk
@@ -19,11 +19,13 @@ from .faults import Fault, When, given
 from .room import Room
 from .simulation import Simulation
 
-#: The address of the room: `sim://room/relays`, `sim://room/camera`.
+#: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/servo`,
+#: `sim://room/hands`, `sim://room/camera`.
 NAME = "room"
-#: Relay that carries the lamp.
+#: Relay that carries the lamp, of either relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
 RELAYS = 8
+LCUS_RELAYS = 4
 
 
 class OpenRoom:
@@ -32,18 +34,26 @@ class OpenRoom:
     def __init__(self, simulation: Simulation, clock: VirtualClock) -> None:
         self.clock = clock
         self.seed = simulation.seed
-        self.room = Room(simulation, clock)
-        relays = NumatoBoard(RELAYS, self._relay_moved)
-        relays.states[LAMP_RELAY] = simulation.initial.lamp == "on"
+        servo = _servo_board(simulation, clock)
+        self.room = Room(simulation, clock, servo.pulses)
+        relays = NumatoBoard(RELAYS, lambda relay, on: self._relay_moved("relays", relay, on))
+        lcus = LcusBoard(
+            LCUS_RELAYS, lambda relay, on: self._relay_moved("lcus", relay - 1, on), simulation.lcus
+        )
+        self._lamp_board = simulation.lamp.board
+        carrier = relays if self._lamp_board == "relays" else lcus
+        carrier.states[LAMP_RELAY] = simulation.initial.lamp == "on"
         faults = simulation.faults
-        self.boards = {
-            "relays": SerialCable(
-                relays,
+        hands = HandsBoard({"fresh sample": self.room.change_sample})
+        self.boards = {"servo": SerialCable(servo, clock), "hands": SerialCable(hands, clock)} | {
+            name: SerialCable(
+                board,
                 clock,
                 unplugged=given(fault.relays_unplugged for fault in faults),
                 silent=given(fault.relays_silent for fault in faults),
                 echo_lost=given(fault.relays_echo_lost for fault in faults),
             )
+            for name, board in (("relays", relays), ("lcus", lcus))
         }
         self.camera = SimulatedCamera(
             clock,
@@ -63,8 +73,8 @@ class OpenRoom:
         """The USB bus on which `device` is alone; `None` if there is no such device."""
         return self.camera.backend if device == "camera" else None
 
-    def _relay_moved(self, relay: int, on: bool) -> None:
-        if relay == LAMP_RELAY:
+    def _relay_moved(self, board: str, relay: int, on: bool) -> None:
+        if (board, relay) == (self._lamp_board, LAMP_RELAY):
             self.room.switch_lamp(on)
 
 
@@ -94,6 +104,19 @@ def open_room(
         yield room
     finally:
         protocol_sim.close_door(NAME)
+
+
+def _servo_board(simulation: Simulation, clock: VirtualClock) -> MaestroBoard:
+    """The Maestro, its channels at home: trap door closed, shield open."""
+    homes = {}
+    if simulation.shield is not None:
+        homes[simulation.shield.channel] = simulation.shield.open
+    if simulation.door is not None:
+        homes[simulation.door.channel] = simulation.door.closed
+    board = MaestroBoard(clock, homes, simulation.servo.time_out)
+    if simulation.door is not None and simulation.initial.door == "open":
+        board.start_at(simulation.door.channel, simulation.door.open)
+    return board
 
 
 def _camera_faults(faults: Sequence[Fault]) -> CameraFaults:

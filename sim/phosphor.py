@@ -4,7 +4,7 @@ Eq. 1 of Nalbach et al. is integrated as it stands, by an explicit Runge–Kutta
 (DOP853). Nothing here knows a solution of it: that is what labrig's fits are tested against.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
@@ -59,7 +59,12 @@ class Phosphor:
     patch: NDArray[np.intp]
 
     def evolve(
-        self, level: FloatArray, start_s: float, end_s: float, light: Light
+        self,
+        level: FloatArray,
+        start_s: float,
+        end_s: float,
+        light: Light,
+        visible: Callable[[float], float] = lambda _: 1.0,
     ) -> tuple[FloatArray, FloatArray]:
         """Let time pass.
 
@@ -71,32 +76,41 @@ class Phosphor:
             Of the interval.
         light
             What shines on the samples.
+        visible
+            Part v of the samples that is seen at a time; smooth where the light is.
 
         Returns
         -------
         level : ndarray, shape (states,)
             Concentrations at `end_s`.
         exposure_s : ndarray, shape (states,)
-            ∫ r dt from `start_s` to `end_s`.
+            ∫ v r dt from `start_s` to `end_s`.
         """
         state = np.concatenate([level, np.zeros_like(level)])
         corners = [start_s, *light.corners(start_s, end_s), end_s]
         for left, right in pairwise(corners):
             if right > left:
-                state = self._smooth(state, left, right, light)
+                state = self._smooth(state, left, right, light, visible)
         count = len(level)
         return state[:count], state[count:]
 
-    def _smooth(self, state: FloatArray, left: float, right: float, light: Light) -> FloatArray:
+    def _smooth(
+        self,
+        state: FloatArray,
+        left: float,
+        right: float,
+        light: Light,
+        visible: Callable[[float], float],
+    ) -> FloatArray:
         k_r, excitation, count = self.k_r_per_s, self.excitation, len(self.k_r_per_s)
 
-        def in_the_dark(_: float, y: FloatArray) -> FloatArray:
-            return np.concatenate([-k_r * y[:count], y[:count]])
+        def in_the_dark(time_s: float, y: FloatArray) -> FloatArray:
+            return np.concatenate([-k_r * y[:count], visible(time_s) * y[:count]])
 
         def lit(time_s: float, y: FloatArray) -> FloatArray:
             r = y[:count]
             kappa = excitation @ light.irradiance(time_s)
-            return np.concatenate([(1 - r) * kappa - k_r * r, r])
+            return np.concatenate([(1 - r) * kappa - k_r * r, visible(time_s) * r])
 
         rates = in_the_dark if light.dark(left, right) else lit
         solution = solve_ivp(

@@ -18,9 +18,11 @@ from .aiming import (
 )
 from .circuit import LampCircuit
 from .dng import Shot, encode_dng
+from .door import Door
+from .doors import Doors, Pulses, no_pulses
 from .faults import given
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
-from .lights import Lights, room_light_spectrum
+from .lights import Lights, Seen, room_light_spectrum
 from .optics import (
     CLOTH_REFLECTANCE,
     SAMPLE_REFLECTANCE,
@@ -52,6 +54,8 @@ class Room:
         What the room is like.
     clock
         The room's time; its zero is the epoch, at which the camera was switched on.
+    pulses
+        What the doors' servos are sent.
 
     Raises
     ------
@@ -59,7 +63,9 @@ class Room:
         A material that does not exist or cannot glow, or a patch outside the frame.
     """
 
-    def __init__(self, simulation: Simulation, clock: VirtualClock) -> None:
+    def __init__(
+        self, simulation: Simulation, clock: VirtualClock, pulses: Pulses = no_pulses
+    ) -> None:
         self._simulation = simulation
         self._clock = clock
         self._patches = simulation.patches
@@ -72,6 +78,7 @@ class Room:
             simulation.lamp, simulation.initial.lamp == "on", simulation.faults, clock
         )
         self._left_on = given(fault.light_left_on for fault in simulation.faults)
+        self._doors = Doors(simulation, clock, pulses)
         sensor = simulation.sensor
         self._curves = (
             bent_curves(self._rng(CURVES_STREAM))
@@ -98,9 +105,21 @@ class Room:
         """Whether the lamp has current, whatever register and bulb say."""
         return self._circuit.closed
 
+    @property
+    def door(self) -> Door | None:
+        """The trap door with its history up to now; None where there is none."""
+        return self._doors.trap_door
+
     def switch_lamp(self, on: bool) -> None:
         """Ask the lamp's relay to switch now."""
         self._circuit.ask(on)
+
+    def change_sample(self) -> None:
+        """Put another piece of the same materials in, now; it has been in the dark for long."""
+        now_s = self._clock.now()
+        self._level_at(now_s)
+        self._known_s.append(now_s)
+        self._known_levels.append(np.zeros(len(self._emission)))
 
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
         """The DNG of an exposure that is over.
@@ -124,10 +143,11 @@ class Room:
                 f"got {start_s} s to {end_s} s"
             )
         lights = self._lights()
-        _, glow_s = self._phosphor.evolve(self._level_at(start_s), start_s, end_s, lights)
-        light = self._simulation.lamp.irradiance * lights.exposure(start_s, end_s)
+        _, glow_s = self._phosphor.evolve(
+            self._level_at(start_s), start_s, end_s, lights, lights.openness
+        )
         mosaic = self._sensor.expose(
-            self._electrons(glow_s, light, f_number)[self._places],
+            self._electrons(glow_s, lights.seen(start_s, end_s), f_number)[self._places],
             exposure_s,
             iso,
             self._sensor_temperature.expose(start_s, exposure_s),
@@ -142,11 +162,16 @@ class Room:
         """
         start_s = max(at_s - LIVE_EXPOSURE_S, 0.0)
         lights = self._lights()
-        _, glow_s = self._phosphor.evolve(self._level_at(start_s), start_s, at_s, lights)
-        light = lights.exposure(start_s, at_s)
+        _, glow_s = self._phosphor.evolve(
+            self._level_at(start_s), start_s, at_s, lights, lights.openness
+        )
+        seen = lights.seen(start_s, at_s)
         if self._simulation.room_light:
-            light = light + (at_s - start_s) * room_light_spectrum()
-        electrons = self._electrons(glow_s, self._simulation.lamp.irradiance * light, LIVE_F_NUMBER)
+            light, opened = (at_s - start_s) * room_light_spectrum(), lights.openness(at_s)
+            seen = Seen(
+                seen.sample + opened * light, seen.door + (1 - opened) * light, seen.cloth + light
+            )
+        electrons = self._electrons(glow_s, seen, LIVE_F_NUMBER)
         step = 2 * live_stride(*self._places.shape)
         patch = self._places[::step, ::step] // 4
         rgb = electrons.reshape(-1, 4)[:, [0, 1, 3]].astype(np.float64)[patch]
@@ -183,7 +208,12 @@ class Room:
         self.truth().write(path)
 
     def _lights(self) -> Lights:
-        return Lights(self._circuit.lamp, self._left_on)
+        return Lights(
+            self._circuit.lamp,
+            self._left_on,
+            self._doors.trap_door,
+            self._doors.shield,
+        )
 
     def _rng(self, *stream: int) -> np.random.Generator:
         return np.random.default_rng([self._simulation.seed, *stream])
@@ -203,16 +233,18 @@ class Room:
         radiance: FloatArray = self._emission * self._phosphor.k_r_per_s[:, None]
         return radiance
 
-    def _electrons(
-        self, glow_s: FloatArray, light: FloatArray, f_number: float
-    ) -> NDArray[np.float32]:
+    def _electrons(self, glow_s: FloatArray, seen: Seen, f_number: float) -> NDArray[np.float32]:
         """Expected electrons in the middle of the lens, flat over (cloth and patches, Bayer)."""
         radiance_s = np.zeros((1 + len(self._patches), len(WAVELENGTH_NM)))
         np.add.at(radiance_s, 1 + self._phosphor.patch, glow_s[:, None] * self._radiance_at_one())
         electrons = self._curves.glow_electrons_per_s(radiance_s, f_number)
-        reflectance = np.full(len(radiance_s), SAMPLE_REFLECTANCE)
-        reflectance[0] = CLOTH_REFLECTANCE
-        electrons += np.outer(reflectance, self._curves.reflected_electrons(light, f_number))
+        scale = self._simulation.lamp.irradiance
+        sample, door, cloth = (
+            self._curves.reflected_electrons(scale * light, f_number)
+            for light in (seen.sample, seen.door, seen.cloth)
+        )
+        electrons[0] += CLOTH_REFLECTANCE * cloth
+        electrons[1:] += SAMPLE_REFLECTANCE * sample + CLOTH_REFLECTANCE * door
         return electrons[:, BAYER_RGGB].astype(np.float32).reshape(-1)
 
     def _painted(self) -> NDArray[np.intp]:

@@ -11,11 +11,13 @@ from pydantic import (
     ConfigDict,
     Field,
     field_validator,
+    model_validator,
 )
 
 from labrig.quantity import DurationS, Fraction
 from labrig.region import Region
 
+from .boards.lcus import Answers
 from .camera import BodySettings
 from .faults import Fault, given
 
@@ -98,18 +100,68 @@ class LampSettings(_Part):
         Light missing when switched on cold.
     drift_per_hour
         Light lost by ageing and dust, per hour of the room's clock.
+    board
+        The board that switches it: relay 0 of `relays` (Numato), or relay 1 of `lcus`.
     """
 
     irradiance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 4.0
     warm_up: Annotated[DurationS, Field(gt=0)] = 150.0
     warm_up_deficit: Annotated[Fraction, Field(ge=0, lt=1)] = 0.03
     drift_per_hour: Annotated[Fraction, Field(ge=0, lt=1)] = 0.002
+    board: Literal["relays", "lcus"] = "relays"
+
+
+class DoorSettings(_Part):
+    """A door that a servo swings by a quarter turn; the lamp's shield, closed, covers the lamp.
+
+    Attributes
+    ----------
+    channel
+        Of the Maestro `servo` that moves it.
+    closed, open
+        Length of the servo's pulse at either end.
+    travel
+        Of the whole way, after the servo's frame of up to 20 ms.
+    overshoot
+        How far it swings beyond its end, as a part of its way.
+    ringing
+        Time in which the ringing after that falls to 1/e.
+    ringing_hz
+        Of the ringing.
+    """
+
+    channel: Annotated[int, Field(ge=0, le=23)] = 0
+    closed: DurationS = 1000e-6
+    open: DurationS = 2000e-6
+    travel: Annotated[DurationS, Field(gt=0)] = 0.2
+    overshoot: Annotated[Fraction, Field(ge=0, le=0.5)] = 0.04
+    ringing: Annotated[DurationS, Field(gt=0)] = 0.01
+    ringing_hz: Annotated[float, Field(gt=0)] = 25.0
+
+    @model_validator(mode="after")
+    def _two_ends(self) -> Self:
+        if self.closed == self.open:
+            raise ValueError("expected two different pulses for 'closed' and 'open'")
+        return self
+
+
+class ServoBoardSettings(_Part):
+    """The Maestro at `sim://room/servo`; its channels' homes are: door closed, shield open.
+
+    Attributes
+    ----------
+    time_out
+        The serial time-out after which it sends all channels home; null: none.
+    """
+
+    time_out: Annotated[DurationS, Field(gt=0)] | None = None
 
 
 class InitialState(_Part):
     """How the room is found at the epoch: what a crash left behind, a sample that still glows."""
 
     lamp: Literal["off", "on"] = "off"
+    door: Literal["closed", "open"] = "closed"
     concentration: Annotated[float, Field(ge=0, le=1)] = 0.0
 
 
@@ -134,6 +186,15 @@ class Simulation(_Part):
         Of everything random: camera curves, hot pixels, noise.
     faults
         What goes wrong, and when, see `sim.faults`.
+    door
+        The trap door: closed, the sample faces the lamp, open, the camera. Null: none, and the
+        sample always faces both.
+    shield
+        A door before the lamp, open at first; null: none.
+    servo
+        The board that moves both.
+    lcus
+        What the LCUS board at `sim://room/lcus` says to its query.
     room_light
         Whether the room's own light is on while somebody aims through the viewfinder; photographs
         are always taken without it.
@@ -154,6 +215,10 @@ class Simulation(_Part):
     initial: InitialState = InitialState()
     faults: tuple[Fault, ...] = ()
     lamp: LampSettings = LampSettings()
+    door: DoorSettings | None = None
+    shield: DoorSettings | None = None
+    servo: ServoBoardSettings = ServoBoardSettings()
+    lcus: Answers = "nothing"
     room_light: bool = True
 
     @field_validator("faults")
@@ -162,6 +227,14 @@ class Simulation(_Part):
         if len(given(fault.camera_unplugged for fault in faults)) > 1:
             raise ValueError("expected 'camera_unplugged' once: the simulated cable comes out once")
         return faults
+
+    @model_validator(mode="after")
+    def _doors_that_can_move(self) -> Self:
+        if self.door is None and any(fault.door_stuck or fault.door_slow for fault in self.faults):
+            raise ValueError("a fault of the door needs a 'door:'")
+        if self.door and self.shield and self.door.channel == self.shield.channel:
+            raise ValueError("expected 'door' and 'shield' on two channels of the servo board")
+        return self
 
     def opened_at(self, wall_s: float) -> Self:
         """The same room opened at `wall_s`, seconds since 1970, if its epoch is earlier."""

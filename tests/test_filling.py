@@ -33,7 +33,7 @@ def quick(make_protocol: Make) -> Path:
 
 def transfers(rig: Path, protocol: Path, folder: Path, patch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Where on the bulk pipes, in bytes since the beginning, each kind of transfer took place."""
-    backend = shipped.load("sim.camera.usb_backend").CameraBackend
+    backend = shipped.load("sim.camera.usb.backend").CameraBackend
     places: dict[str, list[int]] = {}
     carried = 0
 

@@ -9,12 +9,12 @@ from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
 from labrig.errors import DeviceError, DeviceLostError
 
 from .body import Body
-from .eos_camera import EosCamera
-from .eos_protocol import lacking_operations
+from .eos.camera import EosCamera
+from .eos.protocol import lacking_operations
 from .opening import identify, open_link, open_session
 from .session import Session
 from .settings import PtpCameraSettings
-from .standard_camera import NEEDED, StandardCamera
+from .standard.camera import NEEDED, StandardCamera
 
 
 class PtpCamera:

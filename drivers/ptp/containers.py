@@ -82,8 +82,7 @@ def announced_length(beginning: bytes) -> int:
     """
     if len(beginning) < HEADER_BYTES:
         raise MalformedError(
-            f"expected a PTP container of at least {HEADER_BYTES} bytes, the camera sent "
-            f"{len(beginning)}: {beginning.hex(' ')}"
+            f"expected a PTP container of at least {HEADER_BYTES} bytes from the camera", beginning
         )
     length, kind, _, _ = _HEADER.unpack_from(beginning)
     most = HEADER_BYTES + 4 * MOST_PARAMETERS
@@ -91,10 +90,7 @@ def announced_length(beginning: bytes) -> int:
     if plausible and kind != Kind.DATA:
         plausible = length <= most and length % 4 == 0
     if not plausible:
-        raise MalformedError(
-            "expected a PTP container, the camera sent something that begins with "
-            f"{beginning[:HEADER_BYTES].hex(' ')}: unplug it and plug it in again"
-        )
+        raise MalformedError("expected a PTP container from the camera", beginning)
     return int(length)
 
 
@@ -108,6 +104,6 @@ def decode(data: bytes) -> Container:
     """
     length = announced_length(data)
     if length != len(data):
-        raise MalformedError(f"expected a container of {length} bytes, the camera sent {len(data)}")
+        raise MalformedError(f"expected a container of {length} bytes from the camera", data)
     _, kind, code, transaction_id = _HEADER.unpack_from(data)
     return Container(Kind(kind), code, transaction_id, data[HEADER_BYTES:])

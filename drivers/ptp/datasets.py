@@ -33,8 +33,8 @@ class DatasetReader:
         if len(piece) < size:
             raise MalformedError(
                 f"the camera's {self._name} is cut short: expected {size} bytes from byte "
-                f"{self._position} on, it ends at {len(self._data)} and begins with "
-                f"'{self._data[:16].hex(' ')}': unplug it and plug it in again"
+                f"{self._position} on",
+                self._data,
             )
         self._position += size
         return piece

@@ -2,6 +2,17 @@
 
 from labrig.errors import DeviceError, DeviceLostError
 
+MOST_SHOWN_BYTES = 32
+
+
+def shown(data: bytes) -> str:
+    """How a message shows bytes: all of them in hexadecimal if few, else how they begin."""
+    if not data:
+        return "nothing"
+    if len(data) <= MOST_SHOWN_BYTES:
+        return f"'{data.hex(' ')}'"
+    return f"{len(data)} bytes '{data[:MOST_SHOWN_BYTES].hex(' ')} …'"
+
 
 class NoAnswerError(DeviceError):
     """The camera did not answer in time."""
@@ -16,7 +27,22 @@ class StallError(DeviceError):
 
 
 class MalformedError(DeviceError):
-    """Bytes that are not what the protocol says."""
+    """Bytes that are not what the protocol says; the message always shows them.
+
+    Parameters
+    ----------
+    expected
+        The message's beginning: what should have come.
+    came
+        What came instead.
+    remedy
+        What to do.
+    """
+
+    def __init__(
+        self, expected: str, came: bytes, remedy: str = "switch the camera off and on"
+    ) -> None:
+        super().__init__(f"{expected}, got {shown(came)}: {remedy}")
 
 
 class RefusedError(DeviceError):

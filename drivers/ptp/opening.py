@@ -7,12 +7,12 @@ from labrig.acquire.connections import Connections
 from labrig.clock import Clock
 from labrig.errors import DeviceError
 
+from .codes import Standard
 from .device_info import DeviceInfo, parse_device_info
-from .ip_link import PORT, IpLink
+from .ip.link import PORT, IpLink
 from .link import Link
-from .ptp_codes import Standard
 from .session import Session
-from .usb_link import UsbLink
+from .usb.link import UsbLink
 
 
 def open_link(address: str, connections: Connections) -> Link:

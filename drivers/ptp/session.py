@@ -6,10 +6,7 @@ from enum import IntEnum
 from labrig.clock import Clock
 from labrig.errors import DeviceError
 
-from .containers import Container, Kind, command
-from .failures import MalformedError, RefusedError
-from .link import Link
-from .ptp_codes import (
+from .codes import (
     DEVICE_BUSY,
     OK,
     SESSION_ALREADY_OPEN,
@@ -18,6 +15,9 @@ from .ptp_codes import (
     operation_text,
     response_text,
 )
+from .containers import Container, Kind, command, encode
+from .failures import MalformedError, RefusedError
+from .link import Link
 
 SESSION_ID = 1
 LAST_TRANSACTION_ID = 0xFFFFFFFE
@@ -234,10 +234,13 @@ class Session:
             if container.kind is not Kind.DATA or container.code != operation or incoming:
                 raise MalformedError(
                     f"{doing}: expected data or a response, the camera sent a container of kind "
-                    f"{container.kind.name} and code 0x{container.code:04X}: start again"
+                    f"{container.kind.name} and code 0x{container.code:04X}",
+                    encode(container),
+                    "start again",
                 )
             incoming = container.payload
-        raise DeviceError(
+        raise MalformedError(
             f"{doing}: expected an answer to transaction {transaction_id}, the camera sent "
-            f"{MOST_STALE} containers of others: unplug it and plug it in again"
+            f"{MOST_STALE} containers of others",
+            encode(container),
         )

@@ -7,8 +7,8 @@ from pydantic import BaseModel, ConfigDict, Field, field_validator
 from labrig.acquire.values import CameraOffers
 from labrig.quantity import DurationS, SizeBytes
 
-from .eos_codes import F_NUMBERS, ISOS, bulb_times_s, shutter_time_s, third_stop_codes
-from .eos_iso import NativeIsos, isos_of_model
+from .eos.codes import F_NUMBERS, ISOS, bulb_times_s, shutter_time_s, third_stop_codes
+from .eos.iso import NativeIsos, isos_of_model
 
 
 class PtpCameraSettings(BaseModel):
@@ -20,7 +20,7 @@ class PtpCameraSettings(BaseModel):
         From the release to the begin of the exposure, as `labrig rig check` measured it.
     isos
         The sensor's native sensitivities; the camera's others (gain after digitising) stay unused.
-        What is written here goes before what `eos_iso` knows of an EOS.
+        What is written here goes before what `eos.iso` knows of an EOS.
     f_numbers
         Apertures of the lens; read from the camera when there is one.
     longest_exposure

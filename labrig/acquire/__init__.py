@@ -1,5 +1,21 @@
 """Devices by role, the rig file, protocols as units, the plan and the runner."""
 
+from labrig.acquire.actions import (
+    DOOR_CLOSE,
+    DOOR_OPEN,
+    LAMP_OFF,
+    LAMP_ON,
+    SHIELD_COVER,
+    SHIELD_UNCOVER,
+    Door,
+    Missed,
+    Shield,
+    Shoot,
+    Switch,
+    Timed,
+    at,
+)
+from labrig.acquire.by_hand import ByHand, TakenBack
 from labrig.acquire.findings import Finding
 from labrig.acquire.planner import Plan, plan
 from labrig.acquire.protocol import ProtocolModel, Sample, Unit
@@ -9,31 +25,44 @@ from labrig.acquire.roles import (
     Camera,
     Checkable,
     Device,
+    Guarded,
+    Hands,
     KeptAwake,
     Lamp,
+    LampShield,
     LedBank,
     LiveView,
     Spectrometer,
     TrapDoor,
 )
 from labrig.acquire.runner import RunObserver, run_units
-from labrig.acquire.session import LAMP_OFF, LAMP_ON, Session, Shoot, Switch, Timed, at
+from labrig.acquire.session import Session
 from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
 
 __all__ = [
+    "DOOR_CLOSE",
+    "DOOR_OPEN",
     "LAMP_OFF",
     "LAMP_ON",
+    "SHIELD_COVER",
+    "SHIELD_UNCOVER",
+    "ByHand",
     "Camera",
     "CameraOffers",
     "Checkable",
     "Device",
+    "Door",
     "ExposureSettings",
     "Finding",
     "Frame",
+    "Guarded",
+    "Hands",
     "KeptAwake",
     "Lamp",
+    "LampShield",
     "LedBank",
     "LiveView",
+    "Missed",
     "Plan",
     "ProtocolModel",
     "Rig",
@@ -41,9 +70,11 @@ __all__ = [
     "RunObserver",
     "Sample",
     "Session",
+    "Shield",
     "Shoot",
     "Spectrometer",
     "Switch",
+    "TakenBack",
     "Timed",
     "TrapDoor",
     "Unit",

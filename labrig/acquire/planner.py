@@ -6,22 +6,20 @@ from dataclasses import asdict, dataclass, field
 from typing import TypeVar
 
 from labrig.acquire import plugins
+from labrig.acquire.by_hand import ByHand
 from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import Device
-from labrig.acquire.session import Session
+from labrig.acquire.session import TOLERANCE_S, Session
 from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
 from labrig.clock import VirtualClock
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
-from labrig.record import FrameRecord
+from labrig.record import PERSON, FrameRecord
 from labrig.yaml_file import validate
 
 T = TypeVar("T")
-
-#: A planned action may begin this much after its time; a PC is no better (wire facts: 5 ms tails).
-TOLERANCE_S = 0.02
 
 
 @dataclass(frozen=True)
@@ -53,6 +51,11 @@ class Plan:
     def size_bytes(self) -> int:
         """What the frames will take on disk."""
         return self.frames * self.offers.frame_bytes
+
+    @property
+    def by_hand(self) -> tuple[str, ...]:
+        """What a person does."""
+        return tuple(step.action for step in self.steps if step.device == PERSON)
 
     def lines(self) -> list[str]:
         """The timeline as `@t (+dt) device action`, a heading per unit."""
@@ -100,6 +103,8 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
             devices[key] = _PlannedCamera(clock, offers)
         elif key == "lamp":
             devices[key] = _PlannedLamp()
+        elif key in ("door", "shield"):
+            devices[key] = _PlannedDoor(driver.declared_travel_s(settings))
     warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
     planned = Rig(rig.name, clock, devices, warm_up_s)
     units, ends = protocol.units(), []
@@ -139,6 +144,28 @@ class _PlannedLamp(_PlannedDevice):
 
     def is_on(self) -> bool:
         return self._on
+
+
+class _PlannedDoor(_PlannedDevice):
+    """A trap door or a shield; moving it takes no time, its travel is the protocol's to wait."""
+
+    def __init__(self, travel_s: float) -> None:
+        self._travel_s = travel_s
+
+    def travel_s(self) -> float:
+        return self._travel_s
+
+    def open(self) -> None:
+        pass
+
+    def close(self) -> None:
+        pass
+
+    def cover(self) -> None:
+        pass
+
+    def uncover(self) -> None:
+        pass
 
 
 class _PlannedCamera(_PlannedDevice):
@@ -181,6 +208,13 @@ class _PlanRecorder:
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
         self.frame_count += 1
         self._note(frame.start_s, "camera", f"{purpose} frame, {frame.settings}", late_s)
+
+    def last_by_hand(self) -> None:
+        return None
+
+    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str:
+        self.clock.spend(step.takes_s)
+        return ""
 
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
         return ()

@@ -1,9 +1,9 @@
 """The devices of one bench, open, with the clock they share."""
 
-from collections.abc import Mapping
+from collections.abc import Iterable, Mapping
 from typing import cast
 
-from labrig.acquire.roles import Camera, Device, Lamp
+from labrig.acquire.roles import SAFE_ORDER, Camera, Device, Hands, Lamp, LampShield, TrapDoor
 from labrig.clock import Clock
 from labrig.errors import DeviceError, DeviceLostError, LabrigError, ProtocolError
 
@@ -46,6 +46,21 @@ class Rig:
         """The camera; `ProtocolError` where the rig has none."""
         return cast(Camera, self._device("camera"))
 
+    @property
+    def door(self) -> TrapDoor:
+        """The trap door; `ProtocolError` where the rig has none."""
+        return cast(TrapDoor, self._device("door"))
+
+    @property
+    def shield(self) -> LampShield:
+        """The lamp's shield; `ProtocolError` where the rig has none."""
+        return cast(LampShield, self._device("shield"))
+
+    @property
+    def hands(self) -> Hands:
+        """What works in a person's place; `ProtocolError` where the rig has none."""
+        return cast(Hands, self._device("hands"))
+
     def warm_up_s(self, key: str) -> float:
         """Seconds that device needs to become steady; 0 where the rig file says nothing."""
         return self._warm_up_s.get(key, 0.0)
@@ -57,6 +72,8 @@ class Rig:
     def make_safe(self) -> None:
         """Lamp off, LEDs off, door closed: every device is tried, whatever the others answered.
 
+        Lights first: a door that closes turns its sample to the lamp.
+
         Raises
         ------
         DeviceError
@@ -66,9 +83,9 @@ class Rig:
         """
         failures, gone = {}, True
         with self.clock.shielded():
-            for key, device in self.devices.items():
+            for key in in_safe_order(self.devices):
                 try:
-                    device.make_safe()
+                    self.devices[key].make_safe()
                 except Exception as error:
                     said = str(error) if isinstance(error, LabrigError) else repr(error)
                     failures[key] = f"{key}: {said}"
@@ -94,3 +111,8 @@ class Rig:
                 f"(only {', '.join(sorted(self.devices)) or 'nothing'}); add it under 'devices:'"
             )
         return self.devices[key]
+
+
+def in_safe_order(keys: Iterable[str]) -> list[str]:
+    """Keys of devices, those first that have to be safe before the others move."""
+    return sorted(keys, key=lambda key: SAFE_ORDER.get(key, len(SAFE_ORDER)))

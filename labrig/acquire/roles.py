@@ -32,13 +32,13 @@ class Lamp(Device, Protocol):
     """A light that charges the sample. Safe: off."""
 
     def on(self) -> None:
-        """Switch on, read back."""
+        """Switch on, read back where the device can."""
 
     def off(self) -> None:
-        """Switch off, read back."""
+        """Switch off, read back where the device can."""
 
     def is_on(self) -> bool:
-        """What the device says, not what was asked."""
+        """What the device says, not what was asked; a driver whose device says nothing says so."""
 
 
 @runtime_checkable
@@ -67,6 +67,37 @@ class TrapDoor(Device, Protocol):
 
     def travel_s(self) -> float:
         """Seconds from the command until the door has stopped."""
+
+
+@runtime_checkable
+class LampShield(Device, Protocol):
+    """Keeps the afterglow of a lamp that is off from the sample (Nalbach et al., section 4.4).
+
+    Safe: uncovered, since a hot lamp behind a shield cannot lose its heat.
+    """
+
+    def cover(self) -> None:
+        """Begin to cover the lamp; returns when the command is acknowledged."""
+
+    def uncover(self) -> None:
+        """Begin to uncover it."""
+
+    def travel_s(self) -> float:
+        """Seconds from the command until the shield has stopped."""
+
+
+@runtime_checkable
+class Hands(Device, Protocol):
+    """Do what a person would do at the bench: a sample changer, a filter wheel. Safe: still."""
+
+    def do(self, task: str) -> None:
+        """Do it; returns when it is done.
+
+        Raises
+        ------
+        DeviceError
+            They do not know how, or something went wrong.
+        """
 
 
 @runtime_checkable
@@ -123,6 +154,20 @@ class KeptAwake(Protocol):
 
 
 @runtime_checkable
+class Guarded(Protocol):
+    """A device with a watchdog: it goes to its safe state when it hears nothing for long."""
+
+    def heartbeat(self) -> None:
+        """Let it hear from this PC; takes milliseconds.
+
+        Raises
+        ------
+        DeviceError
+            Its watchdog has struck already.
+        """
+
+
+@runtime_checkable
 class Spectrometer(Device, Protocol):
     """Measures relative spectral irradiance. Safe: idle."""
 
@@ -137,7 +182,9 @@ class Spectrometer(Device, Protocol):
 ROLES: dict[str, type] = {
     "lamp": Lamp,
     "leds": LedBank,
+    "shield": LampShield,
     "door": TrapDoor,
+    "hands": Hands,
     "camera": Camera,
     "viewfinder": LiveView,
     "spectrometer": Spectrometer,
@@ -145,3 +192,6 @@ ROLES: dict[str, type] = {
 
 #: Those that give light: somebody has to know if one of them may be on.
 LIGHTS = frozenset({"lamp", "leds"})
+
+#: Which are made safe before all others, in this order.
+SAFE_ORDER = {key: place for place, key in enumerate(("lamp", "leds", "shield", "door"))}

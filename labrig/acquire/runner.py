@@ -3,12 +3,13 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
+from labrig.acquire.by_hand import TakenBack
 from labrig.acquire.protocol import Unit
 from labrig.acquire.rig import Rig
 from labrig.acquire.session import Observer, Session
 from labrig.acquire.values import Frame
 from labrig.clock import Clock
-from labrig.record import ActionRecord, FrameRecord, RunFolder
+from labrig.record import TAKEN_BACK, ActionRecord, FrameRecord, RunFolder
 from labrig.record.attempt import AttemptWriter
 
 T = TypeVar("T")
@@ -34,20 +35,44 @@ def run_units(
     """Do all units that are not complete in `folder`, in order.
 
     A unit that ends by an exception leaves its attempt open: the caller first reaches the safe
-    state, then closes the attempt with `RunFolder.close_open_attempts`.
+    state, then closes the attempt with `RunFolder.close_open_attempts`. Where a person takes back
+    what was done by hand last, its unit counts no longer and is done again.
     """
+    while True:
+        try:
+            _run_what_is_left(units, rig, folder, observer, metadata)
+        except TakenBack:
+            rig.make_safe()
+        else:
+            return
+
+
+def _run_what_is_left(
+    units: Sequence[Unit],
+    rig: Rig,
+    folder: RunFolder,
+    observer: RunObserver,
+    metadata: Mapping[str, Any],
+) -> None:
     record = folder.read()
     done = record.completed()
     frames = [frame for attempt in done.values() for frame in attempt.frames]
+    by_hand = [
+        action for attempt in done.values() for action in attempt.actions if action.is_by_hand
+    ]
     for number, unit in enumerate(units, start=1):
         if unit.name in done:
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
-        recorder = _Recorder(rig.clock, writer, frames, observer)
-        unit.run(Session(rig, recorder, observer))
+        recorder = _Recorder(rig.clock, writer, frames, by_hand, observer)
+        try:
+            unit.run(Session(rig, recorder, observer))
+        except TakenBack:
+            recorder.take_back()
+            raise
         writer.stop("success")
-        frames = recorder.kept
+        frames, by_hand = recorder.kept, recorder.by_hand
 
 
 class _Recorder:
@@ -58,18 +83,30 @@ class _Recorder:
         clock: Clock,
         writer: AttemptWriter,
         kept: Sequence[FrameRecord],
+        by_hand: Sequence[ActionRecord],
         observer: RunObserver,
     ) -> None:
         self._clock = clock
         self._writer = writer
         self._observer = observer
         self.kept = list(kept)
+        self.by_hand = list(by_hand)
 
     def acted(self, device: str, action: str, start_s: float, end_s: float, late_s: float) -> None:
         wall = self._clock.wall
-        self._writer.action(
-            ActionRecord(self._writer.unit, device, action, wall(start_s), wall(end_s), late_s)
-        )
+        record = ActionRecord(self._writer.unit, device, action, wall(start_s), wall(end_s), late_s)
+        self._writer.action(record)
+        if record.is_by_hand:
+            self.by_hand.append(record)
+
+    def last_by_hand(self) -> str | None:
+        return self.by_hand[-1].action if self.by_hand else None
+
+    def take_back(self) -> None:
+        """The unit of what was done by hand last does not count; this attempt ends."""
+        unit, now_s = self.by_hand[-1].unit, self._clock.now()
+        self.acted(TAKEN_BACK, unit, now_s, now_s, 0.0)
+        self._writer.stop("abort", f"taken back: '{self.last_by_hand()}'; {unit} is done again")
 
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
         record = self._writer.frame(

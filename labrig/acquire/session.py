@@ -5,17 +5,18 @@ The same code runs on a bench and in the planner: only devices, clock and record
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
-from dataclasses import dataclass
 from functools import cached_property
 from typing import Protocol, TypeVar
 
+from labrig.acquire.actions import Action, Missed, Shoot, Timed
+from labrig.acquire.by_hand import ByHand, TakenBack
 from labrig.acquire.rig import Rig
-from labrig.acquire.roles import KeptAwake
+from labrig.acquire.roles import Guarded, KeptAwake
 from labrig.acquire.values import ExposureSettings, Frame
 from labrig.clock import Clock
 from labrig.errors import DeviceError, LabrigError
 from labrig.quantity import duration_text
-from labrig.record import FrameRecord
+from labrig.record import PERSON, FrameRecord
 
 T = TypeVar("T")
 
@@ -23,46 +24,10 @@ T = TypeVar("T")
 AWAKE_PERIOD_S = 30.0
 #: Nobody is spoken to so shortly before an action: a busy camera may take seconds to answer.
 QUIET_BEFORE_S = 10.0
-
-
-@dataclass(frozen=True)
-class Switch:
-    """Lamp on or off."""
-
-    on: bool
-
-    def __str__(self) -> str:
-        return "on" if self.on else "off"
-
-
-@dataclass(frozen=True)
-class Shoot:
-    """One photograph, for a purpose: `dark`, `meter`, `decay`, `daylight`."""
-
-    purpose: str
-    settings: ExposureSettings
-
-    def __str__(self) -> str:
-        return f"{self.purpose} frame, {self.settings}"
-
-
-Action = Switch | Shoot
-
-LAMP_ON = Switch(on=True)
-LAMP_OFF = Switch(on=False)
-
-
-@dataclass(frozen=True)
-class Timed:
-    """An action and when it begins, in seconds after the start of its sequence."""
-
-    at_s: float
-    action: Action
-
-
-def at(at_s: float, action: Action) -> Timed:
-    """`action`, to begin `at_s` seconds after the start of the sequence."""
-    return Timed(at_s, action)
+#: A watchdog is heard of in less.
+BEAT_S = 0.5
+#: An action may begin this much after its time; a PC is no better (tails of 5 ms, 10 under load).
+TOLERANCE_S = 0.02
 
 
 class Recorder(Protocol):
@@ -73,6 +38,9 @@ class Recorder(Protocol):
 
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
         """A frame is to be kept."""
+
+    def last_by_hand(self) -> str | None:
+        """What a person did last, in this unit or a completed one."""
 
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
         """Frames with that purpose: of completed units, then of this one."""
@@ -90,6 +58,22 @@ class Observer(Protocol):
     def warn(self, text: str) -> None:
         """Something a person should know."""
 
+    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+        """Have a person do something, and wait until it is done.
+
+        Parameters
+        ----------
+        last
+            What can be taken back.
+        meanwhile
+            Called some times a second while nobody answers.
+
+        Returns
+        -------
+        str or None
+            A remark, mostly empty; None to take back what was done last.
+        """
+
 
 class Session:
     """One unit's hold on the bench."""
@@ -99,6 +83,7 @@ class Session:
         self._recorder = recorder
         self._observer = observer
         self._in_force: ExposureSettings | None = None
+        self._beaten_s = rig.clock.now()
 
     @property
     def clock(self) -> Clock:
@@ -122,13 +107,21 @@ class Session:
         self._prepare(action)
         self._execute(action, late_s=0.0)
 
-    def run_sequence(self, sequence: Sequence[Timed]) -> None:
+    def run_sequence(
+        self, sequence: Sequence[Timed], tolerance_s: float = TOLERANCE_S
+    ) -> Sequence[Missed]:
         """Do things at their times after now, against absolute deadlines.
 
         The camera is set and half-pressed for its next photograph as soon as the previous one is
         over, for the first one before the sequence begins. An action whose time has passed is done
-        at once and recorded as late.
+        at once and recorded as late; of lamp, door and shield that is said, too.
+
+        Returns
+        -------
+        sequence of Missed
+            What began more than `tolerance_s` after its time, for protocols that then repeat it.
         """
+        missed = []
         photographs = [timed.action for timed in sequence if isinstance(timed.action, Shoot)]
         if photographs:
             self._prepare(photographs.pop(0))
@@ -136,9 +129,37 @@ class Session:
         for timed in sequence:
             deadline_s = zero_s + timed.at_s
             self._sleep_until(deadline_s)
-            self._execute(timed.action, late_s=self.clock.now() - deadline_s)
+            late_s = self.clock.now() - deadline_s
+            self._execute(timed.action, late_s)
+            if late_s > tolerance_s:
+                missed.append(Missed(timed, late_s))
             if isinstance(timed.action, Shoot) and photographs:
                 self._prepare(photographs.pop(0))
+        if moves := [str(one) for one in missed if not isinstance(one.timed.action, Shoot)]:
+            self.warn(
+                f"began late: {', '.join(moves)}; the times at which it happened are recorded "
+                "(leave more time before it, or let this PC do less)"
+            )
+        return missed
+
+    def ask(self, step: ByHand) -> str:
+        """Have something done by hand; returns the remark that came with it, mostly empty.
+
+        Raises
+        ------
+        TakenBack
+            What was done by hand last is to be done again. The runner does its unit again.
+        """
+        start_s = self.clock.now()
+        remark = self._observer.ask(step, self._recorder.last_by_hand(), self._meanwhile())
+        if remark is None:
+            raise TakenBack
+        if "hands" in self.rig.devices:
+            with _device_errors("hands"):
+                self.rig.hands.do(step.task)
+        said = f"{step.what} ({remark})" if remark else step.what
+        self._recorder.acted(PERSON, said, start_s, self.clock.now(), 0.0)
+        return remark
 
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
         """Frames taken for that purpose, by completed units and by this one so far."""
@@ -159,13 +180,44 @@ class Session:
         self._observer.warn(text)
 
     def _sleep_until(self, deadline_s: float) -> None:
-        """Wait, and keep from falling asleep what would."""
-        while self._sleepy and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
+        """Wait; keep from falling asleep what would, and from striking what guards."""
+        spoken_to = self._sleepy or self._guarded
+        while spoken_to and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
             self.clock.sleep(AWAKE_PERIOD_S)
-            for key, device in self._sleepy.items():
-                with _device_errors(key):
-                    device.keep_awake()
+            self._keep_awake()
+        now_s = self.clock.now()
+        if now_s - self._beaten_s >= AWAKE_PERIOD_S and deadline_s - now_s > BEAT_S:
+            self._beat()
         self.clock.sleep_until(deadline_s)
+
+    def _meanwhile(self) -> Callable[[], None]:
+        """While a person takes an unknown time: what would fall asleep is kept awake, too."""
+        next_s = self.clock.now() + AWAKE_PERIOD_S
+
+        def look_up() -> None:
+            nonlocal next_s
+            self.clock.sleep(0.0)
+            if self.clock.now() >= next_s:
+                self._keep_awake()
+                next_s = self.clock.now() + AWAKE_PERIOD_S
+
+        return look_up
+
+    def _keep_awake(self) -> None:
+        for key, device in self._sleepy.items():
+            with _device_errors(key):
+                device.keep_awake()
+        self._beat()
+
+    def _beat(self) -> None:
+        for key, device in self._guarded.items():
+            with _device_errors(key):
+                device.heartbeat()
+        self._beaten_s = self.clock.now()
+
+    @cached_property
+    def _guarded(self) -> dict[str, Guarded]:
+        return {k: d for k, d in self.rig.devices.items() if isinstance(d, Guarded)}
 
     @cached_property
     def _sleepy(self) -> dict[str, KeptAwake]:
@@ -189,14 +241,11 @@ class Session:
                 frame = self.rig.camera.shoot()
             self._recorder.photographed(action.purpose, frame, late_s)
             return
-        self._observer.doing(f"lamp {action}")
-        lamp, start_s = self.rig.lamp, self.clock.now()
-        with _device_errors("lamp"):
-            if action.on:
-                lamp.on()
-            else:
-                lamp.off()
-        self._recorder.acted("lamp", str(action), start_s, self.clock.now(), late_s)
+        self._observer.doing(f"{action.device} {action}")
+        start_s = self.clock.now()
+        with _device_errors(action.device):
+            action.begin(self.rig)
+        self._recorder.acted(action.device, str(action), start_s, self.clock.now(), late_s)
 
 
 @contextmanager

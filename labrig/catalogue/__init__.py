@@ -9,7 +9,6 @@ from labrig.catalogue.listing import (
     list_runs,
     summarise,
 )
-from labrig.catalogue.notes import add_note, read_notes
 from labrig.catalogue.results import Measured, PatchResult, read_results
 
 __all__ = [
@@ -20,12 +19,10 @@ __all__ = [
     "PatchResult",
     "RunSummary",
     "Wanted",
-    "add_note",
     "compare_runs",
     "find_run",
     "is_being_written",
     "list_runs",
-    "read_notes",
     "read_results",
     "summarise",
 ]

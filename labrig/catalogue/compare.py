@@ -8,12 +8,16 @@ from typing import Any
 
 from scipy import stats
 
+from labrig.catalogue.reference import gain
 from labrig.catalogue.results import Measured, PatchResult, read_results
-from labrig.errors import DataError, UsageError
-from labrig.yaml_file import did_you_mean, read_yaml
+from labrig.errors import DataError
+from labrig.yaml_file import read_yaml
 
 #: Chance alone makes two equal sets of numbers differ so much less often than this.
 DIFFERENT_P = 0.01
+NO_GAIN = Measured(1.0, 0.0)
+#: Less than this is not told apart.
+LEAST_P = 1e-9
 
 
 @dataclass(frozen=True)
@@ -42,12 +46,15 @@ class PatchComparison:
         State by state; empty where the numbers of states differ.
     p_value
         Probability that equal rates come out as different as these; NaN if they cannot be told.
+    gain
+        What amplitudes of B were multiplied by, as the reference tells; 1 without one.
     """
 
     patch: str
     states: tuple[int, int]
     differences: tuple[Difference, ...]
     p_value: float
+    gain: Measured
 
     @property
     def verdict(self) -> str:
@@ -57,7 +64,8 @@ class PatchComparison:
         if math.isnan(self.p_value):
             return "cannot be told: the uncertainties are not known"
         agree = "differ" if self.p_value < DIFFERENT_P else "agree"
-        return f"the rates {agree} (p = {self.p_value:.2g})"
+        p = f"p = {self.p_value:.2g}" if self.p_value >= LEAST_P else f"p < {LEAST_P:g}"
+        return f"the rates {agree} ({p})"
 
 
 @dataclass(frozen=True)
@@ -69,7 +77,7 @@ class Comparison:
     asked
         Keys of the protocol that differ, with both values.
     missing
-        Patches that only one of the runs has.
+        Patches that were fitted in only one of the runs.
     """
 
     asked: tuple[tuple[str, Any, Any], ...]
@@ -83,8 +91,8 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
     Parameters
     ----------
     reference
-        Patch with a steady source that is there on both days. Its amplitude ties the days together:
-        those of B are scaled by what the reference lost or gained.
+        Patch with a source that is the same on both days, steady or decaying; it ties the days
+        together: the amplitudes of B are scaled by what it lost or gained.
 
     Raises
     ------
@@ -93,50 +101,53 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
     UsageError
         There is no such reference in both.
     """
-    of_a, of_b = _results(a), _results(b)
-    shared = [name for name in of_a if name in of_b]
-    if reference is not None and reference not in shared:
-        raise UsageError(f"--reference {reference}: {did_you_mean(reference, shared)}")
-    scale = Measured(1.0, 0.0)
-    if reference is not None:
-        scale = _ratio(_brightness(of_a[reference]), _brightness(of_b[reference]))
+    protocols = read_yaml(a / "protocol.yaml"), read_yaml(b / "protocol.yaml")
+    of_a, of_b = (_results(run, protocol) for run, protocol in zip((a, b), protocols, strict=True))
+    if len(of_a) == len(of_b) == 1:  # the one patch, whatever it is called
+        of_b = dict(zip(of_a, of_b.values(), strict=True))
+    shared = [name for name in of_a if name in of_b and name != reference]
+    gains = {
+        name: NO_GAIN if reference is None else gain(a, b, reference, of_a[name].brightest)
+        for name in shared
+    }
     return Comparison(
-        asked=tuple(_differing(_protocol(a), _protocol(b))),
-        patches=tuple(
-            _compare(name or "sample", of_a[name], of_b[name], scale)
-            for name in shared
-            if name != reference
+        asked=tuple(
+            (key, *values)
+            for key, *values in _differing(*protocols)
+            # said as `missing`, in fewer words
+            if not (key.startswith("patches.") and None in values)
         ),
+        patches=tuple(_compare(name, of_a[name], of_b[name], gains[name]) for name in shared),
         missing=tuple(sorted(set(of_a) ^ set(of_b))),
     )
 
 
-def _compare(name: str, a: PatchResult, b: PatchResult, scale: Measured) -> PatchComparison:
+def _compare(name: str, a: PatchResult, b: PatchResult, gain_of_b: Measured) -> PatchComparison:
     counts = len(a.rates), len(b.rates)
     if counts[0] != counts[1]:
-        return PatchComparison(name, counts, (), math.nan)
+        return PatchComparison(name, counts, (), math.nan, gain_of_b)
     rates = [
         Difference(f"k_r {number}", "1/s", of_a, of_b)
         for number, (of_a, of_b) in enumerate(zip(a.rates, b.rates, strict=True), start=1)
     ]
+    channel = a.brightest
+    pairs = zip(a.amplitudes, b.amplitudes_in(channel), strict=True)
     amplitudes = [
-        Difference(f"a {number}", "DN/s", of_a, _product(of_b, scale))
-        for number, (of_a, of_b) in enumerate(zip(a.amplitudes, b.amplitudes, strict=True), start=1)
+        Difference(f"a {number}", f"DN/s of channel {channel}", of_a, of_b.times(gain_of_b))
+        for number, (of_a, of_b) in enumerate(pairs, start=1)
     ]
     chi2 = sum(difference.pull**2 for difference in rates)
     p_value = float(stats.chi2.sf(chi2, len(rates)))
-    return PatchComparison(name, counts, (*rates, *amplitudes), p_value)
+    return PatchComparison(name, counts, (*rates, *amplitudes), p_value, gain_of_b)
 
 
-def _results(run: Path) -> dict[str, PatchResult]:
-    results = {result.name: result for result in read_results(run)}
+def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, PatchResult]:
+    """By the name of the patch, also where there is only one."""
+    only = next(iter(protocol.get("patches") or ["sample"]))
+    results = {result.name or only: result for result in read_results(run)}
     if not results:
         raise DataError(f"{run}: it has no result to compare; make one: labrig process {run}")
     return results
-
-
-def _protocol(run: Path) -> dict[str, Any]:
-    return read_yaml(run / "protocol.yaml")
 
 
 def _differing(
@@ -150,19 +161,3 @@ def _differing(
         elif of_a != of_b:
             found.append((f"{place}{key}", of_a, of_b))
     return found
-
-
-def _brightness(result: PatchResult) -> Measured:
-    """Of all states at lamp off; their σ are taken as independent."""
-    return Measured(
-        sum(amplitude.value for amplitude in result.amplitudes),
-        math.hypot(*(amplitude.sigma for amplitude in result.amplitudes)),
-    )
-
-
-def _ratio(a: Measured, b: Measured) -> Measured:
-    return _product(a, Measured(1 / b.value, b.sigma / b.value**2))
-
-
-def _product(a: Measured, b: Measured) -> Measured:
-    return Measured(a.value * b.value, math.hypot(a.sigma * b.value, a.value * b.sigma))

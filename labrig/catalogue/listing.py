@@ -104,8 +104,11 @@ def find_run(run: Path, runs: Path) -> Path:
     ]
     if len(fitting) == 1:
         return fitting[0]
-    said = f"{len(fitting)} runs begin so, write more of the name" if fitting else "no such run"
-    raise UsageError(f"{run}: {said}; see: labrig runs --runs {runs}")
+    said = f"{len(fitting)} runs begin so" if fitting else "there is no such run"
+    raise UsageError(
+        f"{run}: expected a run folder, the beginning of one's name or 'last'; {said}, see: "
+        f"labrig runs --runs {runs}"
+    )
 
 
 def summarise(folder: Path) -> RunSummary:

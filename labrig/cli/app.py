@@ -2,7 +2,7 @@
 
 import typer
 
-from labrig.cli import fit, frame, process, protocol, rig, run, runs, schema, sim, watch
+from labrig.cli import fit, frame, optics, process, protocol, rig, run, runs, schema, sim, watch
 
 app = typer.Typer(
     help="From a lab bench to a measured phosphorescent or fluorescent material.",
@@ -20,6 +20,7 @@ app.command("note")(runs.note)
 app.command("watch")(watch.watch)
 app.command("schema")(schema.schema)
 app.add_typer(fit.app, name="fit")
+app.add_typer(optics.app, name="optics")
 app.add_typer(protocol.app, name="protocol")
 app.add_typer(rig.app, name="rig")
 app.add_typer(runs.app, name="runs")

@@ -10,7 +10,9 @@ if TYPE_CHECKING:
 
 
 def process(
-    run: Annotated[Path, typer.Argument(help="The run folder.")],
+    run: Annotated[
+        Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
+    ],
     roi: Annotated[
         list[str] | None,
         typer.Option("--roi", help="NAME=x,y,width,height (or x,y,…): another region. Repeatable."),
@@ -29,18 +31,20 @@ def process(
     camera: Annotated[
         str | None, typer.Option("--camera", help="Other camera curves, for the report's colours.")
     ] = None,
+    runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Reduce, fit and report a run again, and say what changed.
 
     An earlier result that differs is kept as result-1, result-2, …
     """
+    from labrig.catalogue import find_run
     from labrig.process import Choices
 
-    process_and_tell(
-        run, Choices.parse(roi or [], exclude or [], states, rate or [], camera), json=json
-    )
-    typer.echo(run)
+    choices = Choices.parse(roi or [], exclude or [], states, rate or [], camera)
+    folder = find_run(run, runs)
+    process_and_tell(folder, choices, json=json)
+    typer.echo(folder)
 
 
 def process_and_tell(run: Path, choices: "Choices | None" = None, *, json: bool) -> None:

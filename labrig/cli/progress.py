@@ -2,7 +2,7 @@
 
 import shutil
 import sys
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
 
@@ -15,8 +15,10 @@ from rich.style import Style
 from rich.table import Table
 from rich.text import Text
 
-from labrig.acquire import ExposureSettings, Plan, RunObserver
+from labrig.acquire import ByHand, ExposureSettings, Plan, RunObserver
+from labrig.cli.prompt import Terminal
 from labrig.clock import Clock
+from labrig.errors import UsageError
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
 from labrig.watch.glances import Glances, Seen
@@ -26,7 +28,14 @@ THUMBNAIL_WIDTH = 48
 
 
 @contextmanager
-def progress(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+def progress(
+    plan: Plan,
+    done: Sequence[str],
+    clock: Clock,
+    *,
+    yes: bool = False,
+    has_hands: bool = False,
+) -> Iterator[RunObserver]:
     """An observer that tells the person at the terminal, or a log, on standard error.
 
     Parameters
@@ -37,8 +46,23 @@ def progress(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObser
         Names of units that are complete already.
     clock
         The rig's clock.
+    yes
+        What is to be done by hand, the rig's own hands do: nobody is asked.
+    has_hands
+        Whether it has any.
+
+    Raises
+    ------
+    UsageError
+        `yes` for what only a person can do.
     """
-    state = _State(plan, done, clock)
+    if yes and plan.by_hand and not has_hands:
+        raise UsageError(
+            f"--yes: {len(plan.by_hand)} steps are done by hand, such as '{plan.by_hand[0]}', and "
+            "the rig has no 'hands' to do them; run it without --yes, or (on a simulated rig) add "
+            "to its devices: hands: {driver: text_hands, address: sim://room/hands}"
+        )
+    state = _State(plan, done, clock, yes=yes)
     if not sys.stderr.isatty():
         yield PlainProgress(state)
         return
@@ -54,7 +78,7 @@ def progress(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObser
 class _State:
     """Where the run is, held against the plan."""
 
-    def __init__(self, plan: Plan, done: Sequence[str], clock: Clock) -> None:
+    def __init__(self, plan: Plan, done: Sequence[str], clock: Clock, *, yes: bool) -> None:
         self.plan = plan
         self.clock = clock
         self.done = set(done)
@@ -63,11 +87,13 @@ class _State:
         self.doing = "connecting"
         self.until_s: float | None = None
         self.frames = 0
+        self._person = None if yes else Terminal()
         self._unit_began_s = clock.now()
 
     def begin(self, unit: str, number: int) -> None:
-        if self.unit:
+        if self.unit and number > self.number:  # else it was taken back
             self.done.add(self.unit)
+        self.done.discard(unit)
         self.unit, self.number = unit, number
         self._unit_began_s = self.clock.now()
 
@@ -80,6 +106,13 @@ class _State:
             elif name not in self.done:
                 left_s += ends_s - begins_s
         return left_s
+
+    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+        """The person at the terminal; without one, only the time that it takes passes."""
+        if self._person is None:
+            self.clock.sleep(step.takes_s)
+            return ""
+        return self._person.ask(step, last, self.left_s(), meanwhile)
 
     def next_step(self) -> str:
         """What the plan has next in this unit, else the next unit."""
@@ -133,6 +166,11 @@ class PlainProgress:
         """Say a warning."""
         self._say(f"warning: {text}")
 
+    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+        """Have something done by hand."""
+        self._say(f"by hand: {step.what}")
+        return self._state.ask(step, last, meanwhile)
+
     def _say(self, text: str) -> None:
         left = _countdown(self._state.left_s())
         print(f"[{left} left] {text}", file=sys.stderr, flush=True)
@@ -143,6 +181,7 @@ class LiveProgress:
 
     def __init__(self, state: _State, live: Live, console: Console) -> None:
         self._state = state
+        self._live = live
         self._console = console
         self._total = len(state.plan.units)
         self._run: Path | None = None
@@ -173,6 +212,14 @@ class LiveProgress:
     def warn(self, text: str) -> None:
         """A warning stays on the screen above the table."""
         self._console.print(Text(f"warning: {text}", style="yellow"))
+
+    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+        """Have something done by hand; the table makes room for question and answer."""
+        self._live.stop()
+        try:
+            return self._state.ask(step, last, meanwhile)
+        finally:
+            self._live.start()
 
     def __rich__(self) -> Group:
         """All of it as it is now."""

@@ -40,7 +40,8 @@ def new_protocol(
         raise UsageError(f"{path} is there already; give the new file another name") from None
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
-    typer.echo(f"{path} is yours to change; then: labrig plan ./{path} --rig sim")
+    place = path if path.is_absolute() else f"./{path}"
+    typer.echo(f"{path} is yours to change; then: labrig plan {place} --rig sim")
 
 
 @app.callback()

@@ -1,5 +1,6 @@
 """`labrig run`, `labrig plan`, `labrig resume`: protocols on a rig."""
 
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -23,7 +24,10 @@ NoProcess = Annotated[
     bool, typer.Option("--no-process", help="Stop after recording; reduce and fit later.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
-Yes = Annotated[bool, typer.Option("--yes", help="Answer every question with yes.")]
+Yes = Annotated[
+    bool,
+    typer.Option("--yes", help="Ask nobody: the rig's 'hands' do what is to be done by hand."),
+]
 
 
 def run(
@@ -40,7 +44,8 @@ def run(
 
     recording = _prepared(protocol, rig, runs)
     with told_at_end(recording.rig.on_finish) as ending:
-        folder = recording.record(progress)
+        has_hands = "hands" in recording.rig.devices
+        folder = recording.record(partial(progress, yes=yes, has_hands=has_hands))
         _finish(folder, no_process, json)
         ending.message = str(folder)
 
@@ -73,20 +78,28 @@ def plan(
 
 
 def resume(
-    run: Annotated[Path, typer.Argument(help="The run folder.")],
+    run: Annotated[
+        Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
+    ],
+    runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
+    yes: Yes = False,
     no_process: NoProcess = False,
     json: Json = False,
 ) -> None:
     """Go on with a run that was interrupted: completed units are kept, the rest is done."""
     from labrig.acquire import read_rig_file
+    from labrig.catalogue import find_run
     from labrig.cli.at_end import told_at_end
     from labrig.cli.progress import progress
     from labrig.run import resume_run
 
-    rig = run / "rig.yaml"
-    with told_at_end(read_rig_file(rig).on_finish if rig.is_file() else None) as ending:
-        _finish(resume_run(run, progress), no_process, json)
-        ending.message = str(run)
+    folder = find_run(run, runs)
+    path = folder / "rig.yaml"
+    rig = read_rig_file(path) if path.is_file() else None
+    watch = partial(progress, yes=yes, has_hands=rig is not None and "hands" in rig.devices)
+    with told_at_end(None if rig is None else rig.on_finish) as ending:
+        _finish(resume_run(folder, watch), no_process, json)
+        ending.message = str(folder)
 
 
 def _prepared(protocol: str, rig: str, runs: Path) -> "Recording":

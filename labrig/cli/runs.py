@@ -1,15 +1,30 @@
 """`labrig runs` and `labrig note`: what was measured, and what there is to say about it."""
 
+import itertools
+import math
 from datetime import datetime
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
+from typer.core import TyperGroup
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, PatchResult, RunSummary
 
-app = typer.Typer(help="The runs in a folder.")
+
+class _ListsByDefault(TyperGroup):
+    """`labrig runs --since 2026-11-20` is `labrig runs list --since 2026-11-20`."""
+
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        is_bare = not args or (args[0].startswith("-") and args[0] not in ctx.help_option_names)
+        return super().parse_args(ctx, ["list", *args] if is_bare else args)
+
+
+app = typer.Typer(
+    help="The runs in a folder: list (the default, with its options), show one, compare two.",
+    cls=_ListsByDefault,
+)
 
 Runs = Annotated[Path, typer.Option("--runs", help="Where the run folders are.")]
 Run = Annotated[Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")]
@@ -28,13 +43,6 @@ State = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print as JSON.")]
 
 _STYLES = {"running": "bold", "unfinished": "yellow", "damaged": "red", "processed": "green"}
-
-
-@app.callback(invoke_without_command=True)
-def runs(context: typer.Context) -> None:
-    """The runs in a folder: list (the default), show one, compare two."""
-    if context.invoked_subcommand is None:
-        list_them()
 
 
 @app.command("list")
@@ -71,7 +79,8 @@ def list_them(
 @app.command("show")
 def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
     """All there is to know of one run, its notes and earlier results included."""
-    from labrig.catalogue import find_run, read_notes, summarise
+    from labrig.catalogue import find_run, summarise
+    from labrig.record import read_notes
 
     folder = find_run(run, runs)
     summary, notes = summarise(folder), read_notes(folder)
@@ -81,8 +90,7 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
     typer.echo(f"{folder}")
     typer.echo(f"  {summary.protocol} of {summary.sample}, {_when(summary)} UTC, {summary.state}")
     typer.echo(f"  {_progress(summary)} units, {summary.frames} frames")
-    for result in _result_folders(folder):
-        _tell_results(folder, result)
+    _tell_results(folder)
     report = folder / "result" / "report.html"
     if report.is_file():
         typer.echo(f"  report: {report}")
@@ -97,7 +105,7 @@ def compare(
     runs: Runs = Path("runs"),
     reference: Annotated[
         str | None,
-        typer.Option(help="A patch with a steady source; ties the amplitudes of two days."),
+        typer.Option(help="A patch with the same source on both days; ties their amplitudes."),
     ] = None,
     json: Json = False,
 ) -> None:
@@ -120,8 +128,9 @@ def note(
     runs: Runs = Path("runs"),
 ) -> None:
     """Add a note to a run: what you saw, what was odd. Kept in notes.md in its folder."""
-    from labrig.catalogue import add_note, find_run
+    from labrig.catalogue import find_run
     from labrig.clock import SystemClock
+    from labrig.record import add_note
 
     typer.echo(add_note(find_run(run, runs), text, SystemClock().wall()))
 
@@ -132,16 +141,15 @@ def _print_runs(found: list["RunSummary"]) -> None:
     from rich.text import Text
 
     table = Table(box=None, pad_edge=False)
-    for title in ("began (UTC)", "sample", "protocol", "state", "units", "k_r in 1/s"):
+    for title in ("began (UTC)", "sample", "protocol", "state", "k_r in 1/s"):
         table.add_column(title, overflow="fold")
     for run in found:
         table.add_row(
             _when(run),
             run.sample,
             run.protocol,
-            Text(run.state, style=_STYLES.get(run.state, "")),
-            _progress(run),
-            "\n".join(_rates(result) for result in run.results),
+            Text(_state(run), style=_STYLES.get(run.state, "")),
+            "\n".join(_short_rates(result) for result in run.results),
         )
     Console().print(table)
 
@@ -154,30 +162,45 @@ def _print_comparison(comparison: "Comparison") -> None:
 
     for key, of_a, of_b in comparison.asked:
         typer.echo(f"asked differently: {key}: {of_a} | {of_b}")
-    for name in comparison.missing:
-        typer.echo(f"only in one of them: {name or 'sample'}")
+    if comparison.missing:
+        typer.echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
+    if not comparison.patches:
+        typer.echo("no patch is fitted in both")
     for patch in comparison.patches:
-        table = Table(box=None, pad_edge=False, title=f"{patch.patch}: {patch.verdict}")
-        table.title_justify = "left"
-        for title in ("", "A", "B", "B - A in σ"):
+        typer.echo(f"{patch.patch}: {patch.verdict}")
+        table = Table(box=None, pad_edge=False)
+        for title in ("", "run A", "run B", "B − A in σ"):
             table.add_column(title)
         for one in patch.differences:
             table.add_row(
                 f"{one.quantity} in {one.unit}",
                 plus_minus(one.a.value, one.a.sigma),
                 plus_minus(one.b.value, one.b.sigma),
-                f"{one.pull:+.1f}",
+                "–" if math.isnan(one.pull) else f"{one.pull:+.1f}".replace("-", "−"),
             )
-        Console().print(table)
+        if patch.differences:
+            Console().print(table)
+        if patch.gain.sigma:
+            gain = plus_minus(patch.gain.value, patch.gain.sigma)
+            typer.echo(f"a of run B is multiplied by {gain}, as the reference tells")
+    if not any(patch.gain.sigma for patch in comparison.patches):
+        typer.echo("a is in each day's own DN/s; a source that stays, as --reference, ties them")
 
 
-def _tell_results(folder: Path, result: str) -> None:
+def _tell_results(folder: Path) -> None:
+    """Each result and what it was made with otherwise than the one before it."""
     from labrig.catalogue import read_results
+    from labrig.process.changes import other_settings
 
-    for patch in read_results(folder, result):
-        typer.echo(f"  {result}: {_rates(patch)} /s")
-        for warning in patch.warnings:
-            typer.echo(f"    warning: {warning}")
+    results = _result_folders(folder)
+    for result, before in itertools.zip_longest(results, results[1:]):
+        for patch in read_results(folder, result):
+            typer.echo(f"  {result}: {_rates(patch)} /s")
+            for warning in patch.warnings:
+                typer.echo(f"    warning: {warning}")
+        if before is not None:
+            for line in other_settings(folder / before, folder / result):
+                typer.echo(f"    {line}")
 
 
 def _result_folders(folder: Path) -> list[str]:
@@ -196,8 +219,20 @@ def _rates(result: "PatchResult") -> str:
     return f"{result.name}: {rates}" if result.name else rates
 
 
+def _short_rates(result: "PatchResult") -> str:
+    """With σ in units of the last places, so that a line holds them."""
+    from labrig.fit.decay.result import with_uncertainty
+
+    rates = ",  ".join(with_uncertainty(rate.value, rate.sigma) for rate in result.rates)
+    return f"{result.name}: {rates}" if result.name else rates
+
+
 def _when(run: "RunSummary") -> str:
     return "–" if run.began is None else f"{run.began:%Y-%m-%d %H:%M}"
+
+
+def _state(run: "RunSummary") -> str:
+    return run.state if run.done == run.units else f"{run.state}, {_progress(run)}"
 
 
 def _progress(run: "RunSummary") -> str:

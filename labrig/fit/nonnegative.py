@@ -58,7 +58,7 @@ def _by_active_sets(columns: FloatArray, target: FloatArray, least_gain: float) 
     """Lawson and Hanson's algorithm for columns of length 1 (or 0), each set solved by itself."""
     n = columns.shape[1]
     solution, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
-    empty = ~columns.any(axis=0)
+    empty = np.asarray(~columns.any(axis=0), dtype=np.bool_)
     # A column that gains nothing but rounding is not asked again until another one has.
     refused = empty
     residual = target

@@ -55,13 +55,18 @@ def changes(before: Path, after: Path) -> tuple[str, ...]:
     other = [file for file in files if not _alike(before / file, after / file)]
     if not other:
         return ()
-    settings = list(_other_settings(_settings(before), _settings(after)))
+    settings = other_settings(before, after)
     numbers = list(_other_numbers(_fits(before), _fits(after)))
     if not numbers:
         numbers = [f"the numbers are the same; other in {', '.join(map(str, other))}"]
     elif not settings:
         numbers.append("nothing that is recorded explains it: labrig's code, or the computer?")
     return (*settings, *numbers)
+
+
+def other_settings(before: Path, after: Path) -> tuple[str, ...]:
+    """What the result folder `after` was made with otherwise than `before`, a line each."""
+    return tuple(_other_settings(_settings(before), _settings(after)))
 
 
 def _alike(one: Path, other: Path) -> bool:

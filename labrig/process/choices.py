@@ -122,7 +122,8 @@ class Choices:
         """
         unknown = self.excluded.difference(*(_names(frame) for frame in frames))
         if unknown:
-            raise UsageError(f"--exclude: the run has no frame {', '.join(sorted(unknown))}")
+            there = f"; it has {frames[0].path.name} to {frames[-1].path.name}" if frames else ""
+            raise UsageError(f"--exclude: the run has no frame {', '.join(sorted(unknown))}{there}")
 
 
 def _names(frame: FrameRecord) -> set[str]:

@@ -10,7 +10,7 @@ from labrig.optics import CameraResponse, read_camera
 from labrig.process.choices import DecayProtocol
 from labrig.process.history import charges_s, interruptions, written_time
 from labrig.process.provenance import library_versions
-from labrig.record import FrameRecord, RunRecord
+from labrig.record import FrameRecord, RunRecord, read_notes
 from labrig.reduce import Series
 from labrig.region import Region
 from labrig.report import DeviceLine, GlowPhotograph, PatchReport, RunReport
@@ -64,7 +64,7 @@ def run_report(
         background=protocol.background if protocol.dark == "background" else None,
         states=states,
         interruptions=interruptions(run),
-        notes=_notes(run),
+        notes=read_notes(run.folder),
     )
 
 
@@ -95,9 +95,3 @@ def _glow(run: RunRecord, series: Series) -> tuple[GlowPhotograph, ...]:
     last = len(first.frame) - 1
     chosen = sorted({round(share * last) for share in GLOW_SHARES})
     return tuple(GlowPhotograph(frames[first.frame[row]], float(first.t_s[row])) for row in chosen)
-
-
-def _notes(run: RunRecord) -> str:
-    """What `labrig note` has written."""
-    path = run.folder / "notes.md"
-    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""

@@ -36,6 +36,11 @@ class FrameRecord:
     disk_s: float = 0.0
 
 
+#: Devices of actions that are a person's: what was done by hand, and the unit that does not count
+#: any more because it was done wrongly.
+PERSON, TAKEN_BACK = "person", "taken back"
+
+
 @dataclass(frozen=True)
 class ActionRecord:
     """One switch, move or choice. Times are seconds since 1970, as measured."""
@@ -46,3 +51,8 @@ class ActionRecord:
     start_time: float
     end_time: float
     late_s: float
+
+    @property
+    def is_by_hand(self) -> bool:
+        """Whether a person did it."""
+        return self.device == PERSON

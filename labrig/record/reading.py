@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from labrig.errors import DataError
-from labrig.record.frames import ActionRecord, FrameRecord
+from labrig.record.frames import TAKEN_BACK, ActionRecord, FrameRecord
 from labrig.record.journal import Document, read_journal
 
 #: End of the year 9999 in seconds since 1970: no calendar reaches further.
@@ -49,8 +49,18 @@ class RunRecord:
     last_time: float
 
     def completed(self) -> dict[str, Attempt]:
-        """The attempt that counts, of each completed unit, in order of completion."""
-        return {attempt.unit: attempt for attempt in self.attempts if attempt.completed}
+        """The attempt that counts, of each completed unit, in order of completion.
+
+        One that a person took back later does not count.
+        """
+        done: dict[str, Attempt] = {}
+        for attempt in self.attempts:
+            for action in attempt.actions:
+                if action.device == TAKEN_BACK:
+                    done.pop(action.action, None)
+            if attempt.completed:
+                done[attempt.unit] = attempt
+        return done
 
     def frames(self, purpose: str) -> list[FrameRecord]:
         """Frames with that purpose, of completed units only."""

@@ -1,6 +1,7 @@
 """The report: one HTML file that needs nothing else."""
 
 import re
+import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
 from datetime import UTC, datetime
@@ -25,7 +26,7 @@ from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
 from labrig.report.plates import Plate, Plates
 from labrig.report.residual_figure import residual_figure
 from labrig.report.run_figures import overview_figures, timing_figure
-from labrig.report.stability import Repeat, repeats
+from labrig.report.stability import Repeat, Steady, repeats, steady
 from labrig.report.swatches import Swatch, swatches
 from labrig.report.timing import Lateness, frame_timings, lateness
 from labrig.report.written_numbers import plus_minus, rounded
@@ -60,6 +61,8 @@ class _Patch:
     figures: _Figures
     swatches: tuple[Swatch, ...]
     repeats: tuple[Repeat, ...]
+    #: Without a fit, if it shone.
+    steady: Steady | None
     #: Small figure for comparison; None if there is only one patch.
     overview: Plate | None
 
@@ -116,6 +119,7 @@ def _page(
         utc=_utc,
     )
     environment.filters["indexed"] = _indexed
+    environment.filters["quoted"] = shlex.quote
     photographed = [photograph.frame for photograph in report.glow]
     return environment.get_template(TEMPLATE).render(
         report=report,
@@ -123,6 +127,7 @@ def _page(
         style=Markup((folder / STYLE).read_text(encoding="utf-8")),
         script=Markup((folder / SCRIPT).read_text(encoding="utf-8")),
         warnings=_warnings(report),
+        notes=_notes(report.notes),
         patches=patches,
         late=late,
         timing=timing,
@@ -148,6 +153,13 @@ def _warnings(report: RunReport) -> list[str]:
             if not any(reason in warning for warning in report.warnings)
         ),
     ]
+
+
+def _notes(text: str) -> list[tuple[str, str]]:
+    """Heading and text of every note; what stands before the first heading has none."""
+    before, *entries = re.split(r"^## +", text, flags=re.MULTILINE)
+    split = (entry.partition("\n") for entry in entries)
+    return [("", before.strip()), *((heading.strip(), rest.strip()) for heading, _, rest in split)]
 
 
 def _patches(report: RunReport, screen: Screen, plates: Plates) -> list[_Patch]:
@@ -178,6 +190,7 @@ def _patch(
         figures=_figures(f"{number}-{patch.name}", patch, fit, plates),
         swatches=swatches(patch.series, screen),
         repeats=repeats(patch.series, fit) if fit else (),
+        steady=None if fit else steady(patch.series),
         overview=overview,
     )
 

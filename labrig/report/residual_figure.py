@@ -24,6 +24,7 @@ from labrig.report.figure_style import (
     points,
 )
 from labrig.report.fitted_curve import middles_s
+from labrig.report.legend import legend_above, marked
 from labrig.report.written_numbers import rounded
 
 FloatArray = NDArray[np.float64]
@@ -78,7 +79,7 @@ def residual_figure(series: Series, fit: DecayFit) -> Figure:
     left = residuals(series, fit)
     several = len(series.channels) > 1
     figure = new_figure(HEIGHT_PT if several else LOW_HEIGHT_PT)
-    upper = place(figure, left=LEFT_PT, bottom=136 if several else 38, right=12, top=14)
+    upper = place(figure, left=LEFT_PT, bottom=136 if several else 38, right=12, top=30)
     t_s, usable = middles_s(series), series.usable
     last = float(t_s.max())
     upper.axhspan(-BAND, BAND, color=SHADE, linewidth=0)
@@ -89,6 +90,7 @@ def residual_figure(series: Series, fit: DecayFit) -> Figure:
         colour = channel_colour(name, number)
         for rows, face in ((usable, colour), (~usable, PAPER)):
             points(upper, t_s[rows], cut[rows, number], marker, colour, face, size=3.6)
+    _legend(figure, series)
     reach = float(np.abs(cut[usable]).max()) if usable.any() else BAND
     upper.set_ylim(-max(reach * 1.1, 3.2), max(reach * 1.1, 3.2))
     upper.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
@@ -113,3 +115,15 @@ def residual_figure(series: Series, fit: DecayFit) -> Figure:
     lower.set_ylabel("In common / %")
     lower.set_xlabel(TIME_LABEL)
     return figure
+
+
+def _legend(figure: Figure, series: Series) -> None:
+    entries = [
+        marked(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
+        for number, name in enumerate(series.channels)
+    ]
+    if len(series.channels) > 1:
+        entries.append(marked("in common", ".", INK))
+    if not series.usable.all():
+        entries.append(marked("left out", "o", MUTED, PAPER))
+    legend_above(figure, entries, columns=7)

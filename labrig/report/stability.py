@@ -1,4 +1,4 @@
-"""Whether a decay came out alike each time it was repeated."""
+"""Whether a decay came out alike each time it was repeated, and what was steady stayed so."""
 
 from dataclasses import dataclass
 
@@ -7,6 +7,9 @@ import numpy as np
 from labrig.fit import DecayFit
 from labrig.reduce import Series
 from labrig.report.residual_figure import residuals
+
+#: What stands out of its own σ by less was dark.
+SEEN_SIGMA = 5.0
 
 
 @dataclass(frozen=True)
@@ -42,4 +45,56 @@ def repeats(series: Series, fit: DecayFit) -> tuple[Repeat, ...]:
             unit, mean / first, mean / first * float(np.hypot(sigma / mean, first_sigma / first))
         )
         for unit, mean, sigma in others
+    )
+
+
+@dataclass(frozen=True)
+class Steady:
+    """A patch that shone steadily, such as a reference diode: what it says of lamp and camera.
+
+    Parameters
+    ----------
+    channel
+        The brightest one.
+    level, level_sigma
+        Its mean over all frames, DN/s.
+    drift, drift_sigma
+        Change of a straight line through it, relative to its mean, from the first frame of a decay
+        to the last.
+    """
+
+    channel: str
+    level: float
+    level_sigma: float
+    drift: float
+    drift_sigma: float
+
+
+def steady(series: Series) -> Steady | None:
+    """For a patch without a fit; None if it is dark or has fewer than three usable frames.
+
+    The scatter of the frames about the line tells σ, flicker included.
+    """
+    values = series.values[series.usable]
+    if len(values) < 3:
+        return None
+    brightest = int(values.mean(axis=0).argmax())
+    value, t_s = values[:, brightest], series.t_s[series.usable]
+    level, span_s = float(value.mean()), float(np.ptp(t_s))
+    away_s = t_s - t_s.mean()
+    if not span_s:
+        return None
+    slope = float(away_s @ value / (away_s @ away_s))
+    rest = value - level - slope * away_s
+    scatter = float(np.sqrt(rest @ rest / (len(value) - 2)))
+    level_sigma = scatter / np.sqrt(len(value))
+    if not level > SEEN_SIGMA * level_sigma:
+        return None
+    slope_sigma = scatter / np.sqrt(away_s @ away_s)
+    return Steady(
+        channel=series.channels[brightest],
+        level=level,
+        level_sigma=float(level_sigma),
+        drift=slope * span_s / level,
+        drift_sigma=float(slope_sigma * span_s / level),
     )

@@ -1,12 +1,22 @@
 """A rig's devices identified, looked over and exercised gently."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 
-from labrig.acquire import Camera, Checkable, Device, Lamp, LiveView, Rig
+from labrig.acquire import (
+    Camera,
+    Checkable,
+    Device,
+    Lamp,
+    LampShield,
+    LiveView,
+    Rig,
+    TrapDoor,
+)
 from labrig.bench import Bench
 from labrig.clock import Clock
 from labrig.errors import DeviceError, LabrigError
+from labrig.quantity import duration_text
 from labrig.setup.photographs import exercise_camera
 from labrig.setup.picture_stats import decode
 from labrig.setup.report import DeviceReport, Measured, RigReport, spread_ms
@@ -20,8 +30,9 @@ VIEWFINDER = "viewfinder"
 def check_rig(stand: Bench) -> RigReport:
     """Open the rig, look at every device, bring it to its safe state.
 
-    The lamp is lit for some hundredths of a second, three times; the camera takes four frames; a
-    viewfinder shows one picture. A camera whose settings would spoil photometry takes none.
+    The lamp is lit for some hundredths of a second, three times; trap door and shield go there and
+    back once; the camera takes four frames; a viewfinder shows one picture. A camera whose settings
+    would spoil photometry takes none.
 
     Raises
     ------
@@ -61,6 +72,12 @@ def _checked(key: str, device: Device, clock: Clock) -> DeviceReport:
             report = replace(report, measured=_look_through(device, clock))
         elif isinstance(device, Lamp):
             report = replace(report, measured=_exercise_lamp(device, clock))
+        elif isinstance(device, TrapDoor):
+            ways = {"open, read back": device.open, "close, read back": device.close}
+            report = replace(report, measured=_swing(ways, device.travel_s(), clock))
+        elif isinstance(device, LampShield):
+            ways = {"cover, read back": device.cover, "uncover, read back": device.uncover}
+            report = replace(report, measured=_swing(ways, device.travel_s(), clock))
         elif isinstance(device, Camera):
             report = exercise_camera(report, device, clock)
     except LabrigError as error:
@@ -84,6 +101,23 @@ def _exercise_lamp(lamp: Lamp, clock: Clock) -> tuple[Measured, ...]:
     return (
         Measured("switch on, read back", spread_ms(on_s)),
         Measured("switch off, read back", spread_ms(off_s)),
+    )
+
+
+def _swing(
+    ways: Mapping[str, Callable[[], None]], travel_s: float, clock: Clock
+) -> tuple[Measured, ...]:
+    """There and back, the full travel each; the last way is the safe one."""
+    measured = []
+    for what, go in ways.items():
+        measured.append(Measured(what, f"{_timed(go, clock) * 1e3:.1f} ms"))
+        clock.sleep(travel_s)
+    return (
+        *measured,
+        Measured(
+            "travel, from the rig file",
+            f"{duration_text(travel_s)}; watch that it has stopped by then: no board sees that",
+        ),
     )
 
 

@@ -20,23 +20,56 @@ _STILL_IMAGE = 6
 
 @dataclass(frozen=True)
 class _Board:
-    """What is known of a USB vendor's serial devices; `keys` are those of a rig file's lamp."""
+    """What is known of a USB vendor's serial devices; `keys` are those of its role's entry."""
 
     name: str
     driver: str | None = None
     keys: str = ""
+    role: str = "lamp"
+    hints: tuple[str, ...] = ()
 
+
+_MAESTRO = _Board(
+    "Pololu Maestro servo controller",
+    "maestro_door",
+    ", channel: 0, closed: 1000 us, open: 2000 us, travel: 300 ms",
+    role="door",
+    hints=(
+        "a Maestro shows two ports: its command port is usually the lower one; it has to be set to "
+        "USB Dual Port in the Maestro Control Center",
+    ),
+)
 
 #: USB vendor and product, or vendor alone. Sources: the vendors' manuals, the USB ID repository.
 _BOARDS: dict[tuple[int, int | None], _Board] = {
     (0x2A19, None): _Board("Numato relay board", "numato_relay", ", relay: 0, warm_up: 15 min"),
-    (0x1A86, 0x7523): _Board("CH340 adapter, as on LCUS relay boards and Arduino clones"),
+    (0x1A86, 0x7523): _Board(
+        "CH340 adapter, as on LCUS relay boards and Arduino clones",
+        "lcus_relay",
+        ", relay: 1, warm_up: 15 min",
+        hints=("nothing tells what is behind it: use its line only if it is an LCUS board",),
+    ),
+    (0x1FFB, 0x0089): _MAESTRO,
+    (0x1FFB, 0x008A): _MAESTRO,
+    (0x1FFB, 0x008B): _MAESTRO,
+    (0x1FFB, 0x008C): _MAESTRO,
     (0x1FFB, None): _Board("Pololu servo controller"),
     (0x0403, None): _Board("FTDI adapter; the device behind it is not known"),
     (0x10C4, 0xEA60): _Board("CP210x adapter; the device behind it is not known"),
     (0x2341, None): _Board("Arduino"),
     (0x1313, None): _Board("Thorlabs instrument"),
     (0x04D8, 0xFFEE): _Board("Devantech relay board"),
+}
+
+#: USB vendors whose cameras take photographs at commands of their maker's own only, which
+#: `ptp_camera` does not know and libgphoto2 does (its camlibs/ptp2/library.c).
+_OWN_COMMANDS = {
+    0x054C: "Sony",
+    0x04CB: "Fujifilm",
+    0x04DA: "Panasonic",
+    0x07B4: "Olympus",
+    0x33A2: "OM Digital Solutions",
+    0x1003: "Sigma",
 }
 
 
@@ -88,7 +121,7 @@ def discover(around: Surroundings, drivers: Collection[str]) -> Discovery:
     return Discovery(
         ports,
         tuple(
-            _camera(device, around, alike[device.idVendor, device.idProduct] > 1)
+            _camera(device, around, drivers, alike[device.idVendor, device.idProduct] > 1)
             for device in devices
         ),
     )
@@ -108,7 +141,8 @@ def _serial(port: Port, drivers: Collection[str]) -> Found:
     return Found(
         port.device,
         name,
-        f'lamp: {{driver: {board.driver}, address: "{port.device}"{board.keys}}}',
+        f'{board.role}: {{driver: {board.driver}, address: "{port.device}"{board.keys}}}',
+        board.hints,
     )
 
 
@@ -123,7 +157,7 @@ def _is_camera(device: Any) -> bool:
         return False  # a device that does not even show its descriptors is none of ours
 
 
-def _camera(device: Any, around: Surroundings, has_twin: bool) -> Found:
+def _camera(device: Any, around: Surroundings, drivers: Collection[str], has_twin: bool) -> Found:
     address = f"usb://{device.idVendor:04x}:{device.idProduct:04x}"
     refused = unreachable(device, around.platform)
     hints = [refused] if refused else []
@@ -135,10 +169,18 @@ def _camera(device: Any, around: Surroundings, has_twin: bool) -> Found:
         hints.append("there are several of this model: append /SERIAL, see labrig rig check")
     words = [] if refused else [_text(device, device.iManufacturer), _text(device, device.iProduct)]
     usb.util.dispose_resources(device)
+    driver: str | None = "ptp_camera"
+    if maker := _OWN_COMMANDS.get(device.idVendor):
+        driver = None if around.platform == "win32" else "gphoto2_camera"
+        hints.append(
+            f"{maker} has commands of its own, which libgphoto2 knows (Linux, macOS): "
+            "pip install 'labrig[gphoto2]'"
+        )
+    snippet = f'camera: {{driver: {driver}, address: "{address}", warm_up: 30 min}}'
     return Found(
         address,
         " ".join(word for word in words if word) or "camera",
-        f'camera: {{driver: ptp_camera, address: "{address}", warm_up: 30 min}}',
+        snippet if driver in drivers else "",
         tuple(hints),
     )
 

@@ -104,10 +104,6 @@ class Following:
             "planned_frames": self.plan.frames,
             "points": [asdict(p) for points in self._points.values() for p in points],
             "frame": self._frame(),
-            "actions": [
-                {"time": action.start_time, "what": f"{action.device} {action.action}"}
-                for action in (attempts[-1].actions if attempts else [])[-3:]
-            ],
             "trouble": [
                 f"{attempt.unit}: {attempt.reason}"
                 for attempt in attempts
@@ -184,12 +180,13 @@ class Following:
             results = read_results(self.run)
         except DataError:
             return []
+        order = {name: number for number, name in enumerate(self.patches)}
         return [
             {
-                "patch": result.name,
+                "patch": result.name or next(iter(self.patches), ""),
                 "rates": ", ".join(plus_minus(rate.value, rate.sigma) for rate in result.rates),
             }
-            for result in results
+            for result in sorted(results, key=lambda one: order.get(one.name, 0))
         ]
 
 

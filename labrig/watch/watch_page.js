@@ -1,8 +1,14 @@
 // Shows what the server tells; asks again by itself when the connection breaks.
 
-import { COLOURS, draw } from "./watch_plot.js";
+import { draw, sample } from "./watch_plot.js";
 
 const $ = (id) => document.getElementById(id);
+const NOTHING_NEXT = {
+  unfinished: "Nobody is at it. Go on with: labrig resume",
+  recorded: "Everything is recorded; the fit follows, or else: labrig process",
+  processed: "Done; the report is in the run's folder: result/report.html",
+  damaged: "The journal cannot be read.",
+};
 let state = null;
 let isConnected = false;
 
@@ -42,17 +48,12 @@ function showDecay() {
     const channel = brightest(points);
     series.set(`${patch}, ${channel}`, points.map((p) => [p.t_s, p.dn_per_s[channel]]));
   }
-  const drawn = [...series].map(([name, points], n) => ({
-    name, points, colour: COLOURS[n % COLOURS.length],
-  }));
-  $("legend").replaceChildren(...drawn.map((one) => {
+  $("legend").replaceChildren(...[...series.keys()].map((name, number) => {
     const entry = tag("span");
-    const dot = tag("i");
-    dot.style.background = one.colour;
-    entry.append(dot, one.name);
+    entry.append(sample(number), name);
     return entry;
   }));
-  draw($("plot"), drawn, $("log").checked);
+  draw($("plot"), [...series.values()], $("log").checked);
 }
 
 function showFrame() {
@@ -66,7 +67,7 @@ function showFrame() {
     picture.hidden = false;
   }
   $("frame-name").textContent = frame.name;
-  const exposure = frame.exposure_s < 0.3 ? `1/${Math.round(1 / frame.exposure_s)} s` : `${frame.exposure_s} s`;
+  const exposure = frame.exposure_s < 0.3 ? `1/${Math.round(1 / frame.exposure_s)} s` : `${Number(frame.exposure_s.toPrecision(3))} s`;
   const late = frame.late_s > 0.02 ? `, ${(1000 * frame.late_s).toFixed(0)} ms late` : "";
   $("frame-said").textContent =
     `${frame.purpose}, ${exposure}, ISO ${frame.iso}${late}; brightened ${frame.brightened} ×`;
@@ -97,7 +98,7 @@ function showSteps() {
     entry.append(tag("b", when), tag("span", step.what));
     return entry;
   }));
-  if (!shown.length) $("steps").replaceChildren(tag("li", state.actions.at(-1)?.what ?? "–"));
+  if (!shown.length) $("steps").replaceChildren(tag("li", NOTHING_NEXT[state.state] ?? "–", "alone"));
   const left = state.units.reduce((sum, unit) => {
     if (unit.state === "done") return sum;
     return sum + Math.max(0, unit.planned_s - (unit.state === "now" ? at : 0));
@@ -118,9 +119,12 @@ function showUnits() {
   }));
   $("frames").textContent = `${state.frames} of ${state.planned_frames} frames`;
   $("disk").textContent = `${(state.disk_free_bytes / 1e9).toFixed(1)} GB free on the disk`;
-  $("results").textContent = state.results
-    .map((result) => `${result.patch ? `${result.patch}: ` : ""}k_r = ${result.rates} /s`)
-    .join("; ");
+  $("results").replaceChildren(...state.results.map((result) => {
+    const row = tag("tr");
+    row.append(tag("td", result.patch), tag("td", `${result.rates} /s`));
+    return row;
+  }));
+  $("results-head").hidden = !state.results.length;
 }
 
 function show() {

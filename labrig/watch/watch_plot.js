@@ -2,7 +2,14 @@
 
 const NS = "http://www.w3.org/2000/svg";
 // Okabe and Ito: told apart by everybody.
-export const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+const COLOURS = ["#0072b2", "#d55e00", "#009e73", "#cc79a7", "#e69f00", "#56b4e9"];
+// Of more series than colours, each round has its own shape: a circle, a square, a triangle, a cross.
+const SHAPES = [
+  "M-3.2,0a3.2,3.2 0 1,0 6.4,0a3.2,3.2 0 1,0 -6.4,0z",
+  "M-3,-3h6v6h-6z",
+  "M0,-4l4,7h-8z",
+  "M-3.6,-2l1.6,-1.6l2,2l2,-2l1.6,1.6l-2,2l2,2l-1.6,1.6l-2,-2l-2,2l-1.6,-1.6l2,-2z",
+];
 const MARGIN = { left: 64, right: 14, top: 12, bottom: 46 };
 
 function element(name, attributes, text) {
@@ -10,6 +17,20 @@ function element(name, attributes, text) {
   for (const [key, value] of Object.entries(attributes)) made.setAttribute(key, value);
   if (text !== undefined) made.textContent = text;
   return made;
+}
+
+/** A path that marks the `number`-th series at (x, y). */
+function marker(number, x, y) {
+  const shape = SHAPES[Math.floor(number / COLOURS.length) % SHAPES.length];
+  const fill = COLOURS[number % COLOURS.length];
+  return element("path", { class: "marker", d: shape, fill, transform: `translate(${x} ${y})` });
+}
+
+/** The marker alone, for a legend. */
+export function sample(number) {
+  const svg = element("svg", { viewBox: "-5 -5 10 10", width: 11, height: 11, "aria-hidden": true });
+  svg.append(marker(number, 0, 0));
+  return svg;
 }
 
 /** Round numbers that divide a range into some `about` steps. */
@@ -25,7 +46,7 @@ export function ticks(low, high, about) {
 function decades(low, high) {
   const made = [];
   for (let n = Math.floor(Math.log10(low)); 10 ** n <= high; n += 1) {
-    for (const factor of high / low < 20 ? [1, 2, 5] : [1]) {
+    for (const factor of high / low < 200 ? [1, 2, 5] : [1]) {
       const value = factor * 10 ** n;
       if (value >= low && value <= high) made.push(value);
     }
@@ -38,17 +59,14 @@ function written(value) {
   return String(Number(value.toPrecision(6)));
 }
 
-/** Draw `series`: [{name, colour, points: [[t_s, value], …]}]; true if there was anything. */
+/** Draw `series`: [[[t_s, value], …], …]; true if there was anything. */
 export function draw(svg, series, logarithmic) {
   const width = svg.clientWidth || 800;
   const height = svg.clientHeight || 450;
   svg.setAttribute("viewBox", `0 0 ${width} ${height}`);
   svg.replaceChildren();
-  const shown = series.map((one) => ({
-    ...one,
-    points: one.points.filter(([, value]) => !logarithmic || value > 0),
-  }));
-  const all = shown.flatMap((one) => one.points);
+  const shown = series.map((points) => points.filter(([, value]) => !logarithmic || value > 0));
+  const all = shown.flat();
   const inner = [width - MARGIN.left - MARGIN.right, height - MARGIN.top - MARGIN.bottom];
   if (!all.length) {
     svg.append(element("text", { x: width / 2, y: height / 2, "text-anchor": "middle" },
@@ -65,7 +83,7 @@ export function draw(svg, series, logarithmic) {
     : (v) => (v - low) / (high - low);
   const down = (v) => MARGIN.top + inner[1] * (1 - share(v));
 
-  for (const t of ticks(0, lastS, width / 110)) {
+  for (const t of ticks(0, lastS, width / 75)) {
     svg.append(
       element("line", { class: "grid", x1: across(t), x2: across(t), y1: MARGIN.top, y2: MARGIN.top + inner[1] }),
       element("text", { x: across(t), y: height - MARGIN.bottom + 18, "text-anchor": "middle" }, written(t)),
@@ -89,10 +107,8 @@ export function draw(svg, series, logarithmic) {
       transform: `translate(14 ${MARGIN.top + inner[1] / 2}) rotate(-90)`,
     }, "signal / (DN/s)"),
   );
-  for (const one of shown) {
-    for (const [t, value] of one.points) {
-      svg.append(element("circle", { cx: across(t), cy: down(value), r: 3.2, fill: one.colour }));
-    }
-  }
+  shown.forEach((points, number) => {
+    svg.append(...points.map(([t, value]) => marker(number, across(t), down(value))));
+  });
   return true;
 }

@@ -10,9 +10,9 @@ from .body_settings import BodySettings
 from .camera import SimulatedCamera
 from .faults import CameraFaults
 from .pace import Pace
-from .ptpip_server import PtpIpServer
+from .ptpip.server import PtpIpServer
 from .sensor import Sensor
-from .standard import StandardHabits
+from .standard.body import StandardHabits
 
 __all__ = [
     "BodySettings",

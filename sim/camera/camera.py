@@ -3,10 +3,8 @@
 from labrig.clock import VirtualClock
 
 from .body_settings import BodySettings
-from .cable import Cable
-from .descriptors import UsbIdentity
-from .eos import EosBody
-from .eos_operations import EosOperations
+from .eos.body import EosBody
+from .eos.operations import EosOperations
 from .faults import CameraFaults
 from .objects import StoredObject
 from .operations import Operations
@@ -14,10 +12,12 @@ from .power import AutoPowerOff
 from .responder import Responder
 from .sensor import Sensor
 from .shutter import Shutter
-from .standard import StandardBody, StandardHabits
-from .standard_operations import StandardOperations
-from .still_image import StillImageFunction
-from .usb_backend import CameraBackend
+from .standard.body import StandardBody, StandardHabits
+from .standard.operations import StandardOperations
+from .usb.backend import CameraBackend
+from .usb.cable import Cable
+from .usb.descriptors import UsbIdentity
+from .usb.still_image import StillImageFunction
 
 _NO_FAULTS = CameraFaults()
 _WELL_SET = BodySettings()

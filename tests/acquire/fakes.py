@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from labrig.acquire import CameraOffers, ExposureSettings, Frame
+from labrig.acquire import ByHand, CameraOffers, ExposureSettings, Frame
 from labrig.clock import VirtualClock
 from labrig.record import FrameRecord
 
@@ -41,6 +41,57 @@ class NotingLamp:
 
     def disconnect(self) -> None:
         self._note("lamp gone")
+
+
+class _NotingSwing:
+    """Something that swings between two ends; each command takes its time, or fails on demand."""
+
+    def __init__(self, clock: VirtualClock, note: Note) -> None:
+        self.takes_s = 0.005
+        self.fail: Exception | None = None
+        self._clock = clock
+        self._note = note
+
+    def identity(self) -> str:
+        return "noting swing"
+
+    def travel_s(self) -> float:
+        return 0.28
+
+    def disconnect(self) -> None:
+        self._note("swing gone")
+
+    def _go(self, where: str) -> None:
+        self._clock.sleep(self.takes_s)
+        if self.fail:
+            raise self.fail
+        self._note(where)
+
+
+class NotingDoor(_NotingSwing):
+    """A trap door."""
+
+    def open(self) -> None:
+        self._go("door open")
+
+    def close(self) -> None:
+        self._go("door closed")
+
+    def make_safe(self) -> None:
+        self.close()
+
+
+class NotingShield(_NotingSwing):
+    """A shield before the lamp."""
+
+    def cover(self) -> None:
+        self._go("shield covered")
+
+    def uncover(self) -> None:
+        self._go("shield uncovered")
+
+    def make_safe(self) -> None:
+        self.uncover()
 
 
 class NotingCamera:
@@ -83,6 +134,7 @@ class Watching:
 
     def __init__(self) -> None:
         self.told: list[str] = []
+        self.answers: list[str | None] = []
 
     def unit(self, name: str, number: int, total: int) -> None:
         self.told.append(f"unit {name} {number}/{total}")
@@ -95,3 +147,9 @@ class Watching:
 
     def warn(self, text: str) -> None:
         self.told.append(f"warning: {text}")
+
+    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+        """Answers from `answers`, then `done` without a remark."""
+        self.told.append(f"by hand: {step.what}; before: {last}")
+        meanwhile()
+        return self.answers.pop(0) if self.answers else ""

@@ -94,6 +94,9 @@ class NothingRecorded:
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
         pass
 
+    def last_by_hand(self) -> None:
+        return None
+
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
         return ()
 

@@ -1,9 +1,12 @@
 """A folder of runs: found, filtered, shown, noted, compared."""
 
 import json
+import re
+import shutil
 from collections.abc import Callable
 from pathlib import Path
 
+import numpy as np
 import pytest
 import yaml
 from filelock import FileLock
@@ -77,9 +80,9 @@ def test_a_person_reads_one_line_a_run(week: Path, labrig: Labrig) -> None:
     (paint,) = (line for line in said.splitlines() if "2026-01-03" in line)
     assert "blue-paint" in paint
     assert "processed" in paint
-    assert "3 of 3" in paint
-    assert "0.03" in paint
-    assert "±" in paint
+    assert re.search(r"0\.03\d+\(\d+\)", paint)
+    assert labrig("runs", "--runs", week).out == said
+    assert "unfinished, 0 of 2" in labrig("runs", "--state=unfinished", "--runs", week).out
 
 
 def test_a_run_that_is_being_written_or_damaged_says_so(week: Path, tmp_path: Path) -> None:
@@ -99,7 +102,7 @@ def test_runs_are_called_by_the_beginning_of_their_name(week: Path, labrig: Labr
     assert "green-paint" in shown.out
     assert "report.html" in shown.out
     assert "0 of 2" in labrig("runs", "show", "last", "--runs", week).out
-    for name, said in (("2026", "4 runs begin so"), ("2027", "no such run")):
+    for name, said in (("2026", "4 runs begin so"), ("2027", "there is no such run")):
         refused = labrig("runs", "show", name, "--runs", week)
         assert (refused.code, len(refused.err.splitlines())) == (2, 1)
         assert said in refused.err
@@ -131,26 +134,104 @@ def test_the_same_paint_on_two_days_agrees_and_another_one_differs(
     assert "the rates agree" in labrig("runs", "compare", first, again).out
 
 
-def test_a_reference_ties_the_amplitudes_of_two_days_together(tmp_path: Path) -> None:
-    for run, gain in (("a", 1.0), ("b", 0.8)):
-        for patch, amplitude in (("lamp", 100.0), ("paint", 50.0)):
+@pytest.fixture
+def two_days(tmp_path: Path) -> tuple[Path, Path]:
+    """A paint and two sources that stay: a phosphor and a steady one.
+
+    B's camera gives 0.8 of A's signal in R and 0.5 in G. The paint is brightest in R, the others
+    in G.
+    """
+    rng = np.random.default_rng(1)
+    for run, of_r, of_g in (("a", 1.0, 1.0), ("b", 0.8, 0.5)):
+        for patch, r, g in (
+            ("sticker", 60.0, 100.0),
+            ("paint", 50.0, 20.0),
+            ("diode", 30.0, 300.0),
+        ):
             place = tmp_path / run / "result" / patch
             place.mkdir(parents=True)
+            signal = np.array([r * of_r, g * of_g])
+            frames = np.outer(1 + 0.007 * rng.standard_normal(40), signal)
+            rows = [f"{5 * n},1,{frame[0]},0.1,{frame[1]},0.1" for n, frame in enumerate(frames)]
+            table = "\n".join(["t_s,exposure_s,R,R_sigma,G,G_sigma", *rows])
+            (place / "series.csv").write_text(table)
+            if patch == "diode":
+                continue
             state = {
                 "k_r_per_s": 0.01,
                 "k_r_sigma_per_s": 1e-4,
-                "amplitude": amplitude * gain,
-                "amplitude_sigma": 0.5,
+                "amplitude": signal.max(),
+                "amplitude_sigma": 0.2,
             }
-            (place / "fit.json").write_text(json.dumps({"states": [state], "warnings": []}))
+            fit = {
+                "states": [state],
+                "warnings": [],
+                "channel_weights": dict(zip("RG", signal / signal.max(), strict=True)),
+                "channel_weights_sigma": {"R": 0.0, "G": 0.0},
+            }
+            (place / "fit.json").write_text(json.dumps(fit))
         (tmp_path / run / "protocol.yaml").write_text("protocol: decay\n")
-    a, b = tmp_path / "a", tmp_path / "b"
-    (free,) = (p for p in compare_runs(a, b).patches if p.patch == "paint")
+    return tmp_path / "a", tmp_path / "b"
+
+
+@pytest.mark.parametrize("reference", ["sticker", "diode"])
+def test_a_reference_ties_the_amplitudes_of_two_days_together(
+    two_days: tuple[Path, Path], labrig: Labrig, reference: str
+) -> None:
+    (free,) = (p for p in compare_runs(*two_days).patches if p.patch == "paint")
     assert free.differences[1].pull < -10
-    (tied,) = compare_runs(a, b, reference="lamp").patches
-    assert tied.differences[1].b.value == pytest.approx(50.0)
-    assert tied.differences[1].b.sigma > 0.5
-    assert abs(tied.differences[1].pull) < 0.1
+    tied = compare_runs(*two_days, reference)
+    (paint,) = (p for p in tied.patches if p.patch == "paint")
+    assert reference not in [patch.patch for patch in tied.patches]
+    assert paint.differences[1].b.value == pytest.approx(50.0, rel=0.01)
+    assert paint.differences[1].b.sigma > 0.2
+    assert abs(paint.differences[1].pull) < 2
+    assert abs(paint.gain.value - 1.25) < 3 * paint.gain.sigma
+    assert 0.001 < paint.gain.sigma < 0.02
+    said = labrig("runs", "compare", *two_days, "--reference", reference).out
+    assert "a of run B is multiplied by 1.2" in said
+
+
+def test_what_is_no_reference_is_said_in_a_line(
+    two_days: tuple[Path, Path], labrig: Labrig
+) -> None:
+    a, b = two_days
+    ended = labrig("runs", "compare", a, b, "--reference", "diod")
+    assert (ended.code, len(ended.err.splitlines())) == (2, 1)
+    assert "did you mean 'diode'?" in ended.err
+    (b / "result" / "sticker" / "fit.json").unlink()
+    ended = labrig("runs", "compare", a, b, "--reference", "sticker")
+    assert (ended.code, len(ended.err.splitlines())) == (2, 1)
+    assert "steady in the other" in ended.err
+    (b / "result" / "diode" / "series.csv").write_text("t_s,exposure_s,G\n0,1,0\n1,1,0\n")
+    ended = labrig("runs", "compare", a, b, "--reference", "diode")
+    assert (ended.code, len(ended.err.splitlines())) == (4, 1)
+
+
+def test_one_patch_is_compared_with_one_patch_whatever_it_is_called(
+    week: Path, tmp_path: Path
+) -> None:
+    first, again, *_ = (run.folder for run in list_runs(week, Wanted()))
+    renamed = shutil.copytree(again, tmp_path / "renamed")
+    protocol = yaml.safe_load((renamed / "protocol.yaml").read_text())
+    protocol["patches"] = {"paint": protocol["patches"]["sample"]}
+    (renamed / "protocol.yaml").write_text(yaml.safe_dump(protocol))
+    compared = compare_runs(first, renamed)
+    assert [patch.patch for patch in compared.patches] == ["sample"]
+    assert compared.missing == ()
+    assert compared.asked == (("repeats", 1, 2),)
+
+
+def test_results_are_shown_with_what_they_were_made_with(
+    week: Path, tmp_path: Path, labrig: Labrig
+) -> None:
+    run = shutil.copytree(week / "2026-01-04T00-00-00_decay_green-paint", tmp_path / "again")
+    refit = labrig("process", "again", "--runs", tmp_path, "--states", "1", "--exclude", "10")
+    assert refit.code == 0, refit.err
+    assert refit.out.splitlines()[-1] == str(run)
+    shown = labrig("runs", "show", run).out
+    for line in ("result: 0.2", "states: auto → 1", "excluded: none → ", "result-1: 0.2"):
+        assert line in shown, shown
 
 
 def test_what_cannot_be_compared_is_said_in_a_line(week: Path, labrig: Labrig) -> None:

@@ -9,15 +9,15 @@ from pathlib import Path
 
 import pytest
 
+from drivers.ptp.codes import StandardEvent
 from drivers.ptp.containers import Kind, command
 from drivers.ptp.device_info import parse_device_info
-from drivers.ptp.eos_events import Event, ObjectOffered, parse_events
-from drivers.ptp.object_info import parse_object_info
-from drivers.ptp.ptp_codes import StandardEvent
+from drivers.ptp.eos.events import Event, ObjectOffered, parse_events
+from drivers.ptp.standard.object_info import parse_object_info
 from labrig.clock import VirtualClock
-from sim.camera.ptpip_packets import Packet
-from sim.camera.ptpip_transactions import Transactions
-from tests.drivers.ptp.ip_wire import saying
+from sim.camera.ptpip.packets import Packet
+from sim.camera.ptpip.transactions import Transactions
+from tests.drivers.ptp.ip.wire import saying
 
 from . import transcript
 from .record import PICTURE_BYTES, SESSIONS, body_of

@@ -16,7 +16,7 @@ from typing import Any
 
 import usb.core
 
-from tests.drivers.ptp.usb_wire import BULK_IN, BULK_OUT, INTERRUPT_IN, PACKET, StillImageDevice
+from tests.drivers.ptp.usb.wire import BULK_IN, BULK_OUT, INTERRUPT_IN, PACKET, StillImageDevice
 
 STATUS, STATUS_OK = 0x67, bytes((4, 0, 0x01, 0x20))
 GP_ERROR_TIMEOUT = -10

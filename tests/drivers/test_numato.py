@@ -1,7 +1,5 @@
 """The Numato driver against wire transcripts and against the emulated board."""
 
-from typing import NoReturn
-
 import pytest
 from hypothesis import given
 from hypothesis import strategies as st
@@ -12,63 +10,7 @@ from labrig.acquire import Lamp
 from labrig.clock import Interrupted, VirtualClock
 from labrig.errors import DeviceError
 from sim.boards import NumatoBoard
-
-
-class ScriptedPort:
-    """Plays (what must be written, what comes back) in order; bytes come one per millisecond."""
-
-    def __init__(self, clock: VirtualClock, script: list[tuple[bytes, bytes]]) -> None:
-        self.script = script
-        self._clock = clock
-        self._coming: list[tuple[float, bytes]] = []
-
-    @property
-    def in_waiting(self) -> int:
-        return sum(due_s <= self._clock.now() for due_s, _ in self._coming)
-
-    def read(self, size: int = 1, /) -> bytes:
-        count = min(size, self.in_waiting)
-        taken, self._coming = self._coming[:count], self._coming[count:]
-        return b"".join(byte for _, byte in taken)
-
-    def write(self, data: bytes, /) -> int:
-        expected, answer = self.script.pop(0)
-        assert data == expected
-        now_s = self._clock.now()
-        self._coming += [(now_s + 0.001 * n, answer[n : n + 1]) for n in range(len(answer))]
-        return len(data)
-
-    def close(self) -> None:
-        pass
-
-
-class BoardPort(ScriptedPort):
-    """The same line with an emulated board at its end."""
-
-    def __init__(self, clock: VirtualClock, board: NumatoBoard) -> None:
-        super().__init__(clock, [])
-        self._board = board
-
-    def write(self, data: bytes, /) -> int:
-        self.script.append((data, self._board.receive(data)))
-        return super().write(data)
-
-
-class Wired:
-    """Connections with one port."""
-
-    def __init__(self, clock: VirtualClock, port: ScriptedPort) -> None:
-        self.clock = clock
-        self._port = port
-
-    def serial(self, address: str, baudrate: int) -> ScriptedPort:
-        return self._port
-
-    def usb(self, address: str, serial_of: object = None) -> None:
-        raise AssertionError("no USB here")
-
-    def tcp(self, address: str, default_port: int) -> NoReturn:
-        raise AssertionError("no network here")
+from tests.drivers.serial_wire import BoardPort, InterruptingClock, ScriptedPort, Wired
 
 
 def lamp(script: list[tuple[bytes, bytes]], relay: int = 0) -> tuple[NumatoRelay, ScriptedPort]:
@@ -142,18 +84,6 @@ def test_an_interruption_at_any_wait_can_be_made_safe(waits: int) -> None:
     driver.make_safe()
     assert not board.states[0]
     assert not driver.is_on()
-
-
-class InterruptingClock(VirtualClock):
-    """Interrupts at the n-th wait."""
-
-    waits_left = 10**9
-
-    def _pause_until(self, deadline_s: float) -> None:
-        self.waits_left -= 1
-        if self.waits_left == 0:
-            self.interrupt(2)
-        super()._pause_until(deadline_s)
 
 
 @given(st.binary(max_size=40))

@@ -41,7 +41,7 @@ def finished(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 @pytest.fixture(scope="session")
 def with_dark_patch(tmp_path_factory: pytest.TempPathFactory) -> Finished:
     """Two patches with names that are none in NeXus; of one there is no fit."""
-    patches = {"Öl, 2 %": [0.3, 0.3, 0.4, 0.4], "Öl? 2 %": [0.0, 0.0, 0.2, 0.2]}
+    patches = {"Öl, 2 %": [0.3, 0.3, 0.4, 0.4], "Öl; 2 %": [0.0, 0.0, 0.2, 0.2]}
     return finish(tmp_path_factory.mktemp("two"), patches=patches)
 
 

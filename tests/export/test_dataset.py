@@ -44,10 +44,10 @@ def test_units_and_origin_are_attributes(finished: Finished) -> None:
 
 def test_a_patch_without_a_fit_has_values_and_no_parameters(with_dark_patch: Finished) -> None:
     dataset = labrig.read_dataset(with_dark_patch.folder)
-    assert set(dataset.patch.values) == {"Öl, 2 %", "Öl? 2 %"}
+    assert set(dataset.patch.values) == {"Öl, 2 %", "Öl; 2 %"}
     assert np.isfinite(dataset.value).all()
     assert np.isfinite(dataset.k_r_per_s.sel(patch="Öl, 2 %", state=1))
-    dark = dataset.sel(patch="Öl? 2 %")
+    dark = dataset.sel(patch="Öl; 2 %")
     assert np.isnan(dark.k_r_per_s).all()
     assert np.isnan(dark.channel_weight).all()
 

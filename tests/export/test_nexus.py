@@ -132,7 +132,7 @@ def test_of_a_patch_without_a_fit_it_has_the_values_and_the_reason(
         entry = file["entry"]
         assert entry.attrs["default"] == "decay_1_l_2"
         dark = entry["decay_1_l_2_"]
-        assert dark["title"].asstr()[()] == "Öl? 2 %, decay-1"
+        assert dark["title"].asstr()[()] == "Öl; 2 %, decay-1"
         assert abs(dark["B"][()].mean()) < entry["decay_1_l_2/B"][()].mean() / 100
         assert entry["fit_l_2_/not_fitted/data"].asstr()[()] == NO_FIT
         assert "parameters" in entry["fit_l_2"]

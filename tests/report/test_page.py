@@ -189,7 +189,7 @@ def test_what_a_run_has_besides_is_shown(plain: Made, tmp_path: Path) -> None:
                 plain.report,
                 simulated=True,
                 patches=(patch(replace(series, unit=unit)),),
-                notes="## today\n\na <b>note</b>\n",
+                notes="by hand\n## today\n\na <b>note</b>\n# as typed\n",
                 charges_s=(5400.0,),
                 interruptions=(Interruption("decay-2", "2026-01-01 00:40:00 UTC", "unplugged"),),
             ),
@@ -197,7 +197,8 @@ def test_what_a_run_has_besides_is_shown(plain: Made, tmp_path: Path) -> None:
     )
     for expected in (
         "simulated rig",
-        "## today\n\na <b>note</b>",
+        "today",
+        "a <b>note</b>\n# as typed",
         "1 h 30 min",
         "unplugged",
         "decay-2",
@@ -253,6 +254,16 @@ def test_a_missing_fit_is_warned_of_once(tmp_path: Path) -> None:
     odd = clipped_series()
     page = Page(written(tmp_path, run_report(tmp_path, [odd], [f"not fitted: {odd.fit}"])))
     assert "1 warning" in page.text
+
+
+def test_a_steady_source_is_told_with_its_drift(tmp_path: Path) -> None:
+    series = decay_series(name="my diode")
+    flicker = 1 + 0.007 * np.random.default_rng(1).standard_normal((30, 1))
+    lit = PatchReport("my diode", None, replace(series, values=400 * flicker * [0.3, 1, 0.5]), "no")
+    page = Page(written(tmp_path, run_report(tmp_path, [patch(series), lit])))
+    assert "my diode, G" in page.text
+    assert "--reference 'my diode'" in page.text
+    assert "do not decay" not in Page(written(tmp_path, run_report(tmp_path))).text
 
 
 def test_many_patches(tmp_path: Path) -> None:

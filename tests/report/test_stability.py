@@ -8,7 +8,7 @@ import pytest
 from labrig.fit import DecayFit
 from labrig.reduce import Series
 from labrig.report.fitted_curve import fitted_curve
-from labrig.report.stability import repeats
+from labrig.report.stability import repeats, steady
 from labrig.report.timing import FrameTiming, lateness
 
 from .made import decay_series, fitted
@@ -81,3 +81,26 @@ def test_an_unknown_parameter_leaves_the_band_unknown() -> None:
     covariance = FIT.covariance.copy()
     covariance[0, 0] = np.inf
     assert np.isinf(fitted_curve(SERIES, replace(FIT, covariance=covariance)).sigma).all()
+
+
+@pytest.mark.parametrize("drift", [0.0, 0.02, -0.05])
+def test_a_steady_source_tells_its_level_and_its_drift_within_their_sigma(drift: float) -> None:
+    rng = np.random.default_rng(3)
+    seen = []
+    for _ in range(200):
+        frames = 1 + drift * (np.arange(60) / 59 - 0.5) + 0.007 * rng.standard_normal(60)
+        found = steady(replace(SERIES, values=np.outer(frames, [10.0, 400.0, 90.0])))
+        assert found is not None
+        assert found.channel == "G"
+        seen.append(
+            ((found.level - 400) / found.level_sigma, (found.drift - drift) / found.drift_sigma)
+        )
+    # 200 draws: a mean is known to 0.07, a scatter to 5 %
+    assert np.abs(np.mean(seen, axis=0)).max() < 0.25
+    assert np.std(seen, axis=0) == pytest.approx([1.0, 1.0], abs=0.2)
+
+
+def test_what_was_dark_is_not_called_steady() -> None:
+    noise = np.random.default_rng(4).standard_normal(SERIES.values.shape)
+    assert steady(replace(SERIES, values=noise)) is None
+    assert steady(replace(SERIES, flag=("clipped",) * 60)) is None

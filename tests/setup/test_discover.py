@@ -9,6 +9,8 @@ import pytest
 import usb.core
 import yaml
 
+from labrig.acquire import plugins
+from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
 from labrig.setup import Process, Surroundings, discover
 from labrig.setup import surroundings as surroundings_module
@@ -92,6 +94,26 @@ def test_serial_ports_are_told_by_their_usb_numbers(
     assert bool(found.snippet) == has_driver
 
 
+@pytest.mark.parametrize(
+    ("ids", "driver", "role", "hint"),
+    [
+        ((0x1A86, 0x7523), "lcus_relay", "lamp", "only if it is an LCUS board"),
+        ((0x1FFB, 0x0089), "maestro_door", "door", "usually the lower one"),
+        ((0x1FFB, 0x008C), "maestro_door", "door", "USB Dual Port"),
+    ],
+    ids=["LCUS", "Maestro Micro 6", "Maestro Mini 24"],
+)
+def test_a_board_has_the_line_of_its_driver(
+    ids: tuple[int, int], driver: str, role: str, hint: str
+) -> None:
+    (found,) = discover(pc([Plugged("COM5", "USB", *ids)]), [driver]).ports
+    line = yaml.safe_load(found.snippet)
+    assert (line[role]["driver"], line[role]["address"]) == (driver, "COM5")
+    assert hint in found.hints[0]
+    settings = {key: line[role][key] for key in line[role] if key not in DeviceEntry.model_fields}
+    plugins.load(plugins.DRIVERS, driver, "a test").Settings.model_validate(settings)
+
+
 def test_snippets_are_yaml_that_names_driver_and_address() -> None:
     found = discover(pc([Plugged("COM4", "USB", 0x2A19, 0x0C05)], cameras()), DRIVERS)
     devices = yaml.safe_load("\n".join(d.snippet for d in (*found.ports, *found.cameras)))
@@ -113,6 +135,29 @@ def test_a_camera_is_named_and_left_free() -> None:
     assert found.name == "Canon Inc. Canon Digital Camera"
     assert found.hints == ()
     usb.util.claim_interface(device, 0)
+
+
+@pytest.mark.parametrize(
+    ("vendor", "platform", "driver"),
+    [
+        (0x04A9, "linux", "ptp_camera"),
+        (0x04B0, "win32", "ptp_camera"),
+        (0x054C, "linux", "gphoto2_camera"),
+        (0x04CB, "darwin", "gphoto2_camera"),
+        (0x04CB, "win32", None),
+    ],
+    ids=["Canon", "Nikon", "Sony", "Fujifilm", "Fujifilm on Windows"],
+)
+def test_a_makers_own_commands_are_left_to_libgphoto2(
+    vendor: int, platform: str, driver: str | None
+) -> None:
+    (device,) = cameras()
+    device.idVendor = vendor
+    around = pc(usb_devices=[device], platform=platform)
+    (found,) = discover(around, (*DRIVERS, "gphoto2_camera")).cameras
+    camera = yaml.safe_load(found.snippet)["camera"] if found.snippet else {}
+    assert camera.get("driver") == driver
+    assert any("labrig[gphoto2]" in hint for hint in found.hints) == (driver != "ptp_camera")
 
 
 def test_twins_without_serial_numbers_cannot_be_told_apart() -> None:

@@ -91,6 +91,7 @@ def test_a_frame_that_is_marked_as_turned_is_refused(cfa: str) -> None:
     turned = dark_frame(cfa, tags=[TURNED])
     (refused,) = [f for f in exercised(turned).findings if f.severity == "refuse"]
     assert "auto rotate" in refused.what
+    assert "Auto rotate → Off" in refused.remedy
 
 
 def test_a_frame_that_cannot_be_reduced() -> None:

@@ -188,7 +188,7 @@ def test_nobody_else_gets_to_see_it(watching: Watching) -> None:
 
 
 def dots(chromium: Chrome) -> int:
-    return len(chromium.find_elements(By.CSS_SELECTOR, "#plot circle"))
+    return len(chromium.find_elements(By.CSS_SELECTOR, "#plot .marker"))
 
 
 def text(chromium: Chrome, place: str) -> str:
@@ -225,7 +225,8 @@ def test_the_page_follows_the_run_and_finds_back(
     growing.finish()
     watching.look()
     wait.until(lambda _: text(chromium, "state") == "processed")
-    assert "k_r = 0.03" in text(chromium, "results")
+    assert "0.03" in text(chromium, "results")
+    assert "the report is" in text(chromium, "steps")
     keep(chromium, "watch-finished", tmp_path)
     logged = chromium.get_log("browser")  # type: ignore[no-untyped-call]
     assert all("events" in entry["message"] for entry in logged), logged

@@ -10,7 +10,7 @@ from hypothesis import strategies as st
 
 from drivers.ptp.containers import Container, Kind, command, decode, encode
 from drivers.ptp.device_info import parse_device_info
-from drivers.ptp.eos_codes import (
+from drivers.ptp.eos.codes import (
     F_NUMBERS,
     ISOS,
     aperture_code,
@@ -19,7 +19,7 @@ from drivers.ptp.eos_codes import (
     shutter_time_s,
     third_stop_codes,
 )
-from drivers.ptp.eos_events import (
+from drivers.ptp.eos.events import (
     ChoicesChanged,
     Event,
     ObjectOffered,
@@ -29,8 +29,8 @@ from drivers.ptp.eos_events import (
 )
 from labrig.errors import DeviceError
 
-from .bench import bench, photograph
-from .usb_wire import Wire
+from .eos.bench import bench, photograph
+from .usb.wire import Wire
 
 quiet = settings(deadline=None, database=None, derandomize=True)
 u32s = st.integers(0, 0xFFFFFFFF)

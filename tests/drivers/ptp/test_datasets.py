@@ -7,8 +7,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from drivers.ptp.device_info import parse_device_info
-from drivers.ptp.object_info import parse_object_info
-from drivers.ptp.property_description import PropertyDescription, parse_property_description
+from drivers.ptp.standard.object_info import parse_object_info
+from drivers.ptp.standard.property_description import (
+    PropertyDescription,
+    parse_property_description,
+)
 from labrig.errors import DeviceError
 
 #: ExposureTime of libgphoto2's virtual Nikon: 10 ms now, nine times from 1 s to 0.1 ms.

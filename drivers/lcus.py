@@ -1,0 +1,195 @@
+"""LCUS relay boards (LC Technology, CH340): four bytes a command, and never an acknowledgement.
+
+Boards with several relays answer the query FF, in text or in bytes, the first time often with what
+was true before; LCUS-1 says nothing at all. Sources: sellers' data sheets of LCUS-1 to LCUS-8
+and the public drivers of brzycki, AscomSwitchDriver and MultiRoomAudio.
+"""
+
+import re
+from collections.abc import Sequence
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.acquire import Finding
+from labrig.acquire.connections import Connections
+from labrig.errors import DeviceError, DeviceLostError
+
+from .serial_line import SerialLine
+
+BAUDRATE = 9600
+QUERY = b"\xff"
+#: The board has begun to answer by then, and does not pause for so long inside an answer.
+QUIET_S = 0.05
+#: Eight lines of text take 0.1 s.
+ANSWER_TIMEOUT_S = 0.5
+#: Until the last bit of a command has left at 9600 baud: ten bits a byte.
+COMMAND_S = 4 * 10 / BAUDRATE
+#: Before it is given up that a lamp could be switched off.
+SAFE_TRIES = 5
+RETRY_S = 1.0
+MOST_RELAYS = 8
+_LINE = re.compile(rb"CH(\d+): *(ON|OFF) *\r\n")
+
+
+class LcusRelay:
+    """One relay of an LCUS board, switching a lamp.
+
+    `on` and `off` return when the command has left the PC; nothing tells whether it was obeyed. A
+    board that answers the query is asked by `is_on` and `make_safe`, not by `on` and `off`: two
+    queries take a fifth of a second, in which a halogen lamp fades, and the time at which the lamp
+    was switched would be as uncertain.
+
+    Parameters
+    ----------
+    address
+        Serial port of the board; several relays may share it.
+    settings
+        The rig file's keys for this device.
+    connections
+        Opens the port.
+    """
+
+    class Settings(BaseModel):
+        """Keys of the rig file.
+
+        Attributes
+        ----------
+        relay
+            As printed on the board: the first one is 1.
+        """
+
+        model_config = ConfigDict(frozen=True, extra="forbid")
+
+        relay: int = Field(ge=1, le=MOST_RELAYS)
+
+    def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
+        self._relay = settings.relay
+        self._name = f"the LCUS board at {address}"
+        self._clock = connections.clock
+        self._line = SerialLine(connections.serial(address, BAUDRATE), self._clock, self._name)
+        self._asked_on = False
+        self._send(on=False)
+        self._answers = self._query() is not None
+
+    def identity(self) -> str:
+        """What the board shows of itself: how many relays it tells of, or that it tells nothing."""
+        states = self._query() if self._answers else None
+        told = (
+            "never acknowledges: only the camera can verify it"
+            if states is None
+            else f"{len(states)} relays, read back by query"
+        )
+        return f"LCUS relay board ({told}), relay {self._relay}"
+
+    def findings(self) -> Sequence[Finding]:
+        """Whether anything but the camera can tell that the lamp was switched."""
+        if self._answers:
+            return [Finding("fine", "the board answers its query: its register is read back")]
+        return [
+            Finding(
+                "warn",
+                "this board never acknowledges: a relay that does not switch goes unnoticed here",
+                "see the lamp flash three times now; in a run only the camera can tell, so keep "
+                "photographs under the lamp and after it (protocol 'decay' takes them)",
+            )
+        ]
+
+    def on(self) -> None:
+        """Send the command to switch on; see the class about reading back."""
+        self._send(on=True)
+
+    def off(self) -> None:
+        """Send the command to switch off; see the class about reading back."""
+        self._send(on=False)
+
+    def is_on(self) -> bool:
+        """The board's register, where it answers its query; else merely what was sent last.
+
+        Of a board that never acknowledges nobody knows more: it may have missed the command, its
+        contact may be welded. The register knows nothing of the contact, either.
+        """
+        return self._read() if self._answers else self._asked_on
+
+    def make_safe(self) -> None:
+        """Off, sent twice: the second ends a command that was cut off; then read back, if it is.
+
+        Raises
+        ------
+        DeviceError
+            It reads on.
+        DeviceLostError
+            It has answered before and does not now.
+        """
+        for tries_left in reversed(range(SAFE_TRIES)):
+            self._send(on=False)
+            self._send(on=False)
+            if not self._answers:
+                return
+            try:
+                if self._read():
+                    raise DeviceError(
+                        f"relay {self._relay} of {self._name} was switched off but reads on; "
+                        "switch off by hand and check the board"
+                    )
+            except DeviceLostError:
+                if not tries_left:
+                    raise
+                self._clock.sleep(RETRY_S)
+            else:
+                return
+
+    def disconnect(self) -> None:
+        """The port belongs to the connections, which close it."""
+
+    def _send(self, *, on: bool) -> None:
+        self._line.write(command(self._relay, on=on))
+        self._asked_on = on
+        self._clock.sleep(COMMAND_S)
+
+    def _read(self) -> bool:
+        states = self._query()
+        if states is None:
+            raise DeviceLostError(
+                f"{self._name} answered its query before and does not within {QUIET_S:g} s now; "
+                "check its power and cable"
+            )
+        return states[self._relay - 1]
+
+    def _query(self) -> tuple[bool, ...] | None:
+        """States of all relays; None if nothing comes. Asked twice: the first answer may be old."""
+        self._line.drain(QUIET_S, ANSWER_TIMEOUT_S)
+        for _ in range(2):
+            self._line.write(QUERY)
+            came = self._line.drain(QUIET_S, ANSWER_TIMEOUT_S)
+        if not came:
+            return None
+        states = relay_states(came)
+        if len(states) < self._relay:
+            raise DeviceError(
+                f"{self._name} was asked for relay {self._relay}: expected 'CH{self._relay}: ON' "
+                f"or 'OFF', or a byte for each relay, got {came!r}; is it an LCUS board, and has "
+                "it that many relays?"
+            )
+        return states
+
+
+def command(relay: int, *, on: bool) -> bytes:
+    """A0, relay, 1 or 0, and the sum of these three in a byte."""
+    return bytes((0xA0, relay, on, (0xA0 + relay + on) & 0xFF))
+
+
+def relay_states(answer: bytes) -> tuple[bool, ...]:
+    """States of relays 1, 2, … in an answer to the query; empty if it is none.
+
+    Parameters
+    ----------
+    answer
+        Lines such as `CH1: ON`, numbered without a gap, or one byte 00 or 01 a relay.
+    """
+    if set(answer) <= {0, 1}:
+        return tuple(byte == 1 for byte in answer)
+    lines = _LINE.findall(answer)
+    numbered = [int(number) for number, _ in lines] == list(range(1, len(lines) + 1))
+    if not numbered or _LINE.sub(b"", answer):
+        return ()
+    return tuple(state == b"ON" for _, state in lines)

@@ -1,0 +1,202 @@
+"""One channel of a Pololu Maestro: pulses out, errors and pulses read back.
+
+Set to "USB Dual Port" in the Maestro Control Center, its command port is usually the lower of the
+two that it shows. Any error sends every channel to its home position there: give the door's
+channel the closed pulse as home and the serial time-out becomes a watchdog.
+Source: Pololu's Maestro User's Guide, sections 4.e and 5.
+"""
+
+from dataclasses import dataclass
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.acquire.connections import Connections
+from labrig.errors import DeviceError
+from labrig.quantity import DurationS
+
+from ..serial_line import SerialLine
+from .errors import told
+
+#: The USB port ignores it; a Maestro's own default where it is wired to a UART adapter.
+BAUDRATE = 9600
+ANSWER_TIMEOUT_S = 0.5
+#: Longer than any pause inside an answer.
+QUIET_S = 0.03
+#: In this time a new pulse is sent at the latest: five servo frames.
+READ_BACK_S = 0.1
+LOOK_AGAIN_S = 0.005
+#: Beyond the time that the whole way takes.
+SLACK_S = 1.0
+
+SET_TARGET, SET_SPEED, SET_ACCELERATION = 0x84, 0x87, 0x89
+GET_POSITION, GET_MOVING, GET_ERRORS = 0x90, 0x93, 0xA1
+POLOLU_PROTOCOL = 0xAA
+QUARTER_US = 0.25e-6
+
+#: What a Maestro can send: 64 µs to 4080 µs.
+PulseS = Annotated[DurationS, Field(ge=64e-6, le=4080e-6)]
+
+
+class ServoSettings(BaseModel):
+    """Keys of the rig file that every servo has.
+
+    Attributes
+    ----------
+    channel
+        Of the Maestro, counted from 0.
+    travel
+        From the command until it has stopped ringing, the servo's frame of 20 ms included.
+    speed
+        Limit in 0.25 µs per 10 ms, as in the Maestro Control Center; 0: none.
+    acceleration
+        Limit in 0.25 µs per 10 ms per 80 ms; 0: none.
+    device_number
+        Of one Maestro of several on a line, which is then spoken to by Pololu's protocol; null:
+        the only one, by the compact protocol.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    channel: int = Field(ge=0, le=23)
+    travel: Annotated[DurationS, Field(gt=0)]
+    speed: int = Field(0, ge=0, le=0x3FFF)
+    acceleration: int = Field(0, ge=0, le=0xFF)
+    device_number: int | None = Field(None, ge=0, le=0x7F)
+
+
+@dataclass(frozen=True)
+class Wire:
+    """How commands are written: by the compact protocol, or with a device number by Pololu's."""
+
+    device_number: int | None = None
+
+    def command(self, code: int, *data: int) -> bytes:
+        """Bytes of a command; data bytes have 7 bits."""
+        if self.device_number is None:
+            return bytes((code, *data))
+        return bytes((POLOLU_PROTOCOL, self.device_number, code & 0x7F, *data))
+
+
+def seven_bits(value: int) -> tuple[int, int]:
+    """A number below 2¹⁴ as the Maestro takes it: low seven bits first."""
+    return value & 0x7F, value >> 7
+
+
+class Servo:
+    """A servo on a channel; several may share a Maestro and its port.
+
+    Parameters
+    ----------
+    address
+        Serial port.
+    settings
+        The servo's part of the rig file.
+    connections
+        Opens the port.
+    """
+
+    def __init__(self, address: str, settings: ServoSettings, connections: Connections) -> None:
+        self._settings = settings
+        self._wire = Wire(settings.device_number)
+        self.name = f"the Maestro at {address}"
+        self._clock = connections.clock
+        port = connections.serial(address, BAUDRATE)
+        self._line = SerialLine(port, self._clock, self.name)
+        self._resynchronise()
+
+    @property
+    def pulse_s(self) -> float:
+        """Length of the pulse that is being sent, 0 for none: what is commanded, not an angle."""
+        came = self._ask(GET_POSITION, 2, self._settings.channel)
+        return int.from_bytes(came, "little") * QUARTER_US
+
+    def go(self, pulse_s: float) -> None:
+        """Begin to turn; errors and the pulse are read back.
+
+        Raises
+        ------
+        DeviceError
+            The Maestro reports an error, or sends another pulse and does not ramp to this one.
+        """
+        self._tell(SET_TARGET, *seven_bits(quarters(pulse_s)))
+        self.raise_errors()
+        deadline_s = self._clock.now() + READ_BACK_S
+        while not (self._sends(pulse_s) or (self._is_limited and self._is_moving())):
+            if self._clock.now() >= deadline_s:
+                raise self._refused(pulse_s)
+            self._clock.sleep(LOOK_AGAIN_S)
+
+    def bring(self, pulse_s: float) -> None:
+        """Whatever was interrupted, turn, and return when the servo has had the time to stop.
+
+        Raises
+        ------
+        DeviceError
+            As `go`.
+        """
+        self._resynchronise()
+        self._tell(SET_SPEED, *seven_bits(self._settings.speed))
+        self._tell(SET_ACCELERATION, *seven_bits(self._settings.acceleration))
+        was_there = self._sends(pulse_s)
+        self.go(pulse_s)
+        if was_there:
+            return
+        deadline_s = self._clock.now() + self._settings.travel + SLACK_S
+        self._clock.sleep(self._settings.travel)
+        while not self._sends(pulse_s):
+            if self._clock.now() >= deadline_s:
+                raise self._refused(pulse_s)
+            self._clock.sleep(LOOK_AGAIN_S)
+
+    def raise_errors(self) -> None:
+        """Read the error bits, which clears them.
+
+        Raises
+        ------
+        DeviceError
+            Names each error that has happened since they were read last.
+        """
+        if bits := self._errors():
+            raise DeviceError(
+                f"{self.name} reports that {told(bits)}; it has sent all its channels home"
+            )
+
+    @property
+    def _is_limited(self) -> bool:
+        return self._settings.speed > 0 or self._settings.acceleration > 0
+
+    def _sends(self, pulse_s: float) -> bool:
+        return quarters(self.pulse_s) == quarters(pulse_s)
+
+    def _is_moving(self) -> bool:
+        return self._ask(GET_MOVING, 1) != b"\0"
+
+    def _refused(self, pulse_s: float) -> DeviceError:
+        channel, sent_s = self._settings.channel, self.pulse_s
+        return DeviceError(
+            f"channel {channel} of {self.name} was told to send {pulse_s * 1e6:.2f} µs and sends "
+            f"{sent_s * 1e6:.2f} µs; in the Maestro Control Center look whether it is a servo "
+            "channel and its range (Min, Max) wide enough"
+        )
+
+    def _errors(self) -> int:
+        return int.from_bytes(self._ask(GET_ERRORS, 2), "little")
+
+    def _tell(self, code: int, *data: int) -> None:
+        self._line.write(self._wire.command(code, self._settings.channel, *data))
+
+    def _ask(self, code: int, count: int, *data: int) -> bytes:
+        self._line.write(self._wire.command(code, *data))
+        return self._line.read_exactly(count, ANSWER_TIMEOUT_S)
+
+    def _resynchronise(self) -> None:
+        """Forget old errors and a half-read answer; a half-written command is an error itself."""
+        self._line.drain(QUIET_S, ANSWER_TIMEOUT_S)
+        for _ in range(2):
+            self._errors()
+
+
+def quarters(pulse_s: float) -> int:
+    """A pulse in quarter microseconds, the Maestro's unit."""
+    return round(pulse_s / QUARTER_US)

@@ -1,0 +1,234 @@
+"""A Canon EOS, remotely controlled, which delivers its RAW frames to the PC only."""
+
+from collections.abc import Callable, Sequence
+from contextlib import suppress
+from dataclasses import replace
+
+from labrig.acquire.findings import Finding
+from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.clock import Clock
+
+from ..device_info import DeviceInfo
+from ..failures import RefusedError
+from ..session import CURT, Session
+from ..settings import PtpCameraSettings
+from .checks import findings
+from .exposure import EosExposure
+from .frames import EosFrames
+from .protocol import (
+    FEW_SHOTS,
+    HOST_ROOM,
+    RAW_ONLY,
+    SINGLE_SHOT,
+    TO_HOST,
+    Eos,
+    Property,
+    number,
+)
+from .shutter import EosShutter
+from .state import EosState
+from .transfer import EosTransfer
+from .viewfinder import EosViewfinder
+
+
+class EosCamera:
+    """A Canon EOS in an open session.
+
+    The button is held half pressed from `arm` on, so that `shoot` costs one short transaction
+    before the shutter moves. A frame whose `shoot` was broken off is discarded before the next.
+    Exposures longer than the dial's are at bulb, and as long as they are measured to be.
+
+    Parameters
+    ----------
+    session
+        Over which it is spoken to.
+    clock
+        On which it is waited for.
+    info
+        What it says about itself.
+    settings
+        The rig file's keys for this camera.
+    """
+
+    def __init__(
+        self, session: Session, clock: Clock, info: DeviceInfo, settings: PtpCameraSettings
+    ) -> None:
+        self._session = session
+        self._clock = clock
+        self._info = info
+        self._settings = settings
+        self._armed = False
+        self._state = EosState(session, clock, settings.answer_timeout, info.operations)
+        transfer = EosTransfer(session, clock, info)
+        self._frames = EosFrames(self._state, transfer, clock, settings.transfer_timeout)
+        self._shutter = EosShutter(session, clock, info, self._frames, settings.shutter_lag)
+        self._exposure = EosExposure(
+            self._state,
+            settings,
+            settings.native_isos(info.model).values,
+            has_bulb=self._shutter.has_bulb,
+        )
+        self._viewfinder = EosViewfinder(session, self._state, clock, info)
+
+    def take_control(self) -> None:
+        """Remote mode, single shots, RAW frames to the PC.
+
+        Raises
+        ------
+        DeviceError
+            The camera did not take one of these.
+        """
+        self._session.transact(Eos.SetRemoteMode, 1)
+        self._session.transact(Eos.SetEventMode, 1)
+        self._state.refresh()
+        if self._state.value(Property.drive_mode) is not None:
+            self._state.set(Property.drive_mode, number(SINGLE_SHOT))
+        self._state.set(Property.image_format, RAW_ONLY)
+        self._state.set(Property.destination, number(TO_HOST))
+        self._send_if_known(Eos.PCHDDCapacity, *HOST_ROOM)
+        self._state.refresh()
+
+    def take_over(self) -> None:
+        """As `take_control`; lets go of a button, or a shutter, that somebody may have held.
+
+        Raises
+        ------
+        DeviceError
+            The camera did not take one of these.
+        """
+        self.take_control()
+        self._shutter.let_go_blindly()
+        self._frames.expect_left_over()
+
+    def give_back(self) -> None:
+        """Out of remote mode.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer.
+        """
+        for step in (Eos.SetEventMode, Eos.SetRemoteMode):
+            with suppress(RefusedError):
+                self._session.transact(step, 0, patience=CURT)
+
+    def offers(self) -> CameraOffers:
+        """What it can be set to, as it is now.
+
+        Raises
+        ------
+        DeviceError
+            Nothing that the rig file allows, for example because its dial is not at M.
+        """
+        self._state.refresh()
+        return self._exposure.offers()
+
+    def findings(self) -> Sequence[Finding]:
+        """How its dial, lens switch and menus are set.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer.
+        """
+        self._state.refresh()
+        return findings(self._state, self._settings, self._info, has_bulb=self._shutter.has_bulb)
+
+    def keep_awake(self) -> None:
+        """Put off its automatic switching-off.
+
+        Raises
+        ------
+        DeviceError
+            The camera is gone.
+        """
+        # one that refuses is awake, too
+        with suppress(RefusedError):
+            self._send_if_known(Eos.KeepDeviceOn)
+
+    def configure(self, settings: ExposureSettings) -> ExposureSettings:
+        """Set and read back; returns the settings in force, with the true shutter time.
+
+        Parameters
+        ----------
+        settings
+            The shutter time as offered, or as on the dial (1/60 s for the true 1/64 s). At bulb
+            the true one is only known when it is over: see the frame's.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not offer them or did not take them.
+        """
+        self._armed = False
+        self._shutter.let_go()
+        self._frames.discard_abandoned()
+        self._exposure.apply(settings)
+        return self._exposure.in_force()
+
+    def arm(self) -> None:
+        """Press half and hold; may take seconds where the lens focuses.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not get ready.
+        """
+        if self._armed:
+            return
+        self._viewfinder.off()
+        self._frames.discard_abandoned()
+        shots = self._state.value(Property.shots_left)
+        if shots is not None and shots < FEW_SHOTS:
+            self._send_if_known(Eos.PCHDDCapacity, *HOST_ROOM)
+        self._send_if_known(Eos.KeepDeviceOn)
+        self._shutter.get_ready(at_bulb=self._exposure.at_bulb)
+        self._armed = True
+
+    def shoot(self) -> Frame:
+        """Release now, wait for the exposure, transfer the frame.
+
+        Raises
+        ------
+        DeviceError
+            The camera did not release, or delivered no or another frame.
+        """
+        self.arm()
+        self._armed = False
+        settings = self._exposure.in_force()
+        if self._exposure.at_bulb:
+            start_s, end_s = self._shutter.expose_at_bulb(settings.exposure_s)
+            settings = replace(settings, exposure_s=end_s - start_s)
+        else:
+            start_s, end_s = self._shutter.expose(settings.exposure_s)
+        data, suffix = self._frames.fetch()
+        self._shutter.let_go()
+        return Frame(data, suffix, start_s, end_s, settings)
+
+    def preview(self) -> bytes:
+        """One picture of the viewfinder, a JPEG; the first one starts it.
+
+        Raises
+        ------
+        DeviceError
+            The camera has no live view, does not start it, or sends no picture.
+        """
+        self._armed = False
+        return self._viewfinder.picture()
+
+    def steps_to_safety(self) -> Sequence[Callable[[], None]]:
+        """Shutter closed at bulb, button let go, viewfinder off, nothing pending.
+
+        Another exposure that has begun runs to its end in the camera; frames are discarded later.
+        """
+        self._armed = False
+        return (
+            self._shutter.close,
+            self._shutter.let_go,
+            self._frames.discard_offered,
+            self._viewfinder.off_whoever_switched_it_on,
+        )
+
+    def _send_if_known(self, operation: Eos, *params: int) -> None:
+        if operation in self._info.operations:
+            self._session.transact(operation, *params)

@@ -1,0 +1,139 @@
+"""The frames of an EOS: the one that is due, its fetching, and those that nobody wants any more."""
+
+import math
+import re
+
+from labrig.clock import Clock
+from labrig.errors import DeviceError
+
+from ..failures import RefusedError
+from ..session import USUAL
+from .events import ObjectOffered
+from .state import POLL_PERIOD_S, EosState
+from .transfer import EosTransfer
+
+_SUFFIX = re.compile(r"\.[a-z0-9]{1,5}")
+_JPEG_FORMAT = 0x3801
+#: So long after its end the frame of an exposure that a dead program began may still be offered.
+LEFT_OVER_S = 2.0
+
+
+class EosFrames:
+    """Knows whether a frame is due, so that none is ever taken for another.
+
+    Parameters
+    ----------
+    state
+        Where offered frames show up.
+    transfer
+        Fetches them.
+    clock
+        On which is waited for them.
+    timeout_s
+        Seconds from the end of an exposure until its frame must have been offered.
+    """
+
+    def __init__(
+        self, state: EosState, transfer: EosTransfer, clock: Clock, timeout_s: float
+    ) -> None:
+        self._state = state
+        self._transfer = transfer
+        self._clock = clock
+        self._timeout_s = timeout_s
+        self._due_after_s: float | None = None
+        self._left_over_until_s = -math.inf
+
+    def expect(self, exposure_end_s: float) -> None:
+        """An exposure has begun, or may have, that ends at this clock time at the latest."""
+        self._due_after_s = exposure_end_s
+
+    def expect_none(self) -> None:
+        """No exposure is under way."""
+        self._due_after_s = None
+
+    def expect_left_over(self) -> None:
+        """Another program's exposure may have ended just now."""
+        self._left_over_until_s = self._clock.now() + LEFT_OVER_S
+
+    def exposing_for_s(self) -> float:
+        """Seconds for which the camera may still expose."""
+        now_s = self._clock.now()
+        return max(0.0, (self._due_after_s or now_s) - now_s)
+
+    def fetch(self) -> tuple[bytes, str]:
+        """The frame that is due: its bytes and its suffix, such as `.cr2`.
+
+        Raises
+        ------
+        DeviceError
+            None came, one that is no RAW file, or not as many bytes as announced.
+        """
+        if not self._wait():
+            raise DeviceError(
+                f"expected a frame within {self._timeout_s:g} s of the exposure's end, the camera "
+                "offered none: set its lens to manual focus (MF), its mirror lock-up and "
+                "self-timer off"
+            )
+        offered = self._state.offered[0]
+        suffix = _raw_suffix(offered)
+        data = self._transfer.fetch(offered)
+        self._settle(offered)
+        return data, suffix
+
+    def discard_abandoned(self) -> None:
+        """Wait for frames that are due though nobody wants them, and discard all there are.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer.
+        """
+        if self._due_after_s is not None:
+            self._clock.sleep_until(self._due_after_s)
+            self._wait()
+            self._due_after_s = None
+        self._clock.sleep_until(self._left_over_until_s)
+        self.discard_offered()
+
+    def discard_offered(self) -> None:
+        """Discard the frames that are there now.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer.
+        """
+        self._state.refresh(USUAL.busy_s + self.exposing_for_s())
+        for offered in self._state.offered:
+            try:
+                self._settle(offered)
+            except RefusedError:
+                self._state.forget(offered)  # else it would be refused, and in the way, for ever
+                raise
+
+    def _wait(self) -> bool:
+        deadline_s = (self._due_after_s or self._clock.now()) + self._timeout_s
+        while True:
+            self._state.listen()
+            if self._state.offered:
+                return True
+            if self._clock.now() >= deadline_s:
+                return False
+            self._clock.sleep(POLL_PERIOD_S)
+
+    def _settle(self, offered: ObjectOffered) -> None:
+        self._transfer.complete(offered)
+        self._state.forget(offered)
+        self._due_after_s = None
+
+
+def _raw_suffix(offered: ObjectOffered) -> str:
+    suffix = "." + offered.name.rpartition(".")[2].lower()
+    is_jpeg = offered.object_format == _JPEG_FORMAT or suffix in (".jpg", ".jpeg")
+    if is_jpeg or not _SUFFIX.fullmatch(suffix) or offered.size_bytes == 0:
+        raise DeviceError(
+            f"expected a RAW file from the camera, it offers {offered.name!r} of "
+            f"{offered.size_bytes} bytes, format 0x{offered.object_format:04X}: "
+            "set its image quality to RAW alone"
+        )
+    return suffix

@@ -1,0 +1,213 @@
+"""The release button of an EOS: two stages, or one on older cameras."""
+
+from abc import ABC, abstractmethod
+from enum import Enum, auto
+
+from ..codes import DEVICE_BUSY
+from ..device_info import DeviceInfo
+from ..failures import RefusedError
+from ..session import Patience, Reply, Session
+from .protocol import Eos
+
+HALF, FULL = 1, 2
+#: A slow lens keeps a 5D Mark II from answering for 8 s (libgphoto2).
+FOCUS_S = 12.0
+#: Busy at the full press is common; a frame later than so much belongs to no decay.
+LATE_PRESS_S = 3.0
+
+_RESULTS = {
+    1: "it found no focus: set the lens to manual focus (MF)",
+    3: "its mirror is locked up: switch mirror lock-up off",
+    7: "it believes there is no room for the frame: start again",
+}
+
+#: An operation and its parameters.
+Command = tuple[Eos, *tuple[int, ...]]
+
+
+class Stage(Enum):
+    """Where something that can be held is, as far as is known."""
+
+    UP = auto()
+    #: A command was sent, and not answered with OK.
+    UNKNOWN = auto()
+    DOWN = auto()
+
+
+class Held:
+    """Something that one command presses and another lets go of, after whatever has happened.
+
+    Parameters
+    ----------
+    session
+        Over which the camera is told.
+    press, let_go
+        The two commands.
+    """
+
+    def __init__(self, session: Session, press: Command, let_go: Command) -> None:
+        self._session = session
+        self._press = press
+        self._let_go = let_go
+        self._stage = Stage.UP
+
+    @property
+    def is_down(self) -> bool:
+        """Whether it is certainly held."""
+        return self._stage is Stage.DOWN
+
+    def press(self, patience: Patience) -> Reply:
+        """Press it.
+
+        Raises
+        ------
+        DeviceError
+            The camera did not say that it is down.
+        """
+        self._stage = Stage.UNKNOWN
+        reply = self._session.transact(*self._press, patience=patience)
+        self._stage = Stage.DOWN
+        return reply
+
+    def let_go(self, busy_s: float) -> Reply | None:
+        """Let go of it unless it is certainly up; a camera that exposes may be busy for `busy_s`.
+
+        Returns
+        -------
+        Reply | None
+            None if there was nothing to let go of.
+
+        Raises
+        ------
+        DeviceError
+            It may still be down.
+        """
+        before = self._stage
+        if before is Stage.UP:
+            return None
+        self._stage = Stage.UNKNOWN
+        reply = None
+        try:
+            reply = self._session.transact(*self._let_go, patience=Patience(FOCUS_S, busy_s))
+        except RefusedError as refusal:
+            if refusal.code == DEVICE_BUSY:
+                self._stage = before
+                raise
+            # a camera may refuse to let go of what is not down: refused twice, it is not
+            if before is Stage.DOWN:
+                raise
+        self._stage = Stage.UP
+        return reply
+
+    def doubt(self) -> None:
+        """What was pressed may not be down."""
+        self._stage = Stage.UNKNOWN
+
+    def let_go_blindly(self) -> None:
+        """Let go of what another program, or this one before a reset, may hold.
+
+        Raises
+        ------
+        DeviceError
+            It may still be down.
+        """
+        self.doubt()
+        self.let_go(LATE_PRESS_S)
+
+
+class Release(ABC):
+    """Presses and lets go, and can let go after anything."""
+
+    @abstractmethod
+    def press_half(self) -> None:
+        """Have the camera get ready."""
+
+    @abstractmethod
+    def press_full(self, exposure_s: float) -> Reply:
+        """Begin an exposure of `exposure_s` seconds; the reply tells when.
+
+        Raises
+        ------
+        RefusedError
+            No exposure has begun.
+        DeviceError
+            Nobody knows whether one has.
+        """
+
+    @abstractmethod
+    def let_go_full(self, busy_s: float) -> None:
+        """Let go of the second stage; a camera that still exposes may be busy for `busy_s`."""
+
+    @abstractmethod
+    def let_go_half(self, busy_s: float) -> None:
+        """Let go of the first stage."""
+
+    @abstractmethod
+    def let_go_blindly(self) -> None:
+        """Let go of what another program, or this one before a reset, may have held."""
+
+
+class TwoStageRelease(Release):
+    """RemoteReleaseOn and Off: the first stage can be held, the second acts at once."""
+
+    def __init__(self, session: Session) -> None:
+        self._half, self.full = (
+            Held(session, (Eos.RemoteReleaseOn, stage, 0), (Eos.RemoteReleaseOff, stage))
+            for stage in (HALF, FULL)
+        )
+
+    def press_half(self) -> None:
+        if not self._half.is_down:
+            self._half.press(Patience(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
+
+    def press_full(self, exposure_s: float) -> Reply:
+        # some cameras answer when the shutter has closed
+        return self.full.press(Patience(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S))
+
+    def let_go_full(self, busy_s: float) -> None:
+        self.full.let_go(busy_s)
+
+    def let_go_half(self, busy_s: float) -> None:
+        self._half.let_go(busy_s)
+
+    def let_go_blindly(self) -> None:
+        self.full.let_go_blindly()
+        self._half.let_go_blindly()
+
+
+class OneStageRelease(Release):
+    """RemoteRelease: presses and lets go by itself."""
+
+    def __init__(self, session: Session) -> None:
+        self._session = session
+
+    def press_half(self) -> None:
+        pass
+
+    def press_full(self, exposure_s: float) -> Reply:
+        patience = Patience(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S)
+        reply = self._session.transact(Eos.RemoteRelease, patience=patience)
+        result = reply.params[0] if reply.params else 0
+        if result != 0:
+            remedy = _RESULTS.get(result, "leave its menus and try again")
+            raise RefusedError(
+                f"expected the camera to release, it answered {result} to RemoteRelease 0x910F: "
+                f"{remedy}",
+                result,
+            )
+        return reply
+
+    def let_go_full(self, busy_s: float) -> None:
+        pass
+
+    def let_go_half(self, busy_s: float) -> None:
+        pass
+
+    def let_go_blindly(self) -> None:
+        pass
+
+
+def release_of(info: DeviceInfo, session: Session) -> Release:
+    """The release that a camera has."""
+    two_stages = {Eos.RemoteReleaseOn, Eos.RemoteReleaseOff} <= info.operations
+    return TwoStageRelease(session) if two_stages else OneStageRelease(session)

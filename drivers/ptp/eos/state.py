@@ -1,0 +1,164 @@
+"""What an EOS says about itself, kept from its events; and setting its properties."""
+
+from collections.abc import Collection
+from contextlib import suppress
+
+from labrig.clock import Clock
+from labrig.errors import DeviceError
+
+from ..failures import RefusedError
+from ..session import USUAL, Patience, Session
+from .custom_functions import CustomFunctions
+from .events import ChoicesChanged, Event, ObjectOffered, ValueChanged, parse_events
+from .protocol import Eos, Property, property_dataset, value_text
+
+POLL_PERIOD_S = 0.03
+#: A camera lists itself in a few answers; more than so many in a row is a babbling one.
+MOST_ANSWERS = 64
+#: Many times what fits into a camera's memory for the PC.
+MOST_OFFERED = 1000
+_KNOWN = frozenset(Property)
+
+
+class EosState:
+    """Mirror of the camera's properties and of the frames that it offers.
+
+    What the camera last said of a property is in doubt from a set that was not confirmed, or an
+    answer that was lost, until it speaks of it again: it is then set anew.
+
+    Parameters
+    ----------
+    session
+        Over which the camera is asked.
+    clock
+        On which is waited for it.
+    settle_s
+        Seconds within which it must have taken a setting.
+    operations
+        Codes of what the camera can do.
+    """
+
+    def __init__(
+        self, session: Session, clock: Clock, settle_s: float, operations: Collection[int]
+    ) -> None:
+        self._session = session
+        self._clock = clock
+        self._settle_s = settle_s
+        self._can_be_asked = Eos.RequestDevicePropValue in operations
+        self._values: dict[int, bytes] = {}
+        self._in_doubt: set[int] = set()
+        self._choices: dict[int, tuple[int, ...]] = {}
+        self._offered: dict[int, ObjectOffered] = {}
+        self.custom_functions = CustomFunctions()
+
+    @property
+    def offered(self) -> tuple[ObjectOffered, ...]:
+        """Frames that wait in the camera, oldest first."""
+        return tuple(self._offered.values())
+
+    def value(self, prop: Property) -> int | None:
+        """A numeric property, None if the camera never spoke of it."""
+        value = self._values.get(prop)
+        return int.from_bytes(value[:4], "little") if value else None
+
+    def choices(self, prop: Property) -> tuple[int, ...]:
+        """Codes that a property can be set to, as the camera lists them."""
+        return self._choices.get(prop, ())
+
+    def refresh(self, busy_s: float = USUAL.busy_s) -> None:
+        """Take in all that the camera has to say; it may be busy for `busy_s` seconds.
+
+        Raises
+        ------
+        DeviceError
+            It does not answer, not in the protocol's terms, or never comes to an end.
+        """
+        for _ in range(MOST_ANSWERS):
+            if not self.listen(busy_s):
+                return
+        raise DeviceError(
+            f"expected the camera to come to an end, it has reported events {MOST_ANSWERS} times "
+            "in a row: switch it off and on"
+        )
+
+    def listen(self, busy_s: float = USUAL.busy_s) -> bool:
+        """Ask once for events; True if there were any. The camera may be busy for `busy_s`.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer, or not in the protocol's terms.
+        """
+        events = self._events(Patience(USUAL.answer_s, busy_s))
+        for event in events:
+            match event:
+                case ValueChanged(prop, value) if prop in _KNOWN:
+                    self._values[prop] = value
+                    self._in_doubt.discard(prop)
+                    if prop == Property.custom_functions:
+                        self.custom_functions.take(value)
+                case ChoicesChanged(prop, codes) if prop in _KNOWN:
+                    self._choices[prop] = codes
+                case ObjectOffered():
+                    self._offered.setdefault(event.handle, event)
+        if (many := len(self._offered)) > MOST_OFFERED:
+            self._offered.clear()
+            raise DeviceError(
+                f"expected at most {MOST_OFFERED} frames in the camera, it offers {many}: switch "
+                "it off and on"
+            )
+        return bool(events)
+
+    def forget(self, offered: ObjectOffered) -> None:
+        """A frame no longer waits in the camera."""
+        del self._offered[offered.handle]
+
+    def set(self, prop: Property, value: bytes) -> None:
+        """Set a property unless it has the value already, and wait for the camera to say so.
+
+        Raises
+        ------
+        DeviceError
+            The camera refuses, or still says something else at the end of the settling time.
+        """
+        if self._has(prop, value):
+            return
+        self._in_doubt.add(prop)
+        self._session.transact(Eos.SetDevicePropValueEx, data=property_dataset(prop, value))
+        deadline_s = self._clock.now() + self._settle_s
+        ask_s = self._clock.now() + self._settle_s / 2
+        self.refresh()
+        while not self._has(prop, value):
+            if self._clock.now() >= deadline_s:
+                if self._says(prop, value):
+                    return  # it took it, and reports nothing that it had before
+                said = self._values.get(prop)
+                raise DeviceError(
+                    f"asked the camera for {prop.name.replace('_', ' ')} (0x{prop:X}) = "
+                    f"{value_text(prop, value)}, it says "
+                    f"{'nothing' if said is None else value_text(prop, said)}: "
+                    "turn its dial to M, leave its menus, and try again"
+                )
+            self._clock.sleep(POLL_PERIOD_S)
+            if self._can_be_asked and self._clock.now() >= ask_s:
+                with suppress(RefusedError):
+                    self._session.transact(Eos.RequestDevicePropValue, prop)
+                ask_s = deadline_s
+            self.refresh()
+
+    def _events(self, patience: Patience) -> tuple[Event, ...]:
+        try:
+            return parse_events(self._session.transact(Eos.GetEvent, patience=patience).data)
+        except RefusedError:
+            raise
+        except DeviceError:
+            self._in_doubt.update(self._values)  # nobody knows what that answer said
+            raise
+
+    def _has(self, prop: Property, value: bytes) -> bool:
+        return prop not in self._in_doubt and self._says(prop, value)
+
+    def _says(self, prop: Property, value: bytes) -> bool:
+        """Models differ in how many zeros they write after a value."""
+        said = self._values.get(prop)
+        return said is not None and said.rstrip(b"\0") == value.rstrip(b"\0")

@@ -1,0 +1,47 @@
+"""Fetching a frame from an EOS, and telling it so."""
+
+from labrig.clock import Clock
+
+from ..codes import INVALID_OBJECT_HANDLE, Standard
+from ..device_info import DeviceInfo
+from ..failures import RefusedError
+from ..object_transfer import PATIENT, ObjectTransfer
+from ..session import Session
+from .events import ObjectOffered
+from .protocol import Eos
+
+_IN_PARTS: tuple[Eos | Standard, ...] = (Eos.GetPartialObject, Standard.GetPartialObject)
+
+
+class EosTransfer:
+    """Fetches what the camera offers."""
+
+    def __init__(self, session: Session, clock: Clock, info: DeviceInfo) -> None:
+        self._session = session
+        part = next((op for op in _IN_PARTS if op in info.operations), None)
+        self._objects = ObjectTransfer(session, clock, Eos.GetObject, part)
+
+    def fetch(self, offered: ObjectOffered) -> bytes:
+        """The file's bytes.
+
+        Raises
+        ------
+        DeviceError
+            The camera sends more or fewer than it announced, or fails to send.
+        """
+        return self._objects.fetch(offered.handle, offered.name, offered.size_bytes)
+
+    def complete(self, offered: ObjectOffered) -> None:
+        """Tell the camera that it may forget the file.
+
+        Raises
+        ------
+        DeviceError
+            The camera did not take it.
+        """
+        try:
+            self._session.transact(Eos.TransferComplete, offered.handle, patience=PATIENT)
+        except RefusedError as refusal:
+            # it has forgotten it: it heard an earlier attempt, whose answer was lost
+            if refusal.code != INVALID_OBJECT_HANDLE:
+                raise

@@ -1,0 +1,80 @@
+"""Properties of a camera without a maker's extension: asking, setting, reading back."""
+
+from collections.abc import Collection
+
+from labrig.clock import Clock
+
+from ..codes import (
+    ACCESS_DENIED,
+    OPERATION_NOT_SUPPORTED,
+    PROPERTY_NOT_SUPPORTED,
+    Standard,
+    StandardProperty,
+)
+from ..failures import RefusedError
+from ..session import Session
+from .property_description import PropertyDescription, parse_property_description
+
+POLL_PERIOD_S = 0.05
+_NOT_TOLD = (OPERATION_NOT_SUPPORTED, PROPERTY_NOT_SUPPORTED, ACCESS_DENIED)
+
+
+class StandardProperties:
+    """Asks the camera every time: nothing that is turned by hand is overlooked.
+
+    Parameters
+    ----------
+    session
+        Over which it is asked.
+    clock
+        On which is waited for it.
+    known
+        Codes of the properties that it says it has.
+    settle_s
+        Seconds within which it must have taken a setting.
+    """
+
+    def __init__(
+        self, session: Session, clock: Clock, known: Collection[int], settle_s: float
+    ) -> None:
+        self._session = session
+        self._clock = clock
+        self._known = known
+        self._settle_s = settle_s
+
+    def describe(self, prop: StandardProperty) -> PropertyDescription | None:
+        """The property as it is now and what it can be set to; None if the camera has none.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not answer, or not in the protocol's terms.
+        """
+        if prop not in self._known:
+            return None
+        try:
+            data = self._session.transact(Standard.GetDevicePropDesc, prop).data
+        except RefusedError as refusal:
+            if refusal.code not in _NOT_TOLD:
+                raise
+            return None
+        return parse_property_description(data)
+
+    def set(self, prop: StandardProperty, described: PropertyDescription, value: int) -> int:
+        """Set unless it has the value already; the value that the camera then says it has.
+
+        Raises
+        ------
+        DeviceError
+            The camera refuses, or does not answer.
+        """
+        if described.value == value:
+            return value
+        self._session.transact(Standard.SetDevicePropValue, prop, data=described.encode(value))
+        deadline_s = self._clock.now() + self._settle_s
+        while (said := self._ask(prop, described)) != value and self._clock.now() < deadline_s:
+            self._clock.sleep(POLL_PERIOD_S)
+        return said
+
+    def _ask(self, prop: StandardProperty, described: PropertyDescription) -> int:
+        return described.decode(self._session.transact(Standard.GetDevicePropValue, prop).data)

@@ -1,0 +1,1 @@
+"""PTP over USB: the still image device class, through pyusb."""

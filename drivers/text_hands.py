@@ -1,0 +1,82 @@
+r"""Hands that obey lines of text: a sample changer or filter wheel of one's own.
+
+Any microcontroller will do: it reads `fresh sample\n` or `filter 37\n`, moves, and answers `done\n`
+or `cannot`, the reason and `\n`. The simulated room's hands speak the same.
+"""
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.acquire.connections import Connections
+from labrig.errors import DeviceError
+from labrig.quantity import DurationS
+
+from .serial_line import SerialLine
+
+BAUDRATE = 115_200
+QUIET_S = 0.03
+DRAIN_S = 1.0
+
+
+class TextHands:
+    """Hands on a serial line.
+
+    Parameters
+    ----------
+    address
+        Their serial port.
+    settings
+        The rig file's keys for this device.
+    connections
+        Opens the port.
+    """
+
+    class Settings(BaseModel):
+        """Keys of the rig file.
+
+        Attributes
+        ----------
+        baud
+            Of the line; USB boards ignore it.
+        takes_at_most
+            Until they have answered `done`.
+        """
+
+        model_config = ConfigDict(frozen=True, extra="forbid")
+
+        baud: int = Field(BAUDRATE, gt=0)
+        takes_at_most: DurationS = 120.0
+
+    def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
+        self._settings = settings
+        self._name = f"the hands at {address}"
+        port = connections.serial(address, settings.baud)
+        self._line = SerialLine(port, connections.clock, self._name)
+
+    def identity(self) -> str:
+        """They do not tell more than where they are."""
+        return self._name.removeprefix("the ")
+
+    def do(self, task: str) -> None:
+        """Do it; returns when they say that it is done.
+
+        Raises
+        ------
+        DeviceError
+            They cannot, or answer something else.
+        """
+        self._line.write(task.encode() + b"\n")
+        came = self._line.read_until(b"\n", self._settings.takes_at_most)
+        said = " ".join(came.decode(errors="replace").split())
+        if said != "done":
+            raise DeviceError(
+                f"{self._name} were told '{task}': expected 'done', got '{said}'; do it by hand, "
+                "without 'hands:' in the rig file, or teach them"
+            )
+
+    def make_safe(self) -> None:
+        """End a half-written line and forget old answers; hands that move come to their end."""
+        self._line.write(b"\n")
+        self._line.drain(QUIET_S, DRAIN_S)
+
+    def disconnect(self) -> None:
+        """The port belongs to the connections, which close it."""

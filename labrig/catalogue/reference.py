@@ -1,0 +1,79 @@
+"""A source that is the same on two days: it tells what camera and geometry gained or lost."""
+
+import math
+from pathlib import Path
+
+import numpy as np
+
+from labrig.catalogue.results import Measured, PatchResult, read_results
+from labrig.errors import DataError, UsageError
+from labrig.reduce import read_series
+from labrig.yaml_file import did_you_mean
+
+#: What stands out of its own σ by less is no light to rely on.
+SEEN_SIGMA = 5.0
+
+
+def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
+    """How much brighter the patch `name` is in run A than in run B, in that channel.
+
+    A reference that was charged and decays is as bright as its amplitudes together, a steady one,
+    in which no decay was found, as the mean of its frames.
+
+    Raises
+    ------
+    UsageError
+        There is no such patch in both, or it decays in one of them only.
+    DataError
+        It is dark there, or its series is damaged.
+    """
+    shared = [patch for patch in _patches(a) if patch in _patches(b)]
+    if name not in shared:
+        hint = did_you_mean(name, shared) if shared else "they share none"
+        raise UsageError(
+            f"--reference {name}: expected a patch of its own, in both runs, with a source that "
+            f"is the same on both days; {hint}"
+        )
+    fits = [next((one for one in read_results(run) if one.name == name), None) for run in (a, b)]
+    if (fits[0] is None) != (fits[1] is None):
+        raise UsageError(
+            f"--reference {name}: it decays in one run and is steady in the other; expected a "
+            "source that is the same on both days"
+        )
+    of_a, of_b = (
+        _steady(run, name, channel) if fit is None else _glow(fit, channel)
+        for run, fit in zip((a, b), fits, strict=True)
+    )
+    for run, seen in ((a, of_a), (b, of_b)):
+        if not seen.value > SEEN_SIGMA * seen.sigma:
+            raise DataError(
+                f"--reference {name}: expected light in {channel} that stands out by "
+                f"{SEEN_SIGMA:g} σ, got {seen.value:.3g} ± {seen.sigma:.2g} DN/s in {run}"
+            )
+    return of_a.over(of_b)
+
+
+def _patches(run: Path) -> list[str]:
+    """Those with folders of their own; a fit is not needed."""
+    return sorted(path.parent.name for path in (run / "result").glob("*/series.csv"))
+
+
+def _glow(fit: PatchResult, channel: str) -> Measured:
+    """All amplitudes together, their σ taken as independent."""
+    amplitudes = fit.amplitudes_in(channel)
+    return Measured(
+        sum(amplitude.value for amplitude in amplitudes),
+        math.hypot(*(amplitude.sigma for amplitude in amplitudes)),
+    )
+
+
+def _steady(run: Path, name: str, channel: str) -> Measured:
+    """The mean of the channel in DN/s, by its scatter from frame to frame."""
+    path = run / "result" / name / "series.csv"
+    parts = [part for part in read_series(path) if channel in part.channels]
+    columns = [part.values[part.usable, part.channels.index(channel)] for part in parts]
+    values = np.concatenate([*columns, []])
+    if len(values) < 2:
+        raise DataError(f"{path}: expected usable frames with a channel {channel}, got too few")
+    scatter = values.std(ddof=1) / math.sqrt(len(values))
+    return Measured(float(values.mean()), float(scatter))

@@ -1,0 +1,55 @@
+"""What patches may be called: each name is a folder of the result."""
+
+import re
+import unicodedata
+from typing import Annotated, Any
+
+from pydantic import AfterValidator, BeforeValidator
+
+from labrig.region import Region
+
+#: What some system takes for a path, a device or a pattern, or does not take at all.
+_FORBIDDEN = './\\:*?"<>|'
+_LONGEST = 60
+#: In a result beside the patches, and what Windows takes for devices.
+_TAKEN = re.compile(r"figures|con|prn|aux|nul|(?:com|lpt)\d")
+
+
+def _in_words(patches: Any) -> dict[str, Any]:
+    """`1: […]` is the patch "1", though YAML reads a number there."""
+    if not isinstance(patches, dict) or not patches:
+        raise ValueError("expected 'name: [x, y, width, height]' for each patch")
+    return {"" if name is None else str(name): region for name, region in patches.items()}
+
+
+def _can_be_folder(name: str) -> bool:
+    return (
+        0 < len(name) <= _LONGEST
+        and name == name.strip()
+        and name.isprintable()
+        and not set(name) & set(_FORBIDDEN)
+        and not _TAKEN.fullmatch(name)
+    )
+
+
+def _folders(patches: dict[str, Region]) -> dict[str, Region]:
+    """Refuse what is no name of a folder on every disk, or of the same one twice."""
+    seen: dict[str, str] = {}
+    for name in patches:
+        folder = unicodedata.normalize("NFC", name).casefold()
+        if not _can_be_folder(folder):
+            raise ValueError(
+                f"expected names of patches that can be folders (1 to {_LONGEST} characters, none "
+                f"of {' '.join(_FORBIDDEN)}, no space around, not 'figures'), got '{name}'"
+            )
+        if folder in seen:
+            raise ValueError(
+                "expected names of patches that differ in more than capital letters, got "
+                f"'{seen[folder]}' and '{name}'"
+            )
+        seen[folder] = name
+    return patches
+
+
+#: Regions of interest by name.
+Patches = Annotated[dict[str, Region], BeforeValidator(_in_words), AfterValidator(_folders)]

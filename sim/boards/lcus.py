@@ -1,0 +1,68 @@
+"""An LCUS relay board: four bytes a command, no acknowledgement, and perhaps an answer to FF."""
+
+from collections.abc import Callable
+from typing import Literal
+
+#: What a board says to the query FF: nothing, lines of text, or a byte a relay.
+Answers = Literal["nothing", "text", "bytes"]
+
+START, QUERY = 0xA0, 0xFF
+COMMAND_BYTES = 4
+
+
+class LcusBoard:
+    """Understands `A0 relay op sum`, relays counted from 1, and the query FF.
+
+    Parameters
+    ----------
+    relays
+        Number of relays.
+    on_change
+        Called with (relay, on) whenever a contact moves; the first relay is 1.
+    answers
+        To the query. The first answer after a change is what was true before it.
+    """
+
+    def __init__(
+        self, relays: int, on_change: Callable[[int, bool], None], answers: Answers = "nothing"
+    ) -> None:
+        self.states = [False] * relays
+        self._on_change = on_change
+        self._answers = answers
+        self._command = b""
+        self._told = tuple(self.states)
+
+    def receive(self, data: bytes) -> bytes:
+        """What the board sends back, in order, for these bytes."""
+        answer = b""
+        for byte in data:
+            if self._command or byte == START:
+                self._command += bytes((byte,))
+                if len(self._command) == COMMAND_BYTES:
+                    self._obey(self._command)
+                    self._command = b""
+            elif byte == QUERY:
+                answer += self._answer()
+        return answer
+
+    def _obey(self, command: bytes) -> None:
+        relay, operation, checksum = command[1:]
+        known = 1 <= relay <= len(self.states) and operation in (0, 1)
+        if known and sum(command[:3]) & 0xFF == checksum:
+            on = operation == 1
+            if self.states[relay - 1] != on:
+                self.states[relay - 1] = on
+                self._on_change(relay, on)
+
+    def _answer(self) -> bytes:
+        told, self._told = self._told, tuple(self.states)
+        match self._answers:
+            case "nothing":
+                return b""
+            case "bytes":
+                return bytes(told)
+            case "text":
+                return "".join(
+                    f"CH{relay}: {'ON ' if on else 'OFF'}\r\n"
+                    for relay, on in enumerate(told, start=1)
+                ).encode("ascii")

@@ -1,0 +1,1 @@
+"""The simulated camera as a Canon EOS 5D Mark II."""

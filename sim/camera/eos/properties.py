@@ -1,0 +1,135 @@
+"""The EOS properties: what they are, what they may become, and the records that tell so."""
+
+import struct
+from enum import IntEnum
+
+from .. import codes
+from ..body_settings import BodySettings
+from ..vocabulary import EosEvent, EosProperty, ResponseCode
+from .custom_functions import custom_function_blocks
+from .events import record
+from .viewfinder import TO_PC
+
+_ONE_SHOT_FOCUS, _MANUAL_FOCUS = 0, 3
+#: Codes of exposure modes are their places here.
+_DIAL = ("P", "Tv", "Av", "M", "B")
+#: Type of an availability list; the only one that is an enumeration.
+_ENUMERATION = 3
+
+#: One image, RAW, large, RAW compression: the only thing that this camera writes.
+_RAW = struct.pack("<IIIII", 1, 0x10, 6, 0, 4)
+
+
+class Destination(IntEnum):
+    """Where photographs go."""
+
+    CARD = 2
+    HOST = 4
+
+
+class Drive(IntEnum):
+    """Drive modes."""
+
+    SINGLE = 0x00
+    SELF_TIMER_10_S = 0x10
+    SELF_TIMER_2_S = 0x11
+
+
+#: How long a drive mode waits after the button.
+SELF_TIMER_S = {Drive.SINGLE: 0.0, Drive.SELF_TIMER_10_S: 10.0, Drive.SELF_TIMER_2_S: 2.0}
+
+
+def _u32(*values: int) -> tuple[bytes, ...]:
+    return tuple(struct.pack("<I", value) for value in values)
+
+
+#: What the host may set, and to what. Mirror lock-up can only be off.
+_CHOICES: dict[EosProperty, tuple[bytes, ...]] = {
+    EosProperty.AV: _u32(*codes.AV_CODES),
+    EosProperty.TV: _u32(*codes.TV_CODES),
+    EosProperty.ISO: _u32(codes.ISO_AUTO, *codes.ISO_CODES),
+    EosProperty.DRIVE_MODE: _u32(*Drive),
+    EosProperty.CAPTURE_DESTINATION: _u32(*Destination),
+    EosProperty.IMAGE_FORMAT: (_RAW,),
+    EosProperty.MIRROR_UP: _u32(0),
+    EosProperty.EVF_OUTPUT: _u32(0, TO_PC),
+}
+
+
+class PropertyBank:
+    """Present values of the EOS properties.
+
+    Dial, lens switch and menus cannot be set over the wire.
+
+    Parameters
+    ----------
+    available_shots
+        What the camera shows for its present destination.
+    settings
+        What somebody has set by hand.
+    """
+
+    def __init__(self, available_shots: int, settings: BodySettings) -> None:
+        focus = _ONE_SHOT_FOCUS if settings.autofocus else _MANUAL_FOCUS
+        self._custom_functions = custom_function_blocks(settings)
+        self._values: dict[int, bytes] = {
+            EosProperty.AV: struct.pack("<I", 0x30),
+            EosProperty.TV: struct.pack(
+                "<I", codes.TV_BULB if settings.exposure_mode == "B" else 0x68
+            ),
+            EosProperty.ISO: struct.pack("<I", codes.iso_code(settings.iso)),
+            EosProperty.AE_MODE: struct.pack("<I", _DIAL.index(settings.exposure_mode)),
+            EosProperty.DRIVE_MODE: struct.pack("<I", Drive.SINGLE),
+            EosProperty.FOCUS_MODE: struct.pack("<I", focus),
+            EosProperty.AUTO_POWER_OFF: struct.pack("<I", round(settings.auto_power_off)),
+            EosProperty.IMAGE_FORMAT: _RAW,
+            EosProperty.CAPTURE_DESTINATION: struct.pack("<I", Destination.CARD),
+            EosProperty.AVAILABLE_SHOTS: struct.pack("<I", available_shots),
+            EosProperty.MIRROR_UP: struct.pack("<I", 0),
+            EosProperty.EVF_OUTPUT: struct.pack("<I", 0),
+        }
+
+    def __contains__(self, code: int) -> bool:
+        return code in self._values
+
+    def number(self, code: EosProperty) -> int:
+        """A property that is one number."""
+        return int.from_bytes(self._values[code], "little")
+
+    def put(self, code: EosProperty, value: int) -> None:
+        """The camera itself changes a number."""
+        self._values[code] = struct.pack("<I", value)
+
+    def set(self, code: int, value: bytes) -> ResponseCode:
+        """The host wants to change a property."""
+        if code not in self._values:
+            return ResponseCode.DEVICE_PROP_NOT_SUPPORTED
+        if code not in _CHOICES:
+            return ResponseCode.ACCESS_DENIED
+        if value not in _CHOICES[EosProperty(code)]:
+            return ResponseCode.INVALID_DEVICE_PROP_VALUE
+        self._values[code] = value
+        return ResponseCode.OK
+
+    def value_record(self, code: int) -> bytes:
+        """PropValueChanged with the present value."""
+        return _value_record(code, self._values[code])
+
+    def all_records(self) -> bytes:
+        """The flood of values, then of lists, when a host begins to listen."""
+        values = [self.value_record(code) for code in self._values]
+        values += [
+            _value_record(EosProperty.CUSTOM_FUNCTIONS, block) for block in self._custom_functions
+        ]
+        lists = [
+            record(
+                EosEvent.AVAIL_LIST_CHANGED,
+                struct.pack("<III", code, _ENUMERATION, len(choices)) + b"".join(choices),
+            )
+            for code, choices in _CHOICES.items()
+        ]
+        return b"".join(values + lists)
+
+
+def _value_record(code: int, value: bytes) -> bytes:
+    return record(EosEvent.PROP_VALUE_CHANGED, struct.pack("<I", code) + value)

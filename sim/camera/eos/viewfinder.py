@@ -1,0 +1,70 @@
+"""The camera's live picture: mirror up, a stream of JPEGs inside Canon's records."""
+
+import math
+import struct
+from typing import Protocol, runtime_checkable
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.clock import Clock
+
+from ..sensor import Sensor
+
+#: From the command until the first picture: mirror up, shutter open, sensor running.
+START_S = 0.4
+#: A live picture is read out so often.
+PICTURE_S = 1 / 30
+#: EVF output to the PC; the camera's own display is 1.
+TO_PC = 2
+
+_JPEG, _ZOOM = 1, 4
+_JPEG_QUALITY = 85
+
+
+@runtime_checkable
+class LiveSensor(Protocol):
+    """A sensor that can also be looked through."""
+
+    def preview(self, at_s: float) -> NDArray[np.uint8]:
+        """What it sees at a time, shape (height, width, 3): R, G, B as for a display."""
+        ...
+
+
+class Viewfinder:
+    """Live view of one camera.
+
+    Parameters
+    ----------
+    clock
+        Time.
+    sensor
+        Only a `LiveSensor` gives pictures; with any other, none is ever ready.
+    """
+
+    def __init__(self, clock: Clock, sensor: Sensor) -> None:
+        self._clock = clock
+        self._sensor = sensor
+        self._ready_s = math.inf
+
+    def send_to(self, output: int) -> None:
+        """EVF output was set."""
+        if output != TO_PC:
+            self._ready_s = math.inf
+        elif self._ready_s == math.inf:
+            self._ready_s = self._clock.now() + START_S
+
+    def records(self) -> bytes | None:
+        """The data of GetViewFinderData, or None while there is no picture."""
+        now_s = self._clock.now()
+        if now_s < self._ready_s or not isinstance(self._sensor, LiveSensor):
+            return None
+        rgb = self._sensor.preview(now_s - now_s % PICTURE_S)
+        _, jpeg = cv2.imencode(".jpg", rgb[:, :, ::-1], [cv2.IMWRITE_JPEG_QUALITY, _JPEG_QUALITY])
+        # A camera sends more than the picture, such as the magnification; a host passes over it.
+        return _record(_ZOOM, struct.pack("<I", 1)) + _record(_JPEG, jpeg.tobytes())
+
+
+def _record(kind: int, data: bytes) -> bytes:
+    return struct.pack("<II", 8 + len(data), kind) + data

@@ -1,0 +1,230 @@
+"""The simulated camera on a network of one PC: PTP/IP on 127.0.0.1, one host at a time.
+
+A host makes two connections. It introduces itself on the first, which then carries its
+transactions; on the second, which names the first, the camera reports events.
+"""
+
+import select
+import socket
+from collections.abc import Callable
+from dataclasses import dataclass
+from typing import NoReturn
+
+from labrig.clock import LOOK_UP_S, Clock
+from labrig.errors import UsageError
+
+from ..responder import Responder
+from . import packets as ptpip
+from .connection import Connection
+from .packets import FailReason, MalformedPacketError, Packet, PacketType
+from .transactions import Transactions
+
+#: Nobody outside this PC may reach a simulated camera.
+LOOPBACK = "127.0.0.1"
+#: Connections that have not said what they are for; the oldest makes way for a new one.
+_MOST_STRANGERS = 8
+_GUID = b"labrig simulated"
+_GUID_BYTES = 16
+#: Longer than the 39 letters of the standard, because libgphoto2 sends the PC's name as it is.
+_MOST_NAME_BYTES = 512
+
+
+@dataclass
+class _Host:
+    """Who uses the camera."""
+
+    number: int
+    command: Connection
+    transactions: Transactions
+    event: Connection | None = None
+
+
+class PtpIpServer:
+    """Serves one camera; close it at the end.
+
+    Parameters
+    ----------
+    responder
+        The camera.
+    catch_up
+        Lets the camera's time pass, and tells it.
+    port
+        TCP port on 127.0.0.1; 0 for any that is free.
+
+    Raises
+    ------
+    UsageError
+        The port is taken.
+    """
+
+    def __init__(self, responder: Responder, catch_up: Callable[[], float], port: int = 0) -> None:
+        self._responder = responder
+        self._catch_up = catch_up
+        try:
+            self._listener = socket.create_server((LOOPBACK, port))
+        except (OSError, OverflowError) as error:
+            raise UsageError(
+                f"cannot listen on port {port} of {LOOPBACK} ({error}); choose another, or 0 for "
+                "any that is free"
+            ) from None
+        self._listener.setblocking(False)
+        self._strangers: list[Connection] = []
+        self._host: _Host | None = None
+        self._hosts_so_far = 0
+
+    @property
+    def port(self) -> int:
+        """TCP port on which it listens."""
+        port: int = self._listener.getsockname()[1]
+        return port
+
+    @property
+    def address(self) -> str:
+        """What a rig file says to reach this camera."""
+        return f"ptpip://{LOOPBACK}:{self.port}"
+
+    def serve(self, clock: Clock) -> NoReturn:
+        """Serve until somebody asks `clock` to stop.
+
+        Raises
+        ------
+        Interrupted
+            Somebody has.
+        """
+        while True:
+            self.serve_once(LOOK_UP_S)
+            clock.sleep(0.0)
+
+    def serve_once(self, patience_s: float) -> None:
+        """Do what there is to do; wait at most so long for something."""
+        self._report_events(self._catch_up())
+        connections = self._connections()
+        sending = [connection for connection in connections if connection.is_sending]
+        # a host that does not read its answer is not asked for its next command
+        listening: list[socket.socket | Connection] = [self._listener]
+        listening += [connection for connection in connections if not connection.is_sending]
+        due_in_s = max(0.0, self._responder.event_due_s() - self._catch_up())
+        patience_s = min(patience_s, due_in_s)
+        readable, writable, _ = select.select(listening, sending, [], patience_s)
+        self._catch_up()
+        # all that hung up are noticed before anybody new is let in
+        for connection in connections:
+            if connection in readable and not connection.receive():
+                self._hang_up(connection)
+        for connection in connections:
+            if connection in readable or connection in writable:
+                self._advance(connection)
+        if self._listener in readable:
+            self._accept()
+
+    def close(self) -> None:
+        """Hang up on everybody and stop listening."""
+        for connection in self._connections():
+            self._hang_up(connection)
+        self._listener.close()
+
+    def _connections(self) -> list[Connection]:
+        used = [] if self._host is None else [self._host.command, self._host.event]
+        return [*self._strangers, *(connection for connection in used if connection)]
+
+    def _accept(self) -> None:
+        try:
+            accepted, _ = self._listener.accept()
+        except OSError:
+            return  # it has hung up already
+        self._strangers.append(Connection(accepted))
+        if len(self._strangers) > _MOST_STRANGERS:
+            self._hang_up(self._strangers[0])
+
+    def _report_events(self, now_s: float) -> None:
+        host = self._host
+        if host and host.event and self._responder.event_due_s() <= now_s:
+            event = self._responder.take_event()
+            host.event.put([ptpip.event(event.code, event.params)])
+            self._send(host.event)
+
+    def _advance(self, connection: Connection) -> None:
+        """Send what waits, then do what came, as long as both go on."""
+        try:
+            while self._send(connection) and (packet := connection.next_packet()):
+                self._take(connection, packet)
+        except MalformedPacketError:
+            self._hang_up(connection)
+
+    def _send(self, connection: Connection) -> bool:
+        """Whether all is sent and the other side is still there."""
+        if connection not in self._connections():
+            return False
+        if not connection.send():
+            self._hang_up(connection)
+            return False
+        if connection.is_sending:
+            return False
+        if self._host and connection is self._host.command:
+            self._host.transactions.answered()
+        return True
+
+    def _take(self, connection: Connection, packet: Packet) -> None:
+        host = self._host
+        if connection in self._strangers:
+            self._introduce(connection, packet)
+        elif packet.kind == PacketType.PING:
+            connection.put([ptpip.packet(PacketType.PONG)])
+        elif host and packet.kind == PacketType.CANCEL:
+            if answer := host.transactions.cancel(packet):
+                host.command.put_instead(answer)
+                self._send(host.command)
+        elif packet.kind == PacketType.PONG:
+            pass
+        elif host and host.event and connection is host.command:
+            connection.put(host.transactions.take(packet))
+        else:
+            raise MalformedPacketError
+
+    def _introduce(self, connection: Connection, packet: Packet) -> None:
+        if packet.kind == PacketType.INIT_COMMAND_REQUEST:
+            _check_introduction(packet)
+            answer = self._welcome(connection)
+        elif packet.kind == PacketType.INIT_EVENT_REQUEST:
+            answer = self._add_event_connection(connection, *packet.fields("I"))
+        else:
+            raise MalformedPacketError
+        connection.put([answer])
+        if connection in self._strangers:
+            connection.send()
+            self._hang_up(connection)
+
+    def _welcome(self, connection: Connection) -> bytes:
+        if self._host is not None:
+            return ptpip.init_fail(FailReason.BUSY)
+        self._hosts_so_far += 1
+        self._host = _Host(self._hosts_so_far, connection, Transactions(self._responder))
+        self._strangers.remove(connection)
+        return ptpip.init_command_ack(self._hosts_so_far, _GUID, self._responder.model)
+
+    def _add_event_connection(self, connection: Connection, number: int) -> bytes:
+        host = self._host
+        if host is None or host.event is not None or number != host.number:
+            return ptpip.init_fail(FailReason.REJECTED)
+        host.event = connection
+        self._strangers.remove(connection)
+        return ptpip.packet(PacketType.INIT_EVENT_ACK)
+
+    def _hang_up(self, connection: Connection) -> None:
+        """Hang up; a host that loses one of its connections loses both and its session."""
+        connection.close()
+        if connection in self._strangers:
+            self._strangers.remove(connection)
+        elif self._host and connection in (self._host.command, self._host.event):
+            used, self._host = (self._host.command, self._host.event), None
+            for other in used:
+                if other is not None:
+                    other.close()
+            self._responder.disconnect()
+
+
+def _check_introduction(packet: Packet) -> None:
+    """GUID, name with its closing zero, version; any version is welcome."""
+    name_bytes = len(packet.payload) - _GUID_BYTES - 4
+    if not 2 <= name_bytes <= _MOST_NAME_BYTES or name_bytes % 2:
+        raise MalformedPacketError

@@ -1,0 +1,1 @@
+"""The simulated camera on a simulated USB cable, as pyusb sees it."""

@@ -1,0 +1,240 @@
+"""The simulated camera as pyusb sees it: an `IBackend` with one device, or none when unplugged."""
+
+from collections.abc import Iterator
+from types import SimpleNamespace
+from typing import Any, NoReturn
+
+import usb.backend
+
+from labrig.clock import VirtualClock
+
+from . import descriptors, errors
+from .cable import Cable
+from .descriptors import UsbIdentity
+from .still_image import BULK_IN, BULK_OUT, INTERRUPT_IN, StillImageFunction
+
+#: Request type, GET_DESCRIPTOR, and its kind.
+_GET_STRING = (0x80, 0x06, 3)
+_FROM_INTERFACE, _TO_INTERFACE = 0xA1, 0x21
+_INTERFACE = 0
+
+
+class _Handle:
+    """One opening of the device, good until it is closed or the cable comes out."""
+
+
+class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is untyped
+    """Bus with this one camera on it.
+
+    Every transfer lets virtual time pass; a time-out passes in full. A time-out of 0, for ever
+    with libusb, ends at once here: nobody else moves this clock meanwhile.
+
+    Parameters
+    ----------
+    clock
+        The simulated room's.
+    function
+        The camera's endpoints.
+    cable
+        Costs time, and can be pulled.
+    identity
+        By what the camera is known on the bus.
+    """
+
+    def __init__(
+        self,
+        clock: VirtualClock,
+        function: StillImageFunction,
+        cable: Cable,
+        identity: UsbIdentity,
+    ) -> None:
+        super().__init__()
+        self._identity = identity
+        self._clock = clock
+        self._function = function
+        self._cable = cable
+        self._plugging = cable.plugging
+        self._handles: set[_Handle] = set()
+        self._claimed_by: _Handle | None = None
+
+    def close_all(self) -> None:
+        """What an operating system does for a process that was killed: the camera is not told."""
+        self._handles.clear()
+        self._claimed_by = None
+
+    def enumerate_devices(self) -> Iterator[int]:
+        """Identify the camera by its address on the bus, if it is plugged in."""
+        self._notice_unplugging()
+        if self._cable.is_plugged:
+            yield self._cable.plugging
+
+    def get_parent(self, dev: Any) -> None:
+        """No hub is simulated."""
+
+    def get_device_descriptor(self, dev: Any) -> SimpleNamespace:
+        """Device descriptor."""
+        return descriptors.device(dev, self._identity)
+
+    def get_configuration_descriptor(self, dev: Any, config: int) -> SimpleNamespace:
+        """The one configuration; IndexError ends pyusb's walk."""
+        return (descriptors.configuration(),)[config]
+
+    def get_interface_descriptor(
+        self, dev: Any, intf: int, alt: int, config: int
+    ) -> SimpleNamespace:
+        """The one interface with its one setting; IndexError ends pyusb's walk."""
+        return (((descriptors.interface(),),),)[config][intf][alt]
+
+    def get_endpoint_descriptor(
+        self, dev: Any, ep: int, intf: int, alt: int, config: int
+    ) -> SimpleNamespace:
+        """Endpoint by its place in the interface."""
+        return descriptors.endpoints()[ep]
+
+    def open_device(self, dev: int) -> _Handle:
+        """Open the camera, unless it has gone or come back under another address."""
+        self._notice_unplugging()
+        if dev != self._cable.plugging or not self._cable.is_plugged:
+            raise errors.unplugged()
+        handle = _Handle()
+        self._handles.add(handle)
+        return handle
+
+    def close_device(self, dev_handle: _Handle) -> None:
+        """Close, also what has been unplugged."""
+        self._handles.discard(dev_handle)
+        if self._claimed_by is dev_handle:
+            self._claimed_by = None
+
+    def get_configuration(self, dev_handle: _Handle) -> int:
+        """The one configuration is always the active one."""
+        self._use(dev_handle)
+        return descriptors.CONFIGURATION_VALUE
+
+    def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
+        """Nothing to choose from."""
+        self._use(dev_handle)
+        if config_value != descriptors.CONFIGURATION_VALUE:
+            raise errors.not_found()
+
+    def set_interface_altsetting(self, dev_handle: _Handle, intf: int, altsetting: int) -> None:
+        """Nothing to choose from."""
+        self._use(dev_handle)
+        if (intf, altsetting) != (_INTERFACE, 0):
+            raise errors.not_found()
+
+    def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
+        """One at a time."""
+        self._use(dev_handle)
+        if intf != _INTERFACE:
+            raise errors.not_found()
+        if self._claimed_by not in (None, dev_handle):
+            raise errors.claimed_by_another()
+        self._claimed_by = dev_handle
+
+    def release_interface(self, dev_handle: _Handle, intf: int) -> None:
+        """Let others have it."""
+        self._use(dev_handle)
+        if intf != _INTERFACE or self._claimed_by is not dev_handle:
+            raise errors.not_found()
+        self._claimed_by = None
+
+    def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
+        """No desktop has mounted this camera."""
+        self._use(dev_handle)
+        return False
+
+    def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
+        """One bulk-out transfer."""
+        self._use(dev_handle)
+        if ep != BULK_OUT:
+            raise errors.not_found()
+        transfer = data.tobytes()
+        self._cable.carry(len(transfer))
+        if not self._function.write(transfer):
+            self._time_out(timeout)
+        return len(transfer)
+
+    def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
+        """One bulk-in transfer."""
+        self._use(dev_handle)
+        if ep != BULK_IN:
+            raise errors.not_found()
+        target = memoryview(buff).cast("B")
+        transfer = self._function.read(len(target))
+        if transfer is None:
+            self._time_out(timeout)
+        return self._deliver(transfer, target)
+
+    def intr_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
+        """One interrupt transfer, as soon as the camera has something to say."""
+        self._use(dev_handle)
+        if ep != INTERRUPT_IN:
+            raise errors.not_found()
+        wait_s = self._function.interrupt_due_s() - self._clock.now()
+        if wait_s > timeout / 1000:
+            self._time_out(timeout)
+        self._cable.wait(max(wait_s, 0.0))
+        target = memoryview(buff).cast("B")
+        return self._deliver(self._function.read_interrupt(len(target)), target)
+
+    def ctrl_transfer(
+        self,
+        dev_handle: _Handle,
+        bmRequestType: int,
+        bRequest: int,
+        wValue: int,
+        wIndex: int,
+        data: Any,
+        timeout: int,
+    ) -> int:
+        """String descriptors and the class requests; anything else stalls, for this once."""
+        self._use(dev_handle)
+        if bmRequestType == _TO_INTERFACE:
+            sent = data.tobytes()
+            self._cable.carry(0)
+            self._function.request_out(bRequest, sent)
+            return len(sent)
+        if bmRequestType == _FROM_INTERFACE:
+            answer = self._function.request_in(bRequest)
+        elif (bmRequestType, bRequest, wValue >> 8) == _GET_STRING:
+            answer = descriptors.string(wValue & 0xFF, self._identity)
+        else:
+            raise errors.stalled()
+        target = memoryview(data).cast("B")
+        n_bytes = min(len(answer), len(target))
+        target[:n_bytes] = answer[:n_bytes]
+        self._cable.carry(0)
+        return n_bytes
+
+    def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
+        """Un-stall one endpoint."""
+        self._use(dev_handle)
+        self._cable.carry(0)
+        self._function.clear_halt(ep)
+
+    def reset_device(self, dev_handle: _Handle) -> None:
+        """Reset the port: the camera forgets its session, the handle stays good."""
+        self._use(dev_handle)
+        self._cable.carry(0)
+        self._function.reset()
+
+    def _use(self, handle: _Handle) -> None:
+        self._notice_unplugging()
+        if handle not in self._handles or not self._cable.is_plugged:
+            raise errors.unplugged()
+
+    def _notice_unplugging(self) -> None:
+        if self._plugging != self._cable.plugging:
+            self._plugging = self._cable.plugging
+            self.close_all()
+            self._function.reset()
+
+    def _deliver(self, transfer: memoryview, target: memoryview) -> int:
+        self._cable.carry(len(transfer))
+        target[: len(transfer)] = transfer
+        return len(transfer)
+
+    def _time_out(self, timeout: int) -> NoReturn:
+        self._cable.wait(timeout / 1000)
+        raise errors.timed_out()

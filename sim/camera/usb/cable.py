@@ -1,0 +1,78 @@
+"""The USB cable: what a transfer costs in time, and being pulled out."""
+
+import math
+
+from labrig.clock import VirtualClock
+
+from ..faults import CameraFaults
+from ..power import AutoPowerOff
+from . import errors
+
+#: Host controller and scheduler, for every transfer however small (one high-speed microframe).
+TRANSACTION_S = 125e-6
+#: What a high-speed bulk pipe really carries.
+BYTES_PER_S = 35e6
+
+
+class Cable:
+    """Lets time pass for every transfer, and may be unplugged once.
+
+    Parameters
+    ----------
+    clock
+        The simulated room's.
+    faults
+        When the cable is pulled and put back.
+    power
+        A camera that is off is not on the bus either.
+    """
+
+    def __init__(self, clock: VirtualClock, faults: CameraFaults, power: AutoPowerOff) -> None:
+        self._clock = clock
+        self._power = power
+        self._unplug_at_s = math.inf if faults.unplug_at_s is None else faults.unplug_at_s
+        self._bytes_to_unplug = faults.unplug_after_bytes
+        self._away_s = math.inf if faults.replug_after_s is None else faults.replug_after_s
+
+    @property
+    def is_plugged(self) -> bool:
+        """Whether the cable is in now, with a camera that is on at its end."""
+        now_s = self._clock.now()
+        return (
+            not self._power.is_off
+            and not self._unplug_at_s <= now_s < self._unplug_at_s + self._away_s
+        )
+
+    @property
+    def plugging(self) -> int:
+        """How often the cable was put in: a camera that comes back is another device."""
+        return 2 if self._clock.now() >= self._unplug_at_s else 1
+
+    def carry(self, n_bytes: int) -> None:
+        """Let one transfer of so many bytes pass.
+
+        Raises
+        ------
+        usb.core.USBError
+            The cable was pulled before the end of it.
+        """
+        self._power.put_off()
+        if self._bytes_to_unplug is not None:
+            if n_bytes > self._bytes_to_unplug:
+                self._pass(TRANSACTION_S + self._bytes_to_unplug / BYTES_PER_S)
+                self._bytes_to_unplug = None
+                self._unplug_at_s = self._clock.now()
+                raise errors.unplugged()
+            self._bytes_to_unplug -= n_bytes
+        self._pass(TRANSACTION_S + n_bytes / BYTES_PER_S)
+
+    def wait(self, duration_s: float) -> None:
+        """Let time pass with nothing on the wire."""
+        self._pass(duration_s)
+
+    def _pass(self, duration_s: float) -> None:
+        to_unplug_s = self._unplug_at_s - self._clock.now()
+        if 0 < to_unplug_s <= duration_s:
+            self._clock.spend(to_unplug_s)
+            raise errors.unplugged()
+        self._clock.spend(duration_s)

@@ -1,0 +1,192 @@
+"""The USB still-image function: three endpoints and four class requests in front of a responder."""
+
+import struct
+
+from labrig.clock import Clock
+
+from ..faults import CameraFaults
+from ..responder import Responder
+from ..vocabulary import ResponseCode
+from . import errors
+from .containers import (
+    Assembler,
+    Container,
+    ContainerType,
+    MalformedContainerError,
+    encode,
+    encode_parameters,
+)
+from .pipes import InPipe
+
+BULK_IN, BULK_OUT, INTERRUPT_IN = 0x81, 0x02, 0x83
+#: wMaxPacketSize at high speed.
+BULK_PACKET = 512
+INTERRUPT_PACKET = 8
+
+#: Class requests of the still-image class.
+CANCEL, RESET, GET_STATUS = 0x64, 0x66, 0x67
+_CANCELLATION = 0x4001
+#: After a cancel the camera clears its buffers and says that it is busy.
+CANCEL_S = 0.002
+_UNSOLICITED = 0xFFFFFFFF
+
+
+class StillImageFunction:
+    """Takes packets from the host, gives packets to it; knows nothing of pyusb's objects.
+
+    Parameters
+    ----------
+    clock
+        Time.
+    responder
+        The camera.
+    faults
+        `stall_at` and `timeout_once_at` happen here.
+    """
+
+    def __init__(self, clock: Clock, responder: Responder, faults: CameraFaults) -> None:
+        self._clock = clock
+        self._responder = responder
+        self._stall_at = faults.stall_at
+        self._swallow_at = faults.timeout_once_at
+        self._out = Assembler(BULK_PACKET)
+        self._in = InPipe(BULK_PACKET)
+        self._interrupt = InPipe(INTERRUPT_PACKET)
+        self._command: Container | None = None
+        self._transaction_id = 0
+        self._halted: set[int] = set()
+        self._cancelling_until_s = 0.0
+
+    def reset(self) -> None:
+        """Back to the state after plugging in, the camera's session included."""
+        self._discard_transaction()
+        self._interrupt.discard()
+        self._halted.clear()
+        self._responder.disconnect()
+
+    def clear_halt(self, endpoint: int) -> None:
+        """ClearFeature(ENDPOINT_HALT)."""
+        self._halted.discard(endpoint)
+
+    def write(self, transfer: bytes) -> bool:
+        """One bulk-out transfer; False if the camera does not take it.
+
+        The camera takes nothing while an answer waits to be read.
+        """
+        if BULK_OUT in self._halted:
+            raise errors.stalled()
+        if self._in:
+            return False
+        try:
+            container = self._out.feed(transfer)
+            if container is not None:
+                self._take(container)
+        except MalformedContainerError:
+            self._stall()
+        return True
+
+    def read(self, room: int) -> memoryview | None:
+        """One bulk-in transfer of at most `room` bytes; None if there is nothing to read."""
+        if BULK_IN in self._halted:
+            raise errors.stalled()
+        return self._in.take(room) if self._in else None
+
+    def interrupt_due_s(self) -> float:
+        """When the interrupt endpoint will have something to say."""
+        return self._clock.now() if self._interrupt else self._responder.event_due_s()
+
+    def read_interrupt(self, room: int) -> memoryview:
+        """One interrupt transfer, when one is due."""
+        if not self._interrupt:
+            event = self._responder.take_event()
+            self._interrupt.put(
+                encode_parameters(ContainerType.EVENT, event.code, _UNSOLICITED, event.params)
+            )
+        return self._interrupt.take(room)
+
+    def request_out(self, request: int, data: bytes) -> None:
+        """A class request from the host."""
+        if request == RESET and not data:
+            self.reset()
+        elif request == CANCEL and len(data) == 6:
+            self._cancel(*struct.unpack("<HI", data))
+        else:
+            raise errors.stalled()
+
+    def request_in(self, request: int) -> bytes:
+        """A class request to the host."""
+        if request != GET_STATUS:
+            raise errors.stalled()
+        if self._halted:
+            code = ResponseCode.TRANSACTION_CANCELLED
+        elif self._clock.now() < self._cancelling_until_s:
+            code = ResponseCode.DEVICE_BUSY
+        else:
+            code = ResponseCode.OK
+        endpoints = sorted(self._halted)
+        length = 4 + 4 * len(endpoints)
+        return struct.pack(f"<HH{len(endpoints)}I", length, code, *endpoints)
+
+    def _take(self, container: Container) -> None:
+        if self._command is not None:
+            self._finish(self._command, container)
+        elif container.kind != ContainerType.COMMAND:
+            raise MalformedContainerError
+        else:
+            self._begin(container)
+
+    def _begin(self, command: Container) -> None:
+        command.parameters()
+        self._transaction_id = command.transaction_id
+        if not self._responder.takes_data(command.code):
+            self._execute(command, b"")
+        elif self._stall_at == command.code:
+            self._stall_at = None
+            self._responder.abandon(command.transaction_id)
+            self._stall()
+        else:
+            self._command = command
+
+    def _finish(self, command: Container, data: Container) -> None:
+        belongs = (ContainerType.DATA, command.code, command.transaction_id)
+        if (data.kind, data.code, data.transaction_id) != belongs:
+            self._responder.abandon(command.transaction_id)
+            raise MalformedContainerError
+        self._command = None
+        self._execute(command, data.payload)
+
+    def _execute(self, command: Container, data: bytes) -> None:
+        code, transaction_id = command.code, command.transaction_id
+        response = self._responder.transaction(code, transaction_id, command.parameters(), data)
+        if code == self._swallow_at:
+            self._swallow_at = None
+            return
+        if code == self._stall_at:
+            self._stall_at = None
+            self._stall()
+            return
+        if response.data is not None:
+            self._in.put(encode(ContainerType.DATA, code, transaction_id, response.data))
+        self._in.put(
+            encode_parameters(
+                ContainerType.RESPONSE, response.code, transaction_id, response.params
+            )
+        )
+
+    def _cancel(self, code: int, transaction_id: int) -> None:
+        if code != _CANCELLATION:
+            raise errors.stalled()
+        if transaction_id == self._transaction_id:
+            if self._command is not None:
+                self._responder.abandon(transaction_id)
+            self._discard_transaction()
+            self._cancelling_until_s = self._clock.now() + CANCEL_S
+
+    def _discard_transaction(self) -> None:
+        self._command = None
+        self._out.discard()
+        self._in.discard()
+
+    def _stall(self) -> None:
+        self._discard_transaction()
+        self._halted |= {BULK_IN, BULK_OUT}

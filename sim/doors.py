@@ -1,0 +1,76 @@
+"""The doors of a simulated room, as its settings say: the trap door, the shield before the lamp."""
+
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from labrig.clock import VirtualClock
+
+from .boards import Pulse
+from .door import FRAME_S, Door, DoorDrive
+from .faults import Fault, given
+from .simulation import DoorSettings, Simulation
+
+#: Stream of random numbers drawn from the seed, beside the room's own.
+SERVO_STREAM = 4
+
+#: The pulses that a channel of the servo board has sent up to now.
+Pulses = Callable[[int], Sequence[Pulse]]
+
+
+def no_pulses(_: int) -> Sequence[Pulse]:
+    """Of a servo board that is not there."""
+    return ()
+
+
+class Doors:
+    """What a servo board swings; a door that the settings do not have is None.
+
+    Parameters
+    ----------
+    simulation
+        What the room is like; its door's faults are the trap door's.
+    clock
+        The room's.
+    pulses
+        What the servos are sent.
+    """
+
+    def __init__(self, simulation: Simulation, clock: VirtualClock, pulses: Pulses) -> None:
+        self._seed = simulation.seed
+        self._clock = clock
+        self._pulses = pulses
+        found_open = simulation.initial.door == "open"
+        self._trap_door = self._drive(simulation.door, simulation.faults, is_open=found_open)
+        self._shield = self._drive(simulation.shield, (), is_open=True)
+
+    @property
+    def trap_door(self) -> Door | None:
+        """With its history up to now."""
+        return None if self._trap_door is None else self._trap_door.door
+
+    @property
+    def shield(self) -> Door | None:
+        """With its history up to now."""
+        return None if self._shield is None else self._shield.door
+
+    def _drive(
+        self, settings: DoorSettings | None, faults: Sequence[Fault], *, is_open: bool
+    ) -> DoorDrive | None:
+        if settings is None:
+            return None
+        return DoorDrive(
+            settings,
+            lambda: self._pulses(settings.channel),
+            lambda asked_s: self._frame_to_come_s(settings.channel, asked_s),
+            self._clock,
+            is_open=is_open,
+            stuck=given(fault.door_stuck for fault in faults),
+            slow=given(fault.door_slow for fault in faults),
+        )
+
+    def _frame_to_come_s(self, channel: int, asked_s: float) -> float:
+        """Until a servo takes over the pulse that its board was told at `asked_s`."""
+        moment = round(self._clock.wall(asked_s) * 1e6)
+        rng = np.random.default_rng([self._seed, SERVO_STREAM, channel, moment])
+        return float(rng.uniform(0.0, FRAME_S))

@@ -1,0 +1,61 @@
+"""`labrig optics show`."""
+
+from collections.abc import Callable
+from pathlib import Path
+
+import pytest
+
+from tests.conftest import Ended
+
+Labrig = Callable[..., Ended]
+
+
+def test_a_shipped_camera(labrig: Labrig, tmp_path: Path) -> None:
+    picture = tmp_path / "camera.svg"
+    ended = labrig("optics", "show", "canon_eos_5d_mark_ii", "--picture", picture)
+    assert ended.code == 0
+    assert "Canon EOS 5D Mark II: 3 curves" in ended.out
+    assert "G  380-780 nm, step 5; 0.000163 to 1, highest at 520 nm" in ended.out
+    assert "█" in ended.out
+    assert picture.read_text(encoding="utf-8").count("<path") > 3
+
+
+def test_one_curve_of_many(labrig: Labrig, tmp_path: Path) -> None:
+    names = [f"led{k}" for k in range(20)]
+    rows = [f"{nm}," + ",".join(["1"] * 20) for nm in (400, 500, 601)]
+    path = tmp_path / "leds.csv"
+    path.write_text("\n".join([",".join(["wavelength_nm", *names]), *rows]))
+    every = labrig("optics", "show", path)
+    assert "20 curves" in every.out
+    assert "and 8 more" in every.out
+    one = labrig("optics", "show", path, "--curve", "led7")
+    assert "one curve" in one.out
+    assert "400-601 nm, 3 points" in one.out
+
+
+@pytest.mark.parametrize(
+    ("arguments", "said"),
+    [
+        (["nope"], "no shipped camera is called 'nope'"),
+        (["none.csv"], "none.csv: cannot be read"),
+        (["bad.csv"], "something is not a number"),
+        (["twice.csv"], "a wavelength stands twice"),
+        (["canon_eos_5d_mark_ii", "--curve", "X"], "no curve is called 'X'"),
+        (["canon_eos_5d_mark_ii", "--picture", "x.bmp"], "expected a file name that ends in .png"),
+        (["canon_eos_5d_mark_ii", "--picture", "none/x.png"], "cannot be written"),
+    ],
+)
+def test_what_is_wrong_is_one_line(
+    labrig: Labrig,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    arguments: list[str],
+    said: str,
+) -> None:
+    monkeypatch.chdir(tmp_path)
+    Path("bad.csv").write_text("wavelength_nm,a\n400,1\n500,x\n")
+    Path("twice.csv").write_text("wavelength_nm,a\n400,1\n400,2\n500,2\n")
+    ended = labrig("optics", "show", *arguments)
+    assert ended.code == 2
+    assert said in ended.err
+    assert ended.err.count("\n") == 1

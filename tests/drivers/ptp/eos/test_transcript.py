@@ -1,0 +1,219 @@
+"""The bytes on the wire from plugging in to taking leave, written by hand from the protocol.
+
+`>` is what the driver must write, to the byte; `<` what the camera then sends; `#` a remark.
+Texts in quotes stand for PTP strings (u8 letters, UTF-16, closing zero).
+"""
+
+import re
+
+import pytest
+
+from drivers.ptp import PtpCamera
+from labrig.acquire.values import CameraOffers, ExposureSettings
+from labrig.clock import VirtualClock
+
+from ..usb.wire import TRANSACTION_S, OneDevice, Wire
+
+CONNECT = """
+# OpenSession 1
+> 10000000 0100 0210 00000000 01000000
+< 0c000000 0300 0120 00000000
+# GetDeviceInfo: standard 100, extension 0xB 200 "", mode 0, twelve operations, no other codes
+> 0c000000 0100 0110 01000000
+< 8d000000 0200 0110 01000000 6400 0b000000 c800 00 0000
+  0c000000 0110 0210 0310 0791 1091 1491 1591 1691 1791 1a91 2891 2991
+  00000000 00000000 00000000 00000000
+  "Canon Inc." "Canon EOS X" "3-2.1.2" "123"
+< 0c000000 0300 0120 01000000
+# SetRemoteMode 1, SetEventMode 1
+> 10000000 0100 1491 02000000 01000000
+< 0c000000 0300 0120 02000000
+> 10000000 0100 1591 03000000 01000000
+< 0c000000 0300 0120 03000000
+# GetEvent: mode M, Tv 1/128, Av 4, ISO 100, to card, JPEG; lists of Tv, ISO (0: automatic), Av
+> 0c000000 0100 1691 04000000
+< e0000000 0200 1691 04000000
+  10000000 89c10000 05d10000 03000000
+  10000000 89c10000 02d10000 70000000
+  10000000 89c10000 01d10000 28000000
+  10000000 89c10000 03d10000 48000000
+  10000000 89c10000 1cd10000 02000000
+  20000000 89c10000 20d10000 01000000 10000000 01000000 00000000 03000000
+  20000000 8ac10000 02d10000 03000000 03000000 0c000000 68000000 70000000
+  20000000 8ac10000 03d10000 03000000 03000000 00000000 48000000 50000000
+  1c000000 8ac10000 01d10000 03000000 02000000 28000000 30000000
+  08000000 00000000
+< 0c000000 0300 0120 04000000
+> 0c000000 0100 1691 05000000
+< 14000000 0200 1691 05000000 08000000 00000000
+< 0c000000 0300 0120 05000000
+# SetDevicePropValueEx: image format RAW alone; read back
+> 0c000000 0100 1091 06000000
+> 28000000 0200 1091 06000000
+  1c000000 20d10000 01000000 10000000 06000000 00000000 04000000
+< 0c000000 0300 0120 06000000
+> 0c000000 0100 1691 07000000
+< 34000000 0200 1691 07000000
+  20000000 89c10000 20d10000 01000000 10000000 06000000 00000000 04000000
+  08000000 00000000
+< 0c000000 0300 0120 07000000
+> 0c000000 0100 1691 08000000
+< 14000000 0200 1691 08000000 08000000 00000000
+< 0c000000 0300 0120 08000000
+# SetDevicePropValueEx: destination host; read back
+> 0c000000 0100 1091 09000000
+> 18000000 0200 1091 09000000 0c000000 1cd10000 04000000
+< 0c000000 0300 0120 09000000
+> 0c000000 0100 1691 0a000000
+< 24000000 0200 1691 0a000000 10000000 89c10000 1cd10000 04000000 08000000 00000000
+< 0c000000 0300 0120 0a000000
+> 0c000000 0100 1691 0b000000
+< 14000000 0200 1691 0b000000 08000000 00000000
+< 0c000000 0300 0120 0b000000
+# PCHDDCapacity; the lists may have changed
+> 18000000 0100 1a91 0c000000 ffffff0f 00100000 01000000
+< 0c000000 0300 0120 0c000000
+> 0c000000 0100 1691 0d000000
+< 14000000 0200 1691 0d000000 08000000 00000000
+< 0c000000 0300 0120 0d000000
+"""
+
+#: After `offers()`; Tv is the only setting that is not in force already.
+CONFIGURE = """
+> 0c000000 0100 1691 0e000000
+< 0c000000 0300 0120 0e000000
+> 0c000000 0100 1691 0f000000
+< 14000000 0200 1691 0f000000 08000000 00000000
+< 0c000000 0300 0120 0f000000
+> 0c000000 0100 1091 10000000
+> 18000000 0200 1091 10000000 0c000000 02d10000 68000000
+< 0c000000 0300 0120 10000000
+# not taken at once: asked again
+> 0c000000 0100 1691 11000000
+< 14000000 0200 1691 11000000 08000000 00000000
+< 0c000000 0300 0120 11000000
+> 0c000000 0100 1691 12000000
+< 24000000 0200 1691 12000000 10000000 89c10000 02d10000 68000000 08000000 00000000
+< 0c000000 0300 0120 12000000
+> 0c000000 0100 1691 13000000
+< 14000000 0200 1691 13000000 08000000 00000000
+< 0c000000 0300 0120 13000000
+"""
+
+ARM = """
+> 0c000000 0100 1691 14000000
+< 14000000 0200 1691 14000000 08000000 00000000
+< 0c000000 0300 0120 14000000
+# RemoteReleaseOn half
+> 14000000 0100 2891 15000000 01000000 00000000
+< 0c000000 0300 0120 15000000
+"""
+
+
+def shoot(frame: bytes) -> str:
+    size = len(frame).to_bytes(4, "little").hex()
+    container = (12 + len(frame)).to_bytes(4, "little").hex()
+    return f"""
+# RemoteReleaseOn full; RemoteReleaseOff full
+> 14000000 0100 2891 16000000 02000000 00000000
+< 0c000000 0300 0120 16000000
+> 10000000 0100 2991 17000000 02000000
+< 0c000000 0300 0120 17000000
+# nothing yet; then RequestObjectTransfer of 91000001, format B103, IMG_0001.CR2
+> 0c000000 0100 1691 18000000
+< 14000000 0200 1691 18000000 08000000 00000000
+< 0c000000 0300 0120 18000000
+> 0c000000 0100 1691 19000000
+< 45000000 0200 1691 19000000
+  31000000 86c10000 01000091 03b10000 00000000 {size} 00000000
+  494d475f303030312e43523200 0000000000000000
+  08000000 00000000
+< 0c000000 0300 0120 19000000
+# GetPartialObject from 0; TransferComplete; RemoteReleaseOff half
+> 18000000 0100 0791 1a000000 01000091 00000000 {size}
+< {container} 0200 0791 1a000000 {frame.hex()}
+< 0c000000 0300 0120 1a000000
+> 10000000 0100 1791 1b000000 01000091
+< 0c000000 0300 0120 1b000000
+> 10000000 0100 2991 1c000000 01000000
+< 0c000000 0300 0120 1c000000
+"""
+
+
+LEAVE = """
+> 10000000 0100 1591 1d000000 00000000
+< 0c000000 0300 0120 1d000000
+> 10000000 0100 1491 1e000000 00000000
+< 0c000000 0300 0120 1e000000
+> 0c000000 0100 0310 1f000000
+< 0c000000 0300 0120 1f000000
+"""
+
+
+class Transcript:
+    """Plays the camera's part; anything but the driver's part is an error."""
+
+    def __init__(self, text: str) -> None:
+        self.steps = [
+            (step[0], bytes.fromhex(re.sub(r'"([^"]*)"', _ptp_string, step[1:])))
+            for step in re.split(r"\n(?=[<>])", re.sub(r"(?m)^#.*\n", "", text))
+            if step.strip()
+        ]
+
+    def written(self, wire: Wire, data: bytes) -> None:
+        assert not any(wire.to_host), "the driver wrote before it had read the answer"
+        assert self.steps, f"the driver wrote more: {data.hex(' ')}"
+        direction, expected = self.steps.pop(0)
+        assert direction == ">"
+        assert data.hex(" ") == expected.hex(" ")
+        while self.steps and self.steps[0][0] == "<":
+            wire.send(self.steps.pop(0)[1])
+
+    def control(self, wire: Wire, request: int, data: bytes) -> bytes:
+        raise AssertionError(f"unexpected class request 0x{request:02X}")
+
+
+def _ptp_string(match: re.Match[str]) -> str:
+    text = match[1] + "\0"
+    return (bytes([len(text)]) + text.encode("utf-16-le")).hex()
+
+
+FRAMES = {
+    "less than a packet": b"RAW" * 33,
+    "two containers of whole packets, payload ragged": bytes(range(250)) * 2,
+    "container of exactly three packets": b"\x5a" * (3 * 512 - 12),
+    "payload of exactly two packets": b"\xa5" * 1024,
+}
+
+
+@pytest.mark.parametrize("frame", FRAMES.values(), ids=FRAMES.keys())
+@pytest.mark.parametrize("empty_packets", [True, False], ids=["ended", "not ended"])
+def test_from_plug_to_leave(frame: bytes, empty_packets: bool) -> None:
+    transcript = Transcript(CONNECT + CONFIGURE + ARM + shoot(frame) + LEAVE)
+    wire = Wire(transcript, VirtualClock())
+    wire.sends_empty_packets = empty_packets
+    settings = PtpCamera.Settings.model_validate({"shutter_lag": "62.5 ms"})
+    camera = PtpCamera("usb://04a9:3199", settings, OneDevice(wire))
+    assert camera.identity() == "Canon EOS X, serial 123, firmware 2.1.2"
+
+    assert camera.offers() == CameraOffers(
+        (1 / 128, 1 / 64), (100, 200), (4.0, 5.6), overhead_s=2.0, frame_bytes=30_000_000
+    )
+    assert camera.configure(ExposureSettings(1 / 60, 100, 4.0)) == ExposureSettings(
+        1 / 64, 100, 4.0
+    )
+    camera.arm()
+    before_s = wire.clock.now()
+    photograph = camera.shoot()
+
+    assert photograph.data == frame
+    assert photograph.suffix == ".cr2"
+    assert photograph.settings == ExposureSettings(1 / 64, 100, 4.0)
+    # the command and its answer take one bus transaction each
+    assert photograph.start_s == pytest.approx(before_s + TRANSACTION_S + 0.0625)
+    assert photograph.end_s == pytest.approx(photograph.start_s + 1 / 64)
+
+    camera.disconnect()
+    assert not transcript.steps
+    assert not any(wire.to_host)
+    assert not wire.claimed

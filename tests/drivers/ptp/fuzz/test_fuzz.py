@@ -1,0 +1,18 @@
+"""A few hundred harmed containers each way; `tests.acceptance.ptp_fuzz` does 10⁵."""
+
+import pytest
+
+from .sessions import WAYS, Tally, sessions
+
+CASES = 500
+
+
+@pytest.mark.parametrize("way", WAYS)
+def test_harmed_containers_end_in_one_helpful_line_and_the_camera_works_again(way: str) -> None:
+    tally = Tally()
+    failures = [failure for failure in sessions(way, CASES, 2, tally) if failure]
+    assert not failures
+    assert tally.cases.total() >= CASES
+    assert tally.refused
+    assert min(tally.sessions["eos"], tally.sessions["standard"], tally.bulbs) > 0
+    assert tally.attempts[0] == 0, "it gave up"

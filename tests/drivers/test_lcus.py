@@ -1,0 +1,198 @@
+"""The LCUS driver against wire transcripts and against the emulated board."""
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from drivers.lcus import LcusRelay, command, relay_states
+from labrig.acquire import Checkable, Lamp
+from labrig.clock import Interrupted, VirtualClock
+from labrig.errors import DeviceError, DeviceLostError
+from sim.boards import LcusBoard
+from sim.boards.lcus import Answers
+from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
+
+ON_1, OFF_1 = bytes.fromhex("A00101A2"), bytes.fromhex("A00100A1")
+ON_2, OFF_2 = bytes.fromhex("A00201A3"), bytes.fromhex("A00200A2")
+QUERY = b"\xff"
+ANSWERS: tuple[Answers, ...] = ("nothing", "text", "bytes")
+
+
+def lamp(script: Script, relay: int = 1) -> tuple[LcusRelay, ScriptedPort]:
+    clock = VirtualClock()
+    port = ScriptedPort(clock, script)
+    return LcusRelay("COM5", LcusRelay.Settings(relay=relay), Wired(clock, port)), port
+
+
+def asked(first: bytes, second: bytes) -> Script:
+    return [(QUERY, first), (QUERY, second)]
+
+
+def test_a_mute_board_is_told_and_never_asked_again() -> None:
+    driver, port = lamp(
+        [(OFF_1, b""), *asked(b"", b""), (ON_1, b""), (OFF_1, b""), (OFF_1, b""), (OFF_1, b"")]
+    )
+    assert isinstance(driver, Lamp)
+    assert isinstance(driver, Checkable)
+    driver.on()
+    assert driver.is_on(), "what was sent last"
+    driver.off()
+    assert not driver.is_on()
+    driver.make_safe()
+    assert "only the camera can verify it" in driver.identity()
+    (finding,) = driver.findings()
+    assert finding.severity == "warn"
+    assert "never acknowledges" in finding.what
+    assert "camera" in finding.remedy
+    assert port.script == []
+
+
+@pytest.mark.parametrize(
+    ("off", "on"),
+    [
+        (b"CH1: OFF\r\nCH2: OFF\r\n", b"CH1: OFF\r\nCH2: ON \r\n"),
+        (b"CH1:OFF \r\nCH2:OFF \r\n", b"CH1:OFF \r\nCH2:ON \r\n"),
+        (b"\x00\x00", b"\x00\x01"),
+    ],
+    ids=["brzycki", "AscomSwitchDriver", "bytes"],
+)
+def test_the_second_of_two_answers_counts(off: bytes, on: bytes) -> None:
+    driver, port = lamp(
+        [
+            (OFF_2, b""),
+            *asked(on, off),
+            (ON_2, b""),
+            *asked(off, on),
+            *asked(on, on),
+            *((OFF_2, b""), (OFF_2, b"")),
+            *asked(on, off),
+        ],
+        relay=2,
+    )
+    driver.on()
+    assert driver.is_on(), "the first answer is what was true before"
+    assert driver.identity() == "LCUS relay board (2 relays, read back by query), relay 2"
+    driver.make_safe()
+    assert [finding.severity for finding in driver.findings()] == ["fine"]
+    assert port.script == []
+
+
+@pytest.mark.parametrize(
+    ("answer", "said"),
+    [
+        (b"ver\n\r00000008\n\r>", "expected 'CH2: ON' or 'OFF', or a byte for each relay, got"),
+        (b"CH1: OFF\r\n", "has it that many relays?"),
+        (b"CH1: OFF\r\nCH2: O", "is it an LCUS board"),
+        (b"\x00", "has it that many relays?"),
+    ],
+    ids=["another board", "one relay", "cut off", "one byte"],
+)
+def test_another_answer_is_a_device_error(answer: bytes, said: str) -> None:
+    with pytest.raises(DeviceError, match="got") as refusal:
+        lamp([(OFF_2, b""), *asked(answer, answer)], relay=2)
+    assert said in str(refusal.value)
+    assert "\n" not in str(refusal.value)
+
+
+def test_a_register_that_stays_on_is_said() -> None:
+    driver, _ = lamp(
+        [(OFF_1, b""), *asked(b"\1", b"\1"), (OFF_1, b""), (OFF_1, b""), *asked(b"\1", b"\1")]
+    )
+    with pytest.raises(DeviceError, match="was switched off but reads on; switch off by hand"):
+        driver.make_safe()
+
+
+def test_a_board_that_fell_silent_is_tried_again_then_lost() -> None:
+    trial: Script = [(OFF_1, b""), (OFF_1, b""), *asked(b"", b"")]
+    driver, port = lamp([(OFF_1, b""), *asked(b"\0", b"\0"), *trial * 5])
+    with pytest.raises(DeviceLostError, match="answered its query before"):
+        driver.make_safe()
+    assert port.script == []
+
+
+def test_the_command_has_left_when_it_returns_and_no_sooner() -> None:
+    clock = VirtualClock()
+    board = LcusBoard(1, lambda relay, on: None)
+    driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
+    before_s = clock.now()
+    driver.on()
+    assert clock.now() - before_s == pytest.approx(4 * 10 / 9600)
+
+
+@pytest.mark.parametrize("answers", ANSWERS)
+def test_the_driver_and_the_emulated_board(answers: Answers) -> None:
+    clock = VirtualClock()
+    moved: list[tuple[int, bool]] = []
+    board = LcusBoard(4, lambda relay, on: moved.append((relay, on)), answers)
+    board.states[2] = True
+    driver = LcusRelay("COM5", LcusRelay.Settings(relay=3), Wired(clock, BoardPort(clock, board)))
+    assert moved == [(3, False)], "off at connect"
+    for on in (True, False, True):
+        (driver.on if on else driver.off)()
+        assert driver.is_on() == on
+        assert board.states == [False, False, on, False]
+    driver.make_safe()
+    assert not board.states[2]
+
+
+@given(waits=st.integers(0, 80), answers=st.sampled_from(ANSWERS))
+def test_an_interruption_at_any_wait_can_be_made_safe(waits: int, answers: Answers) -> None:
+    clock = InterruptingClock()
+    board = LcusBoard(2, lambda relay, on: None, answers)
+    driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
+    clock.waits_left = waits
+    try:
+        driver.on()
+        driver.is_on()
+        driver.off()
+        driver.on()
+    except Interrupted:
+        pass
+    clock.waits_left = 10**9
+    driver.make_safe()
+    assert not board.states[0]
+    assert not driver.is_on()
+
+
+@pytest.mark.parametrize("torn", [b"\xa0", b"\xa0\x01", b"\xa0\x01\x01"])
+def test_half_a_command_of_another_program_does_not_keep_the_lamp_on(torn: bytes) -> None:
+    clock = VirtualClock()
+    board = LcusBoard(2, lambda relay, on: None)
+    driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
+    driver.on()
+    board.receive(torn)
+    driver.make_safe()
+    assert not board.states[0]
+
+
+@given(relay=st.integers(1, 8), on=st.booleans())
+def test_a_command_moves_its_relay_and_no_other(relay: int, on: bool) -> None:
+    board = LcusBoard(8, lambda relay, on: None)
+    board.states[:] = [not on] * 8
+    assert board.receive(command(relay, on=on)) == b""
+    assert [number for number, state in enumerate(board.states, start=1) if state == on] == [relay]
+
+
+@given(
+    states=st.lists(st.booleans(), min_size=1, max_size=8),
+    answers=st.sampled_from(("text", "bytes")),
+)
+def test_what_a_board_tells_is_read(states: list[bool], answers: Answers) -> None:
+    board = LcusBoard(len(states), lambda relay, on: None, answers)
+    board.states[:] = states
+    board.receive(QUERY)
+    assert relay_states(board.receive(QUERY)) == tuple(states)
+
+
+@given(st.binary(max_size=60))
+def test_any_answer_is_understood_or_a_device_error(answer: bytes) -> None:
+    driver, _ = lamp([(OFF_1, b""), *asked(b"\0", b"\0"), *asked(answer, answer)])
+    try:
+        assert driver.is_on() in (True, False)
+    except DeviceError as error:
+        assert "\n" not in str(error)
+
+
+@given(st.binary(max_size=40), st.sampled_from(ANSWERS))
+def test_the_board_answers_any_bytes(data: bytes, answers: Answers) -> None:
+    LcusBoard(8, lambda relay, on: None, answers).receive(data)

@@ -1,0 +1,71 @@
+"""The drivers' bytes through pyserial and a terminal device, on the system's clock."""
+
+import os
+import threading
+from collections.abc import Callable, Iterator
+from contextlib import ExitStack, contextmanager
+from pathlib import Path
+
+import pytest
+
+from labrig.acquire import read_rig_file
+from labrig.bench import open_bench
+from labrig.clock import VirtualClock
+from sim.boards import LcusBoard, MaestroBoard
+from tests.drivers.serial_wire import Board
+
+pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
+
+RIG = """
+name: two boards
+devices:
+  lamp: {{driver: lcus_relay, address: "{lcus}", relay: 2}}
+  door: {{driver: maestro_door, address: "{maestro}", channel: 3, closed: 1000 us, open: 1877.5 us,
+          travel: 20 ms}}
+"""
+
+
+@contextmanager
+def wired(board: Board) -> Iterator[str]:
+    """The terminal device at whose other end `board` is."""
+    ours, theirs = pty.openpty()
+
+    def serve() -> None:
+        while True:
+            try:
+                os.write(ours, board.receive(os.read(ours, 100)))
+            except OSError:
+                return
+
+    threading.Thread(target=serve, daemon=True).start()
+    try:
+        yield os.ttyname(theirs)
+    finally:
+        os.close(theirs)
+        os.close(ours)
+
+
+@pytest.fixture
+def open_ports() -> Iterator[Callable[[Board], str]]:
+    with ExitStack() as stack:
+        yield lambda board: stack.enter_context(wired(board))
+
+
+def test_lamp_and_door(open_ports: Callable[[Board], str], tmp_path: Path) -> None:
+    lcus = LcusBoard(2, lambda relay, on: None, "text")
+    maestro = MaestroBoard(VirtualClock(), {3: 1000e-6})
+    maestro.start_at(3, 2000e-6)
+    lcus.states[1] = True
+    path = tmp_path / "rig.yaml"
+    path.write_text(RIG.format(lcus=open_ports(lcus), maestro=open_ports(maestro)))
+    with open_bench(read_rig_file(path), str(path)) as bench:
+        with bench.devices() as rig:
+            assert not lcus.states[1]
+            rig.lamp.on()
+            assert rig.lamp.is_on()
+            rig.door.open()
+            assert "pulse 1877.50 µs" in rig.identities()["door"]
+        assert not lcus.states[1]
+    assert [pulse.width_s * 1e6 for pulse in maestro.pulses(3)] == pytest.approx(
+        [2000, 1000, 1877.5, 1000]
+    )
