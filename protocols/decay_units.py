@@ -1,15 +1,12 @@
 """What a decay consists of: dark frames, a metered charge, charge and decay, daylight."""
 
 from dataclasses import dataclass
-from typing import TYPE_CHECKING
 
 from labrig.acquire import LAMP_OFF, LAMP_ON, Session, Shoot, at
 from labrig.quantity import duration_text
 
+from .decay_settings import DecaySettings
 from .metering import Schedule, glow, look
-
-if TYPE_CHECKING:
-    from .decay import Decay
 
 #: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.
 METER_CHARGE_S = 600.0
@@ -22,7 +19,7 @@ LAMP_SETTLES_S = 5.0
 class DarkUnit:
     """Dark frames at the exposures to come, before anything glows."""
 
-    protocol: "Decay"
+    protocol: DecaySettings
     name: str = "dark"
 
     def run(self, session: Session) -> None:
@@ -39,7 +36,7 @@ class DarkUnit:
 class MeterUnit:
     """A shorter charge whose glow says how long to expose."""
 
-    protocol: "Decay"
+    protocol: DecaySettings
     name: str = "meter"
 
     def run(self, session: Session) -> None:
@@ -68,7 +65,7 @@ class MeterUnit:
 class DecayUnit:
     """One charge and the decay after it."""
 
-    protocol: "Decay"
+    protocol: DecaySettings
     number: int
 
     @property
@@ -146,7 +143,7 @@ class DecayUnit:
 class DaylightUnit:
     """What the samples look like under the lamp."""
 
-    protocol: "Decay"
+    protocol: DecaySettings
     name: str = "daylight"
 
     def run(self, session: Session) -> None:

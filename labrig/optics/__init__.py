@@ -1,5 +1,32 @@
 """Spectra and what light passes on its way to a number."""
 
-from labrig.optics.camera import CameraResponse, read_camera
+from labrig.optics.band import Bands
+from labrig.optics.camera import CameraResponse, read_camera, read_monochrome_camera
+from labrig.optics.curve_file import (
+    Curve,
+    CurveFile,
+    read_curve_file,
+    read_spectrum,
+    read_transmittance,
+)
+from labrig.optics.lvf import Lvf, nominal_lvf, seen_through
+from labrig.optics.spectrum import Spectrum, Transmittance
+from labrig.optics.wavelength_map import WavelengthMap
 
-__all__ = ["CameraResponse", "read_camera"]
+__all__ = [
+    "Bands",
+    "CameraResponse",
+    "Curve",
+    "CurveFile",
+    "Lvf",
+    "Spectrum",
+    "Transmittance",
+    "WavelengthMap",
+    "nominal_lvf",
+    "read_camera",
+    "read_curve_file",
+    "read_monochrome_camera",
+    "read_spectrum",
+    "read_transmittance",
+    "seen_through",
+]

@@ -1,26 +1,29 @@
 """Spectral sensitivity of a camera's channels."""
 
-import json
 import os
 from dataclasses import dataclass
-from typing import Any
+from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike
 
 from labrig import shipped
 from labrig.errors import UsageError
-
-FloatArray = NDArray[np.float64]
+from labrig.optics.curve_file import CurveFile, checked, read_curve_file
+from labrig.optics.piecewise import FloatArray, band_means
+from labrig.optics.spectrum import check_curve
 
 CHANNELS = ("R", "G", "B")
+MONOCHROME = ("L",)
 #: What is called "a little below zero" in measured curves: noise of the measurement.
 _NOISE_BELOW_ZERO = -0.05
+#: Suffixes of tables; names shipped with labrig have none.
+_TABLES = (".csv", ".dat", ".txt")
 
 
 @dataclass(frozen=True, eq=False)
 class CameraResponse:
-    """Relative spectral sensitivity of R, G and B.
+    """Relative spectral sensitivity of R, G and B, or of a monochrome camera's one channel.
 
     Parameters
     ----------
@@ -29,83 +32,95 @@ class CameraResponse:
     wavelength_nm
         Shape (n,), rising.
     sensitivity
-        Shape (n, 3), the highest of all 1. How high the channels stand relative to each other is
-        kept: it is what links raw numbers, not white balanced, to colours.
+        Shape (n, channels), the highest of all 1. How high the channels stand relative to each
+        other is kept: it is what links raw numbers, not white balanced, to colours. Straight lines
+        in between, zero outside.
+    channels
+        Their names.
     """
 
     name: str
     wavelength_nm: FloatArray
     sensitivity: FloatArray
+    channels: tuple[str, ...] = CHANNELS
 
     def response(self, spectrum: FloatArray) -> FloatArray:
-        """Camera values of a spectrum given at `wavelength_nm`, shape (3,), relative."""
+        """Camera values of a spectrum given at `wavelength_nm`, shape (channels,), relative."""
         values: FloatArray = (spectrum * np.gradient(self.wavelength_nm)) @ self.sensitivity
         return values
 
+    def at(self, wavelength_nm: ArrayLike) -> FloatArray:
+        """Sensitivity at (q,) wavelengths, shape (q, channels)."""
+        wanted = np.asarray(wavelength_nm, dtype=np.float64)
+        return np.stack(
+            [
+                np.interp(wanted, self.wavelength_nm, column, left=0.0, right=0.0)
+                for column in self.sensitivity.T
+            ],
+            axis=1,
+        )
+
+    def in_bands(self, edges_nm: ArrayLike) -> FloatArray:
+        """Mean over each band between neighbouring `edges_nm`, shape (edges − 1, channels)."""
+        return band_means(self.wavelength_nm, self.sensitivity, edges_nm)
+
 
 def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
-    """The shipped camera of that name, or the one in a file of rawtoaces' format.
+    """The shipped camera of that name, or the one in a file.
 
     Parameters
     ----------
     name_or_path
-        Such as `canon_eos_5d_mark_ii`, or a path that ends in `.json`.
+        Such as `canon_eos_5d_mark_ii`, or a path: rawtoaces' JSON, or a table in CSV with
+        `wavelength_nm,R,G,B` or, as Jiang et al. have it, those four columns without a header.
 
     Raises
     ------
     UsageError
         No such camera, or its file is malformed.
     """
-    path = shipped.find("config/optics", "camera", name_or_path)
-    try:
-        content = json.loads(path.read_text(encoding="utf-8"))
-    except OSError as error:
-        raise UsageError(f"{path}: cannot be read ({error.strerror})") from None
-    except (ValueError, RecursionError) as error:
-        raise UsageError(f"{path}: not JSON ({' '.join(str(error).split())})") from None
-    try:
-        return _camera(content, path.stem)
-    except ValueError as error:
+    file = read_curve_file(camera_path(name_or_path))
+    if set(file.curves) != set(CHANNELS):
         raise UsageError(
-            f"{path}: {error}; expected rawtoaces camera data, R, G and B under every wavelength "
-            "in spectral_data.data.main"
-        ) from None
+            f"{file.path}: expected the channels R, G and B, the channels are "
+            f"{', '.join(list(file.curves)[:6])}; a monochrome camera is read as such"
+        )
+    return checked(file.path, lambda known: _camera(known, CHANNELS), file)
 
 
-def _camera(content: Any, file_name: str) -> CameraResponse:
-    table = content
-    for key in ("spectral_data", "data", "main"):
-        if not isinstance(table, dict) or key not in table:
-            raise ValueError(f"the key '{key}' is missing")
-        table = table[key]
-    channels = _entry(content["spectral_data"], "index", "main")
-    if channels is not None and channels != list(CHANNELS):
-        raise ValueError(f"the channels are {channels}")
-    if not isinstance(table, dict) or len(table) < len(CHANNELS):
+def read_monochrome_camera(
+    path: str | os.PathLike[str], curve: str | None = None
+) -> CameraResponse:
+    """A camera without colours, from a file as `read_spectrum` takes it.
+
+    Raises
+    ------
+    UsageError
+        The file or the name of the curve is no good.
+    """
+    file = read_curve_file(path)
+    name, columns = file.pick(curve)
+    one = CurveFile(file.path, file.title, {name: columns})
+    return checked(file.path, lambda known: _camera(known, (name,)), one)
+
+
+def camera_path(name_or_path: str | os.PathLike[str]) -> Path:
+    """File of a shipped camera, or the path as given."""
+    path = Path(name_or_path)
+    if path.suffix.lower() in _TABLES:
+        return path
+    return shipped.find("config/optics", "camera", name_or_path)
+
+
+def _camera(file: CurveFile, names: tuple[str, ...]) -> CameraResponse:
+    curves = [file.curves[name] for name in names]
+    wavelength_nm, values = curves[0].wavelength_nm, np.stack([c.value for c in curves], axis=1)
+    check_curve(wavelength_nm, values, None)
+    if len(wavelength_nm) < 3:
         raise ValueError("there are fewer than three wavelengths")
-    try:
-        wavelength_nm = np.array([float(key) for key in table])
-        values = np.array(list(table.values()), dtype=np.float64)
-    except (TypeError, ValueError):
-        raise ValueError("something is not a number") from None
-    if values.shape != (len(table), len(CHANNELS)):
-        raise ValueError("some wavelength has not three values")
-    order = np.argsort(wavelength_nm)
-    wavelength_nm, values = wavelength_nm[order], values[order]
-    if not (np.isfinite(values).all() and np.isfinite(wavelength_nm).all()):
-        raise ValueError("some value is infinite or NaN")
-    if (np.diff(wavelength_nm) <= 0).any():
-        raise ValueError("a wavelength stands twice")
     if (values.max(axis=0) <= 0).any() or values.min() < _NOISE_BELOW_ZERO * values.max():
         raise ValueError("some channel is negative or zero throughout")
-    if np.linalg.matrix_rank(values / values.max(axis=0), tol=1e-6) < len(CHANNELS):
+    if np.linalg.matrix_rank(values / values.max(axis=0), tol=1e-6) < len(names):
         raise ValueError("two channels are the same")
-    maker, model = (_entry(content, "header", key) for key in ("manufacturer", "model"))
-    named = " ".join(str(part) for part in (maker, model) if part)
-    return CameraResponse(named or file_name, wavelength_nm, values / values.max())
-
-
-def _entry(content: dict[str, Any], section: str, key: str) -> Any:
-    """`content[section][key]`, None if it is not there."""
-    part = content.get(section)
-    return part.get(key) if isinstance(part, dict) else None
+    channels = CHANNELS if names == CHANNELS else MONOCHROME
+    return CameraResponse(file.title, wavelength_nm, values / values.max(), channels)

@@ -57,16 +57,18 @@ def test_a_misspelt_name_gets_a_hint() -> None:
         ("{", "not JSON"),
         ("[]", "'spectral_data' is missing"),
         (json.dumps({"spectral_data": {"data": {}}}), "'main' is missing"),
-        (json.dumps(rawtoaces({})), "fewer than three"),
+        (json.dumps(rawtoaces({})), "fewer than two"),
         (json.dumps(rawtoaces({**GOOD, "650": [1.0, 2.0]})), "not a number"),
-        (json.dumps(rawtoaces({k: [1.0, 2.0] for k in GOOD})), "not three values"),
+        (json.dumps(rawtoaces({k: [1.0, 2.0] for k in GOOD})), "not one value for every name"),
         (json.dumps(rawtoaces({**GOOD, "red": [1.0, 2.0, 3.0]})), "not a number"),
         (json.dumps(rawtoaces({**GOOD, "650": [1.0, None, 3.0]})), "infinite or NaN"),
         (json.dumps(rawtoaces({**GOOD, "600.0": [1.0, 2.0, 3.0]})), "stands twice"),
         (json.dumps(rawtoaces({**GOOD, "650": [-9.0, 2.0, 3.0]})), "negative"),
         (json.dumps(rawtoaces({k: [v[0], v[0], v[2]] for k, v in GOOD.items()})), "the same"),
         (
-            json.dumps({"spectral_data": {"index": {"main": ["L"]}, "data": {"main": GOOD}}}),
+            json.dumps(
+                {"spectral_data": {"index": {"main": ["X", "Y", "Z"]}, "data": {"main": GOOD}}}
+            ),
             "the channels are",
         ),
     ],

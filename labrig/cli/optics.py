@@ -1,0 +1,28 @@
+"""`labrig optics`: measured curves of cameras, lamps and filters."""
+
+from pathlib import Path
+from typing import Annotated
+
+import typer
+
+app = typer.Typer(help="Curves of cameras, lamps and filters.", no_args_is_help=True)
+
+
+@app.command("show")
+def show(
+    file: Annotated[str, typer.Argument(help="A file of curves, or a shipped camera.")],
+    curve: Annotated[
+        list[str] | None, typer.Option("--curve", help="Name of a curve; may be given again.")
+    ] = None,
+    picture: Annotated[
+        Path | None, typer.Option("--picture", help="Draw into this file (.png, .svg, .pdf).")
+    ] = None,
+) -> None:
+    """What is in a file of measured curves, and how they look."""
+    from labrig.optics.sketch import describe, draw, shown
+
+    found = shown(file, curve)
+    typer.echo(describe(found))
+    if picture is not None:
+        draw(found, picture)
+        typer.echo(f"drawn into {picture}")

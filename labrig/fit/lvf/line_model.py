@@ -1,0 +1,231 @@
+"""The profile of a strip under a mercury lamp, as a sum of lines on a background."""
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.errors import FitError
+from labrig.fit.least_squares import FloatArray, least_squares
+from labrig.optics.band import peak_shape
+
+FEWEST_LINES = 3
+#: Share of the profile's variance that lines and background explain, if there are lines.
+LEAST_EXPLAINED = 0.9
+#: Shares of a blend stay this near to what is known of them: a shape that is not quite the filter's
+#: would otherwise pull them along.
+SHARE_SIGMAS = 2.0
+#: A line is there if its height is this many of its σ.
+SIGNIFICANT = 6.0
+#: A line is located if its σ is below this share of its width.
+LOCATED = 0.2
+_STEP = 1e-5
+
+
+@dataclass(frozen=True)
+class Line:
+    """A spectral line, or two that are seen as one.
+
+    Attributes
+    ----------
+    wavelength_nm
+        In air; of the two, the shorter one first.
+    second_share
+        Share of the second one in the light of both, and how well that is known; it depends on the
+        lamp and on the camera.
+    """
+
+    wavelength_nm: tuple[float, ...]
+    second_share: tuple[float, float] = (0.0, 0.0)
+
+    @property
+    def centre_nm(self) -> float:
+        """Mean of the two by their share."""
+        if len(self.wavelength_nm) == 1:
+            return self.wavelength_nm[0]
+        share = self.second_share[0]
+        return (1 - share) * self.wavelength_nm[0] + share * self.wavelength_nm[1]
+
+
+#: Mercury in air (Sansonetti, Salit and Reader, *Wavelengths of spectral lines in mercury pencil
+#: lamps*, Appl. Opt. 35, 1996), as far as cameras see it. Shares: lamps and cameras differ.
+MERCURY = (
+    Line((404.6565, 407.7837), (0.12, 0.08)),
+    Line((435.8335,)),
+    Line((546.0750,)),
+    Line((576.9610, 579.0670), (0.5, 0.06)),
+)
+
+
+@dataclass(frozen=True, eq=False)
+class LocatedLines:
+    """Lines found along a strip.
+
+    Attributes
+    ----------
+    wavelength_nm
+        (l,) rising; of a blend, of its first line.
+    position, sigma
+        (l,) where they are, and one standard deviation, in the unit of the profile's positions.
+    fwhm
+        Width of a single line in that unit, in the middle of the lines.
+    rising
+        Whether the wavelength grows with the position.
+    explained
+        Share of the profile's variance that the lines and a straight background explain.
+    """
+
+    wavelength_nm: FloatArray
+    position: FloatArray
+    sigma: FloatArray
+    fwhm: float
+    rising: bool
+    explained: float
+
+
+@dataclass(frozen=True)
+class Assignment:
+    """λ ≈ offset + slope · position, and how well the peaks agree with it."""
+
+    offset_nm: float
+    slope_nm: float
+    fwhm: float
+    score: float
+
+
+class LineModel:
+    """The profile as a sum of lines; heights and background are eliminated at every step."""
+
+    def __init__(
+        self, u: FloatArray, values: FloatArray, lines: tuple[Line, ...], way: Assignment
+    ) -> None:
+        self.u, self.values, self.way = u, values, way
+        expected = [(line.wavelength_nm[0] - way.offset_nm) / way.slope_nm for line in lines]
+        inside = [u[0] < at < u[-1] for at in expected]
+        self.lines = [line for line, there in zip(lines, inside, strict=True) if there]
+        self.start = [at for at, there in zip(expected, inside, strict=True) if there]
+        self.middle, self.reach = float(u.mean()), float(np.ptp(u)) / 2
+
+    def located(self) -> LocatedLines:
+        """Fit; lines too faint to be located are left out, and the rest fitted again."""
+        while True:
+            x, sigma, noise = self._fitted()
+            position, at_sigma = x[: len(self.lines)], sigma[: len(self.lines)]
+            heights, height_sigma = self._heights(x, noise)
+            fwhm = float(np.exp(x[len(self.lines)]))
+            clear = (heights > SIGNIFICANT * height_sigma).any(axis=1) & (at_sigma < LOCATED * fwhm)
+            if clear.all():
+                break
+            if clear.sum() < FEWEST_LINES:
+                raise FitError(
+                    f"no lines of mercury: {clear.sum()} could be located, {FEWEST_LINES} are "
+                    "needed; expose longer, or check the lamp"
+                )
+            self.lines = [line for line, ok in zip(self.lines, clear, strict=True) if ok]
+            self.start = [float(at) for at, ok in zip(position, clear, strict=True) if ok]
+        left = self.values - self._fit_values(x)
+        explained = 1 - float(left.var() / (self.values - self.values.mean(axis=0)).var())
+        if explained < LEAST_EXPLAINED:
+            raise FitError(
+                f"no lines of mercury: lines explain {explained:.0%} of the profile, expected "
+                f"{LEAST_EXPLAINED:.0%} or more; check that no other lamp is lit"
+            )
+        wavelength_nm = np.array([line.wavelength_nm[0] for line in self.lines])
+        return LocatedLines(
+            wavelength_nm, position, at_sigma, fwhm, self.way.slope_nm > 0, explained
+        )
+
+    def _fitted(self) -> tuple[FloatArray, FloatArray, float]:
+        """Positions, log width and its change, skew, shares; their σ; the noise."""
+        shares = [line.second_share for line in self.lines if len(line.wavelength_nm) == 2]
+        start = np.array(
+            [*self.start, np.log(self.way.fwhm), 0.0, 0.0, *(share for share, _ in shares)]
+        )
+        prior = np.array([known for _, known in shares])
+        low, high = np.full(len(start), -np.inf), np.full(len(start), np.inf)
+        n = len(self.lines)
+        low[:n], high[:n] = start[:n] - self.way.fwhm, start[:n] + self.way.fwhm
+        low[n], high[n] = start[n] - 1, start[n] + 1
+        low[n + 1 : n + 3], high[n + 1 : n + 3] = -0.5, 0.5
+        low[n + 3 :] = np.maximum(start[n + 3 :] - SHARE_SIGMAS * prior, 0.0)
+        high[n + 3 :] = np.minimum(start[n + 3 :] + SHARE_SIGMAS * prior, 1.0)
+        noise = 1.0
+        for _ in range(2):
+
+            def residuals(x: FloatArray, noise: float = noise) -> tuple[FloatArray, FloatArray]:
+                return _with_derivatives(lambda at: self._residuals(at, noise, prior), x, start)
+
+            fit = least_squares(residuals, start, lower=low, upper=high, tolerance=1e-6)
+            start_left = self.values - self._fit_values(fit.parameters)
+            noise = float(np.sqrt((start_left**2).sum() / (start_left.size - len(start))))
+        covariance = np.linalg.pinv(fit.jacobian.T @ fit.jacobian, hermitian=True)
+        variance = np.maximum(np.diag(covariance), 0.0)
+        variance[:n] += self._blend_variance(fit.parameters)
+        return fit.parameters, np.sqrt(variance), noise
+
+    def _blend_variance(self, x: FloatArray) -> FloatArray:
+        """(lines,) of the positions, by the shares of blends that are not resolved."""
+        per_nm, fwhm = abs(self._per_nm(x[: len(self.lines)])), np.exp(x[len(self.lines)])
+        apart = np.array([per_nm * np.ptp(line.wavelength_nm) for line in self.lines])
+        unsure = np.array([line.second_share[1] for line in self.lines])
+        variance: FloatArray = np.where(apart < fwhm, (apart * unsure) ** 2, 0.0)
+        return variance
+
+    def _residuals(self, x: FloatArray, noise: float, prior: FloatArray) -> FloatArray:
+        left = (self.values - self._fit_values(x)) / noise
+        shares = [line.second_share[0] for line in self.lines if len(line.wavelength_nm) == 2]
+        pulled = (x[len(self.lines) + 3 :] - shares) / prior
+        return np.concatenate([left.ravel(), pulled])
+
+    def _shapes(self, x: FloatArray) -> FloatArray:
+        """(n, lines + 2): every line at height 1, and the background."""
+        n = len(self.lines)
+        positions, log_width, change, skew, shares = (
+            x[:n],
+            x[n],
+            x[n + 1],
+            x[n + 2],
+            list(x[n + 3 :]),
+        )
+        per_nm = self._per_nm(positions)
+        columns = []
+        for line, at in zip(self.lines, positions, strict=True):
+            width = np.exp(log_width + change * (at - self.middle) / self.reach)
+            column = peak_shape(self.u - at, width, skew)
+            if len(line.wavelength_nm) == 2:
+                share, apart = shares.pop(0), line.wavelength_nm[1] - line.wavelength_nm[0]
+                second = peak_shape(self.u - at - apart * per_nm, width, skew)
+                column = (1 - share) * column + share * second
+            columns.append(column)
+        slope = (self.u - self.middle) / self.reach
+        return np.column_stack([*columns, np.ones_like(slope), slope])
+
+    def _per_nm(self, positions: FloatArray) -> float:
+        nm = np.array([line.wavelength_nm[0] for line in self.lines])
+        return float(np.polyfit(nm, positions, 1)[0])
+
+    def _fit_values(self, x: FloatArray) -> FloatArray:
+        shapes = self._shapes(x)
+        fitted: FloatArray = shapes @ np.linalg.lstsq(shapes, self.values)[0]
+        return fitted
+
+    def _heights(self, x: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
+        """(lines, channels) heights and their (lines, 1) σ."""
+        shapes, n = self._shapes(x), len(self.lines)
+        heights = np.asarray(np.linalg.lstsq(shapes, self.values)[0][:n], dtype=np.float64)
+        variance = np.diag(np.linalg.pinv(shapes.T @ shapes))[:n]
+        sigma: FloatArray = noise * np.sqrt(variance)[:, np.newaxis]
+        return heights, sigma
+
+
+def _with_derivatives(
+    function: Callable[[FloatArray], FloatArray], x: FloatArray, scale: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Residuals and their Jacobian by central differences."""
+    steps = _STEP * np.maximum(np.abs(scale), 1.0)
+    columns = []
+    for k, step in enumerate(steps):
+        moved = np.zeros_like(x)
+        moved[k] = step
+        columns.append((function(x + moved) - function(x - moved)) / (2 * step))
+    return function(x), np.stack(columns, axis=1)

@@ -1,0 +1,217 @@
+"""A spectrum from values that each see much of it: non-negative, smooth as the data say.
+
+The values determine few figures well, so a prior is needed: p(x) ∝ exp(−w‖D x‖²/2), D the second
+differences. Its weight w is no choice: every draw takes another, by the evidence p(values | w). A
+spectrum with narrow lines therefore comes out rough and with a wide band, a smooth one smooth and
+with a narrow one. Values and prior are drawn anew, too, and every draw is the non-negative
+spectrum nearest to them: its values may be exactly zero (Bardsley and Hansen, *MCMC algorithms for
+computational UQ of nonnegativity constrained linear inverse problems*, SIAM J. Sci. Comput. 42,
+2020; Everink, Dong and Andersen, *Bayesian inference with projected densities*, 2023).
+
+The band holds for spectra that are not much narrower than what one value sees of them. Lines, such
+as a mercury lamp's through a filter of 25 nm, come out too broad, by more than their band says.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from scipy.linalg import solve_triangular
+
+from labrig.errors import FitError
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.spectrum.nonnegative_quadratic import nonnegative_minimum
+from labrig.fit.spectrum.system import SpectralSystem
+from labrig.optics.piecewise import band_means
+
+SAMPLES = 400
+#: Rounds in which the covariance of a wrong design follows the spectrum.
+ROUNDS = 3
+FEWEST_VALUES = 3
+#: Weights of the prior that are possible, for a spectrum of about 1.
+WEIGHTS = np.geomspace(1e-4, 1e8, 73)
+#: Added to the curvature of the fit, for a spectrum of about 1.
+LEAST_CURVATURE = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class SpectrumFit:
+    """A spectrum and how well it is known.
+
+    Attributes
+    ----------
+    knots_nm, value
+        (n,) the mean of the samples: straight lines between the knots.
+    samples
+        (s, n) draws from what the values leave possible; all their spread is uncertainty.
+    weight
+        Median weight of the smoothness, of a spectrum scaled to about 1.
+    misfit
+        Root of χ² per degree of freedom: about 1 if the σ given and the design hold; more has
+        been taken into the samples' spread.
+    used
+        (m,) bool, the values that took part.
+    """
+
+    knots_nm: FloatArray
+    value: FloatArray
+    samples: FloatArray
+    weight: float
+    misfit: float
+    used: NDArray[np.bool_]
+
+    def in_bands(self, edges_nm: ArrayLike, level: float = 0.6827) -> "BandedSpectrum":
+        """Means over neighbouring bands and their credible interval.
+
+        Parameters
+        ----------
+        edges_nm
+            (b + 1,) rising.
+        level
+            Probability that the truth is in the interval, band by band.
+        """
+        draws = band_means(self.knots_nm, self.samples.T, edges_nm)
+        low, high = np.quantile(draws, [(1 - level) / 2, (1 + level) / 2], axis=1)
+        value = band_means(self.knots_nm, self.value, edges_nm)
+        edges = np.asarray(edges_nm, dtype=np.float64)
+        return BandedSpectrum(edges, value, draws.std(axis=1, ddof=1), low, high)
+
+
+@dataclass(frozen=True, eq=False)
+class BandedSpectrum:
+    """Means over (b,) bands between (b + 1,) `edges_nm`, σ, and the ends of a credible interval."""
+
+    edges_nm: FloatArray
+    value: FloatArray
+    sigma: FloatArray
+    low: FloatArray
+    high: FloatArray
+
+
+def fit_spectrum(
+    value: ArrayLike,
+    sigma: ArrayLike,
+    system: SpectralSystem,
+    *,
+    samples: int = SAMPLES,
+    seed: int = 0,
+) -> SpectrumFit:
+    """The spectrum behind some values.
+
+    Parameters
+    ----------
+    value, sigma
+        (m,) as the system has them, and one standard deviation of their noise. A value that is
+        NaN (clipped, missing) is left out.
+    system
+        Design, and how it may be wrong.
+    samples
+        How many draws to make.
+    seed
+        Of the draws: the same values give the same spectrum.
+
+    Raises
+    ------
+    FitError
+        Too few values, or none above its noise.
+    """
+    values, sigmas = np.asarray(value, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
+    used = np.isfinite(values) & np.isfinite(sigmas) & system.design.any(axis=1)
+    if (sigmas[used] <= 0).any():
+        raise FitError("expected every σ above 0, got some of 0; give the noise of every value")
+    if used.sum() < FEWEST_VALUES:
+        raise FitError(
+            f"expected {FEWEST_VALUES} or more values that are neither clipped nor missing, got "
+            f"{used.sum()}; expose shorter or light more of the filter"
+        )
+    part, y, s = system.of(used), values[used], sigmas[used]
+    of_white = part.design.sum(axis=1)
+    scale = float(y @ of_white) / float(of_white @ of_white)
+    if not scale > 0:
+        raise FitError("expected values above 0, got none above their noise; expose longer")
+    roughness = _second_differences(part.knots_nm)
+    x, misfit = np.full(len(part.knots_nm), scale), 1.0
+    for _ in range(ROUNDS):
+        whitened, target = _whitened(part, y, misfit * s, x / scale, scale)
+        x, more = _likeliest(whitened, target, roughness)
+        x, misfit = x * scale, max(1.0, misfit * more)
+    rng = np.random.default_rng(seed)
+    draws, weights = _draw(whitened, target, roughness, samples, rng)
+    return SpectrumFit(
+        part.knots_nm, draws.mean(axis=0) * scale, draws * scale,
+        float(np.median(weights)), misfit, used,
+    )  # fmt: skip
+
+
+def _whitened(
+    system: SpectralSystem, y: FloatArray, s: FloatArray, spectrum: FloatArray, scale: float
+) -> tuple[FloatArray, FloatArray]:
+    """Design and values in units of all that may be wrong, for a spectrum of about 1."""
+    covariance = np.diag((s / scale) ** 2) + system.covariance(spectrum)
+    lower = np.linalg.cholesky(covariance)
+    both = np.linalg.solve(lower, np.column_stack([system.design, y / scale]))
+    return both[:, :-1], both[:, -1]
+
+
+def _second_differences(knots_nm: FloatArray) -> FloatArray:
+    """(n − 2, n) of values on an even grid."""
+    n = len(knots_nm)
+    return np.diff(np.eye(n), n=2, axis=0)
+
+
+def _weights(design: FloatArray, target: FloatArray, prior: FloatArray) -> FloatArray:
+    """Probability of each of `WEIGHTS`, all likely alike before; x ≥ 0 left aside."""
+    information, linear = design.T @ design, design.T @ target
+    log_evidence = np.empty(len(WEIGHTS))
+    for number, weight in enumerate(WEIGHTS):
+        lower = np.linalg.cholesky(information + weight * prior + _ridge(prior))
+        along = solve_triangular(lower, linear, lower=True)
+        log_determinant = 2 * float(np.log(np.diag(lower)).sum())
+        rank = len(prior) - 2
+        log_evidence[number] = (rank * np.log(weight) - log_determinant + along @ along) / 2
+    probability = np.exp(log_evidence - log_evidence.max())
+    normalised: FloatArray = probability / probability.sum()
+    return normalised
+
+
+def _likeliest(
+    design: FloatArray, target: FloatArray, roughness: FloatArray
+) -> tuple[FloatArray, float]:
+    """Spectrum at the likeliest weight, and root of χ² per degree of freedom."""
+    prior = roughness.T @ roughness
+    weight = float(WEIGHTS[np.argmax(_weights(design, target, prior))])
+    curvature = design.T @ design + weight * prior + _ridge(prior)
+    everywhere = np.ones(len(prior), dtype=np.bool_)
+    x = nonnegative_minimum(curvature, design.T @ target, everywhere)
+    free = x > 0
+    seen = np.linalg.solve(curvature[np.ix_(free, free)], (design.T @ design)[np.ix_(free, free)])
+    residual = target - design @ x
+    dof = max(len(target) - float(np.trace(seen)), 1.0)
+    return x, float(np.sqrt(residual @ residual / dof))
+
+
+def _draw(
+    design: FloatArray,
+    target: FloatArray,
+    roughness: FloatArray,
+    samples: int,
+    rng: np.random.Generator,
+) -> tuple[FloatArray, FloatArray]:
+    """(s, n) spectra and the (s,) weights they were drawn with."""
+    information, prior = design.T @ design, roughness.T @ roughness
+    probability = _weights(design, target, prior)
+    weights = np.sort(rng.choice(WEIGHTS, samples, p=probability))
+    draws = np.empty((samples, len(prior)))
+    free = np.ones(len(prior), dtype=np.bool_)
+    for number, weight in enumerate(weights):
+        measured = design.T @ (target + rng.standard_normal(len(target)))
+        expected = np.sqrt(weight) * roughness.T @ rng.standard_normal(len(roughness))
+        curvature = information + weight * prior + _ridge(prior)
+        draws[number] = nonnegative_minimum(curvature, measured + expected, free)
+        free = draws[number] > 0
+    return draws, weights
+
+
+def _ridge(prior: FloatArray) -> FloatArray:
+    """Holds what neither the values nor the prior know anything about."""
+    return LEAST_CURVATURE * np.eye(len(prior))

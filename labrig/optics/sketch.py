@@ -1,0 +1,92 @@
+"""Curves to look at: a line of text each, or a picture."""
+
+import os
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+
+from labrig.errors import UsageError
+from labrig.optics.camera import camera_path
+from labrig.optics.curve_file import Curve, CurveFile, checked, read_curve_file
+from labrig.optics.piecewise import band_means
+from labrig.optics.spectrum import check_curve
+
+#: Eighths of a line of text.
+BARS = " ▁▂▃▄▅▆▇█"
+COLUMNS = 48
+#: Curves described; a catalogue has hundreds.
+MOST_CURVES = 12
+PICTURES = (".png", ".svg", ".pdf")
+_COLOURS = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
+
+
+def shown(name_or_path: str | os.PathLike[str], names: Sequence[str] | None = None) -> CurveFile:
+    """A file with the curves of some names, all of them sound.
+
+    Raises
+    ------
+    UsageError
+        No such file or curve, or a curve that makes no sense.
+    """
+    file = read_curve_file(camera_path(name_or_path))
+    if names:
+        file = replace(file, curves=dict(file.pick(name) for name in names))
+    for name, curve in file.curves.items():
+        checked(f"{file.path}: {name}", lambda c: check_curve(*c), curve)
+    return file
+
+
+def describe(file: CurveFile) -> str:
+    """Title, and of every curve its grid, its range, its peak and its shape."""
+    curves = list(file.curves.items())
+    what = "one curve" if len(curves) == 1 else f"{len(curves)} curves"
+    lines = [f"{file.title}: {what} ({file.path})"]
+    widest = max(len(name) for name, _ in curves[:MOST_CURVES])
+    lines += [_described(name.ljust(widest), curve) for name, curve in curves[:MOST_CURVES]]
+    if len(curves) > MOST_CURVES:
+        lines.append(f"and {len(curves) - MOST_CURVES} more; choose with --curve NAME")
+    return "\n".join(lines)
+
+
+def _described(name: str, curve: Curve) -> str:
+    nm, value = curve.wavelength_nm, curve.value
+    steps = np.diff(nm)
+    grid = f"step {steps[0]:g}" if np.ptp(steps) < 1e-6 else f"{len(nm)} points"
+    means = band_means(nm, value, np.linspace(nm[0], nm[-1], COLUMNS + 1))
+    top = max(float(means.max()), 1e-300)
+    levels = np.clip(np.rint(means / top * (len(BARS) - 1)), 0, len(BARS) - 1).astype(int)
+    bars = "".join(BARS[level] for level in levels)
+    return (
+        f"  {name}  {nm[0]:g}-{nm[-1]:g} nm, {grid}; {value.min():.3g} to {value.max():.3g}, "
+        f"highest at {nm[value.argmax()]:g} nm\n  {' ' * len(name)}  |{bars}|"
+    )
+
+
+def draw(file: CurveFile, path: Path) -> None:
+    """All curves of a file over wavelength.
+
+    Raises
+    ------
+    UsageError
+        A file name that is no picture, or cannot be written.
+    """
+    from matplotlib.figure import Figure  # slow to load
+
+    if path.suffix.lower() not in PICTURES:
+        raise UsageError(f"{path}: expected a file name that ends in {', '.join(PICTURES)}")
+    figure = Figure(figsize=(7.0, 4.0), layout="constrained")
+    axes = figure.subplots()
+    for name, curve in file.curves.items():
+        line = axes.plot(*curve[:2], label=name, color=_COLOURS.get(name), linewidth=1.2)[0]
+        if curve.sigma is not None:
+            low, high = curve.value - curve.sigma, curve.value + curve.sigma
+            axes.fill_between(curve.wavelength_nm, low, high, color=line.get_color(), alpha=0.25)
+    axes.set(xlabel="wavelength / nm", title=file.title)
+    if 1 < len(file.curves) <= MOST_CURVES:
+        axes.legend(frameon=False)
+    try:
+        figure.savefig(path, dpi=150)
+    except OSError as error:
+        raise UsageError(f"{path}: cannot be written ({error.strerror})") from None
