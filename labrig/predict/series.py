@@ -11,7 +11,7 @@ from labrig.fit.least_squares import FloatArray
 from labrig.predict.frames import ExpectedFrames
 from labrig.predict.glow import Glow
 from labrig.reduce import fit_dark
-from labrig.reduce.patches import ONE_DEGREE
+from labrig.reduce.patches import TWO_DEGREES
 
 PHOTONS, READING, FLICKER, DARK = "photons", "reading", "flicker", "dark"
 #: Where noise comes from, in the order in which it is told.
@@ -111,7 +111,7 @@ def _dark_level_sigma(frames: ExpectedFrames, darks: ExpectedFrames) -> FloatArr
     model = fit_dark(darks.exposure_s, level, np.sqrt(darks.variance))
     sigma = np.array(
         [
-            np.hypot(model.dark_level(exposure_s)[1], ONE_DEGREE * model.current(exposure_s))
+            np.hypot(model.dark_level(exposure_s)[1], TWO_DEGREES * model.current(exposure_s))
             / exposure_s
             for exposure_s in frames.exposure_s
         ]

@@ -2,11 +2,12 @@
 
 from labrig.reduce.channels import ChannelStats, FrameMeasurement, measure
 from labrig.reduce.dark import DarkModel, fit_dark, hot_pixels
-from labrig.reduce.patches import SeriesFrame, reduce_patches, reduce_series
+from labrig.reduce.patches import reduce_patches, reduce_series
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
 from labrig.reduce.series import Series, add_flag, write_series
 from labrig.reduce.series_table import parse_series, read_series
+from labrig.reduce.shots import SeriesFrame
 
 __all__ = [
     "ChannelStats",

@@ -47,7 +47,7 @@ class DarkModel:
             All dark frames had another exposure.
         """
         only = self.only_exposure_s
-        if only is not None and not _same_exposure(only, exposure_s):
+        if only is not None and not same_exposure(only, exposure_s):
             raise DataError(
                 f"expected dark frames of {exposure_s:g} s or of several exposures, got only "
                 f"{only:g} s; take dark frames at the shortest and the longest exposure"
@@ -77,7 +77,7 @@ def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
     """
     if len(exposure_s) == 0:
         raise DataError("expected dark frames, got none; take some before charging")
-    one = _same_exposure(float(exposure_s.min()), float(exposure_s.max()))
+    one = same_exposure(float(exposure_s.min()), float(exposure_s.max()))
     design = np.ones((len(exposure_s), 1))
     if not one:
         design = np.stack([np.ones_like(exposure_s), exposure_s], axis=1)
@@ -100,7 +100,8 @@ def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
     )
 
 
-def _same_exposure(one_s: float, other_s: float) -> bool:
+def same_exposure(one_s: float, other_s: float) -> bool:
+    """Whether two exposures differ by no more than cameras round them by."""
     return abs(one_s - other_s) <= SAME_EXPOSURE * max(one_s, other_s)
 
 

@@ -5,15 +5,18 @@ stands still cancels (the sample's structure, its edges, each pixel's own respon
 what a single frame (`labrig.reduce.noise`) cannot: noise that the pixels of a row share, and that
 of a patch too small to be told from its surroundings. It is the photon transfer from pairs of
 Janesick (2007) and EMVA 1288, on strips as wide as the patch instead of single pixels: the scatter
-of a strip contains the correlation of all pixels in it.
+of a strip contains the correlation of all pixels in it. Dark frames of like exposure are pairs,
+too: they tell the noise of reading, which of a decay only the faintest frames do.
 """
 
-from collections.abc import Sequence
-from itertools import combinations
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from itertools import combinations, pairwise
 
 import numpy as np
 import numpy.typing as npt
 
+from labrig.reduce.dark import same_exposure
 from labrig.reduce.noise import Floats
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame
@@ -30,6 +33,52 @@ SCALED_SIGMAS = 5.0
 LEAST_SHARE = 0.1
 #: Rounds in which the weights follow the noise found.
 REWEIGHTINGS = 4
+
+
+@dataclass(frozen=True, eq=False)
+class PatchFrames:
+    """A patch in n frames of C channels, to be paired.
+
+    Attributes
+    ----------
+    exposure_s
+        Shape (n,).
+    deviations
+        Shape (n, C, strips), of `strip_deviations`, DN.
+    light
+        Shape (n, C): means in DN above those of no exposure, dark current included.
+    sigma
+        Shape (n, C): what each frame by itself says, DN.
+    """
+
+    exposure_s: Floats
+    deviations: Floats
+    light: Floats
+    sigma: Floats
+
+    def take(self, rows: npt.NDArray[np.intp]) -> "PatchFrames":
+        """Some of the frames."""
+        return PatchFrames(
+            self.exposure_s[rows], self.deviations[rows], self.light[rows], self.sigma[rows]
+        )
+
+    def and_then(self, others: "PatchFrames") -> "PatchFrames":
+        """These frames, then the others."""
+        return PatchFrames(
+            np.append(self.exposure_s, others.exposure_s),
+            np.concatenate([self.deviations, others.deviations]),
+            np.concatenate([self.light, others.light]),
+            np.concatenate([self.sigma, others.sigma]),
+        )
+
+    def pairs_of_like_exposure(self) -> list[tuple[int, int]]:
+        """Frames that differ by nothing but noise, however much dark current leaves its pattern."""
+        rising = np.argsort(self.exposure_s, kind="stable").tolist()
+        return [
+            (one, other)
+            for one, other in pairwise(rising)
+            if same_exposure(self.exposure_s[one], self.exposure_s[other])
+        ]
 
 
 def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Floats:
@@ -69,51 +118,55 @@ def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Fl
 
 
 def paired_sigma(
-    deviations: Floats,
-    light: Floats,
-    sigma: Floats,
+    frames: PatchFrames,
     t_s: Floats,
     unit: Sequence[str],
     usable: npt.NDArray[np.bool_],
+    darks: Mapping[str, PatchFrames],
 ) -> Floats:
     """Standard uncertainty in DN of the means of a patch, shape (n, C), unit by unit.
 
+    What each frame says by itself is kept where pairs are too few.
+
     Parameters
     ----------
-    deviations
-        Shape (n, C, strips), of `strip_deviations`.
-    light
-        Shape (n, C), the means above the dark level.
-    sigma
-        Shape (n, C), what each frame by itself says; kept where pairs are too few.
+    frames
+        The patch in n frames.
     t_s, unit, usable
         Shape (n,) each: when, in which unit, and whether the frame can be in a pair.
+    darks
+        Dark frames at the ISO of each unit, where there are any.
     """
-    found = sigma.copy()
+    found = frames.sigma.copy()
     for one in dict.fromkeys(unit):
         rows = np.array([row for row, name in enumerate(unit) if name == one])
         paired = np.flatnonzero(usable[rows])
         paired = paired[np.argsort(t_s[rows[paired]], kind="stable")]
-        if (len(paired) - 1) * (deviations.shape[2] - 1) < FEWEST_DOF:
+        pairs = list(pairwise(paired.tolist()))
+        if len(pairs) * (frames.deviations.shape[2] - 1) < FEWEST_DOF:
             continue
-        for channel in range(sigma.shape[1]):
-            found[rows, channel] = _photon_transfer(
-                deviations[rows, channel], light[rows, channel], sigma[rows, channel], paired
-            )
+        part = frames.take(rows)
+        if one in darks:
+            dark_pairs = darks[one].pairs_of_like_exposure()
+            pairs += [(len(rows) + first, len(rows) + second) for first, second in dark_pairs]
+            part = part.and_then(darks[one])
+        first, second = np.array(pairs).T
+        for channel in range(found.shape[1]):
+            found[rows, channel] = _photon_transfer(part, channel, first, second)[: len(rows)]
     return found
 
 
 def _photon_transfer(
-    deviations: Floats, light: Floats, sigma: Floats, paired: npt.NDArray[np.intp]
+    frames: PatchFrames, channel: int, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
 ) -> Floats:
-    """σ of the means of one channel, shape (n,), from the `paired` frames in order of time.
+    """σ of the means of one channel, shape (n,), from pairs of `one` frame and an `other`.
 
     The variance is A + B·light + C·light², all ≥ 0: reading, photons, and what is proportional to
     the light but not common to the patch.
     """
+    deviations, sigma = frames.deviations[:, channel], frames.sigma[:, channel]
     strips = deviations.shape[1]
-    one, other = paired[:-1], paired[1:]
-    light = np.maximum(light, 0)
+    light = np.maximum(frames.light[:, channel], 0)
     bright = light[one] > SCALED_SIGMAS * sigma[one]
     scale = np.where(bright, light[other] / np.where(bright, light[one], 1.0), 1.0)
     difference = deviations[other] - scale[:, np.newaxis] * deviations[one]

@@ -2,82 +2,38 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 
 from labrig.errors import DataError
-from labrig.reduce.channels import FrameMeasurement, measure
 from labrig.reduce.dark import HOT_FRAMES, SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
 from labrig.reduce.noise import Floats
-from labrig.reduce.pairs import paired_sigma, strip_deviations
+from labrig.reduce.pairs import PatchFrames, paired_sigma
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
 from labrig.reduce.series import Series, add_flag, is_usable
+from labrig.reduce.shots import SeriesFrame, Shot, View, levels, read_shots, strips
 from labrig.region import Region
 
 #: Share of a patch's pixels that may be saturated before its mean is too small.
 CLIPPED_SHARE = 0.001
-#: Share by which the dark current changes when the sensor is one degree warmer than in the dark
-#: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before.
-ONE_DEGREE = 2 ** (1 / 6) - 1
+#: Share by which the dark current changes when the sensor is two degrees warmer than in the dark
+#: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before
+#: the decay, and 20 min of warming up leave a camera a degree or two to go.
+TWO_DEGREES = 2 ** (2 / 6) - 1
 #: Dark frames held in memory at once, to look for hot pixels.
 _DARKS_FOR_HOT = 5
-#: Frames in memory at once otherwise; only one is ever being decoded.
-_FRAMES_AT_ONCE = 2
-
-
-@dataclass(frozen=True)
-class SeriesFrame:
-    """A frame on disk and its *measured* times.
-
-    Parameters
-    ----------
-    t_s, exposure_s
-        Start of the exposure (after lamp off) and its length. Of a dark frame, `t_s` is not used.
-    iso, f_number
-        None: as the file's EXIF says.
-    unit, flag
-        Unit of the run, and flags it already has.
-    """
-
-    path: Path
-    t_s: float
-    exposure_s: float
-    iso: float | None = None
-    f_number: float | None = None
-    unit: str = ""
-    flag: str = ""
 
 
 @dataclass(frozen=True, eq=False)
-class _View:
-    """A region of a frame: what is in it, and how its strips (C, strips) deviate from its mean."""
+class _Dark:
+    """A patch in the dark frames of one ISO, of one `kind` of frame."""
 
-    measured: FrameMeasurement
-    strips: Floats
-
-
-@dataclass(frozen=True)
-class _Shot:
-    """A frame, seen in every patch and in the background, if there is one."""
-
-    frame: SeriesFrame
-    patches: Mapping[str, _View]
-    background: _View | None
-
-    @property
-    def iso(self) -> float:
-        """NaN where neither the run nor the file says."""
-        return _first(self.frame.iso, *(view.measured.iso for view in self.patches.values()))
-
-    @property
-    def f_number(self) -> float:
-        """NaN where neither the run nor the file says."""
-        views = self.patches.values()
-        return _first(self.frame.f_number, *(view.measured.f_number for view in views))
+    kind: tuple[int, int, tuple[str, ...]]
+    model: DarkModel
+    frames: PatchFrames
 
 
 def reduce_series(
@@ -112,7 +68,8 @@ def reduce_patches(
         A dark region of the frames themselves, whose level is subtracted instead.
 
     Frames with more than 0.1 % of a patch saturated are flagged `clipped`, not dropped. Sigma comes
-    from pairs of successive frames of a unit, if there are enough, else from each frame alone.
+    from pairs of successive frames of a unit, and of dark frames of one exposure, if there are
+    enough of a unit, else from each frame alone.
 
     Raises
     ------
@@ -125,11 +82,11 @@ def reduce_patches(
         raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
     longest = _read_longest(darks)
     hot = hot_pixels(list(longest.values())) if longest else None
-    models = {} if background else _dark_models(darks, patches, hot, longest)
+    dark = {} if background else _measured_darks(darks, patches, hot, longest)
     longest.clear()  # five frames of 42 MB that nobody needs any more
-    shots = _shots(frames, patches, background, hot, {})
+    shots = read_shots(frames, patches, background, hot, {})
     _check_settings(shots)
-    return {name: _patch_series(name, shots, models) for name in patches}
+    return {name: _patch_series(name, shots, dark) for name in patches}
 
 
 def _read_longest(darks: Sequence[SeriesFrame]) -> dict[Path, RawFrame]:
@@ -141,99 +98,69 @@ def _read_longest(darks: Sequence[SeriesFrame]) -> dict[Path, RawFrame]:
     return {dark.path: read_raw(dark.path) for dark in longest[:_DARKS_FOR_HOT]}
 
 
-def _shots(
-    frames: Sequence[SeriesFrame],
-    patches: Mapping[str, Region],
-    background: Region | None,
-    hot: PixelMask | None,
-    read: Mapping[Path, RawFrame],
-) -> list[_Shot]:
-    """All `frames` in order; one is decoded, unless it is `read`, while another is measured."""
-
-    def shot(frame: SeriesFrame) -> _Shot:
-        raw = read.get(frame.path) or read_raw(frame.path)
-        return _shot(frame, raw, patches, background, hot)
-
-    with ThreadPoolExecutor(_FRAMES_AT_ONCE) as pool:
-        return list(pool.map(shot, frames))
-
-
-def _shot(
-    frame: SeriesFrame,
-    raw: RawFrame,
-    patches: Mapping[str, Region],
-    background: Region | None,
-    hot: PixelMask | None,
-) -> _Shot:
-    if not frame.exposure_s > 0:
-        raise DataError(f"{frame.path}: expected an exposure above 0 s, got {frame.exposure_s}")
-    return _Shot(
-        frame,
-        {name: _view(raw, region, hot, frame.path) for name, region in patches.items()},
-        _view(raw, background, hot, frame.path) if background else None,
-    )
-
-
-def _view(raw: RawFrame, region: Region, hot: PixelMask | None, path: Path) -> _View:
-    try:
-        return _View(measure(raw, region, hot), strip_deviations(raw, region, hot))
-    except DataError as error:
-        raise type(error)(f"{path}: {error}") from None
-
-
-def _dark_models(
+def _measured_darks(
     darks: Sequence[SeriesFrame],
     patches: Mapping[str, Region],
     hot: PixelMask | None,
     read: Mapping[Path, RawFrame],
-) -> dict[tuple[str, float], DarkModel]:
-    """Dark level by patch and ISO."""
-    by_iso: dict[float, list[_Shot]] = defaultdict(list)
-    for shot in _shots(darks, patches, None, hot, read):
+) -> dict[tuple[str, float], _Dark]:
+    """The dark by patch and ISO."""
+    by_iso: dict[float, list[Shot]] = defaultdict(list)
+    for shot in read_shots(darks, patches, None, hot, read):
         by_iso[_key(shot.iso)].append(shot)
     return {
-        (name, iso): fit_dark(
-            np.array([shot.frame.exposure_s for shot in shots]),
-            *_levels([shot.patches[name] for shot in shots]),
-        )
+        (name, iso): _dark([shot.frame.exposure_s for shot in shots], _views(name, shots))
         for iso, shots in by_iso.items()
         for name in patches
     }
 
 
+def _dark(exposures_s: Sequence[float], views: Sequence[View]) -> _Dark:
+    exposure_s = np.array(exposures_s)
+    level, sigma = levels(views)
+    model = fit_dark(exposure_s, level, sigma)
+    return _Dark(
+        views[0].kind, model, PatchFrames(exposure_s, strips(views), level - model.base, sigma)
+    )
+
+
 def _patch_series(
-    name: str, shots: Sequence[_Shot], models: Mapping[tuple[str, float], DarkModel]
+    name: str, shots: Sequence[Shot], darks: Mapping[tuple[str, float], _Dark]
 ) -> Series:
     exposure_s = np.array([shot.frame.exposure_s for shot in shots])
     t_s = np.array([shot.frame.t_s for shot in shots])
     unit = tuple(shot.frame.unit for shot in shots)
     flags = tuple(_flag(shot, name) for shot in shots)
+    dark_of_unit: dict[str, PatchFrames] = {}
 
-    def noise(views: Sequence[_View], light: Floats, sigma: Floats) -> Floats:
-        strips = np.stack([view.strips for view in views])
+    def noise(views: Sequence[View], light: Floats, sigma: Floats) -> Floats:
+        frames = PatchFrames(exposure_s, strips(views), light, sigma)
         usable = np.array([is_usable(flag) for flag in flags])
-        return paired_sigma(strips, light, sigma, t_s, unit, usable)
+        return paired_sigma(frames, t_s, unit, usable, dark_of_unit)
 
-    views = [shot.patches[name] for shot in shots]
-    level, sigma = _levels(views)
+    views = _views(name, shots)
+    level, sigma = levels(views)
     dark, dark_sigma = np.zeros_like(level), np.full_like(level, np.nan)
+    unexposed = np.zeros_like(level)
     backgrounds = [shot.background for shot in shots if shot.background is not None]
     if backgrounds:
-        dark, dark_noise = _levels(backgrounds)
+        dark, dark_noise = levels(backgrounds)
         dark_noise = noise(backgrounds, np.zeros_like(dark), dark_noise)
         dark_sigma = np.zeros_like(level)
-    elif models:
-        for row, shot in enumerate(shots):
-            model = models.get((name, _key(shot.iso)))
-            if model is None or len(model.base) != level.shape[1]:
+    elif darks:
+        for row, (shot, view) in enumerate(zip(shots, views, strict=True)):
+            found = darks.get((name, _key(shot.iso)))
+            if found is None or found.kind != view.kind:
                 raise DataError(
                     f"{shot.frame.path}: expected dark frames at ISO {shot.iso:g} as this frame, "
                     "of the same sensor, got none; take some, or name a background region"
                 )
-            dark[row], of_model = model.dark_level(shot.frame.exposure_s)
-            drift = ONE_DEGREE * np.abs(model.current(shot.frame.exposure_s))
+            dark[row], of_model = found.model.dark_level(shot.frame.exposure_s)
+            unexposed[row] = found.model.base
+            drift = TWO_DEGREES * np.abs(found.model.current(shot.frame.exposure_s))
             dark_sigma[row] = np.hypot(of_model, drift)
-    sigma = noise(views, level - dark, sigma)
+            dark_of_unit[shot.frame.unit] = found.frames
+    sigma = noise(views, level - (dark if backgrounds else unexposed), sigma)
     if backgrounds:
         sigma = np.hypot(sigma, dark_noise)
     per_second = exposure_s[:, np.newaxis]
@@ -255,17 +182,11 @@ def _patch_series(
     )
 
 
-def _levels(views: Sequence[_View]) -> tuple[Floats, Floats]:
-    """Means and what each frame by itself says of their sigma in DN, each of shape (n, C)."""
-    kinds = {(view.measured.width, view.measured.height, *view.measured.channels) for view in views}
-    if len(kinds) > 1:
-        raise DataError(f"expected frames of one sensor and size, got {sorted(kinds)}")
-    pairs = [[(c.mean, c.sigma) for c in view.measured.channels.values()] for view in views]
-    mean, sigma = np.moveaxis(np.array(pairs), 2, 0)
-    return mean, sigma
+def _views(name: str, shots: Sequence[Shot]) -> list[View]:
+    return [shot.patches[name] for shot in shots]
 
 
-def _flag(shot: _Shot, name: str) -> str:
+def _flag(shot: Shot, name: str) -> str:
     views = [shot.patches[name], *([shot.background] if shot.background else [])]
     clipped = any(
         stats.saturated > CLIPPED_SHARE * stats.n
@@ -275,7 +196,7 @@ def _flag(shot: _Shot, name: str) -> str:
     return add_flag(shot.frame.flag, "clipped") if clipped else shot.frame.flag
 
 
-def _check_settings(shots: Sequence[_Shot]) -> None:
+def _check_settings(shots: Sequence[Shot]) -> None:
     """DN/s compare only at one gain and one aperture."""
     for unit in {shot.frame.unit for shot in shots}:
         for what, found in (
@@ -287,10 +208,6 @@ def _check_settings(shots: Sequence[_Shot]) -> None:
                     f"expected one {what} in unit '{unit}', got {sorted(found)}; DN/s of different "
                     "settings do not compare: reduce them apart"
                 )
-
-
-def _first(*numbers: float | None) -> float:
-    return next((number for number in numbers if number is not None), np.nan)
 
 
 def _key(number: float) -> float:

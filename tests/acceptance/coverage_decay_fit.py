@@ -1,11 +1,11 @@
 """What the decay fit's uncertainties and choices are worth, over many seeds.
 
-    PYTHONPATH=. python tests/acceptance/coverage_decay_fit.py [seeds]
+    python -m tests.acceptance.coverage_decay_fit [--seeds 500] [--jobs 2] [--case NAME ...]
 
 Prints one line per case; takes about a minute per 500 seeds and processor.
 """
 
-import sys
+import argparse
 from concurrent.futures import ProcessPoolExecutor
 from dataclasses import dataclass, field
 from functools import partial
@@ -67,6 +67,18 @@ CASES = {
         _states("2 states .08/.015, n and ρ from data", DOUBLE, flicker=None),
         _states("2 states .05/.02, n and ρ from data", CLOSE, flicker=None),
         _states("2 states .05/.02, ρ known", CLOSE),
+        _states("2 states .2/.01, n and ρ from data", ((0.2, 1.0), (0.01, 0.25)), flicker=None),
+        _states("2 states .2/.04, n and ρ from data", ((0.2, 1.0), (0.04, 1.0)), flicker=None),
+        *(
+            Case(
+                f"1 state .02, flicker {flicker:g}, ρ from data",
+                truths.exponentials((0.02, 1.0)),
+                ((0.02, 1.0),),
+                {"flicker": flicker},
+                {"flicker": None},
+            )
+            for flicker in (0.0, 0.0005, 0.001, 0.002)
+        ),
         Case(
             "2 states .08/.015, no flicker",
             truths.exponentials(*DOUBLE),
@@ -148,13 +160,20 @@ def report(case: Case, fits: list[tuple[DecayFit, truths.Observed]]) -> str:
         )
 
 
-def main(seeds: int) -> None:
+def main() -> None:
     """Run every case and print."""
-    with ProcessPoolExecutor() as pool:
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("--seeds", type=int, default=500)
+    parser.add_argument("--jobs", type=int, default=2)
+    parser.add_argument("--case", nargs="*", default=[""], help="the beginning of their names; all")
+    asked = parser.parse_args()
+    with ProcessPoolExecutor(asked.jobs) as pool:
         for case in CASES.values():
-            fits = list(pool.map(partial(fit_case, case.name), range(seeds), chunksize=10))
-            print(report(case, fits), flush=True)
+            if case.name.startswith(tuple(asked.case)):
+                seeds = range(asked.seeds)
+                fits = list(pool.map(partial(fit_case, case.name), seeds, chunksize=10))
+                print(report(case, fits), flush=True)
 
 
 if __name__ == "__main__":
-    main(int(sys.argv[1]) if len(sys.argv) > 1 else 500)
+    main()

@@ -24,6 +24,7 @@ import numpy as np
 import yaml
 
 from labrig.cli.ending import guarded
+from labrig.errors import FitError
 from labrig.process.choices import Choices, read_decay_protocol
 from labrig.process.series_fit import fit_series
 from labrig.process.timed_frames import intact_frames
@@ -111,7 +112,10 @@ def fitted(case: Case, day: int) -> Fitted:
         patches = read_decay_protocol(made).patches
         frames = intact_frames(read_run(made), Choices())
         (series,) = reduce_patches(frames.decay, patches, frames.dark).values()
-    fit = fit_series(series, case.states)
+    try:
+        fit = fit_series(series, case.states)
+    except FitError:  # nothing stands out of the noise
+        return Fitted([], [], told=False)
     return Fitted(
         [state.k_r_per_s for state in fit.states],
         [state.k_r_sigma_per_s for state in fit.states],
@@ -135,7 +139,9 @@ def lines(case: Case, said: dict[str, Any], fits: list[Fitted]) -> list[str]:
     for i, state in enumerate(said["states"]):
         rates = np.array([fit.rates[i] for fit in complete])
         expected = state["k_r_sigma_per_s"]
-        scatter, own = rates.std(ddof=1), np.median([fit.sigmas[i] for fit in complete])
+        enough = len(rates) > 2
+        scatter = rates.std(ddof=1) if enough else np.nan
+        own = np.median([fit.sigmas[i] for fit in complete]) if enough else np.nan
         made.append(
             f"{case.material:18}{case.name:20} k{i + 1} {state['k_r_per_s']:.4f}"
             f" {expected:10.2e} {scatter:10.2e} × {scatter / expected:.2f}"

@@ -49,6 +49,10 @@ REFUSED = [
         ("--states", "2"),
         T[:3],
     ),
+    Case("no points", DECAY[:0], 1.0, "got a header without rows", (), T[:0]),
+    Case(
+        "one moment", DECAY, 1.0, "expected frames at several times, got all at 5 s", (), 0 * T + 5
+    ),
     Case("NaN", with_frame(5, np.nan), 1.0, "line 7: expected a finite number for 'value'"),
     Case("infinity", with_frame(5, np.inf), 1.0, "line 7: expected a finite number for 'value'"),
     Case("NaN in time", DECAY, 1.0, "finite number for 't_s'", (), np.where(T > 60, np.nan, T)),
@@ -72,6 +76,21 @@ WARNED = [
         100 * np.exp(-0.002 * T) + 0.3 * NOISE,
         0.3,
         "longer than the 180 s recorded",
+    ),
+    Case(
+        "too short to see it fall",
+        100 * np.exp(-0.002 * T[:8]) + 0.3 * NOISE[:8],
+        0.3,
+        "longer than the 35 s recorded: record longer",
+        (),
+        T[:8],
+    ),
+    Case(
+        "three states of one",
+        DECAY + 0.3 * NOISE,
+        0.3,
+        "k1 and k2 cannot be told apart: ask for one state fewer",
+        ("--states", "3"),
     ),
     Case(
         "as many parameters as points",

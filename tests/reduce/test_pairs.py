@@ -14,7 +14,7 @@ Floats = npt.NDArray[np.float64]
 
 HEIGHT, WIDTH = 72, 96
 PATCH = (20, 18, 30, 36)
-READ_DN, RATE_PER_S, BRIGHT_DN = 6.0, 0.03, 4000.0
+READ_DN, ROW_DN, RATE_PER_S, BRIGHT_DN = 6.0, 3.0, 0.03, 4000.0
 TIMES_S: Floats = np.asarray(0.5 + 5.0 * np.arange(24))
 #: Pixels of R, G and B in the patch, and its rows that have them.
 PIXELS, ROWS = np.array([270, 540, 270]), np.array([18, 36, 18])
@@ -30,14 +30,19 @@ def recorded(
     scene: Floats | float = 1.0,
     row_dn: float = 0.0,
     flicker: float = 0.0,
+    crosstalk: float = 0.0,
     times_s: Sequence[float] | Floats = TIMES_S,
 ) -> list[SeriesFrame]:
-    """A decay of `scene`, relative brightness of every pixel, with photon, read and row noise."""
+    """A decay of `scene`, relative brightness of every pixel, with photon, read and row noise.
+
+    `crosstalk` is the share of a pixel's charge that each of its four neighbours shows instead.
+    """
     rng = np.random.default_rng(seed)
     frames = []
     for number, t_s in enumerate(times_s):
         light = BRIGHT_DN * np.exp(-RATE_PER_S * t_s) * scene * COLOURS
-        mosaic = 1000 + rng.poisson(light * max(1 + flicker * rng.normal(), 0))
+        charge = rng.poisson(light * max(1 + flicker * rng.normal(), 0)).astype(np.float64)
+        mosaic = 1000 + shared_with_neighbours(charge, crosstalk)
         mosaic = mosaic + READ_DN * rng.normal(size=mosaic.shape)
         mosaic = mosaic + row_dn * rng.normal(size=(HEIGHT, 1))
         path = folder / f"{seed}-{number:06d}.dng"
@@ -46,11 +51,25 @@ def recorded(
     return frames
 
 
-def expected_sigma(series: Series, row_dn: float = 0.0, scene: float = 1.0) -> Floats:
+def shared_with_neighbours(charge: Floats, share: float) -> Floats:
+    around = sum(np.roll(charge, step, axis) for axis in (0, 1) for step in (-1, 1))
+    return np.asarray((1 - 4 * share) * charge + share * around)
+
+
+def expected_sigma(
+    series: Series, row_dn: float = 0.0, scene: float = 1.0, crosstalk: float = 0.0
+) -> Floats:
     """Photons, reading, rounding and rows, in DN of the patch's mean."""
-    signal = np.multiply.outer(BRIGHT_DN * np.exp(-RATE_PER_S * series.t_s) * scene, WEIGHTS)
-    variance = (signal + READ_DN**2 + 1 / 12) / PIXELS + row_dn**2 / ROWS
-    return np.asarray(np.sqrt(variance))
+    x, y, w, h = PATCH
+    inside = np.zeros((HEIGHT, WIDTH))
+    inside[y : y + h, x : x + w] = 1
+    photons = []  # of R, G and B at a brightness of 1
+    for level, pixels in zip(WEIGHTS, PIXELS, strict=True):
+        share = shared_with_neighbours(inside * (level == COLOURS) / pixels, crosstalk)
+        photons.append(np.sum(np.square(share) * COLOURS))
+    light = BRIGHT_DN * np.exp(-RATE_PER_S * series.t_s) * scene
+    variance = np.multiply.outer(light, photons) + (READ_DN**2 + 1 / 12) / PIXELS
+    return np.asarray(np.sqrt(variance + row_dn**2 / ROWS))
 
 
 @pytest.mark.parametrize("flicker", [0.0, 0.01])
@@ -66,6 +85,41 @@ def test_noise_that_rows_share_is_counted(
     # 23 pairs of 15 degrees of freedom: σ to 4 % in each, the worst frame less well.
     assert np.mean(ratios) == pytest.approx(1, abs=0.05)
     assert np.abs(np.array(ratios) - 1).max() < 0.35
+
+
+def test_dark_frames_tell_the_noise_of_reading(tmp_path: Path, write_dng: WriteDng) -> None:
+    """A decay that is faint at its end only says little of it by itself."""
+    noise = {"row_dn": ROW_DN, "crosstalk": 0.03}
+
+    def faintest(series: Series) -> float:
+        return float(np.mean((series.sigma / expected_sigma(series, **noise))[-8:]))
+
+    alone, with_darks = [], []
+    for seed in range(8):
+        frames = recorded(tmp_path, write_dng, seed, times_s=TIMES_S[:16], **noise)
+        darks = recorded(tmp_path, write_dng, 100 + seed, times_s=np.zeros(12), scene=0.0, **noise)
+        alone.append(faintest(reduce_series(frames, PATCH)))
+        with_darks.append(faintest(reduce_series(frames, PATCH, darks)))
+    assert np.mean(with_darks) == pytest.approx(1, abs=0.05)
+    assert np.std(with_darks) < 0.8 * np.std(alone)
+
+
+def test_dark_frames_of_different_exposures_are_no_pair(
+    tmp_path: Path, write_dng: WriteDng
+) -> None:
+    """Where rows start from different levels, they differ by more than noise."""
+    rng = np.random.default_rng(5)
+    frames = recorded(tmp_path, write_dng, 1)
+    start = 1000 + 40 * rng.random((HEIGHT, 1)) * np.ones(WIDTH)
+    darks = []
+    for number, exposure_s in enumerate([0.5, 2.0, 8.0] * 2):
+        current = rng.poisson(3 * exposure_s, start.shape)
+        mosaic = start + current + READ_DN * rng.normal(size=start.shape)
+        path = tmp_path / f"dark-{number}.dng"
+        path.write_bytes(write_dng(np.rint(mosaic)))
+        darks.append(SeriesFrame(path, 0.0, exposure_s, 100.0))
+    series = reduce_series(frames, PATCH, darks)
+    assert np.mean(series.sigma / expected_sigma(series)) == pytest.approx(1, abs=0.1)
 
 
 def test_neighbours_and_structure_of_the_sample_do_not_matter(

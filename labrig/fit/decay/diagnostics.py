@@ -6,6 +6,7 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc, ndtr
 
 from labrig.fit.decay.result import DecayState
+from labrig.fit.decay.states import APART_SIGMAS, sigmas_apart
 from labrig.fit.least_squares import FloatArray
 
 #: Chance at which data that are as assumed get a misfit warning, per test.
@@ -13,8 +14,6 @@ MISFIT_LEVEL = 5e-4
 #: Frames below which residuals' order tells nothing.
 FEWEST_FOR_ORDER = 8
 ILL_DETERMINED = 0.3
-#: Two log rates closer than this many σ are one as far as the data know.
-APART_SIGMAS = 3.0
 BELOW_ZERO_SIGMAS = 5.0
 OFFSET_SIGMAS = 4.0
 #: A frame is named that lies this many robust standard deviations off the others …
@@ -173,15 +172,9 @@ def state_warnings(
                 f"{rate} is known to {100 * sigma[number - 1]:.0f} % only: "
                 + ("record longer" if long_lived else "ask for fewer states or take more light")
             )
-    for number in range(1, len(states)):
-        fast, slow = number - 1, number
-        variance = (
-            log_rate_covariance[fast, fast]
-            + log_rate_covariance[slow, slow]
-            - 2 * log_rate_covariance[fast, slow]
-        )
-        apart = np.log(states[fast].k_r_per_s / states[slow].k_r_per_s)
-        if variance > 0 and apart < APART_SIGMAS * np.sqrt(variance):
+    log_rates = np.log([state.k_r_per_s for state in states])
+    for number, apart in enumerate(sigmas_apart(log_rates, log_rate_covariance), start=1):
+        if apart < APART_SIGMAS:
             warnings.append(
                 f"k{number} and k{number + 1} cannot be told apart: ask for one state fewer"
             )

@@ -1,6 +1,7 @@
 """How many states, and whether exponentials at all.
 
-One more state is believed only if both the Bayesian information criterion and an F-test want it.
+One more state is believed only if both the Bayesian information criterion and an F-test want it,
+and if its rate can be told from the others'.
 The F-test's denominator is the frames' own scatter along the signal, so that neither an
 underestimated σ nor channels that flicker together can argue a state into being.
 """
@@ -87,7 +88,9 @@ def choose_states(
         tried.append(
             Candidate(n_states, fit.joint.least_squares.reduced_chi2, bic(data, fit.joint), p_value)
         )
-        if p_value is not None and (p_value > F_TEST_LEVEL or tried[-1].bic > tried[-2].bic):
+        if p_value is not None and (
+            p_value > F_TEST_LEVEL or tried[-1].bic > tried[-2].bic or not fit.told_apart
+        ):
             break
         chosen = fit
         weights, offsets = fit.joint.weights, fit.joint.offsets

@@ -17,6 +17,8 @@ from labrig.fit.least_squares import FloatArray
 NEGLIGIBLE_AMPLITUDE = 1e-9
 #: Two rates closer than this in log k are one.
 MERGED_LOG_RATE = 1e-2
+#: Two rates less than so many σ apart cannot be told apart.
+APART_SIGMAS = 3.0
 #: A candidate is only compared by its χ²: evaluations and relative step that will do for that.
 CANDIDATE_ITERATIONS = 100
 CANDIDATE_TOLERANCE = 1e-8
@@ -72,6 +74,14 @@ class StatesFit:
         return covariance_under(data, shape, self.joint)
 
     @property
+    def told_apart(self) -> bool:
+        """Whether the free rates differ by more than their uncertainty."""
+        free = slice(0, 2 * self.n_free, 2)
+        covariance = self.joint.least_squares.covariance[free, free]
+        apart = sigmas_apart(self.joint.shape[free], covariance)
+        return bool((apart >= APART_SIGMAS).all())
+
+    @property
     def vanished(self) -> NDArray[np.bool_]:
         """(n,) states without amplitude, in the order of `log_rates`."""
         vanished: NDArray[np.bool_] = (
@@ -83,6 +93,16 @@ class StatesFit:
         """(n, C) without offset."""
         h, _ = exponentials(series, self.n_free, self.fixed)(self.joint.shape)
         return np.multiply.outer(h, self.joint.weights)
+
+
+def sigmas_apart(log_rates: FloatArray, covariance: FloatArray) -> FloatArray:
+    """(n − 1,) distance in σ of neighbours among log rates (n,) of covariance (n, n)."""
+    falling = np.argsort(-log_rates)
+    fast, slow = falling[:-1], falling[1:]
+    variance = covariance[fast, fast] + covariance[slow, slow] - 2 * covariance[fast, slow]
+    apart: FloatArray = log_rates[fast] - log_rates[slow]
+    known = variance > 0
+    return np.where(known, apart / np.sqrt(np.where(known, variance, 1.0)), np.inf)
 
 
 def exponentials(series: DecaySeries, n_free: int, fixed: FloatArray) -> Shape:
