@@ -68,6 +68,7 @@ def fit_series(
         flicker=flicker,
         fixed_rates=fixed_rates_per_s,
         repeats=usable.unit,
+        correlation=usable.correlation,
     )
     if all(state.amplitude < SEEN_SIGMA * state.amplitude_sigma for state in fit.states):
         raise FitError(

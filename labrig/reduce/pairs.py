@@ -7,6 +7,9 @@ of a patch too small to be told from its surroundings. It is the photon transfer
 Janesick (2007) and EMVA 1288, on strips as wide as the patch instead of single pixels: the scatter
 of a strip contains the correlation of all pixels in it. Dark frames of like exposure are pairs,
 too: they tell the noise of reading, which of a decay only the faintest frames do.
+
+What one channel's strips deviate by, another's may, too: rows that are read together, charge that
+strays into the neighbour of another colour. The same differences tell that correlation.
 """
 
 from collections.abc import Mapping, Sequence
@@ -33,6 +36,24 @@ SCALED_SIGMAS = 5.0
 LEAST_SHARE = 0.1
 #: Rounds in which the weights follow the noise found.
 REWEIGHTINGS = 4
+#: Keeps a correlation from being 1 to the last digit.
+LEAST_PRODUCT = 1e-6
+
+
+@dataclass(frozen=True, eq=False)
+class PatchNoise:
+    """Noise of the means of a patch.
+
+    Attributes
+    ----------
+    sigma
+        Shape (n, C), DN.
+    correlation
+        Shape (C, C): of the channels of one frame; what they share as flicker is not in it.
+    """
+
+    sigma: Floats
+    correlation: Floats
 
 
 @dataclass(frozen=True, eq=False)
@@ -117,16 +138,16 @@ def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Fl
     return np.asarray(means - means.mean(axis=1, keepdims=True))
 
 
-def paired_sigma(
+def paired_noise(
     frames: PatchFrames,
     t_s: Floats,
     unit: Sequence[str],
     usable: npt.NDArray[np.bool_],
     darks: Mapping[str, PatchFrames],
-) -> Floats:
-    """Standard uncertainty in DN of the means of a patch, shape (n, C), unit by unit.
+) -> PatchNoise:
+    """Noise of the means of a patch, σ unit by unit.
 
-    What each frame says by itself is kept where pairs are too few.
+    What each frame says by itself is kept where pairs are too few, channels then independent.
 
     Parameters
     ----------
@@ -138,6 +159,8 @@ def paired_sigma(
         Dark frames at the ISO of each unit, where there are any.
     """
     found = frames.sigma.copy()
+    channels = found.shape[1]
+    products = LEAST_PRODUCT * np.eye(channels)
     for one in dict.fromkeys(unit):
         rows = np.array([row for row, name in enumerate(unit) if name == one])
         paired = np.flatnonzero(usable[rows])
@@ -151,9 +174,36 @@ def paired_sigma(
             pairs += [(len(rows) + first, len(rows) + second) for first, second in dark_pairs]
             part = part.and_then(darks[one])
         first, second = np.array(pairs).T
-        for channel in range(found.shape[1]):
+        for channel in range(channels):
             found[rows, channel] = _photon_transfer(part, channel, first, second)[: len(rows)]
-    return found
+        light = second < len(rows)
+        products += _cross_products(frames.take(rows), found[rows], first[light], second[light])
+    length = np.sqrt(np.diag(products))
+    return PatchNoise(found, products / np.outer(length, length))
+
+
+def _cross_products(
+    frames: PatchFrames, sigma: Floats, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
+) -> Floats:
+    """Of the channels' differences between paired frames, in σ, shape (C, C)."""
+    scales, differences = _differences(frames, sigma, one, other)
+    expected = np.square(sigma[other]) + np.square(scales * sigma[one])
+    normal = differences / np.sqrt(expected)[..., np.newaxis]
+    products: Floats = np.einsum("pcs,pds->cd", normal, normal)
+    return products
+
+
+def _differences(
+    frames: PatchFrames, sigma: Floats, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
+) -> tuple[Floats, Floats]:
+    """By what `one` frame is scaled to the `other`, (p, C); strips of their difference, (p, C, s).
+
+    A frame that is nothing but noise is not scaled.
+    """
+    light = np.maximum(frames.light, 0)
+    bright = light[one] > SCALED_SIGMAS * sigma[one]
+    scales = np.where(bright, light[other] / np.where(bright, light[one], 1.0), 1.0)
+    return scales, frames.deviations[other] - scales[..., np.newaxis] * frames.deviations[one]
 
 
 def _photon_transfer(
@@ -164,12 +214,10 @@ def _photon_transfer(
     The variance is A + B·light + C·light², all ≥ 0: reading, photons, and what is proportional to
     the light but not common to the patch.
     """
-    deviations, sigma = frames.deviations[:, channel], frames.sigma[:, channel]
-    strips = deviations.shape[1]
+    scales, differences = _differences(frames, frames.sigma, one, other)
+    scale, difference, sigma = scales[:, channel], differences[:, channel], frames.sigma[:, channel]
+    strips = difference.shape[1]
     light = np.maximum(frames.light[:, channel], 0)
-    bright = light[one] > SCALED_SIGMAS * sigma[one]
-    scale = np.where(bright, light[other] / np.where(bright, light[one], 1.0), 1.0)
-    difference = deviations[other] - scale[:, np.newaxis] * deviations[one]
     scatter = np.square(difference).sum(axis=1) / (strips - 1) / strips
     terms = np.stack([np.ones_like(light), light, np.square(light)], axis=1)
     design = terms[other] + np.square(scale)[:, np.newaxis] * terms[one]

@@ -10,7 +10,7 @@ import numpy as np
 from labrig.errors import DataError
 from labrig.reduce.dark import HOT_FRAMES, SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
 from labrig.reduce.noise import Floats
-from labrig.reduce.pairs import PatchFrames, paired_sigma
+from labrig.reduce.pairs import PatchFrames, PatchNoise, paired_noise
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
 from labrig.reduce.series import Series, add_flag, is_usable
@@ -133,10 +133,10 @@ def _patch_series(
     flags = tuple(_flag(shot, name) for shot in shots)
     dark_of_unit: dict[str, PatchFrames] = {}
 
-    def noise(views: Sequence[View], light: Floats, sigma: Floats) -> Floats:
+    def noise(views: Sequence[View], light: Floats, sigma: Floats) -> PatchNoise:
         frames = PatchFrames(exposure_s, strips(views), light, sigma)
         usable = np.array([is_usable(flag) for flag in flags])
-        return paired_sigma(frames, t_s, unit, usable, dark_of_unit)
+        return paired_noise(frames, t_s, unit, usable, dark_of_unit)
 
     views = _views(name, shots)
     level, sigma = levels(views)
@@ -145,7 +145,7 @@ def _patch_series(
     backgrounds = [shot.background for shot in shots if shot.background is not None]
     if backgrounds:
         dark, dark_noise = levels(backgrounds)
-        dark_noise = noise(backgrounds, np.zeros_like(dark), dark_noise)
+        dark_noise = noise(backgrounds, np.zeros_like(dark), dark_noise).sigma
         dark_sigma = np.zeros_like(level)
     elif darks:
         for row, (shot, view) in enumerate(zip(shots, views, strict=True)):
@@ -160,9 +160,8 @@ def _patch_series(
             drift = TWO_DEGREES * np.abs(found.model.current(shot.frame.exposure_s))
             dark_sigma[row] = np.hypot(of_model, drift)
             dark_of_unit[shot.frame.unit] = found.frames
-    sigma = noise(views, level - (dark if backgrounds else unexposed), sigma)
-    if backgrounds:
-        sigma = np.hypot(sigma, dark_noise)
+    own = noise(views, level - (dark if backgrounds else unexposed), sigma)
+    sigma = np.hypot(own.sigma, dark_noise) if backgrounds else own.sigma
     per_second = exposure_s[:, np.newaxis]
     sigma = sigma / per_second
     return Series(
@@ -179,6 +178,7 @@ def _patch_series(
         unit=unit,
         flag=flags,
         region=name,
+        correlation=own.correlation,
     )
 
 

@@ -48,6 +48,9 @@ class Series:
         `excluded`, joined by `+`.
     region
         Name of the patch.
+    correlation
+        Shape (C, C), of the channels' noise in one frame; None if not known. Not a column of
+        series.csv.
     """
 
     t_s: Floats
@@ -62,6 +65,7 @@ class Series:
     unit: tuple[str, ...]
     flag: tuple[str, ...]
     region: str = ""
+    correlation: Floats | None = None
 
     def __post_init__(self) -> None:
         _check_shapes(self)
@@ -88,6 +92,7 @@ class Series:
             unit=tuple(self.unit[row] for row in rows),
             flag=tuple(self.flag[row] for row in rows),
             region=self.region if region is None else region,
+            correlation=self.correlation,
         )
 
     def by_unit(self) -> list["Series"]:

@@ -87,6 +87,53 @@ def test_noise_that_rows_share_is_counted(
     assert np.abs(np.array(ratios) - 1).max() < 0.35
 
 
+def expected_correlation(crosstalk: float) -> Floats:
+    """Of the photon noise of the patch's means, R, G and B."""
+    x, y, w, h = PATCH
+    inside = np.zeros((HEIGHT, WIDTH))
+    inside[y : y + h, x : x + w] = 1
+    shares = [
+        shared_with_neighbours(inside * (level == COLOURS) / pixels, crosstalk)
+        for level, pixels in zip(WEIGHTS, PIXELS, strict=True)
+    ]
+    covariance = np.array([[np.sum(a * b * COLOURS) for b in shares] for a in shares])
+    length = np.sqrt(np.diag(covariance))
+    return np.asarray(covariance / np.outer(length, length))
+
+
+@pytest.mark.parametrize("crosstalk", [0.0, 0.04])
+def test_charge_that_strays_correlates_the_channels(
+    tmp_path: Path, write_dng: WriteDng, crosstalk: float
+) -> None:
+    found = []
+    for seed in range(4):
+        frames = recorded(tmp_path, write_dng, seed, crosstalk=crosstalk, times_s=TIMES_S[:12])
+        correlation = reduce_series(frames, PATCH).correlation
+        assert correlation is not None
+        assert np.linalg.eigvalsh(correlation).min() > 0
+        found.append(correlation)
+    expected = expected_correlation(crosstalk)
+    assert expected[0, 1] > 7 * crosstalk - 1e-9
+    # 11 pairs of 15 degrees of freedom, 4 times: 0.04 each.
+    assert np.mean(found, axis=0) == pytest.approx(expected, abs=0.12)
+
+
+def test_rows_read_together_correlate_the_channels(tmp_path: Path, write_dng: WriteDng) -> None:
+    """All of the noise in the dark; R and B have no row in common, G has all of them."""
+    frames = recorded(tmp_path, write_dng, 1, row_dn=30.0, scene=0.01)
+    correlation = reduce_series(frames, PATCH).correlation
+    assert correlation is not None
+    red_green, red_blue, green_blue = correlation[[0, 0, 1], [1, 2, 2]]
+    assert red_green == pytest.approx(0.7, abs=0.1)
+    assert green_blue == pytest.approx(0.7, abs=0.1)
+    assert red_blue == pytest.approx(0.0, abs=0.15)
+
+
+def test_too_few_frames_tell_no_correlation(tmp_path: Path, write_dng: WriteDng) -> None:
+    frames = recorded(tmp_path, write_dng, 1, crosstalk=0.04, times_s=[0.5, 5.5])
+    assert reduce_series(frames, PATCH).correlation == pytest.approx(np.eye(3))
+
+
 def test_dark_frames_tell_the_noise_of_reading(tmp_path: Path, write_dng: WriteDng) -> None:
     """A decay that is faint at its end only says little of it by itself."""
     noise = {"row_dn": ROW_DN, "crosstalk": 0.03}

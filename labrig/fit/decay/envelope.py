@@ -109,7 +109,7 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
         if len(series.repeats) > 1:
             series = series.relevelled(_gains(data, curve, weights, offsets))
         signal = np.multiply.outer(curve, weights)
-        brightness = float(np.linalg.norm(signal * series.inverse_sigma))
+        brightness = float(np.linalg.norm(np.einsum("fcd,fd->fc", series.whiteners, signal)))
         if brightness == 0 or (series.sigma_given and brightness < LEAST_BRIGHTNESS):
             raise FitError(NO_DECAY)
         if flicker is None:
@@ -196,9 +196,9 @@ def _flicker(
     the curve followed the share `leverage` (n,). ρ² is the restricted maximum of the likelihood
     (REML; Patterson and Thompson 1971), by its fixed-point form.
     """
-    u = signal * series.inverse_sigma
+    u = np.einsum("fcd,fd->fc", series.whiteners, signal)
     brightness2 = np.einsum("fc,fc->f", u, u)
-    left = series.inverse_sigma * (series.values - signal - offsets)
+    left = np.einsum("fcd,fd->fc", series.whiteners, series.values - signal - offsets)
     along2 = np.einsum("fc,fc->f", u, left) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
     spare = np.maximum(1 - leverage, 0.0)
     if float(brightness2**2 @ spare) <= LEAST_SPARE * float(brightness2 @ brightness2):

@@ -40,11 +40,12 @@ def fit_decay(
     flicker: float | None = 0.0,
     fixed_rates: Sequence[float] = (),
     repeats: Sequence[str] | None = None,
+    correlation: ArrayLike | None = None,
 ) -> DecayFit:
     """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al. sec. 4.4).
 
     Frame f, channel c: y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + b_c, g the mean of e^(−k t) over the
-    exposure. Cov = diag(σ_fc²) + ρ² s_f s_fᵀ within a frame, s the signal without b_c.
+    exposure. Cov = (σ_fc r_cd σ_fd) + ρ² s_f s_fᵀ within a frame, s the signal without b_c.
 
     Parameters
     ----------
@@ -75,13 +76,17 @@ def fit_decay(
     repeats
         (n,) name of the charge that each frame follows: all decay alike, each from a level of its
         own. None: there was one.
+    correlation
+        (C, C) r of the channels' noise in one frame without flicker; None: they are independent.
 
     Raises
     ------
     FitError
         Data from which no decay can be had.
     """
-    series = decay_series(t_s, values, sigma, exposure_s, channels, offset_sigma, repeats)
+    series = decay_series(
+        t_s, values, sigma, exposure_s, channels, offset_sigma, repeats, correlation
+    )
     fixed = _log_rates(fixed_rates, series.span_s)
     numbers = _numbers_of_states(series, n_states, max_states, len(fixed))
     _check_flicker(series, flicker)

@@ -34,6 +34,8 @@ class DecaySeries:
         The first frame's time, in spans.
     values, inverse_sigma
         (n, C); an inverse σ of 0 marks a value that was not measured.
+    correlation
+        (C, C) of the channels' noise in one frame, flicker apart.
     offset_sigma
         (C,) prior σ of the channels' offsets: 0 held at zero, inf free.
     span_s, peak
@@ -53,6 +55,7 @@ class DecaySeries:
     start: float
     values: FloatArray
     inverse_sigma: FloatArray
+    correlation: FloatArray
     offset_sigma: FloatArray
     span_s: float
     peak: float
@@ -77,6 +80,19 @@ class DecaySeries:
     def frame_levels(self) -> FloatArray:
         """(n, 1) what the values of each frame were divided by."""
         return self.levels[self.repeat][:, None]
+
+    @property
+    def whiteners(self) -> FloatArray:
+        """(n, C, C) W with Wᵀ W the inverse covariance of each frame's noise without flicker."""
+        measured = self.inverse_sigma > 0
+        roots = np.zeros((self.n_frames, *self.correlation.shape))
+        for seen in np.unique(measured, axis=0):
+            part = np.ix_(seen, seen)
+            roots[np.ix_((measured == seen).all(axis=1), seen, seen)] = np.linalg.inv(
+                np.linalg.cholesky(self.correlation[part])
+            )
+        whiteners: FloatArray = roots * self.inverse_sigma[:, None, :]
+        return whiteners
 
     def relevelled(self, gains: FloatArray) -> "DecaySeries":
         """With the values after each charge divided by their gain (r,) > 0."""
@@ -112,6 +128,7 @@ def decay_series(
     channels: Sequence[str],
     offset_sigma: ArrayLike,
     repeats: Sequence[str] | None = None,
+    correlation: ArrayLike | None = None,
 ) -> DecaySeries:
     """Check, sort and scale; arguments as `labrig.fit.decay.fit_decay` takes them.
 
@@ -170,6 +187,7 @@ def decay_series(
         start=float(t.min()) / span,
         values=y[order] / peak,
         inverse_sigma=inverse_sigma[order] * (peak if sigma is not None else 1.0),
+        correlation=_correlation(correlation, len(names)),
         # A channel that was not measured has no offset to fit.
         offset_sigma=np.where(measured.any(axis=0), prior_sigma / peak, 0.0),
         span_s=span,
@@ -206,6 +224,23 @@ def _inverse_sigma(sigma: ArrayLike | None, y: FloatArray) -> FloatArray:
             "or inf for a value to leave out"
         )
     return 1 / s
+
+
+def _correlation(correlation: ArrayLike | None, n_channels: int) -> FloatArray:
+    if correlation is None:
+        return np.eye(n_channels)
+    matrix = np.asarray(correlation, dtype=np.float64)
+    proper = matrix.shape == (n_channels, n_channels) and bool(
+        np.allclose(matrix, matrix.T)
+        and np.allclose(np.diag(matrix), 1)
+        and np.linalg.eigvalsh(matrix).min() > 0
+    )
+    if not proper:
+        raise FitError(
+            f"expected a correlation matrix of {n_channels} channels, symmetric, positive and 1 on "
+            f"its diagonal, got {matrix.tolist()}; leave it out for independent channels"
+        )
+    return matrix
 
 
 def _prior_sigma(offset_sigma: ArrayLike, n_channels: int) -> FloatArray:

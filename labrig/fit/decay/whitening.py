@@ -1,9 +1,9 @@
-"""Noise of a frame: independent per value, plus flicker that all channels of the frame share.
+"""Noise of a frame: of each value, as they correlate, plus flicker that its channels share.
 
 Lamp, shutter and aperture make a whole frame brighter or darker by a relative ρ, so that the values
-of one frame scatter together: Cov = diag(σ²) + ρ² s sᵀ with s the frame's signal. Residuals and
-models are multiplied by Cov^(−1/2), frame by frame, after which they are independent with unit
-variance.
+of one frame scatter together: Cov = N + ρ² s sᵀ with s the frame's signal and N = (σ_c r_cd σ_d)
+what reading and photons do, r the channels' correlation. Residuals and models are multiplied by a
+W with Wᵀ W = Cov⁻¹, frame by frame, after which they are independent with unit variance.
 """
 
 from dataclasses import dataclass
@@ -16,7 +16,7 @@ from labrig.fit.least_squares import EPSILON, FloatArray
 
 @dataclass(frozen=True)
 class WhitenedSeries:
-    """A series multiplied by its noise's Cov^(−1/2).
+    """A series multiplied by its noise's W.
 
     Attributes
     ----------
@@ -102,15 +102,15 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
     flicker
         Relative ρ ≥ 0.
     """
-    n_channels = len(series.channels)
     measured = series.inverse_sigma > 0
-    matrices = series.inverse_sigma[:, :, None] * np.eye(n_channels)
+    matrices = series.whiteners
     if flicker > 0:
-        u = flicker * signal * series.inverse_sigma
+        u = flicker * np.einsum("fcd,fd->fc", matrices, signal)
         root = np.sqrt(1 + np.einsum("fc,fc->f", u, u))
         # (1 + u uᵀ)^(−1/2) = 1 − u uᵀ / (root (1 + root)), without dividing by |u|.
         shrink = u / (root * (1 + root))[:, None]
-        matrices = matrices - shrink[:, :, None] * (u * series.inverse_sigma)[:, None, :]
+        along = np.einsum("fc,fcd->fd", u, matrices)
+        matrices = matrices - shrink[:, :, None] * along[:, None, :]
     alone = 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2
     values = np.einsum("fcd,fd->fc", matrices, series.values)
     fitted = series.fitted_offsets
