@@ -130,10 +130,14 @@ def _orientation(content: bytes) -> Finding:
     logging.getLogger("exifread").setLevel(logging.CRITICAL)
     try:
         tags: dict[str, Any] = exifread.process_file(io.BytesIO(content), details=False)
-        values = tags["Image Orientation"].values
-    except Exception:  # a frame without it, or damaged EXIF, which fails in any way
-        return Finding("fine", "frames are not marked as turned")
-    if list(values) == [UPRIGHT]:
+    except Exception:  # damaged EXIF fails in any way
+        return Finding(
+            "warn",
+            "the frame's EXIF cannot be read, and so not whether it is turned",
+            "see that auto rotate is off",
+        )
+    tag = tags.get("Image Orientation")
+    if tag is None or list(tag.values) == [UPRIGHT]:
         return Finding("fine", "frames are not marked as turned")
     return Finding(
         "refuse",
