@@ -4,6 +4,7 @@ import queue
 import sys
 import threading
 from collections.abc import Callable
+from contextlib import suppress
 from typing import TextIO
 
 from labrig.acquire import ByHand
@@ -21,6 +22,7 @@ class Terminal:
 
     def __init__(self) -> None:
         self._lines: queue.Queue[str] = queue.Queue()
+        self._ended = threading.Event()
         self._reading = False
 
     def ask(
@@ -42,8 +44,7 @@ class Terminal:
         _say(f"  Enter when it is done, or a remark{offer}; Ctrl-C stops, labrig resume goes on")
         while True:
             line = self._next_line(meanwhile)
-            if not line:
-                self._reading = False
+            if line is None:
                 raise UsageError(
                     f"'{step.what}' has to be done by hand, and nobody can answer here (the input "
                     "has ended); run labrig in a terminal, or a simulated rig with --yes"
@@ -61,21 +62,21 @@ class Terminal:
             threading.Thread(target=self._keep_reading, args=(sys.stdin,), daemon=True).start()
 
     def _keep_reading(self, source: TextIO) -> None:
-        line = "\n"
-        while line:
-            try:
-                line = source.readline()
-            except (OSError, ValueError):  # it was closed, which is an end, too
-                line = ""
-            self._lines.put(line)
+        with suppress(OSError, ValueError):  # it was closed, which is an end, too
+            while line := source.readline():
+                self._lines.put(line)
+        self._ended.set()
 
-    def _next_line(self, meanwhile: Callable[[], None]) -> str:
+    def _next_line(self, meanwhile: Callable[[], None]) -> str | None:
+        """What was typed; None if nothing can be any more."""
         while True:
             meanwhile()
+            ended = self._ended.is_set()  # asked first: what came before the end counts
             try:
                 return self._lines.get(timeout=LOOK_UP_S)
             except queue.Empty:
-                continue
+                if ended:
+                    return None
 
 
 def _say(text: str) -> None:

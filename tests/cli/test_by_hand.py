@@ -73,8 +73,10 @@ def void(_: object) -> None:
 
 def test_an_input_that_has_ended_is_said(typed: TextIO) -> None:
     typed.close()
-    with pytest.raises(UsageError, match="nobody can answer here"):
-        Terminal().ask(STEP, None, 60.0, nothing)
+    terminal = Terminal()
+    for _ in range(2):  # the end may have been read before the question
+        with pytest.raises(UsageError, match="nobody can answer here"):
+            terminal.ask(STEP, None, 60.0, nothing)
 
 
 def test_ctrl_c_is_answered_while_nobody_types(typed: TextIO) -> None:
