@@ -69,6 +69,7 @@ def fit_series(
         fixed_rates=fixed_rates_per_s,
         repeats=usable.unit,
         correlation=usable.correlation,
+        offset_correlation=usable.dark_correlation,
     )
     if all(state.amplitude < SEEN_SIGMA * state.amplitude_sigma for state in fit.states):
         raise FitError(

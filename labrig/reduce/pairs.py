@@ -182,6 +182,19 @@ def paired_noise(
     return PatchNoise(found, products / np.outer(length, length))
 
 
+def paired_dark_sigma(darks: PatchFrames) -> Floats:
+    """Standard uncertainty in DN of the means of a patch in dark frames, shape (n, C).
+
+    From pairs of like exposure; what each frame says by itself where these are too few.
+    """
+    pairs = darks.pairs_of_like_exposure()
+    if len(pairs) * (darks.deviations.shape[2] - 1) < FEWEST_DOF:
+        return darks.sigma
+    first, second = np.array(pairs).T
+    channels = range(darks.sigma.shape[1])
+    return np.stack([_photon_transfer(darks, c, first, second) for c in channels], axis=1)
+
+
 def _cross_products(
     frames: PatchFrames, sigma: Floats, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
 ) -> Floats:

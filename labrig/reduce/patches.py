@@ -2,7 +2,7 @@
 
 from collections import defaultdict
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -10,7 +10,7 @@ import numpy as np
 from labrig.errors import DataError
 from labrig.reduce.dark import HOT_FRAMES, SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
 from labrig.reduce.noise import Floats
-from labrig.reduce.pairs import PatchFrames, PatchNoise, paired_noise
+from labrig.reduce.pairs import PatchFrames, PatchNoise, paired_dark_sigma, paired_noise
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
 from labrig.reduce.series import Series, add_flag, is_usable
@@ -23,6 +23,8 @@ CLIPPED_SHARE = 0.001
 #: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before
 #: the decay, and 20 min of warming up leave a camera a degree or two to go.
 TWO_DEGREES = 2 ** (2 / 6) - 1
+#: Correlation that errors of different channels have at most.
+MOST_COMMON = 0.99
 #: Dark frames held in memory at once, to look for hot pixels.
 _DARKS_FOR_HOT = 5
 
@@ -118,10 +120,10 @@ def _measured_darks(
 def _dark(exposures_s: Sequence[float], views: Sequence[View]) -> _Dark:
     exposure_s = np.array(exposures_s)
     level, sigma = levels(views)
-    model = fit_dark(exposure_s, level, sigma)
-    return _Dark(
-        views[0].kind, model, PatchFrames(exposure_s, strips(views), level - model.base, sigma)
-    )
+    light = level - fit_dark(exposure_s, level, sigma).base
+    frames = PatchFrames(exposure_s, strips(views), light, sigma)
+    frames = replace(frames, sigma=paired_dark_sigma(frames))
+    return _Dark(views[0].kind, fit_dark(exposure_s, level, frames.sigma), frames)
 
 
 def _patch_series(
@@ -141,6 +143,7 @@ def _patch_series(
     views = _views(name, shots)
     level, sigma = levels(views)
     dark, dark_sigma = np.zeros_like(level), np.full_like(level, np.nan)
+    drift = np.zeros_like(level)
     unexposed = np.zeros_like(level)
     backgrounds = [shot.background for shot in shots if shot.background is not None]
     if backgrounds:
@@ -157,20 +160,23 @@ def _patch_series(
                 )
             dark[row], of_model = found.model.dark_level(shot.frame.exposure_s)
             unexposed[row] = found.model.base
-            drift = TWO_DEGREES * np.abs(found.model.current(shot.frame.exposure_s))
-            dark_sigma[row] = np.hypot(of_model, drift)
+            drift[row] = TWO_DEGREES * np.abs(found.model.current(shot.frame.exposure_s))
+            dark_sigma[row] = np.hypot(of_model, drift[row])
             dark_of_unit[shot.frame.unit] = found.frames
     own = noise(views, level - (dark if backgrounds else unexposed), sigma)
     sigma = np.hypot(own.sigma, dark_noise) if backgrounds else own.sigma
     per_second = exposure_s[:, np.newaxis]
     sigma = sigma / per_second
+    # As the offset acts on a fit, most where weights are highest.
+    weights = 1 / np.square(sigma)
+    dark_sigma = np.average(dark_sigma / per_second, axis=0, weights=weights)
+    drift_sigma = np.average(drift / per_second, axis=0, weights=weights)
     return Series(
         t_s=t_s,
         exposure_s=exposure_s,
         values=(level - dark) / per_second,
         sigma=sigma,
-        # One number for all frames: as the offset acts on a fit, most where weights are highest.
-        dark_sigma=np.average(dark_sigma / per_second, axis=0, weights=1 / np.square(sigma)),
+        dark_sigma=dark_sigma,
         channels=tuple(views[0].measured.channels),
         iso=np.array([shot.iso for shot in shots]),
         f_number=np.array([shot.f_number for shot in shots]),
@@ -179,7 +185,19 @@ def _patch_series(
         flag=flags,
         region=name,
         correlation=own.correlation,
+        dark_correlation=_dark_correlation(dark_sigma, drift_sigma, own.correlation),
     )
+
+
+def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | None:
+    """Of a dark level's errors (C,): warming is common to all channels, noise as it correlates."""
+    if not (sigma > 0).all():
+        return None
+    of_model = np.sqrt(np.maximum(np.square(sigma) - np.square(drift), 0.0)) / sigma
+    common = drift / sigma
+    correlation = noise * np.outer(of_model, of_model) + np.outer(common, common)
+    # A dark level known without noise would make the errors all one.
+    return np.where(np.eye(len(sigma), dtype=np.bool_), 1.0, MOST_COMMON * correlation)
 
 
 def _views(name: str, shots: Sequence[Shot]) -> list[View]:

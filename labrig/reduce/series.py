@@ -51,6 +51,8 @@ class Series:
     correlation
         Shape (C, C), of the channels' noise in one frame; None if not known. Not a column of
         series.csv.
+    dark_correlation
+        Shape (C, C), of what `dark_sigma` is the σ of; None if not known. No column, either.
     """
 
     t_s: Floats
@@ -66,6 +68,7 @@ class Series:
     flag: tuple[str, ...]
     region: str = ""
     correlation: Floats | None = None
+    dark_correlation: Floats | None = None
 
     def __post_init__(self) -> None:
         _check_shapes(self)
@@ -93,6 +96,7 @@ class Series:
             flag=tuple(self.flag[row] for row in rows),
             region=self.region if region is None else region,
             correlation=self.correlation,
+            dark_correlation=self.dark_correlation,
         )
 
     def by_unit(self) -> list["Series"]:

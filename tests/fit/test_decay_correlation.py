@@ -87,3 +87,31 @@ def test_the_order_of_channels_does_not_matter(r: float, seed: int) -> None:
 def test_what_is_no_correlation(matrix: np.ndarray) -> None:
     with pytest.raises(FitError, match="expected a correlation matrix of 3 channels"):
         fitted(1, matrix)
+
+
+def test_dark_levels_wrong_in_all_channels_alike() -> None:
+    """A sensor that has warmed since its dark frames."""
+    dark_sigma, common = 0.004, np.where(np.eye(3), 1.0, 0.99)
+
+    def pulls(offset_correlation: np.ndarray | None) -> np.ndarray:
+        found = []
+        for seed in range(60):
+            seen = truths.observe(truths.exponentials((RATE, 1.0)), seed, snr=150, flicker=0.004)
+            wrong_by = dark_sigma * np.random.default_rng(seed + 900).normal()
+            state = fit_decay(
+                seen.t_s,
+                seen.values + wrong_by,
+                seen.sigma,
+                exposure_s=seen.exposure_s,
+                channels="RGB",
+                n_states=1,
+                flicker=0.004,
+                offset_sigma=dark_sigma,
+                offset_correlation=offset_correlation,
+            ).states[0]
+            found.append((state.k_r_per_s - RATE) / state.k_r_sigma_per_s)
+        return np.array(found)
+
+    known, ignored = pulls(common), pulls(None)
+    assert 0.8 < known.std() < 1.2
+    assert ignored.std() > 1.1 * known.std()

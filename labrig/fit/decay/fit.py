@@ -41,6 +41,7 @@ def fit_decay(
     fixed_rates: Sequence[float] = (),
     repeats: Sequence[str] | None = None,
     correlation: ArrayLike | None = None,
+    offset_correlation: ArrayLike | None = None,
 ) -> DecayFit:
     """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al. sec. 4.4).
 
@@ -78,6 +79,8 @@ def fit_decay(
         own. None: there was one.
     correlation
         (C, C) r of the channels' noise in one frame without flicker; None: they are independent.
+    offset_correlation
+        (C, C) of the offsets' priors, likewise: a sensor that warms does so in all channels.
 
     Raises
     ------
@@ -85,7 +88,15 @@ def fit_decay(
         Data from which no decay can be had.
     """
     series = decay_series(
-        t_s, values, sigma, exposure_s, channels, offset_sigma, repeats, correlation
+        t_s,
+        values,
+        sigma,
+        exposure_s,
+        channels,
+        offset_sigma,
+        repeats,
+        correlation,
+        offset_correlation,
     )
     fixed = _log_rates(fixed_rates, series.span_s)
     numbers = _numbers_of_states(series, n_states, max_states, len(fixed))

@@ -38,6 +38,8 @@ class DecaySeries:
         (C, C) of the channels' noise in one frame, flicker apart.
     offset_sigma
         (C,) prior σ of the channels' offsets: 0 held at zero, inf free.
+    offset_correlation
+        (C, C) of the same.
     span_s, peak
         What times and values were divided by.
     order
@@ -57,6 +59,7 @@ class DecaySeries:
     inverse_sigma: FloatArray
     correlation: FloatArray
     offset_sigma: FloatArray
+    offset_correlation: FloatArray
     span_s: float
     peak: float
     order: NDArray[np.intp]
@@ -94,6 +97,17 @@ class DecaySeries:
         whiteners: FloatArray = roots * self.inverse_sigma[:, None, :]
         return whiteners
 
+    @property
+    def offset_prior(self) -> FloatArray:
+        """(p, m) rows that, times the offsets fitted, have unit variance by their prior."""
+        known = np.flatnonzero(np.isfinite(self.offset_sigma) & (self.offset_sigma > 0))
+        sigma = self.offset_sigma[known]
+        covariance = self.offset_correlation[np.ix_(known, known)] * np.outer(sigma, sigma)
+        rows = np.zeros((len(known), len(self.fitted_offsets)))
+        places = np.searchsorted(self.fitted_offsets, known)
+        rows[:, places] = np.linalg.inv(np.linalg.cholesky(covariance))
+        return rows
+
     def relevelled(self, gains: FloatArray) -> "DecaySeries":
         """With the values after each charge divided by their gain (r,) > 0."""
         of_frame = gains[self.repeat][:, None]
@@ -129,6 +143,7 @@ def decay_series(
     offset_sigma: ArrayLike,
     repeats: Sequence[str] | None = None,
     correlation: ArrayLike | None = None,
+    offset_correlation: ArrayLike | None = None,
 ) -> DecaySeries:
     """Check, sort and scale; arguments as `labrig.fit.decay.fit_decay` takes them.
 
@@ -190,6 +205,7 @@ def decay_series(
         correlation=_correlation(correlation, len(names)),
         # A channel that was not measured has no offset to fit.
         offset_sigma=np.where(measured.any(axis=0), prior_sigma / peak, 0.0),
+        offset_correlation=_correlation(offset_correlation, len(names)),
         span_s=span,
         peak=peak,
         order=order,

@@ -114,8 +114,7 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
     alone = 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2
     values = np.einsum("fcd,fd->fc", matrices, series.values)
     fitted = series.fitted_offsets
-    prior = np.diag(1 / series.offset_sigma[fitted])
-    prior = prior[prior.any(axis=1)]
+    prior = series.offset_prior
     return WhitenedSeries(
         series=series,
         matrices=matrices,
