@@ -3,6 +3,7 @@
 import numpy as np
 
 from labrig.fit.least_squares import FloatArray
+from labrig.material.rates import phi1
 
 #: Below this k T the difference of two nearly equal numbers gives way to its Taylor series.
 SERIES_BELOW = 0.03
@@ -28,7 +29,7 @@ def exponential_means(
     if not exposure_s.any():
         return decayed
     x = np.multiply.outer(exposure_s, rates_per_s)
-    return decayed * _mean_over(x)
+    return decayed * phi1(x)
 
 
 def exponential_means_and_slopes(
@@ -40,18 +41,12 @@ def exponential_means_and_slopes(
     if not exposure_s.any():
         return decayed, -phase * decayed
     x = np.multiply.outer(exposure_s, rates_per_s)
-    mean = _mean_over(x)
+    mean = phi1(x)
     return decayed * mean, decayed * (_mean_slope(x, mean) - phase * mean)
 
 
-def _mean_over(x: FloatArray) -> FloatArray:
-    """φ(x) = (1 − e^(−x))/x, with φ(0) = 1."""
-    safe = np.where(x > 0, x, 1.0)
-    return np.where(x > 0, -np.expm1(-safe) / safe, 1.0)
-
-
 def _mean_slope(x: FloatArray, mean: FloatArray) -> FloatArray:
-    """Give x φ′(x) = e^(−x) − φ(x)."""
+    """Give x φ₁′(x) = e^(−x) − φ₁(x)."""
     # Σ_j j (−x)^j / (j + 1)!, j = 1 … 6.
     series = -x * (1 / 2 - x * (1 / 3 - x * (1 / 8 - x * (1 / 30 - x * (1 / 144 - x / 840)))))
     return np.where(x < SERIES_BELOW, series, np.exp(-x) - mean)
