@@ -17,6 +17,7 @@ from labrig.acquire.actions import (
 )
 from labrig.acquire.by_hand import ByHand, TakenBack
 from labrig.acquire.findings import Finding
+from labrig.acquire.part import PartUnit
 from labrig.acquire.planner import Plan, plan
 from labrig.acquire.protocol import ProtocolModel, Sample, Unit
 from labrig.acquire.rig import Rig
@@ -63,6 +64,7 @@ __all__ = [
     "LedBank",
     "LiveView",
     "Missed",
+    "PartUnit",
     "Plan",
     "ProtocolModel",
     "Rig",

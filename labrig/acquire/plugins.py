@@ -1,6 +1,7 @@
 """Drivers and protocols by name: the shipped ones and those that other packages add.
 
-A package adds its own by an entry point in `labrig.drivers` or `labrig.protocols`.
+A package adds its own by an entry point in `labrig.drivers` or `labrig.protocols`; how a protocol's
+runs are processed is registered under the same name in `labrig.processing`.
 """
 
 from importlib.metadata import EntryPoint, entry_points
@@ -14,6 +15,8 @@ from labrig.yaml_file import did_you_mean, read_yaml, validate
 
 DRIVERS = "labrig.drivers"
 PROTOCOLS = "labrig.protocols"
+PROCESSING = "labrig.processing"
+_KINDS = {DRIVERS: "driver", PROTOCOLS: "protocol", PROCESSING: "processing of protocol"}
 
 
 def names(group: str) -> list[str]:
@@ -22,7 +25,7 @@ def names(group: str) -> list[str]:
 
 
 def load(group: str, name: str, source: str) -> Any:
-    """The class registered as `name`; `source` says in messages who asked for it.
+    """The class or function registered as `name`; `source` says in messages who asked for it.
 
     Raises
     ------
@@ -30,7 +33,7 @@ def load(group: str, name: str, source: str) -> Any:
         There is none, or it cannot be imported.
     """
     found = {entry.name: entry for entry in entry_points(group=group)}
-    kind = "driver" if group == DRIVERS else "protocol"
+    kind = _KINDS[group]
     if name not in found:
         raise UsageError(f"{source}: unknown {kind} '{name}'; {did_you_mean(name, list(found))}")
     try:
@@ -42,7 +45,8 @@ def load(group: str, name: str, source: str) -> Any:
 
 
 def _import(entry: EntryPoint) -> Any:
-    if entry.dist is not None and entry.dist.name == "labrig":
+    own = entry.dist is not None and entry.dist.name == "labrig"
+    if own and entry.module.partition(".")[0] in shipped.PACKAGES:
         return getattr(shipped.load(entry.module), entry.attr)
     return entry.load()
 

@@ -26,12 +26,29 @@ class DeviceEntry(BaseModel):
 
 
 class Optics(BaseModel):
-    """Which measured curves describe this bench; names of shipped files or paths."""
+    """What is known of this bench.
+
+    Attributes
+    ----------
+    camera, lamp, grey_card
+        Measured curves: names of shipped files or paths.
+    filters
+        Folder of the colour filters' transmittances, a file each.
+    camera_file, lvf, irradiance, fade, blank
+        What the protocols of that purpose found: a file, or the folder of their run.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     camera: str | None = None
     lamp: str | None = None
+    grey_card: str | None = None
+    filters: str | None = None
+    camera_file: str | None = None
+    lvf: str | None = None
+    irradiance: str | None = None
+    fade: str | None = None
+    blank: str | None = None
 
 
 class RigFile(BaseModel):
@@ -74,6 +91,11 @@ def _anchored(value: Any, folder: Path) -> Any:
         return {key: _anchored(inner, folder) for key, inner in value.items()}
     if isinstance(value, list):
         return [_anchored(inner, folder) for inner in value]
-    if isinstance(value, str) and Path(value).suffix and (folder / value).is_file():
+    if isinstance(value, str) and _looks_like_a_path(value) and (folder / value).exists():
         return str(folder / value)
     return value
+
+
+def _looks_like_a_path(value: str) -> bool:
+    """A bare word is a shipped name, whatever lies beside the file."""
+    return bool(Path(value).suffix) or len(Path(value).parts) > 1

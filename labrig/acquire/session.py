@@ -5,6 +5,7 @@ The same code runs on a bench and in the planner: only devices, clock and record
 
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from dataclasses import replace
 from functools import cached_property
 from typing import Protocol, TypeVar
 
@@ -16,7 +17,7 @@ from labrig.acquire.values import ExposureSettings, Frame
 from labrig.clock import Clock
 from labrig.errors import DeviceError, LabrigError
 from labrig.quantity import duration_text
-from labrig.record import PERSON, FrameRecord
+from labrig.record import PERSON, FrameRecord, unit_within
 
 T = TypeVar("T")
 
@@ -165,6 +166,10 @@ class Session:
         """Frames taken for that purpose, by completed units and by this one so far."""
         return self._recorder.frames(purpose)
 
+    def within(self, part: str) -> "Session":
+        """The session of a unit of one part of a chain: it sees frames of its part only."""
+        return Session(self.rig, _PartRecorder(self._recorder, part), self._observer)
+
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         """A choice that rests on frames already taken; the plan assumes `worst`.
 
@@ -246,6 +251,25 @@ class Session:
         with _device_errors(action.device):
             action.begin(self.rig)
         self._recorder.acted(action.device, str(action), start_s, self.clock.now(), late_s)
+
+
+class _PartRecorder:
+    """Records as the recorder it is given; shows frames of one part of a chain as its own."""
+
+    def __init__(self, whole: Recorder, part: str) -> None:
+        self.acted = whole.acted
+        self.photographed = whole.photographed
+        self.last_by_hand = whole.last_by_hand
+        self.choose = whole.choose
+        self._whole = whole
+        self._part = part
+
+    def frames(self, purpose: str) -> Sequence[FrameRecord]:
+        return [
+            replace(frame, unit=unit)
+            for frame in self._whole.frames(purpose)
+            if (unit := unit_within(self._part, frame.unit)) is not None
+        ]
 
 
 @contextmanager

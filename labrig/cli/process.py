@@ -1,5 +1,6 @@
 """`labrig process`: from a recorded run to its result."""
 
+from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -54,12 +55,13 @@ def process_and_tell(run: Path, choices: "Choices | None" = None, *, json: bool)
     result = process_run(run, choices)
     if json:
         fits = ", ".join(f'"{name}": {fit.to_json()}' for name, fit in result.fits.items())
-        typer.echo(f"{{{fits}}}")
+        told = {"lines": result.lines, "warnings": result.run_warnings}
+        typer.echo(f"{{{fits}}}" if result.fits else dumps(told, ensure_ascii=False))
         return
     for warning in result.run_warnings:
         typer.echo(f"warning: {warning}", err=True)
-    for name, fit in result.fits.items():
-        typer.echo(f"{name}\n{fit}")
+    for line in result.lines:
+        typer.echo(line)
     for number, line in enumerate(result.changes):
         typer.echo(f"  {line}" if number else line)
     typer.echo(f"report: {result.report}")

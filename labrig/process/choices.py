@@ -6,7 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol, Self, cast
 
-from labrig.acquire import Sample, plugins
+from labrig.acquire import ProtocolModel, Sample, plugins
 from labrig.errors import UsageError
 from labrig.record import FrameRecord
 from labrig.region import Region, parse_region
@@ -23,18 +23,29 @@ class DecayProtocol(Protocol):
     states: Literal["auto", 1, 2, 3]
 
 
-def read_decay_protocol(run: Path) -> DecayProtocol:
+def read_run_protocol(run: Path) -> ProtocolModel:
     """The protocol in a run folder.
+
+    Raises
+    ------
+    UsageError
+        Not a run folder.
+    """
+    path = run / "protocol.yaml"
+    if not path.is_file():
+        raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
+    return plugins.read_protocol(path)
+
+
+def read_decay_protocol(run: Path) -> DecayProtocol:
+    """The protocol in a run folder of a decay.
 
     Raises
     ------
     UsageError
         Not a run folder, or not one of a decay.
     """
-    path = run / "protocol.yaml"
-    if not path.is_file():
-        raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
-    protocol = plugins.read_protocol(path)
+    protocol = read_run_protocol(run)
     if protocol.protocol != "decay":
         raise UsageError(f"{run}: expected a run of 'decay', got one of '{protocol.protocol}'")
     return cast(DecayProtocol, protocol)

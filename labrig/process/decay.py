@@ -1,7 +1,6 @@
 """A decay run, from its folder to its result: the way of a photon's number, in one function."""
 
 from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 from labrig.acquire import read_rig_file
@@ -11,6 +10,7 @@ from labrig.fit import DecayFit
 from labrig.process.choices import Choices, DecayProtocol, read_decay_protocol
 from labrig.process.page import camera_response, run_name, run_report
 from labrig.process.provenance import provenance
+from labrig.process.result import Result
 from labrig.process.result_folder import (
     new_result,
     put_in_place,
@@ -24,37 +24,16 @@ from labrig.reduce import Series, reduce_patches
 from labrig.report import write_report
 
 
-@dataclass(frozen=True)
-class Result:
-    """What came out of a run; series and fits by the name of their patch.
-
-    Each fit has warnings of its own; `run_warnings` are about everything before the fits.
-    `changes` says in some lines what is other than in the result before, if there was one.
-    """
-
-    report: Path
-    series: Mapping[str, Series]
-    fits: Mapping[str, DecayFit]
-    run_warnings: tuple[str, ...]
-    changes: tuple[str, ...]
-
-
-def process_run(folder: Path, choices: Choices | None = None) -> Result:
-    """Reduce and fit the run in `folder`, write `result/` and the report in it.
-
-    A `result` that comes out any different from the one before takes its place; that one is kept
-    as `result-1`, `result-2`, …
+def process_decay(folder: Path, choices: Choices) -> Result:
+    """As `process_run`, of a decay.
 
     Raises
     ------
-    UsageError
-        Not a run folder, or a choice that does not fit it.
     DataError
         No decay is complete, or a frame is missing or was changed after the run.
     FitError
         No patch could be fitted; series and report are written all the same.
     """
-    folder, choices = Path(folder), choices or Choices()
     protocol, rig = read_decay_protocol(folder), read_rig_file(folder / "rig.yaml")
     run = read_run(folder)
     recorded = [frame for attempt in run.completed().values() for frame in attempt.frames]
@@ -103,7 +82,8 @@ def process_run(folder: Path, choices: Choices | None = None) -> Result:
     fitted = {name: fit for name, fit in fits.items() if isinstance(fit, DecayFit)}
     if not fitted:
         raise FitError(f"{'; '.join(map(str, fits.values()))}; the run is kept, see {report}")
-    return Result(report, series, fitted, run_warnings, changes)
+    lines = tuple(f"{name}\n{fit}" for name, fit in fitted.items())
+    return Result(report, lines, run_warnings, changes, series, fitted)
 
 
 def _fit_all(

@@ -13,15 +13,13 @@ from labrig.region import Region
 _LIBRARIES = ("numpy", "scipy", "nlopt", "rawpy", "matplotlib", "colour-science", "h5py")
 
 
-class ResultProvenance(BaseModel):
+class StageProvenance(BaseModel):
     """`provenance.yaml` of a result: the same in all of these gives the same result.
 
     Attributes
     ----------
     labrig, libraries
         Versions.
-    patches, background, states, fixed_rates_per_s, camera
-        As used, whoever asked for them; the camera by the name of its curves.
     frames
         How many went in, by purpose.
     excluded
@@ -32,13 +30,18 @@ class ResultProvenance(BaseModel):
 
     labrig: str
     libraries: dict[str, str]
+    frames: dict[str, int]
+    excluded: tuple[str, ...]
+
+
+class ResultProvenance(StageProvenance):
+    """Of a decay: what was used besides, whoever asked for it; the camera by its curves' name."""
+
     patches: dict[str, Region]
     background: Region | None
     states: str | int
     fixed_rates_per_s: tuple[float, ...]
     camera: str | None
-    frames: dict[str, int]
-    excluded: tuple[str, ...]
 
 
 def provenance(

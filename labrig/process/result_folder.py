@@ -7,7 +7,7 @@ from pathlib import Path
 from labrig.fit import DecayFit
 from labrig.material import Material, Provenance, State, write_material
 from labrig.process.changes import changes
-from labrig.process.provenance import ResultProvenance
+from labrig.process.provenance import StageProvenance
 from labrig.reduce import Series, write_series
 from labrig.yaml_file import write_yaml
 
@@ -48,7 +48,7 @@ def _earlier(run: Path) -> list[Path]:
     return [path for path in run.glob(f"{_EARLIER}*") if path.name[len(_EARLIER) :].isdecimal()]
 
 
-def write_provenance(made: Path, provenance: ResultProvenance) -> None:
+def write_provenance(made: Path, provenance: StageProvenance) -> None:
     """Write provenance.yaml into `made`."""
     write_yaml(made / "provenance.yaml", provenance)
 

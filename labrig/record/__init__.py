@@ -1,7 +1,14 @@
 """The run folder: written while it happens, read afterwards."""
 
 from labrig.record.disk import REAL_DISK, Disk
-from labrig.record.frames import PERSON, TAKEN_BACK, ActionRecord, FrameRecord
+from labrig.record.frames import (
+    PERSON,
+    TAKEN_BACK,
+    ActionRecord,
+    FrameRecord,
+    unit_in,
+    unit_within,
+)
 from labrig.record.notes import add_note, read_notes
 from labrig.record.reading import Attempt, RunRecord, read_run
 from labrig.record.run_folder import RunFolder
@@ -19,4 +26,6 @@ __all__ = [
     "add_note",
     "read_notes",
     "read_run",
+    "unit_in",
+    "unit_within",
 ]

@@ -41,6 +41,17 @@ class FrameRecord:
 PERSON, TAKEN_BACK = "person", "taken back"
 
 
+def unit_in(part: str, unit: str) -> str:
+    """The name of a unit of one part of a chain within the whole."""
+    return f"{part}/{unit}"
+
+
+def unit_within(part: str, name: str) -> str | None:
+    """The name within its part of what `unit_in` named; None if it is not of that part."""
+    unit = name.removeprefix(f"{part}/")
+    return None if unit == name else unit
+
+
 @dataclass(frozen=True)
 class ActionRecord:
     """One switch, move or choice. Times are seconds since 1970, as measured."""

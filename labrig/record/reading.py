@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from labrig.errors import DataError
-from labrig.record.frames import TAKEN_BACK, ActionRecord, FrameRecord
+from labrig.record.frames import TAKEN_BACK, ActionRecord, FrameRecord, unit_within
 from labrig.record.journal import Document, read_journal
 
 #: End of the year 9999 in seconds since 1970: no calendar reaches further.
@@ -62,6 +62,11 @@ class RunRecord:
                 done[attempt.unit] = attempt
         return done
 
+    def part(self, name: str) -> "RunRecord":
+        """The completed units of one part of a chain, by their names within it."""
+        own = [_within(name, attempt) for attempt in self.completed().values()]
+        return replace(self, attempts=[attempt for attempt in own if attempt is not None])
+
     def frames(self, purpose: str) -> list[FrameRecord]:
         """Frames with that purpose, of completed units only."""
         return [
@@ -70,6 +75,18 @@ class RunRecord:
             for frame in attempt.frames
             if frame.purpose == purpose
         ]
+
+
+def _within(part: str, attempt: Attempt) -> Attempt | None:
+    unit = unit_within(part, attempt.unit)
+    if unit is None:
+        return None
+    return replace(
+        attempt,
+        unit=unit,
+        frames=[replace(frame, unit=unit) for frame in attempt.frames],
+        actions=[replace(action, unit=unit) for action in attempt.actions],
+    )
 
 
 def read_run(run: str | os.PathLike[str]) -> RunRecord:

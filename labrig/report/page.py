@@ -1,19 +1,14 @@
 """The report: one HTML file that needs nothing else."""
 
-import re
 import shlex
 from collections.abc import Sequence
 from dataclasses import dataclass
-from datetime import UTC, datetime
 from pathlib import Path
 
-from jinja2 import Environment, FileSystemLoader, StrictUndefined
-from markupsafe import Markup, escape
+from markupsafe import Markup
 
 from labrig.errors import DiskError
 from labrig.fit import DecayFit
-from labrig.quantity import duration_text
-from labrig.record.frames import FrameRecord
 from labrig.report import parameters
 from labrig.report.colours import Screen, screen_for
 from labrig.report.content import PatchReport, RunReport
@@ -28,13 +23,12 @@ from labrig.report.residual_figure import residual_figure
 from labrig.report.run_figures import overview_figures, timing_figure
 from labrig.report.stability import Repeat, Steady, repeats, steady
 from labrig.report.swatches import Swatch, swatches
+from labrig.report.template import dated_notes, environment, script, style
 from labrig.report.timing import Lateness, frame_timings, lateness
-from labrig.report.written_numbers import plus_minus, rounded
 
-TEMPLATE, STYLE, SCRIPT = "report.html.j2", "report.css", "report.js"
+TEMPLATE = "report.html.j2"
 #: With more patches than this, photographs show their numbers and not their names.
 NAMES_ON_PHOTOGRAPH = 3
-_SYMBOL = re.compile(r"\b([a-z])_([a-z])\b")
 
 
 @dataclass(frozen=True)
@@ -99,35 +93,23 @@ def _page(
     late: Lateness | None,
     timing: Plate | None,
 ) -> str:
-    folder = Path(__file__).parent
-    environment = Environment(
-        loader=FileSystemLoader(folder),
-        autoescape=True,
-        undefined=StrictUndefined,
-        trim_blocks=True,
-        lstrip_blocks=True,
-    )
-    environment.globals.update(
+    templates = environment()
+    templates.globals.update(
         state_rows=parameters.state_rows,
         quality_rows=parameters.quality_rows,
         paper_rows=parameters.paper_rows,
         candidate_rows=parameters.candidate_rows,
         why_so_many_states=parameters.why_so_many_states,
-        duration_text=duration_text,
-        plus_minus=plus_minus,
-        rounded=rounded,
-        utc=_utc,
     )
-    environment.filters["indexed"] = _indexed
-    environment.filters["quoted"] = shlex.quote
+    templates.filters["quoted"] = shlex.quote
     photographed = [photograph.frame for photograph in report.glow]
-    return environment.get_template(TEMPLATE).render(
+    return templates.get_template(TEMPLATE).render(
         report=report,
         # Style sheet and script are labrig's own; escaping them would break them.
-        style=Markup((folder / STYLE).read_text(encoding="utf-8")),
-        script=Markup((folder / SCRIPT).read_text(encoding="utf-8")),
+        style=Markup(style()),
+        script=Markup(script()),
         warnings=_warnings(report),
-        notes=_notes(report.notes),
+        notes=dated_notes(report.notes),
         patches=patches,
         late=late,
         timing=timing,
@@ -153,13 +135,6 @@ def _warnings(report: RunReport) -> list[str]:
             if not any(reason in warning for warning in report.warnings)
         ),
     ]
-
-
-def _notes(text: str) -> list[tuple[str, str]]:
-    """Heading and text of every note; what stands before the first heading has none."""
-    before, *entries = re.split(r"^## +", text, flags=re.MULTILINE)
-    split = (entry.partition("\n") for entry in entries)
-    return [("", before.strip()), *((heading.strip(), rest.strip()) for heading, _, rest in split)]
 
 
 def _patches(report: RunReport, screen: Screen, plates: Plates) -> list[_Patch]:
@@ -213,14 +188,3 @@ def _figures(which: str, patch: PatchReport, fit: DecayFit | None, plates: Plate
             )
     parts = tuple(budget.visible()) if budget else ()
     return _Figures(linear, logarithmic, left, noise, parts, values_below_axis(series))
-
-
-def _indexed(text: str) -> Markup:
-    """Symbols such as `k_i` with their index below the line."""
-    return Markup(_SYMBOL.sub(r"<i>\1</i><sub><i>\2</i></sub>", str(escape(text))))
-
-
-def _utc(frame: FrameRecord) -> str:
-    """When the frame began."""
-    start = datetime.fromtimestamp(frame.start_time, UTC)
-    return start.strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
