@@ -5,19 +5,14 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labrig.acquire import (
-    LAMP_ON,
-    CameraOffers,
-    ExposureSettings,
-    ProtocolModel,
-    Session,
-)
+from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel, Session
 from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.reduce import FrameMeasurement
 from labrig.region import CENTRE, Region
 
 from .metering import DecayMeter, Look, Schedule
 from .patch_names import Patches
+from .posing import charge
 from .watching import Watcher
 
 #: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.
@@ -159,12 +154,12 @@ class DecaySettings(ProtocolModel):
         ladder = self.meter_ladder(session.rig.camera.offers())[:3]
         return [self.settings(exposure_s) for _, exposure_s in ladder]
 
-    def watcher(self, session: Session, unit: str) -> Watcher:
-        """Holds a unit's frames against what should have happened."""
+    def watcher(self, session: Session, unit: str, metering: str = "meter") -> Watcher:
+        """Holds a unit's frames against what should have happened, and what `metering` saw."""
         background = self.background if self.dark == "background" else None
-        return Watcher(session, unit, list(self.patches.values()), background)
+        regions = list(self.patches.values())
+        return Watcher(session, unit, regions, background, metering=metering)
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
         """Lamp on for that long, for its own warm-up at the least."""
-        session.perform(LAMP_ON)
-        session.wait(max(duration_s, session.rig.warm_up_s("lamp")), "charging")
+        charge(session, max(duration_s, session.rig.warm_up_s("lamp")))

@@ -1,12 +1,16 @@
 """What a decay consists of: dark frames, a metered charge, charge and decay, daylight."""
 
+from collections.abc import Sequence
 from dataclasses import dataclass
+from typing import Protocol
 
-from labrig.acquire import LAMP_OFF, LAMP_ON, Session, Shoot, at
+from labrig.acquire import LAMP_ON, CameraOffers, ExposureSettings, Session, Shoot, at
 from labrig.quantity import duration_text
 
 from .decay_settings import DecaySettings
 from .metering import Schedule, glow, look
+from .posing import check_seen, face_camera, face_lamp, has_door, lights_out
+from .watching import Watcher
 
 #: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.
 METER_CHARGE_S = 600.0
@@ -15,16 +19,39 @@ DAYLIGHT_EXPOSURES_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8)
 LAMP_SETTLES_S = 5.0
 
 
+class MeteredProtocol(Protocol):
+    """What a protocol says that photographs darkness, then meters a glow."""
+
+    def settings(self, exposure_s: float) -> ExposureSettings:
+        """Camera settings with that shutter time."""
+
+    def dark_exposures_s(self, offers: CameraOffers) -> Sequence[float]:
+        """Shutter time of each dark frame."""
+
+    def meter_ladder(self, offers: CameraOffers) -> Sequence[tuple[float, float]]:
+        """Begin after lamp off and shutter time of each metering frame."""
+
+    def short_settings(self, session: Session) -> list[ExposureSettings]:
+        """For a closer look at what clips."""
+
+    def charge_sample(self, session: Session, duration_s: float) -> None:
+        """Lamp on for that long, for its own warm-up at the least."""
+
+    def watcher(self, session: Session, unit: str) -> Watcher:
+        """Holds a unit's frames against what should have happened."""
+
+
 @dataclass(frozen=True)
 class DarkUnit:
     """Dark frames at the exposures to come, before anything glows."""
 
-    protocol: DecaySettings
+    protocol: MeteredProtocol
     name: str = "dark"
 
     def run(self, session: Session) -> None:
         """Warm the camera up, then photograph darkness."""
         session.wait_until_warm("camera")
+        face_camera(session)
         for exposure_s in self.protocol.dark_exposures_s(session.rig.camera.offers()):
             session.perform(Shoot("dark", self.protocol.settings(exposure_s)))
         self.protocol.watcher(session, self.name).insist_on_darkness(
@@ -36,20 +63,19 @@ class DarkUnit:
 class MeterUnit:
     """A shorter charge whose glow says how long to expose."""
 
-    protocol: DecaySettings
+    protocol: MeteredProtocol
+    charge_s: float
     name: str = "meter"
 
     def run(self, session: Session) -> None:
         """Charge, lamp off, a ladder of exposures; for `grow`, then on along the decay."""
         session.wait_until_warm("camera")
-        charge = self.protocol.charge
-        self.protocol.charge_sample(
-            session, min(charge if isinstance(charge, float) else METER_CHARGE_S, METER_CHARGE_S)
-        )
+        self.protocol.charge_sample(session, min(self.charge_s, METER_CHARGE_S))
         ladder = self.protocol.meter_ladder(session.rig.camera.offers())
+        check_seen(session, ladder[0][0])
         session.run_sequence(
             [
-                at(0.0, LAMP_OFF),
+                *lights_out(session),
                 *(
                     at(time_s, Shoot("meter", self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in ladder
@@ -63,31 +89,28 @@ class MeterUnit:
 
 @dataclass(frozen=True)
 class DecayUnit:
-    """One charge and the decay after it."""
+    """One charge and the decay after it, exposed as the unit `metering` found."""
 
     protocol: DecaySettings
-    number: int
-
-    @property
-    def name(self) -> str:
-        """`decay-1`, `decay-2`, …"""
-        return f"decay-{self.number}"
+    name: str
+    metering: str = "meter"
 
     def run(self, session: Session) -> None:
         """Charge, lamp off, one frame every `every` seconds."""
         session.wait_until_warm("camera")
         schedule = self._schedule(session)
+        check_seen(session, self.protocol.first)
         self._charge(session, schedule.exposures_s[0])
         session.run_sequence(
             [
-                at(0.0, LAMP_OFF),
+                *lights_out(session),
                 *(
                     at(time_s, Shoot("decay", self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in schedule.frames()
                 ),
             ]
         )
-        watcher = self.protocol.watcher(session, self.name)
+        watcher = self.protocol.watcher(session, self.name, self.metering)
         watcher.tell_of_delays(schedule.times_s)
         watcher.insist_on_decay(self.protocol.short_settings(session))
 
@@ -96,7 +119,8 @@ class DecayUnit:
         regions = list(protocol.patches.values())
 
         def decide() -> Schedule:
-            looks = [look(frame, regions) for frame in session.frames("meter")]
+            frames = [one for one in session.frames("meter") if one.unit == self.metering]
+            looks = [look(frame, regions) for frame in frames]
             return protocol.schedule(offers, looks, session.warn)
 
         if isinstance(protocol.exposure, float):
@@ -114,7 +138,8 @@ class DecayUnit:
         charged_s = rule.check_every
         while charged_s < rule.at_most:
             look = Shoot("plateau", self.protocol.settings(exposure_s))
-            session.run_sequence([at(0.0, LAMP_OFF), at(self.protocol.first, look)])
+            session.run_sequence([*lights_out(session), at(self.protocol.first, look)])
+            face_lamp(session)
             session.perform(LAMP_ON)
             if session.choose("plateau reached", lambda: self._level(session), worst=False):
                 session.wait(LAMP_SETTLES_S, "lamp settles, charge topped up")
@@ -148,6 +173,9 @@ class DaylightUnit:
 
     def run(self, session: Session) -> None:
         """Lamp on, a ladder of short exposures, lamp off."""
+        if has_door(session):
+            session.warn("no daylight photograph: behind a door the lamp lights the sample unseen")
+            return
         offers = session.rig.camera.offers()
         session.perform(LAMP_ON)
         session.wait(LAMP_SETTLES_S, "lamp settles")

@@ -16,7 +16,7 @@ from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
 from labrig.clock import VirtualClock
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
-from labrig.record import PERSON, FrameRecord
+from labrig.record import PERSON, ActionRecord, FrameRecord
 from labrig.yaml_file import validate
 
 T = TypeVar("T")
@@ -217,6 +217,9 @@ class _PlanRecorder:
         return ""
 
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
+        return ()
+
+    def actions(self, device: str) -> Sequence[ActionRecord]:
         return ()
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:

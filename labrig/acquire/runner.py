@@ -57,22 +57,20 @@ def _run_what_is_left(
     record = folder.read()
     done = record.completed()
     frames = [frame for attempt in done.values() for frame in attempt.frames]
-    by_hand = [
-        action for attempt in done.values() for action in attempt.actions if action.is_by_hand
-    ]
+    actions = [action for attempt in done.values() for action in attempt.actions]
     for number, unit in enumerate(units, start=1):
         if unit.name in done:
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
-        recorder = _Recorder(rig.clock, writer, frames, by_hand, observer)
+        recorder = _Recorder(rig.clock, writer, frames, actions, observer)
         try:
             unit.run(Session(rig, recorder, observer))
         except TakenBack:
             recorder.take_back()
             raise
         writer.stop("success")
-        frames, by_hand = recorder.kept, recorder.by_hand
+        frames, actions = recorder.kept, recorder.done
 
 
 class _Recorder:
@@ -83,30 +81,31 @@ class _Recorder:
         clock: Clock,
         writer: AttemptWriter,
         kept: Sequence[FrameRecord],
-        by_hand: Sequence[ActionRecord],
+        done: Sequence[ActionRecord],
         observer: RunObserver,
     ) -> None:
         self._clock = clock
         self._writer = writer
         self._observer = observer
         self.kept = list(kept)
-        self.by_hand = list(by_hand)
+        self.done = list(done)
 
     def acted(self, device: str, action: str, start_s: float, end_s: float, late_s: float) -> None:
         wall = self._clock.wall
         record = ActionRecord(self._writer.unit, device, action, wall(start_s), wall(end_s), late_s)
         self._writer.action(record)
-        if record.is_by_hand:
-            self.by_hand.append(record)
+        self.done.append(record)
 
     def last_by_hand(self) -> str | None:
-        return self.by_hand[-1].action if self.by_hand else None
+        last = self._last_by_hand()
+        return None if last is None else last.action
 
     def take_back(self) -> None:
         """The unit of what was done by hand last does not count; this attempt ends."""
-        unit, now_s = self.by_hand[-1].unit, self._clock.now()
-        self.acted(TAKEN_BACK, unit, now_s, now_s, 0.0)
-        self._writer.stop("abort", f"taken back: '{self.last_by_hand()}'; {unit} is done again")
+        last, now_s = self._last_by_hand(), self._clock.now()
+        assert last is not None, "only what was done is taken back"
+        self.acted(TAKEN_BACK, last.unit, now_s, now_s, 0.0)
+        self._writer.stop("abort", f"taken back: '{last.action}'; {last.unit} is done again")
 
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
         record = self._writer.frame(
@@ -126,5 +125,11 @@ class _Recorder:
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
         return [frame for frame in self.kept if frame.purpose == purpose]
 
+    def actions(self, device: str) -> Sequence[ActionRecord]:
+        return [action for action in self.done if action.device == device]
+
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         return decide()
+
+    def _last_by_hand(self) -> ActionRecord | None:
+        return next((action for action in reversed(self.done) if action.is_by_hand), None)

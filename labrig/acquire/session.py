@@ -17,9 +17,10 @@ from labrig.acquire.values import ExposureSettings, Frame
 from labrig.clock import Clock
 from labrig.errors import DeviceError, LabrigError
 from labrig.quantity import duration_text
-from labrig.record import PERSON, FrameRecord, unit_within
+from labrig.record import PERSON, ActionRecord, FrameRecord, unit_within
 
 T = TypeVar("T")
+RecordT = TypeVar("RecordT", FrameRecord, ActionRecord)
 
 #: Cameras can be set to switch off after a minute at the least.
 AWAKE_PERIOD_S = 30.0
@@ -45,6 +46,9 @@ class Recorder(Protocol):
 
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
         """Frames with that purpose: of completed units, then of this one."""
+
+    def actions(self, device: str) -> Sequence[ActionRecord]:
+        """What that device did, in the same units."""
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         """`decide()` on a bench; `worst` when planning, where there is nothing to decide on."""
@@ -166,6 +170,10 @@ class Session:
         """Frames taken for that purpose, by completed units and by this one so far."""
         return self._recorder.frames(purpose)
 
+    def actions(self, device: str) -> Sequence[ActionRecord]:
+        """What that device did, in completed units and in this one so far."""
+        return self._recorder.actions(device)
+
     def within(self, part: str) -> "Session":
         """The session of a unit of one part of a chain: it sees frames of its part only."""
         return Session(self.rig, _PartRecorder(self._recorder, part), self._observer)
@@ -265,10 +273,16 @@ class _PartRecorder:
         self._part = part
 
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
+        return self._own(self._whole.frames(purpose))
+
+    def actions(self, device: str) -> Sequence[ActionRecord]:
+        return self._own(self._whole.actions(device))
+
+    def _own(self, records: Sequence[RecordT]) -> list[RecordT]:
         return [
-            replace(frame, unit=unit)
-            for frame in self._whole.frames(purpose)
-            if (unit := unit_within(self._part, frame.unit)) is not None
+            replace(record, unit=unit)
+            for record in records
+            if (unit := unit_within(self._part, record.unit)) is not None
         ]
 
 

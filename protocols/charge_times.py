@@ -1,0 +1,79 @@
+"""For how long to charge next: until the glow stops growing, then where it tells most.
+
+y(t) = a (1 − e^(−s t)) is what one state charged for t glows like just after lamp off; two states
+are near enough to it to choose by, and the fit that matters is another one.
+"""
+
+from collections.abc import Sequence
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import minimize_scalar
+
+FloatArray = NDArray[np.float64]
+
+#: Places whose glow is chosen by: the brightest, where noise does not decide.
+BRIGHTEST = 6
+#: Charge times that are weighed against each other.
+CANDIDATES = 33
+
+
+def still_grows(glows: FloatArray, growth: float) -> bool:
+    """Whether the last charge glowed brighter than the one before.
+
+    Parameters
+    ----------
+    glows
+        (charges, places), in the order of the charges.
+    growth
+        Less than this share is none.
+    """
+    before, last = (_bright(glows)[row].sum() for row in (-2, -1))
+    return bool(last > (1 + growth) * before)
+
+
+def most_telling_s(charges_s: Sequence[float], glows: FloatArray) -> float:
+    """The charge time, among those between the shortest and the longest, that adds most.
+
+    D-optimal for a and s of every bright place (Fedorov, *Theory of Optimal Experiments*, 1972):
+    the determinant of the information grows most. σ is taken as a constant share of the glow.
+
+    Parameters
+    ----------
+    charges_s
+        (charges,) done so far.
+    glows
+        (charges, places) just after each.
+    """
+    done_s, bright = np.asarray(charges_s, dtype=np.float64), _bright(glows)
+    candidates_s = np.geomspace(done_s.min(), done_s.max(), CANDIDATES)
+    gain = np.zeros(CANDIDATES)
+    for place in bright.T:
+        s = _rate(done_s, place)
+        known = _slopes(done_s, s)
+        information = known.T @ known
+        for row, slope in enumerate(_slopes(candidates_s, s)):
+            gain[row] += np.log(np.linalg.det(information + np.outer(slope, slope)))
+    return float(candidates_s[np.argmax(gain)])
+
+
+def _bright(glows: FloatArray) -> FloatArray:
+    order = np.argsort(-glows[-1], kind="stable")[:BRIGHTEST]
+    return np.maximum(glows[:, order], 1e-9)
+
+
+def _rate(charges_s: FloatArray, glow: FloatArray) -> float:
+    """s, by least squares on the logarithms, which gives a at once."""
+
+    def misfit(log_s: float) -> float:
+        left = np.log(glow) - np.log(-np.expm1(-np.exp(log_s) * charges_s))
+        return float(left.var())
+
+    bounds = np.log([0.01 / charges_s.max(), 10 / charges_s.min()])
+    return float(np.exp(minimize_scalar(misfit, bounds=bounds, method="bounded").x))
+
+
+def _slopes(charges_s: FloatArray, s: float) -> FloatArray:
+    """(n, 2) of ln y by ln a and ln s."""
+    x = s * charges_s
+    return np.column_stack([np.ones_like(x), x / np.expm1(x)])

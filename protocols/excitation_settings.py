@@ -1,0 +1,111 @@
+"""The keys of an excitation protocol, and the times and exposures that follow."""
+
+from itertools import pairwise
+from typing import Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel
+from labrig.quantity import DurationS, Fraction, duration_text
+from labrig.region import Region
+
+from .decay_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+
+#: Each pause between two frames is longer than the one before by this factor.
+PAUSES_GROW = 1.25
+
+
+class Rest(BaseModel):
+    """Darkness between two charges: at least and at most so long, until the glow is that low."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    below: Fraction = Field(0.02, gt=0, lt=1)
+    at_least: DurationS = Field(60.0, ge=0)
+    check_every: DurationS = Field(180.0, gt=0)
+    at_most: DurationS = Field(900.0, ge=0)
+
+    @model_validator(mode="after")
+    def _floor_below_ceiling(self) -> Self:
+        if self.at_least > self.at_most:
+            raise ValueError("expected 'at_least' of no more than 'at_most'")
+        return self
+
+
+class ExcitationSettings(ProtocolModel):
+    """The keys; see `excitation.yaml` for what each means."""
+
+    protocol: Literal["excitation"] = "excitation"
+    first_charge: DurationS = Field(8.0, gt=0)
+    growth: Fraction = Field(0.03, gt=0, lt=1)
+    at_most: int = Field(9, ge=2)
+    refine: int = Field(3, ge=0)
+    bare: tuple[DurationS, ...] = Field((10.0, 60.0, 900.0), min_length=1)
+    first: DurationS = Field(1.0, ge=0)
+    every: DurationS = Field(4.0, gt=0)
+    duration: DurationS = Field(90.0, gt=0, alias="for")
+    last_decay: DurationS = Field(180.0, gt=0)
+    rest: Rest = Rest()
+    samples: int = Field(1, ge=1)
+    camera: CameraSettings = CameraSettings()
+    sites: Region = Field((0.1, 0.4, 0.8, 0.2))
+    states: Literal["auto", 1, 2, 3] = "auto"
+    saturated: bool = False
+
+    @model_validator(mode="after")
+    def _rising_charges(self) -> Self:
+        if any(later <= earlier for earlier, later in pairwise(self.bare)):
+            raise ValueError("expected charges in 'bare' that become longer and longer")
+        if self.first + self.every > self.duration:
+            raise ValueError(
+                f"for: {duration_text(self.duration)} leaves no two frames "
+                f"{duration_text(self.every)} apart; make it longer"
+            )
+        return self
+
+    def doubled_s(self, number: int) -> float:
+        """The charge of that number, from 1, while they double."""
+        return self.first_charge * 2.0 ** (number - 1)
+
+    def frame_times_s(self, lasting_s: float) -> list[float]:
+        """Planned begin of each frame after lamp off."""
+        times_s, pause_s = [self.first], self.every
+        while times_s[-1] + pause_s <= lasting_s:
+            times_s.append(times_s[-1] + pause_s)
+            pause_s *= PAUSES_GROW
+        return times_s
+
+    def longest_exposures_s(self, offers: CameraOffers, lasting_s: float) -> list[float]:
+        """Longest offered shutter time of each frame; the last one has the time of the one before.
+
+        A camera must be ready again before the next.
+        """
+        times_s = self.frame_times_s(lasting_s)
+        pauses_s = [later - earlier for earlier, later in pairwise(times_s)]
+        spare_s = offers.overhead_s + MARGIN_S
+        return [offers.exposure_at_most(pause_s - spare_s) for pause_s in (*pauses_s, pauses_s[-1])]
+
+    def settings(self, exposure_s: float) -> ExposureSettings:
+        """Camera settings with that shutter time."""
+        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
+
+    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+        """Shutter time of each dark frame."""
+        longest_s = max(self.longest_exposures_s(offers, self.last_decay))
+        exposures_s = [offers.exposure_at_most(longest_s * part) for part in (1 / 64, 1 / 4, 1)]
+        return [exposure_s for exposure_s in exposures_s for _ in range(DARKS_PER_EXPOSURE)]
+
+    def ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+        """Begin after lamp off and shutter time of each metering frame."""
+        longest_s = max(self.longest_exposures_s(offers, self.duration))
+        at_s, ladder = self.first, []
+        for share in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
+            exposure_s = offers.exposure_at_most(longest_s * share)
+            ladder.append((at_s, exposure_s))
+            at_s += exposure_s + offers.overhead_s + MARGIN_S
+        return ladder
+
+    def strip(self, count: int = 24) -> list[Region]:
+        """Places along the strip on the sample, for metering and for choosing charge times."""
+        x, y, width, height = self.sites
+        return [(x + width * k / count, y, width / count, height) for k in range(count)]

@@ -1,0 +1,92 @@
+"""Which way the sample faces: trap door and lamp shield, on benches that have them.
+
+Without a door the sample faces lamp and camera at once, and nothing has to be moved.
+"""
+
+from collections.abc import Sequence
+
+from labrig.acquire import (
+    DOOR_CLOSE,
+    DOOR_OPEN,
+    LAMP_OFF,
+    LAMP_ON,
+    SHIELD_COVER,
+    SHIELD_UNCOVER,
+    Session,
+    Timed,
+    at,
+)
+from labrig.errors import ProtocolError
+from labrig.quantity import duration_text
+
+#: Until a halogen lamp is dark (Nalbach et al., section 4.4); a shield is faster.
+LAMP_DARK_S = 0.32
+#: A servo takes a new pulse over with its next frame, and a door rings a little.
+SETTLES_S = 0.1
+
+
+def has_door(session: Session) -> bool:
+    """Whether the sample turns from lamp to camera."""
+    return "door" in session.rig.devices
+
+
+def face_camera(session: Session) -> None:
+    """The camera sees the sample, the lamp does not reach it; waits until the door has stopped."""
+    if has_door(session):
+        session.perform(DOOR_OPEN)
+        session.wait(session.rig.door.travel_s() + SETTLES_S, "door opens")
+
+
+def face_lamp(session: Session) -> None:
+    """The sample faces the lamp, uncovered; waits until the doors have stopped."""
+    travels_s = []
+    if "shield" in session.rig.devices:
+        session.perform(SHIELD_UNCOVER)
+        travels_s.append(session.rig.shield.travel_s())
+    if has_door(session):
+        session.perform(DOOR_CLOSE)
+        travels_s.append(session.rig.door.travel_s())
+    if travels_s:
+        session.wait(max(travels_s) + SETTLES_S, "door and shield move")
+
+
+def charge(session: Session, duration_s: float) -> None:
+    """Turn the sample to the lamp and light it for that long."""
+    face_lamp(session)
+    session.perform(LAMP_ON)
+    session.wait(duration_s, "charging")
+
+
+def lights_out(session: Session) -> Sequence[Timed]:
+    """The begin of a timed sequence: lamp off, shield before it, then the door opens."""
+    steps = [at(0.0, LAMP_OFF)]
+    dark_s = LAMP_DARK_S
+    if "shield" in session.rig.devices:
+        steps.append(at(0.0, SHIELD_COVER))
+        dark_s = min(dark_s, session.rig.shield.travel_s() + SETTLES_S)
+    if has_door(session):
+        steps.append(at(dark_s, DOOR_OPEN))
+    return steps
+
+
+def seen_s(session: Session) -> float:
+    """From `lights_out` until the camera sees the whole sample."""
+    if not has_door(session):
+        return 0.0
+    return lights_out(session)[-1].at_s + session.rig.door.travel_s() + SETTLES_S
+
+
+def check_seen(session: Session, first_s: float) -> None:
+    """Refuse a first photograph before the door is open.
+
+    Raises
+    ------
+    ProtocolError
+        Says how long it takes.
+    """
+    if first_s < seen_s(session):
+        raise ProtocolError(
+            f"the first frame {duration_text(first_s)} after lamp off would show a door that still "
+            f"moves; it is open {duration_text(seen_s(session))} after lamp off, so write first: "
+            f"{duration_text(round(seen_s(session) + 0.05, 1))}"
+        )
