@@ -69,7 +69,7 @@ def _rate(charges_s: FloatArray, glow: FloatArray) -> float:
         left = np.log(glow) - np.log(-np.expm1(-np.exp(log_s) * charges_s))
         return float(left.var())
 
-    bounds = np.log([0.01 / charges_s.max(), 10 / charges_s.min()])
+    bounds = (float(np.log(0.01 / charges_s.max())), float(np.log(10 / charges_s.min())))
     return float(np.exp(minimize_scalar(misfit, bounds=bounds, method="bounded").x))
 
 

@@ -109,6 +109,7 @@ class Session:
 
     def perform(self, action: Action) -> None:
         """Do one thing now."""
+        self._beat_if_due()
         self._prepare(action)
         self._execute(action, late_s=0.0)
 
@@ -156,6 +157,7 @@ class Session:
             What was done by hand last is to be done again. The runner does its unit again.
         """
         start_s = self.clock.now()
+        self._beat_if_due()
         remark = self._observer.ask(step, self._recorder.last_by_hand(), self._meanwhile())
         if remark is None:
             raise TakenBack
@@ -198,9 +200,8 @@ class Session:
         while spoken_to and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
             self.clock.sleep(AWAKE_PERIOD_S)
             self._keep_awake()
-        now_s = self.clock.now()
-        if now_s - self._beaten_s >= AWAKE_PERIOD_S and deadline_s - now_s > BEAT_S:
-            self._beat()
+        if deadline_s - self.clock.now() > BEAT_S:
+            self._beat_if_due()
         self.clock.sleep_until(deadline_s)
 
     def _meanwhile(self) -> Callable[[], None]:
@@ -221,6 +222,10 @@ class Session:
             with _device_errors(key):
                 device.keep_awake()
         self._beat()
+
+    def _beat_if_due(self) -> None:
+        if self.clock.now() - self._beaten_s >= AWAKE_PERIOD_S:
+            self._beat()
 
     def _beat(self) -> None:
         for key, device in self._guarded.items():

@@ -2,7 +2,20 @@
 
 import typer
 
-from labrig.cli import fit, frame, optics, process, protocol, rig, run, runs, schema, sim, watch
+from labrig.cli import (
+    compare,
+    fit,
+    frame,
+    optics,
+    process,
+    protocol,
+    rig,
+    run,
+    runs,
+    schema,
+    sim,
+    watch,
+)
 
 app = typer.Typer(
     help="From a lab bench to a measured phosphorescent or fluorescent material.",
@@ -16,6 +29,7 @@ app.command("plan")(run.plan)
 app.command("resume")(run.resume)
 app.command("process")(process.process)
 app.command("frame")(frame.frame)
+app.command("compare")(compare.compare)
 app.command("note")(runs.note)
 app.command("watch")(watch.watch)
 app.command("schema")(schema.schema)

@@ -1,6 +1,7 @@
 """A decay run, from its folder to its result: the way of a photon's number, in one function."""
 
 from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
 from pathlib import Path
 
 from labrig.acquire import read_rig_file
@@ -8,6 +9,7 @@ from labrig.errors import FitError
 from labrig.export import write_nexus
 from labrig.fit import DecayFit
 from labrig.process.choices import Choices, DecayProtocol, read_decay_protocol
+from labrig.process.known import Known
 from labrig.process.page import camera_response, run_name, run_report
 from labrig.process.provenance import provenance
 from labrig.process.result import Result
@@ -18,9 +20,11 @@ from labrig.process.result_folder import (
     write_provenance,
 )
 from labrig.process.series_fit import fit_series
-from labrig.process.timed_frames import intact_frames, timing_warnings
-from labrig.record import read_run
+from labrig.process.this_camera import insist_on_this_camera
+from labrig.process.timed_frames import IntactFrames, intact_frames, timing_warnings
+from labrig.record import RunRecord, read_run
 from labrig.reduce import Series, reduce_patches
+from labrig.region import Region
 from labrig.report import write_report
 
 
@@ -39,20 +43,13 @@ def process_decay(folder: Path, choices: Choices) -> Result:
     recorded = [frame for attempt in run.completed().values() for frame in attempt.frames]
     choices.check(recorded)
 
-    patches = choices.patches(protocol)
-    background = protocol.background if protocol.dark == "background" else None
-    frames = intact_frames(run, choices)
-    series = reduce_patches(frames.decay, patches, frames.dark, background)
+    measured = measure_decay(run, protocol, choices, Known.of(rig))
+    patches, background, frames = measured.patches, measured.background, measured.frames
+    series, fits = measured.series, measured.fits
     states = choices.states or _asked_states(protocol)
-    fits = _fit_all(series, states, choices.fixed_rates_per_s)
     camera, unknown_camera = camera_response(rig, choices.camera)
-    run_warnings = (
-        *timing_warnings(run),
-        *frames.warnings,
-        *unknown_camera,
-        *_clipping_warnings(series),
-    )
-    warnings = (*run_warnings, *_fit_warnings(fits))
+    run_warnings = (*measured.run_warnings, *unknown_camera)
+    warnings = (*run_warnings, *fit_warnings(fits))
 
     made = new_result(folder)
     write_provenance(
@@ -84,6 +81,41 @@ def process_decay(folder: Path, choices: Choices) -> Result:
         raise FitError(f"{'; '.join(map(str, fits.values()))}; the run is kept, see {report}")
     lines = tuple(f"{name}\n{fit}" for name, fit in fitted.items())
     return Result(report, lines, run_warnings, changes, series, fitted)
+
+
+@dataclass(frozen=True)
+class MeasuredDecay:
+    """A decay reduced and fitted; a fit that failed is the reason why."""
+
+    patches: Mapping[str, Region]
+    background: Region | None
+    frames: IntactFrames
+    series: Mapping[str, Series]
+    fits: Mapping[str, DecayFit | str]
+    run_warnings: tuple[str, ...]
+
+
+def measure_decay(
+    run: RunRecord, protocol: DecayProtocol, choices: Choices, known: Known
+) -> MeasuredDecay:
+    """From the frames of a decay to a fit of every patch.
+
+    Raises
+    ------
+    DataError
+        No decay is complete, a frame is missing or was changed after the run, or the camera file
+        that is `known` is of another camera, lens or aperture.
+    """
+    patches = choices.patches(protocol)
+    background = protocol.background if protocol.dark == "background" else None
+    frames = intact_frames(run, choices)
+    insist_on_this_camera(known.camera, run, run.frames("decay"))
+    series = reduce_patches(frames.decay, patches, frames.dark, background, known.camera)
+    fits = _fit_all(series, choices.states or _asked_states(protocol), choices.fixed_rates_per_s)
+    first_s = min(frame.t_s for frame in frames.decay)
+    stray = () if known.blank is None else known.blank.remarks(first_s)
+    warnings = (*timing_warnings(run), *frames.warnings, *stray, *_clipping_warnings(series))
+    return MeasuredDecay(patches, background, frames, series, fits, warnings)
 
 
 def _fit_all(
@@ -130,7 +162,8 @@ def _clipping_warnings(series: Mapping[str, Series]) -> Iterator[str]:
             )
 
 
-def _fit_warnings(fits: Mapping[str, DecayFit | str]) -> Iterator[str]:
+def fit_warnings(fits: Mapping[str, DecayFit | str]) -> Iterator[str]:
+    """What fits warn of, with the names of patches where there are several."""
     for name, fit in fits.items():
         said = [f"not fitted: {fit}"] if isinstance(fit, str) else fit.warnings
         yield from (f"{_patch(name, fits)}{text}" for text in said)

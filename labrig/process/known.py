@@ -10,6 +10,7 @@ from typing import TYPE_CHECKING, TypeVar
 from labrig.acquire import RigFile
 from labrig.errors import UsageError
 from labrig.fit import DecayFit
+from labrig.material import Material
 
 if TYPE_CHECKING:
     from labrig.calibration.blank_file import BlankFile
@@ -34,6 +35,8 @@ class Known:
         Of the sample.
     decays
         By patch.
+    material
+        As excitation, decay and spectrum together say.
     """
 
     camera: CameraFile | None = None
@@ -41,11 +44,12 @@ class Known:
     fade: FadeFile | None = None
     lvf: LvfFile | None = None
     irradiance: IrradianceFile | None = None
-    spectrum: "EmissionSpectrum | None" = None
+    spectrum: EmissionSpectrum | None = None
     decays: dict[str, DecayFit] | None = None
+    material: Material | None = None
 
     @classmethod
-    def of(cls, rig: RigFile) -> "Known":
+    def of(cls, rig: RigFile) -> Known:
         """Read the files that the rig file names.
 
         Raises

@@ -1,20 +1,15 @@
 """From the journal to frames that are as they were recorded, with their times after lamp off."""
 
-from collections.abc import Mapping
 from dataclasses import dataclass
-from hashlib import file_digest
 
 from labrig.errors import DataError
 from labrig.process.choices import Choices
+from labrig.process.intact import damaged_frames, insist
 from labrig.record import Attempt, FrameRecord, RunRecord
 from labrig.reduce import SeriesFrame, add_flag
 
 #: A frame later than this after its planned time is worth a warning; its measured time is used.
 LATE_S = 0.05
-#: What the numbers are made of; a run can do without its other frames.
-MEASURED = ("decay", "dark")
-#: Damaged frames named in a message.
-MOST_NAMED = 4
 
 
 @dataclass(frozen=True)
@@ -37,43 +32,35 @@ class IntactFrames:
     warnings: list[str]
 
 
-def intact_frames(run: RunRecord, choices: Choices) -> IntactFrames:
-    """Every frame held against its checksum; decays timed from the lamp-off before them.
+def intact_frames(run: RunRecord, choices: Choices, purpose: str = "decay") -> IntactFrames:
+    """Every frame held against its checksum; those after lamp off timed from it.
+
+    Parameters
+    ----------
+    purpose
+        Of the frames of the glow.
 
     Raises
     ------
     DataError
         No decay is complete, or a frame is missing or was changed and is not excluded.
     """
-    frames = [
-        frame
-        for attempt in run.completed().values()
-        for frame in attempt.frames
-        if frame.purpose in (*MEASURED, "daylight")
-    ]
-    damaged = {frame: damage for frame in frames if (damage := _damage(frame))}
-    refused = {
-        frame: damage
-        for frame, damage in damaged.items()
-        if frame.purpose in MEASURED and not choices.excludes(frame)
-    }
-    if refused:
-        raise DataError(f"{run.folder}: {_told(refused)}")
+    damaged = _damaged(run, choices, (purpose, "dark"))
     decay = [
         _timed(frame, _lamp_off_time(attempt, frame), choices)
         for attempt in run.completed().values()
         for frame in attempt.frames
-        if frame.purpose == "decay" and frame not in damaged
+        if frame.purpose == purpose and frame not in damaged
     ]
     if not decay:
         raise DataError(
-            f"{run.folder}: no decay is complete, so there is nothing to fit; go on with: "
+            f"{run.folder}: no {purpose} is complete, so there is nothing to fit; go on with: "
             f"labrig resume {run.folder}"
         )
     return IntactFrames(
         decay=decay,
         dark=[
-            SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
+            _steady(frame)
             for frame in run.frames("dark")
             if frame not in damaged and not choices.excludes(frame)
         ],
@@ -86,7 +73,23 @@ def intact_frames(run: RunRecord, choices: Choices) -> IntactFrames:
     )
 
 
-def timing_warnings(run: RunRecord) -> list[str]:
+def steady_frames(run: RunRecord, choices: Choices, purpose: str) -> list[SeriesFrame]:
+    """Frames of that purpose under a steady light, each held against its checksum.
+
+    Raises
+    ------
+    DataError
+        A frame is missing or was changed and is not excluded.
+    """
+    damaged = _damaged(run, choices, (purpose,))
+    return [
+        _steady(frame)
+        for frame in run.frames(purpose)
+        if frame not in damaged and not choices.excludes(frame)
+    ]
+
+
+def timing_warnings(run: RunRecord, purpose: str = "decay") -> list[str]:
     """What is odd about the times in the journal."""
     warnings = []
     if run.torn:
@@ -94,7 +97,7 @@ def timing_warnings(run: RunRecord) -> list[str]:
             "the journal's last line is torn: labrig was cut off while writing it; what it would "
             "have said does not count"
         )
-    late = [frame for frame in run.frames("decay") if frame.late_s > LATE_S]
+    late = [frame for frame in run.frames(purpose) if frame.late_s > LATE_S]
     if late:
         worst = max(late, key=lambda frame: frame.late_s)
         warnings.append(
@@ -104,25 +107,15 @@ def timing_warnings(run: RunRecord) -> list[str]:
     return warnings
 
 
-def _damage(frame: FrameRecord) -> str:
-    """What is wrong with the file, nothing if it is as recorded."""
-    try:
-        with frame.path.open("rb") as file:
-            checksum = file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        return "is missing" if not frame.path.exists() else f"cannot be read ({error.strerror})"
-    return "" if checksum == frame.sha256 else "was changed after the run (its checksum differs)"
+def _damaged(run: RunRecord, choices: Choices, measured: tuple[str, ...]) -> dict[FrameRecord, str]:
+    """What is wrong with frames, those that are `measured` only if they are excluded."""
+    damaged = damaged_frames(run, (*measured, "daylight"))
+    insist(run, {f: damage for f, damage in damaged.items() if f.purpose in measured}, choices)
+    return damaged
 
 
-def _told(damaged: Mapping[FrameRecord, str]) -> str:
-    """In one line, with what to do."""
-    named = list(damaged.items())[:MOST_NAMED]
-    more = f" and {len(damaged) - len(named)} more are damaged" if len(damaged) > len(named) else ""
-    leave_out = " ".join(f"--exclude {frame.path.name}" for frame, _ in named)
-    return (
-        f"{', '.join(f'{frame.path.name} {damage}' for frame, damage in named)}{more}; restore "
-        f"from a copy, or leave out: {leave_out}"
-    )
+def _steady(frame: FrameRecord) -> SeriesFrame:
+    return SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
 
 
 def _timed(frame: FrameRecord, lamp_off_time: float, choices: Choices) -> SeriesFrame:

@@ -28,6 +28,10 @@ class Rates(NamedTuple):
         (S,) ln of each series' irradiance over what was stated; 0 for the first, which defines E.
     log_brightness
         (K,) ln of the lamp's brightness at every charge of every series over what was stated.
+    lacking
+        (1,) what the cold lamp lacks, or (0,) if it is not fitted.
+    log_site
+        (sites whose irradiance is uncertain,) ln of it over what was stated, series by series.
     """
 
     k_r_per_s: FloatArray
@@ -36,6 +40,8 @@ class Rates(NamedTuple):
     weights: FloatArray
     log_scale: FloatArray
     log_brightness: FloatArray
+    lacking: FloatArray
+    log_site: FloatArray
 
 
 @dataclass(frozen=True)
@@ -48,6 +54,8 @@ class Uncertain:
         ρ common to all values of a photograph.
     lamp
         Of its brightness from charge to charge.
+    cold
+        What a lamp lacks that was just switched on; 0 is expected.
     scale
         Of the irradiance of every series but the first over that of the first.
     irradiance
@@ -56,12 +64,15 @@ class Uncertain:
 
     flicker: float = 0.0
     lamp: float = 0.0
+    cold: float = 0.0
     scale: float = 0.0
     irradiance: float = 0.0
 
 
 class ExcitationProblem:
-    """Least-squares problem in θ = [ln k_r, A, k_e, weights, ln scales, ln brightness].
+    """Least-squares problem in θ = [ln k_r, A, k_e, weights, and what is half known].
+
+    Half known are ln scales, ln brightness, what the cold lamp lacks and ln of the sites' light.
 
     Parameters
     ----------
@@ -87,8 +98,17 @@ class ExcitationProblem:
         charges = sum(len(one.charges) for one in self.series)
         self._scales = len(self.series) - 1 if uncertain.scale > 0 else 0
         self._brightness = charges if uncertain.lamp > 0 else 0
+        self._lacking = 1 if uncertain.cold > 0 else 0
+        sites = [np.zeros(0) if one.site_sigma is None else one.site_sigma for one in self.series]
+        #: Where the sites of each series begin among all that are uncertain.
+        self._first_site = np.cumsum([0, *(len(sigma) for sigma in sites)])
         self.prior_sigma = np.concatenate(
-            [np.full(self._scales, uncertain.scale), np.full(self._brightness, uncertain.lamp)]
+            [
+                np.full(self._scales, uncertain.scale),
+                np.full(self._brightness, uncertain.lamp),
+                np.full(self._lacking, uncertain.cold),
+                *sites,
+            ]
         )
         self._flicker = uncertain.flicker
         self._inverse_sigma = [
@@ -104,6 +124,11 @@ class ExcitationProblem:
         """Values measured."""
         return sum(int(np.count_nonzero(one)) for one in self._inverse_sigma)
 
+    @property
+    def uncertain_sites(self) -> int:
+        """Sites whose irradiance is not exact."""
+        return int(self._first_site[-1])
+
     def pack(self, rates: Rates) -> FloatArray:
         """θ."""
         scale = rates.log_scale[1 : 1 + self._scales]
@@ -115,6 +140,8 @@ class ExcitationProblem:
                 rates.weights[self._others],
                 scale,
                 rates.log_brightness[: self._brightness],
+                rates.lacking[: self._lacking],
+                rates.log_site,
             ]
         )
 
@@ -128,8 +155,9 @@ class ExcitationProblem:
     def unpack(self, theta: FloatArray) -> Rates:
         """What `pack` put together; what is not fitted is as stated."""
         n, bands = self.states, self.bands
-        ends = np.cumsum([n, n, n * bands, len(self._others), self._scales])
-        log_k_r, amplitude, k_e, others, scale, brightness = np.split(theta, ends)
+        half_known = (self._scales, self._brightness, self._lacking)
+        ends = np.cumsum([n, n, n * bands, len(self._others), *half_known])
+        log_k_r, amplitude, k_e, others, scale, brightness, lacking, site = np.split(theta, ends)
         weights = np.ones(len(self._others) + 1)
         weights[self._others] = others
         log_scale = np.zeros(len(self.series))
@@ -142,6 +170,8 @@ class ExcitationProblem:
             weights,
             log_scale,
             brightness if len(brightness) else np.zeros(charges),
+            lacking,
+            site,
         )
 
     def signal(self, theta: FloatArray) -> list[FloatArray]:
@@ -192,14 +222,18 @@ class ExcitationProblem:
     def lit(self, rates: Rates) -> list[ChargingSeries]:
         """The series with irradiance and brightness as θ has them."""
         lit, first = [], 0
-        for one, log_scale in zip(self.series, rates.log_scale, strict=True):
+        for number, (one, log_scale) in enumerate(zip(self.series, rates.log_scale, strict=True)):
             last = first + len(one.charges)
-            brightness = np.exp(rates.log_brightness[first:last])
+            cold = np.array([charge.cold for charge in one.charges])
+            brightness = np.exp(rates.log_brightness[first:last] - rates.lacking.sum() * cold)
             charges = tuple(
                 replace(charge, brightness=charge.brightness * float(factor))
                 for charge, factor in zip(one.charges, brightness, strict=True)
             )
             scaled = one.irradiance * float(np.exp(log_scale))
+            if one.site_sigma is not None:
+                own = rates.log_site[slice(*self._first_site[number : number + 2])]
+                scaled = scaled * np.exp(own)[:, None]
             lit.append(replace(one, charges=charges, irradiance=scaled))
             first = last
         return lit
@@ -222,14 +256,20 @@ class ExcitationProblem:
         by_light = np.einsum("fpnb,nb->fp", by_k_e, rates.k_e_per_s)
         if self._scales and number:
             slopes[..., first_scale + number - 1] = by_light
-        if self._brightness:
-            first = first_scale + self._scales + first_charge
-            shot = 0
-            for place, charge in enumerate(one.charges, start=first):
-                # The little that a charge leaves to the next one is neglected here.
-                own = slice(shot, shot + len(charge.start_s))
+        first = first_scale + self._scales
+        shot = 0
+        for place, charge in enumerate(one.charges, start=first + first_charge):
+            # The little that a charge leaves to the next one is neglected here.
+            own = slice(shot, shot + len(charge.start_s))
+            if self._brightness:
                 slopes[own, :, place] = by_light[own]
-                shot = own.stop
+            if self._lacking:
+                slopes[own, :, first + self._brightness] = -charge.cold * by_light[own]
+            shot = own.stop
+        if one.site_sigma is not None:
+            place = first + self._brightness + self._lacking + self._first_site[number]
+            every = np.arange(sites)
+            slopes[:, every, place + every] = by_light
         jacobian = slopes[:, :, None, :] * rates.weights[:, None]
         for place, channel in enumerate(self._others, start=first_weight):
             jacobian[:, :, channel, place] = glow

@@ -72,6 +72,8 @@ class Charge:
         (n,) of the photographs.
     brightness
         The lamp's, over the one that `irradiance` belongs to.
+    cold
+        Part of what a cold lamp lacks that it lacked in this charge on average, 0 to 1.
     fresh
         Whether the sample was exchanged for one that has never seen light.
     saturated
@@ -83,6 +85,7 @@ class Charge:
     start_s: FloatArray
     exposure_s: FloatArray
     brightness: float = 1.0
+    cold: float = 0.0
     fresh: bool = False
     saturated: bool = False
 
@@ -104,6 +107,9 @@ class ChargingSeries:
     values, sigma
         (n, P, C) mean signal per second of exposure, and independent standard uncertainty; NaN
         where nothing was measured.
+    site_sigma
+        (P,) relative standard uncertainty of each site's irradiance, the same at every charge and
+        independent of the other sites'; None: exact.
     """
 
     name: str
@@ -113,6 +119,7 @@ class ChargingSeries:
     irradiance: FloatArray
     values: FloatArray
     sigma: FloatArray
+    site_sigma: FloatArray | None = None
 
     def checked(self) -> Self:
         """Itself, if nothing is wrong with it.
@@ -134,6 +141,12 @@ class ChargingSeries:
                 f"{self.name}: expected values and sigma of {shots} photographs of {sites} sites, "
                 f"rise and fade in {bands} bands, got {self.values.shape}, {self.sigma.shape} and "
                 f"{lamp}"
+            )
+        if self.site_sigma is not None and not (
+            self.site_sigma.shape == (sites,) and (self.site_sigma > 0).all()
+        ):
+            raise FitError(
+                f"{self.name}: expected one 'site_sigma' above 0 for each of {sites} sites"
             )
         if not (self.irradiance >= 0).all():
             raise FitError(f"{self.name}: expected irradiances of 0 or more, got a smaller one")

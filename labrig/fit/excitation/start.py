@@ -44,6 +44,8 @@ def starts(
             _weights(problem, reference),
             np.zeros(len(problem.series)),
             np.zeros(sum(len(one.charges) for one in problem.series)),
+            np.zeros(1),
+            np.zeros(problem.uncertain_sites),
         )
 
 

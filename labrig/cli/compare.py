@@ -1,0 +1,105 @@
+"""`labrig compare`: a run against predictions, against another material and against the paper."""
+
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+if TYPE_CHECKING:
+    from labrig.compare import RunComparison
+    from labrig.fit import DecayFit
+    from labrig.reduce import Series
+    from labrig.report.sections import Section
+
+
+def compare(
+    run: Annotated[
+        Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
+    ],
+    material: Annotated[
+        list[str] | None,
+        typer.Option(
+            metavar="[PATCH=]MATERIAL",
+            help="Lay this beside what was measured: a shipped material such as blue-paint, or a "
+            "file. Repeatable.",
+        ),
+    ] = None,
+    white: Annotated[
+        str, typer.Option(help="White of CIELAB: a CIE illuminant such as D65, D50, A, E.")
+    ] = "D65",
+    normalise: Annotated[
+        str,
+        typer.Option(
+            help="'all': one exposure for all photographs of a patch; 'each': each at its best."
+        ),
+    ] = "all",
+    camera: Annotated[
+        str | None, typer.Option("--camera", help="Other camera curves than the rig file names.")
+    ] = None,
+    figures: Annotated[
+        Path | None,
+        typer.Option(help="Folder for the figures; default: comparison in the run folder."),
+    ] = None,
+    runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
+    json: Annotated[bool, typer.Option("--json", help="Print as JSON, draw nothing.")] = False,
+) -> None:
+    """Predicted against photographed glow, more states against one, a material beside another.
+
+    With the paper's own numbers (Nalbach et al., fig. 8 and 9, section 4.4, Table 1).
+    """
+    from labrig.catalogue import find_run
+    from labrig.compare import compare_run, sections
+
+    folder = find_run(run, runs)
+    comparison = compare_run(folder, _refit, material or [], white, normalise, camera)
+    if json:
+        _print_json(comparison)
+        return
+    for line in comparison.left_out:
+        typer.echo(f"warning: {line}", err=True)
+    for section in sections(comparison):
+        _tell(section)
+        _draw(section, figures or folder / "comparison")
+
+
+def _refit(series: "Series", states: int, flicker: float) -> "DecayFit":
+    from labrig.process import fit_series
+
+    return fit_series(series, states, flicker=flicker)
+
+
+def _tell(section: "Section") -> None:
+    from rich.console import Console
+    from rich.table import Table
+
+    console = Console(highlight=False)
+    console.print(f"\n[bold]{section.title}[/bold]")
+    for text in section.text:
+        console.print(text, style="dim")
+    for one in section.tables:
+        table = Table(box=None, pad_edge=False)
+        for number, heading in enumerate(one.head):
+            table.add_column(heading, justify="right" if number else "left", overflow="fold")
+        for row in one.rows:
+            table.add_row(*row)
+        console.print(table)
+        console.print(one.caption, style="dim")
+
+
+def _draw(section: "Section", folder: Path) -> None:
+    """As PNG to look at and as PDF to print."""
+    if section.figures:
+        folder.mkdir(parents=True, exist_ok=True)
+    for picture in section.figures:
+        picture.figure.patch.set(visible=True, facecolor="white")
+        for suffix in ("png", "pdf"):
+            picture.figure.savefig(folder / f"{picture.name}.{suffix}", dpi=200)
+        typer.echo(f"figure: {folder / picture.name}.png")
+
+
+def _print_json(comparison: "RunComparison") -> None:
+    import json
+
+    from labrig.compare import numbers
+
+    typer.echo(json.dumps(numbers(comparison), ensure_ascii=False))

@@ -1,0 +1,203 @@
+"""A measured material beside another one, such as the same in Table 1 of Nalbach et al.
+
+Two scales are free (see *physics*): k_e belongs to an irradiance of a stated length, so it is
+brought to the other's; Λ is relative, so it is multiplied by the factor that brings it closest.
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from labrig.compare.colorimetry import FloatArray
+from labrig.material import Material, State
+from labrig.report.sections import Table
+from labrig.report.written_numbers import plus_minus, rounded
+
+UNKNOWN = "–"
+
+
+@dataclass(frozen=True)
+class Pair:
+    """One quantity of both; σ NaN where it is not known, values NaN where there are none."""
+
+    quantity: str
+    unit: str
+    measured: float
+    sigma: float
+    reference: float
+    reference_sigma: float
+
+    @property
+    def percent(self) -> float:
+        """Deviation of the measured value from the reference; NaN where that is 0."""
+        return 100 * (self.measured / self.reference - 1) if self.reference else math.nan
+
+    @property
+    def in_sigma(self) -> float:
+        """Deviation in σ of the difference; a σ that is not known counts as 0."""
+        sigma = math.hypot(_or_zero(self.sigma), _or_zero(self.reference_sigma))
+        return (self.measured - self.reference) / sigma if sigma > 0 else math.nan
+
+
+@dataclass(frozen=True)
+class Beside:
+    """All quantities that one of two materials has.
+
+    Attributes
+    ----------
+    k_e_factor, reradiation_factor
+        By what k_e and Λ of the measured one were multiplied.
+    notes
+        What could not be laid side by side, and why.
+    """
+
+    names: tuple[str, str]
+    pairs: tuple[Pair, ...]
+    k_e_factor: float
+    reradiation_factor: float
+    notes: tuple[str, ...]
+
+    def table(self) -> Table:
+        """As the report and the terminal show it."""
+        return Table(
+            head=("", "measured", "reference", "apart / %", "apart / σ"),
+            rows=tuple(
+                (
+                    f"{pair.quantity} / {pair.unit}" if pair.unit else pair.quantity,
+                    _written(pair.measured, pair.sigma),
+                    _written(pair.reference, pair.reference_sigma),
+                    _signed(pair.percent),
+                    _signed(pair.in_sigma),
+                )
+                for pair in self.pairs
+            ),
+            caption=" ".join(
+                [
+                    f"k_e belongs to an irradiance of the reference's length (measured: × "
+                    f"{rounded(self.k_e_factor)})."
+                    if any(pair.quantity.startswith("k_e") for pair in self.pairs)
+                    else "",
+                    f"Λ is relative: the measured one is multiplied by "
+                    f"{rounded(self.reradiation_factor)}, by least squares over bands and states."
+                    if any(pair.quantity.startswith("Λ") for pair in self.pairs)
+                    else "",
+                    *self.notes,
+                ]
+            ).strip(),
+        )
+
+
+def beside(measured: Material, reference: Material) -> Beside:
+    """`measured` beside `reference`, state by state by falling rate, band by band."""
+    notes = []
+    ours, theirs = _by_falling_rate(measured), _by_falling_rate(reference)
+    if len(ours) != len(theirs):
+        notes.append(
+            f"{measured.name} has {len(ours)} states, {reference.name} {len(theirs)}: their rows "
+            "stand beside each other, but do not mean the same; fit as many (--states)."
+        )
+    same_bands = measured.bands_nm == reference.bands_nm
+    if not same_bands and measured.bands_nm is not None and reference.bands_nm is not None:
+        notes.append("Their bands differ, so k_e and Λ are left out.")
+    for symbol, name in (("k_e", "k_e_per_s"), ("Λ", "reradiation")):
+        if all(getattr(state, name) is None for state in ours):
+            notes.append(f"{symbol} was not measured.")
+        if all(getattr(state, name) is None for state in theirs):
+            notes.append(f"The reference has no {symbol}.")
+    k_e_factor = _k_e_factor(measured, reference)
+    factor = _closest(ours, theirs) if same_bands else 1.0
+    pairs = []
+    for number in range(max(len(ours), len(theirs))):
+        one = ours[number] if number < len(ours) else None
+        other = theirs[number] if number < len(theirs) else None
+        label = f" {number + 1}" if max(len(ours), len(theirs)) > 1 else ""
+        pairs += _pairs(one, other, label, "k_r", "s⁻¹", "k_r_per_s")
+        pairs += _pairs(one, other, label, "r(0)", "", "r0")
+        if same_bands and measured.bands_nm is not None:
+            bands = measured.bands_nm
+            pairs += _pairs(one, other, label, "k_e", "s⁻¹", "k_e_per_s", bands, k_e_factor)
+            pairs += _pairs(one, other, label, "Λ", "", "reradiation", bands, factor)
+    return Beside((measured.name, reference.name), tuple(pairs), k_e_factor, factor, tuple(notes))
+
+
+def _by_falling_rate(material: Material) -> Sequence[State]:
+    return sorted(material.states, key=lambda state: -state.k_r_per_s)
+
+
+def _k_e_factor(measured: Material, reference: Material) -> float:
+    """κ = Σ k_e E stays what it is if E is made longer and k_e smaller."""
+    if measured.irradiance_norm is None or reference.irradiance_norm is None:
+        return 1.0
+    return measured.irradiance_norm.value / reference.irradiance_norm.value
+
+
+def _closest(ours: Sequence[State], theirs: Sequence[State]) -> float:
+    """The c for which Σ (c Λ − Λ')² over states and bands is least; 1 without any."""
+    both = [
+        (np.array(one.reradiation), np.array(other.reradiation))
+        for one, other in zip(ours, theirs, strict=False)
+        if one.reradiation is not None and other.reradiation is not None
+    ]
+    square = sum(float(one @ one) for one, _ in both)
+    product = sum(float(one @ other) for one, other in both)
+    return product / square if square > 0 and product > 0 else 1.0
+
+
+def _pairs(
+    one: State | None,
+    other: State | None,
+    label: str,
+    symbol: str,
+    unit: str,
+    name: str,
+    bands: Sequence[float] = (),
+    factor: float = 1.0,
+) -> list[Pair]:
+    """The quantity `name` of two states, one pair or one for each band; none if neither has it."""
+    value, sigma = _values(one, name)
+    reference, reference_sigma = _values(other, name)
+    if value is None and reference is None:
+        return []
+    count = len(value if value is not None else reference if reference is not None else ())
+    nothing = np.full(count, math.nan)
+    places = [f" {low:g}–{high:g} nm" for low, high in pairwise(bands)] or [""]
+    columns = [
+        nothing if column is None else column * scale
+        for column, scale in (
+            (value, factor),
+            (sigma, factor),
+            (reference, 1),
+            (reference_sigma, 1),
+        )
+    ]
+    return [
+        Pair(f"{symbol}{label}{place}", unit, *map(float, numbers))
+        for place, *numbers in zip(places, *columns, strict=True)
+    ]
+
+
+def _values(state: State | None, name: str) -> tuple[FloatArray | None, FloatArray | None]:
+    """Value and σ of a quantity of `state`, (1,) or (bands,), None where not known."""
+    found = (getattr(state, name, None), getattr(state, f"{name}_sigma", None))
+    value, sigma = (None if one is None else np.atleast_1d(np.array(one, float)) for one in found)
+    return value, sigma
+
+
+def _or_zero(sigma: float) -> float:
+    return 0.0 if math.isnan(sigma) else sigma
+
+
+def _written(value: float, sigma: float) -> str:
+    if math.isnan(value):
+        return UNKNOWN
+    return rounded(value) if math.isnan(sigma) else plus_minus(value, sigma)
+
+
+def _signed(number: float) -> str:
+    if not math.isfinite(number):
+        return UNKNOWN
+    text = f"{number:+.1f}"
+    return "0.0" if float(text) == 0 else text.replace("-", "−")

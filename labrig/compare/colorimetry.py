@@ -1,0 +1,140 @@
+"""CIELAB with a stated white, and differences in it (colour-science)."""
+
+from dataclasses import dataclass
+from typing import Literal, get_args
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import UsageError
+from labrig.optics import CameraResponse
+from labrig.report.colours import camera_to_xyz
+from labrig.yaml_file import did_you_mean
+
+FloatArray = NDArray[np.float64]
+
+CIE_1931 = "CIE 1931 2 Degree Standard Observer"
+CIE_2015 = "CIE 2015 2 Degree Standard Observer"
+#: The white of the screens on which such comparisons are looked at.
+DEFAULT_WHITE = "D65"
+
+#: `all`: one factor for all photographs of a patch, as one exposure shows them; `each`: one factor
+#: for every photograph, as if each was exposed anew.
+Normalisation = Literal["all", "each"]
+
+
+@dataclass(frozen=True, eq=False)
+class Observer:
+    """x̄, ȳ, z̄, shape (n, 3), at (n,) wavelengths 1 nm apart."""
+
+    name: str
+    wavelength_nm: FloatArray
+    functions: FloatArray
+
+
+def observer(name: str) -> Observer:
+    """One of colour-science's observers."""
+    import colour  # takes seconds to load
+
+    table = colour.MSDS_CMFS[name]
+    return Observer(name, np.asarray(table.wavelengths), np.asarray(table.values))
+
+
+def white_xyz(name: str, seen_by: Observer) -> FloatArray:
+    """X, Y, Z of an illuminant such as `D65`, Y = 1.
+
+    Raises
+    ------
+    UsageError
+        There is no such illuminant.
+    """
+    import colour
+
+    known = {key: key for key in colour.SDS_ILLUMINANTS if "_" not in key}
+    if name not in known:
+        raise UsageError(
+            f"--white: expected the name of a CIE illuminant, got '{name}'; "
+            f"{did_you_mean(name, list(known))}"
+        )
+    light = colour.SDS_ILLUMINANTS[name]
+    power = np.interp(seen_by.wavelength_nm, light.wavelengths, light.values, left=0.0, right=0.0)
+    xyz = power @ seen_by.functions
+    return np.asarray(xyz / xyz[1])
+
+
+def lab(xyz: FloatArray, white: FloatArray) -> FloatArray:
+    """CIELAB of X, Y, Z, shape (…, 3), on the scale on which `white` has Y = 1."""
+    import colour
+
+    return np.asarray(colour.XYZ_to_Lab(xyz, colour.XYZ_to_xy(white)))
+
+
+def delta_e(one: FloatArray, other: FloatArray) -> FloatArray:
+    """CIEDE2000 (Sharma, Wu, Dalal 2005) of two CIELAB arrays, shape (…, 3) to (…)."""
+    import colour
+
+    return np.asarray(colour.difference.delta_E_CIE2000(one, other))
+
+
+@dataclass(frozen=True, eq=False)
+class Viewing:
+    """How a camera's linear raw values become CIELAB.
+
+    Parameters
+    ----------
+    to_xyz
+        Shape (3, 3), from R, G, B to relative X, Y, Z.
+    white
+        Shape (3,), Y = 1.
+    normalisation
+        See `Normalisation`.
+    words
+        All of that as a person reads it.
+    """
+
+    to_xyz: FloatArray
+    white: FloatArray
+    normalisation: Normalisation
+    words: str
+
+
+def viewing(
+    camera: CameraResponse | None,
+    white: str = DEFAULT_WHITE,
+    normalisation: str = "all",
+) -> Viewing:
+    """By the curves of a camera; without any, its R, G, B are taken for linear sRGB.
+
+    Raises
+    ------
+    UsageError
+        No such white or normalisation.
+    """
+    import colour
+
+    if normalisation not in get_args(Normalisation):
+        raise UsageError(f"--normalise: expected 'all' or 'each', got '{normalisation}'")
+    each = normalisation == "each"
+    if camera is None:
+        to_xyz = np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ)
+        how = "raw R, G, B taken for linear sRGB, since the camera's curves are not known"
+    else:
+        to_xyz = camera_to_xyz(camera)
+        how = (
+            f"raw R, G, B to X, Y, Z by the best 3 × 3 matrix for the curves of {camera.name} "
+            "(least squares over all wavelengths, equal energy exact)"
+        )
+    factor = (
+        "every photograph has a factor of its own, by which it"
+        if each
+        else ("all photographs of a patch have one factor, by which the brightest")
+    )
+    return Viewing(
+        to_xyz=to_xyz,
+        white=white_xyz(white, observer(CIE_1931)),
+        normalisation="each" if each else "all",
+        words=(
+            f"CIELAB with white {white} of the CIE 1931 2° observer; {how}; {factor} just reaches "
+            "the white in X, Y or Z; the predictions have the same factor."
+        ),
+    )

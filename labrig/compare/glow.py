@@ -1,0 +1,173 @@
+"""Predicted against photographed glow over time (Nalbach et al., fig. 8)."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.compare.colorimetry import FloatArray, Viewing, delta_e, lab
+from labrig.compare.paper import DELTA_E
+from labrig.errors import DataError
+from labrig.reduce import Series
+from labrig.report.fitted_curve import middles_s
+from labrig.report.sections import Table
+
+RGB = ("R", "G", "B")
+#: Photographs drawn anew to tell what their noise alone makes.
+DRAWS = 64
+#: A photograph must stand out of its noise by so much.
+LEAST_FOR_COLOUR = 5.0
+
+
+@dataclass(frozen=True, eq=False)
+class GlowComparison:
+    """One patch over n photographs, p predictions.
+
+    Attributes
+    ----------
+    t_s
+        Shape (n,), rising: middles of the exposures after lamp off.
+    first, seen
+        Shape (n,): photographs of the first decay, where there are several; those bright enough to
+        have a colour.
+    photographed, predicted
+        X, Y, Z as normalised, shape (n, 3) and by name (n, 3).
+    delta_e
+        CIEDE2000 by name, shape (n,); NaN where there is no colour.
+    noise
+        Mean CIEDE2000 that noise alone makes, were the nearest prediction true; NaN if the noise
+        is not known.
+    """
+
+    patch: str
+    t_s: FloatArray
+    first: NDArray[np.bool_]
+    seen: NDArray[np.bool_]
+    photographed: FloatArray
+    predicted: Mapping[str, FloatArray]
+    delta_e: Mapping[str, FloatArray]
+    noise: float
+
+    def mean(self, name: str) -> float:
+        """Over all photographs."""
+        return float(np.nanmean(self.delta_e[name]))
+
+    def most(self, name: str) -> float:
+        """Over all photographs."""
+        return float(np.nanmax(self.delta_e[name]))
+
+
+def predicted_by(n_states: int) -> str:
+    """What the prediction of a fit with so many states is called."""
+    return "1 state" if n_states == 1 else f"{n_states} states"
+
+
+def compare_glow(
+    series: Series, predicted: Mapping[str, FloatArray], viewing: Viewing, flicker: float = 0.0
+) -> GlowComparison:
+    """Photographs as in `series` against what was `predicted` for each of them.
+
+    Parameters
+    ----------
+    series
+        R, G, B of usable photographs, rows by rising time.
+    predicted
+        By name, one or more, shape (n, 3): the mean over each exposure, in the unit of the series.
+    flicker
+        Relative noise that all channels of a photograph share.
+
+    Raises
+    ------
+    DataError
+        Other channels than R, G, B, or nothing but darkness.
+    """
+    if series.channels != RGB:
+        raise DataError(
+            f"{series.region}: expected a camera with R, G, B, got {', '.join(series.channels)}; "
+            "there is no colour to compare"
+        )
+    xyz = series.values @ viewing.to_xyz.T
+    scale = _scale(series, xyz, viewing)
+    own = lab(scale * xyz, viewing.white)
+    normalised = {name: scale * (one @ viewing.to_xyz.T) for name, one in predicted.items()}
+    apart = {name: delta_e(own, lab(one, viewing.white)) for name, one in normalised.items()}
+    seen = _seen(series)
+    nearest = min(apart, key=lambda name: float(apart[name][seen].mean()))
+    unit = np.array(series.unit)
+    return GlowComparison(
+        patch=series.region,
+        t_s=middles_s(series),
+        first=unit == unit[0],
+        seen=seen,
+        photographed=scale * xyz,
+        predicted=normalised,
+        delta_e={name: np.where(seen, one, np.nan) for name, one in apart.items()},
+        noise=_noise(series, predicted[nearest], scale, viewing, flicker),
+    )
+
+
+def _seen(series: Series) -> NDArray[np.bool_]:
+    """Photographs that are bright enough to have a colour; without a known σ all are."""
+    with np.errstate(invalid="ignore"):
+        signal_to_noise = np.linalg.norm(series.values / series.sigma, axis=1)
+    return np.asarray(~(signal_to_noise < LEAST_FOR_COLOUR))
+
+
+def _scale(series: Series, xyz: FloatArray, viewing: Viewing) -> FloatArray:
+    """By what X, Y, Z of each photograph are multiplied, shape (n, 1)."""
+    reach = (xyz / viewing.white).max(axis=1)
+    brightest = float(reach[_seen(series)].max(initial=0.0))
+    if not brightest > 0:
+        raise DataError(f"{series.region}: every photograph is too dim to have a colour")
+    own = np.maximum(reach, np.finfo(float).eps * brightest)
+    factor = own if viewing.normalisation == "each" else np.full_like(reach, brightest)
+    return np.asarray(1 / factor[:, np.newaxis])
+
+
+def _noise(
+    series: Series, expected: FloatArray, scale: FloatArray, viewing: Viewing, flicker: float
+) -> float:
+    """Mean CIEDE2000 between what is expected and photographs of exactly that."""
+    if not np.isfinite(series.sigma).all():
+        return float("nan")
+    rng = np.random.default_rng(0)
+    shape = (DRAWS, len(expected))
+    drawn = expected * (1 + flicker * rng.standard_normal((*shape, 1)))
+    drawn = drawn + series.sigma * rng.standard_normal((*shape, 3))
+    of_drawn = lab(scale * (drawn @ viewing.to_xyz.T), viewing.white)
+    of_expected = lab(scale * (expected @ viewing.to_xyz.T), viewing.white)
+    return float(delta_e(of_drawn, of_expected[np.newaxis])[:, _seen(series)].mean())
+
+
+def glow_table(glows: Sequence[GlowComparison]) -> Table:
+    """ΔE of every patch, of all of them, and the paper's."""
+    names = list(dict.fromkeys(name for glow in glows for name in glow.delta_e))
+    rows = [
+        (
+            glow.patch,
+            *(_mean_and_most([glow], name) for name in names),
+            "–" if np.isnan(glow.noise) else f"{glow.noise:.2f}",
+        )
+        for glow in glows
+    ]
+    if len(glows) > 1:
+        rows.append(("all patches", *(_mean_and_most(glows, name) for name in names), ""))
+    of_paper = {predicted_by(n): f"{d.mean:.2f} ({d.most:.2f})" for n, d in DELTA_E.items()}
+    rows.append(("paper, 11 materials", *(of_paper.get(name, "–") for name in names), ""))
+    return Table(
+        head=("patch", *names, "noise"),
+        rows=tuple(rows),
+        caption="CIEDE2000 of photographed and predicted glow, mean over all times and, in "
+        "brackets, the largest; noise: the mean that the photographs' noise alone makes. "
+        f"Photographs that stand out of their noise by less than {LEAST_FOR_COLOUR:g} σ are left "
+        "out. The paper does not say which white and normalisation its figures belong to.",
+    )
+
+
+def _mean_and_most(glows: Sequence[GlowComparison], name: str) -> str:
+    known = [glow.delta_e[name] for glow in glows if name in glow.delta_e]
+    if not known:
+        return "–"
+    together = np.concatenate(known)
+    return f"{np.nanmean(together):.2f} ({np.nanmax(together):.2f})"

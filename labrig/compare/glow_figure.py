@@ -1,0 +1,121 @@
+"""Photographed and predicted glow as colour patches over time, as the paper's fig. 8 has them."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.patches import Rectangle
+from numpy.typing import NDArray
+
+from labrig.compare.colorimetry import FloatArray
+from labrig.compare.glow import GlowComparison
+from labrig.report.colours import css_colour, into_gamut
+from labrig.report.figure_style import (
+    EDGE_PT,
+    FONT_PT,
+    INK,
+    MUTED,
+    SMALL_PT,
+    WIDTH_PT,
+    new_figure,
+)
+from labrig.report.written_numbers import rounded
+
+#: Photographs side by side, and how their times are spread: dense where the glow changes most.
+COLUMNS = 9
+SPREAD = 1.6
+WRITING_PT = 8.5
+LABELS_PT, CELL_HEIGHT_PT = 74.0, 24.0
+TITLE_PT, TIMES_PT, GAP_PT = 20.0, 16.0, 8.0
+#: Luminance from which black writing has more contrast than white.
+BRIGHT = 0.18
+
+
+def glow_figure(glows: Sequence[GlowComparison]) -> Figure:
+    """A block for each patch: photographs above, predictions below with their ΔE."""
+    times = [tuple(glow.t_s[shown_rows(glow)]) for glow in glows]
+    # Patches of one run were mostly photographed together: their times stand once.
+    timed = [one != after for one, after in zip(times, [*times[1:], ()], strict=True)]
+    tops = np.cumsum([0.0, *(_height(*one) for one in zip(glows, timed, strict=True))])
+    height = float(tops[-1]) + TIMES_PT
+    figure = new_figure(height)
+    axes = figure.add_axes((0, 0, 1, 1))
+    axes.set(xlim=(0, WIDTH_PT), ylim=(height, 0))
+    axes.axis("off")
+    for glow, top, with_times in zip(glows, tops, timed, strict=False):
+        _block(axes, glow, float(top), with_times)
+    centre = LABELS_PT + (WIDTH_PT - LABELS_PT) / 2
+    axes.text(centre, height - EDGE_PT, "Time after lamp off / s", ha="center", color=INK)
+    return figure
+
+
+def shown_rows(glow: GlowComparison) -> NDArray[np.intp]:
+    """Photographs of the first decay, more of the early ones."""
+    rows = np.flatnonzero(glow.first)
+    if len(rows) <= COLUMNS:
+        return rows
+    shares = np.linspace(0, 1, COLUMNS) ** SPREAD
+    return np.asarray(rows[np.unique(np.rint(shares * (len(rows) - 1)).astype(int))])
+
+
+def screen_colours(glow: GlowComparison) -> dict[str, FloatArray]:
+    """Linear sRGB, (n, 3) each; the brightest photograph just fills the screen.
+
+    Photographs of nothing but noise are black.
+    """
+    import colour
+
+    matrix = np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB)
+    photographed = into_gamut(glow.photographed @ matrix.T) * glow.seen[:, np.newaxis]
+    full = max(float(photographed.max()), 1e-12)
+    strips = {"photograph": photographed / full}
+    for name, xyz in glow.predicted.items():
+        strips[name] = into_gamut(xyz @ matrix.T) / full
+    return strips
+
+
+def _height(glow: GlowComparison, with_times: bool) -> float:
+    below = TIMES_PT if with_times else GAP_PT
+    return TITLE_PT + (1 + len(glow.predicted)) * CELL_HEIGHT_PT + below
+
+
+def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> None:
+    rows = shown_rows(glow)
+    width = (WIDTH_PT - LABELS_PT - EDGE_PT) / max(len(rows), 1)
+    means = ", ".join(f"{name} {glow.mean(name):.2f}" for name in glow.predicted)
+    axes.text(EDGE_PT, top + 14, glow.patch, color=INK, fontsize=FONT_PT, weight="bold")
+    axes.text(WIDTH_PT - EDGE_PT, top + 14, f"mean ΔE: {means}", ha="right", color=MUTED,
+              fontsize=SMALL_PT)  # fmt: skip
+    y = top + TITLE_PT
+    for name, strip in screen_colours(glow).items():
+        axes.text(LABELS_PT - 6, y + CELL_HEIGHT_PT / 2, name, ha="right", va="center", color=INK,
+                  fontsize=SMALL_PT)  # fmt: skip
+        for column, row in enumerate(rows):
+            x = LABELS_PT + column * width
+            colour = strip[row]
+            axes.add_patch(
+                Rectangle((x, y), width, CELL_HEIGHT_PT, color=css_colour(colour), linewidth=0)
+            )
+            if name in glow.delta_e:
+                axes.text(
+                    x + width / 2,
+                    y + CELL_HEIGHT_PT / 2,
+                    _written(float(glow.delta_e[name][row])),
+                    ha="center",
+                    va="center",
+                    fontsize=WRITING_PT,
+                    color="#000000" if _luminance(colour) > BRIGHT else "#ffffff",
+                )
+        y += CELL_HEIGHT_PT
+    for column, row in enumerate(rows if with_times else ()):
+        axes.text(LABELS_PT + (column + 0.5) * width, y + 12, rounded(float(glow.t_s[row]), 3),
+                  ha="center", color=MUTED, fontsize=SMALL_PT)  # fmt: skip
+
+
+def _written(delta_e: float) -> str:
+    return "–" if np.isnan(delta_e) else f"{delta_e:.1f}"
+
+
+def _luminance(linear: FloatArray) -> float:
+    return float(np.clip(linear, 0, 1) @ (0.2126, 0.7152, 0.0722))

@@ -1,0 +1,70 @@
+"""A comparison as plain numbers, for programs."""
+
+import math
+from typing import Any
+
+from labrig.compare.run import RunComparison
+
+
+def numbers(comparison: RunComparison) -> dict[str, Any]:
+    """Lists, dictionaries, texts and finite numbers; what is not known is None."""
+    found: dict[str, Any] = _plain(
+        {
+            "words": comparison.words,
+            "camera": comparison.camera.name if comparison.camera else None,
+            "white": comparison.white,
+            "left_out": list(comparison.left_out),
+            "glow": {
+                glow.patch: {
+                    "t_s": glow.t_s.tolist(),
+                    "noise": glow.noise,
+                    "delta_e": {name: values.tolist() for name, values in glow.delta_e.items()},
+                    "mean": {name: glow.mean(name) for name in glow.delta_e},
+                    "max": {name: glow.most(name) for name in glow.delta_e},
+                }
+                for glow in comparison.glows
+            },
+            "residuals": [
+                {"patch": one.patch, "weights": one.weighted, "rms": one.rms, "last": one.last}
+                for one in comparison.residuals
+            ],
+            "beside": [
+                {
+                    "measured": one.names[0],
+                    "reference": one.names[1],
+                    "k_e_factor": one.k_e_factor,
+                    "reradiation_factor": one.reradiation_factor,
+                    "rows": [
+                        {
+                            "quantity": pair.quantity,
+                            "unit": pair.unit,
+                            "measured": pair.measured,
+                            "sigma": pair.sigma,
+                            "reference": pair.reference,
+                            "percent": pair.percent,
+                            "in_sigma": pair.in_sigma,
+                        }
+                        for pair in one.pairs
+                    ],
+                    "notes": list(one.notes),
+                }
+                for one in comparison.beside
+            ],
+            "spectra": {
+                one.name: {"delta_e": one.delta_e, "missed": one.missed, "known_on": grid}
+                for one, grid in comparison.spectra
+            },
+        }
+    )
+    return found
+
+
+def _plain(item: Any) -> Any:
+    """JSON knows no infinity and no NaN, and keys are texts."""
+    if isinstance(item, dict):
+        return {str(key): _plain(value) for key, value in item.items()}
+    if isinstance(item, list):
+        return [_plain(value) for value in item]
+    if isinstance(item, float) and not math.isfinite(item):
+        return None
+    return item

@@ -1,0 +1,145 @@
+"""What two and three states leave of a decay that one state leaves (Nalbach et al., sec. 4.4)."""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.compare.colorimetry import FloatArray
+from labrig.compare.paper import LAST_RESIDUALS, RESIDUALS
+from labrig.errors import FitError
+from labrig.fit import DecayFit, fit_decay
+from labrig.reduce import Series
+from labrig.report.sections import Table
+
+#: A fit to a series: so many states, and so much flicker.
+Refit = Callable[[Series, int, float], DecayFit]
+STATES = (1, 2, 3)
+
+
+@dataclass(frozen=True)
+class Residuals:
+    """Errors with n states over those with one, by n.
+
+    Attributes
+    ----------
+    weighted
+        How the values were weighted in the fit.
+    rms
+        Root mean square over all frames and channels.
+    last
+        The same of the last frame alone.
+    supported
+        How many states came out where n were asked for.
+    """
+
+    patch: str
+    weighted: str
+    rms: Mapping[int, float]
+    last: Mapping[int, float]
+    supported: Mapping[int, int]
+
+
+def residuals(series: Series, fits: Mapping[int, DecayFit], weighted: str) -> Residuals:
+    """Of fits to `series` by their number of states, as `fits_by_states` has them."""
+    left = {number: series.values - predicted(series, fit) for number, fit in fits.items()}
+    last = int(np.argmax(series.t_s))
+    return Residuals(
+        patch=series.region,
+        weighted=weighted,
+        rms=_over_one_state(left),
+        last=_over_one_state({number: one[last] for number, one in left.items()}),
+        supported={number: fit.n_states for number, fit in fits.items()},
+    )
+
+
+def predicted(series: Series, fit: DecayFit) -> FloatArray:
+    """What `fit` says of every row of its series, (n, C), each repeat at its own level."""
+    levels = dict(zip(fit.repeats, fit.levels, strict=True))
+    level = np.array([levels.get(unit, 1.0) for unit in series.unit])
+    signal = fit.predict(series.t_s, series.exposure_s) - fit.offsets
+    return np.asarray(level[:, np.newaxis] * signal + fit.offsets)
+
+
+def fits_by_states(series: Series, flicker: float, refit: Refit) -> dict[int, DecayFit]:
+    """Fits of one, two, three states; where one more cannot be told, the fit of one less.
+
+    Raises
+    ------
+    FitError
+        Not even one state can be fitted.
+    """
+    fits = {1: refit(series, 1, flicker)}
+    for number in STATES[1:]:
+        try:
+            fits[number] = refit(series, number, flicker)
+        except FitError:
+            fits[number] = fits[number - 1]
+    return fits
+
+
+def equally_weighted(series: Series, n_states: int, flicker: float = 0.0) -> DecayFit:
+    """A fit as the paper's: plain least squares of the linear values."""
+    known = series.sigma[np.isfinite(series.sigma)]
+    sigma = float(np.median(known)) if known.size else 1e-3 * float(np.abs(series.values).max())
+    return fit_decay(
+        series.t_s,
+        series.values,
+        sigma,
+        exposure_s=series.exposure_s,
+        channels=series.channels,
+        n_states=n_states,
+        flicker=flicker,
+        repeats=series.unit,
+    )
+
+
+def residuals_table(found: Sequence[Residuals]) -> Table:
+    """A row for each patch and way of weighting, their medians, and the paper's figures."""
+    ways = list(dict.fromkeys(one.weighted for one in found))
+    rows = [
+        (one.patch, one.weighted, *_percents(one.rms), *_percents(one.last), _more_states(one))
+        for one in found
+    ]
+    for way in ways:
+        same = [one for one in found if one.weighted == way]
+        if len(same) > 1:
+            rms, last = (
+                {n: float(np.median([getattr(one, what)[n] for one in same])) for n in STATES}
+                for what in ("rms", "last")
+            )
+            rows.append(("median", way, *_percents(rms), *_percents(last), ""))
+    rows.append(
+        ("paper, median of 11", "equal", *_percents(RESIDUALS), *_percents(LAST_RESIDUALS), "")
+    )
+    return Table(
+        head=(
+            "patch",
+            "weights",
+            "2 / %",
+            "3 / %",
+            "last, 2 / %",
+            "last, 3 / %",
+            "found",
+        ),
+        rows=tuple(rows),
+        caption="RMS error with 2 and with 3 states over that with 1, in linear camera values: "
+        "over all frames and channels, and of the last frame alone. Weights: by the noise of each "
+        "value, as everywhere in labrig, or equal, as in the paper. Noise that no state can "
+        "describe is in all of them, so the ratios stay above 0; where the data support no further "
+        "state (found: how many came out of 1, 2 and 3) they stay at those of fewer.",
+    )
+
+
+def _over_one_state(left: Mapping[int, FloatArray]) -> dict[int, float]:
+    """RMS by the number of states, over that with one; 1 where that one is 0 already."""
+    rms = {number: float(np.sqrt(np.mean(one**2))) for number, one in left.items()}
+    return {number: one / rms[1] if rms[1] > 0 else 1.0 for number, one in rms.items()}
+
+
+def _percents(ratios: Mapping[int, float]) -> tuple[str, ...]:
+    return tuple(f"{100 * ratios[number]:.3g}" for number in STATES[1:])
+
+
+def _more_states(one: Residuals) -> str:
+    return ", ".join(str(number) for number in one.supported.values())

@@ -1,0 +1,97 @@
+"""What a run's result says of each patch, read back from its files."""
+
+import json
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from pathlib import Path
+
+import numpy as np
+
+from labrig.errors import DataError, UsageError
+from labrig.material import Material, read_material
+from labrig.reduce import Series, read_series
+from labrig.yaml_file import read_yaml
+
+
+@dataclass(frozen=True, eq=False)
+class MeasuredPatch:
+    """What a result folder holds of one patch.
+
+    Attributes
+    ----------
+    series
+        Usable frames by time, the offsets that the fit found subtracted.
+    flicker
+        As the fit found it.
+    material
+        Its file.
+    """
+
+    series: Series
+    flicker: float
+    material: Material
+
+    @property
+    def name(self) -> str:
+        """Of the patch, or of the sample if there is only one."""
+        return self.series.region
+
+
+def read_patches(run: Path) -> dict[str, MeasuredPatch]:
+    """By name: every patch with a decay fit in a run's latest result.
+
+    Raises
+    ------
+    UsageError
+        Not a run folder.
+    DataError
+        There is no result with a fit, or it is damaged.
+    """
+    if not (run / "protocol.yaml").is_file():
+        raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
+    fits = sorted((run / "result").rglob("fit.json"))
+    places = [fit.parent for fit in fits if (fit.parent / "series.csv").is_file()]
+    if not places:
+        raise DataError(
+            f"{run}: expected a result with the fit of a decay, got none; make one: "
+            f"labrig process {run}"
+        )
+    sample = read_yaml(run / "protocol.yaml").get("sample")
+    only = sample.get("name") if isinstance(sample, dict) and len(places) == 1 else None
+    patches = [_read_patch(place, only) for place in places]
+    return {patch.name: patch for patch in patches}
+
+
+def _read_patch(place: Path, name: str | None) -> MeasuredPatch:
+    path = place / "fit.json"
+    try:
+        fit = json.loads(path.read_text(encoding="utf-8"))
+        series = _joined(read_series(place / "series.csv"))
+        offsets = np.array([float(fit["offsets"][channel]) for channel in series.channels])
+        flicker = float(fit["flicker"])
+    except (ValueError, KeyError, TypeError) as error:
+        raise DataError(
+            f"{path}: expected a fit as labrig writes it, got something else ({error!r}); make it "
+            "again: labrig process"
+        ) from None
+    rows = np.flatnonzero(series.usable)
+    by_time = rows[np.argsort(series.t_s[rows], kind="stable")]
+    usable = series.take(by_time, name)
+    material = read_material(place / "material.yaml")
+    return MeasuredPatch(replace(usable, values=usable.values - offsets), flicker, material)
+
+
+def _joined(parts: Sequence[Series]) -> Series:
+    """All units of one series.csv."""
+    return replace(
+        parts[0],
+        t_s=np.concatenate([part.t_s for part in parts]),
+        exposure_s=np.concatenate([part.exposure_s for part in parts]),
+        values=np.concatenate([part.values for part in parts]),
+        sigma=np.concatenate([part.sigma for part in parts]),
+        iso=np.concatenate([part.iso for part in parts]),
+        f_number=np.concatenate([part.f_number for part in parts]),
+        frame=tuple(frame for part in parts for frame in part.frame),
+        unit=tuple(unit for part in parts for unit in part.unit),
+        flag=tuple(flag for part in parts for flag in part.flag),
+    )

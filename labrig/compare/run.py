@@ -1,0 +1,203 @@
+"""A decay run held against predictions, against other materials and against the paper."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+from labrig.acquire import read_rig_file
+from labrig.compare.beside import Beside, beside
+from labrig.compare.colorimetry import DEFAULT_WHITE, FloatArray, viewing
+from labrig.compare.emission import emission, emission_grid
+from labrig.compare.glow import GlowComparison, compare_glow, predicted_by
+from labrig.compare.material_glow import glow_of, in_colour
+from labrig.compare.paper import TABLE_1
+from labrig.compare.residuals import (
+    Refit,
+    Residuals,
+    equally_weighted,
+    fits_by_states,
+    predicted,
+    residuals,
+)
+from labrig.compare.result import MeasuredPatch, read_patches
+from labrig.compare.three_channels import ThreeChannels, three_channels
+from labrig.errors import DataError, UsageError
+from labrig.fit import DecayFit
+from labrig.material import Material, read_material
+from labrig.optics import CameraResponse, read_camera
+from labrig.yaml_file import did_you_mean
+
+#: Numbers of states of which the glow is predicted, as in the paper's fig. 8.
+PREDICTED = (1, 2)
+#: Name of the prediction by the material file asked for.
+MATERIAL = "material"
+
+
+@dataclass(frozen=True, eq=False)
+class RunComparison:
+    """All that was compared of one run.
+
+    Attributes
+    ----------
+    camera, white
+        By whose curves colours are seen (None: not known), and with which white.
+    words
+        White, normalisation and where the predicted colours come from.
+    spectra
+        Of what the patches emit as far as it is known, of the materials asked for and of Table 1,
+        each with the grid it is known on.
+    left_out
+        What could not be compared, and why.
+    """
+
+    camera: CameraResponse | None
+    white: str
+    words: str
+    glows: tuple[GlowComparison, ...]
+    residuals: tuple[Residuals, ...]
+    beside: tuple[Beside, ...]
+    spectra: tuple[tuple[ThreeChannels, str], ...]
+    left_out: tuple[str, ...]
+
+
+def compare_run(
+    folder: Path,
+    refit: Refit,
+    materials: Sequence[str] = (),
+    white: str = DEFAULT_WHITE,
+    normalisation: str = "all",
+    camera: str | None = None,
+) -> RunComparison:
+    """Compare the latest result of the decay run in `folder`.
+
+    Parameters
+    ----------
+    refit
+        Fits a series with a number of states and a given flicker, as the run's processing does.
+    materials
+        `MATERIAL` or `PATCH=MATERIAL`: shipped names or files.
+    white, normalisation
+        See `viewing`.
+    camera
+        Other curves than the rig file names.
+
+    Raises
+    ------
+    UsageError
+        Not a run, or a patch, material, white or camera that there is not.
+    DataError
+        There is no result, or it is damaged.
+    """
+    patches = read_patches(folder)
+    references = _by_patch(materials, list(patches))
+    curves, left_out = _camera(folder, camera)
+    seen = viewing(curves, white, normalisation)
+    glows: list[GlowComparison] = []
+    ratios: list[Residuals] = []
+    for patch in patches.values():
+        try:
+            fits = fits_by_states(patch.series, patch.flicker, refit)
+            equal = fits_by_states(patch.series, 0.0, equally_weighted)
+            ratios.append(residuals(patch.series, fits, "noise"))
+            ratios.append(residuals(patch.series, equal, "equal"))
+            expected = _expected(patch, fits, references.get(patch.name), curves)
+            glows.append(compare_glow(patch.series, expected, seen, patch.flicker))
+        except DataError as error:
+            left_out.append(f"{patch.name} is left out: {error}")
+    return RunComparison(
+        camera=curves,
+        white=white,
+        words=" ".join([seen.words, *_whence(list(patches.values()), curves, bool(references))]),
+        glows=tuple(glows),
+        residuals=tuple(ratios),
+        beside=tuple(beside(patches[name].material, one) for name, one in references.items()),
+        spectra=() if curves is None else _spectra(patches, references, curves, white),
+        left_out=tuple(left_out),
+    )
+
+
+def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Material]:
+    """Materials by patch; without one, the patch of the same name or the only one."""
+    found: dict[str, Material] = {}
+    for text in materials:
+        named, _, name = text.rpartition("=")
+        patch = named or (name if name in patches or len(patches) > 1 else patches[0])
+        if patch not in patches:
+            raise UsageError(
+                f"--material: no patch is called '{patch}'; {did_you_mean(patch, patches)}; write "
+                f"--material PATCH={name}"
+            )
+        if patch in found:
+            raise UsageError(f"--material: expected one material for {patch}, got two")
+        found[patch] = read_material(name)
+    return found
+
+
+def _camera(folder: Path, instead: str | None) -> tuple[CameraResponse | None, list[str]]:
+    """The curves asked for or the rig's, and why there are none."""
+    named = instead or read_rig_file(folder / "rig.yaml").optics.camera
+    if named is None:
+        return None, ["no camera curves: the rig file names none; give them with --camera"]
+    try:
+        return read_camera(named), []
+    except UsageError as error:
+        if instead is not None:
+            raise
+        return None, [f"no camera curves: {error}"]
+
+
+def _expected(
+    patch: MeasuredPatch,
+    fits: Mapping[int, DecayFit],
+    reference: Material | None,
+    camera: CameraResponse | None,
+) -> dict[str, FloatArray]:
+    """What is predicted for each photograph, (n, C), by the name of the prediction."""
+    series, spectrum = patch.series, emission(patch.material)
+    expected = {}
+    for number in PREDICTED:
+        values = predicted(series, fits[number])
+        if spectrum is not None and camera is not None:
+            values = in_colour(values, spectrum, camera)
+        expected[predicted_by(number)] = values
+    if reference is not None:
+        expected[MATERIAL] = glow_of(reference, series, camera)
+    return expected
+
+
+def _whence(
+    patches: Sequence[MeasuredPatch], camera: CameraResponse | None, with_material: bool
+) -> Iterator[str]:
+    """Where the colours of the predictions come from."""
+    if camera is not None and all(emission(patch.material) for patch in patches):
+        yield "The predicted colour is that of the measured spectrum, by the camera's curves."
+    else:
+        yield "The predicted colour is the one fitted to all photographs: no spectrum was measured."
+    if with_material:
+        yield (
+            f"Prediction '{MATERIAL}': rates, shares of the states and spectrum as in the file "
+            "given, one factor by least squares."
+        )
+
+
+def _spectra(
+    patches: Mapping[str, MeasuredPatch],
+    references: Mapping[str, Material],
+    camera: CameraResponse,
+    white: str,
+) -> tuple[tuple[ThreeChannels, str], ...]:
+    """Of measured materials first; of those of the same name only the first."""
+    known: dict[str, Material] = {}
+    for material in (
+        *(patch.material for patch in patches.values()),
+        *references.values(),
+        *map(read_material, TABLE_1),
+    ):
+        if emission(material) is not None:
+            known.setdefault(material.name, material)
+    found = []
+    for material in known.values():
+        spectrum = emission(material)
+        if spectrum is not None:
+            found.append((three_channels(spectrum, camera, white), emission_grid(material)))
+    return tuple(found)

@@ -1,0 +1,45 @@
+"""A comparison as parts of a page: text, figures, tables."""
+
+from collections.abc import Iterator
+
+from labrig.compare.glow import glow_table
+from labrig.compare.glow_figure import glow_figure
+from labrig.compare.residuals import residuals_table
+from labrig.compare.run import RunComparison
+from labrig.compare.spectra_figure import spectra_figure
+from labrig.compare.three_channels import three_channels_table
+from labrig.report.figure_style import figure_style
+from labrig.report.sections import Picture, Section
+
+
+def sections(comparison: RunComparison) -> tuple[Section, ...]:
+    """In the order of the paper's figures."""
+    with figure_style():
+        return tuple(_sections(comparison))
+
+
+def _sections(comparison: RunComparison) -> Iterator[Section]:
+    if comparison.glows:
+        table = glow_table(comparison.glows)
+        shown = Picture(
+            "glow",
+            glow_figure(comparison.glows),
+            "Photographed and predicted glow; the brightest photograph just fills the screen. "
+            "Numbers are CIEDE2000 to the photograph above; a dash: too dim to have a colour.",
+        )
+        yield Section("Glow, photographed and predicted", (comparison.words,), (shown,), (table,))
+    if comparison.residuals:
+        table = residuals_table(comparison.residuals)
+        yield Section("What more states gain", tables=(table,))
+    for one in comparison.beside:
+        yield Section(f"Measured: {one.names[0]}; reference: {one.names[1]}", tables=(one.table(),))
+    if comparison.spectra and comparison.camera is not None:
+        table = three_channels_table(comparison.spectra, comparison.camera, comparison.white)
+        shown = Picture(
+            "spectra",
+            spectra_figure([one for one, _ in comparison.spectra]),
+            "Spectra relative to their maximum, and the best weighted sum of the three CIE 2015 "
+            "colour-matching functions. In the corner the colour of the spectrum and, right of "
+            "it, that from the camera's R, G, B, as far as a screen shows them; ΔE is CIEDE2000.",
+        )
+        yield Section("Spectra in three channels", figures=(shown,), tables=(table,))

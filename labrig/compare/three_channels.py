@@ -1,0 +1,112 @@
+"""How well three channels represent a spectrum (Nalbach et al., fig. 9).
+
+A camera's R, G, B and a 3 × 3 matrix see the colour of a spectrum exactly only if its curves are
+a linear transform of the observer's colour-matching functions. And the best spectrum that can be
+made of three numbers, a weighted sum of those functions, leaves out what is narrower than they are.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.compare.colorimetry import (
+    CIE_2015,
+    DEFAULT_WHITE,
+    FloatArray,
+    Observer,
+    delta_e,
+    lab,
+    observer,
+    white_xyz,
+)
+from labrig.errors import DataError
+from labrig.optics import CameraResponse, Spectrum
+from labrig.report.sections import Table
+
+
+@dataclass(frozen=True, eq=False)
+class ThreeChannels:
+    """One spectrum, and what is left of it in three channels.
+
+    Attributes
+    ----------
+    wavelength_nm
+        Shape (n,).
+    spectrum, approximation
+        Shape (n,): relative, and the best weighted sum of the colour-matching functions.
+    missed
+        RMS of their difference over that of the spectrum, 0 to 1.
+    xyz, xyz_from_rgb
+        Shape (3,): of the spectrum, and of the camera's R, G, B by the best 3 × 3; the former just
+        reaches the white in X, Y or Z.
+    delta_e
+        CIEDE2000 of the two.
+    """
+
+    name: str
+    wavelength_nm: FloatArray
+    spectrum: FloatArray
+    approximation: FloatArray
+    missed: float
+    xyz: FloatArray
+    xyz_from_rgb: FloatArray
+    delta_e: float
+
+
+def three_channels(
+    spectrum: Spectrum, camera: CameraResponse, white: str = DEFAULT_WHITE
+) -> ThreeChannels:
+    """By the CIE 2015 2° observer.
+
+    Raises
+    ------
+    DataError
+        The spectrum is dark where that observer sees.
+    UsageError
+        There is no such white.
+    """
+    eye = observer(CIE_2015)
+    at_eye = spectrum.resampled(eye.wavelength_nm).value
+    xyz = at_eye @ eye.functions
+    if not xyz.max() > 0:
+        raise DataError(f"{spectrum.name}: expected a spectrum that can be seen, got a dark one")
+    white_point = white_xyz(white, eye)
+    from_rgb = best_matrix(camera, eye) @ (at_eye @ camera.at(eye.wavelength_nm))
+    scale = 1 / float((xyz / white_point).max())
+    weights = np.linalg.lstsq(eye.functions, at_eye, rcond=None)[0]
+    approximation = eye.functions @ weights
+    left = at_eye - approximation
+    return ThreeChannels(
+        name=spectrum.name,
+        wavelength_nm=eye.wavelength_nm,
+        spectrum=at_eye,
+        approximation=approximation,
+        missed=float(np.linalg.norm(left) / np.linalg.norm(at_eye)),
+        xyz=scale * xyz,
+        xyz_from_rgb=scale * from_rgb,
+        delta_e=float(delta_e(lab(scale * xyz, white_point), lab(scale * from_rgb, white_point))),
+    )
+
+
+def best_matrix(camera: CameraResponse, eye: Observer) -> FloatArray:
+    """M, shape (3, 3), for which M · (R, G, B) is nearest to X, Y, Z over all wavelengths."""
+    fitted = np.linalg.lstsq(camera.at(eye.wavelength_nm), eye.functions, rcond=None)[0]
+    return np.asarray(fitted.T)
+
+
+def three_channels_table(
+    found: Sequence[tuple[ThreeChannels, str]], camera: CameraResponse, white: str
+) -> Table:
+    """A row for each material, with the grid on which its spectrum is known."""
+    return Table(
+        head=("material", "spectrum of", "ΔE2000 from R, G, B", "missed by three functions / %"),
+        rows=tuple(
+            (one.name, grid, f"{one.delta_e:.2f}", f"{100 * one.missed:.0f}") for one, grid in found
+        ),
+        caption="Colour from the spectrum against colour from R, G, B by the best 3 × 3 matrix for "
+        f"the curves of {camera.name} (least squares over all wavelengths); CIE 2015 2° observer, "
+        f"CIELAB with white {white}, scaled so that the spectrum's colour just reaches the white "
+        "in X, Y or Z. Missed: RMS of what the best weighted sum of the three colour-matching "
+        "functions leaves of the spectrum. A spectrum of bands is taken as constant in each.",
+    )

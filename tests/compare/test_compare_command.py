@@ -1,0 +1,140 @@
+"""`labrig compare` of a run on the simulated rig."""
+
+import contextlib
+import io
+import json
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from labrig import shipped
+from labrig.cli.ending import guarded
+from tests.conftest import Ended
+
+Labrig = Callable[..., Ended]
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """A decay of a phosphor with two states, processed."""
+    folder = tmp_path_factory.mktemp("compared")
+    rig = yaml.safe_load((shipped.folder("config") / "sim.yaml").read_text())
+    rig["simulation"] |= {
+        "sensor": {"width": 96, "height": 64},
+        "epoch": "2026-01-01T00:00:00Z",
+        "initial": {"lamp": "off"},
+        "sample": "double-wide",
+    }
+    protocol = {
+        "protocol": "decay",
+        "sample": {"name": "double-wide"},
+        "charge": "10 min",
+        "for": "90 s",
+        "repeats": 2,
+    }
+    (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
+    (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
+    quiet = io.StringIO()
+    with contextlib.redirect_stdout(quiet), contextlib.redirect_stderr(quiet):
+        code = guarded(
+            ["run", str(folder / "protocol.yaml"), "--rig", str(folder / "rig.yaml"),
+             "--runs", str(folder / "runs")]
+        )  # fmt: skip
+    assert code == 0, quiet.getvalue()
+    (found,) = (folder / "runs").iterdir()
+    return found
+
+
+def compared(labrig: Labrig, run: Path, *more: object) -> dict[str, Any]:
+    ended = labrig("compare", run, "--json", *more)
+    assert (ended.code, ended.err) == (0, "")
+    said: dict[str, Any] = json.loads(ended.out)
+    return said
+
+
+def test_two_states_are_nearer_to_the_photographs_than_one(labrig: Labrig, run: Path) -> None:
+    said = compared(labrig, run, "--material", "double-wide")
+    glow = said["glow"]["double-wide"]
+    assert glow["mean"]["1 state"] > 5 * glow["mean"]["2 states"]
+    assert glow["mean"]["2 states"] < 2 * glow["noise"]
+    assert glow["max"]["1 state"] > 5
+    # The simulated camera's curves are not quite those it is said to have.
+    assert 0.3 < glow["mean"]["material"] < 10
+    for ratios in said["residuals"]:
+        assert 0 < ratios["rms"]["2"] < 0.2
+    (table,) = said["beside"]
+    assert [row["quantity"] for row in table["rows"]] == ["k_r 1", "k_r 2"]
+    assert all(abs(row["in_sigma"]) < 5 for row in table["rows"])
+    assert len(said["spectra"]) == 12
+    for stated in ("white D65", "one factor", "EOS 5D Mark II"):
+        assert stated in said["words"]
+
+
+def test_the_white_and_normalisation_asked_for_are_used_and_said(labrig: Labrig, run: Path) -> None:
+    said = compared(labrig, run, "--white", "D50", "--normalise", "each")
+    assert "white D50" in said["words"]
+    assert "a factor of its own" in said["words"]
+    glow = said["glow"]["double-wide"]
+    assert glow["mean"] != compared(labrig, run)["glow"]["double-wide"]["mean"]
+
+
+def test_it_tells_a_person_and_draws(labrig: Labrig, run: Path, tmp_path: Path) -> None:
+    ended = labrig("compare", run, "--material", "double-wide", "--figures", tmp_path / "drawn")
+    assert (ended.code, ended.err) == (0, "")
+    for said in ("CIEDE2000", "5.46 (10.64)", "The paper does not say", "k_e was not measured"):
+        assert said in " ".join(ended.out.split())
+    drawn = sorted(path.name for path in (tmp_path / "drawn").iterdir())
+    assert drawn == ["glow.pdf", "glow.png", "spectra.pdf", "spectra.png"]
+    assert not (run / "comparison").exists()
+
+
+@pytest.mark.parametrize(
+    ("options", "code", "said"),
+    [
+        (["--white", "D66"], 2, "did you mean 'D65'?"),
+        (["--normalise", "both"], 2, "expected 'all' or 'each'"),
+        (["--material", "blue-pain"], 2, "did you mean 'blue-paint'?"),
+        (["--material", "x=blue-paint"], 2, "no patch is called 'x'"),
+        (["--camera", "kodak"], 2, "kodak"),
+    ],
+)
+def test_bad_input_is_one_clear_line(
+    labrig: Labrig, run: Path, options: list[str], code: int, said: str
+) -> None:
+    ended = labrig("compare", run, *options)
+    assert (ended.code, len(ended.err.splitlines())) == (code, 1)
+    assert said in ended.err
+
+
+def test_a_run_without_a_sound_result_is_one_clear_line(
+    labrig: Labrig, run: Path, tmp_path: Path
+) -> None:
+    assert labrig("compare", tmp_path / "nothing").code == 2
+    copy = tmp_path / "copy"
+    shutil.copytree(run, copy)
+    (copy / "result" / "fit.json").write_text('{"offsets": 3}')
+    damaged = labrig("compare", copy)
+    assert (damaged.code, len(damaged.err.splitlines())) == (4, 1)
+    assert "labrig process" in damaged.err
+    shutil.rmtree(copy / "result")
+    bare = labrig("compare", copy)
+    assert (bare.code, len(bare.err.splitlines())) == (4, 1)
+    assert "labrig process" in bare.err
+
+
+def test_without_camera_curves_it_says_so_and_does_the_rest(
+    labrig: Labrig, run: Path, tmp_path: Path
+) -> None:
+    copy = tmp_path / "copy"
+    shutil.copytree(run, copy)
+    rig = yaml.safe_load((copy / "rig.yaml").read_text())
+    del rig["optics"]
+    (copy / "rig.yaml").write_text(yaml.safe_dump(rig))
+    said = compared(labrig, copy)
+    assert "linear sRGB" in said["words"]
+    assert said["spectra"] == {}
+    assert "--camera" in said["left_out"][0]
