@@ -21,7 +21,7 @@ from labrig.errors import (
     ProtocolError,
 )
 from labrig.quantity import duration_text
-from labrig.record import RunFolder
+from labrig.record import ActionRecord, RunFolder
 from labrig.signals import interrupting
 
 #: How long a lost device is waited for: somebody has to notice and walk to the bench.
@@ -73,9 +73,12 @@ def fill(
             "labrig_version": version("labrig"),
         }
 
+        left = [action for attempt in record.attempts for action in attempt.actions if action.task]
+
         def use(rig: Rig) -> None:
             _refuse_what_spoils(rig)
             devices = rig.identities()
+            _arrange_again(left, rig, observer)
             _tell_what_was_exchanged(folder, devices, observer)
             run_units(
                 units, rig, folder, observer, {**metadata, "rig": rig.name, "devices": devices}
@@ -166,6 +169,21 @@ def _refuse_what_spoils(rig: Rig) -> None:
     ]
     if spoilers:
         raise ProtocolError("this would spoil the measurement: " + "; ".join(spoilers))
+
+
+def _arrange_again(left: Sequence[ActionRecord], rig: Rig, observer: RunObserver) -> None:
+    """What was put on the bench by hand before the run was interrupted lies there, or must again.
+
+    Hands that are a device do it all once more; a person is told what was last.
+    """
+    if left and "hands" in rig.devices:
+        for action in left:
+            rig.hands.do(action.task)
+    elif left:
+        observer.warn(
+            f"the bench has to be as it was left; last done by hand: {left[-1].action} "
+            f"({left[-1].unit})"
+        )
 
 
 def _tell_what_was_exchanged(

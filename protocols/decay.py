@@ -8,7 +8,7 @@ from collections.abc import Sequence
 from labrig.acquire import Unit
 
 from .decay_settings import DecaySettings
-from .decay_units import DarkUnit, DaylightUnit, DecayUnit, MeterUnit
+from .decay_units import METER_CHARGE_S, DarkUnit, DaylightUnit, DecayUnit, MeterUnit
 
 
 class Decay(DecaySettings):
@@ -20,8 +20,9 @@ class Decay(DecaySettings):
         if self.dark == "frames":
             units.append(DarkUnit(self))
         if isinstance(self.exposure, str):
-            units.append(MeterUnit(self))
-        units += [DecayUnit(self, number) for number in range(1, self.repeats + 1)]
+            longest_s = self.charge if isinstance(self.charge, float) else METER_CHARGE_S
+            units.append(MeterUnit(self, longest_s))
+        units += [DecayUnit(self, f"decay-{number}") for number in range(1, self.repeats + 1)]
         if self.daylight:
             units.append(DaylightUnit(self))
         return units

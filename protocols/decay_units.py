@@ -9,7 +9,8 @@ from labrig.quantity import duration_text
 
 from .decay_settings import DecaySettings
 from .metering import Schedule, glow, look
-from .posing import check_seen, face_camera, face_lamp, has_door, lights_out
+from .posing import check_seen, face_lamp, has_door, lights_out
+from .resting import rest_until_dark, shoot_darkness
 from .watching import Watcher
 
 #: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.
@@ -51,12 +52,12 @@ class DarkUnit:
     def run(self, session: Session) -> None:
         """Warm the camera up, then photograph darkness."""
         session.wait_until_warm("camera")
-        face_camera(session)
-        for exposure_s in self.protocol.dark_exposures_s(session.rig.camera.offers()):
-            session.perform(Shoot("dark", self.protocol.settings(exposure_s)))
-        self.protocol.watcher(session, self.name).insist_on_darkness(
-            self.protocol.short_settings(session)
-        )
+        exposures_s = self.protocol.dark_exposures_s(session.rig.camera.offers())
+        exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
+        shoot_darkness(session, exposures)
+        watcher = self.protocol.watcher(session, self.name)
+        watcher.insist_on_darkness(self.protocol.short_settings(session))
+        rest_until_dark(session, self.name, watcher.patches, exposures)
 
 
 @dataclass(frozen=True)

@@ -7,6 +7,7 @@ from collections.abc import Sequence
 
 from labrig.acquire import Unit
 
+from .album import Album
 from .excitation_settings import ExcitationSettings
 from .excitation_units import BareMeter, BareUnit, DarkUnit, DoublingUnit, RefiningUnit, StripMeter
 
@@ -16,11 +17,12 @@ class Excitation(ExcitationSettings):
 
     def units(self) -> Sequence[Unit]:
         """Darks; a metered charge and all others through the filter; the same without it."""
+        album = Album(self.strip())
         return [
-            DarkUnit(self),
-            StripMeter(self),
-            *(DoublingUnit(self, number) for number in range(1, self.at_most + 1)),
-            *(RefiningUnit(self, number) for number in range(1, self.refine + 1)),
-            BareMeter(self),
-            *(BareUnit(self, number) for number in range(1, len(self.bare) + 1)),
+            DarkUnit(self, album),
+            StripMeter(self, album),
+            *(DoublingUnit(self, album, number) for number in range(1, self.at_most + 1)),
+            *(RefiningUnit(self, album, number) for number in range(1, self.refine + 1)),
+            BareMeter(self, album),
+            *(BareUnit(self, album, number) for number in range(1, len(self.bare) + 1)),
         ]

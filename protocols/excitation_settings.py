@@ -105,7 +105,7 @@ class ExcitationSettings(ProtocolModel):
             at_s += exposure_s + offers.overhead_s + MARGIN_S
         return ladder
 
-    def strip(self, count: int = 24) -> list[Region]:
+    def strip(self, count: int = 12) -> list[Region]:
         """Places along the strip on the sample, for metering and for choosing charge times."""
         x, y, width, height = self.sites
         return [(x + width * k / count, y, width / count, height) for k in range(count)]

@@ -9,11 +9,13 @@ from labrig.acquire import ByHand, Session, Shoot, at
 from labrig.record import FrameRecord
 
 from .afterglow import dark_level
+from .album import Album
 from .charge_times import FloatArray, most_telling_s, still_grows
 from .darkness import levels
 from .excitation_settings import ExcitationSettings
-from .metering import DecayMeter, Look, Schedule, look
+from .metering import DecayMeter, Look, Schedule
 from .posing import charge, check_seen, face_camera, face_lamp, lights_out
+from .resting import rest_until_dark, shoot_darkness
 from .watching import Watcher
 
 #: Frames of a charge are made for it to glow at most this much brighter than the one looked at.
@@ -43,14 +45,15 @@ class _Own:
     """What all units share."""
 
     protocol: ExcitationSettings
+    album: Album
 
     def _darks(self, session: Session) -> list[Look]:
         frames = {frame.exposure_s: frame for frame in session.frames("dark")}
-        return [look(frame, self.protocol.strip()) for frame in frames.values()]
+        return [self.album.look(frame) for frame in frames.values()]
 
     def _rates(self, frame: FrameRecord, darks: Sequence[Look]) -> FloatArray:
         """(places,) of the strip, brightest channel above darkness, DN/s."""
-        seen = look(frame, self.protocol.strip())
+        seen = self.album.look(frame)
         above = levels(seen) - dark_level(darks, frame.exposure_s)
         return np.asarray(above.max(axis=1) / frame.exposure_s)
 
@@ -64,16 +67,13 @@ class DarkUnit(_Own):
     def run(self, session: Session) -> None:
         """Warm the camera up, then photograph darkness."""
         session.wait_until_warm("camera")
-        face_camera(session)
-        offers = session.rig.camera.offers()
-        for exposure_s in self.protocol.dark_exposures_s(offers):
-            session.perform(Shoot("dark", self.protocol.settings(exposure_s)))
-        shorter = [self.protocol.settings(exposure_s) for _, exposure_s in _short(self, session)]
-        Watcher(session, self.name, [self.protocol.sites], None).insist_on_darkness(shorter)
-
-
-def _short(unit: _Own, session: Session) -> list[tuple[float, float]]:
-    return unit.protocol.ladder(session.rig.camera.offers())[:3]
+        offers, sites = session.rig.camera.offers(), self.protocol.strip()
+        exposures_s = self.protocol.dark_exposures_s(offers)
+        exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
+        shoot_darkness(session, exposures)
+        shorter = [self.protocol.settings(time_s) for _, time_s in self.protocol.ladder(offers)[:3]]
+        Watcher(session, self.name, sites, None).insist_on_darkness(shorter)
+        rest_until_dark(session, self.name, sites, exposures)
 
 
 @dataclass(frozen=True)
@@ -156,7 +156,7 @@ class _Charged(_Own):
 
         def decide() -> Schedule:
             looked_s, frames = self._looked_at(session, purpose)
-            found = DecayMeter([look(frame, protocol.strip()) for frame in frames]).schedule(
+            found = DecayMeter([self.album.look(frame) for frame in frames]).schedule(
                 times_s, offers, longest_s, EXPOSURES_GROW, session.warn
             )
             shorter = max(charge_s / looked_s / HEADROOM, 1.0)

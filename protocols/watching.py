@@ -1,8 +1,8 @@
 """Holds the frames of a unit against what lamp, relay, room and disk should have done."""
 
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, field, replace
-from pathlib import Path
+from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 
@@ -23,8 +23,9 @@ from .afterglow import (
     metered,
     went_out,
 )
+from .album import Album
 from .darkness import DARK, Darkness, darkness, levels
-from .metering import Look, look
+from .metering import Look
 
 #: A lamp has gone dark by then; a halogen lamp takes a third of it.
 LAMP_GONE_S = 1.0
@@ -44,13 +45,18 @@ class Watcher:
         Where the samples lie.
     background
         A region that never glows, where it takes the place of dark frames.
+    purpose
+        Of the frames after lamp off.
+    metering
+        The unit that metered the same glow.
     """
 
     session: Session
     unit: str
     patches: Sequence[Region]
     background: Region | None
-    _looks: dict[Path, Look] = field(default_factory=dict)
+    purpose: str = "decay"
+    metering: str = "meter"
 
     def insist_on_darkness(self, shorter: Sequence[ExposureSettings]) -> None:
         """Refuse to charge where the dark frames of this unit show that a light is on.
@@ -92,7 +98,7 @@ class Watcher:
         """Refuse a decay that is none; as `insist_on_glow`."""
 
         def decide() -> Afterglow:
-            frames = self._own("decay")
+            frames = self._own(self.purpose)
             middle = len(frames) // 2
             some = min(2, middle)
             chosen = [*frames[:some], frames[middle], *frames[-some:]]
@@ -141,7 +147,7 @@ class Watcher:
         times_s
             When each was to begin after lamp off.
         """
-        frames = self._own("decay")
+        frames = self._own(self.purpose)
         if not frames:
             return  # the plan takes none
         # A busy camera releases late, though it was asked in time: the begins themselves count.
@@ -189,7 +195,8 @@ class Watcher:
 
     def _before(self) -> list[Glow]:
         """Of the metering, else the begin of the first decay that is complete."""
-        metering, decays = self.session.frames("meter"), self.session.frames("decay")
+        decays = self.session.frames(self.purpose)
+        metering = [one for one in self.session.frames("meter") if one.unit == self.metering]
         if not metering and decays[0].unit == self.unit:
             return []
         return self._glows(metering or decays[:2])
@@ -211,11 +218,13 @@ class Watcher:
         return glow(seen, dark, zero_s)
 
     def _look(self, frame: FrameRecord) -> Look:
-        """At a frame, the background last if there is one; once, since reading takes a second."""
-        if frame.path not in self._looks:
-            regions = self.patches if self.background is None else [*self.patches, self.background]
-            self._looks[frame.path] = look(frame, regions)
-        return self._looks[frame.path]
+        """At a frame, the background last if there is one."""
+        return self._album.look(frame)
+
+    @cached_property
+    def _album(self) -> Album:
+        background = [] if self.background is None else [self.background]
+        return Album([*self.patches, *background])
 
 
 def _one_each(frames: Sequence[FrameRecord]) -> list[FrameRecord]:

@@ -4,8 +4,10 @@ from collections.abc import Sequence
 
 from labrig.clock import VirtualClock
 
+from .arrangement import LampKind
 from .faults import Fault, When, given
 from .lamp import Lamp
+from .mercury import Mercury
 from .simulation import LampSettings
 
 
@@ -22,7 +24,7 @@ class LampCircuit:
     asked_on
         What the register says when the room is opened.
     faults
-        `lamp_dead`, `relay_dead` and `relay_welded` are the circuit's.
+        `lamp_dead`, `mercury_dead`, `relay_dead` and `relay_welded` are the circuit's.
     clock
         The room's.
     """
@@ -32,11 +34,12 @@ class LampCircuit:
     ) -> None:
         self._clock = clock
         self._bulb_dead = given(fault.lamp_dead for fault in faults)
+        self._mercury_dead = given(fault.mercury_dead for fault in faults)
         self._dead = given(fault.relay_dead for fault in faults)
         self._welded = given(fault.relay_welded for fault in faults)
         changes = {
             time_s
-            for when in (*self._bulb_dead, *self._dead, *self._welded)
+            for when in (*self._bulb_dead, *self._mercury_dead, *self._dead, *self._welded)
             for time_s in (when.at, when.until)
         }
         self._changes_s = sorted(time_s for time_s in changes if time_s > 0)
@@ -44,7 +47,9 @@ class LampCircuit:
         # Welded before the room was opened: it was closed then, and has not let go.
         self._closed = any(when.at < 0 and when.is_on(0.0) for when in self._welded)
         self._closed = self._contact(0.0)
+        self._plugged: LampKind = "halogen"
         self._lamp = Lamp.found(settings, self._closed and not _any(self._bulb_dead, 0.0))
+        self._mercury = Mercury()
 
     @property
     def closed(self) -> bool:
@@ -54,9 +59,21 @@ class LampCircuit:
 
     @property
     def lamp(self) -> Lamp:
-        """The lamp with its history up to now."""
+        """The halogen lamp with its history up to now."""
         self._follow()
         return self._lamp
+
+    @property
+    def mercury(self) -> Mercury:
+        """The mercury lamp with its history up to now."""
+        self._follow()
+        return self._mercury
+
+    def plug(self, lamp: LampKind) -> None:
+        """Put one lamp instead of the other behind the relay, now."""
+        self._follow()
+        self._plugged = lamp
+        self._settle(self._clock.now())
 
     def ask(self, on: bool) -> None:
         """The board's register changes now."""
@@ -70,8 +87,11 @@ class LampCircuit:
 
     def _settle(self, time_s: float) -> None:
         self._closed = self._contact(time_s)
-        burning = self._closed and not _any(self._bulb_dead, time_s)
-        self._lamp = self._lamp.switched(burning, time_s)
+        halogen = self._closed and self._plugged == "halogen"
+        self._lamp = self._lamp.switched(halogen and not _any(self._bulb_dead, time_s), time_s)
+        mercury = self._closed and self._plugged == "mercury"
+        arc = mercury and not _any(self._mercury_dead, time_s)
+        self._mercury = self._mercury.switched(arc, time_s)
 
     def _contact(self, time_s: float) -> bool:
         stuck = self._closed and _any(self._welded, time_s)

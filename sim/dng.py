@@ -41,12 +41,16 @@ Entry = tuple[int, int, Values]
 
 @dataclass(frozen=True)
 class Shot:
-    """What the camera notes about an exposure; `start_s` counts from 1970."""
+    """What the camera notes about an exposure; `start_s` counts from 1970.
+
+    `lens` is its name and focal length in mm; None: it tells nothing.
+    """
 
     start_s: float
     exposure_s: float
     iso: int
     f_number: float
+    lens: tuple[str, float] | None = None
 
 
 def exposure_label(exposure_s: float) -> Fraction:
@@ -77,6 +81,10 @@ def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
         (36867, _ASCII, taken),
         (37521, _ASCII, subsecond),
     ]
+    if shot.lens is not None:
+        name, focal_mm = shot.lens
+        exif.insert(-1, (37386, _RATIONAL, [Fraction(focal_mm).limit_denominator(10)]))
+        exif.append((42036, _ASCII, name))
     image: list[Entry] = [
         (254, _LONG, [0]),
         (256, _LONG, [width]),

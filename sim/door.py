@@ -14,9 +14,9 @@ import numpy as np
 
 from labrig.clock import VirtualClock
 
+from .bench_settings import DoorSettings
 from .boards import Pulse
 from .faults import Slowness, When
-from .simulation import DoorSettings
 
 #: A servo takes over a new pulse with its next frame.
 FRAME_S = 0.02

@@ -6,10 +6,11 @@ import numpy as np
 
 from labrig.clock import VirtualClock
 
+from .bench_settings import DoorSettings
 from .boards import Pulse
 from .door import FRAME_S, Door, DoorDrive
 from .faults import Fault, given
-from .simulation import DoorSettings, Simulation
+from .simulation import Simulation
 
 #: Stream of random numbers drawn from the seed, beside the room's own.
 SERVO_STREAM = 4

@@ -6,7 +6,7 @@ from typing import Annotated, Any, Self, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, model_serializer, model_validator
 
-from labrig.quantity import DurationS
+from labrig.quantity import DurationS, Fraction
 
 
 class _Part(BaseModel):
@@ -66,6 +66,18 @@ class Step(When):
     by: DurationS = 3600.0
 
 
+class Leak(When):
+    """`level`: light from the surroundings, of the warm lamp's at the sample."""
+
+    level: Annotated[Fraction, Field(ge=0, le=0.1)] = 1e-5
+
+
+class Skipped(When):
+    """`name`: of the filter; none: whichever."""
+
+    name: str | None = None
+
+
 WhenT = TypeVar("WhenT", bound=When)
 
 
@@ -103,6 +115,14 @@ class Fault(_Part):
         The camera answers DeviceBusy to every full press.
     camera_full
         The camera believes that there is no room for a photograph, on the PC or on its card.
+    mercury_dead
+        The mercury lamp has current, but no arc.
+    ambient_light
+        Light leaks into the room, of `level` times the warm lamp's at the sample.
+    lvf_turned
+        Hands put the LVF in the wrong way round.
+    filter_skipped
+        Hands say that they have changed the filter, but leave the one before in.
     light_left_on
         Somebody has left the room's light on.
     disk_full
@@ -127,6 +147,10 @@ class Fault(_Part):
     camera_unplugged: AfterBytes | None = None
     camera_busy: When | None = None
     camera_full: When | None = None
+    mercury_dead: When | None = None
+    ambient_light: Leak | None = None
+    lvf_turned: When | None = None
+    filter_skipped: Skipped | None = None
     light_left_on: When | None = None
     disk_full: AfterBytes | None = None
     disk_slow: Slowness | None = None

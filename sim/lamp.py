@@ -66,6 +66,10 @@ def filament_spectrum(temperature_k: float) -> FloatArray:
     return planck
 
 
+#: Of the burning lamp.
+BURNING_SPECTRUM: FloatArray = filament_spectrum(BURNING_K)
+
+
 def _warming_k_per_s(temperature_k: float, powered: bool) -> float:
     """Energy balance of the filament, everything relative to the burning state."""
     t = temperature_k / BURNING_K
@@ -79,11 +83,16 @@ def _warming_k_per_s(temperature_k: float, powered: bool) -> float:
 
 @dataclass(frozen=True)
 class _Phase:
-    """From one switch to the next: `warmth` is the housing's at `start_s`, 0 cold to 1 warm."""
+    """From one switch to the next, at `start_s`.
+
+    `warmth` is the housing's then, 0 cold to 1 warm; `glowing` what is left behind of the light
+    that the lamp gave, 0 to 1.
+    """
 
     start_s: float
     powered: bool
     warmth: float
+    glowing: float
     settled_k: float
     settling: OdeSolution | None
 
@@ -103,7 +112,7 @@ class Lamp:
     def found(cls, settings: LampSettings, on: bool) -> Self:
         """A lamp that has been on (and is warm), or off (and is cold), for long at time zero."""
         settled_k = BURNING_K if on else ROOM_K
-        return cls(settings, (_Phase(0.0, on, float(on), settled_k, None),))
+        return cls(settings, (_Phase(0.0, on, float(on), float(on), settled_k, None),))
 
     @property
     def on(self) -> bool:
@@ -124,7 +133,7 @@ class Lamp:
             atol=1e-6,
             dense_output=True,
         ).sol
-        phase = _Phase(at_s, on, self._warmth(at_s), settled_k, settling)
+        phase = _Phase(at_s, on, self._warmth(at_s), self._glowing(at_s), settled_k, settling)
         return replace(self, phases=(*self.phases, phase))
 
     def until(self, time_s: float) -> "Lamp":
@@ -150,15 +159,21 @@ class Lamp:
 
     def dark(self, start_s: float, end_s: float) -> bool:
         """Whether no light at all is to be expected from `start_s` to `end_s`."""
+        if self.settings.afterglow and self._glowing(start_s):
+            return False
         cold = self._settled(start_s) and self._phase(start_s).settled_k == ROOM_K
         return cold and not self.corners(start_s, end_s)
 
     def irradiance(self, time_s: float) -> FloatArray:
         """Relative spectral irradiance at the sample, shape (160,), on `WAVELENGTH_NM`."""
         temperature_k = self.temperature_k(time_s)
+        afterglow = self.settings.afterglow and self.settings.afterglow * self._glowing(time_s)
         if temperature_k == ROOM_K:
-            return np.zeros_like(WAVELENGTH_NM)
-        return self._gain(time_s) * filament_spectrum(temperature_k)
+            return afterglow * BURNING_SPECTRUM
+        burning = temperature_k == BURNING_K
+        spectrum = BURNING_SPECTRUM if burning else filament_spectrum(temperature_k)
+        light = self._gain(time_s) * spectrum
+        return light + afterglow * BURNING_SPECTRUM if afterglow else light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
         """∫ irradiance dt over an interval, shape (160,)."""
@@ -186,10 +201,20 @@ class Lamp:
     def _warmth(self, time_s: float) -> float:
         """Newton's law for the housing, 0 cold to 1 warm."""
         phase = self._phase(time_s)
-        goal = float(phase.powered)
-        elapsed_s = max(time_s - phase.start_s, 0.0)
-        return goal + (phase.warmth - goal) * math.exp(-elapsed_s / self.settings.warm_up)
+        return _approach(phase, phase.warmth, time_s, self.settings.warm_up)
+
+    def _glowing(self, time_s: float) -> float:
+        """What glows on behind the filament, 0 to 1."""
+        phase = self._phase(time_s)
+        return _approach(phase, phase.glowing, time_s, self.settings.afterglow_fades)
 
     def _gain(self, time_s: float) -> float:
         aged = math.exp(math.log1p(-self.settings.drift_per_hour) * time_s / 3600.0)
         return aged * (1 - self.settings.warm_up_deficit * (1 - self._warmth(time_s)))
+
+
+def _approach(phase: _Phase, begin: float, time_s: float, constant_s: float) -> float:
+    """From `begin` towards 1 while there is power, towards 0 while there is none."""
+    goal = float(phase.powered)
+    elapsed_s = max(time_s - phase.start_s, 0.0)
+    return goal + (begin - goal) * math.exp(-elapsed_s / constant_s)

@@ -1,11 +1,12 @@
 """All that shines on the samples, and what the camera sees of it.
 
-The lamp, and the room's own light where somebody left it on; between them and the samples there
-may be a shield before the lamp and a trap door, which turns the samples from lamp to camera.
+The lamp, the room's own light where somebody left it on, and what leaks in; between them and the
+samples there may be a shield before the lamp and a trap door, which turns the samples from lamp to
+camera.
 """
 
 import math
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -14,7 +15,8 @@ from numpy.typing import NDArray
 
 from .door import Door
 from .faults import When
-from .lamp import BURNING_K, PANEL_FADING_S, Lamp, filament_spectrum
+from .lamp import BURNING_K, PANEL_FADING_S, WAVELENGTH_NM, Lamp, filament_spectrum
+from .lamps import FilteredLamps
 
 FloatArray = NDArray[np.float64]
 #: Part of a light at a time.
@@ -22,6 +24,8 @@ Share = Callable[[float], float]
 
 #: The room light's irradiance at the sample over the warm lamp's.
 ROOM_LIGHT = 8e-3
+#: Light that leaks in is a white LED's: peaks [nm], their widths (1 σ) and heights.
+LEAK_PEAKS = ((452.0, 10.0, 1.0), (560.0, 52.0, 0.9))
 
 
 @dataclass(frozen=True)
@@ -31,7 +35,9 @@ class Seen:
     Attributes
     ----------
     sample
-        As far as the door is open.
+        From the lamp's side, as far as the door is open; without a door all there is.
+    sample_stray
+        From the camera's side, as far as the door is open.
     door
         Its outside, as far as it is closed.
     cloth
@@ -39,8 +45,29 @@ class Seen:
     """
 
     sample: FloatArray
+    sample_stray: FloatArray
     door: FloatArray
     cloth: FloatArray
+
+
+@dataclass(frozen=True)
+class Stray:
+    """Light from everywhere, on at some times.
+
+    Attributes
+    ----------
+    whens
+        When it is there.
+    spectrum : ndarray, shape (160,)
+        On `WAVELENGTH_NM`, relative as a `Lamp`'s irradiance.
+    """
+
+    whens: Sequence[When]
+    spectrum: FloatArray
+
+    def is_on(self, time_s: float) -> bool:
+        """Whether it is there at a time."""
+        return any(when.is_on(time_s) for when in self.whens)
 
 
 @dataclass(frozen=True)
@@ -48,32 +75,39 @@ class Lights:
     """A lamp, and when the room light is on; irradiances as `Lamp`'s.
 
     The lamp reaches the sample as far as the trap door is closed and the shield open; the room
-    light comes from everywhere.
+    light, and what leaks in, come from everywhere.
     """
 
-    lamp: Lamp
+    lamp: Lamp | FilteredLamps
     room_light: Sequence[When] = ()
     door: Door | None = None
     shield: Door | None = None
+    leaks: Sequence[Stray] = ()
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
         """Times strictly between at which light or door does not go on smoothly."""
-        switches = {time_s for when in self.room_light for time_s in (when.at, when.until)}
+        whens = [when for stray in self._strays for when in stray.whens]
+        switches = {time_s for when in whens for time_s in (when.at, when.until)}
         inside = {time_s for time_s in switches if start_s < time_s < end_s}
         moving = [time_s for door in self._doors for time_s in door.corners(start_s, end_s)]
         return sorted(inside.union(self.lamp.corners(start_s, end_s), moving))
 
     def dark(self, start_s: float, end_s: float) -> bool:
         """Whether there is no light at all from `start_s` to `end_s`."""
-        return self._room_light_s(start_s, end_s) == 0 and self.lamp.dark(start_s, end_s)
+        if not self.lamp.dark(start_s, end_s):
+            return False
+        corners = [start_s, *self.corners(start_s, end_s), end_s]
+        middles = [(left + right) / 2 for left, right in pairwise(corners)]
+        return not any(stray.is_on(at_s) for stray in self._strays for at_s in middles)
 
     def irradiance(self, time_s: float) -> FloatArray:
         """Relative spectral irradiance at the sample, shape (160,), on `WAVELENGTH_NM`."""
         light = self.lamp.irradiance(time_s)
         if self._doors:
             light = light * self._unshielded(time_s) * self._facing_lamp(time_s)
-        if self._room_light_is_on(time_s):
-            light = light + room_light_spectrum()
+        for stray in self._strays:
+            if stray.is_on(time_s):
+                light = light + stray.spectrum
         return light
 
     def openness(self, time_s: float) -> float:
@@ -82,31 +116,42 @@ class Lights:
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
         """∫ irradiance dt over an interval without doors, shape (160,)."""
-        light_s = self._room_light_s(start_s, end_s)
-        return self.lamp.exposure(start_s, end_s) + light_s * room_light_spectrum()
+        lamp = self.lamp.exposure(start_s, end_s)
+        return lamp + self._stray(start_s, end_s, lambda _: 1.0)
 
     def seen(self, start_s: float, end_s: float) -> Seen:
         """What the camera sees by reflection in an interval."""
         if not self._doors:
-            light = self.exposure(start_s, end_s)
-            return Seen(light, np.zeros_like(light), light)
+            light, none = self.exposure(start_s, end_s), np.zeros_like(WAVELENGTH_NM)
+            return Seen(light, none, none, light)
         shield, opened = self._unshielded, self.openness
+
+        def closed(time_s: float) -> float:
+            return 1 - opened(time_s)
 
         def on_sample(time_s: float) -> float:
             return shield(time_s) * self._facing_lamp(time_s) * opened(time_s)
 
         def on_door(time_s: float) -> float:
-            return shield(time_s) * (1 - opened(time_s))
+            return shield(time_s) * closed(time_s)
 
+        sample, door, cloth = self._lamp(start_s, end_s, (on_sample, on_door, shield))
         return Seen(
-            sample=self._integral(start_s, end_s, on_sample, opened),
-            door=self._integral(start_s, end_s, on_door, lambda time_s: 1 - opened(time_s)),
-            cloth=self._integral(start_s, end_s, shield, lambda _: 1.0),
+            sample=sample,
+            sample_stray=self._stray(start_s, end_s, opened),
+            door=door + self._stray(start_s, end_s, closed),
+            cloth=cloth + self._stray(start_s, end_s, lambda _: 1.0),
         )
 
     @property
     def _doors(self) -> tuple[Door, ...]:
         return tuple(door for door in (self.door, self.shield) if door is not None)
+
+    @property
+    def _strays(self) -> tuple[Stray, ...]:
+        if not self.room_light:
+            return tuple(self.leaks)
+        return (Stray(self.room_light, room_light_spectrum()), *self.leaks)
 
     def _facing_lamp(self, time_s: float) -> float:
         return 1.0 if self.door is None else 1 - self.door.openness(time_s)
@@ -114,42 +159,61 @@ class Lights:
     def _unshielded(self, time_s: float) -> float:
         return 1.0 if self.shield is None else self.shield.openness(time_s)
 
-    def _integral(
-        self, start_s: float, end_s: float, lamp_share: Share, room_share: Share
-    ) -> FloatArray:
-        """∫ (share of the lamp + share of the room light) dt, shape (160,)."""
-        nodes, weights = np.polynomial.legendre.leggauss(8)
-        total = np.zeros_like(self.lamp.irradiance(start_s))
+    def _lamp(self, start_s: float, end_s: float, shares: Sequence[Share]) -> FloatArray:
+        """∫ shares of the lamp dt, shape (shares, 160)."""
+        total = np.zeros((len(shares), len(WAVELENGTH_NM)))
         for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
-            middle_s = (left + right) / 2
-            lit = self._room_light_is_on(middle_s)
-            if all(door.is_still(left, right) for door in self._doors):
-                total += lamp_share(middle_s) * self.lamp.exposure(left, right)
-                total += lit * room_share(middle_s) * (right - left) * room_light_spectrum()
+            if self.lamp.dark(left, right):
                 continue
-            edges = np.linspace(left, right, math.ceil((right - left) / PANEL_FADING_S) + 1)
-            for low, high in pairwise(edges):
-                for node, weight in zip(nodes, weights, strict=True):
-                    at_s = (low + high + (high - low) * node) / 2
-                    part_s = weight * (high - low) / 2
-                    total += part_s * lamp_share(at_s) * self.lamp.irradiance(at_s)
-                    total += part_s * lit * room_share(at_s) * room_light_spectrum()
+            if self._is_still(left, right):
+                parts = [share((left + right) / 2) for share in shares]
+                total += np.outer(parts, self.lamp.exposure(left, right))
+                continue
+            for at_s, part_s in _nodes(left, right):
+                parts = [part_s * share(at_s) for share in shares]
+                total += np.outer(parts, self.lamp.irradiance(at_s))
         return total
 
-    def _room_light_is_on(self, time_s: float) -> bool:
-        return any(when.is_on(time_s) for when in self.room_light)
+    def _stray(self, start_s: float, end_s: float, share: Share) -> FloatArray:
+        """∫ share of what comes from everywhere dt, shape (160,)."""
+        total = np.zeros_like(WAVELENGTH_NM)
+        strays = self._strays
+        if not strays:
+            return total
+        for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
+            middle_s = (left + right) / 2
+            light = sum(stray.spectrum for stray in strays if stray.is_on(middle_s))
+            if self._is_still(left, right):
+                seen_s = share(middle_s) * (right - left)
+            else:
+                seen_s = sum(part_s * share(at_s) for at_s, part_s in _nodes(left, right))
+            total += light * seen_s
+        return total
 
-    def _room_light_s(self, start_s: float, end_s: float) -> float:
-        """For how long of an interval the room light is on."""
-        corners = [start_s, *self.corners(start_s, end_s), end_s]
-        return sum(
-            right - left
-            for left, right in pairwise(corners)
-            if self._room_light_is_on((left + right) / 2)
-        )
+    def _is_still(self, start_s: float, end_s: float) -> bool:
+        return all(door.is_still(start_s, end_s) for door in self._doors)
+
+
+def _nodes(start_s: float, end_s: float) -> Iterator[tuple[float, float]]:
+    """Times and weights of Gauss and Legendre's quadrature while a lamp fades or a door swings."""
+    nodes, weights = np.polynomial.legendre.leggauss(8)
+    edges = np.linspace(start_s, end_s, math.ceil((end_s - start_s) / PANEL_FADING_S) + 1)
+    for low, high in pairwise(edges):
+        for node, weight in zip(nodes, weights, strict=True):
+            yield (low + high + (high - low) * node) / 2, weight * (high - low) / 2
 
 
 def room_light_spectrum() -> FloatArray:
     """Of the room light, shape (160,): incandescent, too."""
     spectrum: FloatArray = ROOM_LIGHT * filament_spectrum(BURNING_K)
     return spectrum
+
+
+def leak(level: float, whens: Sequence[When]) -> Stray:
+    """Light from a screen or a crack, of `level` times the warm lamp's over all wavelengths."""
+    peaks = [
+        height * np.exp(-(((WAVELENGTH_NM - at_nm) / wide_nm) ** 2) / 2)
+        for at_nm, wide_nm, height in LEAK_PEAKS
+    ]
+    shape: FloatArray = np.sum(peaks, axis=0)
+    return Stray(whens, level * filament_spectrum(BURNING_K).sum() / shape.sum() * shape)

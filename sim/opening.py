@@ -44,7 +44,9 @@ class OpenRoom:
         carrier = relays if self._lamp_board == "relays" else lcus
         carrier.states[LAMP_RELAY] = simulation.initial.lamp == "on"
         faults = simulation.faults
-        hands = HandsBoard({"fresh sample": self.room.change_sample})
+        hands = HandsBoard(self.room.tasks)
+        for task in simulation.initial.by_hand:
+            hands.do(task)
         self.boards = {"servo": SerialCable(servo, clock), "hands": SerialCable(hands, clock)} | {
             name: SerialCable(
                 board,

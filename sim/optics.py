@@ -45,8 +45,9 @@ REFLECTED = 12.5
 SAMPLE_REFLECTANCE = 0.5
 CLOTH_REFLECTANCE = 0.03
 
-#: Tangent of the field angle in the corner of the frame: full format behind a 75 mm lens.
-CORNER_TANGENT = 0.29
+#: From the middle to the corner of a full-format frame, and the lens that a camera usually has.
+CORNER_MM = 21.75
+FOCAL_MM = 75.0
 
 
 @dataclass(frozen=True)
@@ -153,10 +154,11 @@ def emission(material: Material) -> FloatArray:
     return np.nan_to_num(smooth)
 
 
-def vignetting(height: int, width: int) -> FloatArray:
+def vignetting(height: int, width: int, focal_mm: float = FOCAL_MM) -> FloatArray:
     """Light of a pixel over that in the middle, cos⁴ of the field angle, shape (height, width)."""
     y = (np.arange(height) - (height - 1) / 2)[:, None]
     x = (np.arange(width) - (width - 1) / 2)[None, :]
-    tangent2 = CORNER_TANGENT**2 * (x**2 + y**2) / ((height / 2) ** 2 + (width / 2) ** 2)
+    corner = CORNER_MM / focal_mm
+    tangent2 = corner**2 * (x**2 + y**2) / ((height / 2) ** 2 + (width / 2) ** 2)
     falloff: FloatArray = (1 + tangent2) ** -2
     return falloff

@@ -51,12 +51,15 @@ class Phosphor:
     excitation : ndarray, shape (states, wavelengths)
         κ = excitation @ irradiance.
     patch : ndarray, shape (states,)
-        Index of the patch a state belongs to.
+        Index of the patch, or part of one, that a state belongs to.
+    quickening
+        By how much re-radiation is faster at a time than `k_r_per_s` says.
     """
 
     k_r_per_s: FloatArray
     excitation: FloatArray
     patch: NDArray[np.intp]
+    quickening: Callable[[float], float] = lambda _: 1.0
 
     def evolve(
         self,
@@ -84,7 +87,7 @@ class Phosphor:
         level : ndarray, shape (states,)
             Concentrations at `end_s`.
         exposure_s : ndarray, shape (states,)
-            ∫ v r dt from `start_s` to `end_s`.
+            ∫ v q r dt from `start_s` to `end_s`, with q the `quickening`.
         """
         state = np.concatenate([level, np.zeros_like(level)])
         corners = [start_s, *light.corners(start_s, end_s), end_s]
@@ -102,15 +105,18 @@ class Phosphor:
         light: Light,
         visible: Callable[[float], float],
     ) -> FloatArray:
-        k_r, excitation, count = self.k_r_per_s, self.excitation, len(self.k_r_per_s)
+        excitation, count = self.excitation, len(self.k_r_per_s)
 
         def in_the_dark(time_s: float, y: FloatArray) -> FloatArray:
-            return np.concatenate([-k_r * y[:count], visible(time_s) * y[:count]])
+            faster, r = self.quickening(time_s), y[:count]
+            return np.concatenate([-faster * self.k_r_per_s * r, visible(time_s) * faster * r])
 
         def lit(time_s: float, y: FloatArray) -> FloatArray:
-            r = y[:count]
-            kappa = excitation @ light.irradiance(time_s)
-            return np.concatenate([(1 - r) * kappa - k_r * r, visible(time_s) * r])
+            faster, r = self.quickening(time_s), y[:count]
+            charging = (1 - r) * (excitation @ light.irradiance(time_s))
+            return np.concatenate(
+                [charging - faster * self.k_r_per_s * r, visible(time_s) * faster * r]
+            )
 
         rates = in_the_dark if light.dark(left, right) else lit
         solution = solve_ivp(

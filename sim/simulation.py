@@ -6,9 +6,7 @@ from typing import Annotated, Any, Literal, Self
 from pydantic import (
     AfterValidator,
     AwareDatetime,
-    BaseModel,
     BeforeValidator,
-    ConfigDict,
     Field,
     field_validator,
     model_validator,
@@ -17,6 +15,14 @@ from pydantic import (
 from labrig.quantity import DurationS, Fraction
 from labrig.region import Region
 
+from .bench_settings import (
+    DoorSettings,
+    LensSettings,
+    LvfSettings,
+    Part,
+    ServoBoardSettings,
+    TemperatureSettings,
+)
 from .boards.lcus import Answers
 from .camera import BodySettings
 from .faults import Fault, given
@@ -38,11 +44,7 @@ def _even(pixels: int) -> int:
 Pixels = Annotated[int, Field(ge=32, le=8192), AfterValidator(_even)]
 
 
-class _Part(BaseModel):
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-
-class Patch(_Part):
+class Patch(Part):
     """A sample of one material on the table.
 
     Attributes
@@ -61,7 +63,7 @@ class Patch(_Part):
     initial_charge: Charge | None = None
 
 
-class SensorSettings(_Part):
+class SensorSettings(Part):
     """The simulated camera's sensor.
 
     Attributes
@@ -85,7 +87,7 @@ class SensorSettings(_Part):
     curves: str | None = None
 
 
-class LampSettings(_Part):
+class LampSettings(Part):
     """The simulated halogen lamp.
 
     Attributes
@@ -102,6 +104,10 @@ class LampSettings(_Part):
         Light lost by ageing and dust, per hour of the room's clock.
     board
         The board that switches it: relay 0 of `relays` (Numato), or relay 1 of `lcus`.
+    afterglow
+        Light that stays behind when it is switched off, of the burning lamp's.
+    afterglow_fades
+        Time in which that falls to 1/e.
     """
 
     irradiance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 4.0
@@ -109,67 +115,30 @@ class LampSettings(_Part):
     warm_up_deficit: Annotated[Fraction, Field(ge=0, lt=1)] = 0.03
     drift_per_hour: Annotated[Fraction, Field(ge=0, lt=1)] = 0.002
     board: Literal["relays", "lcus"] = "relays"
+    afterglow: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
+    afterglow_fades: Annotated[DurationS, Field(gt=0)] = 60.0
 
 
-class DoorSettings(_Part):
-    """A door that a servo swings by a quarter turn; the lamp's shield, closed, covers the lamp.
-
-    Attributes
-    ----------
-    channel
-        Of the Maestro `servo` that moves it.
-    closed, open
-        Length of the servo's pulse at either end.
-    travel
-        Of the whole way, after the servo's frame of up to 20 ms.
-    overshoot
-        How far it swings beyond its end, as a part of its way.
-    ringing
-        Time in which the ringing after that falls to 1/e.
-    ringing_hz
-        Of the ringing.
-    """
-
-    channel: Annotated[int, Field(ge=0, le=23)] = 0
-    closed: DurationS = 1000e-6
-    open: DurationS = 2000e-6
-    travel: Annotated[DurationS, Field(gt=0)] = 0.2
-    overshoot: Annotated[Fraction, Field(ge=0, le=0.5)] = 0.04
-    ringing: Annotated[DurationS, Field(gt=0)] = 0.01
-    ringing_hz: Annotated[float, Field(gt=0)] = 25.0
-
-    @model_validator(mode="after")
-    def _two_ends(self) -> Self:
-        if self.closed == self.open:
-            raise ValueError("expected two different pulses for 'closed' and 'open'")
-        return self
-
-
-class ServoBoardSettings(_Part):
-    """The Maestro at `sim://room/servo`; its channels' homes are: door closed, shield open.
+class InitialState(Part):
+    """How the room is found at the epoch: what a crash left behind, a sample that still glows.
 
     Attributes
     ----------
-    time_out
-        The serial time-out after which it sends all channels home; null: none.
+    by_hand
+        What hands had been told before, such as `lvf on sample`.
     """
-
-    time_out: Annotated[DurationS, Field(gt=0)] | None = None
-
-
-class InitialState(_Part):
-    """How the room is found at the epoch: what a crash left behind, a sample that still glows."""
 
     lamp: Literal["off", "on"] = "off"
     door: Literal["closed", "open"] = "closed"
     concentration: Annotated[float, Field(ge=0, le=1)] = 0.0
+    by_hand: tuple[str, ...] = ()
 
 
 def _alone(sample: Any) -> Any:
     return [{"material": sample}] if isinstance(sample, str) else sample
 
 
-class Simulation(_Part):
+class Simulation(Part):
     """A simulated dark room.
 
     Attributes
@@ -180,6 +149,8 @@ class Simulation(_Part):
         As `Patch.initial_charge`, for patches that do not say.
     camera
         Which body the camera has, and how somebody has set it.
+    lens
+        Its lens; null: one of 75 mm that tells nothing.
     epoch
         Wall-clock time at which the room's clock stands at zero.
     seed
@@ -195,6 +166,23 @@ class Simulation(_Part):
         The board that moves both.
     lcus
         What the LCUS board at `sim://room/lcus` says to its query.
+    lvf
+        The linear variable filter; null: there is none.
+    filters
+        Folder of the colour filters' transmittances, a file each, named by its stem; null: the
+        shipped one.
+    filters_bent
+        By which they really differ from that, root mean square.
+    grey_card
+        Reflectance of the grey card, nearly the same at all wavelengths.
+    chart
+        Where the camera sees a ColorChecker that hands lay down.
+    ambient
+        Light that leaks into the room, of the warm lamp's at the sample.
+    temperature
+        Of the room; null: such that rates are what the materials' files say.
+    anisotropy
+        Part of its glow that a sample loses when it is turned away by 90 degrees.
     room_light
         Whether the room's own light is on while somebody aims through the viewfinder; photographs
         are always taken without it.
@@ -208,6 +196,7 @@ class Simulation(_Part):
     initial_charge: Charge | None = None
     sensor: SensorSettings = SensorSettings()
     camera: BodySettings = BodySettings()
+    lens: LensSettings | None = None
     epoch: Annotated[AwareDatetime, Field(ge=datetime(1970, 1, 1, tzinfo=UTC))] = datetime(
         2026, 1, 1, tzinfo=UTC
     )
@@ -219,6 +208,14 @@ class Simulation(_Part):
     shield: DoorSettings | None = None
     servo: ServoBoardSettings = ServoBoardSettings()
     lcus: Answers = "nothing"
+    lvf: LvfSettings | None = None
+    filters: str | None = None
+    filters_bent: Annotated[Fraction, Field(ge=0, le=0.2)] = 0.0
+    grey_card: Annotated[Fraction, Field(gt=0, le=0.95)] = 0.18
+    chart: Region = MIDDLE
+    ambient: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.0
+    temperature: TemperatureSettings | None = None
+    anisotropy: Annotated[Fraction, Field(ge=0, le=1)] = 0.0
     room_light: bool = True
 
     @field_validator("faults")
@@ -229,11 +226,13 @@ class Simulation(_Part):
         return faults
 
     @model_validator(mode="after")
-    def _doors_that_can_move(self) -> Self:
+    def _what_can_fail(self) -> Self:
         if self.door is None and any(fault.door_stuck or fault.door_slow for fault in self.faults):
             raise ValueError("a fault of the door needs a 'door:'")
         if self.door and self.shield and self.door.channel == self.shield.channel:
             raise ValueError("expected 'door' and 'shield' on two channels of the servo board")
+        if self.lvf is None and any(fault.lvf_turned for fault in self.faults):
+            raise ValueError("a fault of the LVF needs an 'lvf:'")
         return self
 
     def opened_at(self, wall_s: float) -> Self:
@@ -245,6 +244,7 @@ class Simulation(_Part):
             update={
                 "epoch": datetime.fromtimestamp(wall_s, UTC),
                 "faults": tuple(fault.seen_from(later_s) for fault in self.faults),
+                "temperature": self.temperature and self.temperature.later(later_s),
             }
         )
 

@@ -1,8 +1,22 @@
 """What the simulated room knows and labrig must find out: for tests, never for a fit."""
 
+import math
 from pathlib import Path
 
+import numpy as np
+from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict
+
+from .bench_settings import StripSettings
+from .layout import Layout
+from .lvf import Lvf, in_pixels
+from .samples import Samples
+from .simulation import Simulation
+
+FloatArray = NDArray[np.float64]
+
+#: Places along the LVF's strip, as many as the paper takes.
+SLICES = 31
 
 
 class _Part(BaseModel):
@@ -14,14 +28,24 @@ class TrueState(_Part):
 
     Attributes
     ----------
+    k_r_per_s
+        At the room's temperature at lamp-off.
+    k_e_per_s, reradiation
+        Of every band, as in the material's file.
+    emission
+        Λ on the room's `wavelength_nm`.
     concentration
-        r at the moment of the last lamp-off; null if the lamp was never switched off.
+        r at the moment of the last lamp-off; null if the lamp was never switched off. Where an
+        LVF has lain on the patch, the mean over its pixels; so is the amplitude.
     amplitude_dn_per_s
         R, G, B: what the state adds to the signal per second of exposure, extrapolated from the
         dark back to lamp-off (the fade charges a little more), in the middle of the lens.
     """
 
     k_r_per_s: float
+    k_e_per_s: tuple[float, ...] | None
+    reradiation: tuple[float, ...] | None
+    emission: tuple[float, ...]
     concentration: float | None
     amplitude_dn_per_s: tuple[float, float, float] | None
 
@@ -31,7 +55,49 @@ class TruePatch(_Part):
 
     material: str
     region: tuple[float, float, float, float]
+    bands_nm: tuple[float, ...] | None
     states: tuple[TrueState, ...]
+
+
+class TrueStrip(_Part):
+    """Where the LVF's strip is in the picture, in pixels.
+
+    Attributes
+    ----------
+    left, right
+        x and y of the ends of its centre line.
+    height
+        Across that.
+    rising
+        Whether the wavelength rises from left to right.
+    """
+
+    left: tuple[float, float]
+    right: tuple[float, float]
+    height: float
+    rising: bool
+
+
+class TrueLvf(_Part):
+    """The linear variable filter.
+
+    Attributes
+    ----------
+    u
+        31 places along the strip: middles of even slices from its blue end, 0, to its red, 1.
+    centre_nm, fwhm_nm
+        Middle and width between the wavelengths that are let through half as well as the best,
+        the leakage subtracted.
+    transmission
+        There, on the room's `wavelength_nm`.
+    """
+
+    u: tuple[float, ...]
+    centre_nm: tuple[float, ...]
+    fwhm_nm: tuple[float, ...]
+    transmission: tuple[tuple[float, ...], ...]
+    before_camera: TrueStrip
+    on_sample: TrueStrip
 
 
 class Truth(_Part):
@@ -47,6 +113,8 @@ class Truth(_Part):
         Rows R, G, B of the camera's own curves on `wavelength_nm`.
     lamp_irradiance
         Relative spectral irradiance of the warm, new lamp on `wavelength_nm`.
+    lvf
+        Null where there is none.
     """
 
     lamp_off_s: float | None
@@ -56,7 +124,95 @@ class Truth(_Part):
     wavelength_nm: tuple[float, ...]
     sensitivity: tuple[tuple[float, ...], ...]
     lamp_irradiance: tuple[float, ...]
+    lvf: TrueLvf | None
 
     def write(self, path: Path) -> None:
         """As JSON."""
         path.write_text(self.model_dump_json(indent=1) + "\n", encoding="utf-8")
+
+
+def true_patches(
+    simulation: Simulation,
+    samples: Samples,
+    layout: Layout,
+    level: FloatArray | None,
+    effective: FloatArray | None,
+    dn_per_s: FloatArray,
+    faster: float,
+) -> tuple[TruePatch, ...]:
+    """All patches of the room.
+
+    Parameters
+    ----------
+    level, effective : ndarray, shape (states,)
+        Concentrations at lamp-off, and as they seem to have been there from the dark.
+    dn_per_s : ndarray, shape (states, 3)
+        What the states add at r = 1.
+    faster
+        By what the room's temperature makes of their rates.
+    """
+    found = []
+    k_r = samples.cells.k_r_per_s
+    for number, (placed, material) in enumerate(
+        zip(simulation.patches, samples.materials, strict=True), start=1
+    ):
+        cells = np.flatnonzero(layout.patch == number)
+        pixels = layout.pixels[cells]
+        weight = pixels / pixels.sum() if pixels.any() else np.full(len(cells), 1 / len(cells))
+        # One row a state, one column a cell.
+        index = np.flatnonzero(np.isin(samples.cells.patch, cells)).reshape(len(cells), -1).T
+        states = []
+        for of_state in np.argsort(-k_r[index[:, 0]], kind="stable"):
+            here, state = index[of_state], material.states[of_state]
+            amplitude = None
+            if effective is not None:
+                red, green, blue = dn_per_s[here[0]] * float(weight @ effective[here])
+                amplitude = (red, green, blue)
+            states.append(
+                TrueState(
+                    k_r_per_s=faster * k_r[here[0]],
+                    k_e_per_s=state.k_e_per_s,
+                    reradiation=state.reradiation,
+                    emission=tuple(samples.radiance_at_one[here[0]] / k_r[here[0]]),
+                    concentration=None if level is None else float(weight @ level[here]),
+                    amplitude_dn_per_s=amplitude,
+                )
+            )
+        found.append(
+            TruePatch(
+                material=material.name,
+                region=placed.region,
+                bands_nm=material.bands_nm,
+                states=tuple(states),
+            )
+        )
+    return tuple(found)
+
+
+def true_lvf(simulation: Simulation) -> TrueLvf | None:
+    """The room's LVF."""
+    settings = simulation.lvf
+    if settings is None:
+        return None
+    u = (np.arange(SLICES) + 0.5) / SLICES
+    fine_nm = np.linspace(300.0, 900.0, 12001)
+    passed = Lvf(settings).transmission(u, fine_nm) - settings.leakage
+    above = [fine_nm[row >= row.max() / 2] for row in passed]
+    size = simulation.sensor.width, simulation.sensor.height
+    return TrueLvf(
+        u=tuple(u),
+        centre_nm=tuple((nm[0] + nm[-1]) / 2 for nm in above),
+        fwhm_nm=tuple(nm[-1] - nm[0] for nm in above),
+        transmission=tuple(tuple(row) for row in Lvf(settings).transmission(u)),
+        before_camera=_true_strip(settings.before_camera, *size),
+        on_sample=_true_strip(settings.on_sample, *size),
+    )
+
+
+def _true_strip(strip: StripSettings, width: int, height: int) -> TrueStrip:
+    x, y, wide, high = in_pixels(strip.region, width, height)
+    half = np.array([math.cos(math.radians(strip.tilt)), math.sin(math.radians(strip.tilt))])
+    half *= wide / 2
+    middle = np.array([x + wide / 2, y + high / 2])
+    (left, upper), (right, lower) = middle - half, middle + half
+    return TrueStrip(left=(left, upper), right=(right, lower), height=high, rising=strip.rising)

@@ -202,7 +202,15 @@ class _PlanRecorder:
     steps: list[Step] = field(default_factory=list)
     frame_count: int = 0
 
-    def acted(self, device: str, action: str, start_s: float, end_s: float, late_s: float) -> None:
+    def acted(
+        self,
+        device: str,
+        action: str,
+        start_s: float,
+        end_s: float,
+        late_s: float,
+        task: str = "",
+    ) -> None:
         self._note(start_s, device, action, late_s)
 
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:

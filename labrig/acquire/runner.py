@@ -90,9 +90,17 @@ class _Recorder:
         self.kept = list(kept)
         self.done = list(done)
 
-    def acted(self, device: str, action: str, start_s: float, end_s: float, late_s: float) -> None:
-        wall = self._clock.wall
-        record = ActionRecord(self._writer.unit, device, action, wall(start_s), wall(end_s), late_s)
+    def acted(
+        self,
+        device: str,
+        action: str,
+        start_s: float,
+        end_s: float,
+        late_s: float,
+        task: str = "",
+    ) -> None:
+        wall, unit = self._clock.wall, self._writer.unit
+        record = ActionRecord(unit, device, action, wall(start_s), wall(end_s), late_s, task)
         self._writer.action(record)
         self.done.append(record)
 

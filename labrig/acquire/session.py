@@ -35,8 +35,16 @@ TOLERANCE_S = 0.02
 class Recorder(Protocol):
     """Keeps what happens in a unit. Times are on the rig's clock."""
 
-    def acted(self, device: str, action: str, start_s: float, end_s: float, late_s: float) -> None:
-        """Something was switched, moved or decided."""
+    def acted(
+        self,
+        device: str,
+        action: str,
+        start_s: float,
+        end_s: float,
+        late_s: float,
+        task: str = "",
+    ) -> None:
+        """Something was switched, moved or decided; `task` as in `ActionRecord`."""
 
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
         """A frame is to be kept."""
@@ -165,7 +173,7 @@ class Session:
             with _device_errors("hands"):
                 self.rig.hands.do(step.task)
         said = f"{step.what} ({remark})" if remark else step.what
-        self._recorder.acted(PERSON, said, start_s, self.clock.now(), 0.0)
+        self._recorder.acted(PERSON, said, start_s, self.clock.now(), 0.0, step.task)
         return remark
 
     def frames(self, purpose: str) -> Sequence[FrameRecord]:

@@ -19,6 +19,7 @@ _ACTION_KEYS: dict[str, str] = {
     "start_time": "number",
     "end_time": "number",
     "late_s": "number",
+    "task": "string",
 }
 _FRAME_KEYS: dict[str, str] = {
     "frame": "string",

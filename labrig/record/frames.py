@@ -54,7 +54,10 @@ def unit_within(part: str, name: str) -> str | None:
 
 @dataclass(frozen=True)
 class ActionRecord:
-    """One switch, move or choice. Times are seconds since 1970, as measured."""
+    """One switch, move or choice. Times are seconds since 1970, as measured.
+
+    `task` is what hands that are a device are told; empty where a device did it by itself.
+    """
 
     unit: str
     device: str
@@ -62,6 +65,7 @@ class ActionRecord:
     start_time: float
     end_time: float
     late_s: float
+    task: str = ""
 
     @property
     def is_by_hand(self) -> bool:

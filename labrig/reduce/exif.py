@@ -11,7 +11,8 @@ from typing import Any
 class Exif:
     """EXIF of one frame; None where absent, unreadable or a placeholder such as 0.
 
-    `dng`: the file says that it is a DNG.
+    `lens` is its name and focal length, as far as the camera tells. `dng`: the file says that it is
+    a DNG.
     """
 
     exposure_s: float | None = None
@@ -19,6 +20,7 @@ class Exif:
     f_number: float | None = None
     make: str | None = None
     model: str | None = None
+    lens: str | None = None
     dng: bool = False
 
 
@@ -48,6 +50,7 @@ def read_exif(content: bytes) -> Exif:
         f_number=_positive(tags, "FNumber"),
         make=_text(tags, "Image Make"),
         model=_text(tags, "Image Model"),
+        lens=_lens(tags),
         dng=any(name in tags for name in _DNG_VERSION),
     )
 
@@ -63,6 +66,13 @@ def _positive(tags: dict[str, Any], name: str) -> float | None:
         if number > 0 and math.isfinite(number):
             return number
     return None
+
+
+def _lens(tags: dict[str, Any]) -> str | None:
+    """`EF50mm f/1.4 USM, 50 mm`."""
+    focal_mm = _positive(tags, "FocalLength")
+    said = (_text(tags, "EXIF LensModel"), None if focal_mm is None else f"{focal_mm:g} mm")
+    return ", ".join(filter(None, said)) or None
 
 
 def _text(tags: dict[str, Any], name: str) -> str | None:

@@ -7,7 +7,9 @@ from pathlib import Path
 
 import numpy as np
 
+from labrig.calibration import CameraFile
 from labrig.errors import DataError
+from labrig.reduce.calibrated import calibrated
 from labrig.reduce.dark import HOT_FRAMES, SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
 from labrig.reduce.noise import Floats
 from labrig.reduce.pairs import PatchFrames, PatchNoise, paired_dark_sigma, paired_noise
@@ -54,6 +56,7 @@ def reduce_patches(
     patches: Mapping[str, Region],
     darks: Sequence[SeriesFrame] = (),
     background: Region | None = None,
+    camera: CameraFile | None = None,
 ) -> dict[str, Series]:
     """The series of each patch, in DN/s, with a row for every frame in the given order.
 
@@ -68,6 +71,8 @@ def reduce_patches(
         more of the longest, whose hot pixels are then left out. Their level is subtracted.
     background
         A dark region of the frames themselves, whose level is subtracted instead.
+    camera
+        Calibration by which true shutter times, fall-off and settings are put right.
 
     Frames with more than 0.1 % of a patch saturated are flagged `clipped`, not dropped. Sigma comes
     from pairs of successive frames of a unit, and of dark frames of one exposure, if there are
@@ -76,7 +81,8 @@ def reduce_patches(
     Raises
     ------
     DataError
-        Frames of different ISO or f-number in one unit, no exposure, or no dark frames that match.
+        Frames of different ISO or f-number in one unit, no exposure, no dark frames that match, or
+        a calibration of another camera or aperture.
     FrameError, UsageError
         As `read_raw` and `measure`.
     """
@@ -88,7 +94,13 @@ def reduce_patches(
     longest.clear()  # five frames of 42 MB that nobody needs any more
     shots = read_shots(frames, patches, background, hot, {})
     _check_settings(shots)
-    return {name: _patch_series(name, shots, dark) for name in patches}
+    series = {name: _patch_series(name, shots, dark) for name in patches}
+    if camera is None:
+        return series
+    return {
+        name: calibrated(one, camera, patches[name], *_size(shots[0]))
+        for name, one in series.items()
+    }
 
 
 def _read_longest(darks: Sequence[SeriesFrame]) -> dict[Path, RawFrame]:
@@ -198,6 +210,12 @@ def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | N
     correlation = noise * np.outer(of_model, of_model) + np.outer(common, common)
     # A dark level known without noise would make the errors all one.
     return np.where(np.eye(len(sigma), dtype=np.bool_), 1.0, MOST_COMMON * correlation)
+
+
+def _size(shot: Shot) -> tuple[int, int]:
+    """Width and height of a frame in pixels."""
+    width, height, _ = next(iter(shot.patches.values())).kind
+    return width, height
 
 
 def _views(name: str, shots: Sequence[Shot]) -> list[View]:

@@ -2,6 +2,8 @@
 
 from collections.abc import Callable, Mapping
 
+from labrig.errors import UsageError
+
 
 class HandsBoard:
     """Answers `done`, or `cannot …`, to every line.
@@ -9,10 +11,11 @@ class HandsBoard:
     Parameters
     ----------
     tasks
-        What the hands can do, by the line that tells them.
+        What the hands can do, by the line that tells them. Of `filter NAME` they are given what
+        stands for the word in capitals; a UsageError says what they cannot.
     """
 
-    def __init__(self, tasks: Mapping[str, Callable[[], None]]) -> None:
+    def __init__(self, tasks: Mapping[str, Callable[..., None]]) -> None:
         self._tasks = dict(tasks)
         self._line = b""
 
@@ -29,7 +32,26 @@ class HandsBoard:
         return answer
 
     def _do(self, task: str) -> str:
-        if task not in self._tasks:
-            return f"cannot {task}; known: {', '.join(self._tasks)}\n"
-        self._tasks[task]()
+        try:
+            self.do(task)
+        except UsageError as error:
+            return f"cannot {task}; {error}\n"
         return "done\n"
+
+    def do(self, task: str) -> None:
+        """Do what one line says.
+
+        Raises
+        ------
+        UsageError
+            They do not know how.
+        """
+        for pattern, act in self._tasks.items():
+            words, _, variable = pattern.rpartition(" ")
+            if task == pattern:
+                act()
+                return
+            if variable.isupper() and task.startswith(f"{words} "):
+                act(task.removeprefix(f"{words} "))
+                return
+        raise UsageError(f"known: {', '.join(self._tasks)}")

@@ -67,7 +67,16 @@ def test_excitation(against: Against) -> None:
     problem = ExcitationProblem([series], 2, 1, Uncertain())
     charges = len(series.charges)
     theta = problem.pack(
-        Rates(k_r, bench.amplitudes(), k_e, np.ones(3), np.zeros(1), np.zeros(charges))
+        Rates(
+            k_r,
+            bench.amplitudes(),
+            k_e,
+            np.ones(3),
+            np.zeros(1),
+            np.zeros(charges),
+            np.zeros(1),
+            np.zeros(0),
+        )
     )
 
     def peer() -> None:

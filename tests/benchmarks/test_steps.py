@@ -22,7 +22,7 @@ from labrig.acquire import (
 )
 from labrig.acquire.values import Frame
 from labrig.clock import VirtualClock
-from labrig.record import FrameRecord, RunFolder
+from labrig.record import ActionRecord, FrameRecord, RunFolder
 from protocols.decay import Decay
 from tests.acquire.fakes import Watching
 
@@ -88,7 +88,9 @@ class NothingLamp:
 class NothingRecorded:
     """A recorder that keeps nothing."""
 
-    def acted(self, device: str, action: str, start_s: float, end_s: float, late_s: float) -> None:
+    def acted(
+        self, device: str, action: str, start_s: float, end_s: float, late_s: float, task: str = ""
+    ) -> None:
         pass
 
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
@@ -98,6 +100,9 @@ class NothingRecorded:
         return None
 
     def frames(self, purpose: str) -> Sequence[FrameRecord]:
+        return ()
+
+    def actions(self, device: str) -> Sequence[ActionRecord]:
         return ()
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:

@@ -252,6 +252,25 @@ def test_photographs_carry_the_virtual_wall_clock() -> None:
     assert str(tags["EXIF ExposureTime"]) == "1/60"
 
 
+def test_a_lens_names_itself_and_darkens_the_corners() -> None:
+    def grey(lens: object) -> tuple[bytes, float]:
+        room, clock = make_room(initial={"lamp": "on"}, lens=lens)
+        clock.spend(1.0)
+        room.tasks["grey card"]()
+        dng = shoot(room, clock, 1 / 64, 100)
+        frame = mosaic(dng)
+        return dng, frame[:4, :4].mean() / frame[30:34, 46:50].mean()
+
+    dng, falloff = grey({"name": "EF50mm f/1.4", "focal_mm": 50})
+    tags = exifread.process_file(io.BytesIO(dng))
+    assert str(tags["EXIF LensModel"]) == "EF50mm f/1.4"
+    assert str(tags["EXIF FocalLength"]) == "50"
+    silent, usual = grey(None)
+    assert "EXIF LensModel" not in exifread.process_file(io.BytesIO(silent))
+    assert usual == pytest.approx(0.86, abs=0.01)
+    assert falloff == pytest.approx(0.72, abs=0.01)
+
+
 def test_truth_before_and_after_lamp_off(tmp_path: Path) -> None:
     room, clock = make_room(sample="double-wide-slow")
     assert room.truth().lamp_off_s is None

@@ -21,7 +21,7 @@ from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
 #: The flicker's covariance is taken from the fit so often; the second changes nothing visible.
 WHITENINGS = 2
 #: Relative step small enough, of a start and of the end.
-ROUGH, FINE = 1e-3, 1e-8
+ROUGH, FINE = 1e-3, 1e-6
 MAX_ITERATIONS = 60
 #: Known worse than this, an amplitude is an order of magnitude.
 LEVEL_KNOWN = 0.3

@@ -10,16 +10,17 @@ from labrig.fit.least_squares import FloatArray
 
 #: Prominence in units of the noise that is left after smoothing.
 LEAST_PROMINENCE = 10.0
-#: And as a share of the highest peak.
-LEAST_SHARE = 0.03
+#: And as a share of the channel's highest peak, and of the highest of all.
+LEAST_SHARE, LEAST_OF_ALL = 0.03, 0.003
 MOST_PEAKS = 8
 MOST_SAMPLES = 20_000
 #: Peaks of two channels this share of their width apart are one.
 SAME = 0.5
 #: Share of the strip over which noise is smoothed away.
 SMOOTHING = 0.002
-#: Median absolute difference of neighbours over σ, for normal noise.
-_MAD = 0.6745 * np.sqrt(2.0)
+#: Median absolute third difference over σ, for normal noise; a smooth profile has hardly any, even
+#: if a line is but a few samples wide.
+_MAD = 0.6745 * np.sqrt(20.0)
 
 
 @dataclass(frozen=True)
@@ -51,13 +52,14 @@ def find_line_peaks(position: FloatArray, values: FloatArray) -> list[Peak]:
     even = np.arange(position[0], position[-1], finest)
     channels = np.stack([np.interp(even, position, column) for column in values.T], axis=1)
     smooth = gaussian_filter1d(channels, len(even) * SMOOTHING, axis=0)
-    noise = np.median(np.abs(np.diff(values, axis=0)), axis=0) / _MAD
+    noise = np.median(np.abs(np.diff(values, n=3, axis=0)), axis=0) / _MAD
     height = float(np.ptp(smooth, axis=0).max())
     above = np.maximum(smooth - np.percentile(smooth, 5, axis=0), 0.0)
     found: list[Peak] = []
     for channel, own_noise in zip(smooth.T, noise, strict=True):
         unit = max(float(own_noise), 1e-6 * height)
-        least = max(LEAST_PROMINENCE * unit, LEAST_SHARE * height)
+        own = float(np.ptp(channel))
+        least = max(LEAST_PROMINENCE * unit, LEAST_SHARE * own, LEAST_OF_ALL * height)
         if not height:
             continue
         indices, properties = find_peaks(channel, prominence=least)

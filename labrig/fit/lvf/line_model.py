@@ -19,6 +19,9 @@ SHARE_SIGMAS = 2.0
 SIGNIFICANT = 6.0
 #: A line is located if its σ is below this share of its width.
 LOCATED = 0.2
+#: A line is no farther from where the assignment has it, in widths: 405 and 436 nm are 1.2 apart,
+#: and one must not take the other's place.
+NEAR = 0.6
 _STEP = 1e-5
 
 
@@ -144,7 +147,8 @@ class LineModel:
         prior = np.array([known for _, known in shares])
         low, high = np.full(len(start), -np.inf), np.full(len(start), np.inf)
         n = len(self.lines)
-        low[:n], high[:n] = start[:n] - self.way.fwhm, start[:n] + self.way.fwhm
+        near = NEAR * self.way.fwhm
+        low[:n], high[:n] = start[:n] - near, start[:n] + near
         low[n], high[n] = start[n] - 1, start[n] + 1
         low[n + 1 : n + 3], high[n + 1 : n + 3] = -0.5, 0.5
         low[n + 3 :] = np.maximum(start[n + 3 :] - SHARE_SIGMAS * prior, 0.0)

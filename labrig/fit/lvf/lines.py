@@ -19,8 +19,11 @@ from labrig.optics.lvf import NOMINAL_FWHM_NM
 
 #: Lines of the model agree with what was found to this share of their width.
 TOLERANCE = 0.4
-#: Ways round whose scores differ by less took the same peaks for lines.
+#: Assignments whose scores differ by less took the same peaks for lines; so many are fitted.
 AMBIGUOUS = 1.0
+MOST_RIVALS = 4
+#: Strips are bent by some nm, in their middle against their ends.
+MOST_BEND_NM = 20.0
 #: Of such two, one is right if the other leaves this many times as much unexplained.
 CLEARLY = 1.3
 
@@ -59,17 +62,16 @@ def locate_lines(
     if not np.isfinite(values).all() or len(u) < 20:
         raise FitError("expected a profile of 20 or more finite values along the strip")
     peaks = find_line_peaks(u, values)
-    ways = [_assigned(peaks, lines, fwhm_nm, way) for way in (True, False)]
-    found = [way for way in ways if way is not None]
+    found = [trial for way in (True, False) for trial in _assigned(peaks, lines, fwhm_nm, way)]
     if not found:
         raise FitError(
             f"no lines of mercury: of {len(peaks)} peaks no {FEWEST_LINES} stand like "
             f"{', '.join(f'{line.centre_nm:.0f}' for line in lines)} nm; check that the mercury "
             "lamp is lit and the whole strip in the picture"
         )
-    best = max(found, key=lambda way: way.score)
-    rivals = [way for way in found if best.score - way.score < AMBIGUOUS]
-    located = [LineModel(u, values, lines, way).located() for way in rivals]
+    found.sort(key=lambda trial: -trial.score)
+    rivals = [trial for trial in found[:MOST_RIVALS] if found[0].score - trial.score < AMBIGUOUS]
+    located = _best_each_way([LineModel(u, values, lines, trial) for trial in rivals])
     if len(located) == 2:
         located.sort(key=lambda way: -way.explained)
         left = [1 - way.explained for way in located]
@@ -89,18 +91,52 @@ def locate_lines(
     return located[0]
 
 
+def _best_each_way(models: list[LineModel]) -> list[LocatedLines]:
+    """Of the models that can be fitted, the one that explains most, for either way round."""
+    best: dict[bool, LocatedLines] = {}
+    refusal: FitError | None = None
+    for model in models:
+        try:
+            found = model.located()
+        except FitError as error:
+            refusal = refusal or error
+            continue
+        if _bend_nm(found, model.middle, model.reach) > MOST_BEND_NM:
+            refusal = refusal or FitError(
+                "no lines of mercury: the peaks could only be lines of a strip bent as none is; "
+                "check that no other lamp is lit"
+            )
+            continue
+        if found.rising not in best or found.explained > best[found.rising].explained:
+            best[found.rising] = found
+    if refusal is not None and not best:
+        raise refusal
+    return list(best.values())
+
+
+def _bend_nm(lines: LocatedLines, middle: float, reach: float) -> float:
+    """How far the strip's middle is off the line between its ends."""
+    scaled = (lines.position - middle) / reach
+    return abs(float(np.polyfit(scaled, lines.wavelength_nm, 2, w=1 / lines.sigma)[0]))
+
+
 def _assigned(
     peaks: list[Peak], lines: tuple[Line, ...], fwhm_nm: float, rising: bool
-) -> Assignment | None:
+) -> list[Assignment]:
+    """For every choice of lines, the peaks that agree with it best."""
     centres = [line.centre_nm for line in lines]
-    best: Assignment | None = None
+    found: list[Assignment] = []
     for number in range(min(len(lines), len(peaks)), FEWEST_LINES - 1, -1):
         for chosen in combinations(range(len(lines)), number):
-            for some in combinations(peaks if rising else peaks[::-1], number):
-                trial = _tried([centres[k] for k in chosen], list(some), fwhm_nm)
-                if trial is not None and (best is None or trial.score > best.score):
-                    best = trial
-    return best
+            wanted = [centres[k] for k in chosen]
+            trials = [
+                _tried(wanted, list(some), fwhm_nm)
+                for some in combinations(peaks if rising else peaks[::-1], number)
+            ]
+            possible = [trial for trial in trials if trial is not None]
+            if possible:
+                found.append(max(possible, key=lambda trial: trial.score))
+    return found
 
 
 def _tried(centres_nm: list[float], peaks: list[Peak], fwhm_nm: float) -> Assignment | None:

@@ -1,5 +1,6 @@
 """What a spectrum adds to every value that was measured: the linear system, and its own errors."""
 
+from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
 
 import numpy as np
@@ -99,8 +100,10 @@ def system_through_lvf(
         design(transmission, error)
         for error in curve_modes(curve_error, nodes, sensitivity, camera.sensitivity.max(axis=0))
     ]
-    for change in _filter_modes(lvf, nodes):
-        modes.append(design(change, sensitivity))
+    for position, change in _filter_changes(lvf, nodes):
+        mode = np.zeros((len(transmission), sensitivity.shape[1], len(knots_nm)))
+        mode[position] = (change[:, np.newaxis] * sensitivity).T @ tents
+        modes.append(mode.reshape(exact.shape))
     stacked = np.array(modes) if modes else np.empty((0, 0, 0))
     return SpectralSystem(knots_nm, exact, stacked)
 
@@ -138,17 +141,13 @@ def _smooth_modes(nodes: FloatArray, distance_nm: float) -> FloatArray:
     return modes[modes.any(axis=1)]
 
 
-def _filter_modes(lvf: Lvf, nodes: FloatArray) -> list[FloatArray]:
-    """Changes of the transmission (p, q), each by one figure of one position."""
+def _filter_changes(lvf: Lvf, nodes: FloatArray) -> Iterator[tuple[int, FloatArray]]:
+    """Changes of the transmission (q,) at one position, each by one of its figures."""
     if lvf.sigma is None:
-        return []
-    modes = []
+        return
     for name in (f.name for f in fields(Bands)):
         step = _STEP * getattr(lvf.sigma, name)
         moved = replace(lvf.bands, **{name: getattr(lvf.bands, name) + step})
         change = (moved.transmission(nodes) - lvf.bands.transmission(nodes)) / _STEP
-        for row in np.flatnonzero(step > 0):
-            alone = np.zeros_like(change)
-            alone[row] = change[row]
-            modes.append(alone)
-    return modes
+        for position in np.flatnonzero(step > 0).tolist():
+            yield position, change[position]

@@ -246,7 +246,7 @@ def _site_sigma(irradiance: IrradianceFile) -> FloatArray:
     """(P,) relative, of the light on every place."""
     through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
     told = np.sqrt((sigma**2).sum(axis=1)) / np.maximum(through.sum(axis=1), 1e-300)
-    return np.maximum(told, LEAST_SITE_SIGMA)
+    return np.asarray(np.maximum(told, LEAST_SITE_SIGMA))
 
 
 def _after_off(whole: Series, rows: NDArray[np.bool_], charge: _Lit, zero_s: float) -> Series:

@@ -1,0 +1,172 @@
+"""The blank file: what a decay's frames show where nothing glows."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.errors import DataError
+from labrig.yaml_file import read_model, write_yaml
+
+FloatArray = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Row = tuple[Number, ...]
+
+#: A constant level is worth a word from so many σ on.
+SIGNIFICANT = 4.0
+#: By which begins of frames scatter: relays and shutters have their jitter.
+SAME_TIME_S = 0.02
+
+
+class BlankFile(BaseModel):
+    """Light after lamp-off that is no glow, in DN/s above dark frames taken as the decay's are.
+
+    Attributes
+    ----------
+    iso, f_number
+        To which the numbers belong.
+    t_s
+        Middles of the exposures after lamp-off, rising.
+    rate_dn_per_s, sigma_dn_per_s
+        A row for each of `t_s`, a number for each channel: the constant level not in it.
+    constant_dn_per_s, constant_sigma_dn_per_s
+        What stays for good but is not in the dark frames.
+    ambient_dn_per_s, ambient_sigma_dn_per_s
+        What is in frames and dark frames alike beyond dark current: light that leaks in. At least
+        so much; the channel that sees least of it is taken for dark.
+    first_clean_s
+        From when on nothing but the constant level is seen; null: never.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: Literal["blank"] = "blank"
+    iso: Positive
+    f_number: Positive | None
+    channels: tuple[str, ...]
+    t_s: Annotated[tuple[Number, ...], Field(min_length=1)]
+    rate_dn_per_s: tuple[Row, ...]
+    sigma_dn_per_s: tuple[tuple[NotNegative, ...], ...]
+    constant_dn_per_s: Row
+    constant_sigma_dn_per_s: tuple[NotNegative, ...]
+    ambient_dn_per_s: Row
+    ambient_sigma_dn_per_s: tuple[NotNegative, ...]
+    first_clean_s: NotNegative | None
+    source: str = ""
+    run: str | None = None
+
+    @model_validator(mode="after")
+    def _one_number_each(self) -> Self:
+        if any(right <= left for left, right in pairwise(self.t_s)):
+            raise ValueError("expected rising times in 't_s'")
+        rows = (*self.rate_dn_per_s, *self.sigma_dn_per_s)
+        levels = (
+            self.constant_dn_per_s,
+            self.constant_sigma_dn_per_s,
+            self.ambient_dn_per_s,
+            self.ambient_sigma_dn_per_s,
+        )
+        if len(self.rate_dn_per_s) != len(self.t_s) or len(self.sigma_dn_per_s) != len(self.t_s):
+            raise ValueError("expected a row of rates and of σ for every time in 't_s'")
+        if any(len(row) != len(self.channels) for row in (*rows, *levels)):
+            raise ValueError(f"expected {len(self.channels)} numbers in each row, one a channel")
+        return self
+
+    def at(
+        self, t_s: float, exposure_s: float, iso: float, f_number: float | None
+    ) -> tuple[FloatArray, FloatArray]:
+        """What a frame shows of it: level and σ in DN above dark frames, each (channels,).
+
+        Straight between the times that were measured; before the first of them unknown, after
+        `first_clean_s` the constant level alone.
+
+        Parameters
+        ----------
+        t_s, exposure_s
+            Begin after lamp-off and shutter time.
+        iso, f_number
+            Of the frame; other settings than the blank's are converted by their labels.
+
+        Raises
+        ------
+        DataError
+            The frame begins before the blank's first one.
+        """
+        middle_s = t_s + exposure_s / 2
+        if middle_s < self.t_s[0] * (1 - 1e-6):
+            raise DataError(
+                f"the blank begins {self.t_s[0]:.3g} s after lamp-off, a frame at {middle_s:.3g} s "
+                "is asked for; measure a blank that begins as early as the decay"
+            )
+        constant = np.array(self.constant_dn_per_s)
+        constant_sigma = np.array(self.constant_sigma_dn_per_s)
+        if self.first_clean_s is not None and t_s >= self.first_clean_s:
+            rate, sigma = constant, constant_sigma
+        else:
+            rate = constant + _between(self.t_s, self.rate_dn_per_s, middle_s)
+            sigma = np.hypot(constant_sigma, _between(self.t_s, self.sigma_dn_per_s, middle_s))
+        factor = exposure_s * iso / self.iso
+        if f_number is not None and self.f_number is not None:
+            factor *= (self.f_number / f_number) ** 2
+        return factor * rate, factor * sigma
+
+    def remarks(self, first_s: float) -> tuple[str, ...]:
+        """What is wrong with a decay on this bench whose first frame begins `first_s` after
+        lamp-off, a line each.
+        """
+        clean_s = self.first_clean_s
+        said: tuple[str, ...] = ()
+        if clean_s is None:
+            said = (
+                "the blank never became clean: light other than the glow fades along with it (see "
+                "the blank's report)",
+            )
+        elif first_s < clean_s - SAME_TIME_S:
+            said = (
+                f"the first frame begins {first_s:.3g} s after lamp-off, the blank is clean from "
+                f"{clean_s:.3g} s on: it holds some of the lamp's afterglow (begin later, or use a "
+                "shield)",
+            )
+        return (*said, *self.leaks())
+
+    def leaks(self) -> tuple[str, ...]:
+        """What shines all the time, a line each."""
+        said = []
+        for what, level, sigma in (
+            ("after lamp-off, but not in dark frames", self.constant_dn_per_s,
+             self.constant_sigma_dn_per_s),
+            ("all the time", self.ambient_dn_per_s, self.ambient_sigma_dn_per_s),
+        ):  # fmt: skip
+            most = int(np.argmax(level))
+            if level[most] > SIGNIFICANT * sigma[most]:
+                said.append(
+                    f"light of {level[most]:.3g} ± {sigma[most]:.2g} DN/s in {self.channels[most]} "
+                    f"falls on the blank {what}: find where it leaks in"
+                )
+        return tuple(said)
+
+
+def read_blank_file(path: Path) -> BlankFile:
+    """The blank in the file at `path`.
+
+    Raises
+    ------
+    UsageError
+        No such file, or it is malformed.
+    """
+    return read_model(path, BlankFile)
+
+
+def write_blank_file(path: Path, file: BlankFile) -> None:
+    """Write `file` so that `read_blank_file` gives it back."""
+    write_yaml(path, file)
+
+
+def _between(t_s: tuple[float, ...], rows: tuple[Row, ...], at_s: float) -> FloatArray:
+    """Straight between rows; the last one goes on."""
+    return np.array([np.interp(at_s, t_s, column) for column in zip(*rows, strict=True)])

@@ -1,0 +1,104 @@
+"""The fade file: how the lamp goes dark and comes on, band by band."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.yaml_file import read_model, write_yaml
+
+FloatArray = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Row = tuple[NotNegative, ...]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Change(_Part):
+    """Irradiance over that of the steady lamp, after a switch.
+
+    Attributes
+    ----------
+    t_s
+        From the switch, 0 first, rising.
+    share, sigma
+        A row for each time, a number for each band; straight in between.
+    """
+
+    t_s: Annotated[tuple[NotNegative, ...], Field(min_length=2)]
+    share: tuple[Row, ...]
+    sigma: tuple[Row, ...]
+
+    @model_validator(mode="after")
+    def _fits_together(self) -> Self:
+        if self.t_s[0] != 0 or any(right <= left for left, right in pairwise(self.t_s)):
+            raise ValueError("expected times in 't_s' that rise from 0")
+        if len(self.share) != len(self.t_s) or len(self.sigma) != len(self.t_s):
+            raise ValueError("expected a row of 'share' and of 'sigma' for every time in 't_s'")
+        if len({len(row) for row in (*self.share, *self.sigma)}) != 1:
+            raise ValueError("expected as many numbers in each row as there are bands")
+        return self
+
+    def missing_s(self) -> FloatArray:
+        """∫ share dt of each band, (bands,): for how long the steady lamp would give as much."""
+        steps, share = np.diff(self.t_s), np.array(self.share)
+        total: FloatArray = steps @ (share[1:] + share[:-1]) / 2
+        return total
+
+
+class FadeFile(_Part):
+    """What `fade` found.
+
+    Attributes
+    ----------
+    bands_nm
+        Edges of the bands, rising; one more than there are bands.
+    fade, rise
+        After switching off and on; null: not measured.
+    """
+
+    kind: Literal["fade"] = "fade"
+    lamp: str = ""
+    bands_nm: Annotated[tuple[Positive, ...], Field(min_length=2)]
+    fade: Change
+    rise: Change | None = None
+    source: str = ""
+    run: str | None = None
+
+    @model_validator(mode="after")
+    def _fits_its_bands(self) -> Self:
+        if any(right <= left for left, right in pairwise(self.bands_nm)):
+            raise ValueError("expected rising edges in 'bands_nm'")
+        bands = len(self.bands_nm) - 1
+        if any(len(one.share[0]) != bands for one in (self.fade, self.rise) if one is not None):
+            raise ValueError(f"expected {bands} numbers in each row of 'share', one a band")
+        return self
+
+    def in_bands(self, change: Change, edges_nm: ArrayLike) -> tuple[FloatArray, FloatArray]:
+        """Times (n,) and shares (n, bands) of a change in other bands, by their middles."""
+        edges, own = np.asarray(edges_nm, dtype=np.float64), np.array(self.bands_nm)
+        middles, measured = (edges[1:] + edges[:-1]) / 2, (own[1:] + own[:-1]) / 2
+        share = [np.interp(middles, measured, row) for row in change.share]
+        return np.array(change.t_s), np.array(share)
+
+
+def read_fade_file(path: Path) -> FadeFile:
+    """The fade in the file at `path`.
+
+    Raises
+    ------
+    UsageError
+        No such file, or it is malformed.
+    """
+    return read_model(path, FadeFile)
+
+
+def write_fade_file(path: Path, file: FadeFile) -> None:
+    """Write `file` so that `read_fade_file` gives it back."""
+    write_yaml(path, file)

@@ -1,0 +1,96 @@
+"""The irradiance file: what the lamp does to the sample, directly and through the LVF."""
+
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.calibration.lvf_file import Strip
+from labrig.yaml_file import read_model, write_yaml
+
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Numbers = tuple[NotNegative, ...]
+
+
+class IrradianceFile(BaseModel):
+    """E per band, in one scale for the lamp by itself and through every place of the LVF.
+
+    Attributes
+    ----------
+    lamp
+        Name of its spectrum.
+    bands_nm
+        Edges of the bands, rising; one more than there are bands.
+    vector_length
+        Euclidean length of `direct`: what excitation rates found with this file belong to.
+    direct, direct_sigma
+        E of every band, ∫ E dλ over it, of the lamp by itself.
+    position
+        Middles of `strip.slices()`: 0 at the blue end, 1 at the red end.
+    through, through_sigma
+        E of every band behind the LVF, a row for each position.
+    scale_sigma
+        Relative standard uncertainty of all of `through` over `direct`, common to all positions.
+    ratio, ratio_sigma
+        Σ `direct` over Σ `through` of each position.
+    strip
+        Where the LVF lay on the sample, as the camera sees the sample.
+    source, run
+        Where the numbers come from.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    kind: Literal["irradiance"] = "irradiance"
+    lamp: str
+    bands_nm: tuple[Positive, ...]
+    vector_length: Positive = 1.0
+    direct: Numbers
+    direct_sigma: Numbers
+    position: tuple[Annotated[float, Field(ge=0, le=1)], ...]
+    through: tuple[Numbers, ...]
+    through_sigma: tuple[Numbers, ...]
+    scale_sigma: NotNegative
+    ratio: tuple[Positive, ...]
+    ratio_sigma: Numbers
+    strip: Strip
+    source: str = ""
+    run: str | None = None
+
+    @model_validator(mode="after")
+    def _one_number_each(self) -> Self:
+        _rising(self.bands_nm, "bands_nm")
+        _rising(self.position, "position")
+        bands, places = len(self.bands_nm) - 1, len(self.position)
+        rows = (self.direct, self.direct_sigma, *self.through, *self.through_sigma)
+        if any(len(row) != bands for row in rows):
+            raise ValueError(f"expected {bands} numbers for each irradiance, one a band")
+        columns = (self.through, self.through_sigma, self.ratio, self.ratio_sigma)
+        if any(len(column) != places for column in columns):
+            raise ValueError(
+                f"expected {places} entries, one a position, in 'through', 'ratio' and their σ"
+            )
+        return self
+
+
+def read_irradiance_file(path: Path) -> IrradianceFile:
+    """The irradiance in the file at `path`.
+
+    Raises
+    ------
+    UsageError
+        No such file, or it is malformed.
+    """
+    return read_model(path, IrradianceFile)
+
+
+def write_irradiance_file(path: Path, file: IrradianceFile) -> None:
+    """Write `file` so that `read_irradiance_file` gives it back."""
+    write_yaml(path, file)
+
+
+def _rising(values: tuple[float, ...], name: str) -> None:
+    if len(values) < 2 or any(right <= left for left, right in pairwise(values)):
+        raise ValueError(f"expected two or more rising numbers in '{name}', got {list(values)}")

@@ -1,0 +1,210 @@
+"""The LVF file: what a linear variable filter lets through, and where it lies in the frame."""
+
+import math
+from itertools import pairwise
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.optics import Bands, Lvf, WavelengthMap
+from labrig.region import Region, region_pixels
+from labrig.yaml_file import read_model, write_yaml
+
+#: Places along a strip at which pictures through it are read (paper, section 4.2).
+SLICES = 31
+
+Share = Annotated[float, Field(ge=0, le=1)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Numbers = tuple[Number, ...]
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Strip(_Part):
+    """Where the filter is in the frame, in fractions of its width and height.
+
+    Attributes
+    ----------
+    left, right
+        (x, y) of the two ends of the centre line.
+    height
+        Of the strip, less its blurred edges.
+    rising
+        Whether the wavelength rises from left to right.
+    """
+
+    left: tuple[Share, Share]
+    right: tuple[Share, Share]
+    height: Annotated[float, Field(gt=0, le=1)]
+    rising: bool
+
+    @model_validator(mode="after")
+    def _inside_the_frame(self) -> Self:
+        if self.right[0] <= self.left[0]:
+            raise ValueError(
+                f"expected 'right' to the right of 'left', got x = {self.right[0]:g} and "
+                f"{self.left[0]:g}"
+            )
+        middles = (self.left[1], self.right[1])
+        if min(middles) < self.height / 2 or max(middles) > 1 - self.height / 2:
+            raise ValueError("expected a strip inside of the frame, it leaves it at a long side")
+        return self
+
+    def slices(self, count: int = SLICES) -> dict[str, Region]:
+        """Upright regions side by side along the strip, from the blue end to the red end.
+
+        Returns
+        -------
+        dict
+            `p00`, `p01`, … → region; slice k reaches from position k/count to (k + 1)/count.
+        """
+        ends = np.linspace(self.left[0], self.right[0], count + 1)
+        middles = np.linspace(self.left[1], self.right[1], 2 * count + 1)[1::2]
+        regions = [
+            (float(start), max(float(y) - self.height / 2, 0.0), float(end - start), self.height)
+            for (start, end), y in zip(pairwise(ends), middles, strict=True)
+        ]
+        ordered = regions if self.rising else regions[::-1]
+        return {f"p{number:02d}": region for number, region in enumerate(ordered)}
+
+    def positions(self, width: int, height: int, count: int = SLICES) -> tuple[float, ...]:
+        """Position 0 (blue end) to 1 (red end) of the middle of each slice, in whole pixels.
+
+        A frame of `width` × `height` pixels has no others: that is where a slice really lies.
+        """
+        found = []
+        for region in self.slices(count).values():
+            x, _, wide, _ = region_pixels(region, width, height)
+            share = ((x + wide / 2) / width - self.left[0]) / (self.right[0] - self.left[0])
+            found.append(share if self.rising else 1 - share)
+        return tuple(found)
+
+    def tilt_degrees(self, width: int, height: int) -> float:
+        """Of the strip in a frame of so many pixels; > 0 falls to the right."""
+        across = (self.right[0] - self.left[0]) * width
+        down = (self.right[1] - self.left[1]) * height
+        return math.degrees(math.atan2(down, across))
+
+
+class BandColumns(_Part):
+    """One number for every position; as in `labrig.optics.Bands`."""
+
+    centre_nm: Numbers
+    fwhm_nm: Numbers
+    skew: Numbers
+    peak: Numbers
+    leakage: Numbers
+
+    @classmethod
+    def of(cls, bands: Bands) -> Self:
+        """From arrays."""
+        return cls(**{name: tuple(getattr(bands, name).tolist()) for name in cls.model_fields})
+
+    def bands(self) -> Bands:
+        """As arrays."""
+        return Bands(*(np.array(getattr(self, name)) for name in type(self).model_fields))
+
+
+class WavelengthColumns(_Part):
+    """Position → wavelength along the whole strip; as in `labrig.optics.WavelengthMap`."""
+
+    coefficients: Numbers
+    span: tuple[Number, Number]
+    covariance: tuple[Numbers, ...]
+
+    @classmethod
+    def of(cls, wavelengths: WavelengthMap) -> Self:
+        """From arrays."""
+        count = len(wavelengths.coefficients)
+        known = wavelengths.covariance
+        covariance = np.zeros((count, count)) if known is None else known
+        return cls(
+            coefficients=tuple(wavelengths.coefficients.tolist()),
+            span=wavelengths.span,
+            covariance=tuple(tuple(row) for row in covariance.tolist()),
+        )
+
+    def map(self) -> WavelengthMap:
+        """As arrays."""
+        return WavelengthMap(np.array(self.coefficients), self.span, np.array(self.covariance))
+
+
+class LvfFile(_Part):
+    """A calibrated linear variable filter.
+
+    Attributes
+    ----------
+    position
+        Of each of the bands along the strip: 0 at its blue end, 1 at its red end.
+    bands, sigma
+        T_p(λ) and one standard deviation of its figures; all relative to one unknown factor.
+    remainder_nm, remainder
+        What the bands' shape leaves of T_p(λ), a row for every position.
+    wavelengths
+        From mercury lines, before the colour filters had their say.
+    before_camera, on_sample
+        Where the strip is seen when the camera looks through it, and where it lies on the sample
+        in the pose in which the camera sees the sample.
+    source, run
+        Where the numbers come from.
+    """
+
+    kind: Literal["lvf"] = "lvf"
+    position: Numbers
+    bands: BandColumns
+    sigma: BandColumns
+    remainder_nm: Numbers = ()
+    remainder: tuple[Numbers, ...] = ()
+    wavelengths: WavelengthColumns
+    before_camera: Strip | None = None
+    on_sample: Strip | None = None
+    source: str = ""
+    run: str | None = None
+
+    @model_validator(mode="after")
+    def _is_a_filter(self) -> Self:
+        count = len(self.position)
+        columns = [getattr(part, name) for part in (self.bands, self.sigma) for name in _FIGURES]
+        if any(len(column) != count for column in columns):
+            raise ValueError(f"expected {count} numbers, one a position, in every figure")
+        rows = count if self.remainder_nm else 0
+        if [len(row) for row in self.remainder] != [len(self.remainder_nm)] * rows:
+            raise ValueError(
+                "expected a 'remainder' of one row a position, one number a wavelength"
+            )
+        self.wavelengths.map()
+        _ = self.lvf
+        return self
+
+    @property
+    def lvf(self) -> Lvf:
+        """The filter, at positions from 0 (blue end) to 1 (red end)."""
+        nodes = np.array(self.remainder_nm)
+        remainder = np.array(self.remainder).reshape(len(self.remainder), len(nodes))
+        return Lvf(
+            np.array(self.position), self.bands.bands(), self.sigma.bands(), nodes, remainder
+        )
+
+
+_FIGURES = tuple(BandColumns.model_fields)
+
+
+def read_lvf_file(path: Path) -> LvfFile:
+    """The calibrated filter in the file at `path`.
+
+    Raises
+    ------
+    UsageError
+        No such file, or it is malformed.
+    """
+    return read_model(path, LvfFile)
+
+
+def write_lvf_file(path: Path, file: LvfFile) -> None:
+    """Write `file` so that `read_lvf_file` gives it back."""
+    write_yaml(path, file)

@@ -1,0 +1,180 @@
+"""What shutter, ISO and aperture do over what their labels say, and how much light flickers.
+
+Brackets of a steady card: ln(light of a frame) is a lamp that drifts evenly within a unit, plus
+the labels, plus one number for every setting. All units are solved together; the reference exposure
+that stands between the others keeps lamp and settings apart.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.calibration import Factor
+from labrig.errors import DataError
+
+FloatArray = NDArray[np.float64]
+Setting = float | None
+
+#: How much of a factor the frames must determine by themselves.
+DETERMINED = 1 - 1e-6
+#: Rounds in which the frames' weights follow their flicker.
+ROUNDS = 4
+
+
+@dataclass(frozen=True)
+class CardFrame:
+    """One frame of the lit card.
+
+    Attributes
+    ----------
+    unit, purpose
+        Of the run.
+    time_s
+        On any clock.
+    light, sigma
+        ln of its signal over all channels, and what noise makes of that.
+    """
+
+    unit: str
+    purpose: str
+    time_s: float
+    exposure_s: float
+    iso: float
+    f_number: Setting
+    light: float
+    sigma: float
+
+
+@dataclass(frozen=True)
+class Factors:
+    """By rising setting; `flicker` of all frames, `repeated` of equal ones, each with its σ."""
+
+    shutter: tuple[Factor, ...]
+    iso_gain: tuple[Factor, ...]
+    aperture: tuple[Factor, ...]
+    flicker: tuple[float, float]
+    repeated: tuple[float, float]
+
+
+def fit_factors(frames: Sequence[CardFrame], iso: float, f_number: Setting) -> Factors:
+    """The factors to frames of brackets and repeats.
+
+    Parameters
+    ----------
+    iso, f_number
+        Settings at which factors are 1; the shutter's is 1 at the longest time of all.
+
+    Raises
+    ------
+    DataError
+        Too few frames.
+    """
+    repeats = [frame for frame in frames if frame.purpose == "repeat"]
+    if len(repeats) < 4 or len(frames) < 8:
+        raise DataError(
+            f"expected repeats and brackets of the lit card that do not clip, got {len(frames)} "
+            "frames; is the card lit, and 'card:' its region?"
+        )
+    times = sorted({frame.exposure_s for frame in frames})
+    isos = sorted({frame.iso for frame in frames})
+    stops = sorted({frame.f_number for frame in frames if frame.f_number is not None})
+    columns: list[tuple[str, Setting]] = [
+        *(("shutter", time_s) for time_s in times[:-1]),
+        *(("iso", one) for one in isos if one != iso),
+        *(("aperture", stop) for stop in stops if stop != f_number),
+    ]
+    design = np.hstack([_settings(frames, columns), _lamp(frames)])
+    target = np.array([frame.light - _labelled(frame, iso, f_number) for frame in frames])
+    noise = np.array([frame.sigma for frame in frames])
+    values, sigma, determined, flicker = _solve(design, target, noise)
+
+    def of(kind: str, fixed: Setting) -> tuple[Factor, ...]:
+        found = [] if fixed is None else [Factor(setting=fixed, factor=1.0, sigma=0.0)]
+        for number, (name, setting) in enumerate(columns):
+            if name == kind and determined[number] and setting is not None:
+                factor = float(np.exp(values[number]))
+                found.append(
+                    Factor(setting=setting, factor=factor, sigma=factor * float(sigma[number]))
+                )
+        return tuple(sorted(found, key=lambda one: one.setting))
+
+    return Factors(
+        shutter=of("shutter", times[-1]),
+        iso_gain=of("iso", iso),
+        aperture=of("aperture", f_number),
+        flicker=flicker,
+        repeated=_scatter(repeats),
+    )
+
+
+def _settings(frames: Sequence[CardFrame], columns: Sequence[tuple[str, Setting]]) -> FloatArray:
+    design = np.zeros((len(frames), len(columns)))
+    for row, frame in enumerate(frames):
+        own = {("shutter", frame.exposure_s), ("iso", frame.iso), ("aperture", frame.f_number)}
+        design[row] = [column in own for column in columns]
+    return design
+
+
+def _lamp(frames: Sequence[CardFrame]) -> FloatArray:
+    """A level and an even drift for every unit."""
+    units = list(dict.fromkeys(frame.unit for frame in frames))
+    design = np.zeros((len(frames), 2 * len(units)))
+    for number, unit in enumerate(units):
+        rows = [row for row, frame in enumerate(frames) if frame.unit == unit]
+        times_s = np.array([frames[row].time_s for row in rows])
+        span_s = max(float(np.ptp(times_s)), 1.0)
+        design[rows, 2 * number] = 1.0
+        design[rows, 2 * number + 1] = (times_s - times_s.mean()) / span_s
+    return design
+
+
+def _labelled(frame: CardFrame, iso: float, f_number: Setting) -> float:
+    """Logarithm of what the labels alone would make of the reference's light."""
+    labelled = np.log(frame.exposure_s * frame.iso / iso)
+    if frame.f_number is not None and f_number is not None:
+        labelled += 2 * np.log(f_number / frame.f_number)
+    return float(labelled)
+
+
+def _solve(
+    design: FloatArray, target: FloatArray, noise: FloatArray
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], tuple[float, float]]:
+    """Values, σ, whether they are determined, and the flicker with its σ."""
+    flicker = 0.01
+    for _ in range(ROUNDS):
+        weight = 1 / np.hypot(noise, flicker)
+        u, s, v = np.linalg.svd(design * weight[:, np.newaxis], full_matrices=False)
+        kept = s > 1e-9 * s[0]
+        inverse = v[kept].T / s[kept]
+        values = inverse @ (u[:, kept].T @ (target * weight))
+        freedom = len(target) - int(kept.sum())
+        if freedom < 1:
+            raise DataError("expected more frames than settings; raise 'cycles'")
+        squares = np.square(target - design @ values) * len(target) / freedom
+        flicker = _common_scatter(squares, noise)
+    sigma = np.sqrt(np.square(inverse).sum(axis=1))
+    determined = np.square(v[kept]).sum(axis=0) > DETERMINED
+    return values, sigma, determined, (flicker, flicker / np.sqrt(2 * freedom))
+
+
+def _scatter(frames: Sequence[CardFrame]) -> tuple[float, float]:
+    """Flicker of equal frames about a straight line, and its σ."""
+    light, design = np.array([frame.light for frame in frames]), _lamp(frames)
+    found, *_ = np.linalg.lstsq(design, light)
+    freedom = max(len(light) - design.shape[1], 1)
+    squares = np.square(light - design @ found) * len(light) / freedom
+    flicker = _common_scatter(squares, np.array([frame.sigma for frame in frames]))
+    return flicker, float(np.sqrt(squares.mean() / (2 * freedom)))
+
+
+def _common_scatter(squares: FloatArray, noise: FloatArray) -> float:
+    """ρ at which squares are ρ² + noise² in the mean, each weighted as it tells ρ."""
+    variance = float(squares.mean())
+    for _ in range(20):
+        weight = 1 / np.square(variance + np.square(noise))
+        variance = max(float(weight @ (squares - np.square(noise)) / weight.sum()), 0.0)
+        if variance == 0:
+            break
+    return float(np.sqrt(variance))

@@ -1,0 +1,134 @@
+"""The flat field of a lens at one aperture, from frames of an evenly lit card."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import NamedTuple
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.calibration import Flat, rho_squared
+from labrig.errors import DataError
+from labrig.reduce import RawFrame
+from labrig.region import Region, region_pixels
+
+FloatArray = NDArray[np.float64]
+
+#: Blocks across and down the card whose means are fitted.
+BLOCKS = (16, 12)
+#: ρ⁴ takes part if it is so many σ from nothing.
+EVIDENT_SIGMAS = 4.0
+
+
+@dataclass(frozen=True, eq=False)
+class FittedFlat:
+    """A flat field, and means of blocks of the card: ρ², and light over the fit in the middle.
+
+    Attributes
+    ----------
+    rho2
+        (channels, blocks).
+    light
+        (channels, blocks), the gradient divided out.
+    """
+
+    flat: Flat
+    rho2: FloatArray
+    light: FloatArray
+
+
+def fit_flat(
+    frames: Sequence[RawFrame], card: Region, dark_dn: FloatArray, f_number: float | None
+) -> FittedFlat:
+    """Least squares of A (1 + g·x + c₁ρ² + c₂ρ⁴) to blocks of the card, channel by channel.
+
+    Parameters
+    ----------
+    dark_dn
+        (channels,) level of the dark above black.
+
+    Raises
+    ------
+    DataError
+        No frames, or the card is not lit.
+    """
+    if not frames:
+        raise DataError("expected frames of the lit card, got none")
+    first = frames[0]
+    mosaic: FloatArray = np.mean([frame.mosaic for frame in frames], axis=0, dtype=np.float64)
+    blocks = [_blocks(first, mosaic, card, name) for name in first.channels]
+    fits = [
+        _fit(x, y, light - dark, first.width, first.height)
+        for (x, y, light), dark in zip(blocks, dark_dn.tolist(), strict=True)
+    ]
+    powers = max(fit.powers for fit in fits)
+    flat = Flat(
+        f_number=f_number,
+        falloff=tuple(tuple(fit.falloff[:powers].tolist()) for fit in fits),
+        gradient=tuple((float(fit.gradient[0]), float(fit.gradient[1])) for fit in fits),
+        sigma=float(np.sqrt(np.mean([fit.rms**2 for fit in fits]))),
+    )
+    return FittedFlat(flat, np.array([f.rho2 for f in fits]), np.array([f.light for f in fits]))
+
+
+class _Fit(NamedTuple):
+    """Of one channel; `light` of the blocks is over the middle's, the gradient taken off."""
+
+    falloff: FloatArray
+    powers: int
+    gradient: FloatArray
+    rms: float
+    rho2: FloatArray
+    light: FloatArray
+
+
+def _blocks(
+    frame: RawFrame, mosaic: FloatArray, card: Region, channel: str
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Middles in pixels and mean light above black of blocks of a channel, each (blocks,)."""
+    left, top, width, height = region_pixels(card, frame.width, frame.height)
+    side = frame.cfa_side
+    across = _edges(left, width, BLOCKS[0], side)
+    down = _edges(top, height, BLOCKS[1], side)
+    total, count = np.zeros((2, len(down) - 1, len(across) - 1))
+    for position, letter in enumerate(frame.cfa):
+        if letter != channel:
+            continue
+        row, column = divmod(position, side)
+        for j, (low, high) in enumerate(pairwise(down.tolist())):
+            for i, (near, far) in enumerate(pairwise(across.tolist())):
+                here = mosaic[low + (row - low) % side : high : side,
+                              near + (column - near) % side : far : side]  # fmt: skip
+                total[j, i] += float((here - frame.black[position]).sum())
+                count[j, i] += here.size
+    x, y = np.meshgrid((across[1:] + across[:-1]) / 2, (down[1:] + down[:-1]) / 2)
+    return x.ravel(), y.ravel(), (total / count).ravel()
+
+
+def _edges(start: int, length: int, blocks: int, side: int) -> NDArray[np.intp]:
+    """Of blocks that are whole cells of the colour filter, one cell wide at the least."""
+    cells = length // side
+    return start + side * np.linspace(0, cells, min(blocks, cells) + 1).round().astype(np.intp)
+
+
+def _fit(x: FloatArray, y: FloatArray, light: FloatArray, width: int, height: int) -> _Fit:
+    if not light.mean() > 0:
+        raise DataError("expected a lit card, got a dark one; is 'card:' its region?")
+    rho2 = rho_squared(x, y, width, height)
+    half = float(np.hypot(width, height)) / 2
+    odd = np.stack([(x - width / 2) / half, (y - height / 2) / half], axis=1)
+    for powers in (2, 1):
+        even = rho2[:, np.newaxis] ** np.arange(1, powers + 1)
+        design = np.hstack([np.ones((len(x), 1)), odd, even])
+        found, *_ = np.linalg.lstsq(design, light)
+        residual = light - design @ found
+        variance = float(residual @ residual) / max(len(light) - len(found), 1)
+        sigma = float(np.sqrt(np.linalg.inv(design.T @ design)[-1, -1] * variance))
+        if abs(found[-1]) > EVIDENT_SIGMAS * sigma:
+            break
+    middle, gradient = float(found[0]), found[1:3] / found[0]
+    falloff = np.zeros(2)
+    falloff[:powers] = found[3:] / middle
+    plain = light / middle - odd @ gradient
+    return _Fit(falloff, powers, gradient, float(np.sqrt(variance)) / middle, rho2, plain)

@@ -1,0 +1,88 @@
+"""How far a sensor is from linear, from the colours of one grey card.
+
+A grey card has one colour. If the sensor were linear the channels of all its photographs would have
+the same ratios, whatever shutter, aperture and lamp did in that frame: all of that is common to the
+channels. The channels stand at different levels, so that a deviation D(level) shows in their
+ratios, free of flicker and drift:
+
+    ln s_fc = λ_f + κ_c + D(s_fc),   D piecewise linear, D(0) = 0.
+
+A deviation that is the same power at all levels cannot be seen in this way.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.calibration import Linearity
+from labrig.optics.piecewise import hats
+
+FloatArray = NDArray[np.float64]
+
+#: Knots of D, as shares of the range up to saturation.
+KNOTS = (0.15, 0.35, 0.55, 0.75, 0.95)
+#: Below this share noise of reading is most of a value.
+LEAST_SHARE = 0.005
+
+
+def fit_linearity(
+    level_dn: FloatArray,
+    sigma_dn: FloatArray,
+    group: NDArray[np.intp],
+    range_dn: float,
+    saturation_dn: float | None,
+) -> Linearity | None:
+    """D at a few levels; None where the frames cannot tell.
+
+    Parameters
+    ----------
+    level_dn, sigma_dn
+        (frames, channels) above dark; NaN where a value is not to be used.
+    group
+        (frames,) what the lens does to the card's colour is the same within a group.
+    range_dn
+        From black to white.
+    saturation_dn
+        To be noted.
+    """
+    used = np.isfinite(level_dn) & (level_dn > LEAST_SHARE * range_dn)
+    used &= (used.sum(axis=1) > 1)[:, np.newaxis]
+    if not used.any():
+        return None
+    frame, channel = np.nonzero(used)
+    level, relative = level_dn[used], sigma_dn[used] / level_dn[used]
+    highest = float(level.max())
+    between = [share * range_dn for share in KNOTS if share * range_dn < highest]
+    knots = np.array([0.0, *between, highest])
+    frames, channels = level_dn.shape
+    groups = int(group.max()) + 1
+    bends = hats(knots, level)[:, 1:]
+    light = np.equal.outer(frame, np.arange(frames)).astype(np.float64)
+    colour = np.zeros((len(level), groups * channels))
+    colour[np.arange(len(level)), group[frame] * channels + channel] = 1.0
+    weight = 1 / relative
+    nuisance = np.hstack([light, colour]) * weight[:, np.newaxis]
+    # What light and colour explain is taken out; D is what is left.
+    left, weights, _ = np.linalg.svd(nuisance, full_matrices=False)
+    own = left[:, weights > 1e-10 * weights.max()]
+    target, design = np.log(level) * weight, bends * weight[:, np.newaxis]
+    target, design = target - own @ (own.T @ target), design - own @ (own.T @ design)
+    singular = np.linalg.svd(design, compute_uv=False)
+    if singular[-1] < 1e-6 * singular[0]:
+        return None
+    found, *_ = np.linalg.lstsq(design, target)
+    freedom = len(level) - own.shape[1] - len(found)
+    misfit = np.square(target - design @ found).sum() / max(freedom, 1)
+    covariance = np.linalg.inv(design.T @ design) * max(misfit, 1.0)
+    return Linearity(
+        level_dn=tuple(knots[1:].tolist()),
+        deviation=tuple(found.tolist()),
+        sigma=tuple(np.sqrt(np.diag(covariance)).tolist()),
+        saturation_dn=saturation_dn,
+    )
+
+
+def deviation(linearity: Linearity | None, level_dn: FloatArray) -> FloatArray:
+    """D at some levels."""
+    if linearity is None:
+        return np.zeros_like(level_dn)
+    return np.interp(level_dn, [0.0, *linearity.level_dn], [0.0, *linearity.deviation])

@@ -1,0 +1,239 @@
+"""Gain and read noise of a sensor from pairs of frames of the same light.
+
+Photons arrive as Poisson has it: the variance of electrons is their number, so that of numbers is
+level / gain (Janesick, *Photon Transfer*, 2007; EMVA Standard 1288). The difference of two frames
+holds no pattern of pixels, card or lens.
+
+Where pixels share charge with their neighbours each one scatters less than its photons do. The
+covariances with the eight next ones make up for it: what one pixel loses its neighbours have (A. C.
+Moore, Z. Ninkov, W. J. Forrest, Optical Engineering 45, 2006). They are added if they are evident.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.calibration import Noise
+from labrig.errors import DataError
+from labrig.record import FrameRecord
+from labrig.reduce import RawFrame
+from labrig.region import Region, region_pixels
+
+FloatArray = NDArray[np.float64]
+
+#: Pixels that differ by more standard deviations are hot, or were struck by a cosmic ray.
+OUTLIER_SIGMAS = 6.0
+#: Standard deviations by which neighbours must share noise to be corrected for.
+EVIDENT_SIGMAS = 4.0
+#: A frame that is brighter than so many standard deviations of its pixels is lit.
+LIT_SIGMAS = 3.0
+#: More pixels across or down take memory and tell nothing more.
+MOST_PIXELS = 1024
+#: Of rounding to whole numbers.
+ROUNDING_VARIANCE = 1 / 12
+#: Half of the eight neighbours; the others see the same.
+_NEIGHBOURS = ((0, 1), (1, -1), (1, 0), (1, 1))
+
+
+@dataclass(frozen=True)
+class Scatter:
+    """What two frames of the same light differ by, all channels together.
+
+    Attributes
+    ----------
+    level_dn
+        Mean of the two above dark.
+    variance
+        Of a pixel in one frame, DN², without what its row shares.
+    neighbours
+        Sum of its covariances with the eight next pixels, DN².
+    row_variance
+        Of what a row shares, DN².
+    pixels
+        That were compared.
+    """
+
+    level_dn: float
+    variance: float
+    neighbours: float
+    row_variance: float
+    pixels: int
+
+
+@dataclass(frozen=True)
+class PhotonTransfer:
+    """The noise found, and what it was found from.
+
+    Attributes
+    ----------
+    points
+        Of the lit frames.
+    shared, shared_sigma
+        What neighbours share, over the variance of a pixel.
+    reduced_chi2
+        Of the straight line; more than a few: it is none.
+    """
+
+    noise: Noise
+    points: tuple[Scatter, ...]
+    shared: float
+    shared_sigma: float
+    reduced_chi2: float
+
+    @property
+    def shares(self) -> bool:
+        """Whether neighbours evidently share noise."""
+        return self.shared > EVIDENT_SIGMAS * self.shared_sigma
+
+    def variance(self, point: Scatter) -> float:
+        """Of a pixel's own light, DN²."""
+        return point.variance + (point.neighbours if self.shares else 0.0)
+
+
+def scatter(one: RawFrame, other: RawFrame, region: Region, dark_dn: float) -> Scatter:
+    """What two frames of one exposure differ by in a region.
+
+    Parameters
+    ----------
+    dark_dn
+        Level of the dark above black.
+
+    Raises
+    ------
+    DataError
+        The frames are of different sensors.
+    """
+    if one.mosaic.shape != other.mosaic.shape or one.cfa != other.cfa:
+        raise DataError("expected pairs of frames of one sensor; choose those of one camera")
+    x, y, width, height = _middle(region_pixels(region, one.width, one.height))
+    side = one.cfa_side
+    difference, levels = np.zeros((height, width)), []
+    for position in range(side * side):
+        row, column = divmod(position, side)
+        here = (slice(y + (row - y) % side, y + height, side),
+                slice(x + (column - x) % side, x + width, side))  # fmt: skip
+        black = one.black[position] + dark_dn
+        first, second = (frame.mosaic[here].astype(np.float64) - black for frame in (one, other))
+        brightness, again = float(first.mean()), float(second.mean())
+        # Flicker is no noise of pixels; in the dark there is nothing to scale by.
+        lit = min(brightness, again) > LIT_SIGMAS * float(first.std())
+        scale = brightness / again if lit else 1.0
+        apart = first - scale * second
+        difference[(row - y) % side :: side, (column - x) % side :: side] = (
+            apart - apart.mean()
+        ) / np.sqrt(1 + scale**2)
+        levels.append((brightness + again) / 2)
+    return _scatter(difference, float(np.mean(levels)))
+
+
+def _middle(area: tuple[int, int, int, int]) -> tuple[int, int, int, int]:
+    """Of an area x, y, width, height: as many pixels as tell the noise to 0.2 %."""
+    x, y, width, height = area
+    wide, high = min(width, MOST_PIXELS), min(height, MOST_PIXELS)
+    return x + (width - wide) // 2, y + (height - high) // 2, wide, high
+
+
+def _scatter(difference: FloatArray, level_dn: float) -> Scatter:
+    robust = 1.4826 * float(np.median(np.abs(difference)))
+    kept = np.abs(difference) <= OUTLIER_SIGMAS * max(robust, 1.0)
+    clean = np.where(kept, difference, 0.0)
+    columns = clean.shape[1]
+    rows = clean.sum(axis=1) / kept.sum(axis=1)
+    own = np.where(kept, clean - rows[:, np.newaxis], 0.0)
+    variance = float(np.square(own).sum()) / kept.sum()
+    covariances = [_covariance(own, down, right) for down, right in _NEIGHBOURS]
+    # What its mean has taken from each row: pixels that share noise make more of it.
+    taken = (variance + 2 * covariances[0]) / columns
+    return Scatter(
+        level_dn,
+        variance=variance + taken,
+        neighbours=2 * (sum(covariances) + taken),
+        row_variance=max(float(np.square(rows).mean()) - taken, 0.0),
+        pixels=int(kept.sum()),
+    )
+
+
+def _covariance(values: FloatArray, down: int, right: int) -> float:
+    """With the pixel so far down and to the right."""
+    rows, columns = values.shape
+    shifted = values[down:, max(right, 0) : columns + min(right, 0)]
+    unmoved = values[: rows - down, max(-right, 0) : columns - max(right, 0)]
+    return float((shifted * unmoved).mean())
+
+
+def photon_transfer(iso: float, lit: Sequence[Scatter], dark: Sequence[Scatter]) -> PhotonTransfer:
+    """Gain from the lit pairs, read noise from the dark ones.
+
+    Raises
+    ------
+    DataError
+        Too few pairs, or a variance that does not rise with the light.
+    """
+    if len(lit) < 2 or not dark:
+        raise DataError(
+            f"expected pairs of lit frames at two levels and of dark frames at ISO {iso:g}, got "
+            f"{len(lit)} and {len(dark)}; take more"
+        )
+    shared, shared_sigma = _shared(lit)
+    evident = shared > EVIDENT_SIGMAS * shared_sigma
+    level = np.array([point.level_dn for point in lit])
+    variance = np.array([p.variance + (p.neighbours if evident else 0.0) for p in lit])
+    # A variance of n pixels has the relative variance 2/n, each of the eight covariances half that.
+    freedom = np.array([point.pixels for point in lit]) / (5 if evident else 1)
+    dark_variance = float(np.mean([point.variance for point in dark]))
+    slope, sigma, chi2 = _line(level, variance, dark_variance, freedom)
+    if not slope > 0:
+        raise DataError(
+            f"expected noise that rises with the light at ISO {iso:g}, got {slope:.3g} per DN; is "
+            "the card lit, and 'card:' its region?"
+        )
+    gain = 1 / slope
+    read = np.sqrt(max(dark_variance - ROUNDING_VARIANCE, 0.0))
+    pixels = sum(point.pixels for point in dark)
+    row = np.sqrt(np.mean([point.row_variance for point in dark]))
+    noise = Noise(
+        iso=iso,
+        gain_e_per_dn=gain,
+        gain_e_per_dn_sigma=gain * sigma / slope,
+        read_noise_e=float(read * gain),
+        read_noise_e_sigma=float(read * gain * np.hypot(sigma / slope, 1 / np.sqrt(2 * pixels))),
+        row_noise_e=float(row * gain),
+    )
+    return PhotonTransfer(noise, tuple(lit), shared, shared_sigma, chi2)
+
+
+def _shared(lit: Sequence[Scatter]) -> tuple[float, float]:
+    """What neighbours share over all pairs, and its σ if they share nothing."""
+    pixels = np.array([point.pixels for point in lit])
+    ratio = np.array([point.neighbours / max(point.variance, ROUNDING_VARIANCE) for point in lit])
+    sigma = 2 * np.sqrt(len(_NEIGHBOURS) / pixels.sum())
+    return float(ratio @ pixels / pixels.sum()), float(sigma)
+
+
+def _line(
+    level: FloatArray, variance: FloatArray, dark_variance: float, freedom: FloatArray
+) -> tuple[float, float, float]:
+    """Slope, its σ and reduced χ² of variance = dark + slope · level."""
+    rise, expected = variance - dark_variance, variance
+    for _ in range(3):
+        weight = freedom / (2 * np.square(np.maximum(expected, ROUNDING_VARIANCE)))
+        slope = float((weight * level) @ rise / ((weight * level) @ level))
+        expected = np.maximum(dark_variance + slope * level, 1e-3 * variance)
+    misfit = float(weight @ np.square(rise - slope * level)) / max(len(level) - 1, 1)
+    sigma = float(1 / np.sqrt((weight * level) @ level)) * np.sqrt(max(misfit, 1.0))
+    return slope, float(sigma), misfit
+
+
+def pairs_of(frames: Sequence[FrameRecord]) -> list[tuple[FrameRecord, FrameRecord]]:
+    """Frames that follow each other with the same shutter time, two by two."""
+    found: list[tuple[FrameRecord, FrameRecord]] = []
+    waiting: FrameRecord | None = None
+    for frame in frames:
+        if waiting is not None and waiting.exposure_s == frame.exposure_s:
+            found.append((waiting, frame))
+            waiting = None
+        else:
+            waiting = frame
+    return found

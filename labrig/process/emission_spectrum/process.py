@@ -1,0 +1,129 @@
+"""From the frames of an emission_spectrum run to Λ*, and to whether it is one spectrum at all."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.fit.spectrum import fit_spectrum
+from labrig.process.emission_spectrum.bench import SpectralBench, spectral_bench, with_white
+from labrig.process.emission_spectrum.constancy import compared, over_time
+from labrig.process.emission_spectrum.picture import Picture, Pictures, combined
+from labrig.process.emission_spectrum.reading import read_places
+from labrig.process.emission_spectrum.result import EmissionSpectrum, write_emission_spectrum
+from labrig.process.emission_spectrum.telling import (
+    comparison_lines,
+    peak_line,
+    sections,
+    verdicts,
+)
+from labrig.process.stage import Stage, StageResult
+from labrig.process.this_camera import insist_on_this_camera
+from labrig.process.timed_frames import intact_frames, steady_frames, stray_light, timing_warnings
+
+FloatArray = NDArray[np.float64]
+
+#: Draws of the spectra that are only shown.
+FEW_SAMPLES = 60
+#: After another lamp the glow must be so much brighter than what was left of the one before.
+CHARGED_ANEW = 1.05
+
+
+@dataclass(frozen=True, eq=False)
+class _Charge:
+    """The glow after one charge: its frames, and all of them as one picture."""
+
+    lamp: str
+    frames: Pictures
+    picture: Picture
+
+
+def process(stage: Stage) -> StageResult:
+    """Λ* with its credible band, its constancy in time, its independence of the lamp.
+
+    Raises
+    ------
+    UsageError
+        No calibrated LVF, no camera curves.
+    DataError
+        No spectrum is complete, frames are damaged, or nothing glows in them.
+    FitError
+        Too much clips.
+    """
+    frames = intact_frames(stage.run, stage.choices, "spectrum")
+    insist_on_this_camera(stage.known.camera, stage.run, stage.run.frames("spectrum"))
+    bench = spectral_bench(stage, frames.decay[0])
+    darks, white = frames.dark, steady_frames(stage.run, stage.choices, "white")
+    read = read_places([*frames.decay, *white], darks, bench.slices, stage.known.camera)
+    bench, warnings = with_white(bench, stage, read.pictures("white") if white else None)
+    charges = []
+    for unit in dict.fromkeys(frame.unit for frame in frames.decay):
+        pictures = read.pictures(unit)
+        charges.append(_Charge(unit.removeprefix("spectrum-"), pictures, combined(pictures)))
+    first = charges[0]
+    spectrum = _spectrum(first.picture, bench, stage, first.lamp)
+    write_emission_spectrum(stage.folder / "emission.yaml", spectrum)
+    spectrum.write_csv(stage.folder / "spectrum.csv")
+    times = over_time(first.frames, bench.centre_nm) if len(first.frames) > 1 else []
+    lamps = [
+        compared(f"{other.lamp} against {first.lamp}", other.frames, first.picture, bench.centre_nm)
+        for other in charges[1:]
+    ]
+    parts = {
+        f"{t_s:.3g} s": _spectrum(
+            combined(first.frames.take([row])), bench, stage, first.lamp, FEW_SAMPLES
+        )
+        for row, t_s in enumerate(first.frames.t_s)
+    }
+    by_lamp = {
+        one.lamp: _spectrum(one.picture, bench, stage, one.lamp, FEW_SAMPLES) for one in charges
+    }
+    return StageResult(
+        known=replace(stage.known, spectrum=spectrum),
+        sections=tuple(sections(spectrum, bench, first.frames, times, parts, lamps, by_lamp)),
+        lines=(peak_line(spectrum), *comparison_lines(times, lamps)),
+        warnings=(
+            *timing_warnings(stage.run, "spectrum"),
+            *stray_light(stage.known.blank, frames),
+            *warnings,
+            *_clipping(first.frames),
+            *verdicts(times, lamps),
+            *_not_charged(charges),
+        ),
+    )
+
+
+def _spectrum(
+    picture: Picture, bench: SpectralBench, stage: Stage, lamp: str, samples: int = 400
+) -> EmissionSpectrum:
+    fit = fit_spectrum(picture.value, picture.sigma, bench.system, samples=samples)
+    name = stage.protocol.sample.name
+    return EmissionSpectrum.of(fit, name, lamp, stage.run.folder.resolve().name)
+
+
+def _not_charged(charges: Sequence[_Charge]) -> list[str]:
+    """Lamps after which the glow went on fading as if they had not been lit."""
+    told = []
+    for before, after in pairwise(charges):
+        seen = np.isfinite(before.picture.value) & np.isfinite(after.picture.value)
+        left = before.picture.value[seen] * before.picture.brightness[-1]
+        anew = after.picture.value[seen]
+        if float(anew @ left) < CHARGED_ANEW * float(left @ left):
+            told.append(
+                f"after charging with the {after.lamp} lamp the glow is no brighter than what was "
+                f"left before: the {after.lamp} lamp did not light, or hardly excites this sample"
+            )
+    return told
+
+
+def _clipping(frames: Pictures) -> list[str]:
+    clipped = np.isnan(frames.value)
+    if not clipped.any():
+        return []
+    lost = int(clipped.all(axis=0).sum())
+    return [
+        f"{clipped.mean():.0%} of the values clip and are left out, {lost} of "
+        f"{clipped.shape[1]} in every frame; expose for less or lower the ISO"
+    ]

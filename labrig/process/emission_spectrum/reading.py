@@ -1,0 +1,110 @@
+"""From what the filter's places showed to pictures in DN/s: dark and fall-off put right."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.calibration.camera_file import CameraFile
+from labrig.errors import DataError
+from labrig.process.emission_spectrum.noise import PixelNoise, Seen, pixel_noise, seen
+from labrig.process.emission_spectrum.picture import Pictures
+from labrig.reduce import DarkModel, SeriesFrame, fit_dark
+from labrig.reduce.patches import TWO_DEGREES
+from labrig.reduce.series import is_usable
+from labrig.region import Region
+
+FloatArray = NDArray[np.float64]
+
+
+@dataclass(frozen=True, eq=False)
+class Reading:
+    """All frames in all places.
+
+    Attributes
+    ----------
+    frames, darks
+        As seen.
+    slices
+        The places.
+    camera
+        Its calibration, where there is one.
+    noise
+        Of its pixels.
+    dark
+        Level of each place in the dark.
+    """
+
+    frames: Sequence[Seen]
+    darks: Sequence[Seen]
+    slices: Mapping[str, Region]
+    camera: CameraFile | None
+    noise: PixelNoise
+    dark: Sequence[DarkModel]
+
+    def pictures(self, unit: str) -> Pictures:
+        """The frames of a unit, those a person excludes left out."""
+        rows = [one for one in self.frames if one.frame.unit == unit and is_usable(one.frame.flag)]
+        if not rows:
+            raise DataError(f"expected frames of {unit}, got none that are not excluded")
+        columns = [self._reduced(one) for one in rows]
+        value, sigma, dark_sigma = (np.stack(column) for column in zip(*columns, strict=True))
+        middles_s = [one.frame.t_s + one.frame.exposure_s / 2 for one in rows]
+        return Pictures(np.array(middles_s), value, sigma, dark_sigma)
+
+    def _reduced(self, one: Seen) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Value, σ and the dark level's σ, each (places · channels,) in DN/s."""
+        frame, camera = one.frame, self.camera
+        told_s = frame.exposure_s
+        per_dn = np.full(
+            one.level_dn.shape, told_s if camera is None else camera.exposure_s(told_s)[0]
+        )
+        if camera is not None:
+            flats = [
+                camera.flat(frame.f_number, region, one.width, one.height)
+                for region in self.slices.values()
+            ]
+            per_dn = per_dn * np.array(flats)
+        levels = [model.dark_level(told_s) for model in self.dark]
+        level, known = (np.array(column) for column in zip(*levels, strict=True))
+        # A sensor that has warmed since the dark frames is off in all places together.
+        drift = TWO_DEGREES * np.abs(np.array([m.current(told_s) for m in self.dark]))
+        sigma = self.noise.sigma_dn(one.level_dn, one.pixels)
+        sigma = np.where(np.isnan(one.level_dn), np.nan, np.hypot(sigma, known))
+        columns = (one.level_dn - level, sigma, drift)
+        value, sigma, drift = ((column / per_dn).ravel() for column in columns)
+        return value, sigma, drift
+
+
+def read_places(
+    frames: Sequence[SeriesFrame],
+    darks: Sequence[SeriesFrame],
+    slices: Mapping[str, Region],
+    camera: CameraFile | None,
+) -> Reading:
+    """Read every frame in every place.
+
+    Raises
+    ------
+    DataError
+        No dark frames, or some at another ISO.
+    """
+    isos = {frame.iso for frame in (*frames, *darks)}
+    if not darks or len(isos) > 1:
+        raise DataError(
+            f"expected dark frames at the one ISO of all frames, got {len(darks)} and ISO "
+            f"{', '.join(f'{iso:g}' for iso in sorted(filter(None, isos)))}"
+        )
+    lit, dark = seen(frames, slices, darks), seen(darks, slices, darks)
+    groups = [[o for o in lit if o.frame.unit == u] for u in {o.frame.unit: None for o in lit}]
+    rising = sorted(dark, key=lambda one: one.frame.exposure_s)
+    noise = pixel_noise([*groups, rising])
+    exposure_s = np.array([one.frame.exposure_s for one in dark])
+    level = np.stack([np.nan_to_num(one.level_dn) for one in dark])
+    sigma = np.stack([noise.sigma_dn(one.level_dn, one.pixels) for one in dark])
+    models = [
+        fit_dark(exposure_s, level[:, place], np.nan_to_num(sigma[:, place], nan=np.inf))
+        for place in range(level.shape[1])
+    ]
+    return Reading(lit, dark, slices, camera, noise, models)

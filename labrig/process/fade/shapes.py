@@ -1,0 +1,134 @@
+"""How a lamp may go dark or come on: the share of its steady light as a function of a few numbers.
+
+By Wien's law a body at the temperature T(t) has, of its light at T₀, the share
+
+    ln share(λ, t) = −(hc/k) (1/T − 1/T₀) / λ = −u(t) (550 nm / λ)^p,   p = 1.
+
+Parameters θ of all shapes end with p and with the lag of the shutter in s.
+"""
+
+from dataclasses import dataclass
+from typing import Protocol
+
+import numpy as np
+from numpy.typing import NDArray
+
+FloatArray = NDArray[np.float64]
+
+#: Wavelength at which u is minus the logarithm of the share.
+REFERENCE_NM = 550.0
+#: Unit of time of the polynomials.
+SCALE_S = 0.3
+#: Of −ln what counts as nothing.
+DARK = 60.0
+#: hc/(k · 550 nm · T₀) of a lamp of 3000 K, and how much others differ from it (2700 K to 3400 K).
+LN_KAPPA, LN_KAPPA_SIGMA = float(np.log(8.72)), 0.1
+#: Ratio of radiation to conduction, ln r/(1 − r): as good as anything is possible.
+LOGIT_SIGMA = 1.5
+
+
+class Shape(Protocol):
+    """A change of the lamp."""
+
+    @property
+    def rises(self) -> bool:
+        """Whether it comes on."""
+
+    @property
+    def free(self) -> int:
+        """Parameters besides p and the lag."""
+
+    def start(self, level: float, slope: float) -> FloatArray:
+        """(free,) parameters to begin with: of a rise ln u = level + slope t / `SCALE_S`; of a fade
+        u = −slope t / `SCALE_S`.
+        """
+
+    def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
+        """At (m,) times ≥ 0 after the switch."""
+
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """(free,) what parameters are known to be beforehand, and σ; infinite: anything."""
+
+
+@dataclass(frozen=True)
+class Cooling:
+    """A filament that loses heat by radiation and conduction, dT/dt ∝ −T (r T⁴ + 1 − r), T₀ = 1.
+
+    Its radiation goes with T⁵, as tungsten's emissivity grows with T. An equation of Bernoulli's:
+    1/T = [(e^(q t) − r) / (1 − r)]^(1/4), u = κ (1/T − 1). Parameters: ln κ, ln q, ln r/(1 − r).
+    """
+
+    rises: bool = False
+    free: int = 3
+
+    def start(self, level: float, slope: float) -> FloatArray:
+        """Half radiation, half conduction."""
+        per_s = -slope / SCALE_S
+        return np.array([LN_KAPPA, np.log(2 * max(per_s, 0.1) / np.exp(LN_KAPPA)), 0.0])
+
+    def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
+        """See the class."""
+        kappa, rate = np.exp(parameters[:2])
+        conducted = 1 / (1 + np.exp(parameters[2]))
+        grown = np.expm1(np.minimum(rate * t_s, 300.0)) / conducted
+        u: FloatArray = np.minimum(kappa * np.expm1(np.log1p(grown) / 4), DARK)
+        return u
+
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """Of halogen lamps."""
+        return np.array([LN_KAPPA, 0.0, 0.0]), np.array([LN_KAPPA_SIGMA, np.inf, LOGIT_SIGMA])
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """Nothing but smooth: u(t) a polynomial from 0 on, ln u(t) one where the lamp comes on.
+
+    Attributes
+    ----------
+    rises
+        Whether it comes on.
+    degree
+        Of the polynomial.
+    last_s
+        Begin of the last photograph: from there on it goes on straight.
+    """
+
+    rises: bool
+    degree: int
+    last_s: float
+
+    @property
+    def free(self) -> int:
+        """Coefficients."""
+        return self.degree + (1 if self.rises else 0)
+
+    def start(self, level: float, slope: float) -> FloatArray:
+        """A straight line."""
+        theta = np.zeros(self.free)
+        if self.rises:
+            theta[:2] = level, min(slope, -0.1)
+        else:
+            theta[0] = max(-slope, 0.1)
+        return theta
+
+    def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
+        """See the class."""
+        powers = np.arange(self.free) + (0 if self.rises else 1)
+        end, x = self.last_s / SCALE_S, t_s / SCALE_S
+        inner = np.minimum(x, end)[:, np.newaxis] ** powers @ parameters
+        slope = float((powers * end ** np.maximum(powers - 1.0, 0.0)) @ parameters)
+        value = inner + slope * np.maximum(x - end, 0.0)
+        if self.rises:
+            return np.minimum.accumulate(np.exp(np.clip(value, -DARK, np.log(DARK))))
+        return np.clip(np.maximum.accumulate(value), 0.0, DARK)
+
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """Nothing is known."""
+        return np.zeros(self.free), np.full(self.free, np.inf)
+
+
+def share_of(shape: Shape, theta: FloatArray, nm: FloatArray, t_s: FloatArray) -> FloatArray:
+    """Share of the steady lamp's light at (m,) times after the switch, (m, wavelengths)."""
+    u = shape.u(theta[:-2], np.maximum(t_s, 0.0))
+    share: FloatArray = np.exp(-np.outer(u, (REFERENCE_NM / nm) ** theta[-2]))
+    return share

@@ -1,0 +1,98 @@
+"""Several frames of one scene as one picture with more range than any of them."""
+
+from collections.abc import Iterable
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Protocol
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import DataError
+from labrig.reduce import PixelMask, RawFrame, read_raw
+
+FloatArray = NDArray[np.float64]
+Image = NDArray[np.float32]
+
+
+#: Pixels fuller than this are left out: noise carries some of their like beyond the range.
+FULL = 0.95
+
+
+class Photograph(Protocol):
+    """A frame on disk."""
+
+    @property
+    def path(self) -> Path:
+        """Of its file."""
+
+    @property
+    def exposure_s(self) -> float:
+        """Its shutter time."""
+
+
+@dataclass(frozen=True, eq=False)
+class Picture:
+    """What a sensor saw, undemosaiced.
+
+    Attributes
+    ----------
+    rate
+        (height, width) DN/s above black; NaN where all frames clip, or a pixel is hot.
+    cfa, cfa_side, channels
+        As of a `RawFrame`.
+    """
+
+    rate: Image
+    cfa: str
+    cfa_side: int
+    channels: tuple[str, ...]
+
+    def light(self) -> Image:
+        """(height, width) mean of the colours about every pixel; what is NaN counts as bright."""
+        filled = np.where(np.isnan(self.rate), np.nanmax(self.rate), self.rate)
+        size = (max(self.cfa_side, 2),) * 2
+        smooth = cv2.blur(filled.astype(np.float32), size, borderType=cv2.BORDER_REFLECT)
+        return np.asarray(cv2.medianBlur(smooth, 3), dtype=np.float32)
+
+
+def read_picture(frames: Iterable[Photograph], hot: PixelMask | None = None) -> Picture:
+    """As `picture_of`, from files."""
+    return picture_of(((read_raw(frame.path), frame.exposure_s) for frame in frames), hot)
+
+
+def picture_of(frames: Iterable[tuple[RawFrame, float]], hot: PixelMask | None = None) -> Picture:
+    """Frames and their shutter times in seconds, added up where they do not clip.
+
+    Raises
+    ------
+    DataError
+        No frame, or frames of different sensors.
+    """
+    counts: FloatArray | None = None
+    for raw, exposure_s in frames:
+        if counts is None:
+            first, counts = raw, np.zeros(raw.mosaic.shape)
+            seconds = np.zeros(raw.mosaic.shape)
+        if raw.mosaic.shape != counts.shape or raw.cfa != first.cfa:
+            raise DataError("expected frames of one sensor and size; choose those of one camera")
+        light = raw.mosaic - _black(raw)
+        is_open = light < FULL * (raw.white - max(raw.black))
+        counts += np.where(is_open, light, 0.0)
+        seconds += np.where(is_open, exposure_s, 0.0)
+    if counts is None:
+        raise DataError("expected frames of the strip, got none; take them again")
+    if hot is not None:
+        seconds[hot] = 0.0
+    rate = np.full(counts.shape, np.nan, dtype=np.float32)
+    np.divide(counts, seconds, out=rate, where=seconds > 0, casting="same_kind")
+    return Picture(rate, first.cfa, first.cfa_side, first.channels)
+
+
+def _black(raw: RawFrame) -> FloatArray:
+    """Of every pixel."""
+    side = raw.cfa_side
+    cell = np.array(raw.black).reshape(side, side)
+    repeats = (-(-raw.height // side), -(-raw.width // side))
+    return np.tile(cell, repeats)[: raw.height, : raw.width]

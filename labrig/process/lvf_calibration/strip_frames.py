@@ -1,0 +1,62 @@
+"""The frames of a stage that photographs strips."""
+
+from functools import cached_property
+
+from labrig.errors import DataError
+from labrig.process.lvf_calibration.picture import Picture, read_picture
+from labrig.process.stage import Stage
+from labrig.process.this_camera import insist_on_this_camera
+from labrig.process.timed_frames import steady_frames
+from labrig.reduce import PixelMask, SeriesFrame, hot_pixels, read_raw
+
+#: Dark frames that tell hot pixels.
+_DARKS_FOR_HOT = 5
+
+
+class StripFrames:
+    """By purpose; those of completed units, as they were recorded.
+
+    Raises
+    ------
+    DataError
+        None with a purpose that is asked for, or they are damaged, or of another camera than the
+        one that is known.
+    """
+
+    def __init__(self, stage: Stage) -> None:
+        self._stage = stage
+        self.dark = self.of("dark")
+        insist_on_this_camera(stage.known.camera, stage.run, stage.run.frames("dark"))
+
+    def of(self, purpose: str, unit: str | None = None) -> list[SeriesFrame]:
+        """Of a purpose, and of one unit where that matters."""
+        frames = [
+            frame
+            for frame in steady_frames(self._stage.run, self._stage.choices, purpose)
+            if unit is None or frame.unit == unit
+        ]
+        if not frames:
+            raise DataError(
+                f"{self._stage.run.folder}: the unit {unit or purpose} is not complete; go on "
+                f"with: labrig resume {self._stage.run.folder}"
+            )
+        return frames
+
+    def picture(self, purpose: str, unit: str | None = None) -> Picture:
+        """All of them together."""
+        return read_picture(self.of(purpose, unit), self.hot)
+
+    @cached_property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        raw = read_raw(self.dark[0].path)
+        return raw.width, raw.height
+
+    @cached_property
+    def hot(self) -> PixelMask | None:
+        """Pixels that are bright in the dark, where there are frames to tell."""
+        longest_s = max(frame.exposure_s for frame in self.dark)
+        longest = [frame for frame in self.dark if frame.exposure_s == longest_s]
+        if len(longest) < 2:
+            return None
+        return hot_pixels([read_raw(frame.path) for frame in longest[:_DARKS_FOR_HOT]])

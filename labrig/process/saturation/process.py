@@ -1,0 +1,172 @@
+"""From the decays of a saturation run: is r(0) = 1, and do rates depend on the charge?"""
+
+import csv
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.errors import DataError
+from labrig.fit import DecayFit
+from labrig.process.history import charges_s
+from labrig.process.saturation.level import Level, level
+from labrig.process.saturation.shared_rates import Curve, RatesTest, compare_rates, curve
+from labrig.process.saturation.telling import lines, section, verdicts
+from labrig.process.series_fit import fit_series
+from labrig.process.stage import Stage, StageResult
+from labrig.process.this_camera import insist_on_this_camera
+from labrig.process.timed_frames import intact_frames, stray_light, timing_warnings
+from labrig.record import RunRecord
+from labrig.reduce import Series, reduce_patches
+
+FloatArray = NDArray[np.float64]
+
+#: Lights of a saturation run, as its units are called.
+FULL, WEAKER = "full", "weaker"
+
+
+@dataclass(frozen=True, eq=False)
+class Saturation:
+    """What a patch's decays say.
+
+    Attributes
+    ----------
+    fit
+        Of the decay after the longest charge under the full light.
+    charges_s
+        (d,) as they were, by light; rows of `amplitude` and `sigma` (d, s), states by falling rate.
+    curves, test
+        All decays by their unit, and what sharing the rates costs.
+    levels
+        r(0) of every state after that charge; none without a weaker light.
+    """
+
+    fit: DecayFit
+    charges_s: Mapping[str, FloatArray]
+    amplitude: Mapping[str, FloatArray]
+    sigma: Mapping[str, FloatArray]
+    curves: Mapping[str, Curve]
+    test: RatesTest
+    levels: tuple[Level, ...]
+
+
+def process(stage: Stage) -> StageResult:
+    """Plateaus compared, levels where there were two lights, rates shared and not.
+
+    Raises
+    ------
+    DataError
+        Fewer than two decays under the full light, or frames are damaged.
+    FitError
+        The decays do not allow a fit.
+    """
+    frames = intact_frames(stage.run, stage.choices)
+    insist_on_this_camera(stage.known.camera, stage.run, stage.run.frames("decay"))
+    patches = stage.choices.patches(stage.protocol)
+    series = reduce_patches(frames.decay, patches, frames.dark, camera=stage.known.camera)
+    charges = _charges_s(stage.run)
+    asked = stage.choices.states or (
+        None if stage.protocol.states == "auto" else stage.protocol.states
+    )
+    found = {name: _saturation(one, charges, stage, asked) for name, one in series.items()}
+    _write(stage.folder / "saturation.csv", found)
+    several = len(found) > 1
+    return StageResult(
+        known=stage.known,
+        sections=tuple(section(name, one, stage.protocol.weaker) for name, one in found.items()),
+        lines=tuple(
+            f"{name}: {line}" if several else line
+            for name, one in found.items()
+            for line in lines(one)
+        ),
+        warnings=(
+            *timing_warnings(stage.run),
+            *stray_light(stage.known.blank, frames),
+            *(
+                f"{name}: {line}" if several else line
+                for name, one in found.items()
+                for line in verdicts(one)
+            ),
+        ),
+    )
+
+
+def _charges_s(run: RunRecord) -> dict[str, float]:
+    """How long the lamp really shone before the decay of each unit."""
+    units = [
+        unit
+        for unit, attempt in run.completed().items()
+        if any(frame.purpose == "decay" for frame in attempt.frames)
+    ]
+    return dict(zip(units, charges_s(run), strict=True))
+
+
+def _saturation(
+    series: Series, charges: Mapping[str, float], stage: Stage, states: int | None
+) -> Saturation:
+    decays = {one.unit[0]: one for one in series.by_unit()}
+    by_light = {
+        light: [unit for unit in decays if unit.startswith(f"{light}-")] for light in (FULL, WEAKER)
+    }
+    if len(by_light[FULL]) < 2:
+        raise DataError(
+            "expected two or more complete decays under the full light, got "
+            f"{len(by_light[FULL])}; go on with labrig resume"
+        )
+    longest = decays[by_light[FULL][-1]]
+    fit = fit_series(longest, states, fixed_rates_per_s=stage.choices.fixed_rates_per_s)
+    curves = {unit: curve(one, fit) for unit, one in decays.items()}
+    rates = [state.k_r_per_s for state in fit.states]
+    test = compare_rates(list(curves.values()), rates)
+    rows = {light: [list(decays).index(unit) for unit in by_light[light]] for light in by_light}
+    return Saturation(
+        fit=fit,
+        charges_s={
+            light: np.array([charges[unit] for unit in by_light[light]])
+            for light in by_light
+            if by_light[light]
+        },
+        amplitude={light: test.amplitude[rows[light]] for light in by_light if by_light[light]},
+        sigma={light: test.amplitude_sigma[rows[light]] for light in by_light if by_light[light]},
+        curves=curves,
+        test=test,
+        levels=_levels(test, rows, [charges[unit] for unit in decays], stage),
+    )
+
+
+def _levels(
+    test: RatesTest, rows: Mapping[str, Sequence[int]], charges: Sequence[float], stage: Stage
+) -> tuple[Level, ...]:
+    weaker = stage.protocol.weaker
+    if weaker is None or not rows[WEAKER]:
+        return ()
+    dim, bright = rows[WEAKER][-1], rows[FULL][-1]
+    found = []
+    for state, k_per_s in enumerate(test.shared_per_s):
+        a, b = test.amplitude[[dim, bright], state]
+        of_a, of_b = test.amplitude_sigma[[dim, bright], state]
+        if b <= 0:
+            found.append(Level(0.0, 1.0))
+            continue
+        ratio = max(a / b, 1e-6)
+        sigma = float(np.hypot(of_a / b, a / b * of_b / b))
+        both = (charges[dim], charges[bright])
+        found.append(level(ratio, sigma, weaker.share, weaker.share_sigma, float(k_per_s), both))
+    return tuple(found)
+
+
+def _write(path: Path, found: Mapping[str, Saturation]) -> None:
+    with path.open("w", newline="", encoding="utf-8") as file:
+        table = csv.writer(file, lineterminator="\n")
+        table.writerow(["patch", "light", "charge_s", "k_r_per_s", "amplitude", "amplitude_sigma"])
+        for name, one in found.items():
+            for light, charges in one.charges_s.items():
+                for row, charge_s in enumerate(charges):
+                    for state, k_per_s in enumerate(one.test.shared_per_s):
+                        numbers = (
+                            charge_s, k_per_s, one.amplitude[light][row, state],
+                            one.sigma[light][row, state],
+                        )  # fmt: skip
+                        table.writerow([name, light, *(f"{number:.6g}" for number in numbers)])

@@ -1,0 +1,147 @@
+"""A blank: the decay's sequence on what does not glow, for the light that is no glow.
+
+A lamp that is off still glows a little (Nalbach et al., section 4.4), light leaks in, a stray
+reflection finds its way. An inert card in the sample's place shows all of that and nothing else.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.acquire import (
+    ByHand,
+    CameraOffers,
+    ExposureSettings,
+    ProtocolModel,
+    Session,
+    Shoot,
+    Unit,
+    at,
+)
+from labrig.errors import ProtocolError
+from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
+from labrig.region import CENTRE, Region
+
+from .decay_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+from .lit_card import PutAwayUnit
+from .posing import charge, face_camera, lights_out, seen_s
+
+BLANK = ByHand(
+    "put a grey card in the sample's place (in the door, if there is one)",
+    "what the sequence shows without a glow is measured",
+    "blank",
+)
+#: The first frame of a sequence without a door.
+EARLIEST_S = 0.1
+
+
+class Clean(BaseModel):
+    """From when on a blank counts as clean: less than so many σ, or than that share of the range
+    from black to white.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    sigmas: float = Field(4.0, gt=0)
+    share: Fraction = Field(1e-5, ge=0, lt=1)
+
+
+class Blank(ProtocolModel):
+    """See `blank.yaml` for what each key means."""
+
+    protocol: Literal["blank"] = "blank"
+    charge: DurationS = Field(300.0, gt=0)
+    every: DurationS = Field(5.0, gt=0)
+    duration: DurationS = Field(60.0, gt=0, alias="for")
+    first: Annotated[float | Literal["auto"], WordOrDuration("auto")] = "auto"
+    later_by: tuple[DurationS, ...] = Field((0.0, 0.1, 0.2, 0.4), min_length=1)
+    exposure: DurationS = Field(0.5, gt=0)
+    camera: CameraSettings = CameraSettings()
+    region: Region = CENTRE
+    clean: Clean = Clean()
+
+    @model_validator(mode="after")
+    def _leaves_room(self) -> Self:
+        if self.duration < 4 * self.every:
+            raise ValueError(
+                f"for: {duration_text(self.duration)} leaves fewer than four frames "
+                f"{duration_text(self.every)} apart; make it longer"
+            )
+        return self
+
+    def units(self) -> Sequence[Unit]:
+        """Darks, the sequences, the bench as it was."""
+        sequences = [SequenceUnit(self, number) for number in range(1, len(self.later_by) + 1)]
+        return [BlankDarkUnit(self), *sequences, PutAwayUnit()]
+
+    def settings(self, exposure_s: float) -> ExposureSettings:
+        """Camera settings with that shutter time."""
+        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
+
+    def exposures_s(self, offers: CameraOffers) -> tuple[float, float]:
+        """Of the first frame of a sequence, and of all others."""
+        longest_s = offers.exposure_at_most(self.every - offers.overhead_s - MARGIN_S)
+        return min(offers.exposure_at_most(self.exposure), longest_s), longest_s
+
+    def times_s(self, earliest_s: float, later_s: float) -> list[float]:
+        """Begin of each frame of a sequence after lamp off."""
+        first_s = (earliest_s if self.first == "auto" else self.first) + later_s
+        count = int((self.duration - first_s) / self.every + 1e-9) + 1
+        return [first_s + number * self.every for number in range(count)]
+
+
+@dataclass(frozen=True)
+class BlankDarkUnit:
+    """Dark frames in the pose of the sequences, the blank already there."""
+
+    protocol: Blank
+    name: str = "dark"
+
+    def run(self, session: Session) -> None:
+        """At the shortest shutter time and at those to come."""
+        session.ask(BLANK)
+        session.wait_until_warm("camera")
+        face_camera(session)
+        offers = session.rig.camera.offers()
+        times_s = [offers.exposures_s[0], *self.protocol.exposures_s(offers)]
+        for exposure_s in dict.fromkeys(times_s):
+            for _ in range(DARKS_PER_EXPOSURE):
+                session.perform(Shoot("dark", self.protocol.settings(exposure_s)))
+
+
+@dataclass(frozen=True)
+class SequenceUnit:
+    """Lamp on for a while, off, then frames as in a decay."""
+
+    protocol: Blank
+    number: int
+
+    @property
+    def name(self) -> str:
+        """`blank-1`, `blank-2`, …"""
+        return f"blank-{self.number}"
+
+    def run(self, session: Session) -> None:
+        """Later by a little in each sequence."""
+        protocol = self.protocol
+        session.wait_until_warm("camera")
+        first_s, others_s = protocol.exposures_s(session.rig.camera.offers())
+        earliest_s = seen_s(session) or EARLIEST_S
+        if protocol.first != "auto" and protocol.first < seen_s(session):
+            raise ProtocolError(
+                f"first: {duration_text(protocol.first)} after lamp off the door still moves; "
+                f"write first: auto, which is {duration_text(earliest_s)} on this rig"
+            )
+        times_s = protocol.times_s(earliest_s, protocol.later_by[self.number - 1])
+        charge(session, protocol.charge)
+        session.run_sequence(
+            [
+                *lights_out(session),
+                *(
+                    at(time_s, Shoot("blank", protocol.settings(others_s if number else first_s)))
+                    for number, time_s in enumerate(times_s)
+                ),
+            ]
+        )

@@ -1,0 +1,136 @@
+"""The emission spectrum: the glow through the LVF at some times after lamp off.
+
+After Nalbach et al., sec. 4.3: it is to be the same at all times, and whatever lamp charged it.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from labrig.acquire import LAMP_OFF, Session, Shoot, Unit, at
+from labrig.quantity import DurationS, duration_text
+from labrig.region import Region
+
+from .arrangement import Arrangement, LampKind
+from .decay_settings import CameraSettings
+from .decay_units import DarkUnit, MeterUnit
+from .glow_settings import GlowSettings, metered_schedule
+from .lit_card import light_card
+from .posing import check_seen, lights_out
+from .prepared import Arranged, PutBackUnit
+
+Time = Annotated[DurationS, Field(gt=0)]
+
+#: Shutter times for a grey card under the lamp: whatever the place, one of them is right.
+WHITE_EXPOSURES_S = (1 / 1024, 1 / 256, 1 / 64, 1 / 16, 1 / 4)
+WHITES_PER_EXPOSURE = 2
+
+#: Why a person arranges what.
+THROUGH_IT = "the glow is photographed through it"
+OTHER_LAMP = "the glow is to have the same colour whatever lamp charged it"
+WHITE = "it tells what the camera's curves are off by"
+
+
+class EmissionSpectrum(GlowSettings):
+    """The protocol; see `emission_spectrum.yaml` for what each key means."""
+
+    protocol: Literal["emission_spectrum"] = "emission_spectrum"
+    camera: CameraSettings = CameraSettings(iso=1600)
+    times: tuple[Time, ...] = Field((2.0, 10.0, 30.0, 60.0), min_length=1)
+    lamps: tuple[LampKind, ...] = Field(("halogen",), min_length=1)
+    white: bool = True
+    region: Region = (0.0, 0.0, 1.0, 1.0)
+
+    @model_validator(mode="after")
+    def _in_order(self) -> Self:
+        for earlier, later in pairwise(self.times):
+            if later <= earlier:
+                raise ValueError(
+                    f"expected rising times, got {duration_text(later)} after "
+                    f"{duration_text(earlier)}"
+                )
+        if len(set(self.lamps)) < len(self.lamps):
+            raise ValueError(f"expected every lamp once, got {', '.join(self.lamps)}")
+        return self
+
+    @property
+    def purpose(self) -> str:
+        """Of the frames of the glow."""
+        return "spectrum"
+
+    def times_s(self) -> Sequence[float]:
+        """Begin of each frame, seconds after lamp off."""
+        return self.times
+
+    def regions(self) -> Sequence[Region]:
+        """All that the LVF may fill; its brightest part decides."""
+        return [self.region]
+
+    def units(self) -> Sequence[Unit]:
+        """Darks, then metering and spectrum for each lamp, the white, and all put back."""
+        stands, now = Arrangement(), Arrangement(lvf="before camera")
+        units: list[Unit] = [Arranged(DarkUnit(self), now, stands, THROUGH_IT)]
+        for lamp in self.lamps:
+            stands, now = now, replace(now, lamp=lamp)
+            metering = MeterUnit(self, self.charge, f"meter-{lamp}")
+            units += [Arranged(metering, now, stands, OTHER_LAMP), SpectrumUnit(self, lamp)]
+        if self.white:
+            stands, now = now, Arrangement("grey card", "before camera")
+            units.append(Arranged(WhiteUnit(self), now, stands, WHITE))
+        return [*units, PutBackUnit(now)]
+
+
+@dataclass(frozen=True)
+class SpectrumUnit:
+    """One charge and the glow through the LVF after it."""
+
+    protocol: EmissionSpectrum
+    lamp: LampKind
+
+    @property
+    def name(self) -> str:
+        """`spectrum-halogen`, `spectrum-mercury`."""
+        return f"spectrum-{self.lamp}"
+
+    def run(self, session: Session) -> None:
+        """Charge, lamp off, a frame at every time."""
+        session.wait_until_warm("camera")
+        metering = f"meter-{self.lamp}"
+        schedule = metered_schedule(session, self.protocol, metering)
+        check_seen(session, schedule.times_s[0])
+        self.protocol.charge_sample(session, self.protocol.charge)
+        session.run_sequence(
+            [
+                *lights_out(session),
+                *(
+                    at(time_s, Shoot(self.protocol.purpose, self.protocol.settings(exposure_s)))
+                    for time_s, exposure_s in schedule.frames()
+                ),
+            ]
+        )
+        watcher = self.protocol.watcher(session, self.name, metering)
+        watcher.tell_of_delays(schedule.times_s)
+        if len(schedule.times_s) > 1:
+            watcher.insist_on_decay(self.protocol.short_settings(session))
+
+
+@dataclass(frozen=True)
+class WhiteUnit:
+    """A grey card under the lamp, through the same LVF."""
+
+    protocol: EmissionSpectrum
+    name: str = "white"
+
+    def run(self, session: Session) -> None:
+        """Lamp on, a ladder of exposures, lamp off."""
+        session.wait_until_warm("camera")
+        light_card(session)
+        offers = session.rig.camera.offers()
+        for wanted_s in WHITE_EXPOSURES_S:
+            shoot = Shoot("white", self.protocol.settings(offers.exposure_at_most(wanted_s)))
+            for _ in range(WHITES_PER_EXPOSURE):
+                session.perform(shoot)
+        session.perform(LAMP_OFF)

@@ -1,0 +1,146 @@
+"""How the lamp goes dark after switching off, and how it comes on, from photographs of a card.
+
+A shutter opens a while after the switch, another while in every photograph. What it still sees of
+the fade is over in a second, so that every photograph holds all that is left of it. The steady lamp
+is photographed before each. (Nalbach et al., section 4.4, give 320 ms until the lamp is dark.)
+"""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+from typing import Literal, Self
+
+from pydantic import Field, model_validator
+
+from labrig.acquire import (
+    LAMP_OFF,
+    LAMP_ON,
+    ByHand,
+    CameraOffers,
+    ExposureSettings,
+    ProtocolModel,
+    Session,
+    Shoot,
+    Unit,
+    at,
+)
+from labrig.quantity import DurationS, duration_text
+from labrig.region import CENTRE, Region
+
+from .camera_calibration_units import HALF, CardDarkUnit
+from .decay_settings import CameraSettings
+from .lit_card import CardLight, CardMeterUnit, PutAwayUnit, card_light, light_card
+
+LVF = ByHand(
+    "put the variable filter before the camera", "the fade is measured band by band",
+    "lvf before camera",
+)  # fmt: skip
+LVF_AWAY = ByHand("take the variable filter away", "it is not needed any more", "lvf away")
+#: No lamp fades more slowly than to 1/e in this: photographs of the fade clip at no delay.
+SLOWEST_S = 0.09
+#: A filament is steady, or cold, after this.
+STEADY_S = 4.0
+
+
+class Fade(ProtocolModel):
+    """See `fade.yaml` for what each key means."""
+
+    protocol: Literal["fade"] = "fade"
+    camera: CameraSettings = CameraSettings(iso=400, f_number=4.0)
+    every: DurationS = Field(0.03, gt=0)
+    until: DurationS = Field(0.45, gt=0)
+    passes: int = Field(4, ge=2)
+    longest: DurationS = Field(1.0, gt=0)
+    rise: bool = True
+    through_lvf: bool = False
+    card: Region = CENTRE
+    bands: tuple[float, ...] = tuple(380.0 + 20.0 * number for number in range(21))
+
+    @model_validator(mode="after")
+    def _has_delays(self) -> Self:
+        if self.until < 4 * self.every:
+            raise ValueError(
+                f"until: {duration_text(self.until)} leaves fewer than four delays "
+                f"{duration_text(self.every)} apart; make it longer"
+            )
+        if list(self.bands) != sorted(set(self.bands)) or len(self.bands) < 2:
+            raise ValueError("expected rising edges in 'bands'")
+        return self
+
+    def settings(self) -> ExposureSettings:
+        """The reference; its shutter time is to be metered."""
+        return ExposureSettings(1.0, self.camera.iso, self.camera.f_number)
+
+    def delays_s(self, number: int) -> list[float]:
+        """From the switch to the release in one pass; each pass begins a little later."""
+        first_s = number / self.passes * self.every
+        count = int((self.until - first_s) / self.every + 1e-9) + 1
+        return [first_s + step * self.every for step in range(count)]
+
+    def fade_exposure_s(self, delay_s: float, light: CardLight, offers: CameraOffers) -> float:
+        """Longest shutter time in which even a slowly fading lamp fills no more than its share."""
+        steady_s = light.exposure_s(HALF, self.settings())
+        left_s = SLOWEST_S * math.exp(-delay_s / SLOWEST_S)
+        if left_s <= steady_s:
+            return offers.exposure_at_most(self.longest)
+        filled_s = -SLOWEST_S * math.log1p(-steady_s / left_s)
+        return offers.exposure_at_most(min(filled_s, self.longest))
+
+    def units(self) -> Sequence[Unit]:
+        """Darks, metering, passes over all delays, the bench as it was."""
+        reference = self.settings()
+        filter_in = [ByHandUnit("lvf-in", LVF)] if self.through_lvf else []
+        filter_away = [ByHandUnit("lvf-away", LVF_AWAY)] if self.through_lvf else []
+        return [
+            CardDarkUnit(reference, self.camera.iso, self.longest, asks=True),
+            *filter_in,
+            CardMeterUnit(reference, self.card),
+            *(PassUnit(self, number) for number in range(self.passes)),
+            *filter_away,
+            PutAwayUnit(),
+        ]
+
+
+@dataclass(frozen=True)
+class ByHandUnit:
+    """One thing that is done by hand."""
+
+    name: str
+    step: ByHand
+
+    def run(self, session: Session) -> None:
+        """Have it done."""
+        session.ask(self.step)
+
+
+@dataclass(frozen=True)
+class PassUnit:
+    """One photograph of the rise and one of the fade at every delay."""
+
+    protocol: Fade
+    number: int
+
+    @property
+    def name(self) -> str:
+        """`pass-1`, `pass-2`, …"""
+        return f"pass-{self.number + 1}"
+
+    def run(self, session: Session) -> None:
+        """Steady, off and fading, on and rising, and again."""
+        protocol, offers = self.protocol, session.rig.camera.offers()
+        session.wait_until_warm("camera")
+        light_card(session)
+        light = card_light(session, protocol.settings(), protocol.card)
+        steady = light.exposed(HALF, protocol.settings(), offers)
+        for delay_s in protocol.delays_s(self.number):
+            session.perform(Shoot("steady", steady))
+            exposure_s = protocol.fade_exposure_s(delay_s, light, offers)
+            fading = Shoot("fade", replace(steady, exposure_s=exposure_s))
+            session.run_sequence([at(0.0, LAMP_OFF), at(delay_s, fading)])
+            if not protocol.rise:
+                session.perform(LAMP_ON)
+                session.wait(STEADY_S, "lamp settles")
+                continue
+            session.wait(STEADY_S, "lamp cools")
+            session.run_sequence([at(0.0, LAMP_ON), at(delay_s, Shoot("rise", steady))])
+            session.wait(STEADY_S, "lamp settles")

@@ -1,0 +1,76 @@
+"""What the lamp does to the sample: by itself, and through the LVF that lies on it.
+
+The map lamp × LVF at the sample's plane enters excitation rates one to one (Nalbach et al.,
+Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.6): it is measured.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import Field, model_validator
+
+from labrig.acquire import ProtocolModel, Unit
+from labrig.quantity import DurationS
+
+from .arrangement import Arrangement
+from .decay_settings import CameraSettings
+from .lvf_units import StripUnit
+from .scene_units import LightsBackUnit, SceneUnit, StillDarkUnit
+from .still_life import StillLife
+
+Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+#: Of Table 1 of the paper.
+BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
+_DIRECT = Arrangement("grey card")
+_THROUGH = Arrangement("grey card", "on sample")
+
+
+class Irradiance(ProtocolModel):
+    """The irradiance protocol; see `irradiance.yaml` for what each key means."""
+
+    protocol: Literal["irradiance"] = "irradiance"
+    bands_nm: tuple[Nanometres, ...] = BANDS_NM
+    vector_length: float = Field(1.0, gt=0, allow_inf_nan=False)
+    camera: CameraSettings = CameraSettings(iso=100)
+    longest: DurationS = Field(8.0, gt=0)
+    repeats: int = Field(2, ge=1)
+    rounds: int = Field(2, ge=1)
+
+    @model_validator(mode="after")
+    def _bands_rise(self) -> Self:
+        if len(self.bands_nm) < 2 or any(b <= a for a, b in pairwise(self.bands_nm)):
+            raise ValueError(
+                f"expected two or more rising wavelengths in 'bands_nm', got {list(self.bands_nm)}"
+            )
+        return self
+
+    @property
+    def still_life(self) -> StillLife:
+        """How the card is photographed."""
+        return StillLife(self.camera, self.longest, self.repeats)
+
+    def units(self) -> Sequence[Unit]:
+        """Darks, then the card by itself and through the LVF in turn: the lamp drifts."""
+        units: list[SceneUnit] = []
+        for number in range(1, self.rounds + 1):
+            before = units[-1].wanted if units else Arrangement()
+            why = "how bright the lamp is by itself"
+            units.append(
+                SceneUnit(
+                    self.still_life, f"direct-{number}", "irradiance-direct", _DIRECT, before, why
+                )
+            )
+            why = "how much of it the variable filter leaves"
+            units.append(
+                StripUnit(
+                    self.still_life,
+                    f"through-{number}",
+                    "irradiance-through",
+                    _THROUGH,
+                    _DIRECT,
+                    why,
+                )
+            )
+        return [StillDarkUnit(self.still_life), *units, LightsBackUnit(units[-1].wanted)]

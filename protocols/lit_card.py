@@ -1,0 +1,151 @@
+"""A grey card under the steady lamp: who puts it there, how bright it is, how long to expose."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from labrig.acquire import (
+    LAMP_OFF,
+    LAMP_ON,
+    ByHand,
+    CameraOffers,
+    ExposureSettings,
+    Session,
+    Shoot,
+)
+from labrig.errors import DeviceError
+from labrig.quantity import duration_text
+from labrig.region import Region
+
+from .darkness import CLIPPED, range_dn
+from .metering import SEEN_SIGMA, Look, look
+from .posing import face_lamp
+
+GREY_CARD = ByHand(
+    "put a grey card where lamp and camera both see it (on the outside of the closed door; without "
+    "a door over the sample)",
+    "what is measured next is its light",
+    "grey card",
+)
+SAMPLE = ByHand("take the card away", "the sample is measured next", "sample", takes_s=30.0)
+
+#: Shutter times of the metering: one of them is right whatever the lamp.
+METERED_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1.0)
+#: A lamp that was on before needs no warming up, one without a warm-up time at least this.
+SETTLES_S = 5.0
+#: What a plan assumes: a card so dim that exposures are long.
+DIM_PER_S = 0.5
+
+
+@dataclass(frozen=True)
+class CardLight:
+    """How fast the lit card fills the range from black to white, in its brightest pixels.
+
+    Attributes
+    ----------
+    per_s
+        Share of the range in a second.
+    settings
+        At which that is so; their shutter time means nothing.
+    """
+
+    per_s: float
+    settings: ExposureSettings
+
+    def __str__(self) -> str:
+        return f"fills the range in {duration_text(1 / self.per_s)}"
+
+    def exposure_s(self, share: float, settings: ExposureSettings) -> float:
+        """Shutter time in which it fills that share of the range at an ISO and f-number."""
+        gain = settings.iso / self.settings.iso
+        if settings.f_number is not None and self.settings.f_number is not None:
+            gain *= (self.settings.f_number / settings.f_number) ** 2
+        return share / (self.per_s * gain)
+
+    def exposed(
+        self, share: float, settings: ExposureSettings, offers: CameraOffers
+    ) -> ExposureSettings:
+        """`settings` with the longest offered shutter time that fills no more than that share."""
+        exposure_s = offers.exposure_at_most(self.exposure_s(share, settings))
+        return ExposureSettings(exposure_s, settings.iso, settings.f_number)
+
+
+@dataclass(frozen=True)
+class CardMeterUnit:
+    """The lit card at a ladder of shutter times, for `card_light`."""
+
+    settings: ExposureSettings
+    card: Region
+    name: str = "meter"
+
+    def run(self, session: Session) -> None:
+        """Light the card, photograph it, refuse one that is not lit."""
+        session.wait_until_warm("camera")
+        light_card(session)
+        offers = session.rig.camera.offers()
+        for wanted_s in METERED_S:
+            exposure_s = offers.exposure_at_most(wanted_s)
+            shot = ExposureSettings(exposure_s, self.settings.iso, self.settings.f_number)
+            session.perform(Shoot("meter", shot))
+        card_light(session, self.settings, self.card)
+
+
+def light_card(session: Session) -> None:
+    """Lamp on and warm, the sample turned to it; nothing is done where it burns already."""
+    face_lamp(session)
+    if not session.rig.lamp.is_on():
+        session.perform(LAMP_ON)
+        session.wait(max(session.rig.warm_up_s("lamp"), SETTLES_S), "lamp warms up")
+
+
+def card_light(session: Session, settings: ExposureSettings, card: Region) -> CardLight:
+    """How bright the lit card was when it was metered.
+
+    Raises
+    ------
+    DeviceError
+        It is dark, or clips at every shutter time.
+    """
+
+    def decide() -> CardLight:
+        looks = [look(frame, [card]) for frame in session.frames("meter")]
+        return CardLight(_per_s(looks), settings)
+
+    return session.choose("light of the card", decide, CardLight(DIM_PER_S, settings))
+
+
+def put_away(session: Session) -> None:
+    """Lamp off, the sample in its place again."""
+    session.perform(LAMP_OFF)
+    session.ask(SAMPLE)
+
+
+def _per_s(looks: Sequence[Look]) -> float:
+    """From the fullest look that does not clip."""
+    fitting = []
+    for seen in looks:
+        channels = seen.patches[0].channels.values()
+        if not any(channel.saturated > CLIPPED * channel.n for channel in channels):
+            fitting.append((max(channels, key=lambda channel: channel.mean), seen))
+    if not fitting:
+        raise DeviceError(
+            "the lit card is too bright for the shortest shutter time: lower camera.iso or close "
+            "the aperture"
+        )
+    brightest, seen = max(fitting, key=lambda pair: pair[0].mean)
+    if brightest.mean < SEEN_SIGMA * brightest.sigma or brightest.mean < 0.001 * range_dn(seen):
+        raise DeviceError(
+            "the card is not lit: look whether the lamp burns, the card lies in its place and "
+            "'card:' is its region in the frame"
+        )
+    return brightest.peak / range_dn(seen) / seen.exposure_s
+
+
+@dataclass(frozen=True)
+class PutAwayUnit:
+    """The bench as it was found."""
+
+    name: str = "put-away"
+
+    def run(self, session: Session) -> None:
+        """Lamp off, card away."""
+        put_away(session)

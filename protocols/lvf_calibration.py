@@ -1,0 +1,107 @@
+"""A linear variable filter: mercury lines, then colour filters over a grey card.
+
+After Nalbach et al., Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.2.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
+from typing import Annotated, Any, Literal, Self
+
+from pydantic import Field, model_validator
+
+from labrig import shipped
+from labrig.acquire import ProtocolModel, Unit
+from labrig.quantity import DurationS, WordOrDuration
+
+from .arrangement import Arrangement
+from .decay_settings import CameraSettings
+from .lvf_units import NO_FILTER, FilterUnit, LinesUnit, StripesUnit, StripUnit, filter_unit
+from .scene_units import LightsBackUnit, SceneUnit, StillDarkUnit
+from .still_life import StillLife
+
+FilterName = Annotated[str, Field(min_length=1, pattern=r"^[^/\\]+$")]
+
+_CARD = Arrangement("grey card")
+_ON_SAMPLE = Arrangement("grey card", "on sample")
+_BEFORE_CAMERA = Arrangement("grey card", "before camera")
+
+#: Why a scene is arranged, by the purpose of its frames.
+_WHY = {
+    "lvf-card": "how bright the card is at every place by itself",
+    "lvf-strip-on-sample": "where the filter's strip falls on the sample",
+    "lvf-filter": "what the variable filter passes follows from what colour filters take away",
+    "lvf-lines": "mercury lines tell the wavelength of every place",
+    "lvf-lines-on-sample": "mercury lines tell the wavelength of every place on the sample",
+    "lvf-stripes": "the stripes glow where the camera will see the sample",
+}
+#: Kind and name of a unit, purpose of its frames, what lies where, and the kind's own keys.
+_Scene = tuple[type[SceneUnit], str, str, Arrangement, dict[str, Any]]
+
+
+class LvfCalibration(ProtocolModel):
+    """The calibration of an LVF; see `lvf_calibration.yaml` for what each key means."""
+
+    protocol: Literal["lvf_calibration"] = "lvf_calibration"
+    rising: bool | None = None
+    rising_on_sample: bool | None = None
+    filters: Literal["all"] | tuple[FilterName, ...] = "all"
+    camera: CameraSettings = CameraSettings(iso=100)
+    longest: DurationS = Field(8.0, gt=0)
+    repeats: int = Field(2, ge=1)
+    mercury_warm_up: DurationS = Field(300.0, ge=0)
+    stripes: Annotated[float | Literal["none"], WordOrDuration("none")] = 600.0
+
+    @model_validator(mode="after")
+    def _each_filter_once(self) -> Self:
+        names = self.filter_names()
+        if twice := [name for name in names if names.count(name) > 1 or name == NO_FILTER]:
+            raise ValueError(
+                f"'{twice[0]}' in 'filters' stands twice; no filter at all comes first"
+            )
+        return self
+
+    @property
+    def still_life(self) -> StillLife:
+        """How everything but the stripes is photographed."""
+        return StillLife(self.camera, self.longest, self.repeats)
+
+    def filter_names(self) -> tuple[str, ...]:
+        """The colour filters, one after the other."""
+        if self.filters != "all":
+            return self.filters
+        folder = shipped.folder("config/optics/filters")
+        return tuple(sorted(path.stem for path in folder.glob("*.csv")))
+
+    def units(self) -> Sequence[Unit]:
+        """All that can go wrong first: the strip and its lines; then filter by filter."""
+        units: list[SceneUnit] = []
+        for kind, name, purpose, wanted, more in self._scenes():
+            before = units[-1].wanted if units else Arrangement()
+            why, mercury_s = _WHY[purpose], self.mercury_warm_up
+            units.append(
+                kind(self.still_life, name, purpose, wanted, before, why, mercury_s, **more)
+            )
+        return [StillDarkUnit(self.still_life), *units, LightsBackUnit(units[-1].wanted)]
+
+    def _scenes(self) -> Iterator[_Scene]:
+        none, strip = filter_unit(None), "lvf-strip-on-sample"
+        yield SceneUnit, "card", "lvf-card", _CARD, {}
+        yield StripUnit, "strip-on-sample", strip, _ON_SAMPLE, {}
+        yield StripUnit, none, "lvf-filter", _BEFORE_CAMERA, {}
+        lit = replace(_BEFORE_CAMERA, lamp="mercury")
+        more = {"strip": ("lvf-filter", none), "rising": self.rising}
+        yield LinesUnit, "lines", "lvf-lines", lit, more
+        lit = replace(_ON_SAMPLE, lamp="mercury")
+        more = {"strip": (strip, "strip-on-sample"), "rising": self.rising_on_sample}
+        yield LinesUnit, "lines-on-sample", "lvf-lines-on-sample", lit, more
+        if isinstance(self.stripes, float):
+            lit = replace(lit, stage="sample")
+            yield StripesUnit, "stripes", "lvf-stripes", lit, {"charge_s": self.stripes}
+        for name in self.filter_names():
+            yield (
+                FilterUnit,
+                filter_unit(name),
+                "lvf-filter",
+                replace(_BEFORE_CAMERA, filter=name),
+                {},
+            )

@@ -1,0 +1,128 @@
+"""Saturation: decays after short and long charges, under the lamp and under a weaker light.
+
+Nalbach et al. take r(0) = 1 after a long charge (sec. 4.4). Saturation in time is not saturation
+in level: two irradiances tell the two apart. And the rates are to be the same whatever the charge.
+"""
+
+from collections.abc import Sequence
+from itertools import pairwise
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.acquire import ByHand, ProtocolModel, Unit
+from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
+from labrig.region import CENTRE
+
+from .arrangement import Arrangement
+from .decay import Decay
+from .decay_settings import CameraSettings
+from .decay_units import DarkUnit, DecayUnit, MeterUnit
+from .patch_names import Patches
+from .prepared import Arranged, Prepared
+
+Charge = Annotated[DurationS, Field(gt=0)]
+
+#: What depends on what a person does here.
+WHY = "saturation in level shows only between two irradiances"
+
+
+class WeakerLight(BaseModel):
+    """How a person weakens the light, by a neutral filter or a distance; how much of it is left."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    filter: str | None = Field(None, min_length=1)
+    distance: str | None = Field(None, min_length=1)
+    share: Fraction = Field(gt=0, lt=1)
+    share_sigma: Fraction = Field(0.02, ge=0, lt=1)
+
+    @model_validator(mode="after")
+    def _one_way(self) -> Self:
+        if (self.filter is None) == (self.distance is None):
+            raise ValueError("expected either 'filter: NAME' or 'distance: 1.4 m'")
+        return self
+
+    def begun(self, unit: Unit) -> Unit:
+        """`unit`, the light weakened before it."""
+        if self.filter is not None:
+            return Arranged(unit, Arrangement(filter=self.filter), Arrangement(), WHY)
+        what = f"move the lamp to a distance of {self.distance} from the sample"
+        return Prepared(unit, ByHand(what, WHY, f"lamp at {self.distance}"))
+
+    def ended(self, unit: Unit) -> Unit:
+        """`unit`, the light as it was before it."""
+        if self.filter is not None:
+            return Arranged(unit, Arrangement(), Arrangement(filter=self.filter), WHY)
+        return Prepared(unit, ByHand("move the lamp back", WHY, "lamp back"))
+
+
+class Saturation(ProtocolModel):
+    """The protocol; see `saturation.yaml` for what each key means."""
+
+    protocol: Literal["saturation"] = "saturation"
+    charges: tuple[Charge, ...] = Field((300.0, 2700.0, 5400.0), min_length=2)
+    weaker: WeakerLight | None = None
+    every: DurationS = Field(5.0, gt=0)
+    duration: DurationS = Field(180.0, gt=0, alias="for")
+    first: DurationS = Field(0.8, ge=0)
+    camera: CameraSettings = CameraSettings()
+    exposure: Annotated[float | Literal["auto"], WordOrDuration("auto")] = "auto"
+    patches: Patches = Field({"sample": CENTRE}, min_length=1)
+    states: Literal["auto", 1, 2, 3] = "auto"
+
+    @model_validator(mode="after")
+    def _longer_and_longer(self) -> Self:
+        for shorter, longer in pairwise(self.charges):
+            if longer <= shorter:
+                raise ValueError(
+                    f"expected rising charges, got {duration_text(longer)} after "
+                    f"{duration_text(shorter)}"
+                )
+        self._decay(self.charges[0])
+        return self
+
+    def units(self) -> Sequence[Unit]:
+        """Darks, then metering and decays, weaker light first: each begins with less glow left."""
+        dark, full = DarkUnit(self._decay(self.charges[0])), self._decays("full")
+        if self.weaker is None:
+            return [dark, *full]
+        weaker = self._decays("weaker")
+        return [
+            dark,
+            self.weaker.begun(weaker[0]),
+            *weaker[1:],
+            self.weaker.ended(full[0]),
+            *full[1:],
+        ]
+
+    def charge_of(self, unit: str) -> float:
+        """Seconds of charge before the decay of that unit."""
+        return self.charges[int(unit.rpartition("-")[2]) - 1]
+
+    def _decays(self, light: str) -> list[Unit]:
+        metering = f"meter-{light}"
+        decays: list[Unit] = [
+            DecayUnit(self._decay(charge_s), f"{light}-{number}", metering)
+            for number, charge_s in enumerate(self.charges, start=1)
+        ]
+        if isinstance(self.exposure, str):
+            shortest_s = self.charges[0]
+            decays.insert(0, MeterUnit(self._decay(shortest_s), shortest_s, metering))
+        return decays
+
+    def _decay(self, charge_s: float) -> Decay:
+        """One of the decays as a protocol of its own."""
+        exposure = self.exposure if isinstance(self.exposure, str) else f"{self.exposure!r} s"
+        return Decay.model_validate(
+            {
+                "sample": self.sample,
+                "charge": f"{charge_s!r} s",
+                "every": f"{self.every!r} s",
+                "for": f"{self.duration!r} s",
+                "first": f"{self.first!r} s",
+                "camera": self.camera,
+                "exposure": exposure,
+                "patches": self.patches,
+            }
+        )

@@ -1,0 +1,115 @@
+"""Units that photograph a steadily lit scene, and the darkness before."""
+
+from dataclasses import dataclass
+
+from labrig.acquire import LAMP_OFF, Session, Shoot
+from labrig.record import FrameRecord
+from labrig.region import CENTRE
+
+from .arrangement import Arrangement, light
+from .still_life import LOOK, StillLife
+from .watching import Watcher
+
+
+@dataclass(frozen=True)
+class StillDarkUnit:
+    """Dark frames at the exposures to come."""
+
+    still_life: StillLife
+    name: str = "dark"
+
+    def run(self, session: Session) -> None:
+        """Warm the camera up, then photograph darkness."""
+        session.wait_until_warm("camera")
+        scene = self.still_life
+        exposures_s = scene.dark_exposures_s(session.rig.camera.offers())
+        for exposure_s in exposures_s:
+            session.perform(Shoot("dark", scene.settings(exposure_s)))
+        Watcher(session, self.name, [CENTRE], None).insist_on_darkness(
+            [scene.settings(exposure_s) for exposure_s in sorted(set(exposures_s))]
+        )
+
+
+@dataclass(frozen=True)
+class SceneUnit:
+    """A lit scene.
+
+    Attributes
+    ----------
+    still_life
+        How it is photographed.
+    name, purpose
+        Of the unit, and of its frames.
+    wanted, before
+        What lies where now, and in the unit before.
+    why
+        To arrange it.
+    mercury_warm_up_s
+        Of the lamp that the rig file does not know.
+    """
+
+    still_life: StillLife
+    name: str
+    purpose: str
+    wanted: Arrangement
+    before: Arrangement
+    why: str
+    mercury_warm_up_s: float = 0.0
+
+    def run(self, session: Session) -> None:
+        """Arrange, light, photograph, and see whether it shows what it should."""
+        session.wait_until_warm("camera")
+        self.arrange(session)
+        light(session, self.warm_up_s(session))
+        self.still_life.photograph(session, self.name, self.purpose, self.wanted.lamp)
+        self.check(session)
+
+    def arrange(self, session: Session) -> None:
+        """Have everything put in its place."""
+        self.wanted.set_up(session, left_by(self.before, session), self.why)
+
+    def warm_up_s(self, session: Session) -> float:
+        """Until the lamp in use is steady."""
+        if self.wanted.lamp == "mercury":
+            return self.mercury_warm_up_s
+        return session.rig.warm_up_s("lamp")
+
+    def check(self, session: Session) -> None:
+        """Refuse pictures of something else; here none are."""
+
+    def own(self, session: Session) -> list[FrameRecord]:
+        """Its frames."""
+        return frames_of(session, self.purpose, self.name)
+
+
+@dataclass(frozen=True)
+class LightsBackUnit:
+    """The bench as it was found; a unit of its own, so that nothing is measured again for it."""
+
+    before: Arrangement
+    name: str = "put-back"
+
+    def run(self, session: Session) -> None:
+        """Lamp off, filters and card away."""
+        session.perform(LAMP_OFF)
+        before = left_by(self.before, session)
+        Arrangement().set_up(session, before, "the next measurement finds the bench as usual")
+
+
+def left_by(before: Arrangement, session: Session) -> Arrangement | None:
+    """How the unit before left the bench; None in a run that was resumed, when it may have been
+    put to another use meanwhile.
+    """
+
+    def decide() -> bool:
+        since = session.clock.wall(session.rig.connected_s)
+        frames = [*session.frames("dark"), *session.frames(LOOK)]
+        return any(frame.start_time >= since for frame in frames)
+
+    untouched = session.choose("bench as the unit before left it", decide, worst=True)
+    return before if untouched else None
+
+
+def frames_of(session: Session, purpose: str, unit: str) -> list[FrameRecord]:
+    """Frames of one unit."""
+    return [frame for frame in session.frames(purpose) if frame.unit == unit]

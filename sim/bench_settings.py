@@ -1,0 +1,155 @@
+"""What stands between lamp, sample and camera, as a rig file's `simulation:` describes it."""
+
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.quantity import DurationS, Fraction
+from labrig.region import Region
+
+#: Wavelengths of the ends of a strip.
+Nanometres = Annotated[float, Field(ge=300, le=900)]
+
+
+class Part(BaseModel):
+    """Of a simulated room; never changes."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class DoorSettings(Part):
+    """A door that a servo swings by a quarter turn; the lamp's shield, closed, covers the lamp.
+
+    Attributes
+    ----------
+    channel
+        Of the Maestro `servo` that moves it.
+    closed, open
+        Length of the servo's pulse at either end.
+    travel
+        Of the whole way, after the servo's frame of up to 20 ms.
+    overshoot
+        How far it swings beyond its end, as a part of its way.
+    ringing
+        Time in which the ringing after that falls to 1/e.
+    ringing_hz
+        Of the ringing.
+    """
+
+    channel: Annotated[int, Field(ge=0, le=23)] = 0
+    closed: DurationS = 1000e-6
+    open: DurationS = 2000e-6
+    travel: Annotated[DurationS, Field(gt=0)] = 0.2
+    overshoot: Annotated[Fraction, Field(ge=0, le=0.5)] = 0.04
+    ringing: Annotated[DurationS, Field(gt=0)] = 0.01
+    ringing_hz: Annotated[float, Field(gt=0)] = 25.0
+
+    @model_validator(mode="after")
+    def _two_ends(self) -> Self:
+        if self.closed == self.open:
+            raise ValueError("expected two different pulses for 'closed' and 'open'")
+        return self
+
+
+class ServoBoardSettings(Part):
+    """The Maestro at `sim://room/servo`; its channels' homes are: door closed, shield open.
+
+    Attributes
+    ----------
+    time_out
+        The serial time-out after which it sends all channels home; null: none.
+    """
+
+    time_out: Annotated[DurationS, Field(gt=0)] | None = None
+
+
+class StripSettings(Part):
+    """Where the camera finds the LVF, or what it has let through to the sample.
+
+    Attributes
+    ----------
+    region
+        The strip as if it were not tilted; all around is its opaque holder.
+    tilt
+        Of the strip about its middle, in degrees, clockwise in the picture.
+    rising
+        Whether the wavelength rises from left to right.
+    """
+
+    region: Region
+    tilt: Annotated[float, Field(ge=-20, le=20)] = 0.0
+    rising: bool = True
+
+
+class LvfSettings(Part):
+    """The linear variable filter, and where it lies when hands put it in.
+
+    Attributes
+    ----------
+    before_camera
+        Place where the camera looks through it.
+    on_sample
+        Place between lamp and sample, as the camera sees that part of the sample.
+    centre
+        Wavelengths of the strip's blue and red end, in nm.
+    bend_nm
+        How far its middle is off the straight line between them.
+    fwhm_nm
+        Width of the pass band, in the middle of the strip; it grows with the wavelength.
+    leakage
+        What it lets through at all wavelengths.
+    """
+
+    before_camera: StripSettings = StripSettings(region=(0.06, 0.28, 0.88, 0.4), tilt=1.5)
+    on_sample: StripSettings = StripSettings(region=(0.08, 0.3, 0.84, 0.4), tilt=-1.0, rising=False)
+    centre: tuple[Nanometres, Nanometres] = (388.0, 712.0)
+    bend_nm: float = 4.0
+    fwhm_nm: Annotated[float, Field(ge=5, le=100)] = 25.0
+    leakage: Annotated[Fraction, Field(ge=0, le=0.1)] = 0.001
+
+    @model_validator(mode="after")
+    def _rises(self) -> Self:
+        blue, red = self.centre
+        if red - blue < 5 * abs(self.bend_nm):
+            raise ValueError(
+                "expected 'centre' to rise from the blue end to the red one by five times 'bend_nm'"
+            )
+        return self
+
+
+class LensSettings(Part):
+    """The camera's lens, which its files then name; only its falloff differs from another's.
+
+    Attributes
+    ----------
+    name
+        As it introduces itself.
+    focal_mm
+        Focal length on a full-format body, 36 mm wide.
+    """
+
+    name: Annotated[str, Field(pattern="^[ -~]+$")]
+    focal_mm: Annotated[float, Field(ge=20, le=400)] = 75.0
+
+
+class TemperatureSettings(Part):
+    """Of the room; re-radiation follows it with an activation energy of 0.65 eV.
+
+    Attributes
+    ----------
+    start
+        Degrees Celsius at the epoch; a material's rates belong to 21.
+    drift_per_hour
+        Degrees by which it rises, or falls, in an hour.
+    """
+
+    start: Annotated[float, Field(ge=0, le=45)] = 21.0
+    drift_per_hour: Annotated[float, Field(ge=-10, le=10)] = 0.0
+
+    def celsius(self, time_s: float) -> float:
+        """At a time after the epoch."""
+        return self.start + self.drift_per_hour * time_s / 3600.0
+
+    def later(self, seconds: float) -> Self:
+        """The same of a room that opens so much later."""
+        return self.model_copy(update={"start": self.celsius(seconds)})

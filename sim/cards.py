@@ -1,0 +1,66 @@
+"""What hands lay before lamp and camera: a grey card, a ColorChecker."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.region import Region, region_pixels
+
+from .arrangement import Card
+from .lamp import WAVELENGTH_NM
+
+FloatArray = NDArray[np.float64]
+IntArray = NDArray[np.intp]
+
+#: Rows and columns of a ColorChecker; its patches leave this part of their distance to the frame.
+ROWS, COLUMNS = 4, 6
+FRAME = 0.12
+FRAME_REFLECTANCE = 0.04
+
+#: A grey card's reflectance over its nominal one.
+GREY_NM = (380.0, 420.0, 480.0, 560.0, 640.0, 700.0, 780.0)
+GREY = (0.972, 0.995, 1.003, 1.0, 0.998, 1.0, 1.008)
+
+
+def reflectances(card: Card, grey: float) -> FloatArray:
+    """Of all surfaces of a card, shape (surfaces, 160) on `WAVELENGTH_NM`.
+
+    Surface 0 is where the card is not, and 0. A grey card, or a blank of the same, is surface 1;
+    of a ColorChecker, row by row, 1 to 24, its frame is 25.
+    """
+    nothing = np.zeros((1, len(WAVELENGTH_NM)))
+    if card == "sample":
+        return nothing
+    if card == "colorchecker":
+        frame = np.full((1, len(WAVELENGTH_NM)), FRAME_REFLECTANCE)
+        return np.concatenate([nothing, _colorchecker(), frame])
+    return np.concatenate([nothing, grey * np.interp(WAVELENGTH_NM, GREY_NM, GREY)[None, :]])
+
+
+def surfaces(card: Card, chart: Region, width: int, height: int) -> IntArray:
+    """Which surface of a card that lies on top is in every pixel, shape (height, width).
+
+    A grey card fills the picture, a ColorChecker its region. A blank lies below.
+    """
+    found = np.zeros((height, width), dtype=np.intp)
+    if card == "grey card":
+        found[:] = 1
+    elif card == "colorchecker":
+        x, y, wide, high = region_pixels(chart, width, height)
+        row, in_row = np.divmod((np.arange(high) + 0.5) / high * ROWS, 1)
+        column, in_column = np.divmod((np.arange(wide) + 0.5) / wide * COLUMNS, 1)
+        number = 1 + row.astype(np.intp)[:, None] * COLUMNS + column.astype(np.intp)
+        inside = (np.abs(in_row - 0.5) < 0.5 - FRAME)[:, None] & (
+            np.abs(in_column - 0.5) < 0.5 - FRAME
+        )
+        found[y : y + high, x : x + wide] = np.where(inside, number, 1 + ROWS * COLUMNS)
+    return found
+
+
+def _colorchecker() -> FloatArray:
+    """BabelColor's averages over 30 ColorCheckers, shape (24, 160); the ends go on."""
+    import colour  # takes seconds to load
+
+    patches = colour.SDS_COLOURCHECKERS["BabelColor Average"].values()
+    return np.array(
+        [np.interp(WAVELENGTH_NM, patch.wavelengths, patch.values) for patch in patches]
+    )

@@ -1,0 +1,111 @@
+"""Colour filters before the lamp: curves from a folder, really a little different."""
+
+import csv
+import zlib
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.interpolate import CubicSpline
+
+from labrig import shipped
+from labrig.errors import UsageError
+from labrig.yaml_file import did_you_mean
+
+from .arrangement import USUAL_LAMP_M, Arrangements
+from .lamp import WAVELENGTH_NM
+
+FloatArray = NDArray[np.float64]
+
+SHIPPED = "config/optics/filters"
+SUFFIX = ".csv"
+#: Distance of the random knots of what a filter differs from its curve.
+KNOTS_NM: FloatArray = np.arange(360.0, 820.0, 50.0)
+
+
+class Filters:
+    """The filters that hands find.
+
+    Parameters
+    ----------
+    folder
+        Of their curves; None: the shipped one.
+    bent
+        Root mean square of what they really differ from them, of their transmittance.
+    seed
+        Of that difference.
+
+    Raises
+    ------
+    UsageError
+        There is no such folder, or no curve in it.
+    """
+
+    def __init__(self, folder: str | None, bent: float, seed: int) -> None:
+        place = shipped.folder(SHIPPED) if folder is None else Path(folder)
+        if not place.is_dir():
+            raise UsageError(f"{place}: expected a folder of colour filters ({SUFFIX})")
+        self._files = {path.stem: path for path in sorted(place.glob(f"*{SUFFIX}"))}
+        if not self._files:
+            raise UsageError(f"{place}: expected a {SUFFIX} file for each colour filter, got none")
+        self._bent = bent
+        self._seed = seed
+        self._known: dict[str | None, FloatArray] = {None: np.ones_like(WAVELENGTH_NM)}
+
+    def check(self, name: str) -> None:
+        """Raise UsageError if there is no filter of that name."""
+        if name not in self._files:
+            raise UsageError(f"no filter '{name}'; {did_you_mean(name, list(self._files))}")
+
+    def history(self, arrangements: Arrangements) -> tuple[tuple[float, FloatArray], ...]:
+        """From when on, and what of the lamp's light arrived then; the first from 0 on.
+
+        A lamp that is further away than usual gives less by the square of its distance.
+        """
+        history: list[tuple[float, str | None, float]] = []
+        for since_s, arrangement in zip(arrangements.since_s, arrangements.states, strict=True):
+            now = arrangement.filter, arrangement.lamp_m
+            if not history or history[-1][1:] != now:
+                history.append((since_s, *now))
+        return tuple(
+            (since_s, self.transmission(name) * (USUAL_LAMP_M / lamp_m) ** 2)
+            for since_s, name, lamp_m in history
+        )
+
+    def transmission(self, name: str | None) -> FloatArray:
+        """What the filter lets through, shape (160,) on `WAVELENGTH_NM`; no filter: all."""
+        if name is not None and name not in self._known:
+            self._known[name] = self._really(name)
+        return self._known[name]
+
+    def _really(self, name: str) -> FloatArray:
+        self.check(name)
+        curve = read_curve(self._files[name])
+        if not self._bent:
+            return curve
+        rng = np.random.default_rng([self._seed, zlib.crc32(name.encode())])
+        factor = CubicSpline(KNOTS_NM, rng.standard_normal(len(KNOTS_NM)))(WAVELENGTH_NM)
+        factor /= np.sqrt(np.mean(factor**2))
+        bent: FloatArray = np.clip(curve * (1 + self._bent * factor), 0.0, 1.0)
+        return bent
+
+
+def read_curve(path: Path) -> FloatArray:
+    """Wavelength and value in the first two columns, on `WAVELENGTH_NM`; the ends go on.
+
+    Raises
+    ------
+    UsageError
+        Not such a file.
+    """
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+        rows = list(csv.reader(line for line in lines if line.strip() and line[0] != "#"))
+        body = rows[1:] if rows[0][0] == "wavelength_nm" else rows
+        table = np.array([[float(row[0]), float(row[1])] for row in body])
+    except (OSError, ValueError, IndexError, csv.Error) as error:
+        raise UsageError(
+            f"{path}: expected wavelength_nm and a value in two columns ({error})"
+        ) from None
+    curve: FloatArray = np.interp(WAVELENGTH_NM, table[:, 0], table[:, 1])
+    return curve

@@ -1,0 +1,117 @@
+"""What hands can do in the simulated room: cards, filters, lamps, the LVF."""
+
+import re
+from collections.abc import Callable, Mapping
+
+from labrig.clock import VirtualClock
+from labrig.errors import UsageError
+
+from .arrangement import USUAL_LAMP_M, Arrangements, Card, LampKind, LvfPlace
+from .faults import given
+from .filters import Filters
+from .simulation import Simulation
+
+#: As far as a sample can be turned away from the camera.
+MOST_TILT_DEG = 85
+#: As near as a lamp can be moved.
+LEAST_LAMP_M = 0.2
+
+
+class Hands:
+    """They arrange the bench, and sometimes make mistakes.
+
+    Parameters
+    ----------
+    simulation
+        What there is in the room, and what goes wrong.
+    filters
+        That they find.
+    clock
+        The room's.
+    freshen
+        Puts another sample in.
+    plug
+        Puts another lamp behind the relay.
+    """
+
+    def __init__(
+        self,
+        simulation: Simulation,
+        filters: Filters,
+        clock: VirtualClock,
+        *,
+        freshen: Callable[[], None],
+        plug: Callable[[LampKind], None],
+    ) -> None:
+        self._has_lvf = simulation.lvf is not None
+        self._turned = given(fault.lvf_turned for fault in simulation.faults)
+        self._skipped = given(fault.filter_skipped for fault in simulation.faults)
+        self._filters = filters
+        self._clock = clock
+        self._freshen = freshen
+        self._plug = plug
+        self.arrangements = Arrangements()
+
+    @property
+    def tasks(self) -> Mapping[str, Callable[..., None]]:
+        """What to do by the line that tells it; a word in capitals stands for what is given."""
+        return {
+            "fresh sample": self._fresh_sample,
+            "sample": lambda: self._lay("sample"),
+            "grey card": lambda: self._lay("grey card"),
+            "colorchecker": lambda: self._lay("colorchecker"),
+            "blank": lambda: self._lay("blank"),
+            "lvf away": lambda: self._put_lvf("away"),
+            "lvf before camera": lambda: self._put_lvf("before camera"),
+            "lvf on sample": lambda: self._put_lvf("on sample"),
+            "no filter": lambda: self._put_filter(None),
+            "filter NAME": self._put_filter,
+            "lamp halogen": lambda: self._change_lamp("halogen"),
+            "lamp mercury": lambda: self._change_lamp("mercury"),
+            "lamp at DISTANCE": self._move_lamp,
+            "lamp back": lambda: self._change(lamp_m=USUAL_LAMP_M),
+            "tilt DEGREES": self._tilt,
+        }
+
+    def _change(self, **what: object) -> None:
+        self.arrangements = self.arrangements.changed(self._clock.now(), **what)
+
+    def _fresh_sample(self) -> None:
+        self._lay("sample")
+        self._freshen()
+
+    def _lay(self, card: Card) -> None:
+        self._change(card=card)
+
+    def _put_lvf(self, place: LvfPlace) -> None:
+        if place != "away" and not self._has_lvf:
+            raise UsageError("there is no LVF in this room, see 'simulation.lvf'")
+        turned = any(when.is_on(self._clock.now()) for when in self._turned)
+        self._change(lvf=place, turned=turned and place != "away")
+
+    def _put_filter(self, name: str | None) -> None:
+        if name is not None:
+            self._filters.check(name)
+        now_s = self._clock.now()
+        for skipped in self._skipped:
+            if skipped.is_on(now_s) and name is not None and skipped.name in (None, name):
+                return
+        self._change(filter=name)
+
+    def _change_lamp(self, lamp: LampKind) -> None:
+        self._change(lamp=lamp)
+        self._plug(lamp)
+
+    def _move_lamp(self, distance: str) -> None:
+        number, _, unit = distance.partition(" ")
+        if unit != "m" or not re.fullmatch(r"\d+(\.\d+)?", number) or float(number) < LEAST_LAMP_M:
+            raise UsageError(
+                f"expected {LEAST_LAMP_M} m or more, such as '1.41 m' instead of the usual "
+                f"{USUAL_LAMP_M:g} m, got '{distance}'"
+            )
+        self._change(lamp_m=float(number))
+
+    def _tilt(self, degrees: str) -> None:
+        if not degrees.isdecimal() or int(degrees) > MOST_TILT_DEG:
+            raise UsageError(f"expected whole degrees from 0 to {MOST_TILT_DEG}, got '{degrees}'")
+        self._change(tilt_deg=int(degrees))

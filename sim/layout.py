@@ -1,0 +1,109 @@
+"""What lies where in the picture: samples, the strip of the LVF on them and before them, cards."""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.region import region_pixels
+
+from .arrangement import Arrangement, Card, LvfPlace
+from .cards import surfaces
+from .lvf import PIECES, pieces
+from .sensor import BAYER_RGGB
+from .simulation import Simulation
+
+IntArray = NDArray[np.intp]
+
+
+@dataclass(frozen=True)
+class Places:
+    """All that can look different in a picture, arrays of shape (places,).
+
+    Attributes
+    ----------
+    cell
+        Which cell lies there, see `Layout`.
+    surface
+        Which surface of a card lies on it, see `cards`; 0 for none.
+    piece
+        Through which piece of the LVF's strip it is seen, see `lvf`.
+    painted : ndarray, shape (height, width)
+        For every pixel 4 times its place, plus which of a Bayer cell's four pixels it is.
+    """
+
+    cell: IntArray
+    surface: IntArray
+    piece: IntArray
+    painted: IntArray
+
+
+class Layout:
+    """Cells: the cloth, and each part of a sample that lies below its own piece of the strip.
+
+    Attributes
+    ----------
+    patch, piece : ndarray, shape (cells,)
+        Of every cell: its sample, from 1 on, and the piece of the strip on it; cell 0 is the
+        cloth. Without an LVF a sample is one cell.
+    pixels : ndarray, shape (cells,)
+        How many belong to a cell.
+
+    Raises
+    ------
+    UsageError
+        A patch or a strip outside the frame.
+    """
+
+    def __init__(self, simulation: Simulation) -> None:
+        self._simulation = simulation
+        self._size = simulation.sensor.width, simulation.sensor.height
+        width, height = self._size
+        patch = np.zeros((height, width), dtype=np.intp)
+        for number, placed in enumerate(simulation.patches, start=1):
+            x, y, wide, high = region_pixels(placed.region, width, height)
+            patch[y : y + high, x : x + wide] = number  # a later patch lies on an earlier one
+        lvf = simulation.lvf
+        self._strips = {} if lvf is None else {
+            "before camera": pieces(lvf.before_camera, width, height),
+            "on sample": pieces(lvf.on_sample, width, height),
+        }  # fmt: skip
+        numbers = patch * (PIECES + 1)
+        if lvf is not None:
+            numbers += np.where(patch > 0, self._strips["on sample"], 0)
+        # The cloth and every patch have a cell, even one that others hide.
+        every = np.arange(len(simulation.patches) + 1) * (PIECES + 1)
+        found, counts = np.unique(np.concatenate([every, numbers.ravel()]), return_counts=True)
+        self._cells = np.searchsorted(found, numbers)
+        self.patch, self.piece = np.divmod(found, PIECES + 1)
+        self.pixels = counts - np.isin(found, every)
+        self._known: dict[tuple[Card, LvfPlace], Places] = {}
+
+    def places(self, arrangement: Arrangement) -> Places:
+        """All that looks different in an arrangement."""
+        through = self.looked_through(arrangement)
+        key = arrangement.card, through
+        if key not in self._known:
+            self._known[key] = self._places(*key)
+        return self._known[key]
+
+    def looked_through(self, arrangement: Arrangement) -> LvfPlace:
+        """Where the LVF is if the camera looks through it, else `away`.
+
+        Without a door the sample does not leave an LVF that lies on it.
+        """
+        if arrangement.lvf == "on sample" and self._simulation.door is not None:
+            return "away"
+        return arrangement.lvf
+
+    def _places(self, card: Card, through: LvfPlace) -> Places:
+        width, height = self._size
+        surface = surfaces(card, self._simulation.chart, width, height)
+        piece = self._strips.get(through, np.zeros_like(surface))
+        numbers = (self._cells * (surface.max() + 1) + surface) * (PIECES + 1) + piece
+        found, place = np.unique(numbers, return_inverse=True)
+        rest, pieces_found = np.divmod(found, PIECES + 1)
+        cells_found, surfaces_found = np.divmod(rest, surface.max() + 1)
+        bayer = np.tile(np.arange(len(BAYER_RGGB)).reshape(2, 2), (height // 2, width // 2))
+        painted = place.reshape(height, width) * len(BAYER_RGGB) + bayer
+        return Places(cells_found, surfaces_found, pieces_found, painted)

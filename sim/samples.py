@@ -1,0 +1,146 @@
+"""The samples on the table: what has charged them, where they have been followed to."""
+
+from bisect import bisect_right
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.material.file import read_material
+
+from .arrangement import Arrangement, Arrangements
+from .layout import Layout
+from .lights import Lights
+from .lvf import Lvf
+from .optics import emission
+from .phosphor import Light, Phosphor, phosphor
+from .simulation import Simulation
+from .temperature import quickening
+
+FloatArray = NDArray[np.float64]
+
+
+class Samples:
+    """All states of the samples, flat: of whole patches, or of their cells.
+
+    Only an LVF that lies on a sample makes its cells differ. Until then, and again with a fresh
+    sample, patches are followed as wholes.
+
+    Parameters
+    ----------
+    simulation
+        What the room is like.
+    layout
+        Its cells.
+
+    Attributes
+    ----------
+    materials
+        Of its patches.
+    cells : Phosphor
+        Its `patch` is the cell that a state belongs to.
+    radiance_at_one : ndarray, shape (states, wavelengths)
+        Λ k_r of every state of the cells: its radiance at r = 1 (eq. 3).
+    """
+
+    def __init__(self, simulation: Simulation, layout: Layout) -> None:
+        self.materials = [read_material(patch.material) for patch in simulation.patches]
+        charges = [patch.initial_charge for patch in simulation.patches]
+        self._patches = replace(
+            phosphor(self.materials, charges, simulation.lamp.irradiance),
+            quickening=quickening(simulation.temperature),
+        )
+        of_patch = [np.flatnonzero(self._patches.patch == n) for n in range(len(self.materials))]
+        states = [of_patch[patch - 1] for patch in layout.patch[1:]]
+        self._whole = np.concatenate(states)
+        cell = np.repeat(np.arange(1, len(layout.patch)), [len(index) for index in states])
+        self.cells = replace(
+            self._patches,
+            k_r_per_s=self._patches.k_r_per_s[self._whole],
+            excitation=self._patches.excitation[self._whole],
+            patch=cell,
+        )
+        emitted = np.concatenate([emission(material) for material in self.materials])
+        self.radiance_at_one: FloatArray = (emitted * self._patches.k_r_per_s[:, None])[self._whole]
+        self._piece = layout.piece[cell]
+        self._lvf = simulation.lvf
+        self._has_door = simulation.door is not None
+        self._below_lvf: dict[bool, Phosphor] = {}
+        # Where they have been followed to, by time. The past cannot change, so they stay true; a
+        # photograph that is looked at late starts from the last one before it.
+        self._known_s = [0.0]
+        self._known_levels = [
+            np.full_like(self._patches.k_r_per_s, simulation.initial.concentration)
+        ]
+
+    def freshen(self, now_s: float, lights: Lights, arrangements: Arrangements) -> None:
+        """Other pieces of the same materials are put in, which have been in the dark for long."""
+        self.level_at(now_s, lights, arrangements)
+        self._known_s.append(now_s)
+        self._known_levels.append(np.zeros_like(self._patches.k_r_per_s))
+
+    def level_at(self, time_s: float, lights: Lights, arrangements: Arrangements) -> FloatArray:
+        """Concentrations of all states at a time, for `evolve` and `of_cells`."""
+        last = bisect_right(self._known_s, time_s) - 1
+        level = self._known_levels[last]
+        for left, right, arrangement in arrangements.spans(self._known_s[last], time_s):
+            level, _ = self.evolve(level, left, right, arrangement, lights)
+        self._known_s.insert(last + 1, time_s)
+        self._known_levels.insert(last + 1, level)
+        return level
+
+    def evolve(
+        self,
+        level: FloatArray,
+        start_s: float,
+        end_s: float,
+        arrangement: Arrangement,
+        light: Light,
+        visible: Callable[[float], float] = lambda _: 1.0,
+    ) -> tuple[FloatArray, FloatArray]:
+        """Let time pass on a bench that does not change; see `Phosphor.evolve`."""
+        on_top = arrangement.card in ("grey card", "colorchecker") and not self._has_door
+        if arrangement.lvf == "on sample":
+            level, states = self.of_cells(level), self._below(turned=arrangement.turned)
+        else:
+            whole = len(level) == len(self._patches.k_r_per_s)
+            states = self._patches if whole else self.cells
+        if arrangement.card == "blank" or on_top:
+            states = replace(states, excitation=np.zeros_like(states.excitation))
+        return states.evolve(level, start_s, end_s, light, visible)
+
+    def of_cells(self, level: FloatArray) -> FloatArray:
+        """The same for every state of every cell, shape (states,)."""
+        return level if len(level) == len(self._whole) else level[self._whole]
+
+    def glow(
+        self,
+        level: FloatArray,
+        start_s: float,
+        end_s: float,
+        arrangement: Arrangement,
+        lights: Lights,
+    ) -> FloatArray:
+        """∫ visible radiance dt of every cell, shape (cells, wavelengths); cell 0 is the cloth.
+
+        Parameters
+        ----------
+        level
+            Concentrations at `start_s`.
+        arrangement
+            Of the bench until `end_s`.
+        """
+        _, seen_s = self.evolve(level, start_s, end_s, arrangement, lights, lights.openness)
+        glow = np.zeros((self.cells.patch[-1] + 1, self.radiance_at_one.shape[1]))
+        radiance_s = self.of_cells(seen_s)[:, None] * self.radiance_at_one
+        np.add.at(glow, self.cells.patch, radiance_s)
+        return glow
+
+    def _below(self, *, turned: bool) -> Phosphor:
+        """The cells' states with what excites them below the LVF."""
+        if turned not in self._below_lvf:
+            assert self._lvf is not None
+            passed = Lvf(self._lvf).seen(self._lvf.on_sample, turned)[self._piece]
+            self._below_lvf[turned] = replace(self.cells, excitation=self.cells.excitation * passed)
+        return self._below_lvf[turned]

@@ -1,0 +1,101 @@
+"""What the camera sees of the bench: glow, and light thrown back by samples, cards, door, cloth."""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from .arrangement import Arrangement, LvfPlace
+from .cards import reflectances
+from .layout import Layout, Places
+from .lights import Seen
+from .lvf import Lvf
+from .optics import CLOTH_REFLECTANCE, REFLECTED, SAMPLE_REFLECTANCE
+from .simulation import Simulation
+
+FloatArray = NDArray[np.float64]
+
+
+class View:
+    """The way of the light from the bench into the lens.
+
+    Parameters
+    ----------
+    simulation
+        What the room is like.
+    layout
+        Where everything is.
+    """
+
+    def __init__(self, simulation: Simulation, layout: Layout) -> None:
+        self._simulation = simulation
+        self._layout = layout
+        self._reflected = REFLECTED * simulation.lamp.irradiance
+        self._lvf = None if simulation.lvf is None else Lvf(simulation.lvf)
+
+    def radiance_s(self, arrangement: Arrangement, glow_s: FloatArray, seen: Seen) -> FloatArray:
+        """∫ radiance dt of all places of an arrangement, shape (places, wavelengths).
+
+        Parameters
+        ----------
+        arrangement
+            Of the bench, which does not change meanwhile.
+        glow_s : ndarray, shape (cells, wavelengths)
+            ∫ visible glow dt.
+        seen
+            What the camera sees by reflection.
+        """
+        places = self._layout.places(arrangement)
+        radiance = self._samples(arrangement, glow_s, seen)[places.cell]
+        self._cover(radiance, arrangement, places, seen)
+        through = self._layout.looked_through(arrangement)
+        if through == "away":
+            return radiance
+        passed = self._passed(through, arrangement.turned)[places.piece]
+        radiance *= passed
+        return radiance
+
+    def _samples(self, arrangement: Arrangement, glow_s: FloatArray, seen: Seen) -> FloatArray:
+        """Of all cells with nothing before them, shape (cells, wavelengths); cell 0 is cloth."""
+        light = seen.sample + seen.sample_stray
+        if arrangement.lvf == "on sample":
+            passed = self._passed("on sample", arrangement.turned)[self._layout.piece]
+            light = passed * seen.sample + seen.sample_stray
+        if arrangement.card == "blank":
+            glow_s = np.zeros_like(glow_s)
+            reflectance = reflectances("blank", self._simulation.grey_card)[1]
+        else:
+            reflectance = np.full_like(seen.sample, SAMPLE_REFLECTANCE)
+            glow_s = glow_s * self._turned_away(arrangement.tilt_deg)
+        thrown_back = reflectance * light + CLOTH_REFLECTANCE * seen.door
+        radiance: FloatArray = glow_s + self._reflected * thrown_back
+        radiance[0] = self._reflected * CLOTH_REFLECTANCE * seen.cloth
+        return radiance
+
+    def _cover(
+        self, radiance: FloatArray, arrangement: Arrangement, places: Places, seen: Seen
+    ) -> None:
+        """Lay a card on the door's outside, or without a door on everything."""
+        covered = places.surface > 0
+        if not covered.any():
+            return
+        card = reflectances(arrangement.card, self._simulation.grey_card)[places.surface[covered]]
+        if arrangement.lvf == "on sample":
+            # The filter lies on the card as it would on the sample.
+            piece = self._layout.piece[places.cell[covered]]
+            card = self._passed("on sample", arrangement.turned)[piece] * card
+        if self._simulation.door is None:
+            radiance[covered] = self._reflected * card * seen.cloth
+        else:
+            # What the closed door hides is what the card hides, and the door's own outside.
+            radiance[covered] += self._reflected * (card - CLOTH_REFLECTANCE) * seen.door
+
+    def _turned_away(self, tilt_deg: int) -> float:
+        """Radiance of a sample over that of one that faces the camera."""
+        return float(1 - self._simulation.anisotropy * (1 - np.cos(np.radians(tilt_deg))))
+
+    def _passed(self, place: LvfPlace, turned: bool) -> FloatArray:
+        """What the pieces of the strip that lies there let through, shape (pieces, 160)."""
+        settings = self._simulation.lvf
+        assert settings is not None
+        assert self._lvf is not None
+        strip = settings.on_sample if place == "on sample" else settings.before_camera
+        return self._lvf.seen(strip, turned)

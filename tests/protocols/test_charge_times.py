@@ -1,0 +1,48 @@
+"""For how long to charge: when doubling ends, and which charge tells most."""
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from protocols.charge_times import CANDIDATES, FloatArray, most_telling_s, still_grows
+
+DOUBLED_S: FloatArray = 8 * 2.0 ** np.arange(6)
+
+
+def glow(charge_s: FloatArray, rates_per_s: FloatArray) -> FloatArray:
+    return 100 * (1 - np.exp(-np.multiply.outer(charge_s, rates_per_s)))
+
+
+def test_doubling_ends_when_the_glow_has_stopped_growing() -> None:
+    glows = glow(DOUBLED_S, np.full(9, 0.05))
+    grew = [still_grows(glows[: n + 2], 0.03) for n in range(len(DOUBLED_S) - 1)]
+    assert grew == [True, True, True, True, False]
+
+
+@given(st.floats(0.005, 0.1), st.floats(1.0, 1.5))
+def test_the_next_charge_is_the_one_that_tells_most(rate_per_s: float, spread: float) -> None:
+    rates: FloatArray = np.array([rate_per_s, rate_per_s * spread, rate_per_s * spread**2])
+    chosen_s = most_telling_s(list(DOUBLED_S), glow(DOUBLED_S, rates))
+    candidates_s = np.geomspace(DOUBLED_S[0], DOUBLED_S[-1], CANDIDATES)
+    determinants = [_log_determinants(np.append(DOUBLED_S, one_s), rates) for one_s in candidates_s]
+    best_s = candidates_s[int(np.argmax(determinants))]
+    assert chosen_s == pytest.approx(best_s, rel=0.5)
+
+
+def _log_determinants(charges_s: FloatArray, rates: FloatArray) -> float:
+    """Of the information about ln a and ln s at every place, derivatives by differences."""
+    total = 0.0
+    for rate in rates:
+        h = 1e-5
+        up, down = (np.log(glow(charges_s, np.full(1, rate * np.exp(d)))) for d in (h, -h))
+        slopes = np.hstack([np.ones((len(charges_s), 1)), (up - down) / (2 * h)])
+        total += float(np.linalg.slogdet(slopes.T @ slopes)[1])
+    return total
+
+
+def test_dim_places_have_no_say() -> None:
+    bright = glow(DOUBLED_S, np.full(6, 0.02))
+    noise = np.random.default_rng(1).normal(0.0, 0.1, (len(DOUBLED_S), 20))
+    both = np.hstack([noise, bright])
+    assert most_telling_s(list(DOUBLED_S), both) == most_telling_s(list(DOUBLED_S), bright)
