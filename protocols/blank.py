@@ -27,6 +27,7 @@ from labrig.region import CENTRE, Region
 from .decay_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
 from .lit_card import PutAwayUnit
 from .posing import charge, face_camera, lights_out, seen_s
+from .watching import Watcher
 
 BLANK = ByHand(
     "put a grey card in the sample's place (in the door, if there is one)",
@@ -100,7 +101,7 @@ class BlankDarkUnit:
     name: str = "dark"
 
     def run(self, session: Session) -> None:
-        """At the shortest shutter time and at those to come."""
+        """At the shortest shutter time and at those to come; a lamp that burns is refused."""
         session.ask(BLANK)
         session.wait_until_warm("camera")
         face_camera(session)
@@ -109,6 +110,8 @@ class BlankDarkUnit:
         for exposure_s in dict.fromkeys(times_s):
             for _ in range(DARKS_PER_EXPOSURE):
                 session.perform(Shoot("dark", self.protocol.settings(exposure_s)))
+        shorter = [self.protocol.settings(time_s) for time_s in offers.exposures_s[:3]]
+        Watcher(session, self.name, [self.protocol.region], None).insist_on_darkness(shorter)
 
 
 @dataclass(frozen=True)

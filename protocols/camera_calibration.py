@@ -70,7 +70,7 @@ class CameraCalibration(ProtocolModel):
         }
         return [
             *(
-                CardDarkUnit(reference, iso, self.longest_dark, asks=number == 0)
+                CardDarkUnit(reference, self.card, iso, self.longest_dark, asks=number == 0)
                 for number, iso in enumerate(self.isos)
             ),
             CardMeterUnit(reference, self.card),

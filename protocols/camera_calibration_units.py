@@ -9,6 +9,7 @@ from labrig.acquire import CameraOffers, ExposureSettings, Session, Shoot
 from labrig.region import Region
 
 from .lit_card import GREY_CARD, CardLight, card_light, light_card
+from .watching import Watcher
 
 #: Shares of the range that the lit card fills: the reference exposure of brackets, flats, repeats.
 HALF = 0.4
@@ -32,6 +33,7 @@ class CardDarkUnit:
     """Dark frames at one ISO, the card already in its place."""
 
     reference: ExposureSettings
+    card: Region
     iso: int
     longest_s: float
     asks: bool
@@ -42,7 +44,7 @@ class CardDarkUnit:
         return f"dark-iso-{self.iso}"
 
     def run(self, session: Session) -> None:
-        """Photograph darkness, shortest and longest exposure."""
+        """Photograph darkness, shortest and longest exposure, and see that it is dark."""
         if self.asks:
             session.ask(GREY_CARD)
         session.wait_until_warm("camera")
@@ -52,6 +54,8 @@ class CardDarkUnit:
             shot = ExposureSettings(exposure_s, self.iso, self.reference.f_number)
             for _ in range(DARKS_EACH):
                 session.perform(Shoot("dark", shot))
+        shorter = [replace(shot, exposure_s=time_s) for time_s in offers.exposures_s[:3]]
+        Watcher(session, self.name, [self.card], None).insist_on_darkness(shorter)
 
 
 @dataclass(frozen=True)

@@ -92,7 +92,7 @@ class Fade(ProtocolModel):
         filter_in = [ByHandUnit("lvf-in", LVF)] if self.through_lvf else []
         filter_away = [ByHandUnit("lvf-away", LVF_AWAY)] if self.through_lvf else []
         return [
-            CardDarkUnit(reference, self.camera.iso, self.longest, asks=True),
+            CardDarkUnit(reference, self.card, self.camera.iso, self.longest, asks=True),
             *filter_in,
             CardMeterUnit(reference, self.card),
             *(PassUnit(self, number) for number in range(self.passes)),

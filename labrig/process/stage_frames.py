@@ -1,8 +1,10 @@
-"""The frames of a stage that its numbers are made of."""
+"""What of a stage's frames its numbers are made of: which of them, and where in them."""
 
+from labrig.errors import UsageError
 from labrig.process.intact import insist_on_intact
 from labrig.process.stage import Stage
 from labrig.record import FrameRecord
+from labrig.region import Region
 
 
 def stage_frames(stage: Stage, *purposes: str) -> list[FrameRecord]:
@@ -20,3 +22,19 @@ def stage_frames(stage: Stage, *purposes: str) -> list[FrameRecord]:
         for frame in attempt.frames
         if frame.purpose in purposes and not stage.choices.excludes(frame)
     ]
+
+
+def stage_region(stage: Stage, region: Region) -> Region:
+    """The protocol's one `region`, or the one that a person wants instead.
+
+    Raises
+    ------
+    UsageError
+        A region of another name is asked for.
+    """
+    if named := [name for name in stage.choices.regions if name]:
+        raise UsageError(
+            f"--roi: expected x,y,width,height, since this run has one region only, got the name "
+            f"'{named[0]}'"
+        )
+    return stage.choices.regions.get("", region)

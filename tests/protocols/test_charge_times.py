@@ -7,7 +7,7 @@ from hypothesis import strategies as st
 
 from protocols.charge_times import CANDIDATES, FloatArray, most_telling_s, still_grows
 
-DOUBLED_S: FloatArray = 8 * 2.0 ** np.arange(6)
+DOUBLED_S: FloatArray = np.geomspace(8.0, 256.0, 6)
 
 
 def glow(charge_s: FloatArray, rates_per_s: FloatArray) -> FloatArray:

@@ -66,13 +66,14 @@ def fit_excitation(
 
 
 def _brightest(series: Sequence[ChargingSeries]) -> int:
-    """Channel that says most."""
-    snr = np.zeros(series[0].values.shape[2])
+    """Channel that is brightest where every one is measured."""
+    total = np.zeros(series[0].values.shape[2])
     for one in series:
-        snr += np.nansum(np.where(one.sigma > 0, one.values / one.sigma, 0.0), axis=(0, 1))
-    if not snr.max() > 0:
+        measured = (np.isfinite(one.values) & (one.sigma > 0)).all(axis=2)
+        total += np.where(measured[..., None], one.values, 0.0).sum(axis=(0, 1))
+    if not total.max() > 0:
         raise FitError("expected sites that glow after a charge, got none; did the lamp light?")
-    return int(np.argmax(snr))
+    return int(np.argmax(total))
 
 
 def _least(problem: ExcitationProblem, start: FloatArray, tolerance: float) -> LeastSquaresFit:

@@ -31,6 +31,8 @@ REMAINDER_STEP_NM = 20.0
 ALONG_THE_STRIP = ((3, 0.3), (2, 0.03), (1, 0.05))
 #: The map's σ is not believed below this: strips are not smooth to a tenth of a nanometre.
 CENTRE_FLOOR_NM = 0.5
+#: At dim ends what leaks could stand for a whole band: one is there, of this much of its start.
+LEAST_PEAK = 0.1
 FEWEST_FILTERS = 6
 _STEP = 1e-4
 _FIGURES = 5
@@ -228,7 +230,7 @@ class _Room:
             return rows, np.vstack([slopes, prior])
 
         low, high = np.full(count, -np.inf), np.full(count, np.inf)
-        low[2], high[2], low[3], low[4] = -1.0, 1.0, 0.0, 0.0
+        low[2], high[2], low[3], low[4] = -1.0, 1.0, LEAST_PEAK, 0.0
         found = least_squares(residuals, mean, lower=low, upper=high, tolerance=1e-6)
         data = found.residuals[: len(target)]
         misfit = max(1.0, float(np.sqrt(data @ data / max(len(target) - _FIGURES, 1))))

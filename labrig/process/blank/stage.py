@@ -9,7 +9,7 @@ from labrig.calibration import BlankFile, write_blank_file
 from labrig.process.blank.pictures import section
 from labrig.process.blank.stray_light import StrayLight, ambient, stray_light
 from labrig.process.stage import Stage, StageResult
-from labrig.process.stage_frames import stage_frames
+from labrig.process.stage_frames import stage_frames, stage_region
 from labrig.process.this_camera import insist_on_this_camera
 from labrig.process.timed_frames import intact_frames, timing_warnings
 from labrig.reduce import measure, read_raw, reduce_patches
@@ -25,13 +25,12 @@ def process(stage: Stage) -> StageResult:
         No sequence is complete, or a frame is missing or was changed.
     """
     protocol, run, camera = stage.protocol, stage.run, stage.known.camera
+    region = stage_region(stage, protocol.region)
     frames = intact_frames(run, stage.choices, "blank")
     insist_on_this_camera(camera, run, stage_frames(stage, "blank"))
-    series = reduce_patches(frames.decay, {"blank": protocol.region}, frames.dark, camera=camera)[
-        "blank"
-    ]
+    series = reduce_patches(frames.decay, {"blank": region}, frames.dark, camera=camera)["blank"]
     darks = [
-        replace(measure(read_raw(frame.path), protocol.region), exposure_s=frame.exposure_s)
+        replace(measure(read_raw(frame.path), region), exposure_s=frame.exposure_s)
         for frame in frames.dark
     ]
     least_dn = protocol.clean.share * (darks[0].white - max(darks[0].black))

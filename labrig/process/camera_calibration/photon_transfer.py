@@ -6,7 +6,8 @@ holds no pattern of pixels, card or lens.
 
 Where pixels share charge with their neighbours each one scatters less than its photons do. The
 covariances with the eight next ones make up for it: what one pixel loses its neighbours have (A. C.
-Moore, Z. Ninkov, W. J. Forrest, Optical Engineering 45, 2006). They are added if they are evident.
+Moore, Z. Ninkov, W. J. Forrest, Optical Engineering 45, 2006). They are always added: to leave them
+out where they are lost in the noise would make a gain more certain than it is.
 """
 
 from collections.abc import Sequence
@@ -25,7 +26,7 @@ FloatArray = NDArray[np.float64]
 
 #: Pixels that differ by more standard deviations are hot, or were struck by a cosmic ray.
 OUTLIER_SIGMAS = 6.0
-#: Standard deviations by which neighbours must share noise to be corrected for.
+#: Standard deviations from which neighbours evidently share noise.
 EVIDENT_SIGMAS = 4.0
 #: A frame that is brighter than so many standard deviations of its pixels is lit.
 LIT_SIGMAS = 3.0
@@ -89,7 +90,7 @@ class PhotonTransfer:
 
     def variance(self, point: Scatter) -> float:
         """Of a pixel's own light, DN²."""
-        return point.variance + (point.neighbours if self.shares else 0.0)
+        return point.variance + point.neighbours
 
 
 def scatter(one: RawFrame, other: RawFrame, region: Region, dark_dn: float) -> Scatter:
@@ -176,14 +177,14 @@ def photon_transfer(iso: float, lit: Sequence[Scatter], dark: Sequence[Scatter])
             f"expected pairs of lit frames at two levels and of dark frames at ISO {iso:g}, got "
             f"{len(lit)} and {len(dark)}; take more"
         )
-    shared, shared_sigma = _shared(lit)
-    evident = shared > EVIDENT_SIGMAS * shared_sigma
     level = np.array([point.level_dn for point in lit])
-    variance = np.array([p.variance + (p.neighbours if evident else 0.0) for p in lit])
-    # A variance of n pixels has the relative variance 2/n, each of the eight covariances half that.
-    freedom = np.array([point.pixels for point in lit]) / (5 if evident else 1)
+    variance = np.array([point.variance + point.neighbours for point in lit])
+    # Of n pixels the variance V has a variance of 2 V²/n, each of the covariances with the four
+    # neighbours, which count twice, V²/n: 9 times as much together.
+    freedom = np.array([point.pixels for point in lit]) / 9
     dark_variance = float(np.mean([point.variance for point in dark]))
-    slope, sigma, chi2 = _line(level, variance, dark_variance, freedom)
+    in_the_dark = float(np.mean([point.variance + point.neighbours for point in dark]))
+    slope, sigma, chi2 = _line(level, variance, in_the_dark, freedom)
     if not slope > 0:
         raise DataError(
             f"expected noise that rises with the light at ISO {iso:g}, got {slope:.3g} per DN; is "
@@ -201,7 +202,7 @@ def photon_transfer(iso: float, lit: Sequence[Scatter], dark: Sequence[Scatter])
         read_noise_e_sigma=float(read * gain * np.hypot(sigma / slope, 1 / np.sqrt(2 * pixels))),
         row_noise_e=float(row * gain),
     )
-    return PhotonTransfer(noise, tuple(lit), shared, shared_sigma, chi2)
+    return PhotonTransfer(noise, tuple(lit), *_shared(lit), chi2)
 
 
 def _shared(lit: Sequence[Scatter]) -> tuple[float, float]:

@@ -19,7 +19,7 @@ from labrig.process.camera_calibration.flat_fit import FittedFlat, fit_flat
 from labrig.process.camera_calibration.photon_transfer import PhotonTransfer
 from labrig.process.camera_calibration.pictures import sections
 from labrig.process.stage import Stage, StageResult
-from labrig.process.stage_frames import stage_frames
+from labrig.process.stage_frames import stage_frames, stage_region
 from labrig.process.this_camera import camera_identity, lens_of
 from labrig.record import FrameRecord
 from labrig.reduce import read_raw
@@ -43,7 +43,7 @@ def process(stage: Stage) -> StageResult:
         Some unit is missing, or its frames are of no use.
     """
     protocol, run = stage.protocol, stage.run
-    card, iso = protocol.card, protocol.camera.iso
+    card, iso = stage_region(stage, protocol.card), protocol.camera.iso
     darks = stage_frames(stage, "dark")
     lit = stage_frames(stage, *LIT)
     levels = card_levels(lit, darks, card)
@@ -89,7 +89,7 @@ def process(stage: Stage) -> StageResult:
 def _flats(
     stage: Stage, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord]
 ) -> list[FittedFlat]:
-    card, reference = stage.protocol.card, stage.protocol.camera.iso
+    card, reference = stage_region(stage, stage.protocol.card), stage.protocol.camera.iso
     dark_dn = dark_levels([frame for frame in darks if frame.iso == reference], card)
     of_flats = [frame for frame in lit if frame.purpose == "flat"]
     return [
@@ -143,7 +143,7 @@ def _warnings(
         most = max(evident, key=lambda one: one.shared)
         yield (
             f"neighbouring pixels share noise ({100 * most.shared:.0f} % of a pixel's variance): "
-            "the gain is corrected for it"
+            "the gain takes it into account"
         )
     (flicker, _), (repeated, sigma) = factors.flicker, factors.repeated
     if flicker - repeated > CLEAR_SIGMAS * sigma:

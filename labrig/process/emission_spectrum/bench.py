@@ -27,6 +27,9 @@ from labrig.region import Region, region_pixels
 
 FloatArray = NDArray[np.float64]
 
+#: From where to where the holder is read, in heights of the strip from its middle; the filter's own
+#: blurred edges end at 0.7.
+HOLDER = (0.8, 1.1)
 #: Of the spectrum fitted: finer than the filter's 25 nm, and beyond the grid that is told.
 KNOTS_NM: FloatArray = np.arange(380.0, 721.0, 5.0)
 
@@ -37,8 +40,8 @@ class SpectralBench:
 
     Attributes
     ----------
-    slices
-        Where in the frame the filter is read.
+    slices, holder
+        Where in the frame the filter is read, and where its opaque holder is seen beside it.
     lvfs
         The filter at the middle of each slice's own pixels, for every channel.
     camera
@@ -50,6 +53,7 @@ class SpectralBench:
     """
 
     slices: Mapping[str, Region]
+    holder: Mapping[str, Region]
     lvfs: tuple[Lvf, ...]
     camera: CameraResponse
     system: SpectralSystem
@@ -93,7 +97,8 @@ def spectral_bench(stage: Stage, frame: SeriesFrame) -> SpectralBench:
     # At either end pixels reach a little beyond the places that were calibrated.
     places = np.clip(_positions(raw, strip), lvf.position[0], lvf.position[-1])
     lvfs = tuple(lvf.at(own) for own in places)
-    return SpectralBench(strip.slices(), lvfs, camera, _system(lvfs, camera))
+    system = _system(lvfs, camera)
+    return SpectralBench(strip.slices(), _holder(strip), lvfs, camera, system)
 
 
 def with_white(
@@ -115,13 +120,25 @@ def with_white(
             "known: name them in the rig file (optics: {lamp: …, grey_card: …})",
         )
     light = _light(lamp_spectrum(stage.rig), card_reflectance(stage.rig))
-    try:
-        picture = combined(white)
-    except DataError:
+    picture = combined(white)
+    if not picture.shows_light:
         return bench, ("the white picture is dark or clips throughout; the spectrum does without",)
     expected = bench.seen_of(light)
     system = taught_by(bench.system, picture.value, picture.sigma, light, expected)
     return replace(bench, system=system, white=True), ()
+
+
+def _holder(strip: Strip) -> dict[str, Region]:
+    """Dark stripes above and below the strip, as far as the frame reaches."""
+    (left, left_y), (right, right_y) = strip.left, strip.right
+    upper, lower = min(left_y, right_y), max(left_y, right_y)
+    near, far = (share * strip.height for share in HOLDER)
+    stripes = {"above": (upper - far, upper - near), "below": (lower + near, lower + far)}
+    return {
+        name: (left, top, right - left, bottom - top)
+        for name, (top, bottom) in stripes.items()
+        if top >= 0 and bottom <= 1
+    }
 
 
 def _positions(raw: RawFrame, strip: Strip) -> FloatArray:

@@ -16,6 +16,8 @@ FloatArray = NDArray[np.float64]
 
 #: Chance, over all comparisons of a kind, at which spectra that do not differ are said to.
 LEVEL = 1e-3
+#: Share of the highest value above which a place tells the centroid: elsewhere is noise.
+BRIGHT = 0.02
 #: Rounds in which the noise of the reference follows the brightness.
 ROUNDS = 5
 
@@ -76,15 +78,14 @@ def compared(what: str, frames: Pictures, reference: Picture, centre_nm: FloatAr
     picture = combined(frames)
     known = np.isfinite(picture.value) & np.isfinite(reference.value)
     y, m = picture.value[known], reference.value[known]
-    dark = np.sqrt(np.mean(frames.dark_sigma[:, known] ** 2, axis=0))
     gain, chi2 = float(y @ m / (m @ m)), 0.0
     for _ in range(ROUNDS):
         variance = picture.sigma[known] ** 2 + gain**2 * reference.sigma[known] ** 2
-        inverse = _inverse(variance, dark)
+        inverse = _inverse(variance)
         gain = float(m @ inverse @ y / (m @ inverse @ m))
         residual = y - gain * m
         chi2 = float(residual @ inverse @ residual)
-    dof = len(y) - 1
+    dof = len(y) - 2
     excess = max(chi2 - dof, 0.0) / float(gain**2 * (m @ inverse @ m))
     shift, sigma = _shift(y, m, gain, variance, centre_nm[known])
     return Comparison(
@@ -92,17 +93,21 @@ def compared(what: str, frames: Pictures, reference: Picture, centre_nm: FloatAr
     )
 
 
-def _inverse(variance: FloatArray, dark: FloatArray) -> FloatArray:
-    """Of diag(variance) + dark darkᵀ (Sherman and Morrison)."""
-    scaled = dark / variance
-    inverse: FloatArray = np.diag(1 / variance) - np.outer(scaled, scaled) / (1 + dark @ scaled)
+def _inverse(variance: FloatArray) -> FloatArray:
+    """Of the covariance where all values may be off by one and the same amount: a sensor that has
+    warmed since its dark frames is brighter all over.
+    """
+    weight = 1 / variance
+    inverse: FloatArray = np.diag(weight) - np.outer(weight, weight) / weight.sum()
     return inverse
 
 
 def _shift(
     y: FloatArray, m: FloatArray, gain: float, variance: FloatArray, centre_nm: FloatArray
 ) -> tuple[float, float]:
-    """Difference of the centroids in nm, and its σ."""
+    """Difference of the centroids in nm where m has its light, and its σ."""
+    bright = m > BRIGHT * m.max()
+    y, m, variance, centre_nm = y[bright], m[bright], variance[bright], centre_nm[bright]
     light = float(m.sum())
     middle = float(centre_nm @ m) / light
     lever = (centre_nm - middle) / (gain * light)

@@ -25,6 +25,10 @@ FloatArray = NDArray[np.float64]
 DARKS_FOR_HOT = 4
 #: Rounds in which the weights follow the line.
 ROUNDS = 8
+#: A scatter so many times what it should be is none of noise.
+OUTLIER = 10.0
+#: Strips from which a place tells its noise.
+FEWEST_STRIPS = 2
 #: A place in which so many of its pixels clip is no measurement.
 CLIPPED = 0.001
 
@@ -51,7 +55,7 @@ class Seen:
     level_dn, pixels
         (p, C) means above black, NaN where a place clips; over so many pixels.
     strips
-        (p, C, s) means of strips over the width of a place, less its own.
+        (p, C, s) means of strips over the width of a place, less its own; NaN where it has fewer.
     """
 
     frame: SeriesFrame
@@ -113,30 +117,26 @@ def _seen(
         level.append(np.array(totals) / counts)
         pixels.append(counts)
         strips.append(np.array(means))
-    fewest = min(one.shape[1] for one in strips)
-    return Seen(
-        frame,
-        raw.width,
-        raw.height,
-        np.array(level),
-        np.array(pixels, dtype=np.float64),
-        np.stack([one[:, :fewest] - one[:, :fewest].mean(axis=1, keepdims=True) for one in strips]),
-    )
+    deviations = np.full((len(regions), len(raw.channels), STRIPS), np.nan)
+    for place, one in enumerate(strips):
+        deviations[place, :, : one.shape[1]] = one - one.mean(axis=1, keepdims=True)
+    counted = np.array(pixels, dtype=np.float64)
+    return Seen(frame, raw.width, raw.height, np.array(level), counted, deviations)
 
 
 def _pairs(group: Sequence[Seen]) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Level that a pair's noise belongs to and its variance per pixel, each (p, C)."""
     for one, other in pairwise(group):
-        strips = one.strips.shape[2]
-        if strips < 2:
-            continue
         # Brought to the same brightness all over, as nearly as the noisiest place allows.
         a, b = np.nan_to_num(one.level_dn), np.nan_to_num(other.level_dn)
         both = np.isfinite(one.level_dn) & np.isfinite(other.level_dn)
         scale = np.sum(a * b, where=both, axis=0) / np.maximum(np.sum(a * a, where=both, axis=0), 1)
         scale = np.clip(scale, 0.0, 1e3)
         difference = other.strips - scale[:, np.newaxis] * one.strips
-        scatter = np.square(difference).sum(axis=2) / (strips - 1) / strips * one.pixels
+        strips = np.isfinite(difference).sum(axis=2)
+        few = strips < FEWEST_STRIPS
+        scatter = np.nansum(np.square(difference), axis=2) / np.maximum((strips - 1) * strips, 1)
+        scatter = np.where(few, np.nan, scatter * one.pixels)
         # a + b L of the one times scale², of the other times 1.
         share = 1 + scale**2
         level = (b + scale**2 * a) / share
@@ -145,9 +145,16 @@ def _pairs(group: Sequence[Seen]) -> Iterator[tuple[FloatArray, FloatArray]]:
 
 def _line(level: FloatArray, scatter: FloatArray) -> FloatArray:
     """The a and b ≥ 0 of scatter = a + b · level, every scatter as uncertain as it is large."""
-    design = np.stack([np.ones_like(level), np.maximum(level, 0.0)], axis=1)
-    expected = np.full_like(scatter, max(float(scatter.mean()), ROUNDING_VARIANCE))
+    level = np.maximum(level, 0.0)
+    design = np.stack([np.ones_like(level), level], axis=1)
+    # Medians begin, so that a hot pixel or a cosmic ray cannot.
+    dark = level <= np.median(level)
+    at_black = float(np.median(scatter[dark]))
+    rise = (scatter[~dark] - at_black) / np.maximum(level[~dark], 1.0)
+    line = np.array([at_black, max(float(np.median(rise)) if rise.size else 0.0, 0.0)])
     for _ in range(ROUNDS):
-        line, _ = nnls(design / expected[:, np.newaxis], scatter / expected)
         expected = np.maximum(design @ line, ROUNDING_VARIANCE)
+        kept = scatter < OUTLIER * expected
+        weighted = design[kept] / expected[kept, np.newaxis]
+        line, _ = nnls(weighted, scatter[kept] / expected[kept])
     return np.asarray(line, dtype=np.float64)

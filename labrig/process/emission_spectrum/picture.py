@@ -61,15 +61,14 @@ class Picture:
     sigma: FloatArray
     brightness: FloatArray
 
+    @property
+    def shows_light(self) -> bool:
+        """Whether all of it together stands out of the noise."""
+        return bool(np.nansum(self.value) > SEEN_SIGMA * np.sqrt(np.nansum(self.sigma**2)))
+
 
 def combined(frames: Pictures) -> Picture:
-    """The picture behind some frames, each as bright as it is.
-
-    Raises
-    ------
-    DataError
-        Nothing is seen in them.
-    """
+    """The picture behind some frames, each as bright as it is."""
     weight = np.nan_to_num(1 / (frames.sigma**2 + frames.dark_sigma**2))
     value = np.nan_to_num(frames.value)
     brightness = np.ones(len(frames))
@@ -82,9 +81,21 @@ def combined(frames: Pictures) -> Picture:
         brightness = brightness / (brightness[0] or 1.0)
     with np.errstate(divide="ignore"):
         sigma = np.where(total > 0, 1 / np.sqrt(total), np.nan)
-    if not np.nansum(mean) > SEEN_SIGMA * np.sqrt(np.nansum(sigma**2)):
+    return Picture(mean, sigma, brightness)
+
+
+def visible(frames: Pictures) -> Pictures:
+    """Those of the frames in which there is light.
+
+    Raises
+    ------
+    DataError
+        There is none in any of them.
+    """
+    rows = [row for row in range(len(frames)) if combined(frames.take([row])).shows_light]
+    if not rows:
         raise DataError(
             "expected light through the LVF, got none above the noise: was the sample charged, is "
             "the filter where it was calibrated? (raise camera.iso, expose longer)"
         )
-    return Picture(mean, sigma, brightness)
+    return frames.take(rows)

@@ -7,10 +7,11 @@ from itertools import pairwise
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.errors import DataError
 from labrig.fit.spectrum import fit_spectrum
 from labrig.process.emission_spectrum.bench import SpectralBench, spectral_bench, with_white
 from labrig.process.emission_spectrum.constancy import compared, over_time
-from labrig.process.emission_spectrum.picture import Picture, Pictures, combined
+from labrig.process.emission_spectrum.picture import Picture, Pictures, combined, visible
 from labrig.process.emission_spectrum.reading import read_places
 from labrig.process.emission_spectrum.result import EmissionSpectrum, write_emission_spectrum
 from labrig.process.emission_spectrum.telling import (
@@ -22,6 +23,8 @@ from labrig.process.emission_spectrum.telling import (
 from labrig.process.stage import Stage, StageResult
 from labrig.process.this_camera import insist_on_this_camera
 from labrig.process.timed_frames import intact_frames, steady_frames, stray_light, timing_warnings
+from labrig.reduce import SeriesFrame
+from labrig.reduce.series import is_usable
 
 FloatArray = NDArray[np.float64]
 
@@ -56,12 +59,21 @@ def process(stage: Stage) -> StageResult:
     insist_on_this_camera(stage.known.camera, stage.run, stage.run.frames("spectrum"))
     bench = spectral_bench(stage, frames.decay[0])
     darks, white = frames.dark, steady_frames(stage.run, stage.choices, "white")
-    read = read_places([*frames.decay, *white], darks, bench.slices, stage.known.camera)
+    lit, camera = [*frames.decay, *white], stage.known.camera
+    read = read_places(lit, darks, bench.slices, camera, bench.holder)
     bench, warnings = with_white(bench, stage, read.pictures("white") if white else None)
-    charges = []
+    charges: list[_Charge] = []
+    dead: list[str] = []
     for unit in dict.fromkeys(frame.unit for frame in frames.decay):
-        pictures = read.pictures(unit)
-        charges.append(_Charge(unit.removeprefix("spectrum-"), pictures, combined(pictures)))
+        lamp = unit.removeprefix("spectrum-")
+        try:
+            pictures = visible(read.pictures(unit))
+        except DataError:
+            if not charges:
+                raise
+            dead.append(f"after charging with the {lamp} lamp nothing glows: it did not light")
+            continue
+        charges.append(_Charge(lamp, pictures, combined(pictures)))
     first = charges[0]
     spectrum = _spectrum(first.picture, bench, stage, first.lamp)
     write_emission_spectrum(stage.folder / "emission.yaml", spectrum)
@@ -89,8 +101,10 @@ def process(stage: Stage) -> StageResult:
             *stray_light(stage.known.blank, frames),
             *warnings,
             *_clipping(first.frames),
+            *_faint(len(first.frames), frames.decay),
             *verdicts(times, lamps),
             *_not_charged(charges),
+            *dead,
         ),
     )
 
@@ -116,6 +130,16 @@ def _not_charged(charges: Sequence[_Charge]) -> list[str]:
                 f"left before: the {after.lamp} lamp did not light, or hardly excites this sample"
             )
     return told
+
+
+def _faint(count: int, frames: Sequence[SeriesFrame]) -> list[str]:
+    taken = sum(one.unit == frames[0].unit and is_usable(one.flag) for one in frames)
+    if count == taken:
+        return []
+    return [
+        f"{taken - count} of {taken} frames show no light above the noise and are left out; "
+        "photograph earlier (times:), or charge for longer"
+    ]
 
 
 def _clipping(frames: Pictures) -> list[str]:

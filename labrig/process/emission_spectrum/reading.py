@@ -28,6 +28,8 @@ class Reading:
         As seen.
     slices
         The places.
+    holder
+        Dark parts of the frame beside the filter, seen after the places.
     camera
         Its calibration, where there is one.
     noise
@@ -39,6 +41,7 @@ class Reading:
     frames: Sequence[Seen]
     darks: Sequence[Seen]
     slices: Mapping[str, Region]
+    holder: Mapping[str, Region]
     camera: CameraFile | None
     noise: PixelNoise
     dark: Sequence[DarkModel]
@@ -54,27 +57,30 @@ class Reading:
         return Pictures(np.array(middles_s), value, sigma, dark_sigma)
 
     def _reduced(self, one: Seen) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Value, σ and the dark level's σ, each (places · channels,) in DN/s."""
-        frame, camera = one.frame, self.camera
-        told_s = frame.exposure_s
-        per_dn = np.full(
-            one.level_dn.shape, told_s if camera is None else camera.exposure_s(told_s)[0]
-        )
+        """Value, σ and the σ of what all have in common, each (places · channels,) in DN/s."""
+        frame, camera, told_s = one.frame, self.camera, one.frame.exposure_s
+        levels = [model.dark_level(told_s) for model in self.dark]
+        level, known = (np.array(column) for column in zip(*levels, strict=True))
+        light, sigma = one.level_dn - level, self.noise.sigma_dn(one.level_dn, one.pixels)
+        # A sensor that has warmed since the dark frames is off in all places together.
+        common = TWO_DEGREES * np.abs(np.array([m.current(told_s) for m in self.dark]))
+        count = len(self.slices)
+        if self.holder:
+            share = one.pixels[count:] / one.pixels[count:].sum(axis=0)
+            light = light - np.sum(share * light[count:], axis=0)
+            common = np.broadcast_to(
+                np.sqrt(np.sum((share * sigma[count:]) ** 2, axis=0)), light.shape
+            )
+        sigma = np.where(np.isnan(light), np.nan, np.hypot(sigma, known))
+        per_dn = np.full(light.shape, told_s if camera is None else camera.exposure_s(told_s)[0])
         if camera is not None:
-            flats = [
+            per_dn[:count] *= [
                 camera.flat(frame.f_number, region, one.width, one.height)
                 for region in self.slices.values()
             ]
-            per_dn = per_dn * np.array(flats)
-        levels = [model.dark_level(told_s) for model in self.dark]
-        level, known = (np.array(column) for column in zip(*levels, strict=True))
-        # A sensor that has warmed since the dark frames is off in all places together.
-        drift = TWO_DEGREES * np.abs(np.array([m.current(told_s) for m in self.dark]))
-        sigma = self.noise.sigma_dn(one.level_dn, one.pixels)
-        sigma = np.where(np.isnan(one.level_dn), np.nan, np.hypot(sigma, known))
-        columns = (one.level_dn - level, sigma, drift)
-        value, sigma, drift = ((column / per_dn).ravel() for column in columns)
-        return value, sigma, drift
+        columns = (light, sigma, common)
+        value, sigma, common = ((column / per_dn)[:count].ravel() for column in columns)
+        return value, sigma, common
 
 
 def read_places(
@@ -82,8 +88,9 @@ def read_places(
     darks: Sequence[SeriesFrame],
     slices: Mapping[str, Region],
     camera: CameraFile | None,
+    holder: Mapping[str, Region] | None = None,
 ) -> Reading:
-    """Read every frame in every place.
+    """Read every frame in every place, and in the holder, whose light is subtracted.
 
     Raises
     ------
@@ -96,7 +103,8 @@ def read_places(
             f"expected dark frames at the one ISO of all frames, got {len(darks)} and ISO "
             f"{', '.join(f'{iso:g}' for iso in sorted(filter(None, isos)))}"
         )
-    lit, dark = seen(frames, slices, darks), seen(darks, slices, darks)
+    regions = {**slices, **(holder or {})}
+    lit, dark = seen(frames, regions, darks), seen(darks, regions, darks)
     groups = [[o for o in lit if o.frame.unit == u] for u in {o.frame.unit: None for o in lit}]
     rising = sorted(dark, key=lambda one: one.frame.exposure_s)
     noise = pixel_noise([*groups, rising])
@@ -107,4 +115,4 @@ def read_places(
         fit_dark(exposure_s, level[:, place], np.nan_to_num(sigma[:, place], nan=np.inf))
         for place in range(level.shape[1])
     ]
-    return Reading(lit, dark, slices, camera, noise, models)
+    return Reading(lit, dark, slices, holder or {}, camera, noise, models)

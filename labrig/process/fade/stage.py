@@ -16,7 +16,7 @@ from labrig.process.fade.fit import ANY_LAG_S, fit_change
 from labrig.process.fade.pictures import section
 from labrig.process.fade.shots import Shots, shots_after
 from labrig.process.stage import Stage, StageResult
-from labrig.process.stage_frames import stage_frames
+from labrig.process.stage_frames import stage_frames, stage_region
 from labrig.process.this_camera import insist_on_this_camera
 from labrig.record import FrameRecord
 from labrig.reduce import read_raw
@@ -100,7 +100,7 @@ def _places(
     """Regions, and what each channel of each of them sees of the steady lamp at `nm`."""
     seen = (lamp.at(nm)[:, np.newaxis] * curves.at(nm)).T
     if not stage.protocol.through_lvf:
-        return {"card": stage.protocol.card}, _normalised(seen)
+        return {"card": stage_region(stage, stage.protocol.card)}, _normalised(seen)
     lvf = stage.known.lvf
     if lvf is None or lvf.before_camera is None:
         raise DataError(

@@ -22,6 +22,8 @@ UNEVEN_OVER_NM = 60.0
 PARABOLA = (0.2, 0.3, 10.0)
 #: What every position scatters by on its own, besides what is known of it: strips are not smooth.
 ROUGH = 0.02
+#: Factors have logarithms; no light at all is so much.
+LEAST = 1e-6
 #: Steps of derivatives by a band's figures, in their σ.
 _STEP = 0.5
 
@@ -90,26 +92,34 @@ def scales(
     # (modes, p, channels) of the expected ratio.
     wrong = np.stack([passed @ mode / whole - expected * (light @ mode / whole) for mode in modes])
     shifted = _by_figures(lvf, nodes, light) @ sensitivity / whole
-    places = range(len(expected))
-    value, noise, by_curves = np.empty(len(places)), np.empty(len(places)), []
-    for k in places:
+    value, noise, by_curves = np.empty(len(expected)), np.empty(len(expected)), []
+    for k in range(len(expected)):
         used = np.isfinite(ratio.value[k]) & (expected[k] > 0)
         if not used.any():
             raise DataError(f"position p{k:02d}: no light was measured; expose longer")
-        seen, want, unsure = ratio.value[k, used], expected[k, used], ratio.sigma[k, used]
-        of_curves = wrong[:, k, used]
-        start = max(float(seen @ want / (want @ want)), 1e-6)
-        covariance = np.diag(unsure**2) + start**2 * of_curves.T @ of_curves
-        weight = np.linalg.solve(covariance, want)
-        weight = weight / (weight @ want)
-        value[k] = max(float(weight @ seen), 1e-6)
+        seen, unsure, of_curves = ratio.value[k, used], ratio.sigma[k, used], wrong[:, k, used]
+        weight = _weights(seen, expected[k, used], unsure, of_curves)
+        value[k] = max(float(weight @ seen), LEAST)
         of_noise = (weight**2) @ unsure**2 / value[k] ** 2
         of_figures = ((shifted[:, k, used] @ weight) ** 2).sum()
         noise[k] = float(np.sqrt(of_noise + of_figures + ROUGH**2))
         by_curves.append(of_curves @ weight)
     curves = np.array(by_curves)
-    measured = np.diag(noise**2) + curves @ curves.T
-    return _smoothed(value, measured, lvf)
+    return _smoothed(value, np.diag(noise**2) + curves @ curves.T, lvf)
+
+
+def _weights(
+    seen: FloatArray, expected: FloatArray, unsure: FloatArray, of_curves: FloatArray
+) -> FloatArray:
+    """(channels,) by which what was seen of a position adds up to its factor.
+
+    By generalised least squares: noise, and curves that are wrong by so much (modes, channels).
+    """
+    start = max(float(seen @ expected / (expected @ expected)), LEAST)
+    covariance = np.diag(unsure**2) + start**2 * of_curves.T @ of_curves
+    weight = np.linalg.solve(covariance, expected)
+    weights: FloatArray = weight / (weight @ expected)
+    return weights
 
 
 def _by_figures(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatArray:

@@ -7,6 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit.lvf import LvfCalibration, calibrate_lvf
+from labrig.fit.spectrum import CurveError
 from labrig.optics import (
     CameraResponse,
     Lvf,
@@ -28,6 +29,11 @@ BETTER = 3.0
 FAR_OFF = 0.15
 #: Places say what filter is in if they see this share of what the brightest one sees.
 BRIGHT = 0.25
+#: What a gel differs from its table by, and a table of few points from the curve, relative.
+TABLE = 0.02
+#: Curves of cameras are worst at the ends of the spectrum and where a channel is nearly blind;
+#: neighbouring bands tell of it, but only if so much is allowed for.
+CURVES = CurveError(added=0.03)
 #: A place says something of a filter if its value without one is this many of its σ.
 CLEAR = 30.0
 
@@ -167,16 +173,20 @@ def calibrated(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -
     """
     reference = bench.card_values() / scenes.card.value
     value = np.stack([one.value * reference for one in scenes.values], axis=1)
-    relative = [np.hypot(one.sigma, FLICKER * one.value) * reference for one in scenes.values]
+    sigma = [
+        np.hypot(seen.sigma, (FLICKER if one is NO_FILTER else TABLE) * seen.value) * reference
+        for one, seen in zip(scenes.filters, scenes.values, strict=True)
+    ]
     return calibrate_lvf(
         scenes.position,
         value,
-        np.stack(relative, axis=1),
+        np.stack(sigma, axis=1),
         filters=scenes.filters,
         lamp=bench.lamp,
         card=bench.card,
         camera=bench.camera,
         wavelengths=wavelengths,
+        curve_error=CURVES,
     )
 
 

@@ -1,0 +1,135 @@
+"""Blank and fade: written, read, asked."""
+
+from pathlib import Path
+
+import numpy as np
+import pytest
+from hypothesis import given, settings
+from hypothesis import strategies as st
+
+from labrig.calibration import (
+    BlankFile,
+    Change,
+    FadeFile,
+    read_blank_file,
+    read_fade_file,
+    write_blank_file,
+    write_fade_file,
+)
+from labrig.errors import DataError, UsageError
+from labrig.fit.excitation import Transient
+
+BLANK = BlankFile(
+    iso=400,
+    f_number=4.0,
+    channels=("R", "G"),
+    t_s=(0.5, 1.5),
+    rate_dn_per_s=((10.0, 20.0), (0.0, 2.0)),
+    sigma_dn_per_s=((1.0, 1.0), (1.0, 1.0)),
+    constant_dn_per_s=(0.5, 0.25),
+    constant_sigma_dn_per_s=(0.25, 0.25),
+    ambient_dn_per_s=(0.0, 0.0),
+    ambient_sigma_dn_per_s=(0.1, 0.1),
+    first_clean_s=2.0,
+)
+
+number = st.floats(-1e6, 1e6)
+
+
+@settings(max_examples=20)
+@given(st.data())
+def test_a_written_blank_reads_back_as_itself(
+    tmp_path_factory: pytest.TempPathFactory, data: st.DataObject
+) -> None:
+    times = data.draw(st.lists(st.floats(0, 1e4), min_size=1, max_size=5, unique=True).map(sorted))
+    row = st.lists(number, min_size=2, max_size=2)
+    rows = data.draw(st.lists(row, min_size=len(times), max_size=len(times)))
+    file = BlankFile.model_validate(
+        BLANK.model_dump()
+        | {"t_s": times, "rate_dn_per_s": rows, "sigma_dn_per_s": [(1.0, 2.0)] * len(times)}
+        | {"first_clean_s": data.draw(st.none() | st.floats(0, 100))}
+    )
+    path = tmp_path_factory.mktemp("blank") / "blank.yaml"
+    write_blank_file(path, file)
+    assert read_blank_file(path) == file
+
+
+def test_a_blank_says_what_a_frame_shows_of_it() -> None:
+    level, sigma = BLANK.at(0.75, 0.5, 400, 4.0)  # its middle half-way between the two times
+    assert level == pytest.approx(0.5 * np.array([5.5, 11.25]))
+    assert sigma == pytest.approx(0.5 * np.hypot(1.0, 0.25) * np.ones(2))
+    level, sigma = BLANK.at(5.0, 2.0, 800, 8.0)  # clean: what stays, at other settings
+    assert level == pytest.approx(2 * 2 / 4 * np.array([0.5, 0.25]))
+    assert sigma == pytest.approx(2 * 2 / 4 * np.array([0.25, 0.25]))
+
+
+def test_a_blank_does_not_know_what_was_before_it() -> None:
+    with pytest.raises(DataError, match="begins as early as the decay"):
+        BLANK.at(0.1, 0.1, 400, 4.0)
+
+
+def test_a_decay_that_begins_too_early_or_under_a_leak_is_told() -> None:
+    assert BLANK.remarks(2.1) == ()
+    (said,) = BLANK.remarks(0.5)
+    assert "begins 0.5 s after lamp-off, the blank is clean from 2 s on" in said
+    leaking = BLANK.model_copy(update={"ambient_dn_per_s": (0.0, 3.0)})
+    (said,) = leaking.remarks(2.1)
+    assert "3 ± 0.1 DN/s in G" in said
+    (said,) = BLANK.model_copy(update={"first_clean_s": None}).remarks(9.0)
+    assert "never became clean" in said
+
+
+def fade(**changes: object) -> FadeFile:
+    fading = Change(t_s=(0.0, 0.1, 0.3), share=((1, 1), (0.2, 0.4), (0, 0)), sigma=((0, 0),) * 3)
+    return FadeFile.model_validate({"bands_nm": (400, 500, 600), "fade": fading} | changes)
+
+
+@settings(max_examples=20)
+@given(st.lists(st.floats(1e-3, 1.0), min_size=1, max_size=6), st.floats(0, 2))
+def test_a_written_fade_reads_back_as_itself(
+    tmp_path_factory: pytest.TempPathFactory, steps: list[float], share: float
+) -> None:
+    times = [0.0, *np.cumsum(steps).tolist()]
+    rows = [(share, share / 3)] * len(times)
+    file = fade(rise={"t_s": times, "share": rows, "sigma": rows})
+    path = tmp_path_factory.mktemp("fade") / "fade.yaml"
+    write_fade_file(path, file)
+    assert read_fade_file(path) == file
+
+
+def test_a_fade_is_what_the_excitation_fit_takes() -> None:
+    file = fade()
+    transient = Transient.sampled(*file.in_bands(file.fade, file.bands_nm))
+    assert transient.duration_s @ transient.share == pytest.approx(file.fade.missing_s())
+    assert file.fade.missing_s() == pytest.approx([0.08, 0.11])
+    _, share = file.in_bands(file.fade, [450, 550])  # one band, about 500 nm
+    assert share[1] == pytest.approx([0.3])
+
+
+@pytest.mark.parametrize(
+    ("changes", "said"),
+    [
+        ({"bands_nm": (500, 400, 600)}, "rising edges"),
+        ({"bands_nm": (400, 500)}, "expected 1 numbers"),
+        ({"fade": {"t_s": (0.1, 0.2), "share": [[1]] * 2, "sigma": [[0]] * 2}}, "rise from 0"),
+        ({"fade": {"t_s": (0, 0.2), "share": [[1]], "sigma": [[0]] * 2}}, "for every time"),
+    ],
+)
+def test_a_malformed_fade_is_one_clear_line(
+    tmp_path: Path, changes: dict[str, object], said: str
+) -> None:
+    import yaml
+
+    path = tmp_path / "fade.yaml"
+    path.write_text(yaml.safe_dump({**fade().model_dump(mode="json"), **_plain(changes)}))
+    with pytest.raises(UsageError) as caught:
+        read_fade_file(path)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)
+
+
+def _plain(changes: dict[str, object]) -> dict[str, object]:
+    return {
+        key: {k: list(v) for k, v in value.items()} if isinstance(value, dict) else list(value)  # type: ignore[call-overload]
+        for key, value in changes.items()
+    }

@@ -1,0 +1,91 @@
+"""The fade and rise of the simulated lamp, a filament whose heat capacity changes as it cools."""
+
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from labrig.calibration import Change, FadeFile, read_fade_file
+from labrig.errors import UsageError
+from labrig.process import Result, process_run
+from labrig.record import read_run
+from sim.lamp import WAVELENGTH_NM, Lamp
+from sim.simulation import LampSettings
+from tests.process.recorded import cut_off_and_resumed, record
+
+FloatArray = NDArray[np.float64]
+
+PROTOCOL: dict[str, Any] = {
+    "protocol": "fade",
+    "sample": {"name": "lamp"},
+    "every": "50 ms",
+    "until": "400 ms",
+    "passes": 2,
+}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("fade"), PROTOCOL)
+
+
+@pytest.fixture(scope="module")
+def result(run: Path) -> Result:
+    return process_run(run)
+
+
+@pytest.fixture(scope="module")
+def fade(result: Result) -> FadeFile:
+    return read_fade_file(result.report.parent / "fade.yaml")
+
+
+def true_shares(file: FadeFile, change: Change, *, rises: bool) -> FloatArray:
+    lamp = Lamp.found(LampSettings(warm_up_deficit=0, drift_per_hour=0), on=not rises)
+    steady = Lamp.found(lamp.settings, on=True).irradiance(0.0)
+    switched = lamp.switched(rises, 10.0)
+    light = np.array([switched.irradiance(10.0 + t_s) for t_s in change.t_s])
+    edges = np.array(file.bands_nm)
+    inside = (edges[:-1, None] < WAVELENGTH_NM) & (edges[1:, None] > WAVELENGTH_NM)
+    shares: FloatArray = (light @ inside.T) / (inside @ steady)
+    return shares
+
+
+def test_the_fade_is_the_lamps_in_every_band(fade: FadeFile) -> None:
+    true = true_shares(fade, fade.fade, rises=False)
+    share, sigma = np.array(fade.fade.share), np.array(fade.fade.sigma)
+    assert np.abs(share - true).max() < 0.06
+    assert np.all(np.abs(share - true) < 3 * sigma + 1e-3)
+    steps = np.diff(fade.fade.t_s)
+    missing = steps @ (true[1:] + true[:-1]) / 2
+    assert fade.fade.missing_s() == pytest.approx(missing, abs=5e-3)
+    # The blue goes first.
+    assert np.all(np.diff(fade.fade.missing_s()) > 0)
+
+
+def test_the_rise_is_the_lamps_in_every_band(fade: FadeFile) -> None:
+    assert fade.rise is not None
+    true = true_shares(fade, fade.rise, rises=True)
+    share, sigma = np.array(fade.rise.share), np.array(fade.rise.sigma)
+    assert np.all(np.abs(share - true) < 3 * sigma + 0.02)
+    assert np.abs(share - true).max() < 0.08
+
+
+def test_it_is_told_as_a_glowing_bodys(result: Result) -> None:
+    assert result.run_warnings == ()
+    assert any(line.startswith("the fade is worth") for line in result.lines)
+
+
+def test_killed_within_a_pass_it_goes_on_there(run: Path, result: Result) -> None:
+    units = list(read_run(run).completed())
+    cut, resumed = cut_off_and_resumed(run, "pass-2")
+    assert list(cut.completed()) == units[:-2]
+    assert list(resumed.completed()) == units
+
+
+def test_without_the_lamps_spectrum_it_says_what_is_missing(run: Path, result: Result) -> None:
+    path = run / "rig.yaml"
+    path.write_text(path.read_text().replace("lamp: halogen_3000k\n", "lamp: null\n"))
+    with pytest.raises(UsageError, match="which lamp it has"):
+        process_run(run)

@@ -1,0 +1,53 @@
+"""Runs of protocols on the simulated bench, without a terminal; cut off and resumed."""
+
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import yaml
+
+from labrig import shipped
+from labrig.acquire import Plan, RunObserver
+from labrig.clock import Clock
+from labrig.record import RunRecord, read_run
+from labrig.run import Recording, resume_run
+from tests.acquire.fakes import Watching
+
+
+@contextmanager
+def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+    yield Watching()
+
+
+def record(
+    folder: Path,
+    protocol: dict[str, Any],
+    change: Callable[[dict[str, Any]], None] = lambda rig: None,
+) -> Path:
+    """The folder of a run of `protocol` on the shipped rig for phosphors, as `change` leaves it."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rig = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
+    rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    rig["devices"]["lamp"]["warm_up"] = "10 min"
+    rig["devices"]["camera"]["warm_up"] = "1 min"
+    change(rig)
+    (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
+    (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
+    recording = Recording.prepare(folder / "protocol.yaml", folder / "rig.yaml", folder / "runs")
+    return recording.record(quietly)
+
+
+def cut_off_and_resumed(run: Path, unit: str) -> tuple[RunRecord, RunRecord]:
+    """The run as if labrig had been killed within `unit`, and the same after it was resumed."""
+    lines = (run / "journal.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
+    opened = next(n for n, line in enumerate(lines) if f'"unit": "{unit}"' in line)
+    (run / "journal.jsonl").write_text("".join(lines[: opened + 8]), encoding="utf-8")
+    cut = read_run(run)
+    kept = {frame.path for attempt in cut.attempts for frame in attempt.frames}
+    for path in (run / "frames").iterdir():
+        if path not in kept:
+            path.unlink()
+    resume_run(run, quietly)
+    return cut, read_run(run)
