@@ -1,6 +1,11 @@
 """The command `labrig`."""
 
+import os
 import sys
+
+# The matrices here are small: threads of the linear algebra would only wait for one another, six
+# times as long where another program computes, too. Has to be said before numpy is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def main() -> None:

@@ -1,6 +1,10 @@
 """What many tests need: small simulated rigs, quick protocols, the command line in process."""
 
 import os
+
+# As the command line does; has to be said before numpy is loaded.
+os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
+
 import signal
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass

@@ -1,7 +1,7 @@
 """A measured material beside another one, such as the same in Table 1 of Nalbach et al.
 
-Two scales are free (see *physics*): k_e belongs to an irradiance of a stated length, so it is
-brought to the other's; Λ is relative, so it is multiplied by the factor that brings it closest.
+Two scales are free: k_e belongs to the light of one lamp, scaled to a stated length, and Λ is
+relative. Each is multiplied by the factor that brings it closest.
 """
 
 import math
@@ -76,8 +76,8 @@ class Beside:
             ),
             caption=" ".join(
                 [
-                    f"k_e belongs to an irradiance of the reference's length (measured: × "
-                    f"{rounded(self.k_e_factor)})."
+                    f"k_e is relative to how bright the lamp was: the measured one is multiplied "
+                    f"by {rounded(self.k_e_factor)}, by least squares over bands and states."
                     if any(pair.quantity.startswith("k_e") for pair in self.pairs)
                     else "",
                     f"Λ is relative: the measured one is multiplied by "
@@ -107,8 +107,8 @@ def beside(measured: Material, reference: Material) -> Beside:
             notes.append(f"{symbol} was not measured.")
         if all(getattr(state, name) is None for state in theirs):
             notes.append(f"The reference has no {symbol}.")
-    k_e_factor = _k_e_factor(measured, reference)
-    factor = _closest(ours, theirs) if same_bands else 1.0
+    k_e_factor = _closest(ours, theirs, "k_e_per_s") if same_bands else 1.0
+    factor = _closest(ours, theirs, "reradiation") if same_bands else 1.0
     pairs = []
     for number in range(max(len(ours), len(theirs))):
         one = ours[number] if number < len(ours) else None
@@ -127,19 +127,12 @@ def _by_falling_rate(material: Material) -> Sequence[State]:
     return sorted(material.states, key=lambda state: -state.k_r_per_s)
 
 
-def _k_e_factor(measured: Material, reference: Material) -> float:
-    """κ = Σ k_e E stays what it is if E is made longer and k_e smaller."""
-    if measured.irradiance_norm is None or reference.irradiance_norm is None:
-        return 1.0
-    return measured.irradiance_norm.value / reference.irradiance_norm.value
-
-
-def _closest(ours: Sequence[State], theirs: Sequence[State]) -> float:
-    """The c for which Σ (c Λ − Λ')² over states and bands is least; 1 without any."""
+def _closest(ours: Sequence[State], theirs: Sequence[State], name: str) -> float:
+    """The c for which Σ (c x − x')² over states and bands of `name` is least; 1 without any."""
     both = [
-        (np.array(one.reradiation), np.array(other.reradiation))
+        (np.array(getattr(one, name)), np.array(getattr(other, name)))
         for one, other in zip(ours, theirs, strict=False)
-        if one.reradiation is not None and other.reradiation is not None
+        if getattr(one, name) is not None and getattr(other, name) is not None
     ]
     square = sum(float(one @ one) for one, _ in both)
     product = sum(float(one @ other) for one, other in both)

@@ -1,24 +1,27 @@
 """What is known of a bench before a stage is processed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path
-from typing import TYPE_CHECKING, TypeVar
+from typing import Self, TypeVar
 
 from labrig.acquire import RigFile
+from labrig.calibration import (
+    BlankFile,
+    CameraFile,
+    FadeFile,
+    IrradianceFile,
+    LvfFile,
+    read_blank_file,
+    read_camera_file,
+    read_fade_file,
+    read_irradiance_file,
+    read_lvf_file,
+)
 from labrig.errors import UsageError
 from labrig.fit import DecayFit
 from labrig.material import Material
-
-if TYPE_CHECKING:
-    from labrig.calibration.blank_file import BlankFile
-    from labrig.calibration.camera_file import CameraFile
-    from labrig.calibration.fade_file import FadeFile
-    from labrig.calibration.irradiance_file import IrradianceFile
-    from labrig.calibration.lvf_file import LvfFile
-    from labrig.process.emission_spectrum import EmissionSpectrum
+from labrig.process.emission_spectrum.result import EmissionSpectrum
 
 FileT = TypeVar("FileT")
 
@@ -49,7 +52,7 @@ class Known:
     material: Material | None = None
 
     @classmethod
-    def of(cls, rig: RigFile) -> Known:
+    def of(cls, rig: RigFile) -> Self:
         """Read the files that the rig file names.
 
         Raises
@@ -58,27 +61,26 @@ class Known:
             One is missing or malformed.
         """
         optics = rig.optics
-        if not any((optics.camera_file, optics.blank, optics.fade, optics.lvf, optics.irradiance)):
-            return cls()
-        from labrig import calibration as files
-
         return cls(
-            camera=_read(optics.camera_file, "camera.yaml", files.read_camera_file),
-            blank=_read(optics.blank, "blank.yaml", files.read_blank_file),
-            fade=_read(optics.fade, "fade.yaml", files.read_fade_file),
-            lvf=_read(optics.lvf, "lvf.yaml", files.read_lvf_file),
-            irradiance=_read(optics.irradiance, "irradiance.yaml", files.read_irradiance_file),
+            camera=_read(optics.camera_file, "camera.yaml", read_camera_file),
+            blank=_read(optics.blank, "blank.yaml", read_blank_file),
+            fade=_read(optics.fade, "fade.yaml", read_fade_file),
+            lvf=_read(optics.lvf, "lvf.yaml", read_lvf_file),
+            irradiance=_read(optics.irradiance, "irradiance.yaml", read_irradiance_file),
         )
 
 
 def _read(named: str | None, name: str, read: Callable[[Path], FileT]) -> FileT | None:
-    """The file itself, or that of a run folder's result."""
+    """The file itself, or the one in a run folder's result, be it one part of a chain."""
     if named is None:
         return None
     path = Path(named)
     if not path.is_dir():
         return read(path)
-    found = path / "result" / name
-    if not found.is_file():
-        raise UsageError(f"{path}: expected a run with result/{name}, got none; process it first")
-    return read(found)
+    found = [*path.glob(f"result/{name}"), *path.glob(f"result/*/{name}")]
+    if len(found) != 1:
+        raise UsageError(
+            f"{path}: expected a run with one {name} in its result, got {len(found)}; process it "
+            "first, or name the file itself"
+        )
+    return read(found[0])

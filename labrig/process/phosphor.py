@@ -2,10 +2,13 @@
 
 from dataclasses import replace
 
+from labrig import shipped
 from labrig.acquire import plugins
+from labrig.compare.beside import beside
 from labrig.errors import DataError, FitError
-from labrig.material import write_material
+from labrig.material import Material, read_material, write_material
 from labrig.process.stage import Stage, StageResult
+from labrig.report import Section
 
 
 def process(stage: Stage) -> StageResult:
@@ -34,9 +37,22 @@ def process(stage: Stage) -> StageResult:
             found = replace(found, warnings=(*found.warnings, f"{part.name}: {error}"))
     if not found.sections:
         raise failures[0]
-    if found.known.material is not None:
-        write_material(stage.folder / "material.yaml", found.known.material)
-    return found
+    material = found.known.material
+    if material is None:
+        return found
+    write_material(stage.folder / "material.yaml", material)
+    return replace(found, sections=(*_beside_the_paper(material), *found.sections))
+
+
+def _beside_the_paper(material: Material) -> tuple[Section, ...]:
+    """The material beside the shipped one of its name, such as of Table 1, if there is one."""
+    known = shipped.names("config/materials")
+    if material.name not in known:
+        return ()
+    reference = read_material(known[material.name])
+    source = reference.provenance.source if reference.provenance else "labrig"
+    text = f"What was measured, beside {material.name} of {source}."
+    return (Section("Material", (text,), (), (beside(material, reference).table(),)),)
 
 
 def _joined(before: StageResult, after: StageResult, name: str) -> StageResult:

@@ -69,8 +69,9 @@ def _brightest(series: Sequence[ChargingSeries]) -> int:
     """Channel that is brightest where every one is measured."""
     total = np.zeros(series[0].values.shape[2])
     for one in series:
-        measured = (np.isfinite(one.values) & (one.sigma > 0)).all(axis=2)
-        total += np.where(measured[..., None], one.values, 0.0).sum(axis=(0, 1))
+        known = np.isfinite(one.values) & (one.sigma > 0)
+        everywhere = np.all(known, axis=2, keepdims=True)
+        total += np.where(everywhere, one.values, 0.0).sum(axis=(0, 1))
     if not total.max() > 0:
         raise FitError("expected sites that glow after a charge, got none; did the lamp light?")
     return int(np.argmax(total))

@@ -1,18 +1,14 @@
 """The material that an excitation, with the emission spectrum, says there is."""
 
 from importlib.metadata import version
-from typing import TYPE_CHECKING
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labrig.calibration.irradiance_file import IrradianceFile
 from labrig.fit.excitation import ExcitationFit, ExcitedState
-from labrig.material import IrradianceNorm, Material, Provenance, Spectrum, State
-from labrig.optics.piecewise import band_means
-
-if TYPE_CHECKING:
-    from labrig.process.emission_spectrum import EmissionSpectrum
+from labrig.material import IrradianceNorm, Material, Provenance, State
+from labrig.process.emission_spectrum.result import EmissionSpectrum
 
 FloatArray = NDArray[np.float64]
 
@@ -26,7 +22,7 @@ SOURCE = (
 def excited_material(
     fit: ExcitationFit,
     irradiance: IrradianceFile,
-    spectrum: "EmissionSpectrum | None",
+    spectrum: EmissionSpectrum | None,
     name: str,
     run: str,
     frames: tuple[str, ...],
@@ -53,13 +49,7 @@ def excited_material(
             )
             for number, state in enumerate(fit.states)
         ),
-        spectrum=None
-        if spectrum is None
-        else Spectrum(
-            wavelength_nm=tuple(spectrum.wavelength_nm),
-            value=tuple(spectrum.value),
-            sigma=tuple(spectrum.sigma),
-        ),
+        spectrum=None if spectrum is None else spectrum.for_material(),
         provenance=Provenance(source=SOURCE, run=run, frames=frames, version=version("labrig")),
     )
 
@@ -68,7 +58,7 @@ def _reradiation(
     fit: ExcitationFit,
     number: int,
     state: ExcitedState,
-    spectrum: "EmissionSpectrum | None",
+    spectrum: EmissionSpectrum | None,
     bands_nm: FloatArray,
 ) -> dict[str, tuple[float, ...]]:
     """Λ of every band: A_i / k_r,i times the spectrum's mean there, errors of all three."""
@@ -79,9 +69,8 @@ def _reradiation(
     both = [number, states + number]
     slope = np.array([-1 / state.k_r_per_s, 1 / max(state.amplitude, 1e-300)])
     relative = float(slope @ fit.covariance[np.ix_(both, both)] @ slope)
-    nm = np.asarray(spectrum.wavelength_nm)
-    shape = band_means(nm, np.asarray(spectrum.value), bands_nm)
-    shape_sigma = band_means(nm, np.asarray(spectrum.sigma), bands_nm)
+    shape, covariance = spectrum.in_bands(bands_nm)
+    shape_sigma = np.sqrt(np.diag(covariance))
     value = level * shape
     sigma = level * np.hypot(shape_sigma, shape * np.sqrt(relative))
     return {
