@@ -24,10 +24,11 @@ from labrig.errors import ProtocolError
 from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.region import CENTRE, Region
 
-from .decay_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
-from .lit_card import PutAwayUnit
-from .posing import charge, face_camera, lights_out, seen_s
-from .watching import Watcher
+from .steps.arrangement import Arrangement
+from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+from .steps.posing import charge, face_camera, lights_out, seen_s
+from .steps.prepared import PutBackUnit
+from .steps.watching import Watcher
 
 BLANK = ByHand(
     "put a grey card in the sample's place (in the door, if there is one)",
@@ -75,7 +76,7 @@ class Blank(ProtocolModel):
     def units(self) -> Sequence[Unit]:
         """Darks, the sequences, the bench as it was."""
         sequences = [SequenceUnit(self, number) for number in range(1, len(self.later_by) + 1)]
-        return [BlankDarkUnit(self), *sequences, PutAwayUnit()]
+        return [BlankDarkUnit(self), *sequences, PutBackUnit(Arrangement("grey card"))]
 
     def settings(self, exposure_s: float) -> ExposureSettings:
         """Camera settings with that shutter time."""

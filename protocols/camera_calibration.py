@@ -25,8 +25,10 @@ from .camera_calibration_units import (
     linearity_bracket,
     shutter_bracket,
 )
-from .decay_settings import CameraSettings
-from .lit_card import CardMeterUnit, PutAwayUnit
+from .steps.arrangement import Arrangement
+from .steps.camera_settings import CameraSettings
+from .steps.lit_card import CardMeterUnit
+from .steps.prepared import PutBackUnit
 
 
 class CameraCalibration(ProtocolModel):
@@ -81,5 +83,5 @@ class CameraCalibration(ProtocolModel):
                 for name, bracket in brackets.items()
             ),
             *(FlatUnit(reference, self.card, f_number) for f_number in apertures),
-            PutAwayUnit(),
+            PutBackUnit(Arrangement("grey card")),
         ]

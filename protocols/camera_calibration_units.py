@@ -8,8 +8,8 @@ import numpy as np
 from labrig.acquire import CameraOffers, ExposureSettings, Session, Shoot
 from labrig.region import Region
 
-from .lit_card import GREY_CARD, CardLight, card_light, light_card
-from .watching import Watcher
+from .steps.lit_card import GREY_CARD, CardLight, card_light, light_card
+from .steps.watching import Watcher
 
 #: Shares of the range that the lit card fills: the reference exposure of brackets, flats, repeats.
 HALF = 0.4

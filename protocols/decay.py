@@ -8,7 +8,8 @@ from collections.abc import Sequence
 from labrig.acquire import Unit
 
 from .decay_settings import DecaySettings
-from .decay_units import METER_CHARGE_S, DarkUnit, DaylightUnit, DecayUnit, MeterUnit
+from .decay_units import DaylightUnit, DecayUnit
+from .steps.glow_units import METER_CHARGE_S, DarkUnit, MeterUnit
 
 
 class Decay(DecaySettings):

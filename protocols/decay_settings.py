@@ -10,24 +10,11 @@ from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.reduce import FrameMeasurement
 from labrig.region import CENTRE, Region
 
-from .metering import DecayMeter, Look, Schedule
-from .patch_names import Patches
-from .posing import charge
-from .watching import Watcher
-
-#: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.
-DARKS_PER_EXPOSURE = 4
-#: Left free between a frame and the next deadline: setting the camera, half-pressing it.
-MARGIN_S = 0.5
-
-
-class CameraSettings(BaseModel):
-    """How the camera is set; the shutter time has a key of its own."""
-
-    model_config = ConfigDict(frozen=True, extra="forbid")
-
-    iso: int = Field(400, gt=0)
-    f_number: float | None = Field(4.0, gt=0)
+from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+from .steps.metering import DecayMeter, Look, Schedule
+from .steps.patch_names import Patches
+from .steps.posing import charge
+from .steps.watching import Watcher
 
 
 class Plateau(BaseModel):

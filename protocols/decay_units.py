@@ -1,91 +1,17 @@
 """What a decay consists of: dark frames, a metered charge, charge and decay, daylight."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass
-from typing import Protocol
 
-from labrig.acquire import LAMP_ON, CameraOffers, ExposureSettings, Session, Shoot, at
+from labrig.acquire import LAMP_ON, Session, Shoot, at
 from labrig.quantity import duration_text
 
 from .decay_settings import DecaySettings
-from .metering import Schedule, glow, look
-from .posing import check_seen, face_lamp, has_door, lights_out
-from .resting import rest_until_dark, shoot_darkness
-from .watching import Watcher
+from .steps.metering import Schedule, glow, look
+from .steps.posing import check_seen, face_lamp, has_door, lights_out
 
-#: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.
-METER_CHARGE_S = 600.0
 #: Shutter times of the daylight photograph: one of them is right whatever the lamp.
 DAYLIGHT_EXPOSURES_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8)
 LAMP_SETTLES_S = 5.0
-
-
-class MeteredProtocol(Protocol):
-    """What a protocol says that photographs darkness, then meters a glow."""
-
-    def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
-
-    def dark_exposures_s(self, offers: CameraOffers) -> Sequence[float]:
-        """Shutter time of each dark frame."""
-
-    def meter_ladder(self, offers: CameraOffers) -> Sequence[tuple[float, float]]:
-        """Begin after lamp off and shutter time of each metering frame."""
-
-    def short_settings(self, session: Session) -> list[ExposureSettings]:
-        """For a closer look at what clips."""
-
-    def charge_sample(self, session: Session, duration_s: float) -> None:
-        """Lamp on for that long, for its own warm-up at the least."""
-
-    def watcher(self, session: Session, unit: str) -> Watcher:
-        """Holds a unit's frames against what should have happened."""
-
-
-@dataclass(frozen=True)
-class DarkUnit:
-    """Dark frames at the exposures to come, before anything glows."""
-
-    protocol: MeteredProtocol
-    name: str = "dark"
-
-    def run(self, session: Session) -> None:
-        """Warm the camera up, then photograph darkness."""
-        session.wait_until_warm("camera")
-        exposures_s = self.protocol.dark_exposures_s(session.rig.camera.offers())
-        exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
-        shoot_darkness(session, exposures)
-        watcher = self.protocol.watcher(session, self.name)
-        watcher.insist_on_darkness(self.protocol.short_settings(session))
-        rest_until_dark(session, self.name, watcher.patches, exposures)
-
-
-@dataclass(frozen=True)
-class MeterUnit:
-    """A shorter charge whose glow says how long to expose."""
-
-    protocol: MeteredProtocol
-    charge_s: float
-    name: str = "meter"
-
-    def run(self, session: Session) -> None:
-        """Charge, lamp off, a ladder of exposures; for `grow`, then on along the decay."""
-        session.wait_until_warm("camera")
-        self.protocol.charge_sample(session, min(self.charge_s, METER_CHARGE_S))
-        ladder = self.protocol.meter_ladder(session.rig.camera.offers())
-        check_seen(session, ladder[0][0])
-        session.run_sequence(
-            [
-                *lights_out(session),
-                *(
-                    at(time_s, Shoot("meter", self.protocol.settings(exposure_s)))
-                    for time_s, exposure_s in ladder
-                ),
-            ]
-        )
-        self.protocol.watcher(session, self.name).insist_on_glow(
-            self.protocol.short_settings(session)
-        )
 
 
 @dataclass(frozen=True)

@@ -14,13 +14,13 @@ from labrig.acquire import LAMP_OFF, Session, Shoot, Unit, at
 from labrig.quantity import DurationS, duration_text
 from labrig.region import Region
 
-from .arrangement import Arrangement, LampKind
-from .decay_settings import CameraSettings
-from .decay_units import DarkUnit, MeterUnit
-from .glow_settings import GlowSettings, metered_schedule
-from .lit_card import light_card
-from .posing import check_seen, lights_out
-from .prepared import Arranged, PutBackUnit
+from .steps.arrangement import Arrangement, LampKind
+from .steps.camera_settings import CameraSettings
+from .steps.glow_settings import GlowSettings, metered_schedule
+from .steps.glow_units import DarkUnit, MeterUnit
+from .steps.lit_card import light_card
+from .steps.posing import check_seen, lights_out
+from .steps.prepared import Arranged, PutBackUnit
 
 Time = Annotated[DurationS, Field(gt=0)]
 

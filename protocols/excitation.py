@@ -7,9 +7,9 @@ from collections.abc import Sequence
 
 from labrig.acquire import Unit
 
-from .album import Album
 from .excitation_settings import ExcitationSettings
 from .excitation_units import BareMeter, BareUnit, DarkUnit, DoublingUnit, RefiningUnit, StripMeter
+from .steps.album import Album
 
 
 class Excitation(ExcitationSettings):

@@ -9,7 +9,7 @@ from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel
 from labrig.quantity import DurationS, Fraction, duration_text
 from labrig.region import Region
 
-from .decay_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
 
 #: Each pause between two frames is longer than the one before by this factor.
 PAUSES_GROW = 1.25

@@ -8,15 +8,15 @@ import numpy as np
 from labrig.acquire import ByHand, Session, Shoot, at
 from labrig.record import FrameRecord
 
-from .afterglow import dark_level
-from .album import Album
-from .charge_times import FloatArray, most_telling_s, still_grows
-from .darkness import levels
 from .excitation_settings import ExcitationSettings
-from .metering import DecayMeter, Look, Schedule
-from .posing import charge, check_seen, face_camera, face_lamp, lights_out
-from .resting import rest_until_dark, shoot_darkness
-from .watching import Watcher
+from .steps.afterglow import dark_level
+from .steps.album import Album
+from .steps.charge_times import FloatArray, most_telling_s, still_grows
+from .steps.darkness import levels
+from .steps.metering import DecayMeter, Look, Schedule
+from .steps.posing import charge, check_seen, face_camera, face_lamp, lights_out
+from .steps.resting import rest_until_dark, shoot_darkness
+from .steps.watching import Watcher
 
 #: Frames of a charge are made for it to glow at most this much brighter than the one looked at.
 HEADROOM = 2.0

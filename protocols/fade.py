@@ -28,8 +28,10 @@ from labrig.quantity import DurationS, duration_text
 from labrig.region import CENTRE, Region
 
 from .camera_calibration_units import HALF, CardDarkUnit
-from .decay_settings import CameraSettings
-from .lit_card import CardLight, CardMeterUnit, PutAwayUnit, card_light, light_card
+from .steps.arrangement import Arrangement
+from .steps.camera_settings import CameraSettings
+from .steps.lit_card import CardLight, CardMeterUnit, card_light, light_card
+from .steps.prepared import PutBackUnit
 
 LVF = ByHand(
     "put the variable filter before the camera", "the fade is measured band by band",
@@ -97,7 +99,7 @@ class Fade(ProtocolModel):
             CardMeterUnit(reference, self.card),
             *(PassUnit(self, number) for number in range(self.passes)),
             *filter_away,
-            PutAwayUnit(),
+            PutBackUnit(Arrangement("grey card")),
         ]
 
 

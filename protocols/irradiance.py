@@ -13,11 +13,12 @@ from pydantic import Field, model_validator
 from labrig.acquire import ProtocolModel, Unit
 from labrig.quantity import DurationS
 
-from .arrangement import Arrangement
-from .decay_settings import CameraSettings
 from .lvf_units import StripUnit
-from .scene_units import LightsBackUnit, SceneUnit, StillDarkUnit
-from .still_life import StillLife
+from .steps.arrangement import Arrangement
+from .steps.camera_settings import CameraSettings
+from .steps.prepared import PutBackUnit
+from .steps.scene_units import SceneUnit, StillDarkUnit
+from .steps.still_life import StillLife
 
 Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -73,4 +74,4 @@ class Irradiance(ProtocolModel):
                     why,
                 )
             )
-        return [StillDarkUnit(self.still_life), *units, LightsBackUnit(units[-1].wanted)]
+        return [StillDarkUnit(self.still_life), *units, PutBackUnit(units[-1].wanted)]

@@ -13,10 +13,10 @@ from labrig.acquire import ByHand, Session, Shoot, Unit, at
 from labrig.quantity import DurationS, duration_text
 from labrig.region import Region
 
-from .decay_units import DarkUnit, MeterUnit
-from .glow_settings import GlowSettings, metered_schedule
-from .patch_names import Patches
-from .posing import lights_out
+from .steps.glow_settings import GlowSettings, metered_schedule
+from .steps.glow_units import DarkUnit, MeterUnit
+from .steps.patch_names import Patches
+from .steps.posing import lights_out
 
 #: Time to turn the sample in the dark.
 TURNING_S = 20.0

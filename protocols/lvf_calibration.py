@@ -13,11 +13,12 @@ from labrig import shipped
 from labrig.acquire import ProtocolModel, Unit
 from labrig.quantity import DurationS, WordOrDuration
 
-from .arrangement import Arrangement
-from .decay_settings import CameraSettings
 from .lvf_units import NO_FILTER, FilterUnit, LinesUnit, StripesUnit, StripUnit, filter_unit
-from .scene_units import LightsBackUnit, SceneUnit, StillDarkUnit
-from .still_life import StillLife
+from .steps.arrangement import Arrangement
+from .steps.camera_settings import CameraSettings
+from .steps.prepared import PutBackUnit
+from .steps.scene_units import SceneUnit, StillDarkUnit
+from .steps.still_life import StillLife
 
 FilterName = Annotated[str, Field(min_length=1, pattern=r"^[^/\\]+$")]
 
@@ -81,7 +82,7 @@ class LvfCalibration(ProtocolModel):
             units.append(
                 kind(self.still_life, name, purpose, wanted, before, why, mercury_s, **more)
             )
-        return [StillDarkUnit(self.still_life), *units, LightsBackUnit(units[-1].wanted)]
+        return [StillDarkUnit(self.still_life), *units, PutBackUnit(units[-1].wanted)]
 
     def _scenes(self) -> Iterator[_Scene]:
         none, strip = filter_unit(None), "lvf-strip-on-sample"

@@ -4,10 +4,10 @@ from dataclasses import dataclass
 
 from labrig.acquire import Session, Shoot, Timed, at
 
-from .arrangement import light
-from .decay_settings import MARGIN_S
-from .posing import charge, face_lamp, lights_out, seen_s
-from .scene_units import SceneUnit, frames_of
+from .steps.arrangement import light
+from .steps.camera_settings import MARGIN_S
+from .steps.posing import charge, face_lamp, lights_out, seen_s
+from .steps.scene_units import SceneUnit, frames_of
 
 #: What the unit without a colour filter is called by.
 NO_FILTER = "none"

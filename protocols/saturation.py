@@ -14,12 +14,13 @@ from labrig.acquire import ByHand, ProtocolModel, Unit
 from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.region import CENTRE
 
-from .arrangement import Arrangement
 from .decay import Decay
-from .decay_settings import CameraSettings
-from .decay_units import DarkUnit, DecayUnit, MeterUnit
-from .patch_names import Patches
-from .prepared import Arranged, Prepared
+from .decay_units import DecayUnit
+from .steps.arrangement import Arrangement
+from .steps.camera_settings import CameraSettings
+from .steps.glow_units import DarkUnit, MeterUnit
+from .steps.patch_names import Patches
+from .steps.prepared import Arranged, Prepared
 
 Charge = Annotated[DurationS, Field(gt=0)]
 

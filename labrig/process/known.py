@@ -21,7 +21,7 @@ from labrig.calibration import (
 from labrig.errors import UsageError
 from labrig.fit import DecayFit
 from labrig.material import Material
-from labrig.process.emission_spectrum.result import EmissionSpectrum
+from labrig.process.emission_file import EmissionSpectrum
 
 FileT = TypeVar("FileT")
 

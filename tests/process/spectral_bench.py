@@ -20,7 +20,7 @@ from labrig.optics import Bands
 from labrig.optics.piecewise import band_means, edges_about
 from labrig.process import Choices
 from labrig.process.choices import read_run_protocol
-from labrig.process.emission_spectrum.result import WAVELENGTH_NM
+from labrig.process.emission_file import WAVELENGTH_NM
 from labrig.process.known import Known
 from labrig.process.stage import Stage
 from labrig.record import read_run

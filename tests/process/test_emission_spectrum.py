@@ -15,6 +15,7 @@ from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import fit_spectrum, system_through_lvf
 from labrig.optics import Spectrum
 from labrig.process import Choices
+from labrig.process.emission_file import WAVELENGTH_NM
 from labrig.process.emission_spectrum import (
     EmissionSpectrum,
     process,
@@ -25,7 +26,6 @@ from labrig.process.emission_spectrum.bench import spectral_bench
 from labrig.process.emission_spectrum.constancy import compared, differ, over_time
 from labrig.process.emission_spectrum.picture import Pictures, combined, visible
 from labrig.process.emission_spectrum.reading import read_places
-from labrig.process.emission_spectrum.result import WAVELENGTH_NM
 from labrig.process.known import Known
 from labrig.process.stage import StageResult
 from labrig.record import read_run

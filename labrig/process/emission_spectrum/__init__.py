@@ -1,10 +1,10 @@
 """Processing of `emission_spectrum`: Λ* through the LVF, constant in time and for every lamp."""
 
-from labrig.process.emission_spectrum.process import process
-from labrig.process.emission_spectrum.result import (
+from labrig.process.emission_file import (
     EmissionSpectrum,
     read_emission_spectrum,
     write_emission_spectrum,
 )
+from labrig.process.emission_spectrum.process import process
 
 __all__ = ["EmissionSpectrum", "process", "read_emission_spectrum", "write_emission_spectrum"]

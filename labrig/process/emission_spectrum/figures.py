@@ -8,8 +8,8 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 from numpy.typing import NDArray
 
+from labrig.process.emission_file import EmissionSpectrum
 from labrig.process.emission_spectrum.constancy import Comparison
-from labrig.process.emission_spectrum.result import EmissionSpectrum
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,

@@ -9,11 +9,11 @@ from numpy.typing import NDArray
 
 from labrig.errors import DataError
 from labrig.fit.spectrum import fit_spectrum
+from labrig.process.emission_file import EmissionSpectrum, write_emission_spectrum
 from labrig.process.emission_spectrum.bench import SpectralBench, spectral_bench, with_white
 from labrig.process.emission_spectrum.constancy import compared, over_time
 from labrig.process.emission_spectrum.picture import Picture, Pictures, combined, visible
 from labrig.process.emission_spectrum.reading import read_places
-from labrig.process.emission_spectrum.result import EmissionSpectrum, write_emission_spectrum
 from labrig.process.emission_spectrum.telling import (
     comparison_lines,
     peak_line,

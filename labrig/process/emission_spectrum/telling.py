@@ -4,6 +4,7 @@ from collections.abc import Mapping, Sequence
 
 import numpy as np
 
+from labrig.process.emission_file import EmissionSpectrum
 from labrig.process.emission_spectrum.bench import SpectralBench
 from labrig.process.emission_spectrum.constancy import Comparison, differ
 from labrig.process.emission_spectrum.figures import (
@@ -12,7 +13,6 @@ from labrig.process.emission_spectrum.figures import (
     spectrum_figure,
 )
 from labrig.process.emission_spectrum.picture import Pictures
-from labrig.process.emission_spectrum.result import EmissionSpectrum
 from labrig.report.sections import Picture as Plate
 from labrig.report.sections import Section, Table
 from labrig.report.written_numbers import plus_minus, rounded

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 from labrig.calibration.irradiance_file import IrradianceFile
 from labrig.fit.excitation import ExcitationFit, ExcitedState
 from labrig.material import IrradianceNorm, Material, Provenance, State
-from labrig.process.emission_spectrum.result import EmissionSpectrum
+from labrig.process.emission_file import EmissionSpectrum
 
 FloatArray = NDArray[np.float64]
 

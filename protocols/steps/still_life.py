@@ -11,7 +11,7 @@ from labrig.quantity import duration_text
 from labrig.record import FrameRecord
 from labrig.reduce import FrameMeasurement, measure, read_raw
 
-from .decay_settings import DARKS_PER_EXPOSURE, CameraSettings
+from .camera_settings import DARKS_PER_EXPOSURE, CameraSettings
 from .metering import SEEN_DN, SEEN_SIGMA, TARGET
 
 #: Shutter times to look with, as shares of the longest.

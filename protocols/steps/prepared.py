@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from labrig.acquire import ByHand, Session, Unit
+from labrig.acquire import LAMP_OFF, ByHand, Session, Unit
 
-from .arrangement import Arrangement
+from .arrangement import Arrangement, left_by
 
 
 @dataclass(frozen=True)
@@ -53,5 +53,7 @@ class PutBackUnit:
     name: str = "put-back"
 
     def run(self, session: Session) -> None:
-        """Have it put back."""
-        Arrangement().set_up(session, self.before, "it was like that before")
+        """Lamp off, filters and card away."""
+        session.perform(LAMP_OFF)
+        before = left_by(self.before, session)
+        Arrangement().set_up(session, before, "the next measurement finds the bench as usual")

@@ -6,6 +6,7 @@ from typing import Literal
 from labrig.acquire import LAMP_OFF, LAMP_ON, ByHand, Session
 
 from .posing import face_lamp
+from .still_life import LOOK
 
 Stage = Literal["sample", "grey card"]
 LvfPlace = Literal["away", "before camera", "on sample"]
@@ -80,3 +81,17 @@ def light(session: Session, warm_up_s: float) -> None:
         face_lamp(session)
         session.perform(LAMP_ON)
         session.wait(warm_up_s, "the lamp warms up")
+
+
+def left_by(before: Arrangement, session: Session) -> Arrangement | None:
+    """How the unit before left the bench; None in a run that was resumed, when it may have been
+    put to another use meanwhile.
+    """
+
+    def decide() -> bool:
+        since = session.clock.wall(session.rig.connected_s)
+        frames = [*session.frames("dark"), *session.frames(LOOK)]
+        return any(frame.start_time >= since for frame in frames)
+
+    untouched = session.choose("bench as the unit before left it", decide, worst=True)
+    return before if untouched else None

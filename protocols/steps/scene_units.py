@@ -2,12 +2,12 @@
 
 from dataclasses import dataclass
 
-from labrig.acquire import LAMP_OFF, Session, Shoot
+from labrig.acquire import Session, Shoot
 from labrig.record import FrameRecord
 from labrig.region import CENTRE
 
-from .arrangement import Arrangement, light
-from .still_life import LOOK, StillLife
+from .arrangement import Arrangement, left_by, light
+from .still_life import StillLife
 from .watching import Watcher
 
 
@@ -80,34 +80,6 @@ class SceneUnit:
     def own(self, session: Session) -> list[FrameRecord]:
         """Its frames."""
         return frames_of(session, self.purpose, self.name)
-
-
-@dataclass(frozen=True)
-class LightsBackUnit:
-    """The bench as it was found; a unit of its own, so that nothing is measured again for it."""
-
-    before: Arrangement
-    name: str = "put-back"
-
-    def run(self, session: Session) -> None:
-        """Lamp off, filters and card away."""
-        session.perform(LAMP_OFF)
-        before = left_by(self.before, session)
-        Arrangement().set_up(session, before, "the next measurement finds the bench as usual")
-
-
-def left_by(before: Arrangement, session: Session) -> Arrangement | None:
-    """How the unit before left the bench; None in a run that was resumed, when it may have been
-    put to another use meanwhile.
-    """
-
-    def decide() -> bool:
-        since = session.clock.wall(session.rig.connected_s)
-        frames = [*session.frames("dark"), *session.frames(LOOK)]
-        return any(frame.start_time >= since for frame in frames)
-
-    untouched = session.choose("bench as the unit before left it", decide, worst=True)
-    return before if untouched else None
 
 
 def frames_of(session: Session, purpose: str, unit: str) -> list[FrameRecord]:

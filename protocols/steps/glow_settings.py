@@ -10,7 +10,7 @@ from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel, Sessio
 from labrig.quantity import DurationS
 from labrig.region import Region
 
-from .decay_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+from .camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
 from .metering import DecayMeter, Look, Schedule, look
 from .posing import charge
 from .watching import Watcher

@@ -4,7 +4,6 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from labrig.acquire import (
-    LAMP_OFF,
     LAMP_ON,
     ByHand,
     CameraOffers,
@@ -26,7 +25,6 @@ GREY_CARD = ByHand(
     "what is measured next is its light",
     "grey card",
 )
-SAMPLE = ByHand("take the card away", "the sample is measured next", "sample", takes_s=30.0)
 
 #: Shutter times of the metering: one of them is right whatever the lamp.
 METERED_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1.0)
@@ -113,12 +111,6 @@ def card_light(session: Session, settings: ExposureSettings, card: Region) -> Ca
     return session.choose("light of the card", decide, CardLight(DIM_PER_S, settings))
 
 
-def put_away(session: Session) -> None:
-    """Lamp off, the sample in its place again."""
-    session.perform(LAMP_OFF)
-    session.ask(SAMPLE)
-
-
 def _per_s(looks: Sequence[Look]) -> float:
     """From the fullest look that does not clip."""
     fitting = []
@@ -138,14 +130,3 @@ def _per_s(looks: Sequence[Look]) -> float:
             "'card:' is its region in the frame"
         )
     return brightest.peak / range_dn(seen) / seen.exposure_s
-
-
-@dataclass(frozen=True)
-class PutAwayUnit:
-    """The bench as it was found."""
-
-    name: str = "put-away"
-
-    def run(self, session: Session) -> None:
-        """Lamp off, card away."""
-        put_away(session)
