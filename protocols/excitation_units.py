@@ -15,7 +15,7 @@ from .steps.charge_times import FloatArray, most_telling_s, still_grows
 from .steps.darkness import levels
 from .steps.metering import DecayMeter, Look, Schedule
 from .steps.posing import charge, check_seen, face_camera, face_lamp, lights_out
-from .steps.resting import rest_until_dark, shoot_darkness
+from .steps.resting import dark_frames
 from .steps.watching import Watcher
 
 #: Frames of a charge are made for it to glow at most this much brighter than the one looked at.
@@ -57,6 +57,39 @@ class _Own:
         above = levels(seen) - dark_level(darks, frame.exposure_s)
         return np.asarray(above.max(axis=1) / frame.exposure_s)
 
+    def _rest(self, session: Session) -> None:
+        """Darkness until hardly anything glows, or another sample."""
+        rule = self.protocol.rest
+        if self.protocol.samples > 1:
+            session.ask(FRESH)
+            return
+        session.wait(rule.at_least, "resting in the dark")
+        rested_s = rule.at_least
+        exposure_s = max(
+            self.protocol.longest_exposures_s(session.rig.camera.offers(), self.protocol.duration)
+        )
+        look_now = Shoot("rest", self.protocol.settings(exposure_s))
+        while True:
+            face_camera(session)
+            session.perform(look_now)
+            face_lamp(session)
+            dark = session.choose("dark again", lambda: self._is_dark(session), worst=False)
+            left_s = rule.at_most - rested_s
+            if dark or left_s <= 0:
+                return
+            session.wait(min(rule.check_every, left_s), "resting in the dark")
+            rested_s += rule.check_every
+
+    def _is_dark(self, session: Session) -> bool:
+        """Whether the glow is low against that just after the last charge."""
+        frames = [*session.frames("strip"), *session.frames("bare"), *session.frames("meter")]
+        darks = self._darks(session)
+        last_unit = max(frames, key=lambda frame: frame.start_time).unit
+        after = [frame for frame in frames if frame.unit == last_unit]
+        brightest = max(float(self._rates(frame, darks).max()) for frame in after)
+        now = float(self._rates(session.frames("rest")[-1], darks).max())
+        return now < self.protocol.rest.below * brightest
+
 
 @dataclass(frozen=True)
 class DarkUnit(_Own):
@@ -70,10 +103,9 @@ class DarkUnit(_Own):
         offers, sites = session.rig.camera.offers(), self.protocol.strip()
         exposures_s = self.protocol.dark_exposures_s(offers)
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
-        shoot_darkness(session, exposures)
+        dark_frames(session, self.name, sites, exposures)
         shorter = [self.protocol.settings(time_s) for _, time_s in self.protocol.ladder(offers)[:3]]
         Watcher(session, self.name, sites, None).insist_on_darkness(shorter)
-        rest_until_dark(session, self.name, sites, exposures)
 
 
 @dataclass(frozen=True)
@@ -118,6 +150,7 @@ class BareMeter(_Meter):
 
     def run(self, session: Session) -> None:
         """Take the filter away, charge, a ladder of exposures."""
+        self._rest(session)
         self._meter(session, self.name, LVF_AWAY, self.protocol.bare[0])
 
 
@@ -188,39 +221,6 @@ class _Charged(_Own):
         return [one[0] for one in done], np.array(
             [self._rates(frames[0], darks) for _, frames in done]
         )
-
-    def _rest(self, session: Session) -> None:
-        """Darkness until hardly anything glows, or another sample."""
-        rule = self.protocol.rest
-        if self.protocol.samples > 1:
-            session.ask(FRESH)
-            return
-        session.wait(rule.at_least, "resting in the dark")
-        rested_s = rule.at_least
-        exposure_s = max(
-            self.protocol.longest_exposures_s(session.rig.camera.offers(), self.protocol.duration)
-        )
-        look_now = Shoot("rest", self.protocol.settings(exposure_s))
-        while True:
-            face_camera(session)
-            session.perform(look_now)
-            face_lamp(session)
-            dark = session.choose("dark again", lambda: self._is_dark(session), worst=False)
-            left_s = rule.at_most - rested_s
-            if dark or left_s <= 0:
-                return
-            session.wait(min(rule.check_every, left_s), "resting in the dark")
-            rested_s += rule.check_every
-
-    def _is_dark(self, session: Session) -> bool:
-        """Whether the glow is low against that just after the last charge."""
-        frames = [*session.frames("strip"), *session.frames("bare"), *session.frames("meter")]
-        darks = self._darks(session)
-        last_unit = max(frames, key=lambda frame: frame.start_time).unit
-        after = [frame for frame in frames if frame.unit == last_unit]
-        brightest = max(float(self._rates(frame, darks).max()) for frame in after)
-        now = float(self._rates(session.frames("rest")[-1], darks).max())
-        return now < self.protocol.rest.below * brightest
 
 
 def _lit_s(session: Session, unit: str) -> float:

@@ -34,6 +34,8 @@ SHORT = 3
 #: A glow that stays level in the second half of a decay at more than this share of its first frame
 #: may be another light.
 LINGERING = 0.2
+#: Flicker and noise do not make a second frame brighter than the first by so much.
+RISEN = 0.1
 #: A glow below this share of what it was before was not charged like that.
 WEAK = 0.5
 
@@ -47,6 +49,7 @@ class Afterglow(Enum):
     ABSENT = "no glow"
     WEAK = "weaker than before"
     STEADY = "not fading"
+    RISING = "brighter in the second frame than in the first"
 
     def __str__(self) -> str:
         return self.value
@@ -67,8 +70,11 @@ class Afterglow(Enum):
 
 _REFUSED = {
     Afterglow.ABSENT: "nothing glows after the charge: the lamp did not light (check its bulb, its "
-    "plug and the contact of its relay), or the patches hold nothing that glows at these settings "
-    "(raise camera.iso or open the aperture)",
+    "plug and the contact of its relay), a trap door did not open, or the patches hold nothing "
+    "that glows at these settings (raise camera.iso or open the aperture)",
+    Afterglow.RISING: "the second photograph after lamp off is brighter than the first: a trap "
+    "door opens too slowly or gets stuck (look at it; if it always is that slow, raise its "
+    "'travel:' in the rig file and 'first:'), or another light came on",
     Afterglow.STEADY: "what the camera sees does not fade after lamp off: the lamp still burns "
     "although its relay reads off (pull its plug, the contact may be welded), or another light "
     "is on",
@@ -164,6 +170,8 @@ def decayed(
         return Afterglow.CLIPPED
     if start.clips:
         return Afterglow.FADING
+    if first[-1].brightest > (1 + RISEN) * start.brightest and first[-1].seen:
+        return Afterglow.RISING
     if start.brightest < WEAK * _expected(start, before):
         return Afterglow.WEAK
     if _is_steady(first, last, FADED):

@@ -7,7 +7,7 @@ from typing import Protocol
 from labrig.acquire import CameraOffers, ExposureSettings, Session, Shoot, at
 
 from .posing import check_seen, lights_out
-from .resting import rest_until_dark, shoot_darkness
+from .resting import dark_frames
 from .watching import Watcher
 
 #: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.
@@ -48,10 +48,9 @@ class DarkUnit:
         session.wait_until_warm("camera")
         exposures_s = self.protocol.dark_exposures_s(session.rig.camera.offers())
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
-        shoot_darkness(session, exposures)
         watcher = self.protocol.watcher(session, self.name)
+        dark_frames(session, self.name, watcher.patches, exposures)
         watcher.insist_on_darkness(self.protocol.short_settings(session))
-        rest_until_dark(session, self.name, watcher.patches, exposures)
 
 
 @dataclass(frozen=True)

@@ -15,6 +15,7 @@ import sys
 import tempfile
 import time
 from collections.abc import Sequence
+from datetime import UTC, datetime
 from pathlib import Path
 
 import numpy as np
@@ -22,7 +23,9 @@ import yaml
 
 from labrig import shipped
 from labrig.material import Material, read_material
+from labrig.record import read_run
 from sim.lamp import BURNING_K, filament_spectrum
+from sim.optics import emission
 from sim.phosphor import band_cells
 
 PAINTS = ("blue", "green", "orange", "pink", "purple", "red", "white", "yellow")
@@ -68,8 +71,19 @@ def run(folder: Path, material: str, seed: int, width: int) -> tuple[Material | 
     return (read_material(made) if made.is_file() else "no material"), took_s
 
 
-def compared(found: Material, true: Material) -> str:
-    """One line for every state."""
+def brightness(run: Path) -> float:
+    """Of the room's lamp in the last charge: it loses 0.2 % an hour, and warms in 150 s."""
+    (off,) = [
+        action
+        for action in list(read_run(run).completed().values())[-1].actions
+        if action.device == "lamp" and action.action == "off"
+    ]
+    hours = (off.start_time - datetime(2026, 1, 1, tzinfo=UTC).timestamp()) / 3600
+    return 1 - 0.002 * hours - 0.03 * float(np.exp(-900 / 150))
+
+
+def compared(found: Material, true: Material, brightness: float) -> str:
+    """One line for every state; `brightness` of the lamp in the last charge."""
     if len(found.states) != len(true.states):
         return f"{len(found.states)} states instead of {len(true.states)}"
     assert true.bands_nm is not None
@@ -77,7 +91,7 @@ def compared(found: Material, true: Material) -> str:
     direct = cells @ lamp / np.linalg.norm(cells @ lamp)
     pairs = list(zip(found.states, true.states, strict=True))
     ours = np.array([state.reradiation for state, _ in pairs])
-    theirs = np.array([state.reradiation for _, state in pairs])
+    theirs = emission(true) @ cells.T / cells.sum(axis=1)
     factor = (ours * theirs).sum() / (ours**2).sum()
     lines = []
     for number, (state, truth) in enumerate(pairs):
@@ -88,7 +102,7 @@ def compared(found: Material, true: Material) -> str:
         pulls = ((k_e - wanted) / np.maximum(sigma, 1e-12))[strong]
         weak = (wanted / np.maximum(k_e + 1.645 * sigma, 1e-12))[~strong]
         false = ((k_e - wanted) / np.maximum(sigma, 1e-12))[~strong]
-        kappa = LAMP * float(wanted @ direct)
+        kappa = LAMP * brightness * float(wanted @ direct)
         r0 = kappa / (kappa + truth.k_r_per_s)
         own = np.array(state.reradiation_sigma) * factor
         radiated = (factor * ours[number] - theirs[number]) / np.maximum(own, 1e-12)
@@ -125,7 +139,10 @@ def main(arguments: Sequence[str]) -> None:
         for seed in range(1, asked.seeds + 1):
             folder = Path(tempfile.mkdtemp(prefix=f"{material}-{seed}-", dir=asked.keep))
             found, took_s = run(folder, material, seed, asked.width)
-            said = found if isinstance(found, str) else compared(found, read_material(material))
+            said = found
+            if not isinstance(found, str):
+                true = read_material(material)
+                said = compared(found, true, brightness(next(folder.glob("runs/*"))))
             print(f"{material:13} {seed:3} {took_s:5.0f} s  {said}", flush=True)
             if asked.keep is None:
                 shutil.rmtree(folder)

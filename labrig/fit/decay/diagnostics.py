@@ -193,7 +193,7 @@ def offset_warnings(
     """Whether the fit had to pull offsets away from their priors; both (C,) in the same units."""
     return [
         f"the offset of {name} is {abs(offset) / sigma:.0f} times its prior σ from zero: "
-        "check its dark level, or widen offset_sigma"
+        "a light may have come on, or the dark level is wrong; else widen offset_sigma"
         for name, offset, sigma in zip(channels, offsets, prior_sigma, strict=True)
         if 0 < sigma < np.inf and abs(offset) >= OFFSET_SIGMAS * sigma
     ]

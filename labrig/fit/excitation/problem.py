@@ -30,8 +30,8 @@ class Rates(NamedTuple):
         (K,) ln of the lamp's brightness at every charge of every series over what was stated.
     lacking
         (1,) what the cold lamp lacks, or (0,) if it is not fitted.
-    log_site
-        (sites whose irradiance is uncertain,) ln of it over what was stated, series by series.
+    off
+        (M,) z of `ChargingSeries.site_modes`, series by series.
     """
 
     k_r_per_s: FloatArray
@@ -41,7 +41,7 @@ class Rates(NamedTuple):
     log_scale: FloatArray
     log_brightness: FloatArray
     lacking: FloatArray
-    log_site: FloatArray
+    off: FloatArray
 
 
 @dataclass(frozen=True)
@@ -72,7 +72,7 @@ class Uncertain:
 class ExcitationProblem:
     """Least-squares problem in θ = [ln k_r, A, k_e, weights, and what is half known].
 
-    Half known are ln scales, ln brightness, what the cold lamp lacks and ln of the sites' light.
+    Half known are ln scales, ln brightness, what the cold lamp lacks and z of the sites' light.
 
     Parameters
     ----------
@@ -99,15 +99,15 @@ class ExcitationProblem:
         self._scales = len(self.series) - 1 if uncertain.scale > 0 else 0
         self._brightness = charges if uncertain.lamp > 0 else 0
         self._lacking = 1 if uncertain.cold > 0 else 0
-        sites = [np.zeros(0) if one.site_sigma is None else one.site_sigma for one in self.series]
-        #: Where the sites of each series begin among all that are uncertain.
-        self._first_site = np.cumsum([0, *(len(sigma) for sigma in sites)])
+        modes = [0 if one.site_modes is None else len(one.site_modes) for one in self.series]
+        #: Where each series' ways begin in which its sites' light may be off.
+        self._first_mode = np.cumsum([0, *modes])
         self.prior_sigma = np.concatenate(
             [
                 np.full(self._scales, uncertain.scale),
                 np.full(self._brightness, uncertain.lamp),
                 np.full(self._lacking, uncertain.cold),
-                *sites,
+                np.ones(sum(modes)),
             ]
         )
         self._flicker = uncertain.flicker
@@ -125,9 +125,9 @@ class ExcitationProblem:
         return sum(int(np.count_nonzero(one)) for one in self._inverse_sigma)
 
     @property
-    def uncertain_sites(self) -> int:
-        """Sites whose irradiance is not exact."""
-        return int(self._first_site[-1])
+    def site_modes(self) -> int:
+        """Ways in which the light on the sites may be off, of all series."""
+        return int(self._first_mode[-1])
 
     def pack(self, rates: Rates) -> FloatArray:
         """θ."""
@@ -141,7 +141,7 @@ class ExcitationProblem:
                 scale,
                 rates.log_brightness[: self._brightness],
                 rates.lacking[: self._lacking],
-                rates.log_site,
+                rates.off,
             ]
         )
 
@@ -231,9 +231,9 @@ class ExcitationProblem:
                 for charge, factor in zip(one.charges, brightness, strict=True)
             )
             scaled = one.irradiance * float(np.exp(log_scale))
-            if one.site_sigma is not None:
-                own = rates.log_site[slice(*self._first_site[number : number + 2])]
-                scaled = scaled * np.exp(own)[:, None]
+            if one.site_modes is not None:
+                own = rates.off[slice(*self._first_mode[number : number + 2])]
+                scaled = scaled * np.exp(own @ one.site_modes)[:, None]
             lit.append(replace(one, charges=charges, irradiance=scaled))
             first = last
         return lit
@@ -266,10 +266,11 @@ class ExcitationProblem:
             if self._lacking:
                 slopes[own, :, first + self._brightness] = -charge.cold * by_light[own]
             shot = own.stop
-        if one.site_sigma is not None:
-            place = first + self._brightness + self._lacking + self._first_site[number]
-            every = np.arange(sites)
-            slopes[:, every, place + every] = by_light
+        if one.site_modes is not None:
+            place = first + self._brightness + self._lacking + self._first_mode[number]
+            slopes[..., place : place + len(one.site_modes)] = (
+                by_light[..., None] * one.site_modes.T
+            )
         jacobian = slopes[:, :, None, :] * rates.weights[:, None]
         for place, channel in enumerate(self._others, start=first_weight):
             jacobian[:, :, channel, place] = glow

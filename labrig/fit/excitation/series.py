@@ -107,9 +107,9 @@ class ChargingSeries:
     values, sigma
         (n, P, C) mean signal per second of exposure, and independent standard uncertainty; NaN
         where nothing was measured.
-    site_sigma
-        (P,) relative standard uncertainty of each site's irradiance, the same at every charge and
-        independent of the other sites'; None: exact.
+    site_modes
+        (M, P) ln of the sites' irradiance may be off by Σ_m z_m site_modes[m], the z_m independent
+        and of unit variance, the same at every charge; None: exact.
     """
 
     name: str
@@ -119,7 +119,7 @@ class ChargingSeries:
     irradiance: FloatArray
     values: FloatArray
     sigma: FloatArray
-    site_sigma: FloatArray | None = None
+    site_modes: FloatArray | None = None
 
     def checked(self) -> Self:
         """Itself, if nothing is wrong with it.
@@ -142,12 +142,9 @@ class ChargingSeries:
                 f"rise and fade in {bands} bands, got {self.values.shape}, {self.sigma.shape} and "
                 f"{lamp}"
             )
-        if self.site_sigma is not None and not (
-            self.site_sigma.shape == (sites,) and (self.site_sigma > 0).all()
-        ):
-            raise FitError(
-                f"{self.name}: expected one 'site_sigma' above 0 for each of {sites} sites"
-            )
+        modes = self.site_modes
+        if modes is not None and not (modes.shape[1:] == (sites,) and np.isfinite(modes).all()):
+            raise FitError(f"{self.name}: expected 'site_modes' of {sites} finite numbers each")
         if not (self.irradiance >= 0).all():
             raise FitError(f"{self.name}: expected irradiances of 0 or more, got a smaller one")
         measured = np.isfinite(self.values) & np.isfinite(self.sigma)

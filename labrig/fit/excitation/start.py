@@ -45,7 +45,7 @@ def starts(
             np.zeros(len(problem.series)),
             np.zeros(sum(len(one.charges) for one in problem.series)),
             np.zeros(1),
-            np.zeros(problem.uncertain_sites),
+            np.zeros(problem.site_modes),
         )
 
 

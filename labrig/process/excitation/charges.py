@@ -16,12 +16,14 @@ from labrig.reduce import Series, SeriesFrame, read_raw, reduce_patches
 
 FloatArray = NDArray[np.float64]
 
-#: Frames that show the glow after a charge; `meter` and `rest` ones are as good as the others.
-GLOWING = ("meter", "strip", "bare", "rest")
+#: Frames that show the glow after a charge; those of a metering are exposed too long or too short.
+GLOWING = ("strip", "bare", "rest")
 #: Units that charged by the lamp itself; all others charged through the filter.
 BARE = "bare-"
-#: Light on a place is not known better than this, whatever its file says.
-LEAST_SITE_SIGMA = 1e-3
+#: Of the light on a place alone, whatever its file says.
+LEAST_SITE_SIGMA = 3e-3
+#: Errors of places so many parts of the filter apart have nothing in common: some 40 nm.
+SMOOTH_MODES = 9
 #: A halogen lamp's housing and mirror warm about that fast, and the last per cents of light with
 #: them.
 WARMS_S = 150.0
@@ -118,7 +120,7 @@ def charged(
     position = np.array(irradiance.position)
     values = np.stack([_blanked(series[name], series[name].values) for name in sites], axis=1)
     values = centred(values, sites, position, irradiance.strip, raw)
-    sigma = np.stack([_blanked(series[name], series[name].sigma) for name in sites], axis=1)
+    sigma = np.stack([_noise(series[name]) for name in sites], axis=1)
     is_bare = np.array([_of(after, frame).is_bare for frame in kept])
     evenness = _evenness(values[is_bare], sigma[is_bare])
     even = values / evenness[:, None], sigma / evenness[:, None]
@@ -144,14 +146,14 @@ def charged(
             irradiance=light,
             values=even[0][is_bare == wanted],
             sigma=even[1][is_bare == wanted],
-            site_sigma=site_sigma,
+            site_modes=site_modes,
         )
-        for name, wanted, light, site_sigma in (
+        for name, wanted, light, site_modes in (
             (
                 "through the filter",
                 False,
                 np.array(irradiance.through),
-                _site_sigma(irradiance),
+                _site_modes(irradiance),
             ),
             ("by the lamp itself", True, np.tile(irradiance.direct, (len(sites), 1)), None),
         )
@@ -211,6 +213,12 @@ def _blanked(series: Series, numbers: FloatArray) -> FloatArray:
     return np.where(series.usable[:, None], numbers, np.nan)
 
 
+def _noise(series: Series) -> FloatArray:
+    """σ of every value, of the dark level that was subtracted, too: a sensor that has warmed."""
+    dark = np.nan_to_num(series.dark_sigma)
+    return _blanked(series, np.hypot(series.sigma, dark))
+
+
 def _around(
     sites: Mapping[str, tuple[float, float, float, float]],
 ) -> tuple[float, float, float, float]:
@@ -242,11 +250,18 @@ def _cold(charge_s: float) -> float:
     return float(-np.expm1(-charge_s / WARMS_S) * WARMS_S / charge_s)
 
 
-def _site_sigma(irradiance: IrradianceFile) -> FloatArray:
-    """(P,) relative, of the light on every place."""
+def _site_modes(irradiance: IrradianceFile) -> FloatArray:
+    """(M, P): what is said of each place's light, alike for neighbours, and a little of its own.
+
+    Camera curves, the filter's widths and its wavelengths are wrong smoothly along the filter.
+    """
     through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
     told = np.sqrt((sigma**2).sum(axis=1)) / np.maximum(through.sum(axis=1), 1e-300)
-    return np.asarray(np.maximum(told, LEAST_SITE_SIGMA))
+    position = np.array(irradiance.position)
+    knots = np.linspace(position[0], position[-1], SMOOTH_MODES)
+    share = np.clip(1 - np.abs(position - knots[:, None]) / (knots[1] - knots[0]), 0.0, None)
+    smooth = np.sin(np.pi / 2 * share) * told
+    return np.concatenate([smooth, LEAST_SITE_SIGMA * np.eye(len(position))])
 
 
 def _after_off(whole: Series, rows: NDArray[np.bool_], charge: _Lit, zero_s: float) -> Series:

@@ -54,7 +54,7 @@ def test_a_dark_bench_is_clean_as_soon_as_its_lamp_is(tmp_path: Path) -> None:
 
     cut, resumed = cut_off_and_resumed(run, "blank-2")
     assert list(cut.completed()) == ["dark", "blank-1"]
-    assert list(resumed.completed()) == ["dark", "blank-1", "blank-2", "put-away"]
+    assert list(resumed.completed()) == ["dark", "blank-1", "blank-2", "put-back"]
 
 
 def test_a_leak_is_found_and_told_and_a_decay_is_warned(tmp_path: Path) -> None:

@@ -130,8 +130,8 @@ def test_killed_within_a_bracket_it_goes_on_there(
     assert "aperture" not in before
     assert all(after[unit].uid == attempt.uid for unit, attempt in before.items())
     # The card is in its place still: nobody is asked to put it there.
-    asked = [a.action for u in after if u not in before for a in after[u].actions if a.is_by_hand]
-    assert asked == ["take the card away"]
+    asked = [a.task for u in after if u not in before for a in after[u].actions if a.is_by_hand]
+    assert asked == ["lamp halogen", "sample", "lvf away", "no filter"]
     process_run(again)
     other = read_camera_file(again / "result" / "camera.yaml")
     for one, as_before in zip(other.aperture, camera.aperture, strict=True):
