@@ -137,7 +137,9 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
     charges = tuple(replace(one, cold=0.3) for one in series[0].charges)
     modes = np.random.default_rng(4).normal(0, 0.05, (3, sites))
     series = [replace(series[0], charges=charges, site_modes=modes), *series[1:]]
-    problem = ExcitationProblem(series, 2, 1, Uncertain(0.005, 0.01, cold=0.03, scale=0.02))
+    problem = ExcitationProblem(
+        series, 2, 1, Uncertain(0.005, 0.01, cold=0.03, scale=0.02, offset=(0.1, 0.2, 0.3))
+    )
     random = np.random.default_rng(3)
     rates = Rates(
         np.array([0.07, 0.02]),
@@ -148,13 +150,14 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
         np.full(6, 0.005),
         np.array([0.02]),
         random.normal(0, 1.0, 3),
+        np.array([0.3, -0.2, 0.1]),
     )
     theta = problem.pack(rates)
     problem.rewhiten(theta)
     _, jacobian = problem.residuals(theta)
     # Of a charge that leaves something to the next one, the derivative is not quite exact.
-    left = len(theta) - 3 - 7
-    for column in [*range(left), *range(len(theta) - 3, len(theta))]:
+    left = len(theta) - 6 - 7
+    for column in [*range(left), *range(len(theta) - 6, len(theta))]:
         h = 1e-6 * max(abs(theta[column]), 1e-3)
         up, down = theta.copy(), theta.copy()
         up[column] += h

@@ -32,6 +32,8 @@ class Rates(NamedTuple):
         (1,) what the cold lamp lacks, or (0,) if it is not fitted.
     off
         (M,) z of `ChargingSeries.site_modes`, series by series.
+    offset
+        (C,) level in the dark that was not subtracted, or (0,) if it is not fitted.
     """
 
     k_r_per_s: FloatArray
@@ -42,6 +44,7 @@ class Rates(NamedTuple):
     log_brightness: FloatArray
     lacking: FloatArray
     off: FloatArray
+    offset: FloatArray
 
 
 @dataclass(frozen=True)
@@ -58,6 +61,8 @@ class Uncertain:
         What a lamp lacks that was just switched on; 0 is expected.
     scale
         Of the irradiance of every series but the first over that of the first.
+    offset
+        (C,) of the dark level that was subtracted, in the values' unit; the same in all of them.
     irradiance
         Of E in every band, common to all series: nothing measured here can tell.
     """
@@ -66,6 +71,7 @@ class Uncertain:
     lamp: float = 0.0
     cold: float = 0.0
     scale: float = 0.0
+    offset: tuple[float, ...] = ()
     irradiance: float = 0.0
 
 
@@ -99,6 +105,7 @@ class ExcitationProblem:
         self._scales = len(self.series) - 1 if uncertain.scale > 0 else 0
         self._brightness = charges if uncertain.lamp > 0 else 0
         self._lacking = 1 if uncertain.cold > 0 else 0
+        self._offsets = len(uncertain.offset)
         modes = [0 if one.site_modes is None else len(one.site_modes) for one in self.series]
         #: Where each series' ways begin in which its sites' light may be off.
         self._first_mode = np.cumsum([0, *modes])
@@ -108,6 +115,7 @@ class ExcitationProblem:
                 np.full(self._brightness, uncertain.lamp),
                 np.full(self._lacking, uncertain.cold),
                 np.ones(sum(modes)),
+                uncertain.offset,
             ]
         )
         self._flicker = uncertain.flicker
@@ -123,6 +131,11 @@ class ExcitationProblem:
     def n_values(self) -> int:
         """Values measured."""
         return sum(int(np.count_nonzero(one)) for one in self._inverse_sigma)
+
+    @property
+    def offsets(self) -> int:
+        """Channels whose dark level is uncertain."""
+        return self._offsets
 
     @property
     def site_modes(self) -> int:
@@ -142,6 +155,7 @@ class ExcitationProblem:
                 rates.log_brightness[: self._brightness],
                 rates.lacking[: self._lacking],
                 rates.off,
+                rates.offset,
             ]
         )
 
@@ -155,9 +169,11 @@ class ExcitationProblem:
     def unpack(self, theta: FloatArray) -> Rates:
         """What `pack` put together; what is not fitted is as stated."""
         n, bands = self.states, self.bands
-        half_known = (self._scales, self._brightness, self._lacking)
+        half_known = (self._scales, self._brightness, self._lacking, self.site_modes)
         ends = np.cumsum([n, n, n * bands, len(self._others), *half_known])
-        log_k_r, amplitude, k_e, others, scale, brightness, lacking, site = np.split(theta, ends)
+        log_k_r, amplitude, k_e, others, scale, brightness, lacking, off, offset = np.split(
+            theta, ends
+        )
         weights = np.ones(len(self._others) + 1)
         weights[self._others] = others
         log_scale = np.zeros(len(self.series))
@@ -171,7 +187,8 @@ class ExcitationProblem:
             log_scale,
             brightness if len(brightness) else np.zeros(charges),
             lacking,
-            site,
+            off,
+            offset,
         )
 
     def signal(self, theta: FloatArray) -> list[FloatArray]:
@@ -182,6 +199,7 @@ class ExcitationProblem:
                 levels(one, rates.k_r_per_s, rates.k_e_per_s).value @ rates.amplitude,
                 rates.weights,
             )
+            + (rates.offset if len(rates.offset) else 0.0)
             for one in self.lit(rates)
         ]
 
@@ -274,8 +292,13 @@ class ExcitationProblem:
         jacobian = slopes[:, :, None, :] * rates.weights[:, None]
         for place, channel in enumerate(self._others, start=first_weight):
             jacobian[:, :, channel, place] = glow
+        signal = np.multiply.outer(glow, rates.weights)
+        if len(rates.offset):
+            signal = signal + rates.offset
+            for channel in range(len(rates.offset)):
+                jacobian[:, :, channel, width - len(rates.offset) + channel] = 1.0
         inverse = self._inverse_sigma[number]
-        misfit = (np.multiply.outer(glow, rates.weights) - self._values[number]) * inverse
+        misfit = (signal - self._values[number]) * inverse
         jacobian *= inverse[..., None]
         return self._whitened(number, misfit.reshape(shots, -1), jacobian.reshape(shots, -1, width))
 

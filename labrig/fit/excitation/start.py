@@ -46,6 +46,7 @@ def starts(
             np.zeros(sum(len(one.charges) for one in problem.series)),
             np.zeros(1),
             np.zeros(problem.site_modes),
+            np.zeros(problem.offsets),
         )
 
 

@@ -120,7 +120,7 @@ def charged(
     position = np.array(irradiance.position)
     values = np.stack([_blanked(series[name], series[name].values) for name in sites], axis=1)
     values = centred(values, sites, position, irradiance.strip, raw)
-    sigma = np.stack([_noise(series[name]) for name in sites], axis=1)
+    sigma = np.stack([_blanked(series[name], series[name].sigma) for name in sites], axis=1)
     is_bare = np.array([_of(after, frame).is_bare for frame in kept])
     evenness = _evenness(values[is_bare], sigma[is_bare])
     even = values / evenness[:, None], sigma / evenness[:, None]
@@ -211,12 +211,6 @@ def _times(
 def _blanked(series: Series, numbers: FloatArray) -> FloatArray:
     """NaN where a row must not be used."""
     return np.where(series.usable[:, None], numbers, np.nan)
-
-
-def _noise(series: Series) -> FloatArray:
-    """σ of every value, of the dark level that was subtracted, too: a sensor that has warmed."""
-    dark = np.nan_to_num(series.dark_sigma)
-    return _blanked(series, np.hypot(series.sigma, dark))
 
 
 def _around(

@@ -32,6 +32,8 @@ FloatArray = NDArray[np.float64]
 
 #: Of a lamp's brightness from charge to charge, and what one lacks that was just switched on.
 LAMP, COLD = 0.01, 0.03
+#: No dark level is known better, in DN/s.
+LEAST_DARK = 1e-3
 #: Names of a result's files.
 FIT_FILE, MATERIAL_FILE = "excitation.json", "material.yaml"
 MEASURED = (
@@ -70,6 +72,7 @@ def process(stage: Stage) -> StageResult:
         flicker=_flicker(stage, start),
         lamp=LAMP,
         cold=COLD,
+        offset=tuple(np.maximum(np.nan_to_num(measured.whole.dark_sigma), LEAST_DARK).tolist()),
         scale=irradiance.scale_sigma,
         irradiance=_irradiance_sigma(irradiance),
     )
