@@ -76,6 +76,7 @@ def test_excitation(against: Against) -> None:
             np.zeros(charges),
             np.zeros(1),
             np.zeros(0),
+            np.zeros(0),
         )
     )
 

@@ -133,9 +133,8 @@ def test_values_not_measured_and_fresh_samples() -> None:
 def test_the_jacobian_is_that_of_the_residuals() -> None:
     bench = Bench(two_states())
     series = measured(bench)
-    sites = len(series[0].irradiance)
     charges = tuple(replace(one, cold=0.3) for one in series[0].charges)
-    modes = np.random.default_rng(4).normal(0, 0.05, (3, sites))
+    modes = np.random.default_rng(4).normal(0, 0.05, (3, *series[0].irradiance.shape))
     series = [replace(series[0], charges=charges, site_modes=modes), *series[1:]]
     problem = ExcitationProblem(
         series, 2, 1, Uncertain(0.005, 0.01, cold=0.03, scale=0.02, offset=(0.1, 0.2, 0.3))

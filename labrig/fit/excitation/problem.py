@@ -251,7 +251,7 @@ class ExcitationProblem:
             scaled = one.irradiance * float(np.exp(log_scale))
             if one.site_modes is not None:
                 own = rates.off[slice(*self._first_mode[number : number + 2])]
-                scaled = scaled * np.exp(own @ one.site_modes)[:, None]
+                scaled = scaled * np.exp(np.tensordot(own, one.site_modes, axes=1))
             lit.append(replace(one, charges=charges, irradiance=scaled))
             first = last
         return lit
@@ -286,8 +286,9 @@ class ExcitationProblem:
             shot = own.stop
         if one.site_modes is not None:
             place = first + self._brightness + self._lacking + self._first_mode[number]
-            slopes[..., place : place + len(one.site_modes)] = (
-                by_light[..., None] * one.site_modes.T
+            by_band = np.einsum("fpnb,nb->fpb", by_k_e, rates.k_e_per_s)
+            slopes[..., place : place + len(one.site_modes)] = np.einsum(
+                "fpb,mpb->fpm", by_band, one.site_modes
             )
         jacobian = slopes[:, :, None, :] * rates.weights[:, None]
         for place, channel in enumerate(self._others, start=first_weight):

@@ -108,8 +108,8 @@ class ChargingSeries:
         (n, P, C) mean signal per second of exposure, and independent standard uncertainty; NaN
         where nothing was measured.
     site_modes
-        (M, P) ln of the sites' irradiance may be off by Σ_m z_m site_modes[m], the z_m independent
-        and of unit variance, the same at every charge; None: exact.
+        (M, P, B) ln of the sites' irradiance in every band may be off by Σ_m z_m site_modes[m], the
+        z_m independent and of unit variance, the same at every charge; None: exact.
     """
 
     name: str
@@ -143,8 +143,10 @@ class ChargingSeries:
                 f"{lamp}"
             )
         modes = self.site_modes
-        if modes is not None and not (modes.shape[1:] == (sites,) and np.isfinite(modes).all()):
-            raise FitError(f"{self.name}: expected 'site_modes' of {sites} finite numbers each")
+        if modes is not None and not (
+            modes.shape[1:] == (sites, bands) and np.isfinite(modes).all()
+        ):
+            raise FitError(f"{self.name}: expected finite 'site_modes' of {sites} x {bands}")
         if not (self.irradiance >= 0).all():
             raise FitError(f"{self.name}: expected irradiances of 0 or more, got a smaller one")
         measured = np.isfinite(self.values) & np.isfinite(self.sigma)

@@ -22,6 +22,8 @@ GLOWING = ("strip", "bare", "rest")
 BARE = "bare-"
 #: Of the light on a place alone, whatever its file says.
 LEAST_SITE_SIGMA = 3e-3
+#: Of a filter's wavelengths, and what an error of its width does at a band's edge.
+WAVELENGTH_SIGMA_NM = 1.0
 #: Errors of places so many parts of the filter apart have nothing in common: some 40 nm.
 SMOOTH_MODES = 9
 #: A halogen lamp's housing and mirror warm about that fast, and the last per cents of light with
@@ -245,17 +247,24 @@ def _cold(charge_s: float) -> float:
 
 
 def _site_modes(irradiance: IrradianceFile) -> FloatArray:
-    """(M, P): what is said of each place's light, alike for neighbours, and a little of its own.
+    """(M, P, B): what is said of each place's light, alike for neighbours, and a little of its own.
 
-    Camera curves, the filter's widths and its wavelengths are wrong smoothly along the filter.
+    Camera curves, the filter's widths and its wavelengths are wrong smoothly along the filter; the
+    latter two move light from band to band.
     """
     through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
     told = np.sqrt((sigma**2).sum(axis=1)) / np.maximum(through.sum(axis=1), 1e-300)
     position = np.array(irradiance.position)
     knots = np.linspace(position[0], position[-1], SMOOTH_MODES)
     share = np.clip(1 - np.abs(position - knots[:, None]) / (knots[1] - knots[0]), 0.0, None)
-    smooth = np.sin(np.pi / 2 * share) * told
-    return np.concatenate([smooth, LEAST_SITE_SIGMA * np.eye(len(position))])
+    smooth = np.sin(np.pi / 2 * share)[..., None]
+    nm = np.ptp(irradiance.bands_nm) * (position - position[0]) / np.ptp(position)
+    by_nm = np.gradient(np.log(np.maximum(through, 1e-6 * through.max())), nm, axis=0)
+    bands = np.ones(through.shape[1])
+    alone = LEAST_SITE_SIGMA * np.eye(len(position))[..., None]
+    return np.concatenate(
+        [smooth * told[:, None] * bands, smooth * WAVELENGTH_SIGMA_NM * by_nm, alone * bands]
+    )
 
 
 def _after_off(whole: Series, rows: NDArray[np.bool_], charge: _Lit, zero_s: float) -> Series:
