@@ -7,8 +7,9 @@ from collections.abc import Sequence
 
 from labrig.acquire import Unit
 
+from .excitation_metering import BareMeter, DarkUnit, StripMeter
 from .excitation_settings import ExcitationSettings
-from .excitation_units import BareMeter, BareUnit, DarkUnit, DoublingUnit, RefiningUnit, StripMeter
+from .excitation_units import BareUnit, DoublingUnit, RefiningUnit
 from .steps.album import Album
 
 

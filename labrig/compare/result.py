@@ -1,7 +1,6 @@
 """What a run's result says of each patch, read back from its files."""
 
 import json
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,7 +8,7 @@ import numpy as np
 
 from labrig.errors import DataError, UsageError
 from labrig.material import Material, read_material
-from labrig.reduce import Series, read_series
+from labrig.reduce import Series, joined, read_series
 from labrig.yaml_file import read_yaml
 
 
@@ -66,7 +65,7 @@ def _read_patch(place: Path, name: str | None) -> MeasuredPatch:
     path = place / "fit.json"
     try:
         fit = json.loads(path.read_text(encoding="utf-8"))
-        series = _joined(read_series(place / "series.csv"))
+        series = joined(read_series(place / "series.csv"))
         offsets = np.array([float(fit["offsets"][channel]) for channel in series.channels])
         flicker = float(fit["flicker"])
     except (ValueError, KeyError, TypeError) as error:
@@ -79,19 +78,3 @@ def _read_patch(place: Path, name: str | None) -> MeasuredPatch:
     usable = series.take(by_time, name)
     material = read_material(place / "material.yaml")
     return MeasuredPatch(replace(usable, values=usable.values - offsets), flicker, material)
-
-
-def _joined(parts: Sequence[Series]) -> Series:
-    """All units of one series.csv."""
-    return replace(
-        parts[0],
-        t_s=np.concatenate([part.t_s for part in parts]),
-        exposure_s=np.concatenate([part.exposure_s for part in parts]),
-        values=np.concatenate([part.values for part in parts]),
-        sigma=np.concatenate([part.sigma for part in parts]),
-        iso=np.concatenate([part.iso for part in parts]),
-        f_number=np.concatenate([part.f_number for part in parts]),
-        frame=tuple(frame for part in parts for frame in part.frame),
-        unit=tuple(unit for part in parts for unit in part.unit),
-        flag=tuple(flag for part in parts for flag in part.flag),
-    )

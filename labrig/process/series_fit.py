@@ -10,7 +10,7 @@ from numpy.typing import ArrayLike
 from labrig.errors import FitError, UsageError
 from labrig.fit import DecayFit, fit_decay
 from labrig.quantity import FRACTION, parse
-from labrig.reduce import Series, read_series
+from labrig.reduce import Series, joined, read_series
 
 #: Counts below which a Poisson weight would trust a point too much.
 LEAST_COUNTS = 5.0
@@ -122,22 +122,7 @@ def _by_region(parts: Sequence[Series]) -> list[Series]:
     regions: dict[str, list[Series]] = {}
     for part in parts:
         regions.setdefault(part.region, []).append(part)
-    return [_joined(same) for same in regions.values()]
-
-
-def _joined(parts: Sequence[Series]) -> Series:
-    return replace(
-        parts[0],
-        t_s=np.concatenate([part.t_s for part in parts]),
-        exposure_s=np.concatenate([part.exposure_s for part in parts]),
-        values=np.concatenate([part.values for part in parts]),
-        sigma=np.concatenate([part.sigma for part in parts]),
-        iso=np.concatenate([part.iso for part in parts]),
-        f_number=np.concatenate([part.f_number for part in parts]),
-        frame=tuple(frame for part in parts for frame in part.frame),
-        unit=tuple(unit for part in parts for unit in part.unit),
-        flag=tuple(flag for part in parts for flag in part.flag),
-    )
+    return [joined(same) for same in regions.values()]
 
 
 def _sigma(text: str) -> float:

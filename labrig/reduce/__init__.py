@@ -2,6 +2,7 @@
 
 from labrig.reduce.channels import ChannelStats, FrameMeasurement, measure
 from labrig.reduce.dark import DarkModel, fit_dark, hot_pixels
+from labrig.reduce.joined import joined
 from labrig.reduce.patches import reduce_patches, reduce_series
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
@@ -20,6 +21,7 @@ __all__ = [
     "add_flag",
     "fit_dark",
     "hot_pixels",
+    "joined",
     "measure",
     "parse_series",
     "read_raw",
