@@ -102,10 +102,11 @@ def _result(
     covariance = found.covariance * np.outer(scale, scale)
     whole = covariance[:own, :own].copy()
     # E enters k_e one to one, band by band, whatever is measured.
+    light = np.broadcast_to(uncertain.irradiance, bands)
     for band in range(bands):
         by_light = np.zeros(own)
         by_light[2 * n + band :: bands] = rates.k_e_per_s[:, band]
-        whole += uncertain.irradiance**2 * np.outer(by_light, by_light)
+        whole += light[band] ** 2 * np.outer(by_light, by_light)
     sigma = np.sqrt(np.diag(whole))
     order = np.argsort(-rates.k_r_per_s, kind="stable")
     k_e_sigma = sigma[2 * n :].reshape(n, bands)

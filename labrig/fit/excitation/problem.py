@@ -64,7 +64,7 @@ class Uncertain:
     offset
         (C,) of the dark level that was subtracted, in the values' unit; the same in all of them.
     irradiance
-        Of E in every band, common to all series: nothing measured here can tell.
+        Of E in every band, one number or (B,), in all series alike: nothing measured here tells.
     """
 
     flicker: float = 0.0
@@ -72,7 +72,7 @@ class Uncertain:
     cold: float = 0.0
     scale: float = 0.0
     offset: tuple[float, ...] = ()
-    irradiance: float = 0.0
+    irradiance: float | tuple[float, ...] = 0.0
 
 
 class ExcitationProblem:

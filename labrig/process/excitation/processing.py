@@ -115,10 +115,16 @@ def _flicker(stage: Stage, start: DecayFit) -> float:
     return start.flicker if start.flicker > 0 else TYPICAL_FLICKER
 
 
-def _irradiance_sigma(irradiance: IrradianceFile) -> float:
-    """Relative, of the bands that give most light: E enters k_e one to one."""
-    direct, sigma = np.array(irradiance.direct), np.array(irradiance.direct_sigma)
-    return float(np.sqrt((sigma**2).sum() / (direct**2).sum()))
+def _irradiance_sigma(irradiance: IrradianceFile) -> tuple[float, ...]:
+    """Relative, of each band: that of the places where the band charges.
+
+    Errors of neighbouring places are alike, so that a band's do not average out over its places.
+    """
+    through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
+    told = np.sqrt((sigma**2).sum(axis=1)) / np.maximum(through.sum(axis=1), 1e-300)
+    share = through**2 / np.maximum((through**2).sum(axis=0), 1e-300)
+    direct = np.array(irradiance.direct_sigma) / np.maximum(np.array(irradiance.direct), 1e-300)
+    return tuple(np.hypot(told @ share, direct).tolist())
 
 
 def _closure(
