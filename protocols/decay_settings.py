@@ -10,7 +10,7 @@ from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.reduce import FrameMeasurement
 from labrig.region import CENTRE, Region
 
-from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, dark_exposures_s
 from .steps.metering import DecayMeter, Look, Schedule
 from .steps.patch_names import Patches
 from .steps.posing import charge
@@ -81,11 +81,8 @@ class DecaySettings(ProtocolModel):
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Shutter time of each dark frame."""
         if isinstance(self.exposure, float):
-            exposures_s = [offers.exposure_near(self.exposure)]
-        else:
-            longest_s = self.longest_exposure_s(offers)
-            exposures_s = [offers.exposure_at_most(longest_s * part) for part in (1 / 64, 1 / 4, 1)]
-        return [exposure_s for exposure_s in exposures_s for _ in range(DARKS_PER_EXPOSURE)]
+            return [offers.exposure_near(self.exposure)] * DARKS_PER_EXPOSURE
+        return dark_exposures_s(self.longest_exposure_s(offers), offers)
 
     def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
         """Begin after lamp off and shutter time of each metering frame; for `grow`, to the end."""

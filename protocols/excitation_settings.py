@@ -9,7 +9,7 @@ from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel
 from labrig.quantity import DurationS, Fraction, duration_text
 from labrig.region import Region
 
-from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+from .steps.camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
 
 #: Each pause between two frames is longer than the one before by this factor.
 PAUSES_GROW = 1.25
@@ -91,9 +91,7 @@ class ExcitationSettings(ProtocolModel):
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Shutter time of each dark frame."""
-        longest_s = max(self.longest_exposures_s(offers, self.last_decay))
-        exposures_s = [offers.exposure_at_most(longest_s * part) for part in (1 / 64, 1 / 4, 1)]
-        return [exposure_s for exposure_s in exposures_s for _ in range(DARKS_PER_EXPOSURE)]
+        return dark_exposures_s(max(self.longest_exposures_s(offers, self.last_decay)), offers)
 
     def ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
         """Begin after lamp off and shutter time of each metering frame."""

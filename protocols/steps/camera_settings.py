@@ -2,6 +2,8 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from labrig.acquire import CameraOffers
+
 #: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.
 DARKS_PER_EXPOSURE = 4
 #: Left free between a frame and the next deadline: setting the camera, half-pressing it.
@@ -15,3 +17,9 @@ class CameraSettings(BaseModel):
 
     iso: int = Field(400, gt=0)
     f_number: float | None = Field(4.0, gt=0)
+
+
+def dark_exposures_s(longest_s: float, offers: CameraOffers) -> list[float]:
+    """Shutter time of each dark frame, where frames of up to `longest_s` are to come."""
+    exposures_s = [offers.exposure_at_most(longest_s * part) for part in (1 / 64, 1 / 4, 1)]
+    return [exposure_s for exposure_s in exposures_s for _ in range(DARKS_PER_EXPOSURE)]

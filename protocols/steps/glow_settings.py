@@ -10,7 +10,7 @@ from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel, Sessio
 from labrig.quantity import DurationS
 from labrig.region import Region
 
-from .camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
 from .metering import DecayMeter, Look, Schedule, look
 from .posing import charge
 from .watching import Watcher
@@ -55,9 +55,7 @@ class GlowSettings(ProtocolModel):
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
         """Shutter time of each dark frame."""
-        longest_s = max(self.longest_exposures_s(offers))
-        exposures_s = [offers.exposure_at_most(longest_s * part) for part in (1 / 64, 1 / 4, 1)]
-        return [exposure_s for exposure_s in exposures_s for _ in range(DARKS_PER_EXPOSURE)]
+        return dark_exposures_s(max(self.longest_exposures_s(offers)), offers)
 
     def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
         """Begin after lamp off and shutter time of each metering frame, to the last of the glow."""

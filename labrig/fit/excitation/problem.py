@@ -105,7 +105,8 @@ class ExcitationProblem:
         self._scales = len(self.series) - 1 if uncertain.scale > 0 else 0
         self._brightness = charges if uncertain.lamp > 0 else 0
         self._lacking = 1 if uncertain.cold > 0 else 0
-        self._offsets = len(uncertain.offset)
+        #: Channels whose dark level is uncertain.
+        self.offsets = len(uncertain.offset)
         modes = [0 if one.site_modes is None else len(one.site_modes) for one in self.series]
         #: Where each series' ways begin in which its sites' light may be off.
         self._first_mode = np.cumsum([0, *modes])
@@ -131,11 +132,6 @@ class ExcitationProblem:
     def n_values(self) -> int:
         """Values measured."""
         return sum(int(np.count_nonzero(one)) for one in self._inverse_sigma)
-
-    @property
-    def offsets(self) -> int:
-        """Channels whose dark level is uncertain."""
-        return self._offsets
 
     @property
     def site_modes(self) -> int:
