@@ -39,8 +39,9 @@ class Recording:
         DiskError
             The frames will not fit.
         """
-        protocol = plugins.read_protocol(protocol_path)
+        asked = plugins.read_protocol(protocol_path)
         rig = read_rig_file(rig_path)
+        protocol = asked.suited_to(rig)
         if rig.optics.camera is not None:
             read_camera(rig.optics.camera)  # a misspelt name is found now, not after the run
         laid_out = plan(protocol, rig, str(rig_path))

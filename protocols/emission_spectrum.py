@@ -19,6 +19,7 @@ from .steps.camera_settings import CameraSettings
 from .steps.glow_settings import GlowSettings, metered_schedule
 from .steps.glow_units import DarkUnit, MeterUnit
 from .steps.lit_card import light_card
+from .steps.patch_names import FilterPatches
 from .steps.posing import check_seen, lights_out
 from .steps.prepared import Arranged, PutBackUnit
 
@@ -43,6 +44,7 @@ class EmissionSpectrum(GlowSettings):
     lamps: tuple[LampKind, ...] = Field(("halogen",), min_length=1)
     white: bool = True
     region: Region = (0.0, 0.0, 1.0, 1.0)
+    patches: FilterPatches = Field(default_factory=dict)
 
     @model_validator(mode="after")
     def _in_order(self) -> Self:
@@ -66,8 +68,8 @@ class EmissionSpectrum(GlowSettings):
         return self.times
 
     def regions(self) -> Sequence[Region]:
-        """All that the LVF may fill; its brightest part decides."""
-        return [self.region]
+        """All that the LVF may fill, or every patch; the brightest decides."""
+        return list(self.patches.values()) or [self.region]
 
     def units(self) -> Sequence[Unit]:
         """Darks, then metering and spectrum for each lamp, the white, and all put back."""

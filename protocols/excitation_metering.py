@@ -8,7 +8,7 @@ import numpy as np
 from labrig.acquire import ByHand, Session, Shoot, at
 from labrig.record import FrameRecord
 
-from .excitation_settings import ExcitationSettings
+from .excitation_settings import PLACES, ExcitationSettings
 from .steps.afterglow import dark_level
 from .steps.album import Album
 from .steps.charge_times import FloatArray
@@ -48,10 +48,10 @@ class ExcitationUnit:
         return [self.album.look(frame) for frame in frames.values()]
 
     def rates(self, frame: FrameRecord, darks: Sequence[Look]) -> FloatArray:
-        """(places,) of the strip, brightest channel above darkness, DN/s."""
+        """(patches, places) along the strip, brightest channel above darkness, DN/s."""
         seen = self.album.look(frame)
         above = levels(seen) - dark_level(darks, frame.exposure_s)
-        return np.asarray(above.max(axis=1) / frame.exposure_s)
+        return np.asarray(above.max(axis=1) / frame.exposure_s).reshape(-1, PLACES)
 
     def rest(self, session: Session) -> None:
         """Darkness until hardly anything glows, or another sample."""
@@ -77,14 +77,14 @@ class ExcitationUnit:
             rested_s += rule.check_every
 
     def _is_dark(self, session: Session) -> bool:
-        """Whether the glow is low against that just after the last charge."""
+        """Whether the glow of every patch is low against that just after the last charge."""
         frames = [*session.frames("strip"), *session.frames("bare"), *session.frames("meter")]
         darks = self.darks(session)
         last_unit = max(frames, key=lambda frame: frame.start_time).unit
         after = [frame for frame in frames if frame.unit == last_unit]
-        brightest = max(float(self.rates(frame, darks).max()) for frame in after)
-        now = float(self.rates(session.frames("rest")[-1], darks).max())
-        return now < self.protocol.rest.below * brightest
+        brightest = np.max([self.rates(frame, darks).max(axis=1) for frame in after], axis=0)
+        now = self.rates(session.frames("rest")[-1], darks).max(axis=1)
+        return bool((now < self.protocol.rest.below * brightest).all())
 
 
 @dataclass(frozen=True)
@@ -96,12 +96,12 @@ class DarkUnit(ExcitationUnit):
     def run(self, session: Session) -> None:
         """Warm the camera up, then photograph darkness."""
         session.wait_until_warm("camera")
-        offers, sites = session.rig.camera.offers(), self.protocol.strip()
+        offers, regions = session.rig.camera.offers(), self.protocol.regions()
         exposures_s = self.protocol.dark_exposures_s(offers)
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
-        dark_frames(session, self.name, sites, exposures)
+        dark_frames(session, self.name, regions, exposures)
         shorter = [self.protocol.settings(time_s) for _, time_s in self.protocol.ladder(offers)[:3]]
-        Watcher(session, self.name, sites, None).insist_on_darkness(shorter)
+        Watcher(session, self.name, regions, None).insist_on_darkness(shorter)
 
 
 @dataclass(frozen=True)
@@ -124,7 +124,7 @@ class _Meter(ExcitationUnit):
             ]
         )
         shorter = [self.protocol.settings(exposure_s) for _, exposure_s in ladder[:3]]
-        Watcher(session, unit, self.protocol.strip(), None).insist_on_glow(shorter)
+        Watcher(session, unit, self.protocol.regions(), None).insist_on_glow(shorter)
 
 
 @dataclass(frozen=True)

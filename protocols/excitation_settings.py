@@ -10,9 +10,12 @@ from labrig.quantity import DurationS, Fraction, duration_text
 from labrig.region import Region
 
 from .steps.camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
+from .steps.patch_names import FilterPatches
 
 #: Each pause between two frames is longer than the one before by this factor.
 PAUSES_GROW = 1.25
+#: Places along each patch, for metering and for choosing charge times.
+PLACES = 12
 
 
 class Rest(BaseModel):
@@ -49,6 +52,7 @@ class ExcitationSettings(ProtocolModel):
     samples: int = Field(1, ge=1)
     camera: CameraSettings = CameraSettings()
     sites: Region = Field((0.1, 0.4, 0.8, 0.2))
+    patches: FilterPatches = Field(default_factory=dict)
     states: Literal["auto", 1, 2, 3] = "auto"
     saturated: bool = False
 
@@ -103,7 +107,14 @@ class ExcitationSettings(ProtocolModel):
             at_s += exposure_s + offers.overhead_s + MARGIN_S
         return ladder
 
-    def strip(self, count: int = 12) -> list[Region]:
-        """Places along the strip on the sample, for metering and for choosing charge times."""
-        x, y, width, height = self.sites
-        return [(x + width * k / count, y, width / count, height) for k in range(count)]
+    def regions(self) -> list[Region]:
+        """Where a glow is to be seen: every patch, or the strip on the sample."""
+        return list(self.patches.values()) or [self.sites]
+
+    def strip(self) -> list[Region]:
+        """Places along each of the regions, those of one after those of another."""
+        return [
+            (x + width * k / PLACES, y, width / PLACES, height)
+            for x, y, width, height in self.regions()
+            for k in range(PLACES)
+        ]

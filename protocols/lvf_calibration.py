@@ -9,8 +9,8 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig import shipped
-from labrig.acquire import ProtocolModel, Unit
+from labrig.acquire import ProtocolModel, RigFile, Unit
+from labrig.acquire.rig_file import Optics
 from labrig.quantity import DurationS, WordOrDuration
 
 from .lvf_units import NO_FILTER, FilterUnit, LinesUnit, StripesUnit, StripUnit, filter_unit
@@ -67,11 +67,14 @@ class LvfCalibration(ProtocolModel):
         return StillLife(self.camera, self.longest, self.repeats)
 
     def filter_names(self) -> tuple[str, ...]:
-        """The colour filters, one after the other."""
+        """The colour filters, one after the other; `suited_to` no rig, all are the shipped ones."""
+        return tuple(Optics().filter_files()) if self.filters == "all" else self.filters
+
+    def suited_to(self, rig: RigFile) -> Self:
+        """With the names of all filters that the rig file has curves of."""
         if self.filters != "all":
-            return self.filters
-        folder = shipped.folder("config/optics/filters")
-        return tuple(sorted(path.stem for path in folder.glob("*.csv")))
+            return self
+        return self.model_copy(update={"filters": tuple(rig.optics.filter_files())})
 
     def units(self) -> Sequence[Unit]:
         """All that can go wrong first: the strip and its lines; then filter by filter."""

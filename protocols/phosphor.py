@@ -8,14 +8,20 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import PartUnit, ProtocolModel, Unit, plugins
+from labrig.acquire import PartUnit, ProtocolModel, RigFile, Unit, plugins
 from labrig.yaml_file import validate
+
+from .steps.patch_names import FilterPatches
+
+#: Protocols that measure every patch of the chain.
+OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation")
 
 
 class Phosphor(ProtocolModel):
     """The chain; see `phosphor.yaml` for what each key means."""
 
     protocol: Literal["phosphor"] = "phosphor"
+    patches: FilterPatches = Field(default_factory=dict)
     parts: tuple[dict[str, Any], ...] = Field(min_length=1)
 
     @model_validator(mode="after")
@@ -26,11 +32,25 @@ class Phosphor(ProtocolModel):
                 f"expected every protocol once in 'parts', got {', '.join(names)}; give one of "
                 "two alike a 'part:' name of its own"
             )
+        folders = {name.casefold() for name in names}
+        if taken := [name for name in self.patches if name.casefold() in folders]:
+            raise ValueError(
+                f"expected patches that are not called like a part, got '{taken[0]}': both would "
+                "be that folder of the result"
+            )
         return self
 
     def chain(self) -> tuple["Part", ...]:
-        """The protocols in order, each with the sample of the chain."""
+        """The protocols in order, each with the sample and the patches of the chain."""
         return tuple(Part.read(content, self) for content in self.parts)
+
+    def suited_to(self, rig: RigFile) -> Self:
+        """With what its parts leave to the rig file filled in."""
+        parts = [
+            content | _changed(part.protocol, part.protocol.suited_to(rig))
+            for content, part in zip(self.parts, self.chain(), strict=True)
+        ]
+        return self.model_copy(update={"parts": tuple(parts)})
 
     def units(self) -> Sequence[Unit]:
         """Those of all parts, in order."""
@@ -47,13 +67,13 @@ class Part:
         self.protocol = protocol
 
     @classmethod
-    def read(cls, content: dict[str, Any], chain: ProtocolModel) -> Self:
+    def read(cls, content: dict[str, Any], chain: Phosphor) -> Self:
         """A protocol written as in a file of its own.
 
         Raises
         ------
         ValueError
-            It names no protocol that may be a part.
+            It names no protocol that may be a part, or other patches than the chain.
         """
         keys = dict(content)
         kind = keys.get("protocol")
@@ -61,5 +81,22 @@ class Part:
             raise ValueError("expected 'protocol: NAME' in every part, the name of another one")
         name = str(keys.pop("part", kind))
         keys.setdefault("sample", chain.sample.model_dump(exclude_none=True))
+        if chain.patches and kind in OF_PATCHES:
+            own = keys.get("patches")
+            if own is None:
+                keys["patches"] = chain.patches
+            elif isinstance(own, dict) and set(map(str, own)) != set(chain.patches):
+                raise ValueError(
+                    f"part {name}: expected the patches of the chain, {', '.join(chain.patches)}, "
+                    f"got {', '.join(map(str, own)) or 'none'}; leave 'patches:' out of the part, "
+                    "or give them the same names"
+                )
         model = plugins.load(plugins.PROTOCOLS, kind, f"part {name}")
         return cls(name, validate(keys, model, f"part {name}"))
+
+
+def _changed(before: ProtocolModel, after: ProtocolModel) -> dict[str, Any]:
+    """Keys, as written in YAML, that are other after than before."""
+    kept = before.model_dump(mode="json", by_alias=True)
+    now = after.model_dump(mode="json", by_alias=True)
+    return {key: value for key, value in now.items() if value != kept[key]}

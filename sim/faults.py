@@ -125,6 +125,8 @@ class Fault(_Part):
         Hands say that they have changed the filter, but leave the one before in.
     light_left_on
         Somebody has left the room's light on.
+    thermometer_off
+        The thermometer's wire has come off its input.
     disk_full
         No byte more fits on the disk with the run; with `after_bytes`, in the middle of a write.
     disk_slow
@@ -152,6 +154,7 @@ class Fault(_Part):
     lvf_turned: When | None = None
     filter_skipped: Skipped | None = None
     light_left_on: When | None = None
+    thermometer_off: When | None = None
     disk_full: AfterBytes | None = None
     disk_slow: Slowness | None = None
     clock_ahead: Step | None = None

@@ -5,6 +5,7 @@ from contextlib import contextmanager
 from dataclasses import replace
 from typing import Any
 
+import numpy as np
 import usb.backend
 
 from labrig.clock import VirtualClock
@@ -18,6 +19,7 @@ from .disk import SimulatedDisk
 from .faults import Fault, When, given
 from .room import Room
 from .simulation import Simulation
+from .temperature import TemperatureSensor
 
 #: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/servo`,
 #: `sim://room/hands`, `sim://room/camera`.
@@ -26,6 +28,10 @@ NAME = "room"
 LAMP_RELAY = 0
 RELAYS = 8
 LCUS_RELAYS = 4
+#: Analogue input of the Numato board that has the thermometer.
+TEMPERATURE_INPUT = 0
+#: Its stream of random numbers, of nothing else in the room.
+TEMPERATURE_STREAM = 9
 
 
 class OpenRoom:
@@ -36,14 +42,24 @@ class OpenRoom:
         self.seed = simulation.seed
         servo = _servo_board(simulation, clock)
         self.room = Room(simulation, clock, servo.pulses)
-        relays = NumatoBoard(RELAYS, lambda relay, on: self._relay_moved("relays", relay, on))
+        faults = simulation.faults
+        temperature = TemperatureSensor(
+            simulation.temperature,
+            clock,
+            np.random.default_rng([simulation.seed, TEMPERATURE_STREAM]),
+            given(fault.thermometer_off for fault in faults),
+        )
+        relays = NumatoBoard(
+            RELAYS,
+            lambda relay, on: self._relay_moved("relays", relay, on),
+            {TEMPERATURE_INPUT: temperature.volts},
+        )
         lcus = LcusBoard(
             LCUS_RELAYS, lambda relay, on: self._relay_moved("lcus", relay - 1, on), simulation.lcus
         )
         self._lamp_board = simulation.lamp.board
         carrier = relays if self._lamp_board == "relays" else lcus
         carrier.states[LAMP_RELAY] = simulation.initial.lamp == "on"
-        faults = simulation.faults
         hands = HandsBoard(self.room.tasks)
         for task in simulation.initial.by_hand:
             hands.do(task)

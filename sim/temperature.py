@@ -1,14 +1,33 @@
-"""The room's temperature, and what re-radiation makes of it."""
+"""The room's temperature, what re-radiation makes of it, and a sensor that shows it."""
 
 import math
-from collections.abc import Callable
+from collections.abc import Callable, Sequence
+
+import numpy as np
+
+from labrig.clock import VirtualClock
 
 from .bench_settings import TemperatureSettings
+from .faults import When
 from .sensor import AMBIENT_C
 
 #: Depth of the traps over Boltzmann's constant, K: 0.65 eV.
 TRAP_K = 0.65 / 8.617333e-5
 ZERO_C_K = 273.15
+
+#: What a TMP36 gives: 0.75 V at 25 °C and 10 mV for a degree more.
+VOLTS_AT_25, VOLTS_PER_K = 0.75, 0.01
+#: One is off by so much, 1 σ in K, and always alike.
+SENSOR_SIGMA_K = 0.3
+#: Of each conversion, 1 σ: the sensor's own, the supply's and the converter's.
+NOISE_V = 0.004
+#: What an input shows from which the sensor's wire has come off.
+OPEN_V = 5.0
+
+
+def celsius(settings: TemperatureSettings | None, time_s: float) -> float:
+    """Of the room; 21 where nothing is said, where materials were measured."""
+    return AMBIENT_C if settings is None else settings.celsius(time_s)
 
 
 def quickening(settings: TemperatureSettings | None) -> Callable[[float], float]:
@@ -21,3 +40,40 @@ def quickening(settings: TemperatureSettings | None) -> Callable[[float], float]
         return math.exp(TRAP_K * (1 / (AMBIENT_C + ZERO_C_K) - 1 / now_k))
 
     return faster
+
+
+class TemperatureSensor:
+    """A TMP36 beside the sample.
+
+    Parameters
+    ----------
+    settings
+        Of the room.
+    clock
+        The room's.
+    rng
+        Of the sensor's error and noise.
+    off
+        When its wire has come off.
+    """
+
+    def __init__(
+        self,
+        settings: TemperatureSettings | None,
+        clock: VirtualClock,
+        rng: np.random.Generator,
+        off: Sequence[When] = (),
+    ) -> None:
+        self._settings = settings
+        self._clock = clock
+        self._rng = rng
+        self._off = off
+        self._error_k = rng.normal(0.0, SENSOR_SIGMA_K)
+
+    def volts(self) -> float:
+        """What it gives now."""
+        now_s = self._clock.now()
+        if any(when.is_on(now_s) for when in self._off):
+            return OPEN_V
+        shown = celsius(self._settings, now_s) + self._error_k
+        return VOLTS_AT_25 + VOLTS_PER_K * (shown - 25.0) + self._rng.normal(0.0, NOISE_V)

@@ -34,6 +34,7 @@ from labrig.acquire.roles import (
     LedBank,
     LiveView,
     Spectrometer,
+    Thermometer,
     TrapDoor,
 )
 from labrig.acquire.runner import RunObserver, run_units
@@ -77,6 +78,7 @@ __all__ = [
     "Spectrometer",
     "Switch",
     "TakenBack",
+    "Thermometer",
     "Timed",
     "TrapDoor",
     "Unit",

@@ -217,6 +217,9 @@ class _PlanRecorder:
         self.frame_count += 1
         self._note(frame.start_s, "camera", f"{purpose} frame, {frame.settings}", late_s)
 
+    def temperature(self, celsius: float, at_s: float) -> None:
+        pass
+
     def last_by_hand(self) -> None:
         return None
 

@@ -2,10 +2,11 @@
 
 from abc import abstractmethod
 from collections.abc import Sequence
-from typing import Protocol
+from typing import Protocol, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
 
 
@@ -43,3 +44,13 @@ class ProtocolModel(BaseModel):
     @abstractmethod
     def units(self) -> Sequence[Unit]:
         """All units in order, known before anything moves."""
+
+    def suited_to(self, rig: RigFile) -> Self:
+        """The protocol with what it leaves to the rig file filled in; most leave nothing to it.
+
+        Raises
+        ------
+        UsageError
+            The rig file names what is not there.
+        """
+        return self

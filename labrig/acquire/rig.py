@@ -3,7 +3,16 @@
 from collections.abc import Iterable, Mapping
 from typing import cast
 
-from labrig.acquire.roles import SAFE_ORDER, Camera, Device, Hands, Lamp, LampShield, TrapDoor
+from labrig.acquire.roles import (
+    SAFE_ORDER,
+    Camera,
+    Device,
+    Hands,
+    Lamp,
+    LampShield,
+    Thermometer,
+    TrapDoor,
+)
 from labrig.clock import Clock
 from labrig.errors import DeviceError, DeviceLostError, LabrigError, ProtocolError
 
@@ -60,6 +69,11 @@ class Rig:
     def hands(self) -> Hands:
         """What works in a person's place; `ProtocolError` where the rig has none."""
         return cast(Hands, self._device("hands"))
+
+    @property
+    def thermometer(self) -> Thermometer:
+        """The thermometer; `ProtocolError` where the rig has none."""
+        return cast(Thermometer, self._device("thermometer"))
 
     def warm_up_s(self, key: str) -> float:
         """Seconds that device needs to become steady; 0 where the rig file says nothing."""

@@ -1,10 +1,12 @@
 """The rig file: which driver at which address, and how long each device takes to warm up."""
 
+import os
 from pathlib import Path
 from typing import Any, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from labrig import shipped
 from labrig.acquire.roles import ROLES
 from labrig.errors import UsageError
 from labrig.quantity import DurationS
@@ -49,6 +51,24 @@ class Optics(BaseModel):
     irradiance: str | None = None
     fade: str | None = None
     blank: str | None = None
+
+    def filter_files(self) -> dict[str, Path]:
+        """Name → transmittance of every colour filter: in the rig's own folder, else the shipped.
+
+        Raises
+        ------
+        UsageError
+            The folder has none.
+        """
+        shipped_ones = shipped.folder("config/optics/filters")
+        folder = shipped_ones if self.filters is None else Path(self.filters)
+        found = {path.stem: path for path in sorted(folder.glob("*.csv"))}
+        if not found:
+            raise UsageError(
+                f"{folder}: expected a table NAME.csv for every colour filter, found none; see "
+                f"{shipped_ones} for what one looks like, and 'filters' under 'optics:'"
+            )
+        return found
 
 
 class RigFile(BaseModel):
@@ -98,4 +118,4 @@ def _anchored(value: Any, folder: Path) -> Any:
 
 def _looks_like_a_path(value: str) -> bool:
     """A bare word is a shipped name, whatever lies beside the file."""
-    return bool(Path(value).suffix) or len(Path(value).parts) > 1
+    return bool(Path(value).suffix) or "/" in value or os.sep in value

@@ -178,6 +178,14 @@ class Spectrometer(Device, Protocol):
         """One reading, dark not subtracted, one value per wavelength."""
 
 
+@runtime_checkable
+class Thermometer(Device, Protocol):
+    """Tells how warm it is at the sample, or in the room. Safe: anything; one may be gone."""
+
+    def celsius(self) -> float:
+        """Temperature now, in degrees Celsius; takes seconds at most, even when it fails."""
+
+
 #: The key of a device in the rig file, and what it must be able to do.
 ROLES: dict[str, type] = {
     "lamp": Lamp,
@@ -188,6 +196,7 @@ ROLES: dict[str, type] = {
     "camera": Camera,
     "viewfinder": LiveView,
     "spectrometer": Spectrometer,
+    "thermometer": Thermometer,
 }
 
 #: Those that give light: somebody has to know if one of them may be on.

@@ -7,9 +7,16 @@ from labrig.acquire.by_hand import TakenBack
 from labrig.acquire.protocol import Unit
 from labrig.acquire.rig import Rig
 from labrig.acquire.session import Observer, Session
+from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import Frame
 from labrig.clock import Clock
-from labrig.record import TAKEN_BACK, ActionRecord, FrameRecord, RunFolder
+from labrig.record import (
+    TAKEN_BACK,
+    ActionRecord,
+    FrameRecord,
+    RunFolder,
+    TemperatureRecord,
+)
 from labrig.record.attempt import AttemptWriter
 
 T = TypeVar("T")
@@ -36,11 +43,13 @@ def run_units(
 
     A unit that ends by an exception leaves its attempt open: the caller first reaches the safe
     state, then closes the attempt with `RunFolder.close_open_attempts`. Where a person takes back
-    what was done by hand last, its unit counts no longer and is done again.
+    what was done by hand last, its unit counts no longer and is done again. The temperature is
+    read at both ends of a unit, and while it waits.
     """
+    temperature = TemperatureLog(rig, observer.warn)
     while True:
         try:
-            _run_what_is_left(units, rig, folder, observer, metadata)
+            _run_what_is_left(units, rig, folder, observer, metadata, temperature)
         except TakenBack:
             rig.make_safe()
         else:
@@ -53,6 +62,7 @@ def _run_what_is_left(
     folder: RunFolder,
     observer: RunObserver,
     metadata: Mapping[str, Any],
+    temperature: TemperatureLog,
 ) -> None:
     record = folder.read()
     done = record.completed()
@@ -64,11 +74,14 @@ def _run_what_is_left(
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
         recorder = _Recorder(rig.clock, writer, frames, actions, observer)
+        session = Session(rig, recorder, observer, temperature)
+        session.read_temperature()
         try:
-            unit.run(Session(rig, recorder, observer))
+            unit.run(session)
         except TakenBack:
             recorder.take_back()
             raise
+        session.read_temperature()
         writer.stop("success")
         frames, actions = recorder.kept, recorder.done
 
@@ -103,6 +116,11 @@ class _Recorder:
         record = ActionRecord(unit, device, action, wall(start_s), wall(end_s), late_s, task)
         self._writer.action(record)
         self.done.append(record)
+
+    def temperature(self, celsius: float, at_s: float) -> None:
+        self._writer.temperature(
+            TemperatureRecord(self._writer.unit, self._clock.wall(at_s), celsius)
+        )
 
     def last_by_hand(self) -> str | None:
         last = self._last_by_hand()

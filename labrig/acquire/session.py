@@ -13,6 +13,7 @@ from labrig.acquire.actions import Action, Missed, Shoot, Timed
 from labrig.acquire.by_hand import ByHand, TakenBack
 from labrig.acquire.rig import Rig
 from labrig.acquire.roles import Guarded, KeptAwake
+from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import ExposureSettings, Frame
 from labrig.clock import Clock
 from labrig.errors import DeviceError, LabrigError
@@ -48,6 +49,9 @@ class Recorder(Protocol):
 
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
         """A frame is to be kept."""
+
+    def temperature(self, celsius: float, at_s: float) -> None:
+        """The thermometer was read."""
 
     def last_by_hand(self) -> str | None:
         """What a person did last, in this unit or a completed one."""
@@ -89,12 +93,25 @@ class Observer(Protocol):
 
 
 class Session:
-    """One unit's hold on the bench."""
+    """One unit's hold on the bench.
 
-    def __init__(self, rig: Rig, recorder: Recorder, observer: Observer) -> None:
+    Parameters
+    ----------
+    temperature
+        Reads the thermometer, for all units of a run; None: one of this unit's own.
+    """
+
+    def __init__(
+        self,
+        rig: Rig,
+        recorder: Recorder,
+        observer: Observer,
+        temperature: TemperatureLog | None = None,
+    ) -> None:
         self.rig = rig
         self._recorder = recorder
         self._observer = observer
+        self._temperature = temperature or TemperatureLog(rig, observer.warn)
         self._in_force: ExposureSettings | None = None
         self._beaten_s = rig.clock.now()
 
@@ -186,7 +203,8 @@ class Session:
 
     def within(self, part: str) -> "Session":
         """The session of a unit of one part of a chain: it sees frames of its part only."""
-        return Session(self.rig, _PartRecorder(self._recorder, part), self._observer)
+        recorder = _PartRecorder(self._recorder, part)
+        return Session(self.rig, recorder, self._observer, self._temperature)
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         """A choice that rests on frames already taken; the plan assumes `worst`.
@@ -202,34 +220,41 @@ class Session:
         """Tell the person at the terminal."""
         self._observer.warn(text)
 
+    def read_temperature(self) -> None:
+        """Record the temperature now; in a wait that is long enough, that happens by itself."""
+        self._temperature.read(self._recorder.temperature)
+
     def _sleep_until(self, deadline_s: float) -> None:
         """Wait; keep from falling asleep what would, and from striking what guards."""
-        spoken_to = self._sleepy or self._guarded
+        spoken_to = self._sleepy or self._guarded or self._temperature.is_kept
         while spoken_to and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
             self.clock.sleep(AWAKE_PERIOD_S)
-            self._keep_awake()
+            self._look_after()
+        if deadline_s - self.clock.now() > QUIET_BEFORE_S:
+            self._temperature.read_if_due(self._recorder.temperature)
         if deadline_s - self.clock.now() > BEAT_S:
             self._beat_if_due()
         self.clock.sleep_until(deadline_s)
 
     def _meanwhile(self) -> Callable[[], None]:
-        """While a person takes an unknown time: what would fall asleep is kept awake, too."""
+        """While a person takes an unknown time: the devices are looked after, too."""
         next_s = self.clock.now() + AWAKE_PERIOD_S
 
         def look_up() -> None:
             nonlocal next_s
             self.clock.sleep(0.0)
             if self.clock.now() >= next_s:
-                self._keep_awake()
+                self._look_after()
                 next_s = self.clock.now() + AWAKE_PERIOD_S
 
         return look_up
 
-    def _keep_awake(self) -> None:
+    def _look_after(self) -> None:
         for key, device in self._sleepy.items():
             with _device_errors(key):
                 device.keep_awake()
         self._beat()
+        self._temperature.read_if_due(self._recorder.temperature)
 
     def _beat_if_due(self) -> None:
         if self.clock.now() - self._beaten_s >= AWAKE_PERIOD_S:
@@ -280,6 +305,7 @@ class _PartRecorder:
     def __init__(self, whole: Recorder, part: str) -> None:
         self.acted = whole.acted
         self.photographed = whole.photographed
+        self.temperature = whole.temperature
         self.last_by_hand = whole.last_by_hand
         self.choose = whole.choose
         self._whole = whole

@@ -8,7 +8,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labrig.optics import Bands, Lvf, WavelengthMap
+from labrig.optics import Bands, CameraResponse, Lvf, WavelengthMap
 from labrig.region import Region, region_pixels
 from labrig.yaml_file import read_model, write_yaml
 
@@ -134,6 +134,41 @@ class WavelengthColumns(_Part):
         return WavelengthMap(np.array(self.coefficients), self.span, np.array(self.covariance))
 
 
+class CurveColumns(_Part):
+    """A camera's curves; as in `labrig.optics.CameraResponse`."""
+
+    name: str
+    wavelength_nm: Numbers
+    channels: tuple[str, ...]
+    sensitivity: tuple[tuple[NotNegative, ...], ...]
+
+    @classmethod
+    def of(cls, camera: CameraResponse) -> Self:
+        """From arrays."""
+        return cls(
+            name=camera.name,
+            wavelength_nm=tuple(camera.wavelength_nm.tolist()),
+            channels=camera.channels,
+            sensitivity=tuple(tuple(row) for row in camera.sensitivity.tolist()),
+        )
+
+    @model_validator(mode="after")
+    def _one_number_each(self) -> Self:
+        rows = len(self.wavelength_nm)
+        if [len(row) for row in self.sensitivity] != [len(self.channels)] * rows:
+            raise ValueError(
+                f"expected {rows} rows of 'sensitivity', one a wavelength, with a number for each "
+                f"of {', '.join(self.channels)}"
+            )
+        return self
+
+    def response(self) -> CameraResponse:
+        """As arrays."""
+        return CameraResponse(
+            self.name, np.array(self.wavelength_nm), np.array(self.sensitivity), self.channels
+        )
+
+
 class LvfFile(_Part):
     """A calibrated linear variable filter.
 
@@ -150,6 +185,8 @@ class LvfFile(_Part):
     before_camera, on_sample
         Where the strip is seen when the camera looks through it, and where it lies on the sample
         in the pose in which the camera sees the sample.
+    camera
+        Its curves as the colour filters tell them: what the strip lets through belongs to these.
     source, run
         Where the numbers come from.
     """
@@ -163,6 +200,7 @@ class LvfFile(_Part):
     wavelengths: WavelengthColumns
     before_camera: Strip | None = None
     on_sample: Strip | None = None
+    camera: CurveColumns | None = None
     source: str = ""
     run: str | None = None
 

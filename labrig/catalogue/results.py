@@ -78,7 +78,7 @@ def read_results(run: Path, result: str = "result") -> tuple[PatchResult, ...]:
     folder = run / result
     return tuple(
         _read(path, "" if path.parent == folder else path.parent.name)
-        for path in sorted([*folder.glob("fit.json"), *folder.glob("*/fit.json")])
+        for path in sorted(folder.rglob("fit.json"))
     )
 
 

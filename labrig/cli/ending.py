@@ -4,6 +4,7 @@ import os
 import signal
 import sys
 from collections.abc import Sequence
+from typing import TextIO
 
 from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError
@@ -18,13 +19,18 @@ def guarded(arguments: Sequence[str]) -> int:
         code = _run(arguments)
         sys.stdout.flush()
     except BrokenPipeError:
-        # The reader of a pipe has gone; nobody is left to complain to.
-        os.dup2(os.open(os.devnull, os.O_WRONLY), sys.stdout.fileno())
+        # It has read what it wanted: head, less.
+        say_no_more(sys.stdout)
         code = 0
     finally:
         for signum in STOP_SIGNALS:
             signal.signal(signum, signal.SIG_IGN)
     return code
+
+
+def say_no_more(stream: TextIO) -> None:
+    """What is still written to `stream` is dropped: the reader of its pipe has gone."""
+    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _run(arguments: Sequence[str]) -> int:
@@ -41,6 +47,8 @@ def _run(arguments: Sequence[str]) -> int:
         return _complain(str(error), error.exit_code)
     except typer.Exit as ending:
         return ending.exit_code
+    except SystemExit as ending:  # Typer's own answer to a pipe without a reader
+        raise BrokenPipeError from ending
     except TyperException as error:
         return _complain(f"{error.format_message()} (see labrig --help)", 2)
     except OSError as error:
@@ -65,5 +73,8 @@ def _fault(error: Exception) -> str:
 
 
 def _complain(text: str, code: int) -> int:
-    print(f"labrig: {' '.join(text.split())}", file=sys.stderr)
+    try:
+        print(f"labrig: {' '.join(text.split())}", file=sys.stderr)
+    except BrokenPipeError:
+        say_no_more(sys.stderr)
     return code

@@ -16,6 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from labrig.acquire import ByHand, ExposureSettings, Plan, RunObserver
+from labrig.cli.ending import say_no_more
 from labrig.cli.prompt import Terminal
 from labrig.clock import Clock
 from labrig.errors import UsageError
@@ -173,7 +174,10 @@ class PlainProgress:
 
     def _say(self, text: str) -> None:
         left = _countdown(self._state.left_s())
-        print(f"[{left} left] {text}", file=sys.stderr, flush=True)
+        try:
+            print(f"[{left} left] {text}", file=sys.stderr, flush=True)
+        except BrokenPipeError:  # whoever read the log has gone; the run goes on
+            say_no_more(sys.stderr)
 
 
 class LiveProgress:

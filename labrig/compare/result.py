@@ -23,7 +23,7 @@ class MeasuredPatch:
     flicker
         As the fit found it.
     material
-        Its file.
+        Its file: that of all parts, where a chain has made one, else the decay's own.
     """
 
     series: Series
@@ -57,11 +57,15 @@ def read_patches(run: Path) -> dict[str, MeasuredPatch]:
         )
     sample = read_yaml(run / "protocol.yaml").get("sample")
     only = sample.get("name") if isinstance(sample, dict) and len(places) == 1 else None
-    patches = [_read_patch(place, only) for place in places]
+    several = len(places) > 1
+    patches = [
+        _read_patch(place, only, run / "result" / (place.name if several else ""))
+        for place in places
+    ]
     return {patch.name: patch for patch in patches}
 
 
-def _read_patch(place: Path, name: str | None) -> MeasuredPatch:
+def _read_patch(place: Path, name: str | None, of_chain: Path) -> MeasuredPatch:
     path = place / "fit.json"
     try:
         fit = json.loads(path.read_text(encoding="utf-8"))
@@ -76,5 +80,6 @@ def _read_patch(place: Path, name: str | None) -> MeasuredPatch:
     rows = np.flatnonzero(series.usable)
     by_time = rows[np.argsort(series.t_s[rows], kind="stable")]
     usable = series.take(by_time, name)
-    material = read_material(place / "material.yaml")
+    whole = of_chain / "material.yaml"
+    material = read_material(whole if whole.is_file() else place / "material.yaml")
     return MeasuredPatch(replace(usable, values=usable.values - offsets), flicker, material)

@@ -102,13 +102,20 @@ class Spectrum(_Part):
 
 
 class Provenance(_Part):
-    """Where the numbers come from."""
+    """Where the numbers come from.
+
+    Attributes
+    ----------
+    temperature_c
+        Mean while the glow was measured, in degrees Celsius: rates belong to it.
+    """
 
     source: str
     run: str | None = None
     frames: tuple[str, ...] | None = None
     version: str | None = None
     note: str | None = None
+    temperature_c: Annotated[float, Field(ge=-273.15, le=1000)] | None = None
 
 
 class Material(_Part):

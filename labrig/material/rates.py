@@ -32,9 +32,16 @@ def phi1(x: ArrayLike) -> FloatArray:
 def phi2(x: ArrayLike) -> FloatArray:
     """(1 − φ₁(x))/x for x ≥ 0; 1/2 at 0."""
     x = np.asarray(x, dtype=np.float64)
-    away = np.maximum(x, _SERIES_BELOW)
+    return _phi1_and_phi2(x, np.exp(-x))[1]
+
+
+def _phi1_and_phi2(x: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Both, of x and e⁻ˣ."""
+    near = x < _SERIES_BELOW
     series = np.polyval(_PHI2_SERIES, np.minimum(x, _SERIES_BELOW))
-    return np.where(x < _SERIES_BELOW, series, (1 - phi1(away)) / away)
+    away = np.maximum(x, _SERIES_BELOW)
+    first = (1 - left) / away
+    return np.where(near, 1 - x * series, first), np.where(near, series, (1 - first) / away)
 
 
 class Relaxation(NamedTuple):
@@ -75,14 +82,17 @@ def relaxation(kappa_per_s: ArrayLike, k_r_per_s: ArrayLike, duration_s: ArrayLi
     return Relaxation(np.exp(-x), kappa * tau * phi1(x))
 
 
-def relaxation_slopes(
+def relaxation_with_slopes(
     kappa_per_s: ArrayLike, k_r_per_s: ArrayLike, duration_s: ArrayLike
-) -> RelaxationSlopes:
-    """Derivatives of `relaxation` by its rates; φ₁' = φ₂ − φ₁."""
+) -> tuple[Relaxation, RelaxationSlopes]:
+    """The same and its derivatives by the rates, from one exponential; φ₁' = φ₂ − φ₁."""
     kappa, tau = np.asarray(kappa_per_s, dtype=np.float64), np.asarray(duration_s)
     x = (kappa + np.asarray(k_r_per_s)) * tau
-    slope = kappa * tau**2 * (phi2(x) - phi1(x))
-    return RelaxationSlopes(-tau * np.exp(-x), tau * phi1(x) + slope, slope)
+    kept = np.exp(-x)
+    first, second = _phi1_and_phi2(x, kept)
+    by_kappa, gained = tau * first, kappa * tau
+    slope = gained * tau * (second - first)
+    return Relaxation(kept, gained * first), RelaxationSlopes(-tau * kept, by_kappa + slope, slope)
 
 
 def concentration(

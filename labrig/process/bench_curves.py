@@ -5,6 +5,7 @@ from pathlib import Path
 
 from labrig import shipped
 from labrig.acquire import RigFile
+from labrig.calibration import LvfFile
 from labrig.errors import UsageError
 from labrig.optics import (
     CameraResponse,
@@ -20,8 +21,14 @@ from labrig.yaml_file import did_you_mean
 _SUFFIX = ".csv"
 
 
-def camera_curves(rig: RigFile, choices: Choices) -> CameraResponse:
-    """Of the rig's camera, or those a person wants instead."""
+def camera_curves(rig: RigFile, choices: Choices, lvf: LvfFile | None = None) -> CameraResponse:
+    """Those a person wants, else as the calibration of a filter found them, else the rig's.
+
+    Of a filter and a camera it is their product that a calibration knows best: whoever reads light
+    through the filter takes both from it.
+    """
+    if choices.camera is None and lvf is not None and lvf.camera is not None:
+        return lvf.camera.response()
     return read_camera(choices.camera or _named(rig.optics.camera, "camera"))
 
 
@@ -43,12 +50,10 @@ def filter_transmittances(rig: RigFile, names: Sequence[str]) -> list[Transmitta
     UsageError
         There is no file of that name in the rig's folder.
     """
-    named = rig.optics.filters
-    folder = shipped.folder("config/optics/filters") if named is None else Path(named)
-    files = {path.stem: path for path in sorted(folder.glob(f"*{_SUFFIX}"))}
+    files = rig.optics.filter_files()
     if unknown := [name for name in names if name not in files]:
         raise UsageError(
-            f"{folder}: no file for the colour filter '{unknown[0]}'; "
+            f"{next(iter(files.values())).parent}: no file for the colour filter '{unknown[0]}'; "
             f"{did_you_mean(unknown[0], list(files))}"
         )
     return [read_transmittance(files[name]) for name in names]

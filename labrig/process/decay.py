@@ -20,6 +20,7 @@ from labrig.process.result_folder import (
     write_provenance,
 )
 from labrig.process.series_fit import fit_series
+from labrig.process.temperature import glow_temperature_c, temperature_warnings
 from labrig.process.this_camera import insist_on_this_camera
 from labrig.process.timed_frames import IntactFrames, intact_frames, timing_warnings
 from labrig.record import RunRecord, read_run
@@ -48,7 +49,7 @@ def process_decay(folder: Path, choices: Choices) -> Result:
     series, fits = measured.series, measured.fits
     states = choices.states or _asked_states(protocol)
     camera, unknown_camera = camera_response(rig, choices.camera)
-    run_warnings = (*measured.run_warnings, *unknown_camera)
+    run_warnings = (*measured.run_warnings, *unknown_camera, *temperature_warnings(run))
     warnings = (*run_warnings, *fit_warnings(fits))
 
     made = new_result(folder)
@@ -64,10 +65,11 @@ def process_decay(folder: Path, choices: Choices) -> Result:
             camera.name if camera else None,
         ),
     )
+    warmth_c = glow_temperature_c(run)
     for name, fit in fits.items():
         place = made if len(fits) == 1 else made / name
         material = protocol.sample.name if len(fits) == 1 else name
-        write_patch(place, series[name], fit, material, run_name(run))
+        write_patch(place, series[name], fit, material, run_name(run), warmth_c)
     page = run_report(
         run, protocol, rig, patches, series, fits, warnings, frames.daylight, camera, states
     )

@@ -7,6 +7,7 @@ from labrig.fit import DecayFit
 from labrig.process.decay import fit_warnings, measure_decay
 from labrig.process.result_folder import write_patch
 from labrig.process.stage import Stage, StageResult
+from labrig.process.temperature import glow_temperature_c
 from labrig.report.decay_figures import linear_decay, logarithmic_decay
 from labrig.report.residual_figure import residual_figure
 from labrig.report.sections import Picture, Section, Table
@@ -30,8 +31,8 @@ def process(stage: Stage) -> StageResult:
     run = stage.run.folder.resolve().name
     pictures = []
     for name, fit in fits.items():
-        place = stage.folder if len(fits) == 1 else stage.folder / name
-        write_patch(place, found.series[name], fit, name, run)
+        place = stage.folder if len(found.fits) == 1 else stage.folder / name
+        write_patch(place, found.series[name], fit, name, run, glow_temperature_c(stage.run))
         series, file = found.series[name], name.replace(" ", "-").lower()
         pictures += [
             Picture(f"linear-{file}", linear_decay(series, fit), f"{name}: signal after lamp off."),

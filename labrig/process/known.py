@@ -1,7 +1,7 @@
 """What is known of a bench before a stage is processed."""
 
-from collections.abc import Callable
-from dataclasses import dataclass
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self, TypeVar
 
@@ -28,18 +28,18 @@ FileT = TypeVar("FileT")
 
 @dataclass(frozen=True)
 class Known:
-    """Calibrations and earlier results; None where nothing is known.
+    """Calibrations and earlier results; None or empty where nothing is known.
 
     Attributes
     ----------
     camera, blank, fade, lvf, irradiance
         From a rig file's `optics:`, or measured earlier in the same run.
-    spectrum
-        Of the sample.
+    spectra
+        By patch; under "" of the only one.
     decays
         By patch.
-    material
-        As excitation, decay and spectrum together say.
+    materials
+        As excitation, decay and spectrum together say, by patch; under "" the only one.
     """
 
     camera: CameraFile | None = None
@@ -47,9 +47,9 @@ class Known:
     fade: FadeFile | None = None
     lvf: LvfFile | None = None
     irradiance: IrradianceFile | None = None
-    spectrum: EmissionSpectrum | None = None
-    decays: dict[str, DecayFit] | None = None
-    material: Material | None = None
+    spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)
+    decays: Mapping[str, DecayFit] = field(default_factory=dict)
+    materials: Mapping[str, Material] = field(default_factory=dict)
 
     @classmethod
     def of(cls, rig: RigFile) -> Self:

@@ -10,10 +10,11 @@ from labrig.optics import CameraResponse, read_camera
 from labrig.process.choices import DecayProtocol
 from labrig.process.history import charges_s, interruptions, written_time
 from labrig.process.provenance import library_versions
+from labrig.process.temperature import temperature_sections
 from labrig.record import FrameRecord, RunRecord, read_notes
 from labrig.reduce import Series
 from labrig.region import Region
-from labrig.report import DeviceLine, GlowPhotograph, PatchReport, RunReport
+from labrig.report import DeviceLine, GlowPhotograph, PatchReport, RunReport, figure_style
 
 #: Photographs of the glow: dense where it changes most.
 GLOW_SHARES = (0.0, 0.03, 0.09, 0.22, 0.5, 1.0)
@@ -36,6 +37,8 @@ def run_report(
     first = attempts[0].start
     identities: Mapping[str, str] = first.get("devices", {})
     sample = protocol.sample.model_dump(exclude={"name"}, exclude_none=True)
+    with figure_style():
+        sections = temperature_sections(run)
     return RunReport(
         title=protocol.sample.name,
         run=run_name(run),
@@ -65,6 +68,8 @@ def run_report(
         states=states,
         interruptions=interruptions(run),
         notes=read_notes(run.folder),
+        sections=sections,
+        actions=tuple(action for attempt in attempts for action in attempt.actions),
     )
 
 

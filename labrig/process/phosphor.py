@@ -1,4 +1,7 @@
-"""A chain of protocols, from its frames to one material: each part uses what earlier ones found."""
+"""A chain of protocols, from its frames to a material of each patch.
+
+Each part uses what earlier ones found.
+"""
 
 from dataclasses import replace
 
@@ -12,7 +15,7 @@ from labrig.report import Section
 
 
 def process(stage: Stage) -> StageResult:
-    """Process every part into a folder of its own.
+    """Process every part into a folder of its own; materials of several patches have one each.
 
     A part that cannot be processed is a warning, as long as another one can.
 
@@ -37,14 +40,16 @@ def process(stage: Stage) -> StageResult:
             found = replace(found, warnings=(*found.warnings, f"{part.name}: {error}"))
     if not found.sections:
         raise failures[0]
-    material = found.known.material
-    if material is None:
-        return found
-    write_material(stage.folder / "material.yaml", material)
-    return replace(found, sections=(*_beside_the_paper(material), *found.sections))
+    sections: list[Section] = []
+    for patch, material in found.known.materials.items():
+        place = stage.folder / patch
+        place.mkdir(exist_ok=True)
+        write_material(place / "material.yaml", material)
+        sections += _beside_the_paper(f"Material: {patch}" if patch else "Material", material)
+    return replace(found, sections=(*sections, *found.sections))
 
 
-def _beside_the_paper(material: Material) -> tuple[Section, ...]:
+def _beside_the_paper(title: str, material: Material) -> tuple[Section, ...]:
     """The material beside the shipped one of its name, such as of Table 1, if there is one."""
     known = shipped.names("config/materials")
     if material.name not in known:
@@ -52,7 +57,7 @@ def _beside_the_paper(material: Material) -> tuple[Section, ...]:
     reference = read_material(known[material.name])
     source = reference.provenance.source if reference.provenance else "labrig"
     text = f"What was measured, beside {material.name} of {source}."
-    return (Section("Material", (text,), (), (beside(material, reference).table(),)),)
+    return (Section(title, (text,), (), (beside(material, reference).table(),)),)
 
 
 def _joined(before: StageResult, after: StageResult, name: str) -> StageResult:

@@ -53,16 +53,34 @@ def write_provenance(made: Path, provenance: StageProvenance) -> None:
     write_yaml(made / "provenance.yaml", provenance)
 
 
-def write_patch(place: Path, series: Series, fit: DecayFit | str, material: str, run: str) -> None:
-    """Write series.csv and, where there is a fit, fit.json and material.yaml into `place`."""
+def write_patch(
+    place: Path,
+    series: Series,
+    fit: DecayFit | str,
+    material: str,
+    run: str,
+    temperature_c: float | None = None,
+) -> None:
+    """Write series.csv and, where there is a fit, fit.json and material.yaml into `place`.
+
+    Parameters
+    ----------
+    material, run
+        Names.
+    temperature_c
+        At which it decayed, if somebody knows.
+    """
     place.mkdir(exist_ok=True)
     write_series(place / "series.csv", [series])
     if isinstance(fit, DecayFit):
         (place / "fit.json").write_text(fit.to_json(), encoding="utf-8", newline="\n")
-        write_material(place / "material.yaml", _material(series, fit, material, run))
+        made = _material(series, fit, material, run, temperature_c)
+        write_material(place / "material.yaml", made)
 
 
-def _material(series: Series, fit: DecayFit, name: str, run: str) -> Material:
+def _material(
+    series: Series, fit: DecayFit, name: str, run: str, temperature_c: float | None
+) -> Material:
     """What the decay alone says: rates and amplitudes; r0, k_e and Λ stay unknown."""
     return Material(
         name=name,
@@ -81,5 +99,6 @@ def _material(series: Series, fit: DecayFit, name: str, run: str) -> Material:
             run=run,
             frames=series.frame,
             version=version("labrig"),
+            temperature_c=temperature_c,
         ),
     )

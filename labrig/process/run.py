@@ -1,6 +1,8 @@
 """A run of any protocol, from its folder to its result."""
 
 from collections import Counter
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
@@ -13,8 +15,11 @@ from labrig.process.provenance import StageProvenance, library_versions
 from labrig.process.result import Result
 from labrig.process.result_folder import new_result, put_in_place, write_provenance
 from labrig.process.stage import Stage, StageResult
-from labrig.record import RunRecord, read_notes, read_run
+from labrig.process.temperature import temperature_sections, temperature_warnings
+from labrig.record import Attempt, RunRecord, read_notes, read_run
 from labrig.report import DeviceLine, StagePage, figure_style, write_stage_page
+from labrig.report.sections import Section
+from labrig.report.timing import moves_text
 
 
 def process_run(folder: Path, choices: Choices | None = None) -> Result:
@@ -42,6 +47,11 @@ def process_run(folder: Path, choices: Choices | None = None) -> Result:
     made = new_result(folder)
     with figure_style():
         found: StageResult = process(Stage(run, protocol, rig, choices, Known.of(rig), made))
+        found = replace(
+            found,
+            sections=(*found.sections, *temperature_sections(run)),
+            warnings=(*found.warnings, *temperature_warnings(run)),
+        )
         write_stage_page(made / "report.html", _page(run, protocol, rig, found))
     write_provenance(made, _provenance(run, choices))
     changes = put_in_place(made)
@@ -71,10 +81,15 @@ def _page(run: RunRecord, protocol: ProtocolModel, rig: RigFile, found: StageRes
         rig_text=(run.folder / "rig.yaml").read_text(encoding="utf-8"),
         frames=tuple(frame for attempt in attempts for frame in attempt.frames),
         warnings=found.warnings,
-        sections=found.sections,
+        sections=(*found.sections, *_timing(attempts)),
         interruptions=interruptions(run),
         notes=read_notes(run.folder),
     )
+
+
+def _timing(attempts: Sequence[Attempt]) -> Iterator[Section]:
+    if said := moves_text([action for attempt in attempts for action in attempt.actions]):
+        yield Section("Timing", (said,))
 
 
 def _provenance(run: RunRecord, choices: Choices) -> StageProvenance:

@@ -6,6 +6,7 @@ from labrig.record.frames import (
     TAKEN_BACK,
     ActionRecord,
     FrameRecord,
+    TemperatureRecord,
     unit_in,
     unit_within,
 )
@@ -23,6 +24,7 @@ __all__ = [
     "FrameRecord",
     "RunFolder",
     "RunRecord",
+    "TemperatureRecord",
     "add_note",
     "read_notes",
     "read_run",

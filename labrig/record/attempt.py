@@ -10,7 +10,7 @@ import event_model
 
 from labrig.record.disk import Disk
 from labrig.record.durable import write_durably
-from labrig.record.frames import ActionRecord, FrameRecord
+from labrig.record.frames import ActionRecord, FrameRecord, TemperatureRecord
 from labrig.record.journal import Journal
 
 _ACTION_KEYS: dict[str, str] = {
@@ -21,6 +21,7 @@ _ACTION_KEYS: dict[str, str] = {
     "late_s": "number",
     "task": "string",
 }
+_TEMPERATURE_KEYS: dict[str, str] = {"time": "number", "temperature_c": "number"}
 _FRAME_KEYS: dict[str, str] = {
     "frame": "string",
     "sha256": "string",
@@ -87,6 +88,14 @@ class AttemptWriter:
             "actions",
             _ACTION_KEYS,
             {key: getattr(record, key) for key in _ACTION_KEYS},
+        )
+
+    def temperature(self, record: TemperatureRecord) -> None:
+        """Write one reading of the thermometer."""
+        self._event(
+            "temperatures",
+            _TEMPERATURE_KEYS,
+            {key: getattr(record, key) for key in _TEMPERATURE_KEYS},
         )
 
     def frame(

@@ -1,4 +1,4 @@
-"""What is known of a recorded photograph and of anything else that was done."""
+"""What is known of a recorded photograph and of anything else that was done or read."""
 
 from dataclasses import dataclass
 from pathlib import Path
@@ -71,3 +71,12 @@ class ActionRecord:
     def is_by_hand(self) -> bool:
         """Whether a person did it."""
         return self.device == PERSON
+
+
+@dataclass(frozen=True)
+class TemperatureRecord:
+    """One reading of the thermometer; `time` in seconds since 1970."""
+
+    unit: str
+    time: float
+    temperature_c: float

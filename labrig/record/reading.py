@@ -8,14 +8,23 @@ from typing import Any, TypeVar
 from pydantic import TypeAdapter, ValidationError
 
 from labrig.errors import DataError
-from labrig.record.frames import TAKEN_BACK, ActionRecord, FrameRecord, unit_within
+from labrig.record.frames import (
+    TAKEN_BACK,
+    ActionRecord,
+    FrameRecord,
+    TemperatureRecord,
+    unit_within,
+)
 from labrig.record.journal import Document, read_journal
 
 #: End of the year 9999 in seconds since 1970: no calendar reaches further.
 LATEST = 253_402_300_799.0
+#: No thermometer on a bench reads more, or as little, in degrees Celsius.
+HOTTEST_C = 1000.0
 
 Recorded = TypeVar("Recorded", FrameRecord, ActionRecord)
 _FRAME, _ACTION = TypeAdapter(FrameRecord), TypeAdapter(ActionRecord)
+_TEMPERATURE = TypeAdapter(TemperatureRecord)
 
 
 @dataclass(frozen=True)
@@ -32,6 +41,7 @@ class Attempt:
     reason: str = ""
     frames: list[FrameRecord] = field(default_factory=list)
     actions: list[ActionRecord] = field(default_factory=list)
+    temperatures: list[TemperatureRecord] = field(default_factory=list)
 
     @property
     def completed(self) -> bool:
@@ -76,6 +86,11 @@ class RunRecord:
             if frame.purpose == purpose
         ]
 
+    def temperatures(self) -> list[TemperatureRecord]:
+        """All readings of the thermometer by time, those of attempts that failed included."""
+        readings = [reading for attempt in self.attempts for reading in attempt.temperatures]
+        return sorted(readings, key=lambda reading: reading.time)
+
 
 def _within(part: str, attempt: Attempt) -> Attempt | None:
     unit = unit_within(part, attempt.unit)
@@ -86,6 +101,7 @@ def _within(part: str, attempt: Attempt) -> Attempt | None:
         unit=unit,
         frames=[replace(frame, unit=unit) for frame in attempt.frames],
         actions=[replace(action, unit=unit) for action in attempt.actions],
+        temperatures=[replace(reading, unit=unit) for reading in attempt.temperatures],
     )
 
 
@@ -138,6 +154,9 @@ def _take(
         elif stream == "actions":
             action = _ACTION.validate_python({**data, "unit": attempt.unit})
             attempt.actions.append(_dated(action))
+        elif stream == "temperatures":
+            reading = _TEMPERATURE.validate_python({**data, "unit": attempt.unit})
+            attempt.temperatures.append(_sensible(reading))
 
 
 def _opened(doc: dict[str, Any]) -> Attempt:
@@ -148,7 +167,11 @@ def _opened(doc: dict[str, Any]) -> Attempt:
 
 
 def _closed(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
-    held = {"frames": len(attempt.frames), "actions": len(attempt.actions)}
+    held = {
+        "frames": len(attempt.frames),
+        "actions": len(attempt.actions),
+        "temperatures": len(attempt.temperatures),
+    }
     for stream, number in dict(doc.get("num_events", {})).items():
         if stream in held and held[stream] != number:
             raise ValueError(f"it counts {number} {stream}, there are {held[stream]}")
@@ -159,6 +182,13 @@ def _dated(record: Recorded) -> Recorded:
     _seconds(record.start_time)
     _seconds(record.end_time)
     return record
+
+
+def _sensible(reading: TemperatureRecord) -> TemperatureRecord:
+    _seconds(reading.time)
+    if not abs(reading.temperature_c) <= HOTTEST_C:
+        raise ValueError(f"{reading.temperature_c} °C is no temperature")
+    return reading
 
 
 def _seconds(time: float) -> float:

@@ -116,7 +116,11 @@ class RunFolder:
         """
         opened = [attempt for attempt in self.read().attempts if attempt.exit_status is None]
         for attempt in opened:
-            counts = {"frames": len(attempt.frames), "actions": len(attempt.actions)}
+            counts = {
+                "frames": len(attempt.frames),
+                "actions": len(attempt.actions),
+                "temperatures": len(attempt.temperatures),
+            }
             self._journal.append(
                 "stop",
                 {

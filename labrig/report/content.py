@@ -4,9 +4,10 @@ from dataclasses import dataclass, field
 
 from labrig.fit import DecayFit
 from labrig.optics import CameraResponse
-from labrig.record.frames import FrameRecord
+from labrig.record.frames import ActionRecord, FrameRecord
 from labrig.reduce import Series
 from labrig.region import Region
+from labrig.report.sections import Section
 
 #: What every decay measured with a camera rests on, for `RunReport.assumptions`.
 DECAY_ASSUMPTIONS = (
@@ -122,8 +123,12 @@ class RunReport:
         Attempts that failed, by time.
     notes
         What a person had to say afterwards.
+    sections
+        What else is known of the run, after the timing.
     assumptions
         What the numbers rest on, one sentence or two each.
+    actions
+        What devices did; lamp, shield and door tell the timing.
     """
 
     title: str
@@ -149,4 +154,6 @@ class RunReport:
     states: int | None = None
     interruptions: tuple[Interruption, ...] = ()
     notes: str = ""
+    sections: tuple[Section, ...] = ()
     assumptions: tuple[str, ...] = field(default=DECAY_ASSUMPTIONS)
+    actions: tuple[ActionRecord, ...] = ()

@@ -21,10 +21,11 @@ from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
 from labrig.report.plates import Plate, Plates
 from labrig.report.residual_figure import residual_figure
 from labrig.report.run_figures import overview_figures, timing_figure
+from labrig.report.shown import Shown, draw
 from labrig.report.stability import Repeat, Steady, repeats, steady
 from labrig.report.swatches import Swatch, swatches
 from labrig.report.template import dated_notes, environment, script, style
-from labrig.report.timing import Lateness, frame_timings, lateness
+from labrig.report.timing import Lateness, frame_timings, lateness, moves_text
 
 TEMPLATE = "report.html.j2"
 #: With more patches than this, photographs show their numbers and not their names.
@@ -78,7 +79,8 @@ def write_report(path: Path, report: RunReport) -> None:
         timing = None
         if timings:
             timing = plates.add(timing_figure(timings), "timing", "Lateness of the frames")
-    text = _page(report, screen, patches, lateness(timings), timing)
+        shown = draw(report.sections, plates)
+    text = _page(report, screen, patches, lateness(timings), timing, shown)
     try:
         path.write_text(text, encoding="utf-8", newline="\n")
         plates.write(path.parent)
@@ -92,6 +94,7 @@ def _page(
     patches: Sequence[_Patch],
     late: Lateness | None,
     timing: Plate | None,
+    shown: Sequence[Shown],
 ) -> str:
     templates = environment()
     templates.globals.update(
@@ -112,7 +115,9 @@ def _page(
         notes=dated_notes(report.notes),
         patches=patches,
         late=late,
+        moves=moves_text(report.actions),
         timing=timing,
+        shown=shown,
         repeated=list(dict.fromkeys(one.unit for item in patches for one in item.repeats)),
         methods=methods(report, sensor_of(photographed), late),
         references=REFERENCES,

@@ -11,13 +11,11 @@ from labrig.record.frames import FrameRecord
 from labrig.region import region_pixels
 from labrig.report.content import RunReport
 from labrig.report.photographs import Sensor
-from labrig.report.timing import DECAY, Lateness
+from labrig.report.timing import DECAY, ON_TIME_S, Lateness
 from labrig.report.written_numbers import exposure_text, rounded
 
 #: Durations and exposures that differ by less are said as one.
 ALIKE = 0.02
-#: Nobody asks how much less late than this a frame was.
-ON_TIME_S = 1e-4
 
 
 def recording(report: RunReport, sensor: Sensor | None, late: Lateness | None) -> Iterator[str]:

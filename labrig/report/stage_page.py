@@ -8,8 +8,9 @@ from markupsafe import Markup
 from labrig.errors import DiskError
 from labrig.record.frames import FrameRecord
 from labrig.report.content import DeviceLine, Interruption
-from labrig.report.plates import Plate, Plates
+from labrig.report.plates import Plates
 from labrig.report.sections import Section
+from labrig.report.shown import draw
 from labrig.report.template import dated_notes, environment, script, style
 
 TEMPLATE = "stage.html.j2"
@@ -56,14 +57,6 @@ class StagePage:
     camera: None = None
 
 
-@dataclass(frozen=True)
-class _Shown:
-    """A section whose figures are drawn; captions stand beside them."""
-
-    section: Section
-    plates: tuple[tuple[Plate, str], ...]
-
-
 def write_stage_page(path: Path, page: StagePage) -> None:
     """Write `page` to `path`, its figures into a folder `figures` beside it; in `figure_style`.
 
@@ -73,7 +66,7 @@ def write_stage_page(path: Path, page: StagePage) -> None:
         `path` cannot be written.
     """
     with Plates(f"{page.title}, {page.run}") as plates:
-        shown = [_shown(number, section, plates) for number, section in enumerate(page.sections, 1)]
+        shown = draw(page.sections, plates)
     text = (
         environment()
         .get_template(TEMPLATE)
@@ -90,14 +83,3 @@ def write_stage_page(path: Path, page: StagePage) -> None:
         plates.write(path.parent)
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
-
-
-def _shown(number: int, section: Section, plates: Plates) -> _Shown:
-    drawn = [
-        (
-            plates.add(one.figure, f"{number}-{one.name}", f"{section.title}: {one.name}"),
-            one.caption,
-        )
-        for one in section.figures
-    ]
-    return _Shown(section, tuple(drawn))

@@ -11,6 +11,7 @@ from labrig.acquire import (
     LampShield,
     LiveView,
     Rig,
+    Thermometer,
     TrapDoor,
 )
 from labrig.bench import Bench
@@ -31,8 +32,8 @@ def check_rig(stand: Bench) -> RigReport:
     """Open the rig, look at every device, bring it to its safe state.
 
     The lamp is lit for some hundredths of a second, three times; trap door and shield go there and
-    back once; the camera takes four frames; a viewfinder shows one picture. A camera whose settings
-    would spoil photometry takes none.
+    back once; the camera takes four frames; a viewfinder shows one picture; a thermometer is read
+    once. A camera whose settings would spoil photometry takes none.
 
     Raises
     ------
@@ -80,6 +81,8 @@ def _checked(key: str, device: Device, clock: Clock) -> DeviceReport:
             report = replace(report, measured=_swing(ways, device.travel_s(), clock))
         elif isinstance(device, Camera):
             report = exercise_camera(report, device, clock)
+        elif isinstance(device, Thermometer):
+            report = replace(report, measured=_read(device, clock))
     except LabrigError as error:
         report = replace(report, failure=str(error))
     except Exception as error:  # a fault of a driver must not hide what the others do
@@ -129,6 +132,15 @@ def _look_through(viewfinder: LiveView, clock: Clock) -> tuple[Measured, ...]:
     return (
         Measured("live picture", f"{width} x {height} pixels, {len(jpeg) / 1e3:.1f} kB"),
         Measured("until it was shown", f"{shown_s * 1e3:.0f} ms"),
+    )
+
+
+def _read(thermometer: Thermometer, clock: Clock) -> tuple[Measured, ...]:
+    asked_s = clock.now()
+    celsius = thermometer.celsius()
+    return (
+        Measured("temperature", f"{celsius:.1f} °C"),
+        Measured("until it was read", f"{(clock.now() - asked_s) * 1e3:.0f} ms"),
     )
 
 

@@ -12,24 +12,24 @@ from scipy.optimize import minimize_scalar
 
 FloatArray = NDArray[np.float64]
 
-#: Places whose glow is chosen by: the brightest, where noise does not decide.
+#: Places of a patch whose glow is chosen by: the brightest, where noise does not decide.
 BRIGHTEST = 6
 #: Charge times that are weighed against each other.
 CANDIDATES = 33
 
 
 def still_grows(glows: FloatArray, growth: float) -> bool:
-    """Whether the last charge glowed brighter than the one before.
+    """Whether any patch glowed brighter after the last charge than after the one before.
 
     Parameters
     ----------
     glows
-        (charges, places), in the order of the charges.
+        (charges, patches, places), in the order of the charges.
     growth
         Less than this share is none.
     """
-    before, last = (_bright(glows)[row].sum() for row in (-2, -1))
-    return bool(last > (1 + growth) * before)
+    before, last = _bright(glows)[-2:].sum(axis=2)
+    return bool((last > (1 + growth) * before).any())
 
 
 def most_telling_s(charges_s: Sequence[float], glows: FloatArray) -> float:
@@ -43,12 +43,12 @@ def most_telling_s(charges_s: Sequence[float], glows: FloatArray) -> float:
     charges_s
         (charges,) done so far.
     glows
-        (charges, places) just after each.
+        (charges, patches, places) just after each.
     """
     done_s, bright = np.asarray(charges_s, dtype=np.float64), _bright(glows)
     candidates_s = np.geomspace(done_s.min(), done_s.max(), CANDIDATES)
     gain = np.zeros(CANDIDATES)
-    for place in bright.T:
+    for place in bright.reshape(len(done_s), -1).T:
         s = _rate(done_s, place)
         known = _slopes(done_s, s)
         information = known.T @ known
@@ -58,8 +58,9 @@ def most_telling_s(charges_s: Sequence[float], glows: FloatArray) -> float:
 
 
 def _bright(glows: FloatArray) -> FloatArray:
-    order = np.argsort(-glows[-1], kind="stable")[:BRIGHTEST]
-    return np.maximum(glows[:, order], 1e-9)
+    """(charges, patches, places) of every patch's brightest places."""
+    order = np.argsort(-glows[-1], axis=1, kind="stable")[:, :BRIGHTEST]
+    return np.maximum(np.take_along_axis(glows, order[np.newaxis], axis=2), 1e-9)
 
 
 def _rate(charges_s: FloatArray, glow: FloatArray) -> float:

@@ -1,7 +1,8 @@
-"""What patches may be called: each name is a folder of the result."""
+"""What patches may be called, each name is a folder of the result; how they lie below a filter."""
 
 import re
 import unicodedata
+from itertools import combinations
 from typing import Annotated, Any
 
 from pydantic import AfterValidator, BeforeValidator
@@ -51,5 +52,32 @@ def _folders(patches: dict[str, Region]) -> dict[str, Region]:
     return patches
 
 
+def _in_words_or_none(patches: Any) -> dict[str, Any]:
+    return {} if patches in (None, {}) else _in_words(patches)
+
+
+def _one_above_the_other(patches: dict[str, Region]) -> dict[str, Region]:
+    """Refuse patches that share rows; pixels and fractions cannot be held against each other."""
+    for (name, (_, y, _, high)), (other, (_, other_y, _, other_high)) in combinations(
+        patches.items(), 2
+    ):
+        alike = (max(patches[name]) <= 1) == (max(patches[other]) <= 1)
+        if alike and y < other_y + other_high and other_y < y + high:
+            raise ValueError(
+                "expected patches one above the other, each in rows of its own and as long as the "
+                f"filter, got '{name}' in rows {y:g} to {y + high:g} and '{other}' in rows "
+                f"{other_y:g} to {other_y + other_high:g}"
+            )
+    return patches
+
+
 #: Regions of interest by name.
 Patches = Annotated[dict[str, Region], BeforeValidator(_in_words), AfterValidator(_folders)]
+
+#: Rows of different materials below one strip of the variable filter; none: all of it is one.
+FilterPatches = Annotated[
+    dict[str, Region],
+    BeforeValidator(_in_words_or_none),
+    AfterValidator(_folders),
+    AfterValidator(_one_above_the_other),
+]

@@ -1,12 +1,16 @@
 """A Numato relay board as its serial line shows it: echo, value, prompt."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Mapping
 
 CHANNELS = "0123456789ABCDEFGHIJKLMNOPQRSTUV"
+#: The converter's largest number, and what it stands for: the supply from the USB port.
+FULL, SUPPLY_V = 1023, 5.0
+#: Analogue inputs; one with nothing on it floats up.
+INPUTS = 4
 
 
 class NumatoBoard:
-    """Understands `relay on|off|read N`, `relay readall|writeall`, `ver` and `id get`.
+    """Understands `relay on|off|read N`, `relay readall|writeall`, `adc read N`, `ver`, `id get`.
 
     Parameters
     ----------
@@ -14,11 +18,19 @@ class NumatoBoard:
         Number of relays.
     on_change
         Called with (relay, on) whenever a contact moves.
+    volts
+        Analogue input → what is there now; all others are open.
     """
 
-    def __init__(self, relays: int, on_change: Callable[[int, bool], None]) -> None:
+    def __init__(
+        self,
+        relays: int,
+        on_change: Callable[[int, bool], None],
+        volts: Mapping[int, Callable[[], float]] | None = None,
+    ) -> None:
         self.states = [False] * relays
         self._on_change = on_change
+        self._volts = dict(volts or {})
         self._typed = ""
 
     def receive(self, data: bytes) -> bytes:
@@ -49,7 +61,13 @@ class NumatoBoard:
                 relay := self._relay(channel)
             ) is not None:
                 self._set(relay, state == "on")
+            case ["adc", "read", channel] if len(channel) == 1 and channel in CHANNELS[:INPUTS]:
+                return f"{self._converted(CHANNELS.index(channel)):04d}"
         return ""
+
+    def _converted(self, number: int) -> int:
+        volts = self._volts[number]() if number in self._volts else SUPPLY_V
+        return min(max(round(volts / SUPPLY_V * FULL), 0), FULL)
 
     def _relay(self, channel: str) -> int | None:
         relay = CHANNELS.find(channel) if len(channel) == 1 else -1

@@ -1,11 +1,14 @@
-"""A real sensor with 18 channels reads narrow-band light: its peaks, found by labrig's fit.
+"""A real sensor with 18 channels reads narrow-band light: its peaks, found by labrig's fits.
 
     python -m tests.acceptance.lightlogger
 
-The channels' sensitivities are fitted on two of three wavelengths at full intensity, from what a
+The channels' sensitivities are fitted on some of the wavelengths at full intensity, from what a
 spectroradiometer saw; then the wavelengths held out, at four intensities, are told from the 18
-readings alone; three times, so that every wavelength is held out once. Printed: how far each peak
-is off the spectroradiometer's.
+readings alone: as the centre of a line as wide as those it was trained on (`fit_line`), and, for
+comparison, as the highest peak of a spectrum that need only be smooth (`fit_spectrum`). Every third
+wavelength is held out, three times, so that all are once; every second, twice; and a third of them
+at random, five times. Printed: how far each peak is off the spectroradiometer's, what σ the fit
+states, and what σ noise alone would leave if the sensitivities were known.
 """
 
 import csv
@@ -15,7 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.spectrum import SpectralSystem, fit_spectrum
+from labrig.fit.spectrum import LineFit, SpectralSystem, fit_line, fit_spectrum
 from labrig.optics import Spectrum, read_curve_file
 from labrig.optics.piecewise import hats, quadrature
 
@@ -118,39 +121,110 @@ def peak_nm(light: Spectrum) -> float:
     return float((fine[peak] * value[peak]).sum() / value[peak].sum())
 
 
-def peak_errors(first_nm: int, percents: tuple[int, ...]) -> dict[tuple[int, int], float]:
-    """(Nominal wavelength, per cent) → estimated minus measured peak in nm, of what is held out.
+def fwhm_nm(light: Spectrum) -> float:
+    """Wavelengths above half of the highest."""
+    fine = np.arange(370.0, 790.0, 0.1)
+    value = light.at(fine)
+    return 0.1 * float(np.count_nonzero(value > value.max() / 2))
+
+
+@dataclass(frozen=True)
+class Told:
+    """A peak that was held out.
+
+    Attributes
+    ----------
+    nominal_nm, percent
+        What was set.
+    error_nm
+        `line`'s centre minus the measured peak.
+    line
+        What was found.
+    noise_sigma_nm, smooth_error_nm
+        For comparison: σ if the sensitivities were exact, and the error of the highest peak of a
+        smooth spectrum; NaN where not wanted.
+    """
+
+    nominal_nm: int
+    percent: int
+    error_nm: float
+    line: LineFit
+    noise_sigma_nm: float
+    smooth_error_nm: float
+
+
+def told(held_out: set[int], percents: tuple[int, ...], compared: bool = False) -> list[Told]:
+    """All peaks held out where the sensor sees, found without them.
 
     Parameters
     ----------
-    first_nm
-        The shortest wavelength held out; every third one from there on is, too.
+    held_out
+        Nominal wavelengths.
+    percents
+        Intensities; trained is at `TRAINED_PCT`.
+    compared
+        Whether to fit what it is compared with, too.
     """
-    held_out = set(range(first_nm, 781, 30))
     trained = [s for s in settings(TRAINED_PCT) if s.nominal_nm not in held_out]
-    system, errors = sensor(trained), {}
+    system, found = sensor(trained), []
+    exact = SpectralSystem(system.knots_nm, system.design)
+    width_nm = float(np.median([fwhm_nm(setting.light) for setting in trained]))
     for percent in percents:
         for setting in settings(percent):
-            nm = setting.nominal_nm
-            if nm in held_out and SEEN_NM[0] <= nm <= SEEN_NM[1]:
-                fit = fit_spectrum(setting.reading, setting.sigma, system, samples=100)
-                estimated = Spectrum("estimate", fit.knots_nm, fit.value)
-                errors[nm, percent] = peak_nm(estimated) - peak_nm(setting.light)
-    return errors
+            nm, reading, sigma = setting.nominal_nm, setting.reading, setting.sigma
+            if nm not in held_out or not SEEN_NM[0] <= nm <= SEEN_NM[1]:
+                continue
+            true_nm, noise_nm, smooth_nm = peak_nm(setting.light), np.nan, np.nan
+            line = fit_line(reading, sigma, system, width_nm)
+            if compared:
+                known = fit_line(reading, sigma, exact, width_nm)
+                noise_nm = known.sigma_nm / max(1.0, known.misfit)
+                smooth = fit_spectrum(reading, sigma, system, samples=100)
+                smooth_nm = peak_nm(Spectrum("estimate", smooth.knots_nm, smooth.value))
+            error_nm = line.wavelength_nm - true_nm
+            found.append(Told(nm, percent, error_nm, line, noise_nm, smooth_nm - true_nm))
+    return found
+
+
+def every(number: int) -> list[set[int]]:
+    """Wavelengths held out in turn, every second or third."""
+    return [set(range(first, 781, 10 * number)) for first in range(380, 380 + 10 * number, 10)]
+
+
+def at_random(times: int) -> list[set[int]]:
+    """A third of the wavelengths, drawn anew each time."""
+    rng = np.random.default_rng(0)
+    every_nm = np.arange(380, 781, 10)
+    return [set(rng.choice(every_nm, 14, replace=False).tolist()) for _ in range(times)]
+
+
+def _distribution(name: str, errors_nm: list[float]) -> None:
+    marks = np.percentile(np.abs(errors_nm), [25, 50, 75, 90, 100])
+    print(f"{name:<34}{len(errors_nm):>5}" + "".join(f"{mark:>7.1f}" for mark in marks))
 
 
 def main() -> None:
-    """Print errors by wavelength and intensity, and their distribution."""
-    errors: dict[tuple[int, int], float] = {}
-    for first_nm in (380, 390, 400):
-        errors |= peak_errors(first_nm, INTENSITIES_PCT)
+    """Print errors by wavelength and intensity, and their distributions."""
+    thirds = [one for nm in every(3) for one in told(nm, INTENSITIES_PCT, compared=True)]
+    errors = {(one.nominal_nm, one.percent): one.error_nm for one in thirds}
     print("held out   " + "".join(f"{percent:8d} %" for percent in INTENSITIES_PCT))
     for nm in sorted({nm for nm, _ in errors}):
         row = "".join(f"{errors[nm, percent]:+9.1f} " for percent in INTENSITIES_PCT)
         print(f"{nm:6d} nm  {row}")
-    marks = np.percentile(np.abs(list(errors.values())), [25, 50, 75, 90, 100])
-    print("|peak error| of", len(errors), "in nm: quartiles", end=" ")
-    print("{:.1f} {:.1f} {:.1f}, 90 % {:.1f}, worst {:.1f}".format(*marks))
+    print(f"\n{'|peak error| in nm':<34}{'n':>5}   25 %   50 %   75 %   90 %  worst")
+    _distribution("every third held out", [one.error_nm for one in thirds])
+    _distribution("  peak of a smooth spectrum", [one.smooth_error_nm for one in thirds])
+    halves = [one for held_out in every(2) for one in told(held_out, INTENSITIES_PCT)]
+    _distribution("every second held out", [one.error_nm for one in halves])
+    drawn = [one for held_out in at_random(5) for one in told(held_out, INTENSITIES_PCT)]
+    _distribution("a third at random held out", [one.error_nm for one in drawn])
+    over_sigma = np.array([one.error_nm / one.line.sigma_nm for one in thirds])
+    stated = np.median([one.line.sigma_nm for one in thirds])
+    noise = np.median([one.noise_sigma_nm for one in thirds])
+    print(
+        f"\nσ stated {stated:.2f} nm (median), of noise alone {noise:.2f} nm; rms of error over σ "
+        f"{np.sqrt(np.mean(over_sigma**2)):.1f}"
+    )
 
 
 if __name__ == "__main__":

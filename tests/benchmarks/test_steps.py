@@ -96,6 +96,9 @@ class NothingRecorded:
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
         pass
 
+    def temperature(self, celsius: float, at_s: float) -> None:
+        pass
+
     def last_by_hand(self) -> None:
         return None
 

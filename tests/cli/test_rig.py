@@ -11,6 +11,7 @@ import pytest
 import yaml
 
 from labrig import shipped
+from labrig.errors import DeviceError
 from tests.conftest import Ended
 
 Report = dict[str, Any]
@@ -146,7 +147,7 @@ def test_an_unsafe_end_is_shown_beside_what_was_found(
     def fail_at_the_end(self: Any) -> None:
         made_safe.append(1)
         if len(made_safe) > 1:
-            raise shipped.load("drivers.numato").DeviceError("the relay is welded")
+            raise DeviceError("the relay is welded")
 
     monkeypatch.setattr(numato, "make_safe", fail_at_the_end)
     ended = labrig("rig", "check", make_rig(), "--json")

@@ -9,7 +9,7 @@ from labrig.errors import FitError
 from labrig.fit.excitation import Charge, ChargingSeries, ExcitationFit, Transient, Uncertain
 from labrig.fit.excitation import fit_excitation as fit
 from labrig.fit.excitation.levels import levels, levels_at_off
-from labrig.fit.excitation.problem import ExcitationProblem, Rates
+from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.material import Material, read_material
 from tests.fit.charged_samples import DOOR_S, Bench, lvf_windows, two_states
 
@@ -140,18 +140,16 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
         series, 2, 1, Uncertain(0.005, 0.01, cold=0.03, scale=0.02, offset=(0.1, 0.2, 0.3))
     )
     random = np.random.default_rng(3)
-    rates = Rates(
+    theta = problem.parameters.as_stated(
         np.array([0.07, 0.02]),
         np.array([2500.0, 500.0]),
         random.uniform(0.001, 0.1, (2, 8)),
         np.array([0.3, 1.0, 0.7]),
-        np.array([0.0, 0.01]),
-        np.full(6, 0.005),
-        np.array([0.02]),
-        random.normal(0, 1.0, 3),
-        np.array([0.3, -0.2, 0.1]),
     )
-    theta = problem.pack(rates)
+    columns = problem.parameters.columns
+    theta[columns.scale], theta[columns.brightness], theta[columns.lacking] = 0.01, 0.005, 0.02
+    theta[columns.off] = random.normal(0, 1.0, 3)
+    theta[columns.offset] = 0.3, -0.2, 0.1
     problem.rewhiten(theta)
     _, jacobian = problem.residuals(theta)
     # Of a charge that leaves something to the next one, the derivative is not quite exact.

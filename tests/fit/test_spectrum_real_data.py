@@ -39,9 +39,8 @@ def test_the_colour_checker_through_the_filter() -> None:
 
 
 def test_peaks_told_by_a_real_sensor_of_18_channels() -> None:
-    errors: list[float] = []
-    for first_nm in (380, 390, 400):
-        errors += lightlogger.peak_errors(first_nm, (30,)).values()
+    found = [one for held_out in lightlogger.every(3) for one in lightlogger.told(held_out, (30,))]
+    errors = np.abs([one.error_nm for one in found])
     assert len(errors) == 31
-    assert np.median(np.abs(errors)) < 4.0
-    assert np.abs(errors).max() < 15.0
+    assert np.median(errors) < 2.0
+    assert errors.max() < 10.0

@@ -55,7 +55,7 @@ def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path
 
 
 @cache
-def true_lvf_file() -> LvfFile:
+def true_lvf_file(width: int = WIDTH, height: int = HEIGHT) -> LvfFile:
     """What a calibration without error would find of the shipped rig's LVF before the camera."""
     content = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
     settings = LvfSettings.model_validate(content["simulation"]["lvf"])
@@ -65,13 +65,13 @@ def true_lvf_file() -> LvfFile:
         rising=settings.before_camera.rising,
     )  # fmt: skip
     of_piece = Lvf(settings).seen(settings.before_camera, turned=False)
-    piece = pieces(settings.before_camera, WIDTH, HEIGHT)
+    piece = pieces(settings.before_camera, width, height)
     passed = []
     for region in strip.slices().values():
-        left, top, across, down = region_pixels(region, WIDTH, HEIGHT)
+        left, top, across, down = region_pixels(region, width, height)
         passed.append(of_piece[piece[top : top + down, left : left + across]].mean(axis=(0, 1)))
     transmission = np.array(passed)
-    position = np.array(strip.positions(WIDTH, HEIGHT))
+    position = np.array(strip.positions(width, height))
     centre = Lvf(settings).centre_nm(position)
     even = np.ones_like(centre)
     peak = transmission.max(axis=1)

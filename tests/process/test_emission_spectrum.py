@@ -22,7 +22,7 @@ from labrig.process.emission_spectrum import (
     read_emission_spectrum,
     write_emission_spectrum,
 )
-from labrig.process.emission_spectrum.bench import spectral_bench
+from labrig.process.emission_spectrum.bench import spectral_benches
 from labrig.process.emission_spectrum.constancy import compared, differ, over_time
 from labrig.process.emission_spectrum.picture import Pictures, combined, visible
 from labrig.process.emission_spectrum.reading import read_places
@@ -91,8 +91,7 @@ def found(blue: Path) -> StageResult:
 
 
 def test_the_spectrum_is_the_samples(blue: Path, found: StageResult) -> None:
-    spectrum = found.known.spectrum
-    assert spectrum is not None
+    spectrum = found.known.spectra[""]
     difference, in_sigma = error(spectrum, "blue-paint")
     assert max(spectrum.value) == 1
     assert np.sqrt(np.mean(difference**2)) < 0.025
@@ -149,8 +148,7 @@ def test_a_white_picture_mends_the_curves_of_another_laboratory(tmp_path: Path) 
     white = frozenset(frame.path.name for frame in read_run(run).frames("white"))
     errors = []
     for name, excluded in (("with", frozenset[str]()), ("without", white)):
-        spectrum = processed(run, tmp_path / name, excluded=excluded).known.spectrum
-        assert spectrum is not None
+        spectrum = processed(run, tmp_path / name, excluded=excluded).known.spectra[""]
         difference, in_sigma = error(spectrum, "blue-paint")
         assert np.abs(in_sigma).max() < 4.5
         errors.append(float(np.sqrt(np.mean(difference**2))))
@@ -197,7 +195,7 @@ def test_a_monochrome_camera_will_do(blue: Path, tmp_path: Path) -> None:
                      np.exp(-(((np.arange(380.0, 721.0, 5.0) - 530) / 35) ** 2)))  # fmt: skip
     dark = np.full((HEIGHT, 10 * WIDTH), 4.0)
     darks = [monochrome_dng(tmp_path / f"dark{number}.dng", dark) for number in range(2)]
-    bench = spectral_bench(stage, darks[0])
+    (bench,) = spectral_benches(stage, darks[0])[0].values()
     seen = bench.seen_of(light)
     scene = dark.copy()
     for region, value in zip(bench.slices.values(), seen / seen.max(), strict=True):
@@ -207,7 +205,8 @@ def test_a_monochrome_camera_will_do(blue: Path, tmp_path: Path) -> None:
         monochrome_dng(tmp_path / f"glow{'-' * number}.dng", scene / (1 + number))
         for number in range(2)
     ]
-    picture = combined(read_places(frames, darks, bench.slices, None).pictures("spectrum"))
+    (read,) = read_places(frames, darks, {"": bench.slices}, None).values()
+    picture = combined(read.pictures("spectrum"))
     fit = fit_spectrum(picture.value, picture.sigma, bench.system)
     value = np.array(EmissionSpectrum.of(fit, "green", "halogen", "run").value)
     true = light.in_bands(made.EDGES_NM)
@@ -216,8 +215,7 @@ def test_a_monochrome_camera_will_do(blue: Path, tmp_path: Path) -> None:
 
 
 def test_bands_of_a_spectrum_carry_its_covariance(found: StageResult) -> None:
-    spectrum = found.known.spectrum
-    assert spectrum is not None
+    spectrum = found.known.spectra[""]
     edges = np.arange(400.0, 701.0, 37.5)
     value, covariance = spectrum.in_bands(edges)
     draws = np.random.default_rng(0).multivariate_normal(

@@ -7,6 +7,7 @@ import numpy as np
 import pytest
 
 from labrig.errors import DataError
+from labrig.process import process_run
 from labrig.process.isotropy import View, process
 from labrig.process.stage import Stage
 from labrig.report import figure_style
@@ -46,3 +47,9 @@ def test_around_a_whole_sample_the_cosine_is_divided_out(tmp_path: Path) -> None
         process(stage)
     for angle, view in views(stage).items():
         assert view.ratio * np.cos(np.radians(angle)) == pytest.approx(1.0, abs=0.03)
+
+
+def test_the_report_tells_how_late_shield_and_door_were(tmp_path: Path) -> None:
+    page = process_run(record(tmp_path, QUICK | {"angles": [80]})).report.read_text()
+    assert "shield cover at most" in page
+    assert "door open at most 0 ms" in page

@@ -43,7 +43,10 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 def test_a_chain_that_was_killed_and_resumed_ends_in_one_material(run: Path) -> None:
     result = process_run(run)
-    (state,) = read_material(run / "result" / "material.yaml").states
+    material = read_material(run / "result" / "material.yaml")
+    (state,) = material.states
+    assert material.provenance is not None
+    assert material.provenance.temperature_c == pytest.approx(21, abs=1)
     assert state.k_r_per_s == pytest.approx(0.032, rel=0.02)
     assert state.k_e_per_s is not None
     assert state.k_e_per_s[1] / 4 == pytest.approx(0.05, rel=0.2)

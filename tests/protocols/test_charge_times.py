@@ -11,13 +11,23 @@ DOUBLED_S: FloatArray = np.geomspace(8.0, 256.0, 6)
 
 
 def glow(charge_s: FloatArray, rates_per_s: FloatArray) -> FloatArray:
-    return 100 * (1 - np.exp(-np.multiply.outer(charge_s, rates_per_s)))
+    """Of one patch."""
+    return 100 * (1 - np.exp(-np.multiply.outer(charge_s, rates_per_s)))[:, np.newaxis]
 
 
 def test_doubling_ends_when_the_glow_has_stopped_growing() -> None:
     glows = glow(DOUBLED_S, np.full(9, 0.05))
     grew = [still_grows(glows[: n + 2], 0.03) for n in range(len(DOUBLED_S) - 1)]
     assert grew == [True, True, True, True, False]
+
+
+def test_the_slowest_patch_decides_when_it_has_stopped_however_dim_it_is() -> None:
+    quick, slow = glow(DOUBLED_S, np.full(9, 0.05)), 0.01 * glow(DOUBLED_S, np.full(9, 0.005))
+    assert not still_grows(quick, 0.03)
+    assert still_grows(np.concatenate([quick, slow], axis=1), 0.03)
+    chosen_s = most_telling_s(list(DOUBLED_S), np.concatenate([slow, quick], axis=1))
+    alone_s = [most_telling_s(list(DOUBLED_S), patch) for patch in (quick, slow)]
+    assert min(alone_s) <= chosen_s <= max(alone_s)
 
 
 @given(st.floats(0.005, 0.1), st.floats(1.0, 1.5))
@@ -35,7 +45,7 @@ def _log_determinants(charges_s: FloatArray, rates: FloatArray) -> float:
     total = 0.0
     for rate in rates:
         h = 1e-5
-        up, down = (np.log(glow(charges_s, np.full(1, rate * np.exp(d)))) for d in (h, -h))
+        up, down = (np.log(glow(charges_s, np.full(1, rate * np.exp(d))))[:, 0] for d in (h, -h))
         slopes = np.hstack([np.ones((len(charges_s), 1)), (up - down) / (2 * h)])
         total += float(np.linalg.slogdet(slopes.T @ slopes)[1])
     return total
@@ -43,6 +53,6 @@ def _log_determinants(charges_s: FloatArray, rates: FloatArray) -> float:
 
 def test_dim_places_have_no_say() -> None:
     bright = glow(DOUBLED_S, np.full(6, 0.02))
-    noise = np.random.default_rng(1).normal(0.0, 0.1, (len(DOUBLED_S), 20))
-    both = np.hstack([noise, bright])
+    noise = np.random.default_rng(1).normal(0.0, 0.1, (len(DOUBLED_S), 1, 20))
+    both = np.concatenate([noise, bright], axis=2)
     assert most_telling_s(list(DOUBLED_S), both) == most_telling_s(list(DOUBLED_S), bright)

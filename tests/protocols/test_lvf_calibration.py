@@ -1,5 +1,6 @@
 """The LVF's calibration: its timeline, what it refuses, and what it finds in the simulated room."""
 
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -82,6 +83,38 @@ def test_a_misspelt_or_impossible_key_is_one_clear_line(
         plugins.read_protocol(path)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+@pytest.mark.parametrize("in_a_chain", [False, True])
+def test_all_filters_are_those_that_the_rig_has(
+    write: Make, make_rig: Make, tmp_path: Path, in_a_chain: bool
+) -> None:
+    own = tmp_path / "my filters"
+    own.mkdir()
+    for name in ("shortpass-585", "longpass-440"):
+        table = shipped.folder("config/optics/filters") / f"{name}.csv"
+        shutil.copy(table, own / f"mine-{name}.csv")
+    rig = make_rig(base="sim-phosphor", filters=str(own))
+    content = yaml.safe_load(rig.read_text())
+    content["optics"]["filters"] = "./my filters"
+    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    rig.write_text(yaml.safe_dump(content))
+    protocol = write(filters="all")
+    if in_a_chain:
+        parts = [yaml.safe_load(protocol.read_text())]
+        protocol.write_text(yaml.safe_dump({"protocol": "phosphor", "parts": parts}))
+    recording = Recording.prepare(protocol, rig, tmp_path)
+    units = [name.split("/")[-1] for name in recording.plan.units]
+    filters = [name for name in units if name.startswith("filter-")]
+    assert filters == ["filter-none", "filter-mine-longpass-440", "filter-mine-shortpass-585"]
+    # What is recorded holds for resume and processing, whatever becomes of the folder.
+    recorded = recording.protocol.model_dump(mode="json", by_alias=True)
+    (tmp_path / "recorded.yaml").write_text(yaml.safe_dump(recorded))
+    again = plugins.read_protocol(tmp_path / "recorded.yaml")
+    assert tuple(unit.name for unit in again.units()) == recording.plan.units
+    shutil.rmtree(own)
+    with pytest.raises(UsageError, match="expected a table NAME"):
+        Recording.prepare(protocol, rig, tmp_path)
 
 
 class Person(Watching):

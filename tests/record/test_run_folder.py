@@ -9,8 +9,8 @@ from typing import Any
 import event_model
 import pytest
 
-from labrig.errors import DiskError, UsageError
-from labrig.record import ActionRecord, FrameRecord, RunFolder, read_run
+from labrig.errors import DataError, DiskError, UsageError
+from labrig.record import ActionRecord, FrameRecord, RunFolder, TemperatureRecord, read_run
 from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import read_journal
 
@@ -59,14 +59,32 @@ def test_a_completed_attempt_is_read_back_and_fits_event_model(
         writer = folder.attempt("dark", wall, {"rig": "sim"})
         frame = photograph(writer, b"raw data", "dark")
         writer.action(ActionRecord("dark", "lamp", "on", STARTED, STARTED + 0.1, 0.0))
+        warmth = TemperatureRecord("dark", STARTED + 0.5, 21.25)
+        writer.temperature(warmth)
         writer.stop("success")
         record = folder.read()
     assert frame.path.read_bytes() == b"raw data"
     assert frame.sha256 == hashlib.sha256(b"raw data").hexdigest()
     assert record.frames("dark") == [frame]
     assert record.completed()["dark"].actions[0].action == "on"
+    assert record.temperatures() == [warmth]
     for name, doc in read_journal(folder.path / "journal.jsonl").documents:
         event_model.schema_validators[event_model.DocumentNames[name]].validate(doc)
+
+
+@pytest.mark.parametrize("written", ["1e999", "-3000", "null", '"warm"'])
+def test_a_temperature_that_cannot_be_is_refused(
+    tmp_path: Path, wall: Callable[[], float], written: str
+) -> None:
+    with make(tmp_path) as folder:
+        writer = folder.attempt("dark", wall, {})
+        writer.temperature(TemperatureRecord("dark", STARTED, 21.25))
+    path = folder.path / "journal.jsonl"
+    path.write_text(
+        path.read_text().replace('"temperature_c": 21.25', f'"temperature_c": {written}')
+    )
+    with pytest.raises(DataError, match="was changed after the run"):
+        read_run(folder.path)
 
 
 def test_only_success_counts_and_the_last_success_wins(

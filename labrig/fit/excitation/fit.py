@@ -12,7 +12,8 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import FitError
 from labrig.fit.excitation.levels import levels_at_off
-from labrig.fit.excitation.problem import ExcitationProblem, Rates, Uncertain
+from labrig.fit.excitation.parameters import Rates, Uncertain
+from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.excitation.result import ExcitationFit, ExcitedState, LevelAtOff
 from labrig.fit.excitation.series import ChargingSeries, bands_of
 from labrig.fit.excitation.start import starts
@@ -58,7 +59,7 @@ def fit_excitation(
     reference = _brightest(series)
     problem = ExcitationProblem(series, len(rates), reference, uncertain)
     begin = starts(problem, rates, np.asarray(shares, dtype=np.float64), reference)
-    found = min((_least(problem, problem.pack(start), ROUGH) for start in begin), key=_chi2)
+    found = min((_least(problem, start, ROUGH) for start in begin), key=_chi2)
     for _ in range(WHITENINGS):
         problem.rewhiten(found.parameters)
         found = _least(problem, found.parameters, FINE)
@@ -81,7 +82,7 @@ def _least(problem: ExcitationProblem, start: FloatArray, tolerance: float) -> L
     return least_squares(
         problem.residuals,
         start,
-        lower=problem.lower(),
+        lower=problem.parameters.lower(),
         max_iterations=MAX_ITERATIONS,
         tolerance=tolerance,
     )
@@ -94,8 +95,8 @@ def _chi2(fit: LeastSquaresFit) -> float:
 def _result(
     problem: ExcitationProblem, found: LeastSquaresFit, reference: int, uncertain: Uncertain
 ) -> ExcitationFit:
-    n, bands = problem.states, problem.bands
-    rates, theta = problem.unpack(found.parameters), found.parameters
+    n, bands = problem.parameters.states, problem.parameters.bands
+    rates, theta = problem.parameters.unpack(found.parameters), found.parameters
     own = 2 * n + n * bands
     scale = np.ones(len(theta))
     scale[:n] = rates.k_r_per_s
@@ -134,7 +135,7 @@ def _result(
         channel_weights_sigma=weights_sigma,
         at_off=at_off,
         chi2=found.chi2,
-        dof=problem.n_values + len(problem.prior_sigma) - found.rank,
+        dof=problem.n_values + len(problem.parameters.prior_sigma) - found.rank,
         covariance=whole[np.ix_(kept, kept)],
         warnings=tuple(_warnings(problem, found, states)),
         residuals=problem.plain_residuals(theta),
@@ -145,7 +146,7 @@ def _at_off(
     problem: ExcitationProblem, rates: Rates, covariance: FloatArray, order: NDArray[np.intp]
 ) -> tuple[LevelAtOff, ...]:
     """The brightest lamp-off of every series, σ by linear propagation."""
-    n, bands = problem.states, problem.bands
+    n, bands = problem.parameters.states, problem.parameters.bands
     found = []
     for one in problem.lit(rates):
         level = levels_at_off(one, rates.k_r_per_s, rates.k_e_per_s)

@@ -1,16 +1,18 @@
 """How charged every site is at every photograph, with derivatives: exact steps, no integrator.
 
 κ = Σ_j k_e,j E_j is constant within a step: the steady lamp is one, its rise and fade a few dozen.
-Steps are affine in r, so that derivatives of the end of a charge are one sum over them.
+Steps are affine in r, and so is a charge: all charges of a series are worked out at once, each from
+r = 0, and only then follow one another.
 """
 
 from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
-from labrig.fit.excitation.series import Charge, ChargingSeries
+from labrig.fit.excitation.series import ChargingSeries
 from labrig.fit.least_squares import FloatArray
-from labrig.material.rates import phi1, phi2, relaxation, relaxation_slopes
+from labrig.material.rates import phi1, phi2, relaxation_with_slopes
 
 
 class Levels(NamedTuple):
@@ -30,8 +32,17 @@ class Levels(NamedTuple):
     by_k_r: FloatArray
     by_k_e: FloatArray
 
+    def of(self, which: NDArray[np.intp]) -> "Levels":
+        """Some of them, in the order wanted."""
+        return Levels(self.value[which], self.by_k_r[which], self.by_k_e[which])
+
+    def meaned(self, places: int) -> "Levels":
+        """Of sites that stand one after the other for each of so many places within them."""
+        parts = (part.reshape(len(part), places, -1, *part.shape[2:]) for part in self)
+        return Levels(*(part.mean(axis=1) for part in parts))
+
     def decayed(self, k_r_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray) -> "Levels":
-        """In the dark: means over exposures (n,) that begin `t_s` (n,) later; of one level each."""
+        """In the dark: means over exposures (n,) that begin `t_s` (n,) later."""
         t, x = t_s[:, None, None], exposure_s[:, None, None] * k_r_per_s
         mean = phi1(x)
         left = np.exp(-k_r_per_s * t) * mean
@@ -43,6 +54,25 @@ class Levels(NamedTuple):
         )
 
 
+class _Charges(NamedTuple):
+    """What K charges, from lamp-on to the end of the fade, do to r: r → kept r + gained.
+
+    Attributes
+    ----------
+    lasted_s, dose
+        (K,) and (K, P, B) s, −∂ ln kept by k_r and by k_e.
+    kept
+        (K, P, N).
+    gained
+        Levels, n = K, reached from 0.
+    """
+
+    lasted_s: FloatArray
+    dose: FloatArray
+    kept: FloatArray
+    gained: Levels
+
+
 def levels(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
     """Of all photographs of a series.
 
@@ -51,11 +81,15 @@ def levels(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
     k_r_per_s, k_e_per_s
         (N,) and (N, B).
     """
-    shots = [
-        end.decayed(k_r_per_s, charge.start_s - dark_s, charge.exposure_s)
-        for charge, dark_s, end in _charged(series, k_r_per_s, k_e_per_s)
-    ]
-    return Levels(*(np.concatenate(parts) for parts in zip(*shots, strict=True)))
+    if series.across is not None:
+        every = levels(series.spread(), k_r_per_s, k_e_per_s)
+        return every.meaned(len(series.across))
+    charges = series.charges
+    shots = [len(charge.start_s) for charge in charges]
+    start_s = np.concatenate([charge.start_s for charge in charges])
+    exposure_s = np.concatenate([charge.exposure_s for charge in charges])
+    ended = _ended(series, k_r_per_s, k_e_per_s).of(np.repeat(np.arange(len(charges)), shots))
+    return ended.decayed(k_r_per_s, start_s - np.repeat(_dark_s(series), shots), exposure_s)
 
 
 def levels_at_off(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
@@ -63,70 +97,81 @@ def levels_at_off(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: Floa
 
     The fade itself charges a little: this is the r(0) to which the amplitude of a decay belongs.
     """
-    back = [
-        end.decayed(k_r_per_s, np.array([charge.off_s - dark_s]), np.zeros(1))
-        for charge, dark_s, end in _charged(series, k_r_per_s, k_e_per_s)
-    ]
-    return Levels(*(np.concatenate(parts) for parts in zip(*back, strict=True)))
+    none = np.zeros(len(series.charges))
+    ended = _ended(series, k_r_per_s, k_e_per_s)
+    return ended.decayed(k_r_per_s, none - series.fade.total_s, none)
 
 
-def _charged(
-    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
-) -> list[tuple[Charge, float, Levels]]:
-    """Every charge, when the lamp is dark after it, and the levels then, n = 1."""
-    sites, bands = series.irradiance.shape
-    shape = (1, sites, len(k_r_per_s))
-    never = Levels(np.zeros(shape), np.zeros(shape), np.zeros((*shape, bands)))
-    full = never._replace(value=np.ones(shape))
-    fading_s = np.array([series.fade.total_s])
-    found: list[tuple[Charge, float, Levels]] = []
-    level, since_s = never, series.charges[0].on_s
-    for charge in series.charges:
+def _dark_s(series: ChargingSeries) -> FloatArray:
+    """(K,) when the lamp is dark after each charge."""
+    return np.array([charge.off_s for charge in series.charges]) + series.fade.total_s
+
+
+def _ended(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
+    """After every charge, when the lamp is dark, n = K."""
+    alone = _alone(series, k_r_per_s, k_e_per_s)
+    on_s = np.array([charge.on_s for charge in series.charges])
+    waited_s = on_s[1:] - _dark_s(series)[:-1]
+    value, by_k_r, by_k_e = alone.gained
+    for number, charge in enumerate(series.charges):
         if charge.saturated:
-            level = full.decayed(k_r_per_s, fading_s, np.zeros(1))
-        else:
-            waited = level.decayed(k_r_per_s, np.array([charge.on_s - since_s]), np.zeros(1))
-            begin = never if charge.fresh else waited
-            level = _lit(begin, charge, series, k_r_per_s, k_e_per_s)
-        since_s = charge.off_s + series.fade.total_s
-        found.append((charge, since_s, level))
-    return found
+            value[number] = np.exp(-k_r_per_s * series.fade.total_s)
+            by_k_r[number] = -series.fade.total_s * value[number]
+            by_k_e[number] = 0.0
+        elif number and not charge.fresh:
+            before, wait_s = number - 1, float(waited_s[number - 1])
+            left = alone.kept[number] * np.exp(-k_r_per_s * wait_s)
+            lasted_s = alone.lasted_s[number] + wait_s
+            value[number] += left * value[before]
+            by_k_r[number] += left * (by_k_r[before] - lasted_s * value[before])
+            by_k_e[number] += left[..., None] * (
+                by_k_e[before] - value[before, ..., None] * alone.dose[number, :, None]
+            )
+    return alone.gained
 
 
-def _lit(
-    begin: Levels,
-    charge: Charge,
-    series: ChargingSeries,
-    k_r_per_s: FloatArray,
-    k_e_per_s: FloatArray,
-) -> Levels:
-    """From switching on until the lamp is dark."""
-    duration_s, share = _steps(charge, series)
-    light = charge.brightness * share[:, None, :] * series.irradiance
-    kappa = light @ k_e_per_s.T
-    tau = duration_s[:, None, None]
-    step, slopes = relaxation(kappa, k_r_per_s, tau), relaxation_slopes(kappa, k_r_per_s, tau)
-    before = np.empty_like(kappa)
-    level = begin.value[0]
+def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> _Charges:
+    """Every charge for itself."""
+    duration_s, share = _steps(series)
+    brightness = np.array([charge.brightness for charge in series.charges])
+    sites, bands = series.irradiance.shape
+    shape = (len(brightness), sites, len(k_r_per_s))
+    # Sites and states in one axis, and all charges' steps side by side: long rows for numpy.
+    k_r = np.tile(k_r_per_s, sites)
+    of_steady = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
+    kappa = brightness[:, None] * (share @ of_steady.T)[:, None, :]
+    tau = duration_s[:, :, None]
+    step, slopes = relaxation_with_slopes(kappa, k_r, tau)
+    before = np.zeros((len(tau) + 1, *kappa.shape[1:]))
     for number in range(len(tau)):
-        before[number] = level
-        level = step.kept[number] * level + step.gained[number]
+        np.multiply(step.kept[number], before[number], out=before[number + 1])
+        before[number + 1] += step.gained[number]
     # What is left at the end of a change after each step, and of one before the first.
-    after = np.cumprod(step.kept[::-1], axis=0)[::-1]
-    whole, later = after[0], np.concatenate([after[1:], np.ones((1, *level.shape))])
-    by_kappa = later * (slopes.kept * before + slopes.gained_by_kappa)
-    by_k_r = (later * (slopes.kept * before + slopes.gained_by_k_r)).sum(axis=0)
-    by_k_e = np.einsum("mpn,mpb->pnb", by_kappa, light)
-    return Levels(
-        level[None],
-        (whole * begin.by_k_r[0] + by_k_r)[None],
-        (whole[..., None] * begin.by_k_e[0] + by_k_e)[None],
+    after = np.ones_like(before)
+    np.cumprod(step.kept[::-1], axis=0, out=after[-2::-1])
+    by_kappa = after[1:] * (slopes.kept * before[:-1] + slopes.gained_by_kappa)
+    by_k_r = (after[1:] * (slopes.kept * before[:-1] + slopes.gained_by_k_r)).sum(axis=0)
+    by_share = (by_kappa.reshape(len(tau), -1).T @ share).reshape(*shape, bands)
+    light = brightness[:, None, None] * series.irradiance
+    return _Charges(
+        duration_s.sum(axis=0),
+        light * (duration_s.T @ share)[:, None, :],
+        after[0].reshape(shape),
+        Levels(
+            before[-1].reshape(shape),
+            by_k_r.reshape(shape),
+            by_share * light[:, :, None, :],
+        ),
     )
 
 
-def _steps(charge: Charge, series: ChargingSeries) -> tuple[FloatArray, FloatArray]:
-    """(m,) durations of the steps, (m, B) irradiance of the bands in each over the steady one."""
+def _steps(series: ChargingSeries) -> tuple[FloatArray, FloatArray]:
+    """(m, K) durations of the steps, (m, B) irradiance of the bands in each over the steady one."""
     rise, fade = series.rise, series.fade
-    steady_s = charge.off_s - charge.on_s - rise.total_s
-    duration_s = np.concatenate([rise.duration_s, [steady_s], fade.duration_s])
+    steady_s = [charge.off_s - charge.on_s - rise.total_s for charge in series.charges]
+    changes = len(rise.duration_s), len(fade.duration_s)
+    duration_s = np.empty((sum(changes) + 1, len(steady_s)))
+    duration_s[: changes[0]] = rise.duration_s[:, None]
+    duration_s[changes[0]] = steady_s
+    duration_s[changes[0] + 1 :] = fade.duration_s[:, None]
     return duration_s, np.vstack([rise.share, np.ones(rise.share.shape[1]), fade.share])

@@ -5,7 +5,7 @@ by different wavelengths, or samples under the bare lamp.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Self
 
@@ -110,6 +110,9 @@ class ChargingSeries:
     site_modes
         (M, P, B) ln of the sites' irradiance in every band may be off by Σ_m z_m site_modes[m], the
         z_m independent and of unit variance, the same at every charge; None: exact.
+    across
+        (Q, P, B) irradiance at Q places within every site that stand for it, over the site's: where
+        light is uneven, a mean level is not the level of the mean light. None: it is even.
     """
 
     name: str
@@ -120,6 +123,14 @@ class ChargingSeries:
     values: FloatArray
     sigma: FloatArray
     site_modes: FloatArray | None = None
+    across: FloatArray | None = None
+
+    def spread(self) -> Self:
+        """The same with every place within the sites a site of its own, place by place."""
+        if self.across is None:
+            return self
+        irradiance = (self.across * self.irradiance).reshape(-1, self.irradiance.shape[1])
+        return replace(self, irradiance=irradiance, across=None)
 
     def checked(self) -> Self:
         """Itself, if nothing is wrong with it.

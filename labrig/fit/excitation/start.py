@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 
 from labrig.fit.excitation.levels import levels
-from labrig.fit.excitation.problem import ExcitationProblem, Rates
+from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.excitation.series import ChargingSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.nonnegative import nonnegative_least_squares
@@ -18,8 +18,8 @@ KAPPA_OVER_K_R = np.geomspace(1e-5, 1e3, 65)
 
 def starts(
     problem: ExcitationProblem, k_r_per_s: FloatArray, shares: FloatArray, reference: int
-) -> Iterator[Rates]:
-    """One start per guessed level.
+) -> Iterator[FloatArray]:
+    """θ to start from, one per guessed level.
 
     Parameters
     ----------
@@ -37,16 +37,11 @@ def starts(
         kappa, design = np.concatenate(found), _irradiances(problem)
         k_e = nonnegative_least_squares(design, kappa)
         # A state that decays faster charges no further by the same light.
-        yield Rates(
+        yield problem.parameters.as_stated(
             k_r_per_s,
             total * shares,
             np.outer(k_r_per_s / mean_rate, np.maximum(k_e, 1e-3 * k_e.max())),
             _weights(problem, reference),
-            np.zeros(len(problem.series)),
-            np.zeros(sum(len(one.charges) for one in problem.series)),
-            np.zeros(1),
-            np.zeros(problem.site_modes),
-            np.zeros(problem.offsets),
         )
 
 

@@ -2,7 +2,9 @@
 
 I_pfc = ∫ T_p F_f L R S_c dλ (paper, section 4.2) says little about T_p by itself, so T_p is a
 skewed peak on a leakage, plus a remainder on a coarse grid that is held small. The mercury lines'
-map comes in as what is known of the centres beforehand.
+map comes in as what is known of the centres beforehand, and how a strip's figures run along it as
+what its other positions let expect. The camera's curves are fitted along: they are wrong in the
+same way everywhere.
 """
 
 from collections.abc import Sequence
@@ -12,30 +14,37 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray, least_squares
-from labrig.fit.spectrum.system import CurveError, curve_modes
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.lvf import strip_problem as of
+from labrig.fit.lvf.strip_problem import Expected, Found, StripProblem
+from labrig.fit.spectrum.system import CurveError
 from labrig.optics import Bands, CameraResponse, Lvf, Spectrum, Transmittance, WavelengthMap
-from labrig.optics.band import peak_shape
 from labrig.optics.lvf import NOMINAL_FWHM_NM
-from labrig.optics.piecewise import hats, quadrature
 
 #: What is known of a band before it is measured: mean and σ. Leakage and remainder in units of the
 #: peak, the width as its logarithm.
 LOG_FWHM = (float(np.log(NOMINAL_FWHM_NM)), 0.3)
 SKEW = (0.0, 0.2)
-LEAKAGE = (0.0, 0.01)
-REMAINDER = (0.0, 0.01)
-#: Distance of the remainder's knots.
-REMAINDER_STEP_NM = 20.0
-#: How centre, log width and skew run along a strip: order of a polynomial, and scatter about it.
-ALONG_THE_STRIP = ((3, 0.3), (2, 0.03), (1, 0.05))
+LEAKAGE = (0.002, 0.01)
+#: The remainder is that of a band's shape; so far from the band it is what blocking is uneven by.
+REMAINDER, BLOCKING, SHAPE_NM = 0.01, 0.001, 50.0
+#: Of a logarithm of which nothing is known but that of all positions it is the same order.
+ANY_PEAK = 2.0
+#: How figures run along a strip: order of a polynomial, and scatter about it.
+ALONG_THE_STRIP = {
+    of.CENTRE: (3, 0.3),
+    of.LOG_WIDTH: (2, 0.03),
+    of.SKEW: (1, 0.05),
+    of.LOG_PEAK: (2, 0.04),
+    of.LEAKAGE: (1, 0.0005),
+}
 #: The map's σ is not believed below this: strips are not smooth to a tenth of a nanometre.
 CENTRE_FLOOR_NM = 0.5
-#: At dim ends what leaks could stand for a whole band: one is there, of this much of its start.
-LEAST_PEAK = 0.1
+#: Errors of a gel's transmittance are alike over so much: positions closer than that repeat them.
+ALIKE_NM = 40.0
 FEWEST_FILTERS = 6
-_STEP = 1e-4
-_FIGURES = 5
+#: How often the others have their say, and steps in between.
+ROUNDS, STEPS = 3, 4
 
 
 @dataclass(frozen=True, eq=False)
@@ -47,11 +56,15 @@ class LvfCalibration:
     lvf
         Its bands with their σ, transmission relative to the same unknown factor at all positions.
     misfit
-        (p,) root of χ² per degree of freedom; where it is above 1 σ has been raised by it.
+        (p,) root mean square of what is left, in σ; where it is above 1 σ has been raised by it.
+    camera
+        The camera that was used, its curves as the filters tell them: what the strip lets through
+        belongs to these.
     """
 
     lvf: Lvf
     misfit: FloatArray
+    camera: CameraResponse
 
 
 def calibrate_lvf(
@@ -73,7 +86,8 @@ def calibrate_lvf(
     position
         (p,) rising.
     value, sigma
-        (p, filters, channels); NaN leaves a value out (clipped, missing).
+        (p, filters, channels), every channel in units in which the card by itself, without filter
+        and strip, gives ∫ L R S_c dλ; NaN leaves a value out (clipped, missing).
     filters
         One after the other over the grey card; a `Transmittance` of 1 is none.
     lamp, card, camera
@@ -90,169 +104,110 @@ def calibrate_lvf(
     """
     places = np.asarray(position, dtype=np.float64)
     values, sigmas = np.asarray(value, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
-    expected = (len(places), len(filters), camera.sensitivity.shape[1])
-    if values.shape != expected or sigmas.shape != expected:
+    shape = (len(places), len(filters), camera.sensitivity.shape[1])
+    if values.shape != shape or sigmas.shape != shape:
         raise FitError(
-            f"expected values of shape {expected} (positions, filters, channels), got "
+            f"expected values of shape {shape} (positions, filters, channels), got "
             f"{values.shape} and σ of shape {sigmas.shape}"
         )
     if len(filters) < FEWEST_FILTERS:
         raise FitError(f"expected {FEWEST_FILTERS} or more filters, got {len(filters)}")
-    room = _Room(filters, lamp, card, camera, curve_error)
-    count = len(places)
-    mean = np.column_stack(
-        [
-            wavelengths.wavelength_nm(places),
-            np.full(count, LOG_FWHM[0]),
-            np.full(count, SKEW[0]),
-        ]
-    )
-    known = np.column_stack(
-        [
-            np.maximum(wavelengths.sigma_nm(places), CENTRE_FLOOR_NM),
-            np.full(count, LOG_FWHM[1]),
-            np.full(count, SKEW[1]),
-        ]
-    )
-    alone = [room.fit(values[k], sigmas[k], mean[k], known[k], places[k]) for k in range(count)]
-    for figure, (order, floor) in enumerate(ALONG_THE_STRIP):
-        mean[:, figure], known[:, figure] = _from_the_others(
-            places,
-            np.array([f.parameters[figure] for f in alone]),
-            np.array([f.sigma[figure] for f in alone]),
-            order,
-            floor,
-        )
-    fitted = [room.fit(values[k], sigmas[k], mean[k], known[k], places[k]) for k in range(count)]
-    x, errors = np.array([f.parameters for f in fitted]), np.array([f.sigma for f in fitted])
-    width, peak = np.exp(x[:, 1]), x[:, 3]
-    bands = Bands(x[:, 0], width, x[:, 2], peak, x[:, 4] * peak)
-    unsure = Bands(
-        errors[:, 0], width * errors[:, 1], errors[:, 2], errors[:, 3], errors[:, 4] * peak
-    )
+    centre_nm = wavelengths.wavelength_nm(places)
+    alike = np.sqrt(max(1.0, ALIKE_NM / float(np.abs(np.diff(centre_nm)).mean())))
+    problem = StripProblem(values, sigmas * alike, filters, lamp, card, camera, curve_error)
+    first = _before(centre_nm, wavelengths.sigma_nm(places), problem.knots_nm)
+    begin = _begin(problem, first, places)
+    first.mean[:, of.LOG_PEAK] = np.median(begin.figures[:, of.LOG_PEAK])
+    expected, found = first, begin
+    for round_ in range(ROUNDS):
+        if round_:
+            expected = _from_the_others(places, found, problem.sigmas(found, expected), first)
+        found = problem.solve(found, expected, STEPS)
+    misfit = np.maximum(1.0, alike * problem.misfit(found))
+    unsure = problem.sigmas(found, expected) * misfit[:, np.newaxis]
     try:
-        lvf = Lvf(places, bands, unsure, room.knots_nm, x[:, _FIGURES:] * peak[:, np.newaxis])
+        lvf = _lvf(places, found.figures, unsure, problem.knots_nm)
     except ValueError as error:
         raise FitError(f"{error}; check the order of the pictures") from None
-    return LvfCalibration(lvf, np.array([f.misfit for f in fitted]))
+    return LvfCalibration(lvf, misfit, problem.camera(found.curves))
+
+
+def _before(centre_nm: FloatArray, sigma_nm: FloatArray, knots_nm: FloatArray) -> Expected:
+    """What is known before anything is measured."""
+    mean = np.zeros((len(centre_nm), of.FIGURES + len(knots_nm)))
+    sigma = np.empty_like(mean)
+    near = np.abs(knots_nm - centre_nm[:, np.newaxis]) < SHAPE_NM
+    sigma[:, of.FIGURES :] = np.where(near, REMAINDER, BLOCKING)
+    mean[:, of.CENTRE] = centre_nm
+    sigma[:, of.CENTRE] = np.maximum(sigma_nm, CENTRE_FLOOR_NM)
+    for figure, (usual, spread) in (
+        (of.LOG_WIDTH, LOG_FWHM),
+        (of.SKEW, SKEW),
+        (of.LOG_PEAK, (0.0, ANY_PEAK)),
+        (of.LEAKAGE, LEAKAGE),
+    ):
+        mean[:, figure], sigma[:, figure] = usual, spread
+    return Expected(mean, sigma)
+
+
+def _begin(problem: StripProblem, first: Expected, places: FloatArray) -> Found:
+    """The bands that are expected, as high as they are seen.
+
+    Raises
+    ------
+    FitError
+        A position with too few values or no light.
+    """
+    for place, count in zip(places, problem.used.sum(axis=1), strict=True):
+        if count < of.FIGURES:
+            raise FitError(
+                f"position {place:g}: only {count} values are neither clipped nor missing"
+            )
+    scale = problem.scales(first.mean)
+    if (dark := ~(scale > 0)).any():
+        raise FitError(f"position {places[dark][0]:g}: no light above the noise; expose longer")
+    figures = first.mean.copy()
+    figures[:, of.LOG_PEAK] = np.log(scale)
+    return Found(figures, np.zeros(problem.modes))
 
 
 def _from_the_others(
-    places: FloatArray, values: FloatArray, sigmas: FloatArray, order: int, floor: float
-) -> tuple[FloatArray, FloatArray]:
-    """What all other positions let expect of each one, by a polynomial along the strip, and σ.
+    places: FloatArray, found: Found, sigmas: FloatArray, first: Expected
+) -> Expected:
+    """What all other positions let expect of each one, by polynomials along the strip, and σ.
 
     A strip is coated in one go; what a position at the end says badly its neighbours say well.
     """
     scaled = (places - places.mean()) / (np.ptp(places) / 2)
-    powers = np.vander(scaled, min(order, len(places) - 2) + 1, increasing=True)
-    expected, unsure = np.empty_like(values), np.empty_like(values)
-    spread = np.hypot(sigmas, floor)
-    for k in range(len(places)):
-        others = np.arange(len(places)) != k
-        rows = powers[others] / spread[others, np.newaxis]
-        covariance = np.linalg.pinv(rows.T @ rows, hermitian=True)
-        coefficients = covariance @ (rows.T @ (values[others] / spread[others]))
-        expected[k] = powers[k] @ coefficients
-        unsure[k] = np.hypot(np.sqrt(powers[k] @ covariance @ powers[k]), floor)
-    return expected, unsure
+    mean, unsure = first.mean.copy(), first.sigma.copy()
+    for figure, (order, floor) in ALONG_THE_STRIP.items():
+        powers = np.vander(scaled, min(order, len(places) - 2) + 1, increasing=True)
+        spread = np.hypot(sigmas[:, figure], floor)
+        for k in range(len(places)):
+            others = np.arange(len(places)) != k
+            rows = powers[others] / spread[others, np.newaxis]
+            covariance = np.linalg.pinv(rows.T @ rows, hermitian=True)
+            coefficients = covariance @ (rows.T @ (found.figures[others, figure] / spread[others]))
+            mean[k, figure] = powers[k] @ coefficients
+            unsure[k, figure] = np.hypot(np.sqrt(powers[k] @ covariance @ powers[k]), floor)
+    mean[:, of.LEAKAGE] = np.maximum(mean[:, of.LEAKAGE], 0.0)
+    return Expected(mean, unsure)
 
 
-@dataclass(frozen=True, eq=False)
-class _Fitted:
-    parameters: FloatArray
-    sigma: FloatArray
-    misfit: float
-
-
-class _Room:
-    """All but the filter on the strip: what reaches the camera at which wavelength."""
-
-    def __init__(
-        self,
-        filters: Sequence[Transmittance],
-        lamp: Spectrum,
-        card: Transmittance,
-        camera: CameraResponse,
-        curve_error: CurveError | None,
-    ) -> None:
-        low, high = float(camera.wavelength_nm[0]), float(camera.wavelength_nm[-1])
-        knots = [camera.wavelength_nm, lamp.wavelength_nm, card.wavelength_nm]
-        self.nodes, weights = quadrature(low, high, *knots, *(f.wavelength_nm for f in filters))
-        lit = weights * lamp.at(self.nodes) * card.at(self.nodes)
-        self.light = np.stack([lit * f.at(self.nodes) for f in filters])
-        self.sensitivity = camera.at(self.nodes)
-        peaks = camera.sensitivity.max(axis=0)
-        self.modes = curve_modes(curve_error, self.nodes, self.sensitivity, peaks)
-        self.knots_nm = np.arange(low, high + REMAINDER_STEP_NM / 2, REMAINDER_STEP_NM)
-        self.tents = hats(self.knots_nm, self.nodes)
-        # (filters · channels, q): a value is this times the transmission.
-        self.design = np.concatenate(
-            [of_filter[:, np.newaxis] * self.sensitivity for of_filter in self.light], axis=1
-        ).T
-
-    def fit(
-        self,
-        value: FloatArray,
-        sigma: FloatArray,
-        before: FloatArray,
-        before_sigma: FloatArray,
-        at: float,
-    ) -> _Fitted:
-        """Figures and remainder of one position; `before` is what is known of the first three."""
-        y, s = value.ravel(), sigma.ravel()
-        used = np.isfinite(y) & np.isfinite(s) & (s > 0)
-        if used.sum() < _FIGURES:
-            raise FitError(
-                f"position {at:g}: only {used.sum()} values are neither clipped nor missing"
-            )
-        count = _FIGURES + len(self.knots_nm)
-        mean, known = np.zeros(count), np.full(count, REMAINDER[1])
-        mean[:_FIGURES] = *before, 1.0, LEAKAGE[0]
-        known[:_FIGURES] = *before_sigma, np.inf, LEAKAGE[1]
-        shape = self._transmission(mean)
-        expected = self.design @ shape
-        scale = float(y[used] @ expected[used]) / float(expected[used] @ expected[used])
-        if not scale > 0:
-            raise FitError(f"position {at:g}: no light above the noise; expose longer")
-        covariance = np.diag(s**2)
-        for mode in self.modes:
-            wrong = scale * ((self.light * shape) @ mode).ravel()
-            covariance = covariance + np.outer(wrong, wrong)
-        lower = np.linalg.cholesky(covariance[np.ix_(used, used)])
-        design = np.linalg.solve(lower, self.design[used] * scale)
-        target = np.linalg.solve(lower, y[used])
-
-        def residuals(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-            left = design @ self._transmission(x) - target
-            slopes = design @ self._derivatives(x)
-            rows, prior = np.concatenate([left, (x - mean) / known]), np.diag(1 / known)
-            return rows, np.vstack([slopes, prior])
-
-        low, high = np.full(count, -np.inf), np.full(count, np.inf)
-        low[2], high[2], low[3], low[4] = -1.0, 1.0, LEAST_PEAK, 0.0
-        found = least_squares(residuals, mean, lower=low, upper=high, tolerance=1e-6)
-        data = found.residuals[: len(target)]
-        misfit = max(1.0, float(np.sqrt(data @ data / max(len(target) - _FIGURES, 1))))
-        x, errors = found.parameters.copy(), found.sigma * misfit
-        x[3], errors[3] = x[3] * scale, errors[3] * scale
-        x[4:], errors[4:] = x[4:] * scale / x[3], errors[4:] * scale / x[3]
-        return _Fitted(x, errors, misfit)
-
-    def _transmission(self, x: FloatArray) -> FloatArray:
-        """T(λ) at the nodes, in units of the starting scale."""
-        shape = peak_shape(self.nodes - x[0], np.exp(x[1]), x[2])
-        transmission: FloatArray = x[3] * shape + x[4] + self.tents @ x[_FIGURES:]
-        return transmission
-
-    def _derivatives(self, x: FloatArray) -> FloatArray:
-        """(q, parameters)."""
-        columns = []
-        for k in range(3):
-            step = np.zeros_like(x)
-            step[k] = _STEP
-            change = self._transmission(x + step) - self._transmission(x - step)
-            columns.append(change / (2 * _STEP))
-        shape = peak_shape(self.nodes - x[0], np.exp(x[1]), x[2])
-        columns += [shape, np.ones_like(shape)]
-        return np.column_stack([*columns, self.tents])
+def _lvf(places: FloatArray, figures: FloatArray, sigmas: FloatArray, knots_nm: FloatArray) -> Lvf:
+    centre, log_width, skew, log_peak, leakage = figures[:, : of.FIGURES].T
+    width, peak = np.exp(log_width), np.exp(log_peak)
+    unsure = sigmas.T
+    return Lvf(
+        places,
+        Bands(centre, width, skew, peak, leakage * peak),
+        Bands(
+            unsure[of.CENTRE],
+            width * unsure[of.LOG_WIDTH],
+            unsure[of.SKEW],
+            peak * unsure[of.LOG_PEAK],
+            peak * unsure[of.LEAKAGE],
+        ),
+        knots_nm,
+        figures[:, of.FIGURES :] * peak[:, np.newaxis],
+    )

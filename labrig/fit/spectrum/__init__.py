@@ -1,13 +1,16 @@
 """Spectra from pictures through a variable filter, or from any sensor with known channels."""
 
 from labrig.fit.spectrum.fit import BandedSpectrum, SpectrumFit, fit_spectrum
+from labrig.fit.spectrum.line import LineFit, fit_line
 from labrig.fit.spectrum.system import CurveError, SpectralSystem, system_through_lvf
 
 __all__ = [
     "BandedSpectrum",
     "CurveError",
+    "LineFit",
     "SpectralSystem",
     "SpectrumFit",
+    "fit_line",
     "fit_spectrum",
     "system_through_lvf",
 ]

@@ -9,7 +9,8 @@ computational UQ of nonnegativity constrained linear inverse problems*, SIAM J. 
 2020; Everink, Dong and Andersen, *Bayesian inference with projected densities*, 2023).
 
 The band holds for spectra that are not much narrower than what one value sees of them. Lines, such
-as a mercury lamp's through a filter of 25 nm, come out too broad, by more than their band says.
+as a mercury lamp's through a filter of 25 nm, come out too broad, by more than their band says;
+`fit_line` finds where a single one is.
 """
 
 from dataclasses import dataclass
@@ -18,16 +19,15 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from scipy.linalg import solve_triangular
 
-from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.nonnegative_quadratic import nonnegative_minimum
 from labrig.fit.spectrum.system import SpectralSystem
+from labrig.fit.spectrum.values import measured
 from labrig.optics.piecewise import band_means
 
 SAMPLES = 400
 #: Rounds in which the covariance of a wrong design follows the spectrum.
 ROUNDS = 3
-FEWEST_VALUES = 3
 #: Weights of the prior that are possible, for a spectrum of about 1.
 WEIGHTS = np.geomspace(1e-4, 1e8, 73)
 #: Added to the curvature of the fit, for a spectrum of about 1.
@@ -115,20 +115,9 @@ def fit_spectrum(
     FitError
         Too few values, or none above its noise.
     """
-    values, sigmas = np.asarray(value, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
-    used = np.isfinite(values) & np.isfinite(sigmas) & system.design.any(axis=1)
-    if (sigmas[used] <= 0).any():
-        raise FitError("expected every σ above 0, got some of 0; give the noise of every value")
-    if used.sum() < FEWEST_VALUES:
-        raise FitError(
-            f"expected {FEWEST_VALUES} or more values that are neither clipped nor missing, got "
-            f"{used.sum()}; expose shorter or light more of the filter"
-        )
-    part, y, s = system.of(used), values[used], sigmas[used]
+    used, part, y, s = measured(value, sigma, system)
     of_white = part.design.sum(axis=1)
     scale = float(y @ of_white) / float(of_white @ of_white)
-    if not scale > 0:
-        raise FitError("expected values above 0, got none above their noise; expose longer")
     roughness = _second_differences(part.knots_nm)
     x, misfit = np.full(len(part.knots_nm), scale), 1.0
     for _ in range(ROUNDS):

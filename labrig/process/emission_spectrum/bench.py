@@ -22,6 +22,7 @@ from labrig.process.bench_curves import camera_curves, card_reflectance, lamp_sp
 from labrig.process.emission_spectrum.picture import Pictures, combined
 from labrig.process.emission_spectrum.white import taught_by
 from labrig.process.stage import Stage
+from labrig.process.strip_patches import Slices, StripPatch, cut, lean, strip_patches
 from labrig.reduce import RawFrame, SeriesFrame, read_raw
 from labrig.region import Region, region_pixels
 
@@ -36,7 +37,7 @@ KNOTS_NM: FloatArray = np.arange(380.0, 721.0, 5.0)
 
 @dataclass(frozen=True, eq=False)
 class SpectralBench:
-    """The bench as a spectrum sees it.
+    """The bench as the spectrum of one patch sees it.
 
     Attributes
     ----------
@@ -73,8 +74,10 @@ class SpectralBench:
         return np.stack(columns, axis=1).ravel()
 
 
-def spectral_bench(stage: Stage, frame: SeriesFrame) -> SpectralBench:
-    """The bench that a stage was measured on.
+def spectral_benches(
+    stage: Stage, frame: SeriesFrame
+) -> tuple[dict[StripPatch, SpectralBench], tuple[str, ...]]:
+    """The bench that a stage was measured on, for every patch; and why there is none for one.
 
     Parameters
     ----------
@@ -85,6 +88,8 @@ def spectral_bench(stage: Stage, frame: SeriesFrame) -> SpectralBench:
     ------
     UsageError
         No LVF calibrated for this place, or no camera curves.
+    DataError
+        No patch lies below the filter.
     """
     known = stage.known.lvf
     if known is None or known.before_camera is None:
@@ -93,12 +98,15 @@ def spectral_bench(stage: Stage, frame: SeriesFrame) -> SpectralBench:
             "lvf_calibration, and name its run in the rig file (optics: {lvf: …})"
         )
     raw, strip, lvf = read_raw(frame.path), known.before_camera, known.lvf
-    camera = _camera(stage, raw.channels)
-    # At either end pixels reach a little beyond the places that were calibrated.
-    places = np.clip(_positions(raw, strip), lvf.position[0], lvf.position[-1])
-    lvfs = tuple(lvf.at(own) for own in places)
-    system = _system(lvfs, camera)
-    return SpectralBench(strip.slices(), _holder(strip), lvfs, camera, system)
+    camera, holder = _camera(stage, raw.channels), _holder(strip)
+    patches, refused = cut(strip_patches(stage), strip, raw)
+    benches = {}
+    for patch, slices in patches.items():
+        # At either end pixels reach a little beyond the places that were calibrated.
+        places = np.clip(_positions(raw, strip, slices), lvf.position[0], lvf.position[-1])
+        lvfs = tuple(lvf.at(own) for own in places)
+        benches[patch] = SpectralBench(slices, holder, lvfs, camera, _system(lvfs, camera))
+    return benches, refused
 
 
 def with_white(
@@ -141,22 +149,22 @@ def _holder(strip: Strip) -> dict[str, Region]:
     }
 
 
-def _positions(raw: RawFrame, strip: Strip) -> FloatArray:
+def _positions(raw: RawFrame, strip: Strip, slices: Slices) -> FloatArray:
     """Middle of each channel's own pixels in every slice, (channels, positions).
 
     Pixels of one colour are two apart: where slices are few pixels wide, that is some nanometres.
     """
     side = raw.cfa_side
     cell = np.array(list(raw.cfa)).reshape(side, side)
-    middles = np.empty((len(raw.channels), len(strip.slices())))
+    middles = np.empty((len(raw.channels), len(slices)))
     for number, name in enumerate(raw.channels):
         rows = np.count_nonzero(cell == name, axis=0)
-        for place, region in enumerate(strip.slices().values()):
+        for place, region in enumerate(slices.values()):
             x, _, width, _ = region_pixels(region, raw.width, raw.height)
             columns = np.arange(x, x + width)
             middles[number, place] = np.average(columns + 0.5, weights=rows[columns % side])
     across = (strip.right[0] - strip.left[0]) * raw.width
-    share = (middles - strip.left[0] * raw.width) / across
+    share = (middles - strip.left[0] * raw.width) / across + lean(strip, slices, raw)
     return share if strip.rising else 1 - share
 
 
@@ -212,7 +220,7 @@ def _camera(stage: Stage, channels: tuple[str, ...]) -> CameraResponse:
         name = stage.choices.camera or stage.rig.optics.camera
         if name is not None:
             return read_monochrome_camera(name)
-    camera = camera_curves(stage.rig, stage.choices)
+    camera = camera_curves(stage.rig, stage.choices, stage.known.lvf)
     if camera.channels != channels:
         raise DataError(
             f"expected frames with the channels {', '.join(camera.channels)} or one alone, got "

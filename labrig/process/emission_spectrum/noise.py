@@ -6,8 +6,8 @@ transfer; Janesick 2007). Pairs of successive frames, one scaled to the other, t
 stands still cancels.
 """
 
-from collections.abc import Iterator, Mapping, Sequence
-from dataclasses import dataclass
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
 from itertools import pairwise
 
 import numpy as np
@@ -65,15 +65,22 @@ class Seen:
     pixels: FloatArray
     strips: FloatArray
 
+    def take(self, places: Sequence[int]) -> "Seen":
+        """Some of the places."""
+        some = list(places)
+        return replace(
+            self, level_dn=self.level_dn[some], pixels=self.pixels[some], strips=self.strips[some]
+        )
+
 
 def seen(
-    frames: Sequence[SeriesFrame], slices: Mapping[str, Region], darks: Sequence[SeriesFrame]
+    frames: Sequence[SeriesFrame], places: Sequence[Region], darks: Sequence[SeriesFrame]
 ) -> list[Seen]:
     """Every frame in every place, hot pixels left out."""
     longest_s = max((dark.exposure_s for dark in darks), default=0.0)
     longest = [dark for dark in darks if dark.exposure_s == longest_s][:DARKS_FOR_HOT]
     hot = hot_pixels([read_raw(dark.path) for dark in longest]) if len(longest) > 1 else None
-    return [_seen(frame, read_raw(frame.path), list(slices.values()), hot) for frame in frames]
+    return [_seen(frame, read_raw(frame.path), places, hot) for frame in frames]
 
 
 def pixel_noise(groups: Sequence[Sequence[Seen]]) -> PixelNoise:

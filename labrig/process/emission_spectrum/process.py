@@ -1,4 +1,4 @@
-"""From the frames of an emission_spectrum run to Λ*, and to whether it is one spectrum at all."""
+"""From the frames of an emission_spectrum run to Λ* of each patch, and whether it is one at all."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -10,17 +10,19 @@ from numpy.typing import NDArray
 from labrig.errors import DataError
 from labrig.fit.spectrum import fit_spectrum
 from labrig.process.emission_file import EmissionSpectrum, write_emission_spectrum
-from labrig.process.emission_spectrum.bench import SpectralBench, spectral_bench, with_white
+from labrig.process.emission_spectrum.bench import SpectralBench, spectral_benches, with_white
 from labrig.process.emission_spectrum.constancy import compared, over_time
 from labrig.process.emission_spectrum.picture import Picture, Pictures, combined, visible
-from labrig.process.emission_spectrum.reading import read_places
+from labrig.process.emission_spectrum.reading import Reading, read_places
 from labrig.process.emission_spectrum.telling import (
     comparison_lines,
     peak_line,
     sections,
     verdicts,
 )
+from labrig.process.known import Known
 from labrig.process.stage import Stage, StageResult
+from labrig.process.strip_patches import StripPatch, of_each
 from labrig.process.this_camera import insist_on_this_camera
 from labrig.process.timed_frames import intact_frames, steady_frames, stray_light, timing_warnings
 from labrig.reduce import SeriesFrame
@@ -44,27 +46,58 @@ class _Charge:
 
 
 def process(stage: Stage) -> StageResult:
-    """Λ* with its credible band, its constancy in time, its independence of the lamp.
+    """Λ* of every patch with its credible band, whether it is constant, or depends on the lamp.
 
     Raises
     ------
     UsageError
         No calibrated LVF, no camera curves.
     DataError
-        No spectrum is complete, frames are damaged, or nothing glows in them.
+        No spectrum is complete, frames are damaged, nothing glows in them, or no patch lies below
+        the filter.
     FitError
         Too much clips.
     """
     frames = intact_frames(stage.run, stage.choices, "spectrum")
     insist_on_this_camera(stage.known.camera, stage.run, stage.run.frames("spectrum"))
-    bench = spectral_bench(stage, frames.decay[0])
-    darks, white = frames.dark, steady_frames(stage.run, stage.choices, "white")
-    lit, camera = [*frames.decay, *white], stage.known.camera
-    read = read_places(lit, darks, bench.slices, camera, bench.holder)
+    benches, refused = spectral_benches(stage, frames.decay[0])
+    white = steady_frames(stage.run, stage.choices, "white")
+    readings = read_places(
+        [*frames.decay, *white],
+        frames.dark,
+        {patch: bench.slices for patch, bench in benches.items()},
+        stage.known.camera,
+        next(iter(benches.values())).holder,
+    )
+    found = of_each(
+        list(benches),
+        stage.known,
+        lambda patch, known: _of_patch(
+            stage, patch, known, benches[patch], readings[patch], frames.decay, white=bool(white)
+        ),
+    )
+    told = (
+        *timing_warnings(stage.run, "spectrum"),
+        *stray_light(stage.known.blank, frames),
+        *refused,
+    )
+    return replace(found, warnings=(*told, *found.warnings))
+
+
+def _of_patch(
+    stage: Stage,
+    patch: StripPatch,
+    known: Known,
+    bench: SpectralBench,
+    read: Reading,
+    frames: Sequence[SeriesFrame],
+    *,
+    white: bool,
+) -> StageResult:
     bench, warnings = with_white(bench, stage, read.pictures("white") if white else None)
     charges: list[_Charge] = []
     dead: list[str] = []
-    for unit in dict.fromkeys(frame.unit for frame in frames.decay):
+    for unit in dict.fromkeys(frame.unit for frame in frames):
         lamp = unit.removeprefix("spectrum-")
         try:
             pictures = visible(read.pictures(unit))
@@ -74,47 +107,41 @@ def process(stage: Stage) -> StageResult:
             dead.append(f"after charging with the {lamp} lamp nothing glows: it did not light")
             continue
         charges.append(_Charge(lamp, pictures, combined(pictures)))
+
+    def spectrum_of(picture: Picture, lamp: str, samples: int = 400) -> EmissionSpectrum:
+        fit = fit_spectrum(picture.value, picture.sigma, bench.system, samples=samples)
+        run = stage.run.folder.resolve().name
+        return EmissionSpectrum.of(fit, patch.material, lamp, run)
+
     first = charges[0]
-    spectrum = _spectrum(first.picture, bench, stage, first.lamp)
-    write_emission_spectrum(stage.folder / "emission.yaml", spectrum)
-    spectrum.write_csv(stage.folder / "spectrum.csv")
+    spectrum = spectrum_of(first.picture, first.lamp)
+    place = stage.folder / patch.folder
+    place.mkdir(exist_ok=True)
+    write_emission_spectrum(place / "emission.yaml", spectrum)
+    spectrum.write_csv(place / "spectrum.csv")
     times = over_time(first.frames, bench.centre_nm) if len(first.frames) > 1 else []
     lamps = [
         compared(f"{other.lamp} against {first.lamp}", other.frames, first.picture, bench.centre_nm)
         for other in charges[1:]
     ]
     parts = {
-        f"{t_s:.3g} s": _spectrum(
-            combined(first.frames.take([row])), bench, stage, first.lamp, FEW_SAMPLES
-        )
+        f"{t_s:.3g} s": spectrum_of(combined(first.frames.take([row])), first.lamp, FEW_SAMPLES)
         for row, t_s in enumerate(first.frames.t_s)
     }
-    by_lamp = {
-        one.lamp: _spectrum(one.picture, bench, stage, one.lamp, FEW_SAMPLES) for one in charges
-    }
+    by_lamp = {one.lamp: spectrum_of(one.picture, one.lamp, FEW_SAMPLES) for one in charges}
     return StageResult(
-        known=replace(stage.known, spectrum=spectrum),
+        known=replace(known, spectra={**known.spectra, patch.folder: spectrum}),
         sections=tuple(sections(spectrum, bench, first.frames, times, parts, lamps, by_lamp)),
         lines=(peak_line(spectrum), *comparison_lines(times, lamps)),
         warnings=(
-            *timing_warnings(stage.run, "spectrum"),
-            *stray_light(stage.known.blank, frames),
             *warnings,
             *_clipping(first.frames),
-            *_faint(len(first.frames), frames.decay),
+            *_faint(len(first.frames), frames),
             *verdicts(times, lamps),
             *_not_charged(charges),
             *dead,
         ),
     )
-
-
-def _spectrum(
-    picture: Picture, bench: SpectralBench, stage: Stage, lamp: str, samples: int = 400
-) -> EmissionSpectrum:
-    fit = fit_spectrum(picture.value, picture.sigma, bench.system, samples=samples)
-    name = stage.protocol.sample.name
-    return EmissionSpectrum.of(fit, name, lamp, stage.run.folder.resolve().name)
 
 
 def _not_charged(charges: Sequence[_Charge]) -> list[str]:

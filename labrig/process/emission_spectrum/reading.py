@@ -1,7 +1,8 @@
 """From what the filter's places showed to pictures in DN/s: dark and fall-off put right."""
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Hashable, Mapping, Sequence
 from dataclasses import dataclass
+from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,11 +17,12 @@ from labrig.reduce.series import is_usable
 from labrig.region import Region
 
 FloatArray = NDArray[np.float64]
+Patch = TypeVar("Patch", bound=Hashable)
 
 
 @dataclass(frozen=True, eq=False)
 class Reading:
-    """All frames in all places.
+    """All frames in all places of one patch.
 
     Attributes
     ----------
@@ -86,11 +88,12 @@ class Reading:
 def read_places(
     frames: Sequence[SeriesFrame],
     darks: Sequence[SeriesFrame],
-    slices: Mapping[str, Region],
+    patches: Mapping[Patch, Mapping[str, Region]],
     camera: CameraFile | None,
     holder: Mapping[str, Region] | None = None,
-) -> Reading:
-    """Read every frame in every place, and in the holder, whose light is subtracted.
+) -> dict[Patch, Reading]:
+    """Read every frame once, in every place of each patch, and in the holder, whose light is
+    subtracted.
 
     Raises
     ------
@@ -103,11 +106,38 @@ def read_places(
             f"expected dark frames at the one ISO of all frames, got {len(darks)} and ISO "
             f"{', '.join(f'{iso:g}' for iso in sorted(filter(None, isos)))}"
         )
-    regions = {**slices, **(holder or {})}
-    lit, dark = seen(frames, regions, darks), seen(darks, regions, darks)
-    groups = [[o for o in lit if o.frame.unit == u] for u in {o.frame.unit: None for o in lit}]
+    beside = dict(holder or {})
+    regions = [region for slices in patches.values() for region in slices.values()]
+    lit, dark = (seen(some, [*regions, *beside.values()], darks) for some in (frames, darks))
     rising = sorted(dark, key=lambda one: one.frame.exposure_s)
-    noise = pixel_noise([*groups, rising])
+    groups = [[o for o in lit if o.frame.unit == u] for u in {o.frame.unit: None for o in lit}]
+    places, first = {}, 0
+    for patch, slices in patches.items():
+        after = first + len(slices)
+        # The holder's places come last.
+        places[patch] = [*range(first, after), *range(len(regions), len(regions) + len(beside))]
+        first = after
+    # Patches fade differently: the frames of a pair are brought to the same brightness in each.
+    noise = pixel_noise(
+        [[one.take(own) for one in group] for own in places.values() for group in (*groups, rising)]
+    )
+    return {
+        patch: _reading(
+            [one.take(own) for one in lit], [one.take(own) for one in dark], patches[patch],
+            beside, camera, noise,
+        )
+        for patch, own in places.items()
+    }  # fmt: skip
+
+
+def _reading(
+    lit: Sequence[Seen],
+    dark: Sequence[Seen],
+    slices: Mapping[str, Region],
+    holder: Mapping[str, Region],
+    camera: CameraFile | None,
+    noise: PixelNoise,
+) -> Reading:
     exposure_s = np.array([one.frame.exposure_s for one in dark])
     level = np.stack([np.nan_to_num(one.level_dn) for one in dark])
     sigma = np.stack([noise.sigma_dn(one.level_dn, one.pixels) for one in dark])
@@ -115,4 +145,4 @@ def read_places(
         fit_dark(exposure_s, level[:, place], np.nan_to_num(sigma[:, place], nan=np.inf))
         for place in range(level.shape[1])
     ]
-    return Reading(lit, dark, slices, holder or {}, camera, noise, models)
+    return Reading(lit, dark, slices, holder, camera, noise, models)

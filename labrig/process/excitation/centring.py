@@ -5,12 +5,11 @@ channel shows of a slice belongs to a place up to a pixel away from the slice's 
 filter the glow is steep, so that a pixel matters where slices are a few pixels wide.
 """
 
-from collections.abc import Mapping
-
 import numpy as np
 from numpy.typing import NDArray
 
 from labrig.calibration.lvf_file import Strip
+from labrig.process.strip_patches import Slices, lean
 from labrig.reduce import RawFrame
 from labrig.region import Region, region_pixels
 
@@ -19,7 +18,7 @@ FloatArray = NDArray[np.float64]
 
 def centred(
     values: FloatArray,
-    slices: Mapping[str, Region],
+    slices: Slices,
     position: FloatArray,
     strip: Strip,
     raw: RawFrame,
@@ -35,7 +34,7 @@ def centred(
     """
     along = position if strip.rising else 1 - position
     left, right = strip.left[0] * raw.width, strip.right[0] * raw.width
-    wanted = left + along * (right - left)
+    wanted = left + (along - lean(strip, slices, raw)) * (right - left)
     moved = values.copy()
     for number, channel in enumerate(raw.channels):
         x = np.array([_middle(region, raw, channel) for region in slices.values()])

@@ -67,9 +67,8 @@ def process(stage: Stage) -> StageResult:
     position = np.array(known.on_sample.positions(*frames.size))
     places = np.clip(position, known.position[0], known.position[-1])
     lvf = known.lvf.at(places)
-    found = scales(
-        lit.ratio, lvf, lamp, card_reflectance(stage.rig), camera_curves(stage.rig, stage.choices)
-    )
+    camera = camera_curves(stage.rig, stage.choices, known)
+    found = scales(lit.ratio, lvf, lamp, card_reflectance(stage.rig), camera)
     file = _file(stage, known, (lvf, lamp), found, lit)
     write_irradiance_file(stage.folder / "irradiance.yaml", file)
     return StageResult(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.calibration import LvfFile
-from labrig.calibration.lvf_file import BandColumns, Strip, WavelengthColumns
+from labrig.calibration.lvf_file import BandColumns, CurveColumns, Strip, WavelengthColumns
 from labrig.errors import DataError
 from labrig.fit.lvf import LvfCalibration, WavelengthFit
 from labrig.process.bench_curves import (
@@ -157,6 +157,7 @@ def _file(
         wavelengths=WavelengthColumns.of(fit.map),
         before_camera=strips[0],
         on_sample=strips[1],
+        camera=CurveColumns.of(found.camera),
         source=f"{len(scenes.filters) - 1} colour filters and mercury lines, measured with labrig",
         run=stage.run.folder.resolve().name,
     )

@@ -5,7 +5,7 @@ from matplotlib.figure import Figure
 
 from labrig.calibration import LvfFile
 from labrig.fit.lvf import LocatedLines, LvfCalibration
-from labrig.optics import WavelengthMap
+from labrig.optics import CameraResponse, WavelengthMap
 from labrig.process.lvf_calibration.lines import StripLines
 from labrig.process.lvf_calibration.picture import FloatArray
 from labrig.report.figure_style import (
@@ -100,6 +100,25 @@ def along_figure(file: LvfFile) -> Figure:
     upper.set_ylabel("Bend / nm")
     lower.set_ylabel("Width / nm")
     lower.set_xlabel("Position from blue end to red end")
+    return figure
+
+
+def camera_figure(before: CameraResponse, found: CameraResponse) -> Figure:
+    """Curves of every channel, as they were known and as the filters tell them."""
+    figure = new_figure(200)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
+    entries = []
+    for number, name in enumerate(found.channels):
+        colour = channel_colour(name, number)
+        dashed = (0, (4, 2.5))
+        known = before.sensitivity[:, number]
+        axes.plot(before.wavelength_nm, known, color=colour, linewidth=0.9, linestyle=dashed)
+        axes.plot(found.wavelength_nm, found.sensitivity[:, number], color=colour, linewidth=1.2)
+        entries.append(lined(name, colour))
+    axes.set_ylim(0, None)
+    axes.set_xlabel(_WAVELENGTH)
+    axes.set_ylabel("Sensitivity")
+    legend_above(figure, entries, columns=4)
     return figure
 
 

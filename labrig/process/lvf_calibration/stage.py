@@ -118,7 +118,7 @@ def _map_section(made: Calibrated) -> Section:
 
 def _band_section(made: Calibrated) -> Section:
     file, lvf = made.file, made.file.lvf
-    left = residuals(made.scenes, made.bench, lvf)[1:]
+    left = residuals(made.scenes, replace(made.bench, camera=made.found.camera), lvf)[1:]
     names = tuple(one.name for one in made.scenes.filters[1:])
     return Section(
         "What the strip lets through",
@@ -126,7 +126,8 @@ def _band_section(made: Calibrated) -> Section:
             f"From {len(names)} colour filters over the grey card, in units of the card seen "
             f"without the strip. Misfit per value {figures.misfit_text(made.found)}; where it is "
             "above 1, σ was raised by it. Positions at the ends rest on few and faint values: "
-            "their σ is larger.",
+            "their σ is larger. The camera's curves were fitted along, since they are wrong in the "
+            "same way at every position.",
         ),
         (
             Picture(
@@ -139,6 +140,11 @@ def _band_section(made: Calibrated) -> Section:
                 figures.along_figure(file),
                 "Centre minus a straight line (grey: the map by the lines alone) and full width at "
                 "half maximum of the bands, with 1 σ.",
+            ),
+            Picture(
+                "camera-curves",
+                figures.camera_figure(made.bench.camera, made.found.camera),
+                "The camera's curves as the filters tell them; dashed: as their file has them.",
             ),
             Picture(
                 "filter-residuals",

@@ -39,16 +39,16 @@ QUICK: dict[str, Any] = {
 TILT = np.radians(1.0)
 
 
-def true_irradiance() -> IrradianceFile:
-    """What an irradiance run without error would find on the shipped rig."""
+def true_irradiance(width: int = WIDTH, height: int = HEIGHT) -> IrradianceFile:
+    """What an irradiance run without error would find on the shipped rig with such a sensor."""
     lvf_settings = yaml.safe_load(Path("config/sim-phosphor.yaml").read_text())["simulation"]["lvf"]
     lvf = Lvf(LvfSettings.model_validate(lvf_settings))
-    down = 0.42 * WIDTH / HEIGHT * np.tan(TILT)
+    down = 0.42 * width / height * np.tan(TILT)
     strip = Strip(left=(0.08, 0.5 + down), right=(0.92, 0.5 - down), height=0.3, rising=False)
     bands_nm = read_material("blue-paint").bands_nm
     assert bands_nm is not None
     cells, lamp = band_cells(bands_nm), filament_spectrum(BURNING_K)
-    position = np.array(strip.positions(WIDTH, HEIGHT))
+    position = np.array(strip.positions(width, height))
     about = np.linspace(-0.5, 0.5, 41) / SLICES
     passed = np.array([lvf.transmission(np.clip(u + about, 0, 1)).mean(axis=0) for u in position])
     norm = np.linalg.norm(cells @ lamp)
@@ -177,10 +177,12 @@ def test_charges_are_missing(run: Path) -> None:
     from labrig.process.choices import Choices
     from labrig.process.excitation.charges import charged
     from labrig.process.excitation.lamp_changes import lamp_changes
+    from labrig.process.strip_patches import StripPatch
 
     whole = read_run(run)
     some = replace(whole, attempts=[a for a in whole.attempts if not a.unit.startswith("bare")])
     irradiance = true_irradiance()
     rise, fade = lamp_changes(None, np.array(irradiance.bands_nm))
+    patch, choices = StripPatch("", "blue-paint"), Choices()
     with pytest.raises(DataError, match="through the filter and without it"):
-        charged(some, irradiance, rise, fade, Choices(), fresh=False, saturated=False)
+        charged(some, irradiance, [patch], rise, fade, choices, fresh=False, saturated=False)

@@ -1,0 +1,66 @@
+"""The line to a Numato board: ASCII over USB CDC, every command echoed, ended by a `>` prompt.
+
+Echo and prompt prove that the board understood. Source: Numato's documentation of the 16-channel
+board and their public sample code.
+"""
+
+import re
+
+from labrig.acquire.connections import Connections
+from labrig.errors import DeviceLostError
+
+from ..serial_line import SerialLine
+
+#: USB CDC ignores it; Numato's own samples use this one.
+BAUDRATE = 19200
+ANSWER_TIMEOUT_S = 1.0
+#: Longer than any pause inside an answer.
+QUIET_S = 0.03
+#: How relays and inputs are counted in commands.
+CHANNELS = "0123456789ABCDEFGHIJKLMNOPQRSTUV"
+
+
+class Board:
+    """A Numato board; what hangs on it may share the port.
+
+    Parameters
+    ----------
+    address
+        Serial port of the board.
+    connections
+        Opens the port.
+    """
+
+    def __init__(self, address: str, connections: Connections) -> None:
+        self.name = f"the Numato board at {address}"
+        port = connections.serial(address, BAUDRATE)
+        self._line = SerialLine(port, connections.clock, self.name)
+        self.resynchronise()
+
+    def identity(self) -> str:
+        """Firmware version and id, as the board says."""
+        version, board_id = self.ask("ver"), self.ask("id get")
+        return f"firmware {version}, id {board_id}"
+
+    def ask(self, command: str) -> str:
+        """What the board says to `command` between echo and prompt; mostly nothing.
+
+        Raises
+        ------
+        DeviceLostError
+            No answer in time, or no echo.
+        """
+        self._line.write(command.encode("ascii") + b"\r")
+        came = self._line.read_until(b">", ANSWER_TIMEOUT_S)
+        lines = re.split(r"[\r\n]+", came.decode("ascii", errors="replace").removesuffix(">"))
+        if lines[0] != command:
+            raise DeviceLostError(
+                f"{self.name} did not echo '{command}': got {came!r}; is it a Numato board, and "
+                "its cable well?"
+            )
+        return " ".join(line for line in lines[1:] if line)
+
+    def resynchronise(self) -> None:
+        """A bare return ends a half-typed command; whatever comes is of no interest."""
+        self._line.write(b"\r")
+        self._line.drain(QUIET_S, ANSWER_TIMEOUT_S)

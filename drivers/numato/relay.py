@@ -1,0 +1,94 @@
+"""A relay of a Numato board; it is read back after every write."""
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.acquire.connections import Connections
+from labrig.errors import DeviceError, DeviceLostError
+
+from .board import CHANNELS, Board
+
+#: Before it is given up that a lamp could be switched off.
+SAFE_TRIES = 5
+RETRY_S = 1.0
+
+
+class NumatoRelay:
+    """One relay of a Numato board, switching a lamp.
+
+    Parameters
+    ----------
+    address
+        Serial port of the board; several relays may share it.
+    settings
+        The rig file's keys for this device.
+    connections
+        Opens the port.
+    """
+
+    class Settings(BaseModel):
+        """Keys of the rig file."""
+
+        model_config = ConfigDict(frozen=True, extra="forbid")
+
+        relay: int = Field(ge=0, lt=len(CHANNELS))
+
+    def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
+        self._channel = CHANNELS[settings.relay]
+        self._relay = settings.relay
+        self._clock = connections.clock
+        self._board = Board(address, connections)
+
+    def identity(self) -> str:
+        """Maker, firmware version and id, as the board says."""
+        return f"Numato relay board, {self._board.identity()}, relay {self._relay}"
+
+    def on(self) -> None:
+        """Switch on, read back."""
+        self._switch("on")
+
+    def off(self) -> None:
+        """Switch off, read back."""
+        self._switch("off")
+
+    def is_on(self) -> bool:
+        """State as the board reads it."""
+        return self._read() == "on"
+
+    def make_safe(self) -> None:
+        """Bring the line back into step, then off; again if the board does not answer at once."""
+        for tries_left in reversed(range(SAFE_TRIES)):
+            try:
+                self._board.resynchronise()
+                self.off()
+            except DeviceLostError:
+                if not tries_left:
+                    raise
+                self._clock.sleep(RETRY_S)
+            else:
+                return
+
+    def disconnect(self) -> None:
+        """The port belongs to the connections, which close it."""
+
+    def _switch(self, state: str) -> None:
+        said = self._board.ask(f"relay {state} {self._channel}")
+        if said:
+            raise DeviceError(
+                f"{self._board.name} refused 'relay {state} {self._channel}': expected a bare "
+                f"prompt, got '{said}'; is relay {self._relay} on this board?"
+            )
+        read = self._read()
+        if read != state:
+            raise DeviceError(
+                f"relay {self._relay} of {self._board.name} was switched {state} but reads {read}; "
+                "switch off by hand and check the board"
+            )
+
+    def _read(self) -> str:
+        state = self._board.ask(f"relay read {self._channel}")
+        if state not in ("on", "off"):
+            raise DeviceError(
+                f"{self._board.name} was asked for relay {self._relay}: expected 'on' or 'off', "
+                f"got '{state}'"
+            )
+        return state

@@ -1,0 +1,134 @@
+"""A temperature sensor on an analogue input of a Numato board.
+
+Boards with GPIOs have such inputs: `adc read N` answers 0 for 0 V to 1023 for the board's supply
+of 5 V (3.3 V on some). An LM35 gives 10 mV/°C, a TMP36 as much above 0.5 V at 0 °C, so that one
+step is half a degree; the mean of many conversions is finer, since their noise is about a step.
+Sources: Numato's user guides of their relay modules; data sheets of LM35 and TMP36.
+"""
+
+from contextlib import suppress
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.acquire.connections import Connections
+from labrig.errors import DeviceError, DeviceLostError
+
+from .board import CHANNELS, Board
+
+CONVERSIONS = 32
+#: A board that is slow gives fewer.
+CONVERTING_S = 1.0
+#: Of a dark room with people and lamps in it; a sensor of another kind, or wired wrongly, is out.
+PLAUSIBLE_C = (0.0, 60.0)
+
+Volts = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+
+
+class NumatoThermometer:
+    """An LM35, a TMP36 or the like on an analogue input of a Numato board.
+
+    Parameters
+    ----------
+    address
+        Serial port of the board; its relays may be used by other devices.
+    settings
+        The rig file's keys for this device.
+    connections
+        Opens the port.
+    """
+
+    class Settings(BaseModel):
+        """Keys of the rig file; the defaults are a TMP36 on a board with 5 V.
+
+        Attributes
+        ----------
+        input
+            As in `adc read`, counted from 0.
+        volts_per_degree
+            Of the sensor, per degree Celsius.
+        volts_at_zero
+            Of the sensor, at 0 °C: 0 for an LM35.
+        reference_volts
+            What the board's largest number stands for: its supply.
+        bits
+            Of the board's converter.
+        """
+
+        model_config = ConfigDict(frozen=True, extra="forbid")
+
+        input: int = Field(0, ge=0, lt=len(CHANNELS))
+        volts_per_degree: Volts = 0.01
+        volts_at_zero: Annotated[float, Field(allow_inf_nan=False)] = 0.5
+        reference_volts: Volts = 5.0
+        bits: int = Field(10, ge=8, le=16)
+
+    def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
+        self._settings = settings
+        self._full = 2**settings.bits - 1
+        self._clock = connections.clock
+        self._board = Board(address, connections)
+        self._name = f"input {settings.input} of {self._board.name}"
+
+    def identity(self) -> str:
+        """Maker, firmware version and id, as the board says; a sensor does not tell its kind."""
+        return f"Numato board, {self._board.identity()}, analogue input {self._settings.input}"
+
+    def celsius(self) -> float:
+        """Mean of some conversions, in degrees Celsius.
+
+        Raises
+        ------
+        DeviceError
+            No number, nothing connected, or a temperature that cannot be. The line is in step
+            again: a lamp's relay may be on it.
+        """
+        try:
+            return self._celsius(self._steps())
+        except DeviceError:
+            with suppress(DeviceError):
+                self._board.resynchronise()
+            raise
+
+    def make_safe(self) -> None:
+        """Bring the line back into step; no thermometer is unsafe, not even one that is gone."""
+        with suppress(DeviceLostError):
+            self._board.resynchronise()
+
+    def disconnect(self) -> None:
+        """The port belongs to the connections, which close it."""
+
+    def _steps(self) -> float:
+        deadline_s = self._clock.now() + CONVERTING_S
+        steps = [self._convert()]
+        while len(steps) < CONVERSIONS and self._clock.now() < deadline_s:
+            steps.append(self._convert())
+        return sum(steps) / len(steps)
+
+    def _convert(self) -> int:
+        said = self._board.ask(f"adc read {CHANNELS[self._settings.input]}")
+        if not (said.isascii() and said.isdecimal() and int(said) <= self._full):
+            raise DeviceError(
+                f"{self._name}: expected a number from 0 to {self._full}, got '{said}'; has this "
+                "board that analogue input, and as many 'bits'?"
+            )
+        step = int(said)
+        if step in (0, self._full):
+            raise DeviceError(
+                f"{self._name} reads {step}, the {'end' if step else 'beginning'} of its range; is "
+                "the sensor connected, the right way round, and fed?"
+            )
+        return step
+
+    def _celsius(self, steps: float) -> float:
+        settings = self._settings
+        volts = steps / self._full * settings.reference_volts
+        celsius: float = (volts - settings.volts_at_zero) / settings.volts_per_degree
+        low, high = PLAUSIBLE_C
+        if not low <= celsius <= high:
+            raise DeviceError(
+                f"{self._name} reads {volts:.3f} V, which would be {celsius:.1f} °C: expected "
+                f"{low:g} to {high:g} °C; check the sensor and its wires, and 'volts_per_degree', "
+                "'volts_at_zero' and 'reference_volts' of the rig file"
+            )
+        return celsius

@@ -1,0 +1,248 @@
+"""A strip's bands at all positions and the camera's curves, fitted to all pictures together.
+
+The curves are wrong in the same way at every position, so that all positions together tell of it
+what one alone could take for light that leaks. Given the curves each position stands by itself: a
+step solves the positions one by one, and the curves from what that leaves (a Schur complement).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.spectrum.system import CurveError, curve_modes
+from labrig.optics import CameraResponse, Spectrum, Transmittance
+from labrig.optics.band import peak_shape
+from labrig.optics.piecewise import hats, quadrature
+
+#: Figures of a position: centre, log width, skew, log peak, and leakage in units of the peak; then
+#: the remainder in units of the peak, at knots so far apart.
+CENTRE, LOG_WIDTH, SKEW, LOG_PEAK, LEAKAGE = range(5)
+FIGURES = 5
+REMAINDER_STEP_NM = 20.0
+#: T_p is straight between wavelengths so far apart: a band of 25 nm loses 0.1 % of its height.
+GRID_NM = 1.0
+MOST_SKEW = 1.0
+_STEP = 1e-4
+#: Damping to begin with, by how much it changes, and when nothing helps any more.
+_DAMPING, _FACTOR, _HOPELESS = 1e-3, 8.0, 1e6
+#: A decrease of χ² that is not worth another step.
+_ENOUGH = 0.1
+
+
+@dataclass(frozen=True, eq=False)
+class Expected:
+    """What is known of every position's figures beforehand: (p, figures) each."""
+
+    mean: FloatArray
+    sigma: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class Found:
+    """Figures (p, figures) and z of the curves' modes (modes,), where χ² is least."""
+
+    figures: FloatArray
+    curves: FloatArray
+
+
+@dataclass(frozen=True, eq=False)
+class _Step:
+    """One of Gauss and Newton, damped."""
+
+    figures: FloatArray
+    curves: FloatArray
+    #: Of every position: R of its own columns, and what the curves' columns are in its Q.
+    triangles: list[tuple[FloatArray, FloatArray]]
+    #: Inverse covariance of the curves.
+    information: FloatArray
+
+
+class StripProblem:
+    """Least squares of value_pfc = ∫ T_p F_f L R (S_c + Σ_m z_m mode_m) dλ, z_m ~ N(0, 1).
+
+    Parameters
+    ----------
+    value, sigma
+        (p, filters, channels), in units in which the card by itself gives ∫ L R S_c dλ; NaN leaves
+        a value out.
+    filters, lamp, card, camera
+        Known.
+    curve_error
+        How well the curves are; None takes them for exact.
+    """
+
+    def __init__(
+        self,
+        value: FloatArray,
+        sigma: FloatArray,
+        filters: Sequence[Transmittance],
+        lamp: Spectrum,
+        card: Transmittance,
+        camera: CameraResponse,
+        curve_error: CurveError | None,
+    ) -> None:
+        low, high = float(camera.wavelength_nm[0]), float(camera.wavelength_nm[-1])
+        knots = [camera.wavelength_nm, lamp.wavelength_nm, card.wavelength_nm]
+        nodes, weights = quadrature(low, high, *knots, *(f.wavelength_nm for f in filters))
+        self.grid_nm = np.append(np.arange(low, high, GRID_NM), high)
+        self.knots_nm = np.arange(low, high + REMAINDER_STEP_NM / 2, REMAINDER_STEP_NM)
+        self._tents = hats(self.knots_nm, self.grid_nm)
+        sensitivity = camera.at(nodes)
+        lit = weights * lamp.at(nodes) * card.at(nodes)
+        peaks = camera.sensitivity.max(axis=0)
+        modes = np.array(curve_modes(curve_error, nodes, sensitivity, peaks))
+        modes = modes.reshape(-1, *sensitivity.shape)
+        # The card by itself is as bright in every channel as was measured, however curves are bent.
+        share = np.einsum("q,mqc->mc", lit, modes) / (lit @ sensitivity)
+        self._modes = modes - share[:, np.newaxis] * sensitivity
+        self._camera, self._nodes = camera, nodes
+        onto_grid = hats(self.grid_nm, nodes)
+        light = np.stack([lit * f.at(nodes) for f in filters])
+        self._design = _on_grid(light, sensitivity, onto_grid)
+        self._bent = np.array([_on_grid(light, mode, onto_grid) for mode in self._modes])
+        self._bent = self._bent.reshape(-1, *self._design.shape)
+        flat, unsure = value.reshape(len(value), -1), sigma.reshape(len(sigma), -1)
+        used = np.isfinite(flat) & np.isfinite(unsure) & (unsure > 0)
+        self.used = used
+        self._value = np.where(used, flat, 0.0)
+        self._inverse = np.where(used, 1 / np.where(used, unsure, 1.0), 0.0)
+
+    @property
+    def modes(self) -> int:
+        """Ways in which the curves may be wrong."""
+        return len(self._modes)
+
+    def scales(self, figures: FloatArray) -> FloatArray:
+        """(p,) by which the light that these figures let through is to be multiplied."""
+        expected = self._transmission(figures) @ self._design.T
+        weight = expected * self.used
+        total = (weight**2).sum(axis=1)
+        scales: FloatArray = (weight * self._value).sum(axis=1) / np.where(total > 0, total, 1.0)
+        return scales
+
+    def camera(self, curves: FloatArray) -> CameraResponse:
+        """The camera with its curves as found; the highest of all is 1."""
+        order = np.argsort(self._nodes)
+        changes = np.tensordot(curves, self._modes, axes=1)[order]
+        columns = [
+            np.interp(self._camera.wavelength_nm, self._nodes[order], change)
+            for change in changes.T
+        ]
+        sensitivity = np.maximum(self._camera.sensitivity + np.stack(columns, axis=1), 0.0)
+        return replace(self._camera, sensitivity=sensitivity / sensitivity.max())
+
+    def misfit(self, found: Found) -> FloatArray:
+        """(p,) root mean square of what is left, in σ."""
+        left, _ = self._left(found)
+        rms: FloatArray = np.sqrt((left**2).sum(axis=1) / self.used.sum(axis=1))
+        return rms
+
+    def solve(self, begin: Found, expected: Expected, iterations: int) -> Found:
+        """Levenberg–Marquardt from `begin` on; at most so many steps."""
+        found, chi2, damping = begin, self._chi2(begin, expected), _DAMPING
+        for _ in range(iterations):
+            better, after = self._better(found, chi2, expected, damping)
+            while after >= chi2 and damping < _HOPELESS:
+                damping *= _FACTOR
+                better, after = self._better(found, chi2, expected, damping)
+            if after >= chi2:
+                return found
+            gained, found, chi2, damping = chi2 - after, better, after, damping / _FACTOR
+            if gained < _ENOUGH:
+                break
+        return found
+
+    def sigmas(self, found: Found, expected: Expected) -> FloatArray:
+        """(p, figures) standard uncertainties, those of the curves included."""
+        step = self._step(found, expected, 0.0)
+        curves = np.linalg.inv(step.information)
+        rows = []
+        for triangle, by_curves in step.triangles:
+            own = np.linalg.inv(triangle)
+            moved = own @ by_curves
+            rows.append(np.sqrt(np.diag(own @ own.T + moved @ curves @ moved.T)))
+        return np.array(rows)
+
+    def _better(
+        self, found: Found, chi2: float, expected: Expected, damping: float
+    ) -> tuple[Found, float]:
+        step = self._step(found, expected, damping)
+        figures = found.figures + step.figures
+        figures[:, SKEW] = np.clip(figures[:, SKEW], -MOST_SKEW, MOST_SKEW)
+        figures[:, LEAKAGE] = np.maximum(figures[:, LEAKAGE], 0.0)
+        moved = Found(figures, found.curves + step.curves)
+        if not np.isfinite(figures).all():
+            return found, chi2
+        return moved, self._chi2(moved, expected)
+
+    def _chi2(self, found: Found, expected: Expected) -> float:
+        left, _ = self._left(found)
+        prior = (found.figures - expected.mean) / expected.sigma
+        return float((left**2).sum() + (prior**2).sum() + found.curves @ found.curves)
+
+    def _left(self, found: Found) -> tuple[FloatArray, FloatArray]:
+        """(p, values) measured − expected in σ, and the design (values, grid) with its curves."""
+        design = self._design + np.tensordot(found.curves, self._bent, axes=1)
+        expected = self._transmission(found.figures) @ design.T
+        return (self._value - expected) * self._inverse, design
+
+    def _step(self, found: Found, expected: Expected, damping: float) -> _Step:
+        left, design = self._left(found)
+        shape = self._transmission(found.figures)
+        slopes = self._derivatives(found.figures) @ design.T
+        by_curves = np.tensordot(shape, self._bent, axes=(1, 2))
+        information, target = np.eye(self.modes), -found.curves
+        solved = []
+        for k, inverse in enumerate(self._inverse):
+            own = np.vstack([slopes[k].T * inverse[:, np.newaxis], np.diag(1 / expected.sigma[k])])
+            own = np.vstack([own, np.diag(np.sqrt(damping * (own**2).sum(axis=0)))])
+            missing = np.zeros(len(own))
+            missing[: len(inverse)] = left[k]
+            priors = slice(len(inverse), len(inverse) + len(found.figures[k]))
+            missing[priors] = (expected.mean[k] - found.figures[k]) / expected.sigma[k]
+            shared = by_curves[k].T * inverse[:, np.newaxis]
+            q, triangle = np.linalg.qr(own)
+            seen = q[: len(inverse)].T @ shared
+            wanted = q.T @ missing
+            information += shared.T @ shared - seen.T @ seen
+            target = target + shared.T @ left[k] - seen.T @ wanted
+            solved.append((triangle, seen, wanted))
+        damped = information + damping * np.diag(np.diag(information))
+        curves: FloatArray = np.asarray(np.linalg.solve(damped, target), dtype=np.float64)
+        figures = [np.linalg.solve(r, wanted - seen @ curves) for r, seen, wanted in solved]
+        triangles = [(r, seen) for r, seen, _ in solved]
+        return _Step(np.array(figures), curves, triangles, information)
+
+    def _transmission(self, figures: FloatArray) -> FloatArray:
+        """(p, grid)."""
+        relative = _shapes(self.grid_nm, figures) + figures[:, [LEAKAGE]]
+        relative = relative + figures[:, FIGURES:] @ self._tents.T
+        transmission: FloatArray = np.exp(figures[:, [LOG_PEAK]]) * relative
+        return transmission
+
+    def _derivatives(self, figures: FloatArray) -> FloatArray:
+        """(p, figures, grid)."""
+        peak = np.exp(figures[:, [LOG_PEAK]])
+        columns = []
+        for number in (CENTRE, LOG_WIDTH, SKEW):
+            step = np.zeros(figures.shape[1])
+            step[number] = _STEP
+            apart = _shapes(self.grid_nm, figures + step) - _shapes(self.grid_nm, figures - step)
+            columns.append(peak * apart / (2 * _STEP))
+        columns += [self._transmission(figures), peak * np.ones_like(self.grid_nm)]
+        tents = peak[:, np.newaxis] * self._tents.T
+        return np.concatenate([np.stack(columns, axis=1), tents], axis=1)
+
+
+def _on_grid(light: FloatArray, sensitivity: FloatArray, onto_grid: FloatArray) -> FloatArray:
+    """(filters · channels, grid): a value is this times the transmission on the grid."""
+    rows = [light * column @ onto_grid for column in sensitivity.T]
+    return np.stack(rows, axis=1).reshape(-1, onto_grid.shape[1])
+
+
+def _shapes(nm: FloatArray, figures: FloatArray) -> FloatArray:
+    """(p, grid) peaks of height 1."""
+    centre, log_width, skew = (figures[:, [number]] for number in (CENTRE, LOG_WIDTH, SKEW))
+    return peak_shape(nm - centre, np.exp(log_width), skew)

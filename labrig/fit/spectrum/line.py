@@ -1,0 +1,152 @@
+"""Where a narrow line is, told by values that each see much of the spectrum.
+
+A spectrum that is only smooth (`fit_spectrum`) comes out as broad as what one value sees of it, and
+its highest point lies where the values' own curves draw it. Of light that is known to be narrow, a
+laser's, a monochromator's, one LED's, two numbers are unknown, wavelength and strength: they are
+found by likelihood, with the values' noise and with how the system itself may be wrong.
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+from scipy.linalg import cholesky, solve_triangular
+from scipy.optimize import minimize_scalar
+from scipy.special import ndtr
+
+from labrig.errors import FitError
+from labrig.fit.least_squares import FloatArray
+from labrig.fit.spectrum.system import SpectralSystem
+from labrig.fit.spectrum.values import measured
+
+#: Full width at half maximum over σ of a Gaussian.
+FWHM_OVER_SIGMA = 2 * np.sqrt(2 * np.log(2))
+#: Wavelengths tried first, per distance of the knots.
+TRIED_PER_KNOT = 4
+#: Rounds in which the covariance of a wrong system follows the line's strength.
+ROUNDS = 3
+#: Of the search, over the distance of the knots; also the step of derivatives.
+TOLERANCE = 1e-4
+
+
+@dataclass(frozen=True)
+class LineFit:
+    """A narrow line.
+
+    Attributes
+    ----------
+    wavelength_nm, sigma_nm
+        Centre and one standard deviation: the Cramér–Rao bound, times `misfit` where that is
+        above 1. Other wavelengths that explain the values nearly as well are not in it.
+    strength
+        Integral over wavelength, in the unit of the system's spectrum times nm.
+    misfit
+        Root of χ² per degree of freedom: about 1 if the σ given, the system and the line's shape
+        hold.
+    """
+
+    wavelength_nm: float
+    sigma_nm: float
+    strength: float
+    misfit: float
+
+
+def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm: float) -> LineFit:
+    """The line behind some values.
+
+    Parameters
+    ----------
+    value, sigma
+        (m,) as for `fit_spectrum`.
+    system
+        Design on evenly spaced knots, and how it may be wrong.
+    fwhm_nm
+        Of the line, a Gaussian; 0 for one much narrower than what a value sees.
+
+    Raises
+    ------
+    FitError
+        Too few values, none above its noise, or no line between the outermost knots.
+    """
+    _, part, y, s = measured(value, sigma, system)
+    knots = part.knots_nm
+    step = float(knots[1] - knots[0])
+
+    def line_at(wavelength_nm: float) -> _LineAt:
+        return _line_at(part, y, s, _tents(knots, wavelength_nm, fwhm_nm))
+
+    def surprise(wavelength_nm: float) -> float:
+        return line_at(wavelength_nm).surprise
+
+    tried = np.linspace(knots[0], knots[-1], TRIED_PER_KNOT * (len(knots) - 1) + 1)
+    best = int(np.argmin([surprise(wavelength) for wavelength in tried]))
+    if best in (0, len(tried) - 1) or not line_at(tried[best]).strength > 0:
+        raise FitError(
+            f"expected a line between {knots[0]:g} and {knots[-1]:g} nm, got values that none "
+            "there explains; look at the whole spectrum"
+        )
+    between = (float(tried[best - 1]), float(tried[best + 1]))
+    h = TOLERANCE * step
+    centre_nm = float(minimize_scalar(surprise, bounds=between, options={"xatol": h}).x)
+    at = line_at(centre_nm)
+    shift = (line_at(centre_nm + h).shape - line_at(centre_nm - h).shape) / (2 * h)
+    by_wavelength = at.strength * solve_triangular(at.lower, shift, lower=True)
+    along = at.whitened / np.linalg.norm(at.whitened)
+    # What another strength would explain as well says nothing about the wavelength.
+    told = float(np.linalg.norm(by_wavelength - (by_wavelength @ along) * along))
+    misfit = float(np.sqrt(at.chi2 / max(len(y) - 2, 1)))
+    return LineFit(centre_nm, max(1.0, misfit) / told, at.strength, misfit)
+
+
+@dataclass(frozen=True)
+class _LineAt:
+    """Values by a line at one wavelength, of the likeliest strength.
+
+    Attributes
+    ----------
+    shape, whitened
+        (m,) values of a line of strength 1, and over all that may be wrong.
+    lower
+        (m, m) root of the values' covariance.
+    strength, chi2, surprise
+        Likeliest strength, χ² and −2 ln likelihood but for a constant.
+    """
+
+    shape: FloatArray
+    whitened: FloatArray
+    lower: FloatArray
+    strength: float
+    chi2: float
+    surprise: float
+
+
+def _line_at(system: SpectralSystem, y: FloatArray, s: FloatArray, tents: FloatArray) -> _LineAt:
+    shape, noise, strength = system.design @ tents, np.diag(s**2), 0.0
+    wrong = system.covariance(tents)
+    for _ in range(ROUNDS if wrong.any() else 1):
+        lower = cholesky(noise + strength**2 * wrong, lower=True)
+        both = solve_triangular(lower, np.column_stack([shape, y]), lower=True)
+        whitened, target = both[:, 0], both[:, 1]
+        seen = float(whitened @ whitened)
+        strength = max(float(whitened @ target) / seen, 0.0) if seen > 0 else 0.0
+    residual = target - strength * whitened
+    chi2 = float(residual @ residual)
+    surprise = chi2 + 2 * float(np.log(np.diag(lower)).sum())
+    return _LineAt(shape, whitened, lower, strength, chi2, surprise)
+
+
+def _tents(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -> FloatArray:
+    """(n,) values at the knots of a line of integral 1, with its centre and its width.
+
+    The straight lines between the knots make it wider by h²/3 in its variance, h the distance of
+    the knots: so much is taken off, if there is so much.
+    """
+    h = float(knots_nm[1] - knots_nm[0])
+    width = np.sqrt(max((fwhm_nm / FWHM_OVER_SIGMA) ** 2 - h**2 / 3, (TOLERANCE * h) ** 2))
+    # A tent is the second difference of a ramp; a Gaussian of tents that of a smoothed ramp.
+    knots = np.concatenate([knots_nm[:1] - h, knots_nm, knots_nm[-1:] + h])
+    from_line = (knots - wavelength_nm) / width
+    density = np.exp(-(from_line**2) / 2) / np.sqrt(2 * np.pi)
+    ramp = width * (from_line * ndtr(from_line) + density)
+    tents: FloatArray = np.diff(ramp, n=2) / h**2
+    return tents

@@ -1,0 +1,103 @@
+"""When the lamp shone on the sample, and which charge every photograph of the glow belongs to."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+
+import numpy as np
+
+from labrig.errors import DataError
+from labrig.process.choices import Choices
+from labrig.record import Attempt, FrameRecord, RunRecord
+
+#: Frames that show the glow after a charge; those of a metering are exposed too long or too short.
+GLOWING = ("strip", "bare", "rest")
+#: Units that charged by the lamp itself; all others charged through the filter.
+BARE = "bare-"
+#: A halogen lamp's housing and mirror warm about that fast, and the last per cents of light with
+#: them.
+WARMS_S = 150.0
+
+
+@dataclass(frozen=True)
+class Lit:
+    """A unit that charged."""
+
+    unit: str
+    on_s: float
+    off_s: float
+
+    @property
+    def is_bare(self) -> bool:
+        """Whether it charged by the lamp itself."""
+        return self.unit.startswith(BARE)
+
+    @property
+    def cold(self) -> float:
+        """Mean of e^(−t/τ) over the charge: how cold the lamp was, on average."""
+        charge_s = self.off_s - self.on_s
+        return float(-np.expm1(-charge_s / WARMS_S) * WARMS_S / charge_s)
+
+
+@dataclass(frozen=True)
+class Glowing:
+    """The charges, by time, and the photographs after them.
+
+    Attributes
+    ----------
+    charge
+        Photographs by time, each with the charge that it belongs to.
+    """
+
+    lit: Sequence[Lit]
+    charge: Mapping[FrameRecord, Lit]
+
+    @property
+    def zero_s(self) -> float:
+        """When the first charge began; from there times count."""
+        return self.lit[0].on_s
+
+    def after(self, one: Lit) -> list[FrameRecord]:
+        """The photographs of one charge."""
+        return [frame for frame, charge in self.charge.items() if charge is one]
+
+
+def glowing(run: RunRecord, choices: Choices) -> Glowing:
+    """What a run says.
+
+    Raises
+    ------
+    DataError
+        There are no charges through the filter, or none without it, or no photographs.
+    """
+    lit = sorted(
+        (one for attempt in run.completed().values() for one in _lit(attempt)),
+        key=lambda one: one.on_s,
+    )
+    frames = [
+        frame for purpose in GLOWING for frame in run.frames(purpose) if not choices.excludes(frame)
+    ]
+    frames.sort(key=lambda frame: frame.start_time)
+    charge = {frame: one for frame in frames if (one := _charge_before(lit, frame)) is not None}
+    if not charge or not any(one.is_bare for one in lit) or all(one.is_bare for one in lit):
+        raise DataError(
+            f"{run.folder}: expected complete charges through the filter and without it; go on "
+            f"with: labrig resume {run.folder}"
+        )
+    return Glowing(lit, charge)
+
+
+def _lit(attempt: Attempt) -> Sequence[Lit]:
+    times = {
+        action.action: (action.start_time + action.end_time) / 2
+        for action in attempt.actions
+        if action.device == "lamp"
+    }
+    return [Lit(attempt.unit, times["on"], times["off"])] if {"on", "off"} <= set(times) else []
+
+
+def _charge_before(lit: Sequence[Lit], frame: FrameRecord) -> Lit | None:
+    """The last one; None if there was none in the same arrangement of filter and lamp."""
+    before = [one for one in lit if one.off_s < frame.start_time]
+    if not before or before[-1].is_bare is not frame.unit.startswith(BARE):
+        return None
+    return before[-1]
