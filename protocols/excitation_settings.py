@@ -43,7 +43,7 @@ class ExcitationSettings(ProtocolModel):
     growth: Fraction = Field(0.03, gt=0, lt=1)
     at_most: int = Field(9, ge=2)
     refine: int = Field(3, ge=0)
-    bare: tuple[DurationS, ...] = Field((10.0, 60.0, 900.0), min_length=1)
+    bare: tuple[DurationS, ...] = Field((3.0, 10.0, 60.0, 900.0), min_length=1)
     first: DurationS = Field(1.0, ge=0)
     every: DurationS = Field(4.0, gt=0)
     duration: DurationS = Field(90.0, gt=0, alias="for")

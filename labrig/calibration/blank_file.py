@@ -115,24 +115,20 @@ class BlankFile(BaseModel):
             factor *= (self.f_number / f_number) ** 2
         return factor * rate, factor * sigma
 
-    def remarks(self, first_s: float) -> tuple[str, ...]:
-        """What is wrong with a decay on this bench whose first frame begins `first_s` after
-        lamp-off, a line each.
+    def is_clean(self, t_s: float) -> bool:
+        """Whether a frame that begins `t_s` after lamp-off shows nothing that fades but the glow.
+
+        Raises
+        ------
+        DataError
+            The blank never became clean.
         """
-        clean_s = self.first_clean_s
-        said: tuple[str, ...] = ()
-        if clean_s is None:
-            said = (
+        if self.first_clean_s is None:
+            raise DataError(
                 "the blank never became clean: light other than the glow fades along with it (see "
-                "the blank's report)",
+                "the blank's report, and measure one again with a shield or for longer)"
             )
-        elif first_s < clean_s - SAME_TIME_S:
-            said = (
-                f"the first frame begins {first_s:.3g} s after lamp-off, the blank is clean from "
-                f"{clean_s:.3g} s on: it holds some of the lamp's afterglow (begin later, or use a "
-                "shield)",
-            )
-        return (*said, *self.leaks())
+        return t_s >= self.first_clean_s - SAME_TIME_S
 
     def leaks(self) -> tuple[str, ...]:
         """What shines all the time, a line each."""

@@ -9,6 +9,7 @@ from labrig.errors import FitError
 from labrig.export import write_nexus
 from labrig.fit import DecayFit
 from labrig.process.choices import Choices, DecayProtocol, read_decay_protocol
+from labrig.process.clean import cleaned
 from labrig.process.known import Known
 from labrig.process.page import camera_response, run_name, run_report
 from labrig.process.provenance import provenance
@@ -110,12 +111,10 @@ def measure_decay(
     """
     patches = choices.patches(protocol)
     background = protocol.background if protocol.dark == "background" else None
-    frames = intact_frames(run, choices)
+    frames, stray = cleaned(intact_frames(run, choices), known.blank)
     insist_on_this_camera(known.camera, run, run.frames("decay"))
     series = reduce_patches(frames.decay, patches, frames.dark, background, known.camera)
     fits = _fit_all(series, choices.states or _asked_states(protocol), choices.fixed_rates_per_s)
-    first_s = min(frame.t_s for frame in frames.decay)
-    stray = () if known.blank is None else known.blank.remarks(first_s)
     warnings = (*timing_warnings(run), *frames.warnings, *stray, *_clipping_warnings(series))
     return MeasuredDecay(patches, background, frames, series, fits, warnings)
 

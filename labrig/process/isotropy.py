@@ -11,10 +11,11 @@ from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from labrig.errors import DataError
+from labrig.process.clean import cleaned
 from labrig.process.series_fit import TYPICAL_FLICKER
 from labrig.process.stage import Stage, StageResult
 from labrig.process.this_camera import insist_on_this_camera
-from labrig.process.timed_frames import intact_frames, stray_light, timing_warnings
+from labrig.process.timed_frames import intact_frames, timing_warnings
 from labrig.reduce import Series, reduce_patches
 from labrig.report.figure_style import (
     INK,
@@ -58,7 +59,8 @@ def process(stage: Stage) -> StageResult:
     DataError
         A straight view or all others are missing, or frames are damaged.
     """
-    frames = intact_frames(stage.run, stage.choices, stage.protocol.purpose)
+    intact = intact_frames(stage.run, stage.choices, stage.protocol.purpose)
+    frames, stray = cleaned(intact, stage.known.blank)
     insist_on_this_camera(stage.known.camera, stage.run, stage.run.frames(stage.protocol.purpose))
     patches = stage.choices.patches(stage.protocol)
     series = reduce_patches(frames.decay, patches, frames.dark, camera=stage.known.camera)
@@ -76,7 +78,7 @@ def process(stage: Stage) -> StageResult:
         lines=tuple(lines),
         warnings=(
             *timing_warnings(stage.run, stage.protocol.purpose),
-            *stray_light(stage.known.blank, frames),
+            *stray,
             *(line for views in found.values() for line in _verdict(views)),
             *(line for drift in drifts.values() for line in _drift_warning(drift)),
         ),

@@ -2,7 +2,6 @@
 
 from dataclasses import dataclass
 
-from labrig.calibration.blank_file import BlankFile
 from labrig.errors import DataError
 from labrig.process.choices import Choices
 from labrig.process.intact import damaged_frames, insist
@@ -88,13 +87,6 @@ def steady_frames(run: RunRecord, choices: Choices, purpose: str) -> list[Series
         for frame in run.frames(purpose)
         if frame not in damaged and not choices.excludes(frame)
     ]
-
-
-def stray_light(blank: BlankFile | None, frames: IntactFrames) -> tuple[str, ...]:
-    """What a blank says about frames after lamp off, a line each."""
-    if blank is None:
-        return ()
-    return blank.remarks(min(frame.t_s for frame in frames.decay))
 
 
 def timing_warnings(run: RunRecord, purpose: str = "decay") -> list[str]:

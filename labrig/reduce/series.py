@@ -16,7 +16,7 @@ from labrig.reduce.noise import Floats
 TIME, EXPOSURE, SIGMA_SUFFIX = "t_s", "exposure_s", "_sigma"
 RESERVED = ("iso", "f_number", "frame", "unit", "region", "flag")
 #: Flags of rows that a fit must leave out, and what joins the flags of one row.
-EXCLUDING = frozenset({"clipped", "excluded"})
+EXCLUDING = frozenset({"clipped", "excluded", "afterglow"})
 FLAG_JOINER = "+"
 
 

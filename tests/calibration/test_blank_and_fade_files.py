@@ -68,15 +68,15 @@ def test_a_blank_does_not_know_what_was_before_it() -> None:
         BLANK.at(0.1, 0.1, 400, 4.0)
 
 
-def test_a_decay_that_begins_too_early_or_under_a_leak_is_told() -> None:
-    assert BLANK.remarks(2.1) == ()
-    (said,) = BLANK.remarks(0.5)
-    assert "begins 0.5 s after lamp-off, the blank is clean from 2 s on" in said
+def test_when_a_blank_is_clean_and_what_leaks() -> None:
+    assert BLANK.is_clean(2.1)
+    assert not BLANK.is_clean(0.5)
+    assert BLANK.leaks() == ()
     leaking = BLANK.model_copy(update={"ambient_dn_per_s": (0.0, 3.0)})
-    (said,) = leaking.remarks(2.1)
+    (said,) = leaking.leaks()
     assert "3 ± 0.1 DN/s in G" in said
-    (said,) = BLANK.model_copy(update={"first_clean_s": None}).remarks(9.0)
-    assert "never became clean" in said
+    with pytest.raises(DataError, match="never became clean"):
+        BLANK.model_copy(update={"first_clean_s": None}).is_clean(9.0)
 
 
 def fade(**changes: object) -> FadeFile:

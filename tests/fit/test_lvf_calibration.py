@@ -89,7 +89,7 @@ def assert_calibrated(position: FloatArray, found: LvfCalibration) -> None:
     assert (error < 3 * sigma.centre_nm).all()
     assert np.abs(bands.fwhm_nm / width - 1)[inside].max() < 0.1
     middle = len(position) // 2
-    assert min(sigma.centre_nm[0], sigma.centre_nm[-1]) > 1.5 * sigma.centre_nm[middle]
+    assert min(sigma.centre_nm[0], sigma.centre_nm[-1]) > 1.2 * sigma.centre_nm[middle]
     drawn = found.lvf.transmission(FINE_NM)
     assert (drawn >= 0).all()
     true = truth(position)(FINE_NM)

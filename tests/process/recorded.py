@@ -30,6 +30,7 @@ def record(
     rig = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
     rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    rig["simulation"]["sensor"] = {"width": 96, "height": 64}
     rig["devices"]["lamp"]["warm_up"] = "10 min"
     rig["devices"]["camera"]["warm_up"] = "1 min"
     change(rig)

@@ -27,7 +27,7 @@ LOG_FWHM = (float(np.log(NOMINAL_FWHM_NM)), 0.3)
 SKEW = (0.0, 0.2)
 LEAKAGE = (0.002, 0.01)
 #: The remainder is that of a band's shape; so far from the band it is what blocking is uneven by.
-REMAINDER, BLOCKING, SHAPE_NM = 0.01, 0.001, 50.0
+REMAINDER, BLOCKING, SHAPE_NM = 0.01, 0.001, 60.0
 #: Of a logarithm of which nothing is known but that of all positions it is the same order.
 ANY_PEAK = 2.0
 #: How figures run along a strip: order of a polynomial, and scatter about it.
@@ -44,7 +44,7 @@ CENTRE_FLOOR_NM = 0.5
 ALIKE_NM = 40.0
 FEWEST_FILTERS = 6
 #: How often the others have their say, and steps in between.
-ROUNDS, STEPS = 3, 4
+ROUNDS, STEPS = 4, 4
 
 
 @dataclass(frozen=True, eq=False)

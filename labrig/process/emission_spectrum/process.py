@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import DataError
 from labrig.fit.spectrum import fit_spectrum
+from labrig.process.clean import cleaned
 from labrig.process.emission_file import EmissionSpectrum, write_emission_spectrum
 from labrig.process.emission_spectrum.bench import SpectralBench, spectral_benches, with_white
 from labrig.process.emission_spectrum.constancy import compared, over_time
@@ -24,7 +25,7 @@ from labrig.process.known import Known
 from labrig.process.stage import Stage, StageResult
 from labrig.process.strip_patches import StripPatch, of_each
 from labrig.process.this_camera import insist_on_this_camera
-from labrig.process.timed_frames import intact_frames, steady_frames, stray_light, timing_warnings
+from labrig.process.timed_frames import intact_frames, steady_frames, timing_warnings
 from labrig.reduce import SeriesFrame
 from labrig.reduce.series import is_usable
 
@@ -58,7 +59,8 @@ def process(stage: Stage) -> StageResult:
     FitError
         Too much clips.
     """
-    frames = intact_frames(stage.run, stage.choices, "spectrum")
+    intact = intact_frames(stage.run, stage.choices, "spectrum")
+    frames, stray = cleaned(intact, stage.known.blank)
     insist_on_this_camera(stage.known.camera, stage.run, stage.run.frames("spectrum"))
     benches, refused = spectral_benches(stage, frames.decay[0])
     white = steady_frames(stage.run, stage.choices, "white")
@@ -78,7 +80,7 @@ def process(stage: Stage) -> StageResult:
     )
     told = (
         *timing_warnings(stage.run, "spectrum"),
-        *stray_light(stage.known.blank, frames),
+        *stray,
         *refused,
     )
     return replace(found, warnings=(*told, *found.warnings))

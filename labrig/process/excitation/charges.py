@@ -6,6 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IrradianceFile
 from labrig.errors import DataError
 from labrig.fit.excitation import Charge, ChargingSeries, Transient
@@ -58,6 +59,7 @@ def charged(
     fade: Transient,
     choices: Choices,
     *,
+    blank: BlankFile | None,
     fresh: bool,
     saturated: bool,
 ) -> tuple[dict[StripPatch, Charged], tuple[str, ...]]:
@@ -67,6 +69,8 @@ def charged(
     ----------
     rise, fade
         In the bands of `irradiance`.
+    blank
+        From when on after lamp-off photographs show nothing but the glow.
     fresh
         Whether every charge found a sample that had never seen light.
     saturated
@@ -77,7 +81,7 @@ def charged(
     DataError
         Charges or frames are missing, or no patch lies below the filter.
     """
-    glow = glowing(run, choices)
+    glow = glowing(run, choices, blank)
     raw = read_raw(next(iter(glow.charge)).path)
     sites, refused = cut(patches, irradiance.strip, raw, len(irradiance.position))
     series = reduce_patches(

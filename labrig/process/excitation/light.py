@@ -58,8 +58,9 @@ def across_sites(irradiance: IrradianceFile) -> FloatArray:
     off = np.gradient(position)[:, None] / 2 / np.sqrt(3)
     here, slope = course(position), course(position, 1)
     # At the ends there is nothing to look up beyond the last place's middle.
-    pair = np.exp(np.stack([here - slope * off, here + slope * off]))
-    return np.asarray(pair / pair.mean(axis=0), dtype=np.float64)
+    pair: FloatArray = np.exp(np.stack([here - slope * off, here + slope * off]))
+    mean: FloatArray = pair.mean(axis=0)
+    return pair / mean
 
 
 def band_sigma(irradiance: IrradianceFile) -> tuple[float, ...]:
@@ -81,4 +82,5 @@ def _told(irradiance: IrradianceFile) -> FloatArray:
 
 
 def _some(light: FloatArray) -> FloatArray:
-    return np.maximum(light, LEAST_LIGHT * light.max())
+    some: FloatArray = np.maximum(light, LEAST_LIGHT * light.max())
+    return some

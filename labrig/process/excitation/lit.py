@@ -5,6 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from labrig.calibration import BlankFile
 from labrig.errors import DataError
 from labrig.process.choices import Choices
 from labrig.record import Attempt, FrameRecord, RunRecord
@@ -61,13 +62,14 @@ class Glowing:
         return [frame for frame, charge in self.charge.items() if charge is one]
 
 
-def glowing(run: RunRecord, choices: Choices) -> Glowing:
-    """What a run says.
+def glowing(run: RunRecord, choices: Choices, blank: BlankFile | None = None) -> Glowing:
+    """What a run says; photographs that begin before the bench is dark, by its blank, left out.
 
     Raises
     ------
     DataError
-        There are no charges through the filter, or none without it, or no photographs.
+        There are no charges through the filter, or none without it, or no photographs; or the
+        blank never became clean.
     """
     lit = sorted(
         (one for attempt in run.completed().values() for one in _lit(attempt)),
@@ -77,7 +79,12 @@ def glowing(run: RunRecord, choices: Choices) -> Glowing:
         frame for purpose in GLOWING for frame in run.frames(purpose) if not choices.excludes(frame)
     ]
     frames.sort(key=lambda frame: frame.start_time)
-    charge = {frame: one for frame in frames if (one := _charge_before(lit, frame)) is not None}
+    charge = {
+        frame: one
+        for frame in frames
+        if (one := _charge_before(lit, frame)) is not None
+        and (blank is None or blank.is_clean(frame.start_time - one.off_s))
+    }
     if not charge or not any(one.is_bare for one in lit) or all(one.is_bare for one in lit):
         raise DataError(
             f"{run.folder}: expected complete charges through the filter and without it; go on "

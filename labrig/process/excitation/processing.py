@@ -51,7 +51,7 @@ def process(stage: Stage) -> StageResult:
     rise, fade = lamp_changes(known.fade, np.array(irradiance.bands_nm))
     measured, refused = charged(
         stage.run, irradiance, strip_patches(stage), rise, fade, stage.choices,
-        fresh=protocol.samples > 1, saturated=protocol.saturated,
+        blank=known.blank, fresh=protocol.samples > 1, saturated=protocol.saturated,
     )  # fmt: skip
     found = of_each(
         list(measured),
@@ -59,7 +59,8 @@ def process(stage: Stage) -> StageResult:
         lambda patch, sofar: _of_patch(stage, patch, measured[patch], irradiance, sofar),
     )
     unmeasured = [] if known.fade else ["the lamp's fade was not measured: a usual one was taken"]
-    return replace(found, warnings=(*unmeasured, *refused, *found.warnings))
+    leaks = known.blank.leaks() if known.blank else ()
+    return replace(found, warnings=(*unmeasured, *leaks, *refused, *found.warnings))
 
 
 def _of_patch(

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import DataError
 from labrig.fit import DecayFit
+from labrig.process.clean import cleaned
 from labrig.process.history import charges_s
 from labrig.process.saturation.level import Level, level
 from labrig.process.saturation.shared_rates import Curve, RatesTest, compare_rates, curve
@@ -17,7 +18,7 @@ from labrig.process.saturation.telling import lines, section, verdicts
 from labrig.process.series_fit import fit_series
 from labrig.process.stage import Stage, StageResult
 from labrig.process.this_camera import insist_on_this_camera
-from labrig.process.timed_frames import intact_frames, stray_light, timing_warnings
+from labrig.process.timed_frames import intact_frames, timing_warnings
 from labrig.record import RunRecord
 from labrig.reduce import Series, reduce_patches
 
@@ -62,7 +63,7 @@ def process(stage: Stage) -> StageResult:
     FitError
         The decays do not allow a fit.
     """
-    frames = intact_frames(stage.run, stage.choices)
+    frames, stray = cleaned(intact_frames(stage.run, stage.choices), stage.known.blank)
     insist_on_this_camera(stage.known.camera, stage.run, stage.run.frames("decay"))
     patches = stage.choices.patches(stage.protocol)
     series = reduce_patches(frames.decay, patches, frames.dark, camera=stage.known.camera)
@@ -83,7 +84,7 @@ def process(stage: Stage) -> StageResult:
         ),
         warnings=(
             *timing_warnings(stage.run),
-            *stray_light(stage.known.blank, frames),
+            *stray,
             *(
                 f"{name}: {line}" if several else line
                 for name, one in found.items()

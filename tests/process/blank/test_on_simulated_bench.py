@@ -9,10 +9,12 @@ import numpy as np
 import pytest
 
 from labrig.calibration import read_blank_file
+from labrig.errors import DataError
 from labrig.process import Choices, process_run
 from labrig.process.choices import read_decay_protocol
 from labrig.process.decay import measure_decay
 from labrig.process.known import Known
+from labrig.process.timed_frames import intact_frames
 from labrig.record import read_run
 from tests.process.recorded import cut_off_and_resumed, record
 
@@ -81,7 +83,19 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
     blank = read_blank_file(run / "result" / "blank.yaml")
     assert blank.first_clean_s is None
     assert any("still gets darker at its end" in said for said in result.run_warnings)
-    assert any("never became clean" in said for said in blank.remarks(10.0))
+    decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "20 s",
+             "first": "1 s", "exposure": "1 s"}  # fmt: skip
+    decayed = read_run(record(tmp_path / "decay", decay))
+    protocol = read_decay_protocol(decayed.folder)
+    with pytest.raises(DataError, match="never became clean"):
+        measure_decay(decayed, protocol, Choices(), Known(blank=blank))
+    # One that is clean from the third frame on: the earlier ones are left out, and it is said.
+    third = sorted(frame.t_s for frame in intact_frames(decayed, Choices()).decay)[2]
+    ends = blank.model_copy(update={"first_clean_s": third, "ambient_dn_per_s": (0.0, 0.0, 0.0)})
+    found = measure_decay(decayed, protocol, Choices(), Known(blank=ends))
+    (series,) = found.series.values()
+    assert list(series.usable[:4]) == [False, False, True, True]
+    assert any("2 frames begin before the bench is dark" in said for said in found.run_warnings)
     rate = np.array(blank.rate_dn_per_s)[:, 1]
     assert rate[1] > rate[-1]
 

@@ -185,4 +185,7 @@ def test_charges_are_missing(run: Path) -> None:
     rise, fade = lamp_changes(None, np.array(irradiance.bands_nm))
     patch, choices = StripPatch("", "blue-paint"), Choices()
     with pytest.raises(DataError, match="through the filter and without it"):
-        charged(some, irradiance, [patch], rise, fade, choices, fresh=False, saturated=False)
+        charged(
+            some, irradiance, [patch], rise, fade, choices,
+            blank=None, fresh=False, saturated=False,
+        )  # fmt: skip
