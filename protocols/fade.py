@@ -42,6 +42,11 @@ LVF_AWAY = ByHand("take the variable filter away", "it is not needed any more", 
 SLOWEST_S = 0.09
 #: A filament is steady, or cold, after this.
 STEADY_S = 4.0
+#: How long a lamp's housing cools before it is watched, when from switching on it is photographed,
+#: how often each time, and how far apart: the last per cents of light come with the housing.
+COOLS_S = 600.0
+WARMING_S = (4.0, 15.0, 30.0, 60.0, 100.0, 160.0, 250.0, 400.0, 600.0)
+WARMING_SHOTS, WARMING_EVERY_S = 4, 2.0
 
 
 class Fade(ProtocolModel):
@@ -54,6 +59,7 @@ class Fade(ProtocolModel):
     passes: int = Field(4, ge=2)
     longest: DurationS = Field(1.0, gt=0)
     rise: bool = True
+    warming: bool = True
     through_lvf: bool = False
     card: Region = CENTRE
     bands: tuple[float, ...] = tuple(380.0 + 20.0 * number for number in range(21))
@@ -98,6 +104,7 @@ class Fade(ProtocolModel):
             *filter_in,
             CardMeterUnit(reference, self.card),
             *(PassUnit(self, number) for number in range(self.passes)),
+            *([WarmingUnit(self)] if self.warming else []),
             *filter_away,
             PutBackUnit(Arrangement("grey card")),
         ]
@@ -146,3 +153,27 @@ class PassUnit:
             session.wait(STEADY_S, "lamp cools")
             session.run_sequence([at(0.0, LAMP_ON), at(delay_s, Shoot("rise", steady))])
             session.wait(STEADY_S, "lamp settles")
+
+
+@dataclass(frozen=True)
+class WarmingUnit:
+    """Photographs of the card while the lamp's housing becomes warm."""
+
+    protocol: Fade
+    name: str = "warming"
+
+    def run(self, session: Session) -> None:
+        """Off until the housing is cold; then on, and more and more seldom looked at."""
+        protocol = self.protocol
+        session.wait_until_warm("camera")
+        light_card(session)
+        light = card_light(session, protocol.settings(), protocol.card)
+        steady = light.exposed(HALF, protocol.settings(), session.rig.camera.offers())
+        session.perform(LAMP_OFF)
+        session.wait(COOLS_S, "lamp's housing cools")
+        shots = [
+            at(time_s + number * WARMING_EVERY_S, Shoot("warming", steady))
+            for time_s in WARMING_S
+            for number in range(WARMING_SHOTS)
+        ]
+        session.run_sequence([at(0.0, LAMP_ON), *shots])

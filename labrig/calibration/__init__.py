@@ -9,7 +9,13 @@ from labrig.calibration.camera_file import (
     read_camera_file,
     write_camera_file,
 )
-from labrig.calibration.fade_file import Change, FadeFile, read_fade_file, write_fade_file
+from labrig.calibration.fade_file import (
+    Change,
+    FadeFile,
+    Warming,
+    read_fade_file,
+    write_fade_file,
+)
 from labrig.calibration.flat_field import Flat, rho_squared
 from labrig.calibration.irradiance_file import (
     IrradianceFile,
@@ -30,6 +36,7 @@ __all__ = [
     "LvfFile",
     "Noise",
     "Strip",
+    "Warming",
     "read_blank_file",
     "read_camera_file",
     "read_fade_file",

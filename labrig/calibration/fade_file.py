@@ -52,6 +52,22 @@ class Change(_Part):
         return total
 
 
+class Warming(_Part):
+    """Light of a lamp whose housing is cold: 1 − `lacks` e^(−t/`warms_s`) of the warm one's.
+
+    Attributes
+    ----------
+    lacks, lacks_sigma
+        Share of the warm lamp's light, all wavelengths alike.
+    warms_s
+        Time constant of the housing.
+    """
+
+    lacks: Annotated[float, Field(ge=0, lt=1)]
+    lacks_sigma: NotNegative
+    warms_s: Positive
+
+
 class FadeFile(_Part):
     """What `fade` found.
 
@@ -61,6 +77,8 @@ class FadeFile(_Part):
         Edges of the bands, rising; one more than there are bands.
     fade, rise
         After switching off and on; null: not measured.
+    warming
+        What comes later, with the housing's warmth; null: not measured.
     """
 
     kind: Literal["fade"] = "fade"
@@ -68,6 +86,7 @@ class FadeFile(_Part):
     bands_nm: Annotated[tuple[Positive, ...], Field(min_length=2)]
     fade: Change
     rise: Change | None = None
+    warming: Warming | None = None
     source: str = ""
     run: str | None = None
 

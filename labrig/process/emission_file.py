@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
+from scipy.interpolate import CubicSpline
 
 from labrig.fit.spectrum import SpectrumFit
 from labrig.material import Spectrum
@@ -89,13 +90,17 @@ class EmissionSpectrum(BaseModel):
         )
 
     def in_bands(self, edges_nm: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Means over neighbouring bands (b,), and their covariance (b, b)."""
-        grid = np.array(self.wavelength_nm)
-        ends = edges_about(grid)
-        # The outermost values hold to the outermost edges.
-        wider = np.concatenate([ends[:1], grid, ends[-1:]])
-        own = np.eye(len(grid))
-        means = band_means(wider, np.vstack([own[:1], own, own[-1:]]), edges_nm)
+        """Means over neighbouring bands (b,), and their covariance (b, b).
+
+        Values are means: a cubic spline through their running sum takes them apart where an edge
+        of a band lies within one; straight lines between them would fill valleys.
+        """
+        ends = edges_about(np.array(self.wavelength_nm))
+        sums = np.vstack([np.zeros(len(ends) - 1), np.tril(np.ones((len(ends) - 1,) * 2))])
+        sums[1:] *= np.diff(ends)
+        edges = np.asarray(edges_nm, dtype=np.float64)
+        inside = np.clip(edges, ends[0], ends[-1])
+        means = np.diff(CubicSpline(ends, sums)(inside), axis=0) / np.diff(edges)[:, np.newaxis]
         return means @ np.array(self.value), means @ np.array(self.covariance) @ means.T
 
     def for_material(self) -> Spectrum:

@@ -3,6 +3,7 @@
 import csv
 import struct
 from dataclasses import replace
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -219,15 +220,25 @@ def test_bands_of_a_spectrum_carry_its_covariance(found: StageResult) -> None:
     edges = np.arange(400.0, 701.0, 37.5)
     value, covariance = spectrum.in_bands(edges)
     draws = np.random.default_rng(0).multivariate_normal(
-        spectrum.value, np.array(spectrum.covariance), 4000
+        spectrum.value, np.array(spectrum.covariance), 400
     )
     scattered = [
-        np.interp(np.linspace(*edge, 400), WAVELENGTH_NM, draw).mean()
-        for draw in draws[:400]
-        for edge in [(edges[1], edges[2])]
+        spectrum.model_copy(update={"value": tuple(draw)}).in_bands(edges)[0][1] for draw in draws
     ]
     assert value[1] == pytest.approx(np.mean(scattered), abs=0.005)
     assert np.sqrt(covariance[1, 1]) == pytest.approx(np.std(scattered), rel=0.15)
+
+
+def test_bands_that_cut_through_the_grid_are_those_of_the_spectrum(found: StageResult) -> None:
+    """Steep flanks, of which straight lines through means over 10 nm make too much."""
+    fine = np.arange(395.0, 705.0, 0.1) + 0.05
+    steep = np.exp(-(((fine - 460) / 20) ** 2))
+    grid = steep.reshape(31, -1).mean(axis=1)
+    spectrum = found.known.spectra[""].model_copy(update={"value": tuple(grid.tolist())})
+    edges = np.arange(400.0, 701.0, 37.5)
+    value, _ = spectrum.in_bands(edges)
+    true = [steep[(fine > a) & (fine < b)].mean() for a, b in pairwise(edges)]
+    np.testing.assert_allclose(value, true, atol=1e-3)
 
 
 def test_a_malformed_file_is_refused_in_one_line(tmp_path: Path) -> None:

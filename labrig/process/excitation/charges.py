@@ -6,7 +6,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.calibration import BlankFile
+from labrig.calibration import BlankFile, Warming
 from labrig.calibration.irradiance_file import IrradianceFile
 from labrig.errors import DataError
 from labrig.fit.excitation import Charge, ChargingSeries, Transient
@@ -59,6 +59,7 @@ def charged(
     fade: Transient,
     choices: Choices,
     *,
+    warming: Warming,
     blank: BlankFile | None,
     fresh: bool,
     saturated: bool,
@@ -69,6 +70,8 @@ def charged(
     ----------
     rise, fade
         In the bands of `irradiance`.
+    warming
+        What the lamp lacks while its housing is cold.
     blank
         From when on after lamp-off photographs show nothing but the glow.
     fresh
@@ -81,7 +84,7 @@ def charged(
     DataError
         Charges or frames are missing, or no patch lies below the filter.
     """
-    glow = glowing(run, choices, blank)
+    glow = glowing(run, choices, warming.warms_s, blank)
     raw = read_raw(next(iter(glow.charge)).path)
     sites, refused = cut(patches, irradiance.strip, raw, len(irradiance.position))
     series = reduce_patches(
@@ -97,7 +100,7 @@ def charged(
 
     def charges(bare: bool) -> tuple[Charge, ...]:
         return tuple(
-            _charge(one, glow, fresh=fresh, saturated=saturated and one is longest)
+            _charge(one, glow, warming.lacks, fresh=fresh, saturated=saturated and one is longest)
             for one in glow.lit
             if one.is_bare is bare
         )
@@ -143,13 +146,14 @@ def _evened(
     )
 
 
-def _charge(one: Lit, glow: Glowing, *, fresh: bool, saturated: bool) -> Charge:
+def _charge(one: Lit, glow: Glowing, lacks: float, *, fresh: bool, saturated: bool) -> Charge:
     frames = glow.after(one)
     return Charge(
         on_s=one.on_s - glow.zero_s,
         off_s=one.off_s - glow.zero_s,
         start_s=np.array([frame.start_time - glow.zero_s for frame in frames]),
         exposure_s=np.array([frame.exposure_s for frame in frames]),
+        brightness=1 - lacks * one.cold,
         cold=one.cold,
         fresh=fresh,
         saturated=saturated,

@@ -1,9 +1,8 @@
 """When the lamp shone on the sample, and which charge every photograph of the glow belongs to."""
 
+import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
-
-import numpy as np
+from dataclasses import dataclass, replace
 
 from labrig.calibration import BlankFile
 from labrig.errors import DataError
@@ -14,29 +13,27 @@ from labrig.record import Attempt, FrameRecord, RunRecord
 GLOWING = ("strip", "bare", "rest")
 #: Units that charged by the lamp itself; all others charged through the filter.
 BARE = "bare-"
-#: A halogen lamp's housing and mirror warm about that fast, and the last per cents of light with
-#: them.
-WARMS_S = 150.0
 
 
 @dataclass(frozen=True)
 class Lit:
-    """A unit that charged."""
+    """A unit that charged.
+
+    Attributes
+    ----------
+    cold
+        Part of what a cold lamp lacks that it lacked in this charge on average, 0 to 1.
+    """
 
     unit: str
     on_s: float
     off_s: float
+    cold: float = 0.0
 
     @property
     def is_bare(self) -> bool:
         """Whether it charged by the lamp itself."""
         return self.unit.startswith(BARE)
-
-    @property
-    def cold(self) -> float:
-        """Mean of e^(−t/τ) over the charge: how cold the lamp was, on average."""
-        charge_s = self.off_s - self.on_s
-        return float(-np.expm1(-charge_s / WARMS_S) * WARMS_S / charge_s)
 
 
 @dataclass(frozen=True)
@@ -62,8 +59,15 @@ class Glowing:
         return [frame for frame, charge in self.charge.items() if charge is one]
 
 
-def glowing(run: RunRecord, choices: Choices, blank: BlankFile | None = None) -> Glowing:
+def glowing(
+    run: RunRecord, choices: Choices, warms_s: float, blank: BlankFile | None = None
+) -> Glowing:
     """What a run says; photographs that begin before the bench is dark, by its blank, left out.
+
+    Parameters
+    ----------
+    warms_s
+        Time constant with which the lamp's housing warms and cools.
 
     Raises
     ------
@@ -71,9 +75,12 @@ def glowing(run: RunRecord, choices: Choices, blank: BlankFile | None = None) ->
         There are no charges through the filter, or none without it, or no photographs; or the
         blank never became clean.
     """
-    lit = sorted(
-        (one for attempt in run.completed().values() for one in _lit(attempt)),
-        key=lambda one: one.on_s,
+    lit = _with_warmth(
+        sorted(
+            (one for attempt in run.completed().values() for one in _lit(attempt)),
+            key=lambda one: one.on_s,
+        ),
+        warms_s,
     )
     frames = [
         frame for purpose in GLOWING for frame in run.frames(purpose) if not choices.excludes(frame)
@@ -91,6 +98,20 @@ def glowing(run: RunRecord, choices: Choices, blank: BlankFile | None = None) ->
             f"with: labrig resume {run.folder}"
         )
     return Glowing(lit, charge)
+
+
+def _with_warmth(lit: Sequence[Lit], warms_s: float) -> list[Lit]:
+    """By Newton's law: cold before the first charge, warmer in each one, cooler after it."""
+    found: list[Lit] = []
+    lacking, since_s = 1.0, 0.0
+    for one in lit:
+        if found:
+            lacking = 1 - (1 - lacking) * math.exp(-(one.on_s - since_s) / warms_s)
+        charge_s = one.off_s - one.on_s
+        mean = -math.expm1(-charge_s / warms_s) * warms_s / charge_s
+        found.append(replace(one, cold=lacking * mean))
+        lacking, since_s = lacking * math.exp(-charge_s / warms_s), one.off_s
+    return found
 
 
 def _lit(attempt: Attempt) -> Sequence[Lit]:

@@ -4,6 +4,7 @@ from dataclasses import replace
 
 import numpy as np
 
+from labrig.calibration import Warming
 from labrig.calibration.irradiance_file import IrradianceFile
 from labrig.errors import DataError
 from labrig.fit import DecayFit
@@ -23,8 +24,10 @@ from labrig.process.stage import Stage, StageResult
 from labrig.process.strip_patches import StripPatch, of_each, strip_patches
 from labrig.process.temperature import at_temperature
 
-#: Of a lamp's brightness from charge to charge, and what one lacks that was just switched on.
-LAMP, COLD = 0.01, 0.03
+#: Of a lamp's brightness from charge to charge.
+LAMP = 0.01
+#: What a lamp lacks that was just switched on, where nobody has measured it.
+USUAL = Warming(lacks=0.02, lacks_sigma=0.02, warms_s=150.0)
 #: No dark level is known better, in DN/s.
 LEAST_DARK = 1e-3
 #: Names of a result's files.
@@ -51,7 +54,8 @@ def process(stage: Stage) -> StageResult:
     rise, fade = lamp_changes(known.fade, np.array(irradiance.bands_nm))
     measured, refused = charged(
         stage.run, irradiance, strip_patches(stage), rise, fade, stage.choices,
-        blank=known.blank, fresh=protocol.samples > 1, saturated=protocol.saturated,
+        warming=_warming(known), blank=known.blank,
+        fresh=protocol.samples > 1, saturated=protocol.saturated,
     )  # fmt: skip
     found = of_each(
         list(measured),
@@ -70,7 +74,7 @@ def _of_patch(
     uncertain = Uncertain(
         flicker=_flicker(stage, start),
         lamp=LAMP,
-        cold=COLD,
+        cold=_warming(known).lacks_sigma,
         offset=tuple(np.maximum(np.nan_to_num(measured.whole.dark_sigma), LEAST_DARK).tolist()),
         scale=irradiance.scale_sigma,
         irradiance=band_sigma(irradiance),
@@ -116,6 +120,10 @@ def _fit(measured: Charged, start: DecayFit, uncertain: Uncertain) -> Excitation
     amplitudes = np.array([state.amplitude for state in start.states])
     shares = np.maximum(amplitudes / amplitudes.sum(), 1e-3)
     return fit_excitation([measured.through, measured.bare], rates, shares, uncertain)
+
+
+def _warming(known: Known) -> Warming:
+    return USUAL if known.fade is None or known.fade.warming is None else known.fade.warming
 
 
 def _flicker(stage: Stage, start: DecayFit) -> float:

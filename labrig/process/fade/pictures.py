@@ -4,25 +4,54 @@ from collections.abc import Mapping
 
 import numpy as np
 from matplotlib.figure import Figure
+from numpy.typing import NDArray
 
 from labrig.calibration import Change as ChangeTable
-from labrig.calibration import FadeFile
+from labrig.calibration import FadeFile, Warming
 from labrig.process.fade.change import Change
 from labrig.process.fade.shots import Shots
 from labrig.report.figure_style import (
     CHANNEL,
+    INK,
     LEFT_PT,
     OTHER_CHANNELS,
     new_figure,
     place,
+    points,
 )
 from labrig.report.legend import legend_above, lined
 from labrig.report.sections import Picture, Section, Table
 from labrig.report.written_numbers import plus_minus
 
+FloatArray = NDArray[np.float64]
+
 HEIGHT_PT = 250.0
 #: Of the bands that are drawn, from blue to red.
 COLOURS = (CHANNEL["B"], OTHER_CHANNELS[2], CHANNEL["G"], OTHER_CHANNELS[1], CHANNEL["R"])
+
+
+def warming_sections(
+    found: tuple[Warming, FloatArray, FloatArray] | None,
+) -> tuple[Section, ...]:
+    """The light while the housing warms, if it was watched."""
+    if found is None:
+        return ()
+    warm, t_s, light = found
+    figure = new_figure(180)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
+    grid = np.linspace(0, float(t_s.max()), 201)
+    axes.plot(grid, 100 * (1 - warm.lacks * np.exp(-grid / warm.warms_s)), color=INK)
+    points(axes, t_s, 100 * light, "o", INK, INK, size=3.0)
+    axes.set_xlabel("Time after switching on / s")
+    axes.set_ylabel("Light / % of warm")
+    lacks = plus_minus(100 * warm.lacks, 100 * warm.lacks_sigma)
+    text = (
+        f"After ten minutes in the dark the lamp lacks {lacks} % of its light; that comes as its "
+        f"housing warms, with a time constant of {warm.warms_s:.0f} s. Short charges are that much "
+        "weaker."
+    )
+    caption = "Light on the card, by photograph; line: 1 − d e^(−t/τ)."
+    return (Section("How the lamp warms", (text,), (Picture("warming", figure, caption),)),)
 
 
 def section(file: FadeFile, changes: Mapping[str, tuple[Shots, Change]]) -> Section:

@@ -7,14 +7,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.calibration import Change as ChangeTable
-from labrig.calibration import FadeFile, write_fade_file
+from labrig.calibration import FadeFile, Warming, write_fade_file
 from labrig.errors import DataError
 from labrig.optics import CameraResponse, Spectrum
 from labrig.process.bench_curves import camera_curves, lamp_spectrum
 from labrig.process.fade.change import Change
 from labrig.process.fade.fit import ANY_LAG_S, fit_change
-from labrig.process.fade.pictures import section
+from labrig.process.fade.pictures import section, warming_sections
 from labrig.process.fade.shots import Shots, shots_after
+from labrig.process.fade.warming import warming
 from labrig.process.stage import Stage, StageResult
 from labrig.process.stage_frames import stage_frames, stage_region
 from labrig.process.this_camera import insist_on_this_camera
@@ -72,11 +73,13 @@ def process(stage: Stage) -> StageResult:
         change = fit_change(shots, seen, nm, flicker, rises=rises, lag_s=lag_s)
         lag_s = change.lag_s[0], float(np.hypot(change.lag_s[1], RELAY_S))
         found[purpose] = shots, change, _table(change, bands, nm)
+    warm = _warming(stage, darks, flicker)
     file = FadeFile(
         lamp=lamp.name,
         bands_nm=protocol.bands,
         fade=found["fade"][2],
         rise=found["rise"][2] if "rise" in found else None,
+        warming=None if warm is None else warm[0],
         source="measured with labrig, fade",
         run=stage.run.folder.resolve().name,
     )
@@ -84,10 +87,20 @@ def process(stage: Stage) -> StageResult:
     changes = {purpose: (shots, change) for purpose, (shots, change, _) in found.items()}
     return StageResult(
         known=replace(stage.known, fade=file),
-        sections=(section(file, changes),),
+        sections=(section(file, changes), *warming_sections(warm)),
         lines=tuple(_lines(file, changes)),
         warnings=tuple(_warnings(changes)),
     )
+
+
+def _warming(
+    stage: Stage, darks: Sequence[FrameRecord], flicker: float
+) -> tuple[Warming, FloatArray, FloatArray] | None:
+    frames = stage_frames(stage, "warming")
+    if not frames:
+        return None
+    card = stage_region(stage, stage.protocol.card)
+    return warming(stage.run, frames, darks, card, stage.known.camera, flicker)
 
 
 def _places(
@@ -169,6 +182,12 @@ def _lines(file: FadeFile, changes: Mapping[str, tuple[Shots, Change]]) -> Itera
             f"the {purpose} {verb} {first:.1f} ms of the steady lamp in the first band, "
             f"{last:.1f} ms in the last; over after {rounded(table.t_s[-1], 3)} s; exponent of the "
             f"wavelength {plus_minus(*change.exponent)} (1: a glowing body)"
+        )
+    if file.warming is not None:
+        warm = file.warming
+        yield (
+            f"a cold lamp lacks {plus_minus(100 * warm.lacks, 100 * warm.lacks_sigma)} % of its "
+            f"light, which comes with a time constant of {warm.warms_s:.0f} s"
         )
 
 

@@ -177,6 +177,7 @@ def test_charges_are_missing(run: Path) -> None:
     from labrig.process.choices import Choices
     from labrig.process.excitation.charges import charged
     from labrig.process.excitation.lamp_changes import lamp_changes
+    from labrig.process.excitation.processing import USUAL
     from labrig.process.strip_patches import StripPatch
 
     whole = read_run(run)
@@ -187,5 +188,5 @@ def test_charges_are_missing(run: Path) -> None:
     with pytest.raises(DataError, match="through the filter and without it"):
         charged(
             some, irradiance, [patch], rise, fade, choices,
-            blank=None, fresh=False, saturated=False,
+            warming=USUAL, blank=None, fresh=False, saturated=False,
         )  # fmt: skip

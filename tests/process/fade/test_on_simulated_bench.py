@@ -80,7 +80,7 @@ def test_it_is_told_as_a_glowing_bodys(result: Result) -> None:
 def test_killed_within_a_pass_it_goes_on_there(run: Path, result: Result) -> None:
     units = list(read_run(run).completed())
     cut, resumed = cut_off_and_resumed(run, "pass-2")
-    assert list(cut.completed()) == units[:-2]
+    assert list(cut.completed()) == units[:-3]
     assert list(resumed.completed()) == units
 
 
@@ -89,3 +89,12 @@ def test_without_the_lamps_spectrum_it_says_what_is_missing(run: Path, result: R
     path.write_text(path.read_text().replace("lamp: halogen_3000k\n", "lamp: null\n"))
     with pytest.raises(UsageError, match="which lamp it has"):
         process_run(run)
+
+
+def test_what_a_cold_lamp_lacks_is_the_rooms(fade: FadeFile, result: Result) -> None:
+    """The room's lamp lacks 3 % and warms in 150 s."""
+    assert fade.warming is not None
+    assert abs(fade.warming.lacks - 0.03) < 3 * fade.warming.lacks_sigma
+    assert fade.warming.lacks_sigma < 0.006
+    assert 50 < fade.warming.warms_s < 450
+    assert any("a cold lamp lacks" in line for line in result.lines)
