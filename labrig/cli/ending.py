@@ -1,11 +1,10 @@
 """How a command ends: an exit code, and one line where something went wrong."""
 
-import os
 import signal
 import sys
 from collections.abc import Sequence
-from typing import TextIO
 
+from labrig.cli.closed_pipe import say_no_more
 from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
@@ -26,11 +25,6 @@ def guarded(arguments: Sequence[str]) -> int:
         for signum in STOP_SIGNALS:
             signal.signal(signum, signal.SIG_IGN)
     return code
-
-
-def say_no_more(stream: TextIO) -> None:
-    """What is still written to `stream` is dropped: the reader of its pipe has gone."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
 
 
 def _run(arguments: Sequence[str]) -> int:

@@ -16,7 +16,7 @@ from rich.table import Table
 from rich.text import Text
 
 from labrig.acquire import ByHand, ExposureSettings, Plan, RunObserver
-from labrig.cli.ending import say_no_more
+from labrig.cli.closed_pipe import say_no_more
 from labrig.cli.prompt import Terminal
 from labrig.clock import Clock
 from labrig.errors import UsageError

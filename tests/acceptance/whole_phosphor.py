@@ -72,14 +72,14 @@ def run(folder: Path, material: str, seed: int, width: int) -> tuple[Material | 
 
 
 def brightness(run: Path) -> float:
-    """Of the room's lamp in the last charge: it loses 0.2 % an hour, and warms in 150 s."""
+    """Of the room's lamp in the last charge: it loses 0.2 % an hour."""
     (off,) = [
         action
         for action in list(read_run(run).completed().values())[-1].actions
         if action.device == "lamp" and action.action == "off"
     ]
     hours = (off.start_time - datetime(2026, 1, 1, tzinfo=UTC).timestamp()) / 3600
-    return 1 - 0.002 * hours - 0.03 * float(np.exp(-900 / 150))
+    return 1 - 0.002 * hours
 
 
 def compared(found: Material, true: Material, brightness: float) -> str:
@@ -96,13 +96,14 @@ def compared(found: Material, true: Material, brightness: float) -> str:
     lines = []
     for number, (state, truth) in enumerate(pairs):
         k_e, sigma = (np.array(x) / LAMP for x in (state.k_e_per_s, state.k_e_per_s_sigma))
-        wanted = np.array(truth.k_e_per_s)
-        strong = wanted >= MEASURABLE_PER_S
+        # What was found belongs to the lamp as it was.
+        wanted = brightness * np.array(truth.k_e_per_s)
+        strong = np.array(truth.k_e_per_s) >= MEASURABLE_PER_S
         percent = 100 * (k_e / np.where(strong, wanted, 1.0) - 1)[strong]
         pulls = ((k_e - wanted) / np.maximum(sigma, 1e-12))[strong]
         weak = (wanted / np.maximum(k_e + 1.645 * sigma, 1e-12))[~strong]
         false = ((k_e - wanted) / np.maximum(sigma, 1e-12))[~strong]
-        kappa = LAMP * brightness * float(wanted @ direct)
+        kappa = LAMP * float(wanted @ direct)
         r0 = kappa / (kappa + truth.k_r_per_s)
         own = np.array(state.reradiation_sigma) * factor
         radiated = (factor * ours[number] - theirs[number]) / np.maximum(own, 1e-12)

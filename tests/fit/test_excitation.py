@@ -215,3 +215,21 @@ def test_transients_that_are_none() -> None:
     for t_s, left in (([0.0], [[1.0]]), ([0.1, 0.2], [[1.0], [0.0]]), ([0.0, 0.1], [1.0, 0.0])):
         with pytest.raises(FitError, match="that rise from 0 s"):
             Transient.sampled(t_s, left)
+
+
+def test_a_site_under_uneven_light_has_the_mean_level_of_its_places() -> None:
+    bench = Bench(read_material("blue-paint"))
+    _, through = measured(bench)
+    slope = np.linspace(-0.3, 0.3, through.irradiance.size).reshape(through.irradiance.shape)
+    across = np.stack([1 - slope, 1 + slope])
+    k_r, k_e = np.array([0.03]), np.full((1, through.irradiance.shape[1]), 0.05)
+    uneven = levels(replace(through, across=across), k_r, k_e)
+    each = [
+        levels(replace(through, irradiance=through.irradiance * one), k_r, k_e) for one in across
+    ]
+    np.testing.assert_allclose(uneven.value, (each[0].value + each[1].value) / 2, rtol=1e-12)
+    np.testing.assert_allclose(uneven.by_k_e, (each[0].by_k_e + each[1].by_k_e) / 2, rtol=1e-12)
+    # A level saturates: less than that of the mean light.
+    even = levels(through, k_r, k_e).value
+    assert (uneven.value <= even * (1 + 1e-12)).all()
+    assert (uneven.value < 0.995 * even).any()

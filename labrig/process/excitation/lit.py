@@ -75,7 +75,7 @@ def glowing(
         There are no charges through the filter, or none without it, or no photographs; or the
         blank never became clean.
     """
-    lit = _with_warmth(
+    lit = with_warmth(
         sorted(
             (one for attempt in run.completed().values() for one in _lit(attempt)),
             key=lambda one: one.on_s,
@@ -100,7 +100,7 @@ def glowing(
     return Glowing(lit, charge)
 
 
-def _with_warmth(lit: Sequence[Lit], warms_s: float) -> list[Lit]:
+def with_warmth(lit: Sequence[Lit], warms_s: float) -> list[Lit]:
     """By Newton's law: cold before the first charge, warmer in each one, cooler after it."""
     found: list[Lit] = []
     lacking, since_s = 1.0, 0.0

@@ -2,18 +2,17 @@
 
 import csv
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DataError
-from labrig.fit import DecayFit
 from labrig.process.clean import cleaned
 from labrig.process.history import charges_s
+from labrig.process.saturation.found import Saturation
 from labrig.process.saturation.level import Level, level
-from labrig.process.saturation.shared_rates import Curve, RatesTest, compare_rates, curve
+from labrig.process.saturation.shared_rates import RatesTest, compare_rates, curve
 from labrig.process.saturation.telling import lines, section, verdicts
 from labrig.process.series_fit import fit_series
 from labrig.process.stage import Stage, StageResult
@@ -26,31 +25,6 @@ FloatArray = NDArray[np.float64]
 
 #: Lights of a saturation run, as its units are called.
 FULL, WEAKER = "full", "weaker"
-
-
-@dataclass(frozen=True, eq=False)
-class Saturation:
-    """What a patch's decays say.
-
-    Attributes
-    ----------
-    fit
-        Of the decay after the longest charge under the full light.
-    charges_s
-        (d,) as they were, by light; rows of `amplitude` and `sigma` (d, s), states by falling rate.
-    curves, test
-        All decays by their unit, and what sharing the rates costs.
-    levels
-        r(0) of every state after that charge; none without a weaker light.
-    """
-
-    fit: DecayFit
-    charges_s: Mapping[str, FloatArray]
-    amplitude: Mapping[str, FloatArray]
-    sigma: Mapping[str, FloatArray]
-    curves: Mapping[str, Curve]
-    test: RatesTest
-    levels: tuple[Level, ...]
 
 
 def process(stage: Stage) -> StageResult:

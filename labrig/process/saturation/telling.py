@@ -1,16 +1,14 @@
 """What decays after several charges say: lines, warnings, the section of the report."""
 
-from typing import TYPE_CHECKING, Protocol
+from typing import Protocol
 
 import numpy as np
 
 from labrig.process.saturation.figures import decays_figure, plateau_figure
+from labrig.process.saturation.found import Saturation
 from labrig.quantity import duration_text
 from labrig.report.sections import Picture, Section, Table
 from labrig.report.written_numbers import plus_minus, rounded
-
-if TYPE_CHECKING:
-    from labrig.process.saturation.process import Saturation
 
 #: Where a longer charge brightens the glow by less, the plateau is reached.
 PLATEAU = 0.02
@@ -24,7 +22,7 @@ class WeakerLight(Protocol):
     share_sigma: float
 
 
-def lines(found: "Saturation") -> list[str]:
+def lines(found: Saturation) -> list[str]:
     """Saturation in time, in level, and the rates."""
     begin, end = (f"{_percent(growth)} ± {_percent(sigma)}" for growth, sigma in _growth(found))
     shorter, longer = (duration_text(float(charge)) for charge in found.charges_s["full"][-2:])
@@ -46,7 +44,7 @@ def lines(found: "Saturation") -> list[str]:
     return [*told, _rates_text(found)]
 
 
-def verdicts(found: "Saturation") -> list[str]:
+def verdicts(found: Saturation) -> list[str]:
     """Warnings."""
     told = []
     if _in_time(found) == "not saturated":
@@ -70,7 +68,7 @@ def verdicts(found: "Saturation") -> list[str]:
     return told
 
 
-def section(name: str, found: "Saturation", weaker: WeakerLight | None) -> Section:
+def section(name: str, found: Saturation, weaker: WeakerLight | None) -> Section:
     """Of the report."""
     text = [*lines(found)]
     if weaker is not None:
@@ -103,7 +101,7 @@ def section(name: str, found: "Saturation", weaker: WeakerLight | None) -> Secti
     )
 
 
-def _growth(found: "Saturation") -> list[tuple[float, float]]:
+def _growth(found: Saturation) -> list[tuple[float, float]]:
     """Of the glow between the last two charges under the full light, at the begin and the end of
     their decays, where slow states show; each with its σ.
     """
@@ -126,7 +124,7 @@ def _percent(share: float) -> str:
     return f"{share:.1%}".replace("-", "−")
 
 
-def _in_time(found: "Saturation") -> str:
+def _in_time(found: Saturation) -> str:
     growths = _growth(found)
     if any(growth - SIGMAS * sigma > PLATEAU for growth, sigma in growths):
         return "not saturated"
@@ -135,7 +133,7 @@ def _in_time(found: "Saturation") -> str:
     return "not decided"
 
 
-def _rates_text(found: "Saturation") -> str:
+def _rates_text(found: Saturation) -> str:
     test = found.test
     if test.misfit and not test.differ:
         return (
@@ -150,7 +148,7 @@ def _rates_text(found: "Saturation") -> str:
     )
 
 
-def _rates_table(found: "Saturation") -> Table:
+def _rates_table(found: Saturation) -> Table:
     test = found.test
     states = range(len(test.shared_per_s))
     rows = [
