@@ -59,6 +59,7 @@ class Fade(ProtocolModel):
     passes: int = Field(4, ge=2)
     longest: DurationS = Field(1.0, gt=0)
     rise: bool = True
+    repeat_late: int = Field(2, ge=0)
     warming: bool = True
     through_lvf: bool = False
     card: Region = CENTRE
@@ -142,17 +143,27 @@ class PassUnit:
         light = card_light(session, protocol.settings(), protocol.card)
         steady = light.exposed(HALF, protocol.settings(), offers)
         for delay_s in protocol.delays_s(self.number):
-            session.perform(Shoot("steady", steady))
             exposure_s = protocol.fade_exposure_s(delay_s, light, offers)
-            fading = Shoot("fade", replace(steady, exposure_s=exposure_s))
-            session.run_sequence([at(0.0, LAMP_OFF), at(delay_s, fading)])
-            if not protocol.rise:
-                session.perform(LAMP_ON)
-                session.wait(STEADY_S, "lamp settles")
-                continue
-            session.wait(STEADY_S, "lamp cools")
-            session.run_sequence([at(0.0, LAMP_ON), at(delay_s, Shoot("rise", steady))])
+            for _ in range(1 + protocol.repeat_late):
+                if not self._missed(session, delay_s, steady, exposure_s):
+                    break
+
+    def _missed(
+        self, session: Session, delay_s: float, steady: ExposureSettings, exposure_s: float
+    ) -> bool:
+        """Photograph one delay; whether something began late."""
+        session.perform(Shoot("steady", steady))
+        fading = Shoot("fade", replace(steady, exposure_s=exposure_s))
+        missed = session.run_sequence([at(0.0, LAMP_OFF), at(delay_s, fading)])
+        if not self.protocol.rise:
+            session.perform(LAMP_ON)
             session.wait(STEADY_S, "lamp settles")
+            return bool(missed)
+        session.wait(STEADY_S, "lamp cools")
+        rising = [at(0.0, LAMP_ON), at(delay_s, Shoot("rise", steady))]
+        missed = [*missed, *session.run_sequence(rising)]
+        session.wait(STEADY_S, "lamp settles")
+        return bool(missed)
 
 
 @dataclass(frozen=True)

@@ -1,6 +1,6 @@
 """`labrig run phosphor` on the simulated rig, from camera calibration to material, against truth.
 
-    python -m tests.acceptance.whole_phosphor [MATERIAL ...] [--seeds 1] [--width 384] [--keep DIR]
+    python -m tests.acceptance.whole_phosphor [MATERIAL ...] [--seeds 1] [--first 1] [--keep DIR]
 
 Everything is calibrated in the run itself, in a room whose camera curves are bent as laboratories
 disagree and whose filters are 1 % off their files. Per state: k_r and r(0) in σ from the truth;
@@ -133,11 +133,12 @@ def main(arguments: Sequence[str]) -> None:
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("materials", nargs="*", default=[f"{name}-paint" for name in PAINTS])
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--width", type=int, default=384)
     parser.add_argument("--keep", type=Path)
     asked = parser.parse_args(arguments)
     for material in asked.materials:
-        for seed in range(1, asked.seeds + 1):
+        for seed in range(asked.first, asked.first + asked.seeds):
             folder = Path(tempfile.mkdtemp(prefix=f"{material}-{seed}-", dir=asked.keep))
             found, took_s = run(folder, material, seed, asked.width)
             said = found

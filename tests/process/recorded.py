@@ -10,6 +10,7 @@ import yaml
 from labrig import shipped
 from labrig.acquire import Plan, RunObserver
 from labrig.clock import Clock
+from labrig.filling import Watch
 from labrig.record import RunRecord, read_run
 from labrig.run import Recording, resume_run
 from tests.acquire.fakes import Watching
@@ -24,6 +25,7 @@ def record(
     folder: Path,
     protocol: dict[str, Any],
     change: Callable[[dict[str, Any]], None] = lambda rig: None,
+    watch: Watch = quietly,
 ) -> Path:
     """The folder of a run of `protocol` on the shipped rig for phosphors, as `change` leaves it."""
     folder.mkdir(parents=True, exist_ok=True)
@@ -37,7 +39,7 @@ def record(
     (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
     (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
     recording = Recording.prepare(folder / "protocol.yaml", folder / "rig.yaml", folder / "runs")
-    return recording.record(quietly)
+    return recording.record(watch)
 
 
 def cut_off_and_resumed(run: Path, unit: str) -> tuple[RunRecord, RunRecord]:

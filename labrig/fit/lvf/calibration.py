@@ -33,7 +33,7 @@ ANY_PEAK = 2.0
 #: How figures run along a strip: order of a polynomial, and scatter about it.
 ALONG_THE_STRIP = {
     of.CENTRE: (3, 0.3),
-    of.LOG_WIDTH: (2, 0.03),
+    of.LOG_WIDTH: (2, 0.02),
     of.SKEW: (1, 0.05),
     of.LOG_PEAK: (2, 0.04),
     of.LEAKAGE: (1, 0.0005),

@@ -8,8 +8,9 @@ from labrig.calibration.irradiance_file import IrradianceFile
 
 FloatArray = NDArray[np.float64]
 
-#: Of the light on a place alone, whatever its file says.
-LEAST_SITE_SIGMA = 3e-3
+#: Of the light on a place alone, whatever its file says: bands are calibrated place by place, and
+#: their flanks are rough by so much. Smooth errors alone would have to bend for it.
+LEAST_SITE_SIGMA = 0.03
 #: Of a filter's wavelengths.
 WAVELENGTH_SIGMA_NM = 1.0
 #: Errors of places so many parts of the filter apart have nothing in common: some 40 nm.
@@ -72,6 +73,15 @@ def band_sigma(irradiance: IrradianceFile) -> tuple[float, ...]:
     share = through**2 / np.maximum((through**2).sum(axis=0), 1e-300)
     direct = np.array(irradiance.direct_sigma) / np.maximum(np.array(irradiance.direct), 1e-300)
     return tuple(np.hypot(_told(irradiance) @ share, direct).tolist())
+
+
+def scale_sigma(irradiance: IrradianceFile) -> float:
+    """Relative, of the light on all places together over that of the lamp by itself.
+
+    What is not known even of the place that is known best, all places have in common: how bright
+    the camera sees a narrow band against the lamp's whole light.
+    """
+    return float(np.hypot(irradiance.scale_sigma, _told(irradiance).min()))
 
 
 def _told(irradiance: IrradianceFile) -> FloatArray:

@@ -12,7 +12,7 @@ from labrig.fit.excitation import ExcitationFit, Uncertain, fit_excitation
 from labrig.material import write_material
 from labrig.process.excitation.charges import Charged, charged
 from labrig.process.excitation.lamp_changes import lamp_changes
-from labrig.process.excitation.light import band_sigma
+from labrig.process.excitation.light import band_sigma, scale_sigma
 from labrig.process.excitation.lit import GLOWING
 from labrig.process.excitation.material import excited_material
 from labrig.process.excitation.prediction import predicted_charging
@@ -76,7 +76,7 @@ def _of_patch(
         lamp=LAMP,
         cold=_warming(known).lacks_sigma,
         offset=tuple(np.maximum(np.nan_to_num(measured.whole.dark_sigma), LEAST_DARK).tolist()),
-        scale=irradiance.scale_sigma,
+        scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
     )
     fit = _fit(measured, start, uncertain)

@@ -1,5 +1,7 @@
 """The fade and rise of the simulated lamp, a filament whose heat capacity changes as it cools."""
 
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
 from pathlib import Path
 from typing import Any
 
@@ -7,12 +9,15 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
+from labrig.acquire import Plan, RunObserver
 from labrig.calibration import Change, FadeFile, read_fade_file
+from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.process import Result, process_run
 from labrig.record import read_run
 from sim.lamp import WAVELENGTH_NM, Lamp
 from sim.simulation import LampSettings
+from tests.acquire.fakes import Watching
 from tests.process.recorded import cut_off_and_resumed, record
 
 FloatArray = NDArray[np.float64]
@@ -98,3 +103,32 @@ def test_what_a_cold_lamp_lacks_is_the_rooms(fade: FadeFile, result: Result) -> 
     assert fade.warming.lacks_sigma < 0.006
     assert 50 < fade.warming.warms_s < 450
     assert any("a cold lamp lacks" in line for line in result.lines)
+
+
+class Busy(Watching):
+    """A PC that does something else once, just when it should release the shutter."""
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__()
+        self._clock, self._busy = clock, False
+
+    def doing(self, what: str, until_s: float | None = None) -> None:
+        """Be late for the second photograph of the rise."""
+        super().doing(what, until_s)
+        if not self._busy and self.told.count("kept rise") == 1 and what == "lamp on":
+            self._busy = True
+            self._clock.sleep(1.0)
+
+
+def test_what_began_late_is_photographed_again(run: Path, tmp_path: Path) -> None:
+    @contextmanager
+    def busy(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+        yield Busy(clock)
+
+    again = read_run(record(tmp_path, PROTOCOL | {"warming": False}, watch=busy))
+    counts = [
+        len([frame for frame in one.frames("rise") if frame.unit == "pass-1"])
+        for one in (read_run(run), again)
+    ]
+    assert counts[1] == counts[0] + 1
+    assert max(frame.late_s for frame in again.frames("rise")) > 0.5
