@@ -129,7 +129,7 @@ def _add_switching(lamp: h5py.Group, run: RunRecord, start_time: float) -> None:
         if action.device == "lamp" and action.action in ("on", "off")
     ]
     log = add_group(lamp, "switched", "NXlog")
-    middles = [(action.start_time + action.end_time) / 2 - start_time for action in switched]
+    middles = [action.middle_time - start_time for action in switched]
     add_number(log, "time", middles, "s").attrs["start"] = _iso(start_time)
     add_number(log, "value", np.array([action.action == "on" for action in switched], np.int8))
     add_text(log, "description", "1: on, 0: off")

@@ -31,17 +31,14 @@ def cleaned(frames: IntactFrames, blank: BlankFile | None) -> tuple[IntactFrames
             f"lamp-off; the blank is clean from {blank.first_clean_s:.3g} s on: begin later, or "
             "use a shield"
         )
+    if not early:
+        return frames, blank.leaks()
     kept = [
         frame if blank.is_clean(frame.t_s) else replace(frame, flag=add_flag(frame.flag, AFTERGLOW))
         for frame in frames.decay
     ]
-    left_out = () if not early else (left_out_line(len(early), blank),)
-    return replace(frames, decay=kept), (*left_out, *blank.leaks())
-
-
-def left_out_line(count: int, blank: BlankFile) -> str:
-    """That so many frames were too early."""
-    return (
-        f"{count} frames begin before the bench is dark and are left out: the blank is clean from "
-        f"{blank.first_clean_s:.3g} s after lamp-off on (begin later, or use a shield)"
+    left_out = (
+        f"{len(early)} frames begin before the bench is dark and are left out: the blank is clean "
+        f"from {blank.first_clean_s:.3g} s after lamp-off on (begin later, or use a shield)"
     )
+    return replace(frames, decay=kept), (left_out, *blank.leaks())

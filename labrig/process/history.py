@@ -38,7 +38,7 @@ def _shining_s(attempt: Attempt, until: float) -> Iterator[float]:
     """The lengths of the times with the lamp on; relays switch in the middle of a transaction."""
     since = None
     for action in attempt.actions:
-        switched = (action.start_time + action.end_time) / 2
+        switched = action.middle_time
         if action.device != "lamp" or switched > until:
             continue
         if action.action == "on":

@@ -1,6 +1,6 @@
 """From the journal to frames that are as they were recorded, with their times after lamp off."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 from labrig.errors import DataError
 from labrig.process.choices import Choices
@@ -47,7 +47,7 @@ def intact_frames(run: RunRecord, choices: Choices, purpose: str = "decay") -> I
     """
     damaged = _damaged(run, choices, (purpose, "dark"))
     decay = [
-        _timed(frame, _lamp_off_time(attempt, frame), choices)
+        _flagged(frame, attempt, choices)
         for attempt in run.completed().values()
         for frame in attempt.frames
         if frame.purpose == purpose and frame not in damaged
@@ -60,7 +60,7 @@ def intact_frames(run: RunRecord, choices: Choices, purpose: str = "decay") -> I
     return IntactFrames(
         decay=decay,
         dark=[
-            _steady(frame)
+            untimed(frame)
             for frame in run.frames("dark")
             if frame not in damaged and not choices.excludes(frame)
         ],
@@ -83,7 +83,7 @@ def steady_frames(run: RunRecord, choices: Choices, purpose: str) -> list[Series
     """
     damaged = _damaged(run, choices, (purpose,))
     return [
-        _steady(frame)
+        untimed(frame)
         for frame in run.frames(purpose)
         if frame not in damaged and not choices.excludes(frame)
     ]
@@ -114,31 +114,39 @@ def _damaged(run: RunRecord, choices: Choices, measured: tuple[str, ...]) -> dic
     return damaged
 
 
-def _steady(frame: FrameRecord) -> SeriesFrame:
+def untimed(frame: FrameRecord) -> SeriesFrame:
+    """A frame whose time does not matter."""
     return SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
 
 
-def _timed(frame: FrameRecord, lamp_off_time: float, choices: Choices) -> SeriesFrame:
-    flag = "late" if frame.late_s > LATE_S else ""
-    return SeriesFrame(
-        frame.path,
-        frame.start_time - lamp_off_time,
-        frame.exposure_s,
-        frame.iso,
-        frame.f_number,
-        frame.unit,
-        add_flag(flag, "excluded") if choices.excludes(frame) else flag,
-    )
+def timed(frame: FrameRecord, zero_time: float) -> SeriesFrame:
+    """A frame that begins so long after `zero_time`, in seconds since 1970."""
+    return replace(untimed(frame), t_s=frame.start_time - zero_time)
 
 
-def _lamp_off_time(attempt: Attempt, frame: FrameRecord) -> float:
-    """Middle of the last lamp-off transaction before the frame: the relay opened in it."""
-    offs = [
-        (action.start_time + action.end_time) / 2
+def switched_time(attempt: Attempt, frame: FrameRecord, state: str) -> float:
+    """When the lamp went `on` or `off` for the last time before a frame.
+
+    Raises
+    ------
+    DataError
+        The journal does not say.
+    """
+    switches = [
+        action.middle_time
         for action in attempt.actions
-        if action.device == "lamp" and action.action == "off"
+        if action.device == "lamp" and action.action == state
         if action.start_time <= frame.start_time
     ]
-    if not offs:
-        raise DataError(f"{frame.path}: the journal does not say when the lamp went off before it")
-    return offs[-1]
+    if not switches:
+        raise DataError(
+            f"{frame.path}: the journal does not say when the lamp went {state} before it"
+        )
+    return switches[-1]
+
+
+def _flagged(frame: FrameRecord, attempt: Attempt, choices: Choices) -> SeriesFrame:
+    """Timed from lamp-off."""
+    flag = "late" if frame.late_s > LATE_S else ""
+    flag = add_flag(flag, "excluded") if choices.excludes(frame) else flag
+    return replace(timed(frame, switched_time(attempt, frame, "off")), flag=flag)

@@ -68,6 +68,11 @@ class ActionRecord:
     task: str = ""
 
     @property
+    def middle_time(self) -> float:
+        """When a relay switched, as near as is known: in the middle of the transaction."""
+        return (self.start_time + self.end_time) / 2
+
+    @property
     def is_by_hand(self) -> bool:
         """Whether a person did it."""
         return self.device == PERSON

@@ -116,7 +116,7 @@ class Following:
     def _take_in(self, attempt: Attempt) -> None:
         """Look at the frames that were not there before."""
         off_times = [
-            (action.start_time + action.end_time) / 2
+            action.middle_time
             for action in attempt.actions
             if (action.device, action.action) == ("lamp", "off")
         ]

@@ -1,7 +1,7 @@
 """The frames of a camera calibration, reduced."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,8 +17,9 @@ from labrig.process.camera_calibration.photon_transfer import (
     photon_transfer,
     scatter,
 )
+from labrig.process.timed_frames import timed, untimed
 from labrig.record import FrameRecord
-from labrig.reduce import SeriesFrame, measure, read_raw, reduce_patches
+from labrig.reduce import measure, read_raw, reduce_patches
 from labrig.region import Region
 
 FloatArray = NDArray[np.float64]
@@ -87,16 +88,13 @@ def card_levels(
     if not lit:
         raise DataError("expected frames of the lit card, got none; resume the run")
     frames = [
-        SeriesFrame(
-            frame.path, frame.start_time - lit[0].start_time, frame.exposure_s, frame.iso,
-            frame.f_number, f"{frame.unit} ISO {frame.iso} f/{frame.f_number}",
+        replace(
+            timed(frame, lit[0].start_time),
+            unit=f"{frame.unit} ISO {frame.iso} f/{frame.f_number}",
         )
         for frame in lit
-    ]  # fmt: skip
-    dark = [
-        SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
-        for frame in darks
     ]
+    dark = [untimed(frame) for frame in darks]
     series = reduce_patches(frames, {"card": card}, dark)["card"]
     exposure_s = series.exposure_s[:, np.newaxis]
     return CardLevels(

@@ -15,8 +15,9 @@ from labrig.process.excitation.centring import centred
 from labrig.process.excitation.light import across_sites, site_modes
 from labrig.process.excitation.lit import Glowing, Lit, glowing
 from labrig.process.strip_patches import Slices, StripPatch, cut
-from labrig.record import FrameRecord, RunRecord
-from labrig.reduce import Series, SeriesFrame, read_raw, reduce_patches
+from labrig.process.timed_frames import timed, untimed
+from labrig.record import RunRecord
+from labrig.reduce import Series, read_raw, reduce_patches
 from labrig.region import Region
 
 FloatArray = NDArray[np.float64]
@@ -88,13 +89,13 @@ def charged(
     raw = read_raw(next(iter(glow.charge)).path)
     sites, refused = cut(patches, irradiance.strip, raw, len(irradiance.position))
     series = reduce_patches(
-        [_frame(frame, glow.zero_s, one.unit) for frame, one in glow.charge.items()],
+        [replace(timed(frame, glow.zero_s), unit=one.unit) for frame, one in glow.charge.items()],
         {
             _key(patch, name): region
             for patch, slices in sites.items()
             for name, region in {**slices, WHOLE: _around(slices)}.items()
         },
-        [_frame(frame, 0.0) for frame in run.frames("dark") if not choices.excludes(frame)],
+        [untimed(frame) for frame in run.frames("dark") if not choices.excludes(frame)],
     )
     longest = max((one for one in glow.lit if one.is_bare), key=lambda one: one.off_s - one.on_s)
 
@@ -157,17 +158,6 @@ def _charge(one: Lit, glow: Glowing, lacks: float, *, fresh: bool, saturated: bo
         cold=one.cold,
         fresh=fresh,
         saturated=saturated,
-    )
-
-
-def _frame(frame: FrameRecord, zero_s: float, unit: str | None = None) -> SeriesFrame:
-    return SeriesFrame(
-        frame.path,
-        frame.start_time - zero_s,
-        frame.exposure_s,
-        frame.iso,
-        frame.f_number,
-        unit or frame.unit,
     )
 
 

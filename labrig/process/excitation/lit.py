@@ -116,9 +116,7 @@ def with_warmth(lit: Sequence[Lit], warms_s: float) -> list[Lit]:
 
 def _lit(attempt: Attempt) -> Sequence[Lit]:
     times = {
-        action.action: (action.start_time + action.end_time) / 2
-        for action in attempt.actions
-        if action.device == "lamp"
+        action.action: action.middle_time for action in attempt.actions if action.device == "lamp"
     }
     return [Lit(attempt.unit, times["on"], times["off"])] if {"on", "off"} <= set(times) else []
 

@@ -8,8 +8,9 @@ from numpy.typing import NDArray
 
 from labrig.calibration import CameraFile
 from labrig.errors import DataError
-from labrig.record import Attempt, FrameRecord, RunRecord
-from labrig.reduce import Series, SeriesFrame, reduce_patches
+from labrig.process.timed_frames import switched_time, timed, untimed
+from labrig.record import FrameRecord, RunRecord
+from labrig.reduce import Series, reduce_patches
 from labrig.region import Region
 
 FloatArray = NDArray[np.float64]
@@ -80,20 +81,17 @@ def shots_after(
     state = "on" if purpose == "rise" else "off"
     attempts = run.completed()
     taken = [
-        _timed(frame, _switched(attempts[frame.unit], frame, state))
+        timed(frame, switched_time(attempts[frame.unit], frame, state))
         for frame in frames
         if frame.purpose == purpose
     ]
-    steady = [_timed(frame, frame.start_time) for frame in frames if frame.purpose == "steady"]
+    steady = [untimed(frame) for frame in frames if frame.purpose == "steady"]
     if len(taken) < FEWEST or not steady:
         raise DataError(
             f"expected {FEWEST} photographs of the {purpose} or more, and of the steady lamp, got "
             f"{len(taken)} and {len(steady)}; resume the run"
         )
-    dark = [
-        SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
-        for frame in darks
-    ]
+    dark = [untimed(frame) for frame in darks]
     series = reduce_patches([*taken, *steady], places, dark, camera=camera)
     parts = [_of_place(one, len(taken)) for one in series.values()]
     value, sigma = (np.hstack([part[number] for part in parts]) for number in (0, 1))
@@ -136,23 +134,3 @@ def _of_place(series: Series, taken: int) -> tuple[FloatArray, FloatArray, Float
     if not len(steady):
         raise DataError("the steady lamp clips in all frames; lower camera.iso")
     return value, sigma, steady.mean(axis=0)
-
-
-def _timed(frame: FrameRecord, since: float) -> SeriesFrame:
-    return SeriesFrame(
-        frame.path, frame.start_time - since, frame.exposure_s, frame.iso, frame.f_number,
-        frame.unit,
-    )  # fmt: skip
-
-
-def _switched(attempt: Attempt, frame: FrameRecord, state: str) -> float:
-    """Middle of the last transaction that switched the lamp before a frame."""
-    switches = [
-        (action.start_time + action.end_time) / 2
-        for action in attempt.actions
-        if action.device == "lamp" and action.action == state
-        and action.start_time <= frame.start_time
-    ]  # fmt: skip
-    if not switches:
-        raise DataError(f"{frame.path}: the journal does not say when the lamp went {state}")
-    return switches[-1]

@@ -6,8 +6,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.calibration import CameraFile, Warming
+from labrig.process.timed_frames import switched_time, timed, untimed
 from labrig.record import FrameRecord, RunRecord
-from labrig.reduce import SeriesFrame, reduce_patches
+from labrig.reduce import reduce_patches
 from labrig.region import Region
 
 FloatArray = NDArray[np.float64]
@@ -28,15 +29,11 @@ def warming(
 
     The light is 1 − d e^(−t/τ) of that of the warm lamp, by the housing's Newtonian warming.
     """
-    on = [
-        (action.start_time + action.end_time) / 2
-        for action in run.completed()[frames[0].unit].actions
-        if action.device == "lamp" and action.action == "on"
-    ][-1]
+    on = switched_time(run.completed()[frames[0].unit], frames[0], "on")
     series = reduce_patches(
-        [_timed(frame, frame.start_time - on) for frame in frames],
+        [timed(frame, on) for frame in frames],
         {"card": card},
-        [_timed(frame, 0.0) for frame in darks],
+        [untimed(frame) for frame in darks],
         camera=camera,
     )["card"]
     used = series.usable
@@ -69,7 +66,3 @@ def _fit(
     left = level - rows @ [warm, less]
     sigma = float(np.sqrt(slope @ covariance @ slope))
     return float(lacks), sigma, float(left @ left), float(warm)
-
-
-def _timed(frame: FrameRecord, t_s: float) -> SeriesFrame:
-    return SeriesFrame(frame.path, t_s, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
