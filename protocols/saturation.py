@@ -97,10 +97,6 @@ class Saturation(ProtocolModel):
             *full[1:],
         ]
 
-    def charge_of(self, unit: str) -> float:
-        """Seconds of charge before the decay of that unit."""
-        return self.charges[int(unit.rpartition("-")[2]) - 1]
-
     def _decays(self, light: str) -> list[Unit]:
         metering = f"meter-{light}"
         decays: list[Unit] = [

@@ -5,13 +5,11 @@ from pathlib import Path
 from typing import Annotated, Literal, Self
 
 import numpy as np
-from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.errors import DataError
 from labrig.yaml_file import read_model, write_yaml
 
-FloatArray = NDArray[np.float64]
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Number = Annotated[float, Field(allow_inf_nan=False)]
@@ -77,44 +75,6 @@ class BlankFile(BaseModel):
             raise ValueError(f"expected {len(self.channels)} numbers in each row, one a channel")
         return self
 
-    def at(
-        self, t_s: float, exposure_s: float, iso: float, f_number: float | None
-    ) -> tuple[FloatArray, FloatArray]:
-        """What a frame shows of it: level and σ in DN above dark frames, each (channels,).
-
-        Straight between the times that were measured; before the first of them unknown, after
-        `first_clean_s` the constant level alone.
-
-        Parameters
-        ----------
-        t_s, exposure_s
-            Begin after lamp-off and shutter time.
-        iso, f_number
-            Of the frame; other settings than the blank's are converted by their labels.
-
-        Raises
-        ------
-        DataError
-            The frame begins before the blank's first one.
-        """
-        middle_s = t_s + exposure_s / 2
-        if middle_s < self.t_s[0] * (1 - 1e-6):
-            raise DataError(
-                f"the blank begins {self.t_s[0]:.3g} s after lamp-off, a frame at {middle_s:.3g} s "
-                "is asked for; measure a blank that begins as early as the decay"
-            )
-        constant = np.array(self.constant_dn_per_s)
-        constant_sigma = np.array(self.constant_sigma_dn_per_s)
-        if self.first_clean_s is not None and t_s >= self.first_clean_s:
-            rate, sigma = constant, constant_sigma
-        else:
-            rate = constant + _between(self.t_s, self.rate_dn_per_s, middle_s)
-            sigma = np.hypot(constant_sigma, _between(self.t_s, self.sigma_dn_per_s, middle_s))
-        factor = exposure_s * iso / self.iso
-        if f_number is not None and self.f_number is not None:
-            factor *= (self.f_number / f_number) ** 2
-        return factor * rate, factor * sigma
-
     def is_clean(self, t_s: float) -> bool:
         """Whether a frame that begins `t_s` after lamp-off shows nothing that fades but the glow.
 
@@ -161,8 +121,3 @@ def read_blank_file(path: Path) -> BlankFile:
 def write_blank_file(path: Path, file: BlankFile) -> None:
     """Write `file` so that `read_blank_file` gives it back."""
     write_yaml(path, file)
-
-
-def _between(t_s: tuple[float, ...], rows: tuple[Row, ...], at_s: float) -> FloatArray:
-    """Straight between rows; the last one goes on."""
-    return np.array([np.interp(at_s, t_s, column) for column in zip(*rows, strict=True)])

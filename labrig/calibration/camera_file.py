@@ -204,10 +204,6 @@ class CameraFile(_Part):
             raise DataError(f"the camera file has no flat field at {_stop(f_number)}")
         return flat.mean(region, width, height)
 
-    def noise_at(self, iso: float) -> Noise | None:
-        """Of that ISO, if it was measured."""
-        return next((one for one in self.noise if _same(one.iso, iso)), None)
-
     def _flat(self, f_number: float | None) -> Flat | None:
         return next((flat for flat in self.flats if _same(flat.f_number, f_number)), None)
 

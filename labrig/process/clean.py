@@ -1,5 +1,6 @@
 """Frames after lamp-off that show nothing but the glow, as far as a blank knows."""
 
+from collections.abc import Sequence
 from dataclasses import replace
 
 from labrig.calibration import BlankFile
@@ -24,21 +25,32 @@ def cleaned(frames: IntactFrames, blank: BlankFile | None) -> tuple[IntactFrames
     """
     if blank is None:
         return frames, ()
-    early = [frame.t_s for frame in frames.decay if not blank.is_clean(frame.t_s)]
-    if len(early) == len(frames.decay):
+    left_out = left_out_lines([frame.t_s for frame in frames.decay], blank)
+    kept = [
+        frame if blank.is_clean(frame.t_s) else replace(frame, flag=add_flag(frame.flag, AFTERGLOW))
+        for frame in frames.decay
+    ]
+    return replace(frames, decay=kept), (*left_out, *blank.leaks())
+
+
+def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
+    """What to say of frames that begin so long after lamp-off, where the bench is still bright.
+
+    Raises
+    ------
+    DataError
+        The blank never became clean, or no frame begins late enough.
+    """
+    early = [t for t in t_s if not blank.is_clean(t)]
+    if not early:
+        return ()
+    if len(early) == len(t_s):
         raise DataError(
             f"all frames begin before the bench is dark, the last {max(early):.3g} s after "
             f"lamp-off; the blank is clean from {blank.first_clean_s:.3g} s on: begin later, or "
             "use a shield"
         )
-    if not early:
-        return frames, blank.leaks()
-    kept = [
-        frame if blank.is_clean(frame.t_s) else replace(frame, flag=add_flag(frame.flag, AFTERGLOW))
-        for frame in frames.decay
-    ]
-    left_out = (
+    return (
         f"{len(early)} frames begin before the bench is dark and are left out: the blank is clean "
-        f"from {blank.first_clean_s:.3g} s after lamp-off on (begin later, or use a shield)"
+        f"from {blank.first_clean_s:.3g} s after lamp-off on (begin later, or use a shield)",
     )
-    return replace(frames, decay=kept), (left_out, *blank.leaks())

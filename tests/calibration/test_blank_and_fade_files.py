@@ -54,20 +54,6 @@ def test_a_written_blank_reads_back_as_itself(
     assert read_blank_file(path) == file
 
 
-def test_a_blank_says_what_a_frame_shows_of_it() -> None:
-    level, sigma = BLANK.at(0.75, 0.5, 400, 4.0)  # its middle half-way between the two times
-    assert level == pytest.approx(0.5 * np.array([5.5, 11.25]))
-    assert sigma == pytest.approx(0.5 * np.hypot(1.0, 0.25) * np.ones(2))
-    level, sigma = BLANK.at(5.0, 2.0, 800, 8.0)  # clean: what stays, at other settings
-    assert level == pytest.approx(2 * 2 / 4 * np.array([0.5, 0.25]))
-    assert sigma == pytest.approx(2 * 2 / 4 * np.array([0.25, 0.25]))
-
-
-def test_a_blank_does_not_know_what_was_before_it() -> None:
-    with pytest.raises(DataError, match="begins as early as the decay"):
-        BLANK.at(0.1, 0.1, 400, 4.0)
-
-
 def test_when_a_blank_is_clean_and_what_leaks() -> None:
     assert BLANK.is_clean(2.1)
     assert not BLANK.is_clean(0.5)

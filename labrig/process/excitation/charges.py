@@ -65,7 +65,7 @@ def charged(
     fresh: bool,
     saturated: bool,
 ) -> tuple[dict[StripPatch, Charged], tuple[str, ...]]:
-    """Read and reduce all frames of the run: what each patch shows, and why one shows nothing.
+    """Read and reduce all frames of the run: what each patch shows, and what to say of the rest.
 
     Parameters
     ----------
@@ -122,7 +122,7 @@ def charged(
         values = centred(values, slices, np.array(irradiance.position), irradiance.strip, raw)
         whole = series[_key(patch, WHOLE)]
         found[patch] = _evened(values, sigma, through, bare, whole, glow)
-    return found, refused
+    return found, (*glow.left_out, *refused)
 
 
 def _evened(

@@ -7,6 +7,7 @@ from dataclasses import dataclass, replace
 from labrig.calibration import BlankFile
 from labrig.errors import DataError
 from labrig.process.choices import Choices
+from labrig.process.clean import left_out_lines
 from labrig.record import Attempt, FrameRecord, RunRecord
 
 #: Frames that show the glow after a charge; those of a metering are exposed too long or too short.
@@ -44,10 +45,13 @@ class Glowing:
     ----------
     charge
         Photographs by time, each with the charge that it belongs to.
+    left_out
+        What to say of photographs that begin before the bench is dark.
     """
 
     lit: Sequence[Lit]
     charge: Mapping[FrameRecord, Lit]
+    left_out: tuple[str, ...] = ()
 
     @property
     def zero_s(self) -> float:
@@ -86,18 +90,22 @@ def glowing(
         frame for purpose in GLOWING for frame in run.frames(purpose) if not choices.excludes(frame)
     ]
     frames.sort(key=lambda frame: frame.start_time)
-    charge = {
-        frame: one
-        for frame in frames
-        if (one := _charge_before(lit, frame)) is not None
-        and (blank is None or blank.is_clean(frame.start_time - one.off_s))
-    }
+    charge = {frame: one for frame in frames if (one := _charge_before(lit, frame)) is not None}
+    charge, left_out = (charge, ()) if blank is None or not charge else _cleaned(charge, blank)
     if not charge or not any(one.is_bare for one in lit) or all(one.is_bare for one in lit):
         raise DataError(
             f"{run.folder}: expected complete charges through the filter and without it; go on "
             f"with: labrig resume {run.folder}"
         )
-    return Glowing(lit, charge)
+    return Glowing(lit, charge, left_out)
+
+
+def _cleaned(
+    charge: Mapping[FrameRecord, Lit], blank: BlankFile
+) -> tuple[dict[FrameRecord, Lit], tuple[str, ...]]:
+    after_s = {frame: frame.start_time - one.off_s for frame, one in charge.items()}
+    left_out = left_out_lines(list(after_s.values()), blank)
+    return {frame: charge[frame] for frame, t in after_s.items() if blank.is_clean(t)}, left_out
 
 
 def with_warmth(lit: Sequence[Lit], warms_s: float) -> list[Lit]:

@@ -52,7 +52,7 @@ def process(stage: Stage) -> StageResult:
         )
     insist_on_intact(stage.run, (*GLOWING, "dark"), stage.choices)
     rise, fade = lamp_changes(known.fade, np.array(irradiance.bands_nm))
-    measured, refused = charged(
+    measured, said = charged(
         stage.run, irradiance, strip_patches(stage), rise, fade, stage.choices,
         warming=_warming(known), blank=known.blank,
         fresh=protocol.samples > 1, saturated=protocol.saturated,
@@ -64,7 +64,7 @@ def process(stage: Stage) -> StageResult:
     )
     unmeasured = [] if known.fade else ["the lamp's fade was not measured: a usual one was taken"]
     leaks = known.blank.leaks() if known.blank else ()
-    return replace(found, warnings=(*unmeasured, *leaks, *refused, *found.warnings))
+    return replace(found, warnings=(*unmeasured, *leaks, *said, *found.warnings))
 
 
 def _of_patch(

@@ -10,11 +10,18 @@ import numpy as np
 import pytest
 import yaml
 
+from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IrradianceFile, write_irradiance_file
 from labrig.calibration.lvf_file import SLICES, Strip
 from labrig.errors import DataError
 from labrig.material import read_material
 from labrig.process import process_run
+from labrig.process.choices import Choices
+from labrig.process.excitation.charges import charged
+from labrig.process.excitation.lamp_changes import lamp_changes
+from labrig.process.excitation.lit import glowing
+from labrig.process.excitation.processing import USUAL
+from labrig.process.strip_patches import StripPatch
 from labrig.record import read_run
 from labrig.reduce import measure, read_raw
 from sim.bench_settings import LvfSettings
@@ -173,13 +180,24 @@ def test_a_frame_that_was_changed_is_refused(run: Path) -> None:
         frame.write_bytes(kept)
 
 
-def test_charges_are_missing(run: Path) -> None:
-    from labrig.process.choices import Choices
-    from labrig.process.excitation.charges import charged
-    from labrig.process.excitation.lamp_changes import lamp_changes
-    from labrig.process.excitation.processing import USUAL
-    from labrig.process.strip_patches import StripPatch
+def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: Path) -> None:
+    blank = BlankFile(
+        iso=400, f_number=4.0, channels=("G",), t_s=(0.5,), rate_dn_per_s=((0.0,),),
+        sigma_dn_per_s=((1.0,),), constant_dn_per_s=(0.0,), constant_sigma_dn_per_s=(1.0,),
+        ambient_dn_per_s=(0.0,), ambient_sigma_dn_per_s=(1.0,), first_clean_s=10.0,
+    )  # fmt: skip
+    whole = glowing(read_run(run), Choices(), 150.0)
+    clean = glowing(read_run(run), Choices(), 150.0, blank)
+    early = [frame for frame, one in whole.charge.items() if frame.start_time < one.off_s + 9.98]
+    assert early
+    assert set(clean.charge) == set(whole.charge) - set(early)
+    (said,) = clean.left_out
+    assert said.startswith(f"{len(early)} frames begin before the bench is dark and are left out")
+    with pytest.raises(DataError, match="all frames begin before"):
+        glowing(read_run(run), Choices(), 150.0, blank.model_copy(update={"first_clean_s": 1e4}))
 
+
+def test_charges_are_missing(run: Path) -> None:
     whole = read_run(run)
     some = replace(whole, attempts=[a for a in whole.attempts if not a.unit.startswith("bare")])
     irradiance = true_irradiance()
