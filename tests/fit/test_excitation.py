@@ -118,6 +118,22 @@ def test_irradiance_known_badly_goes_into_every_rate() -> None:
     assert rough.k_r_sigma_per_s == pytest.approx(alone.k_r_sigma_per_s, rel=1e-3)
 
 
+@pytest.mark.parametrize("seed", [1, 2, 3])
+def test_a_dark_level_that_wanders_counts_for_no_more_than_it_tells(seed: int) -> None:
+    """A sensor warms and cools between photographs: dim ones would tell a wrong rate."""
+    bench = Bench(read_material("red-paint"), read_noise=0.01, photons=1e4, seed=seed)
+    random = np.random.default_rng(seed)
+    series = [
+        replace(one, values=one.values + random.normal(0.0, 0.3, (len(one.values), 1, 1)))
+        for one in measured(bench)
+    ]
+    found = fit(series, [0.02], [1.0], Uncertain(bench.flicker, LAMP, wander=(0.3, 0.3, 0.3)))
+    (state,), (truth,) = found.states, bench.material.states
+    assert 0.95 < found.reduced_chi2 < 1.05
+    assert abs(state.k_r_per_s - truth.k_r_per_s) < 3 * state.k_r_sigma_per_s
+    assert fitted(bench, series).reduced_chi2 > 100
+
+
 def test_values_not_measured_and_fresh_samples() -> None:
     bench = Bench(read_material("blue-paint"))
     bare, lvf = measured(bench)
@@ -137,7 +153,12 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
     modes = np.random.default_rng(4).normal(0, 0.05, (3, *series[0].irradiance.shape))
     series = [replace(series[0], charges=charges, site_modes=modes), *series[1:]]
     problem = ExcitationProblem(
-        series, 2, 1, Uncertain(0.005, 0.01, cold=0.03, scale=0.02, offset=(0.1, 0.2, 0.3))
+        series,
+        2,
+        1,
+        Uncertain(
+            0.005, 0.01, cold=0.03, scale=0.02, offset=(0.1, 0.2, 0.3), wander=(0.2, 0.1, 0.3)
+        ),
     )
     random = np.random.default_rng(3)
     theta = problem.parameters.as_stated(

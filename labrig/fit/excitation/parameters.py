@@ -59,6 +59,9 @@ class Uncertain:
         Of the irradiance of every series but the first over that of the first.
     offset
         (C,) of the dark level that was subtracted, in the values' unit; the same in all of them.
+    wander
+        (C,) by which the dark level scatters from photograph to photograph, in the values' unit:
+        a sensor that exposes warms.
     irradiance
         Of E in every band, one number or (B,), in all series alike: nothing measured here tells.
     """
@@ -68,6 +71,7 @@ class Uncertain:
     cold: float = 0.0
     scale: float = 0.0
     offset: tuple[float, ...] = ()
+    wander: tuple[float, ...] = ()
     irradiance: float | tuple[float, ...] = 0.0
 
 

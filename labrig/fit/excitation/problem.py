@@ -41,8 +41,13 @@ class ExcitationProblem:
             for one in self.series
         ]
         self._values = [np.nan_to_num(one.values) for one in self.series]
-        #: Along which every photograph scatters by the flicker; none until `rewhitened`.
-        self._along: list[FloatArray] | None = None
+        self._wander = [
+            (np.array(uncertain.wander) * inverse).reshape(len(inverse), 1, -1)
+            for inverse in self._inverse_sigma
+            if uncertain.wander
+        ]
+        #: (n, d, PC): along which all values of a photograph scatter together.
+        self._along = self._wander
 
     @property
     def n_values(self) -> int:
@@ -69,9 +74,13 @@ class ExcitationProblem:
     def rewhiten(self, theta: FloatArray) -> None:
         """Take the flicker's covariance from the signal at θ."""
         if self._flicker > 0:
-            self._along = [
-                self._flicker * (signal * inverse).reshape(len(signal), -1)
+            flicker = [
+                (self._flicker * signal * inverse).reshape(len(signal), 1, -1)
                 for signal, inverse in zip(self.signal(theta), self._inverse_sigma, strict=True)
+            ]
+            self._along = [
+                np.concatenate(both, axis=1)
+                for both in zip(flicker, *([self._wander] if self._wander else []), strict=True)
             ]
 
     def residuals(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -153,15 +162,22 @@ class ExcitationProblem:
     def _whitened(
         self, number: int, misfit: FloatArray, jacobian: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Multiplied by (1 + u uᵀ)^(−1/2) photograph by photograph."""
+        """Multiplied by (1 + UᵀU)^(−1/2) photograph by photograph, U (d, PC)."""
         jacobian = jacobian.reshape(*misfit.shape, -1)
-        if self._along is not None:
-            u = self._along[number]
-            root = np.sqrt(1 + np.einsum("fv,fv->f", u, u))
-            shrink = u / (root * (1 + root))[:, None]
-            misfit = misfit - shrink * np.einsum("fv,fv->f", u, misfit)[:, None]
-            jacobian -= shrink[..., None] * (u[:, None, :] @ jacobian)
+        if self._along:
+            along = self._along[number]
+            shrink = _shrunk(along) @ along
+            together = along @ misfit[..., None]
+            misfit = misfit - (shrink.mT @ together)[..., 0]
+            jacobian -= shrink.mT @ (along @ jacobian)
         return misfit.ravel(), jacobian.reshape(-1, jacobian.shape[-1])
+
+
+def _shrunk(along: FloatArray) -> FloatArray:
+    """(n, d, d) S with (1 + UᵀU)^(−1/2) = 1 − Uᵀ S U, by the eigenvectors of U Uᵀ."""
+    squared, axes = np.linalg.eigh(along @ along.mT)
+    root = np.sqrt(1 + np.maximum(squared, 0.0))
+    return np.asarray((axes / (root * (1 + root))[:, None]) @ axes.mT)
 
 
 def _signal(glow: FloatArray, rates: Rates) -> FloatArray:

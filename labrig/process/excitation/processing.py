@@ -71,11 +71,14 @@ def _of_patch(
     stage: Stage, patch: StripPatch, measured: Charged, irradiance: IrradianceFile, known: Known
 ) -> StageResult:
     start = _start(stage, patch, measured)
+    dark = tuple(np.maximum(np.nan_to_num(measured.whole.dark_sigma), LEAST_DARK).tolist())
     uncertain = Uncertain(
         flicker=_flicker(stage, start),
         lamp=LAMP,
         cold=_warming(known).lacks_sigma,
-        offset=tuple(np.maximum(np.nan_to_num(measured.whole.dark_sigma), LEAST_DARK).tolist()),
+        offset=dark,
+        # The sensor warms and cools over hours of long exposures, more than dark frames tell.
+        wander=dark,
         scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
     )
