@@ -1,22 +1,21 @@
 """From a run's frames to charging series: every charge with the photographs after it."""
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.calibration import BlankFile, Warming
+from labrig.calibration import Warming
 from labrig.calibration.irradiance_file import IrradianceFile
 from labrig.errors import DataError
-from labrig.fit.excitation import Charge, ChargingSeries, Transient
-from labrig.process.choices import Choices
+from labrig.fit.excitation import Charge, ChargingSeries
 from labrig.process.excitation.centring import centred
+from labrig.process.excitation.lamp_changes import lamp_changes
 from labrig.process.excitation.light import across_sites, site_modes
 from labrig.process.excitation.lit import Glowing, Lit, glowing
-from labrig.process.strip_patches import Slices, StripPatch, cut
+from labrig.process.stage import Stage
+from labrig.process.strip_patches import Slices, StripPatch, cut, strip_patches
 from labrig.process.timed_frames import timed, untimed
-from labrig.record import RunRecord
 from labrig.reduce import Series, read_raw, reduce_patches
 from labrig.region import Region
 
@@ -53,41 +52,26 @@ class Charged:
 
 
 def charged(
-    run: RunRecord,
-    irradiance: IrradianceFile,
-    patches: Sequence[StripPatch],
-    rise: Transient,
-    fade: Transient,
-    choices: Choices,
-    *,
-    warming: Warming,
-    blank: BlankFile | None,
-    fresh: bool,
-    saturated: bool,
+    stage: Stage, irradiance: IrradianceFile, warming: Warming
 ) -> tuple[dict[StripPatch, Charged], tuple[str, ...]]:
     """Read and reduce all frames of the run: what each patch shows, and what to say of the rest.
 
     Parameters
     ----------
-    rise, fade
-        In the bands of `irradiance`.
+    irradiance
+        On the sample.
     warming
         What the lamp lacks while its housing is cold.
-    blank
-        From when on after lamp-off photographs show nothing but the glow.
-    fresh
-        Whether every charge found a sample that had never seen light.
-    saturated
-        Take the longest bare charge for a full one.
 
     Raises
     ------
     DataError
         Charges or frames are missing, or no patch lies below the filter.
     """
-    glow = glowing(run, choices, warming.warms_s, blank)
+    known, choices, protocol = stage.known, stage.choices, stage.protocol
+    glow = glowing(stage.run, choices, warming.warms_s, known.blank)
     raw = read_raw(next(iter(glow.charge)).path)
-    sites, refused = cut(patches, irradiance.strip, raw, len(irradiance.position))
+    sites, refused = cut(strip_patches(stage), irradiance.strip, raw, len(irradiance.position))
     series = reduce_patches(
         [replace(timed(frame, glow.zero_s), unit=one.unit) for frame, one in glow.charge.items()],
         {
@@ -95,13 +79,21 @@ def charged(
             for patch, slices in sites.items()
             for name, region in {**slices, WHOLE: _around(slices)}.items()
         },
-        [untimed(frame) for frame in run.frames("dark") if not choices.excludes(frame)],
+        [untimed(frame) for frame in stage.run.frames("dark") if not choices.excludes(frame)],
+        camera=known.camera,
     )
+    rise, fade = lamp_changes(known.fade, np.array(irradiance.bands_nm))
     longest = max((one for one in glow.lit if one.is_bare), key=lambda one: one.off_s - one.on_s)
 
     def charges(bare: bool) -> tuple[Charge, ...]:
         return tuple(
-            _charge(one, glow, warming.lacks, fresh=fresh, saturated=saturated and one is longest)
+            _charge(
+                one,
+                glow,
+                warming.lacks,
+                fresh=protocol.samples > 1,
+                saturated=protocol.saturated and one is longest,
+            )
             for one in glow.lit
             if one.is_bare is bare
         )

@@ -11,17 +11,15 @@ from labrig.fit import DecayFit
 from labrig.fit.excitation import ExcitationFit, Uncertain, fit_excitation
 from labrig.material import write_material
 from labrig.process.excitation.charges import Charged, charged
-from labrig.process.excitation.lamp_changes import lamp_changes
 from labrig.process.excitation.light import band_sigma, scale_sigma
 from labrig.process.excitation.lit import GLOWING
 from labrig.process.excitation.material import excited_material
 from labrig.process.excitation.prediction import predicted_charging
 from labrig.process.excitation.telling import closure_line, fit_json, lines, section
 from labrig.process.intact import insist_on_intact
-from labrig.process.known import Known
 from labrig.process.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.process.stage import Stage, StageResult
-from labrig.process.strip_patches import StripPatch, of_each, strip_patches
+from labrig.process.strip_patches import StripPatch, of_each
 from labrig.process.temperature import at_temperature
 
 #: Of a lamp's brightness from charge to charge.
@@ -44,23 +42,21 @@ def process(stage: Stage) -> StageResult:
     FitError
         Nothing glows, or what glows cannot be fitted.
     """
-    irradiance, protocol, known = stage.known.irradiance, stage.protocol, stage.known
+    irradiance, known = stage.known.irradiance, stage.known
     if irradiance is None:
         raise DataError(
             "expected the light on every place of the sample, got none; run irradiance and name "
             "its run in the rig file: 'optics: {irradiance: …}'"
         )
     insist_on_intact(stage.run, (*GLOWING, "dark"), stage.choices)
-    rise, fade = lamp_changes(known.fade, np.array(irradiance.bands_nm))
-    measured, said = charged(
-        stage.run, irradiance, strip_patches(stage), rise, fade, stage.choices,
-        warming=_warming(known), blank=known.blank,
-        fresh=protocol.samples > 1, saturated=protocol.saturated,
-    )  # fmt: skip
+    warming = USUAL if known.fade is None or known.fade.warming is None else known.fade.warming
+    measured, said = charged(stage, irradiance, warming)
     found = of_each(
         list(measured),
         known,
-        lambda patch, sofar: _of_patch(stage, patch, measured[patch], irradiance, sofar),
+        lambda patch, sofar: _of_patch(
+            replace(stage, known=sofar), patch, measured[patch], irradiance, warming
+        ),
     )
     unmeasured = [] if known.fade else ["the lamp's fade was not measured: a usual one was taken"]
     leaks = known.blank.leaks() if known.blank else ()
@@ -68,14 +64,18 @@ def process(stage: Stage) -> StageResult:
 
 
 def _of_patch(
-    stage: Stage, patch: StripPatch, measured: Charged, irradiance: IrradianceFile, known: Known
+    stage: Stage,
+    patch: StripPatch,
+    measured: Charged,
+    irradiance: IrradianceFile,
+    warming: Warming,
 ) -> StageResult:
-    start = _start(stage, patch, measured)
+    known, start = stage.known, _start(stage, patch, measured)
     dark = tuple(np.maximum(np.nan_to_num(measured.whole.dark_sigma), LEAST_DARK).tolist())
     uncertain = Uncertain(
         flicker=_flicker(stage, start),
         lamp=LAMP,
-        cold=_warming(known).lacks_sigma,
+        cold=warming.lacks_sigma,
         offset=dark,
         # The sensor warms and cools over hours of long exposures, more than dark frames tell.
         wander=dark,
@@ -123,10 +123,6 @@ def _fit(measured: Charged, start: DecayFit, uncertain: Uncertain) -> Excitation
     amplitudes = np.array([state.amplitude for state in start.states])
     shares = np.maximum(amplitudes / amplitudes.sum(), 1e-3)
     return fit_excitation([measured.through, measured.bare], rates, shares, uncertain)
-
-
-def _warming(known: Known) -> Warming:
-    return USUAL if known.fade is None or known.fade.warming is None else known.fade.warming
 
 
 def _flicker(stage: Stage, start: DecayFit) -> float:

@@ -10,18 +10,19 @@ import numpy as np
 import pytest
 import yaml
 
+from labrig.acquire import read_rig_file
 from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IrradianceFile, write_irradiance_file
 from labrig.calibration.lvf_file import SLICES, Strip
 from labrig.errors import DataError
 from labrig.material import read_material
 from labrig.process import process_run
-from labrig.process.choices import Choices
+from labrig.process.choices import Choices, read_run_protocol
 from labrig.process.excitation.charges import charged
-from labrig.process.excitation.lamp_changes import lamp_changes
 from labrig.process.excitation.lit import glowing
 from labrig.process.excitation.processing import USUAL
-from labrig.process.strip_patches import StripPatch
+from labrig.process.known import Known
+from labrig.process.stage import Stage
 from labrig.record import read_run
 from labrig.reduce import measure, read_raw
 from sim.bench_settings import LvfSettings
@@ -198,13 +199,8 @@ def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: P
 
 
 def test_charges_are_missing(run: Path) -> None:
-    whole = read_run(run)
+    whole, rig = read_run(run), read_rig_file(run / "rig.yaml")
     some = replace(whole, attempts=[a for a in whole.attempts if not a.unit.startswith("bare")])
-    irradiance = true_irradiance()
-    rise, fade = lamp_changes(None, np.array(irradiance.bands_nm))
-    patch, choices = StripPatch("", "blue-paint"), Choices()
+    stage = Stage(some, read_run_protocol(run), rig, Choices(), Known.of(rig), run / "result")
     with pytest.raises(DataError, match="through the filter and without it"):
-        charged(
-            some, irradiance, [patch], rise, fade, choices,
-            warming=USUAL, blank=None, fresh=False, saturated=False,
-        )  # fmt: skip
+        charged(stage, true_irradiance(), USUAL)
