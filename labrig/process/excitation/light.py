@@ -65,14 +65,12 @@ def across_sites(irradiance: IrradianceFile) -> FloatArray:
 
 
 def band_sigma(irradiance: IrradianceFile) -> tuple[float, ...]:
-    """Relative, of each band's light: that of the places where the band charges.
+    """Relative, of the lamp's own light in each band: wrong there, it is wrong at all places.
 
-    Errors of neighbouring places are alike, so that a band's do not average out over its places.
+    What else is not known of the light on a place is said by `site_modes`.
     """
-    through = np.array(irradiance.through)
-    share = through**2 / np.maximum((through**2).sum(axis=0), 1e-300)
     direct = np.array(irradiance.direct_sigma) / np.maximum(np.array(irradiance.direct), 1e-300)
-    return tuple(np.hypot(_told(irradiance) @ share, direct).tolist())
+    return tuple(direct.tolist())
 
 
 def scale_sigma(irradiance: IrradianceFile) -> float:
