@@ -60,8 +60,8 @@ def progress(
     if yes and plan.by_hand and not has_hands:
         raise UsageError(
             f"--yes: {len(plan.by_hand)} steps are done by hand, such as '{plan.by_hand[0]}', and "
-            "the rig has no 'hands' to do them; run it without --yes, or (on a simulated rig) add "
-            "to its devices: hands: {driver: text_hands, address: sim://room/hands}"
+            "the rig has no 'hands' to do them; run it without --yes, or on the simulated rig that "
+            "has: --rig sim-phosphor"
         )
     state = _State(plan, done, clock, yes=yes)
     if not sys.stderr.isatty():

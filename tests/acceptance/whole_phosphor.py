@@ -1,11 +1,14 @@
 """`labrig run phosphor` on the simulated rig, from camera calibration to material, against truth.
 
     python -m tests.acceptance.whole_phosphor [MATERIAL ...] [--seeds 1] [--first 1] [--keep DIR]
+    python -m tests.acceptance.whole_phosphor --again DIR
 
 Everything is calibrated in the run itself, in a room whose camera curves are bent as laboratories
 disagree and whose filters are 1 % off their files. Per state: k_r and r(0) in σ from the truth;
 k_e of bands of 0.002 /s or more, furthest in % and in σ; of the weaker ones, how many times their
-95 % limit the truth is (≤ 1 is right); Λ, up to one factor, furthest in σ; wall time.
+95 % limit the truth is (≤ 1 is right); Λ, up to one factor, furthest in σ; wall time. At the end
+the root mean squares over all of them: σ are right where that of errors in σ is 1. `--again`
+processes runs that were kept by the code as it is now.
 """
 
 import argparse
@@ -17,16 +20,21 @@ import time
 from collections.abc import Sequence
 from datetime import UTC, datetime
 from pathlib import Path
+from typing import NamedTuple
 
 import numpy as np
 import yaml
+from numpy.typing import NDArray
 
 from labrig import shipped
 from labrig.material import Material, read_material
+from labrig.process import process_run
 from labrig.record import read_run
 from sim.lamp import BURNING_K, filament_spectrum
 from sim.optics import emission
 from sim.phosphor import band_cells
+
+FloatArray = NDArray[np.float64]
 
 PAINTS = ("blue", "green", "orange", "pink", "purple", "red", "white", "yellow")
 #: Of the room's lamp, in multiples of the irradiance to which Table 1's rates belong.
@@ -82,10 +90,38 @@ def brightness(run: Path) -> float:
     return 1 - 0.002 * hours
 
 
-def compared(found: Material, true: Material, brightness: float) -> str:
-    """One line for every state; `brightness` of the lamp in the last charge."""
-    if len(found.states) != len(true.states):
-        return f"{len(found.states)} states instead of {len(true.states)}"
+class Errors(NamedTuple):
+    """Of one state: numbers in σ from the truth, unless said otherwise.
+
+    Attributes
+    ----------
+    k_e_percent, k_e
+        Of the bands that are to be measured.
+    limit
+        Truth over the 95 % limit, of the weaker bands.
+    """
+
+    r0: tuple[float, float]
+    k_r: float
+    r0_off: float
+    k_e_percent: FloatArray
+    k_e: FloatArray
+    limit: FloatArray
+    weak: FloatArray
+    radiated: FloatArray
+
+    def line(self) -> str:
+        """For the terminal."""
+        return (
+            f"k_r {self.k_r:+5.1f} σ  r(0) {self.r0[0]:.3f} ({self.r0[1]:.3f}) "
+            f"{self.r0_off:+5.1f} σ  k_e {_furthest(self.k_e_percent):+6.1f} % "
+            f"{_furthest(self.k_e):+5.1f} σ  weak {max(self.limit, default=0.0):4.1f} "
+            f"{_furthest(self.weak):+5.1f} σ  Λ {_furthest(self.radiated):+5.1f} σ"
+        )
+
+
+def errors(found: Material, true: Material, brightness: float) -> list[Errors]:
+    """Of every state; `brightness` of the lamp in the last charge."""
     assert true.bands_nm is not None
     cells, lamp = band_cells(true.bands_nm), filament_spectrum(BURNING_K)
     direct = cells @ lamp / np.linalg.norm(cells @ lamp)
@@ -93,29 +129,40 @@ def compared(found: Material, true: Material, brightness: float) -> str:
     ours = np.array([state.reradiation for state, _ in pairs])
     theirs = emission(true) @ cells.T / cells.sum(axis=1)
     factor = (ours * theirs).sum() / (ours**2).sum()
-    lines = []
+    every = []
     for number, (state, truth) in enumerate(pairs):
         k_e, sigma = (np.array(x) / LAMP for x in (state.k_e_per_s, state.k_e_per_s_sigma))
         # What was found belongs to the lamp as it was.
         wanted = brightness * np.array(truth.k_e_per_s)
         strong = np.array(truth.k_e_per_s) >= MEASURABLE_PER_S
-        percent = 100 * (k_e / np.where(strong, wanted, 1.0) - 1)[strong]
-        pulls = ((k_e - wanted) / np.maximum(sigma, 1e-12))[strong]
-        weak = (wanted / np.maximum(k_e + 1.645 * sigma, 1e-12))[~strong]
-        false = ((k_e - wanted) / np.maximum(sigma, 1e-12))[~strong]
+        pulls = (k_e - wanted) / np.maximum(sigma, 1e-12)
         kappa = LAMP * float(wanted @ direct)
         r0 = kappa / (kappa + truth.k_r_per_s)
         own = np.array(state.reradiation_sigma) * factor
         radiated = (factor * ours[number] - theirs[number]) / np.maximum(own, 1e-12)
-        bright = theirs[number] > 0.02 * theirs[number].max()
-        lines.append(
-            f"k_r {_pull(state.k_r_per_s, state.k_r_per_s_sigma, truth.k_r_per_s):+5.1f} σ  "
-            f"r(0) {state.r0:.3f} ({r0:.3f}) {_pull(state.r0, state.r0_sigma, r0):+5.1f} σ  "
-            f"k_e {_furthest(percent):+6.1f} % {_furthest(pulls):+5.1f} σ  "
-            f"weak {max(weak, default=0.0):4.1f} {_furthest(false):+5.1f} σ  "
-            f"Λ {_furthest(radiated[bright]):+5.1f} σ"
+        every.append(
+            Errors(
+                r0=(float(state.r0 or 0.0), r0),
+                k_r=_pull(state.k_r_per_s, state.k_r_per_s_sigma, truth.k_r_per_s),
+                r0_off=_pull(state.r0, state.r0_sigma, r0),
+                k_e_percent=100 * (k_e[strong] / wanted[strong] - 1),
+                k_e=pulls[strong],
+                limit=(wanted / np.maximum(k_e + 1.645 * sigma, 1e-12))[~strong],
+                weak=pulls[~strong],
+                radiated=radiated[theirs[number] > 0.02 * theirs[number].max()],
+            )
         )
-    return "; ".join(lines)
+    return every
+
+
+def summary(every: Sequence[Errors]) -> str:
+    """Root mean squares over all states of all runs."""
+    names = {"k_r": "σ", "r0_off": "σ", "k_e": "σ", "k_e_percent": "%", "radiated": "σ"}
+    parts = []
+    for name, unit in names.items():
+        numbers = np.concatenate([np.atleast_1d(getattr(one, name)) for one in every])
+        parts.append(f"{name} {np.sqrt(np.mean(numbers**2)):.2f} {unit}")
+    return f"root mean squares of {len(every)} states: {', '.join(parts)}"
 
 
 def _pull(value: float | None, sigma: float | None, truth: float) -> float:
@@ -124,7 +171,7 @@ def _pull(value: float | None, sigma: float | None, truth: float) -> float:
     return (value - truth) / sigma
 
 
-def _furthest(numbers: np.ndarray) -> float:
+def _furthest(numbers: FloatArray) -> float:
     return float(numbers[np.argmax(np.abs(numbers))]) if len(numbers) else 0.0
 
 
@@ -136,18 +183,43 @@ def main(arguments: Sequence[str]) -> None:
     parser.add_argument("--first", type=int, default=1)
     parser.add_argument("--width", type=int, default=384)
     parser.add_argument("--keep", type=Path)
+    parser.add_argument("--again", type=Path)
     asked = parser.parse_args(arguments)
-    for material in asked.materials:
-        for seed in range(asked.first, asked.first + asked.seeds):
-            folder = Path(tempfile.mkdtemp(prefix=f"{material}-{seed}-", dir=asked.keep))
-            found, took_s = run(folder, material, seed, asked.width)
-            said = found
-            if not isinstance(found, str):
-                true = read_material(material)
-                said = compared(found, true, brightness(next(folder.glob("runs/*"))))
-            print(f"{material:13} {seed:3} {took_s:5.0f} s  {said}", flush=True)
-            if asked.keep is None:
-                shutil.rmtree(folder)
+    every: list[Errors] = []
+    if asked.again:
+        for kept in sorted(asked.again.glob("*/runs/*")):
+            material, seed, _ = kept.parents[1].name.rsplit("-", 2)
+            began = time.monotonic()
+            process_run(kept)
+            found = read_material(kept / "result" / "material.yaml")
+            every += _told(material, int(seed), time.monotonic() - began, found, kept)
+    else:
+        for material in asked.materials:
+            for seed in range(asked.first, asked.first + asked.seeds):
+                folder = Path(tempfile.mkdtemp(prefix=f"{material}-{seed}-", dir=asked.keep))
+                made, took_s = run(folder, material, seed, asked.width)
+                every += _told(material, seed, took_s, made, next(folder.glob("runs/*"), folder))
+                if asked.keep is None:
+                    shutil.rmtree(folder)
+    if every:
+        print(summary(every))
+
+
+def _told(
+    material: str, seed: int, took_s: float, found: Material | str, run: Path
+) -> list[Errors]:
+    """Of one run, printed."""
+    every: list[Errors] = []
+    true = read_material(material)
+    if isinstance(found, str):
+        said = found
+    elif len(found.states) != len(true.states):
+        said = f"{len(found.states)} states instead of {len(true.states)}"
+    else:
+        every = errors(found, true, brightness(run))
+        said = "; ".join(one.line() for one in every)
+    print(f"{material:13} {seed:3} {took_s:5.0f} s  {said}", flush=True)
+    return every
 
 
 if __name__ == "__main__":

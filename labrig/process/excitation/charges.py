@@ -15,6 +15,7 @@ from labrig.process.excitation.light import across_sites, site_modes
 from labrig.process.excitation.lit import Glowing, Lit, glowing
 from labrig.process.stage import Stage
 from labrig.process.strip_patches import Slices, StripPatch, cut, strip_patches
+from labrig.process.this_camera import insist_on_this_camera
 from labrig.process.timed_frames import timed, untimed
 from labrig.reduce import Series, read_raw, reduce_patches
 from labrig.region import Region
@@ -66,10 +67,12 @@ def charged(
     Raises
     ------
     DataError
-        Charges or frames are missing, or no patch lies below the filter.
+        Charges or frames are missing, no patch lies below the filter, or the camera was not this
+        one.
     """
     known, choices, protocol = stage.known, stage.choices, stage.protocol
     glow = glowing(stage.run, choices, warming.warms_s, known.blank)
+    insist_on_this_camera(known.camera, stage.run, list(glow.charge))
     raw = read_raw(next(iter(glow.charge)).path)
     sites, refused = cut(strip_patches(stage), irradiance.strip, raw, len(irradiance.position))
     series = reduce_patches(

@@ -29,6 +29,7 @@ from sim.bench_settings import LvfSettings
 from sim.lamp import BURNING_K, filament_spectrum
 from sim.lvf import Lvf
 from sim.phosphor import band_cells
+from tests.calibration.test_camera_file import camera
 from tests.process.recorded import cut_off_and_resumed, record
 
 #: Wide, so that a slice of the strip is ten pixels; low, so that it is fast.
@@ -198,9 +199,25 @@ def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: P
         glowing(read_run(run), Choices(), 150.0, blank.model_copy(update={"first_clean_s": 1e4}))
 
 
+def stage_of(run: Path, **known: Any) -> Stage:
+    rig = read_rig_file(run / "rig.yaml")
+    return Stage(
+        read_run(run),
+        read_run_protocol(run),
+        rig,
+        Choices(),
+        replace(Known.of(rig), **known),
+        run / "result",
+    )
+
+
 def test_charges_are_missing(run: Path) -> None:
-    whole, rig = read_run(run), read_rig_file(run / "rig.yaml")
-    some = replace(whole, attempts=[a for a in whole.attempts if not a.unit.startswith("bare")])
-    stage = Stage(some, read_run_protocol(run), rig, Choices(), Known.of(rig), run / "result")
+    stage = stage_of(run)
+    some = [one for one in stage.run.attempts if not one.unit.startswith("bare")]
     with pytest.raises(DataError, match="through the filter and without it"):
-        charged(stage, true_irradiance(), USUAL)
+        charged(replace(stage, run=replace(stage.run, attempts=some)), true_irradiance(), USUAL)
+
+
+def test_a_calibration_of_another_camera_is_refused(run: Path) -> None:
+    with pytest.raises(DataError, match="calibration of another camera"):
+        charged(stage_of(run, camera=camera()), true_irradiance(), USUAL)
