@@ -41,10 +41,12 @@ class ExcitationProblem:
             for one in self.series
         ]
         self._values = [np.nan_to_num(one.values) for one in self.series]
+        wander = np.reshape(uncertain.wander, (-1, self._values[0].shape[2]))
         self._wander = [
-            (np.array(uncertain.wander) * inverse).reshape(len(inverse), 1, -1)
+            (wander[:, None, :] * inverse[:, None]).reshape(
+                len(inverse), len(wander), inverse[0].size
+            )
             for inverse in self._inverse_sigma
-            if uncertain.wander
         ]
         #: (n, d, PC): along which all values of a photograph scatter together.
         self._along = self._wander
@@ -74,13 +76,11 @@ class ExcitationProblem:
     def rewhiten(self, theta: FloatArray) -> None:
         """Take the flicker's covariance from the signal at θ."""
         if self._flicker > 0:
-            flicker = [
-                (self._flicker * signal * inverse).reshape(len(signal), 1, -1)
-                for signal, inverse in zip(self.signal(theta), self._inverse_sigma, strict=True)
-            ]
             self._along = [
-                np.concatenate(both, axis=1)
-                for both in zip(flicker, *([self._wander] if self._wander else []), strict=True)
+                np.hstack([self._flicker * (signal * inverse).reshape(len(signal), 1, -1), wander])
+                for signal, inverse, wander in zip(
+                    self.signal(theta), self._inverse_sigma, self._wander, strict=True
+                )
             ]
 
     def residuals(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -164,8 +164,8 @@ class ExcitationProblem:
     ) -> tuple[FloatArray, FloatArray]:
         """Multiplied by (1 + UᵀU)^(−1/2) photograph by photograph, U (d, PC)."""
         jacobian = jacobian.reshape(*misfit.shape, -1)
-        if self._along:
-            along = self._along[number]
+        along = self._along[number]
+        if along.shape[1]:
             shrink = _shrunk(along) @ along
             together = along @ misfit[..., None]
             misfit = misfit - (shrink.mT @ together)[..., 0]
