@@ -124,8 +124,8 @@ def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
 def emission(material: Material) -> FloatArray:
     """Λ of every state as a smooth spectrum, shape (states, wavelengths).
 
-    A spectrum in the file gives the shape; without one, the bands' values are joined smoothly
-    through the centres of the bands, going to zero one band beyond the outermost.
+    A spectrum in the file gives the shape; without one it is the slope of a monotone curve through
+    the bands' running sum, so that its mean over each band is the file's number.
 
     Raises
     ------
@@ -146,12 +146,12 @@ def emission(material: Material) -> FloatArray:
         in_bands = (cells @ fine / np.maximum(cells.sum(axis=1), 1e-12)).sum()
         return np.outer(bands.sum(axis=1) / in_bands, fine)
     edges = np.asarray(material.bands_nm)
-    centres = (edges[:-1] + edges[1:]) / 2
-    ends = edges[0] * 2 - centres[0], edges[-1] * 2 - centres[-1]
-    knots = np.concatenate([[ends[0]], centres, [ends[1]]])
-    values = np.pad(bands, ((0, 0), (1, 1)))
-    smooth = PchipInterpolator(knots, values, axis=1, extrapolate=False)(WAVELENGTH_NM)
-    return np.nan_to_num(smooth)
+    below = np.pad(np.cumsum(bands * np.diff(edges), axis=1), ((0, 0), (2, 1)), mode="edge")
+    below[:, :2] = 0.0
+    # A band beyond either end, in which there is nothing.
+    knots = np.concatenate([[2 * edges[0] - edges[1]], edges, [2 * edges[-1] - edges[-2]]])
+    running = PchipInterpolator(knots, below, axis=1, extrapolate=False)
+    return np.nan_to_num(running(WAVELENGTH_NM, 1))
 
 
 def vignetting(height: int, width: int, focal_mm: float = FOCAL_MM) -> FloatArray:

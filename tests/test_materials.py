@@ -37,11 +37,32 @@ def measured(labrig: Labrig, tmp_path: Path, rig: Path, protocol: str) -> Path:
     return ended.run_folder
 
 
+@pytest.fixture(scope="module")
+def fits() -> dict[str, dict[str, Any]]:
+    """Of materials that were measured one by one, each once."""
+    return {}
+
+
+@pytest.fixture
+def alone(
+    labrig: Labrig, make_rig: Make, tmp_path: Path, fits: dict[str, dict[str, Any]]
+) -> Callable[[str], dict[str, Any]]:
+    """The fit of a material that was measured by itself."""
+
+    def fit(name: str) -> dict[str, Any]:
+        if name not in fits:
+            rig = make_rig(f"{name}.yaml", sample=name, sensor=SENSOR)
+            fits[name] = fit_of(measured(labrig, tmp_path, rig, "decay"))
+        return fits[name]
+
+    return fit
+
+
 @pytest.mark.parametrize("name", EXPONENTIAL)
 def test_every_rate_is_within_its_sigma_and_the_states_are_as_many_as_there_are(
-    labrig: Labrig, make_rig: Make, tmp_path: Path, name: str
+    alone: Callable[[str], dict[str, Any]], name: str
 ) -> None:
-    fit = fit_of(measured(labrig, tmp_path, make_rig(sample=name, sensor=SENSOR), "decay"))
+    fit = alone(name)
     true = sorted((state.k_r_per_s for state in read_material(name).states), reverse=True)
     assert fit["n_states"] == len(true)
     for state, k_r_per_s in zip(fit["states"], true, strict=True):
@@ -55,16 +76,13 @@ def test_a_power_law_is_flagged(labrig: Labrig, make_rig: Make, tmp_path: Path) 
 
 
 def test_eleven_patches_in_one_charge_give_the_rates_of_one_by_one(
-    labrig: Labrig, make_rig: Make, tmp_path: Path
+    labrig: Labrig, make_rig: Make, tmp_path: Path, alone: Callable[[str], dict[str, Any]]
 ) -> None:
     together = measured(
         labrig, tmp_path, make_rig("all.yaml", "sim-eleven", sensor=SENSOR), "decay-eleven"
     )
     for name in TABLE_1:
-        alone = measured(
-            labrig, tmp_path, make_rig(f"{name}.yaml", sample=name, sensor=SENSOR), "decay"
-        )
-        (one,), (other,) = fit_of(alone)["states"], fit_of(together, name)["states"]
+        (one,), (other,) = alone(name)["states"], fit_of(together, name)["states"]
         (true,) = read_material(name).states
         sigma = (one["k_r_sigma_per_s"] ** 2 + other["k_r_sigma_per_s"] ** 2) ** 0.5
         assert abs(one["k_r_per_s"] - other["k_r_per_s"]) < MOST_SIGMAS * sigma, name

@@ -42,7 +42,7 @@ class Closure:
     rms_percent
         RMS deviation in % of the RMS of the predicted levels.
     rms_sigma
-        RMS deviation in σ of the measured ones: about 1 if prediction and noise explain them.
+        RMS deviation in σ: about 1 if noise and what the prediction may be off by explain it.
     """
 
     picture: Picture
@@ -74,7 +74,7 @@ def closure(
     ----------
     charge_s, level, sigma
         Shape (n,): how long the lamp shone (its fade counts as so much longer at full light), what
-        was then photographed, its σ.
+        was then photographed, and by how much it and the prediction may differ.
     irradiance
         Shape (b,): of that lamp, in the norm to which `k_e_per_s` belongs.
     k_e_per_s, k_r_per_s
@@ -91,7 +91,7 @@ def closure(
     DataError
         Shapes that do not agree, numbers that are not finite, or a σ that is not above 0.
     """
-    sample = _Sample(*map(_floats, (k_e_per_s, k_r_per_s, full_level, irradiance)))
+    sample = Charging(*map(_floats, (k_e_per_s, k_r_per_s, full_level, irradiance)))
     charge, measured, noise = map(_floats, (charge_s, level, sigma))
     if not (charge.ndim == 1 and charge.shape == measured.shape == noise.shape and charge.size):
         raise DataError("closure: expected as many levels and σ as charges, at least one")
@@ -116,14 +116,14 @@ def closure(
         figure = _figure(charge, measured, noise, predicted, (line_s, line), unit)
     caption = (
         "Charging under the whole lamp: the curve is predicted from the rates measured band by "
-        f"band, nothing is fitted; points are measured, with ± 1 σ. RMS deviation {rms_percent:.2g}"
-        f" % of the RMS level, {rms_sigma:.2g} σ."
+        "band, nothing is fitted; points are measured, with ± 1 σ of both. RMS deviation "
+        f"{rms_percent:.2g} % of the RMS level, {rms_sigma:.2g} σ."
     )
     return Closure(Picture("closure", figure, caption), predicted, rms_percent, rms_sigma)
 
 
 @dataclass(frozen=True, eq=False)
-class _Sample:
+class Charging:
     """A sample under the lamp: (m, b) and (m,) rates, (m,) levels at r = 1, (b,) irradiance."""
 
     k_e_per_s: FloatArray

@@ -160,7 +160,8 @@ def test_without_a_door_the_sample_is_seen_through_the_lvf_on_it() -> None:
     bench.do("lvf away", "lvf before camera")
     before = columns(bench.shoot())
     assert covered.max() < 0.3 * bare.max()
-    assert covered == pytest.approx(before, rel=0.1, abs=20)
+    # The strips lie a few pixels apart, over a spectrum that is steep.
+    assert covered == pytest.approx(before, rel=0.15, abs=20)
 
 
 def test_without_a_door_the_lamp_passes_the_lvf_on_the_sample_twice() -> None:

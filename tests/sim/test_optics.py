@@ -55,12 +55,19 @@ def test_a_camera_of_another_laboratory(tmp_path: Path) -> None:
         measured_curves(str(path))
 
 
-def test_bands_are_joined_smoothly() -> None:
-    blue = emission(read_material("blue-paint"))[0]
-    assert np.interp(456.25, WAVELENGTH_NM, blue) == pytest.approx(4.37, rel=0.02)
-    assert np.interp(493.75, WAVELENGTH_NM, blue) == pytest.approx(3.65, rel=0.02)
-    assert blue.min() >= 0
-    assert blue[-1] == 0
+@pytest.mark.parametrize("name", ["blue-paint", "red-paint", "yellow-paint"])
+def test_bands_are_joined_smoothly_and_keep_their_means(name: str) -> None:
+    material = read_material(name)
+    assert material.bands_nm is not None
+    cells = band_cells(material.bands_nm)
+    for spectrum, state in zip(emission(material), material.states, strict=True):
+        assert state.reradiation is not None
+        means = cells @ spectrum / cells.sum(axis=1)
+        # A cell's value is its middle's, not its mean.
+        assert means == pytest.approx(state.reradiation, rel=2e-3, abs=2e-3)
+        assert spectrum.min() >= 0
+        assert not spectrum[WAVELENGTH_NM > 705].any()
+        assert np.abs(np.diff(spectrum)).max() < 0.2 * spectrum.max()
 
 
 def test_a_spectrum_gives_the_shape_and_the_bands_the_size() -> None:

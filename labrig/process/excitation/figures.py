@@ -1,11 +1,10 @@
 """What an excitation looks like: rates by wavelength, how sites charge, what the fit leaves."""
 
-from itertools import pairwise
-
 import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit.excitation import ChargingSeries, ExcitationFit
+from labrig.process.excitation.first_photographs import first_photographs
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,
@@ -76,7 +75,6 @@ def charging_picture(
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=48)
     axes.set_xscale("log")
     axes.set_yscale("log", nonpositive="clip")
-    first = np.cumsum([0, *(len(charge.start_s) for charge in series.charges)])
     charge_s = np.array([charge.off_s - charge.on_s for charge in series.charges])
     channel = int(np.argmax(np.nanmean(series.values, axis=(0, 1))))
     total = np.nansum(fitted[..., channel], axis=0)
@@ -85,16 +83,9 @@ def charging_picture(
     entries = []
     for number, site in enumerate(dict.fromkeys(shown.tolist())):
         colour = OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
-        rows = [
-            next(
-                (row for row in range(low, high) if np.isfinite(series.values[row, site, channel])),
-                -1,
-            )
-            for low, high in pairwise(first)
-        ]
-        use = np.flatnonzero(np.array(rows) >= 0)
-        order = use[np.argsort(charge_s[use])]
-        picked = np.array(rows)[order]
+        first = first_photographs(series, np.isfinite(series.values[:, site, channel]))
+        order = sorted(first, key=lambda number: charge_s[number])
+        picked = [first[number] for number in order]
         x, y = charge_s[order], series.values[picked, site, channel]
         error_bars(axes, x, y, series.sigma[picked, site, channel], colour)
         points(axes, x, y, MARKERS[number], colour, colour, 4.2)

@@ -122,7 +122,8 @@ def _wavelengths(irradiance: IrradianceFile) -> FloatArray:
     """(P,) mean wavelength of the light at every place."""
     edges, through = np.array(irradiance.bands_nm), np.array(irradiance.through)
     middles = (edges[1:] + edges[:-1]) / 2
-    found: FloatArray = through @ middles / np.maximum(through.sum(axis=1), 1e-300)
+    # Squared, so that what leaks all over does not pull.
+    found: FloatArray = through**2 @ middles / np.maximum((through**2).sum(axis=1), 1e-300)
     return found
 
 
