@@ -60,6 +60,15 @@ class Recording:
             f"time, {self.plan.frames} frames, {self.plan.size_bytes / 1e6:.0f} MB"
         )
 
+    def notes(self) -> tuple[str, ...]:
+        """What the person should know before it begins, a line each."""
+        return tuple(
+            f"what {self.protocol.protocol} finds rests on {name}, of which the rig file names no "
+            "run ('optics:'); frames will be kept: measure it, too, and name it to labrig process "
+            "--optics"
+            for name in self.protocol.unmeasured(self.rig)
+        )
+
     def record(self, watch: Watch) -> Path:
         """Make a run folder and fill it; returns its path.
 

@@ -3,10 +3,10 @@
 After Nalbach et al., sec. 4.3: it is to be the same at all times, and whatever lamp charged it.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Annotated, Literal, Self
+from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
@@ -37,6 +37,8 @@ WHITE = "it tells what the camera's curves are off by"
 
 class EmissionSpectrum(GlowSettings):
     """The protocol; see `emission_spectrum.yaml` for what each key means."""
+
+    rests_on: ClassVar[Mapping[str, str]] = {"lvf_calibration": "lvf"}
 
     protocol: Literal["emission_spectrum"] = "emission_spectrum"
     camera: CameraSettings = CameraSettings(iso=1600)

@@ -1,7 +1,8 @@
 """The keys of an excitation protocol, and the times and exposures that follow."""
 
+from collections.abc import Mapping
 from itertools import pairwise
-from typing import Literal, Self
+from typing import ClassVar, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
@@ -37,6 +38,8 @@ class Rest(BaseModel):
 
 class ExcitationSettings(ProtocolModel):
     """The keys; see `excitation.yaml` for what each means."""
+
+    rests_on: ClassVar[Mapping[str, str]] = {"irradiance": "irradiance"}
 
     protocol: Literal["excitation"] = "excitation"
     first_charge: DurationS = Field(8.0, gt=0)

@@ -52,6 +52,15 @@ class Phosphor(ProtocolModel):
         ]
         return self.model_copy(update={"parts": tuple(parts)})
 
+    def unmeasured(self, rig: RigFile) -> Sequence[str]:
+        """What neither the rig file names nor an earlier part measures."""
+        measured: set[str] = set()
+        missing: list[str] = []
+        for part in self.chain():
+            missing += [one for one in part.protocol.unmeasured(rig) if one not in measured]
+            measured.add(part.protocol.protocol)
+        return missing
+
     def units(self) -> Sequence[Unit]:
         """Those of all parts, in order."""
         return [

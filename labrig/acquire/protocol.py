@@ -1,8 +1,8 @@
 """What every protocol is: a small YAML file as a frozen model, that says which units it takes."""
 
 from abc import abstractmethod
-from collections.abc import Sequence
-from typing import Protocol, Self
+from collections.abc import Mapping, Sequence
+from typing import ClassVar, Protocol, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -38,6 +38,9 @@ class ProtocolModel(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    #: Protocols on whose results this one's rest, and the key of 'optics' that names such a run.
+    rests_on: ClassVar[Mapping[str, str]] = {}
+
     protocol: str
     sample: Sample = Sample()
 
@@ -54,3 +57,7 @@ class ProtocolModel(BaseModel):
             The rig file names what is not there.
         """
         return self
+
+    def unmeasured(self, rig: RigFile) -> Sequence[str]:
+        """Protocols on whose results this one's rest, of which the rig file names no run."""
+        return [name for name, key in self.rests_on.items() if getattr(rig.optics, key) is None]

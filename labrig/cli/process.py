@@ -32,6 +32,14 @@ def process(
     camera: Annotated[
         str | None, typer.Option("--camera", help="Other camera curves, for the report's colours.")
     ] = None,
+    optics: Annotated[
+        list[str] | None,
+        typer.Option(
+            "--optics",
+            help="KEY=PATH: a calibration instead of the rig file's 'optics:', a file or a run: "
+            "irradiance, lvf, fade, blank, camera_file, …. Repeatable.",
+        ),
+    ] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
@@ -42,7 +50,7 @@ def process(
     from labrig.catalogue import find_run
     from labrig.process import Choices
 
-    choices = Choices.parse(roi or [], exclude or [], states, rate or [], camera)
+    choices = Choices.parse(roi or [], exclude or [], states, rate or [], camera, optics or [])
     folder = find_run(run, runs)
     process_and_tell(folder, choices, json=json)
     typer.echo(folder)

@@ -106,9 +106,12 @@ def _prepared(protocol: str, rig: str, runs: Path) -> "Recording":
     from labrig import shipped
     from labrig.run import Recording
 
-    return Recording.prepare(
+    recording = Recording.prepare(
         shipped.find("protocols", "protocol", protocol), shipped.find("config", "rig", rig), runs
     )
+    for note in recording.notes():
+        typer.echo(f"note: {note}", err=True)
+    return recording
 
 
 def _finish(folder: Path, no_process: bool, json: bool) -> None:

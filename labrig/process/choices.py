@@ -6,7 +6,8 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Literal, Protocol, Self, cast
 
-from labrig.acquire import ProtocolModel, Sample, plugins
+from labrig.acquire import ProtocolModel, RigFile, Sample, plugins, read_rig_file
+from labrig.acquire.rig_file import Optics
 from labrig.errors import UsageError
 from labrig.record import FrameRecord
 from labrig.region import Region, parse_region
@@ -67,6 +68,8 @@ class Choices:
         Rates known from elsewhere, which take part and are held; they count as states.
     camera
         Other camera curves than the rig file names, for the report's colours.
+    optics
+        Keys of the rig file's `optics:` as they should be: calibrations that came later.
     """
 
     regions: Mapping[str, Region] = field(default_factory=dict)
@@ -74,6 +77,7 @@ class Choices:
     states: int | None = None
     fixed_rates_per_s: tuple[float, ...] = ()
     camera: str | None = None
+    optics: Mapping[str, str] = field(default_factory=dict)
 
     @classmethod
     def parse(
@@ -83,13 +87,15 @@ class Choices:
         states: int | None = None,
         fixed_rates_per_s: Sequence[float] = (),
         camera: str | None = None,
+        optics: Sequence[str] = (),
     ) -> Self:
-        """From the texts of a command line: `NAME=x,y,w,h` or `x,y,w,h`, frame numbers or names.
+        """From the texts of a command line: `NAME=x,y,w,h` or `x,y,w,h`, frame numbers or names,
+        `KEY=PATH` of optics.
 
         Raises
         ------
         UsageError
-            A region or a rate that is none.
+            A region, a rate or a calibration that is none.
         """
         if wrong := [rate for rate in fixed_rates_per_s if not 0 < rate < math.inf]:
             raise UsageError(f"--rate: expected a rate > 0 in 1/s, got {wrong[0]}")
@@ -97,7 +103,25 @@ class Choices:
         for text in regions:
             name, _, numbers = text.rpartition("=")
             named[name] = parse_region(numbers)
-        return cls(named, frozenset(excluded), states, tuple(fixed_rates_per_s), camera)
+        return cls(
+            named,
+            frozenset(excluded),
+            states,
+            tuple(fixed_rates_per_s),
+            camera,
+            dict(_calibration(text) for text in optics),
+        )
+
+    def bench(self, run: Path) -> RigFile:
+        """The rig of a run as it was, but for the calibrations that a person names instead.
+
+        Raises
+        ------
+        UsageError
+            The rig file in the run folder is malformed.
+        """
+        rig = read_rig_file(run / "rig.yaml")
+        return rig.model_copy(update={"optics": rig.optics.model_copy(update=dict(self.optics))})
 
     def patches(self, protocol: DecayProtocol) -> dict[str, Region]:
         """The protocol's patches, moved where a person wants them.
@@ -135,6 +159,17 @@ class Choices:
         if unknown:
             there = f"; it has {frames[0].path.name} to {frames[-1].path.name}" if frames else ""
             raise UsageError(f"--exclude: the run has no frame {', '.join(sorted(unknown))}{there}")
+
+
+def _calibration(text: str) -> tuple[str, str]:
+    """The key and the path, absolute if it is one."""
+    key, _, named = text.partition("=")
+    if key not in Optics.model_fields or not named:
+        raise UsageError(
+            f"--optics: expected KEY=PATH with a key of 'optics:' in a rig file, got '{text}'; "
+            f"{did_you_mean(key, list(Optics.model_fields))}"
+        )
+    return key, str(Path(named).resolve()) if Path(named).exists() else named
 
 
 def _names(frame: FrameRecord) -> set[str]:

@@ -4,7 +4,6 @@ from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from labrig.acquire import read_rig_file
 from labrig.errors import FitError
 from labrig.export import write_nexus
 from labrig.fit import DecayFit
@@ -40,7 +39,7 @@ def process_decay(folder: Path, choices: Choices) -> Result:
     FitError
         No patch could be fitted; series and report are written all the same.
     """
-    protocol, rig = read_decay_protocol(folder), read_rig_file(folder / "rig.yaml")
+    protocol, rig = read_decay_protocol(folder), choices.bench(folder)
     run = read_run(folder)
     recorded = [frame for attempt in run.completed().values() for frame in attempt.frames]
     choices.check(recorded)

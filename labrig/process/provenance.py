@@ -24,6 +24,8 @@ class StageProvenance(BaseModel):
         How many went in, by purpose.
     excluded
         Names of the frames a person left out.
+    optics
+        Calibrations that a person named instead of the rig file's.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -32,6 +34,7 @@ class StageProvenance(BaseModel):
     libraries: dict[str, str]
     frames: dict[str, int]
     excluded: tuple[str, ...]
+    optics: dict[str, str] = {}
 
 
 class ResultProvenance(StageProvenance):
@@ -68,6 +71,7 @@ def provenance(
             "dark": len(frames.dark),
         },
         excluded=excluded,
+        optics=dict(choices.optics),
     )
 
 

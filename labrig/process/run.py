@@ -6,7 +6,7 @@ from dataclasses import replace
 from importlib.metadata import version
 from pathlib import Path
 
-from labrig.acquire import ProtocolModel, RigFile, plugins, read_rig_file
+from labrig.acquire import ProtocolModel, RigFile, plugins
 from labrig.process.choices import Choices, read_run_protocol
 from labrig.process.decay import process_decay
 from labrig.process.history import interruptions, written_time
@@ -41,7 +41,7 @@ def process_run(folder: Path, choices: Choices | None = None) -> Result:
     protocol = read_run_protocol(folder)
     if protocol.protocol == "decay":
         return process_decay(folder, choices)
-    rig, run = read_rig_file(folder / "rig.yaml"), read_run(folder)
+    rig, run = choices.bench(folder), read_run(folder)
     choices.check([frame for attempt in run.completed().values() for frame in attempt.frames])
     process = plugins.load(plugins.PROCESSING, protocol.protocol, str(folder))
     made = new_result(folder)
@@ -99,4 +99,5 @@ def _provenance(run: RunRecord, choices: Choices) -> StageProvenance:
         libraries=library_versions(),
         frames=dict(Counter(frame.purpose for frame in frames if not choices.excludes(frame))),
         excluded=tuple(frame.path.name for frame in frames if choices.excludes(frame)),
+        optics=dict(choices.optics),
     )

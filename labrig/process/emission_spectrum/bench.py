@@ -95,7 +95,8 @@ def spectral_benches(
     if known is None or known.before_camera is None:
         raise UsageError(
             "a spectrum needs the LVF calibrated before the camera: run the protocol "
-            "lvf_calibration, and name its run in the rig file (optics: {lvf: …})"
+            "lvf_calibration, and name its run in the rig file (optics: {lvf: …}) or to labrig "
+            "process --optics"
         )
     raw, strip, lvf = read_raw(frame.path), known.before_camera, known.lvf
     camera, holder = _camera(stage, raw.channels), _holder(strip)

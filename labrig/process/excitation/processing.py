@@ -46,7 +46,7 @@ def process(stage: Stage) -> StageResult:
     if irradiance is None:
         raise DataError(
             "expected the light on every place of the sample, got none; run irradiance and name "
-            "its run in the rig file: 'optics: {irradiance: …}'"
+            "its run in the rig file ('optics: {irradiance: …}') or to labrig process --optics"
         )
     insist_on_intact(stage.run, (*GLOWING, "dark"), stage.choices)
     warming = USUAL if known.fade is None or known.fade.warming is None else known.fade.warming

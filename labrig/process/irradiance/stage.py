@@ -60,7 +60,7 @@ def process(stage: Stage) -> StageResult:
     if known is None or known.on_sample is None:
         raise UsageError(
             f"{stage.run.folder}: no LVF is known that lies on the sample; run lvf_calibration, "
-            "and name its run in the rig file (optics: lvf:)"
+            "and name its run in the rig file (optics: {lvf: …}) or to labrig process --optics"
         )
     frames, lamp = StripFrames(stage), lamp_spectrum(stage.rig)
     lit = _lit(stage, frames, known)
