@@ -5,9 +5,10 @@ the same ratios, whatever shutter, aperture and lamp did in that frame: all of t
 channels. The channels stand at different levels, so that a deviation D(level) shows in their
 ratios, free of flicker and drift:
 
-    ln s_fc = λ_f + κ_c + D(s_fc),   D piecewise linear, D(0) = 0.
+    ln s_fc = λ_f + κ_c + δ_c / s_fc + D(s_fc),   D piecewise linear, D(0) = 0,
 
-A deviation that is the same power at all levels cannot be seen in this way.
+δ the little by which the dark level that was subtracted is wrong. A deviation that is the same
+power at all levels cannot be seen in this way.
 """
 
 import numpy as np
@@ -60,8 +61,9 @@ def fit_linearity(
     colour = np.zeros((len(level), groups * channels))
     colour[np.arange(len(level)), group[frame] * channels + channel] = 1.0
     weight = 1 / relative
-    nuisance = np.hstack([light, colour]) * weight[:, np.newaxis]
-    # What light and colour explain is taken out; D is what is left.
+    dark = np.equal.outer(channel, np.arange(channels)) / level[:, np.newaxis]
+    nuisance = np.hstack([light, colour, dark * level.min()]) * weight[:, np.newaxis]
+    # What light, colour and dark level explain is taken out; D is what is left.
     left, weights, _ = np.linalg.svd(nuisance, full_matrices=False)
     own = left[:, weights > 1e-10 * weights.max()]
     target, design = np.log(level) * weight, bends * weight[:, np.newaxis]

@@ -109,7 +109,17 @@ def test_a_bent_sensor_is_seen_through_flicker() -> None:
     expected = np.log(1 - 0.03 * np.array(found.level_dn) / 10_000)
     # An even power at all levels cannot be told; a slope of it is left in both.
     assert np.abs(np.array(found.deviation) - expected).max() < 0.004
-    assert abs(found.deviation[-1]) > 5 * found.sigma[-1]
+    assert abs(found.deviation[-1]) > 4 * found.sigma[-1]
+
+
+def test_a_dark_level_that_is_a_little_wrong_is_no_bend() -> None:
+    rng = np.random.default_rng(4)
+    true = np.outer(np.geomspace(100, 9000, 80), [0.6, 1.0, 0.4])
+    sigma = np.sqrt(true) / 30
+    seen = true + sigma * rng.standard_normal(true.shape) + [0.5, 0.0, -0.5]
+    found = fit_linearity(seen, sigma, np.zeros(80, np.intp), 10_000.0, None)
+    assert found is not None
+    assert (np.abs(found.deviation) < 3 * np.array(found.sigma)).all()
 
 
 def test_a_monochrome_sensor_cannot_tell_its_linearity_like_this() -> None:
