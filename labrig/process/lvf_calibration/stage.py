@@ -128,6 +128,8 @@ def _band_section(made: Calibrated) -> Section:
             "above 1, σ was raised by it. Positions at the ends rest on few and faint values: "
             "their σ is larger. The camera's curves were fitted along, since they are wrong in the "
             "same way at every position.",
+            "Widths are those of skewed Gaussians: of bands that are flatter on top they may be "
+            "4-5 % too small, beyond σ.",
         ),
         (
             Picture(
