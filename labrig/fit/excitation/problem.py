@@ -6,6 +6,7 @@ a fully charged sample in the brightest channel, and one weight per channel.
 
 from collections.abc import Sequence
 from dataclasses import replace
+from typing import NamedTuple, Self
 
 import numpy as np
 
@@ -41,15 +42,12 @@ class ExcitationProblem:
             for one in self.series
         ]
         self._values = [np.nan_to_num(one.values) for one in self.series]
-        wander = np.reshape(uncertain.wander, (-1, self._values[0].shape[2]))
+        wander = np.array(uncertain.wander)
         self._wander = [
-            (wander[:, None, :] * inverse[:, None]).reshape(
-                len(inverse), len(wander), inverse[0].size
-            )
-            for inverse in self._inverse_sigma
+            [_flat(wander * inverse)] if len(wander) else [] for inverse in self._inverse_sigma
         ]
-        #: (n, d, PC): along which all values of a photograph scatter together.
-        self._along = self._wander
+        #: Along which all values of a photograph scatter together, by series.
+        self._common = [_one_by_one(vectors) for vectors in self._wander]
 
     @property
     def n_values(self) -> int:
@@ -76,8 +74,8 @@ class ExcitationProblem:
     def rewhiten(self, theta: FloatArray) -> None:
         """Take the flicker's covariance from the signal at θ."""
         if self._flicker > 0:
-            self._along = [
-                np.hstack([self._flicker * (signal * inverse).reshape(len(signal), 1, -1), wander])
+            self._common = [
+                _one_by_one([_flat(self._flicker * signal * inverse), *wander])
                 for signal, inverse, wander in zip(
                     self.signal(theta), self._inverse_sigma, self._wander, strict=True
                 )
@@ -162,22 +160,45 @@ class ExcitationProblem:
     def _whitened(
         self, number: int, misfit: FloatArray, jacobian: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Multiplied by (1 + UᵀU)^(−1/2) photograph by photograph, U (d, PC)."""
-        jacobian = jacobian.reshape(*misfit.shape, -1)
-        along = self._along[number]
-        if along.shape[1]:
-            shrink = _shrunk(along) @ along
-            together = along @ misfit[..., None]
-            misfit = misfit - (shrink.mT @ together)[..., 0]
-            jacobian -= shrink.mT @ (along @ jacobian)
+        """Multiplied by a W with Wᵀ W = (1 + Σ u uᵀ)⁻¹, photograph by photograph."""
+        misfit, jacobian = misfit[..., None], jacobian.reshape(*misfit.shape, -1)
+        for common in self._common[number]:
+            common.take_from(misfit)
+            common.take_from(jacobian)
         return misfit.ravel(), jacobian.reshape(-1, jacobian.shape[-1])
 
 
-def _shrunk(along: FloatArray) -> FloatArray:
-    """(n, d, d) S with (1 + UᵀU)^(−1/2) = 1 − Uᵀ S U, by the eigenvectors of U Uᵀ."""
-    squared, axes = np.linalg.eigh(along @ along.mT)
-    root = np.sqrt(1 + np.maximum(squared, 0.0))
-    return np.asarray((axes / (root * (1 + root))[:, None]) @ axes.mT)
+class _Common(NamedTuple):
+    """u (n, PC) of each photograph, and u over √(1 + u²) (1 + √(1 + u²))."""
+
+    u: FloatArray
+    shrunk: FloatArray
+
+    @classmethod
+    def along(cls, u: FloatArray) -> Self:
+        """(1 + u uᵀ)^(−1/2) = 1 − shrunk uᵀ."""
+        root = np.sqrt(1 + np.einsum("fv,fv->f", u, u))
+        return cls(u, u / (root * (1 + root))[:, None])
+
+    def take_from(self, columns: FloatArray) -> None:
+        """Whiten (n, PC, k) in place."""
+        columns -= self.shrunk[..., None] * (self.u[:, None, :] @ columns)
+
+
+def _one_by_one(vectors: Sequence[FloatArray]) -> list[_Common]:
+    """Of a covariance 1 + Σ u uᵀ: each u as it is once those before it are whitened."""
+    every: list[_Common] = []
+    for vector in vectors:
+        column = vector[..., None].copy()
+        for common in every:
+            common.take_from(column)
+        every.append(_Common.along(column[..., 0]))
+    return every
+
+
+def _flat(values: FloatArray) -> FloatArray:
+    """(n, PC) of (n, P, C)."""
+    return values.reshape(len(values), -1)
 
 
 def _signal(glow: FloatArray, rates: Rates) -> FloatArray:
