@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from labrig.calibration.irradiance_file import IrradianceFile
 from labrig.compare.closure import Charging, Closure, closure
 from labrig.fit.excitation import ChargingSeries, ExcitationFit, Uncertain
+from labrig.fit.excitation.levels import levels_at_off
 from labrig.process.excitation.charges import Charged
 from labrig.process.excitation.first_photographs import first_photographs
 
@@ -60,13 +61,14 @@ def predicted_charging(
         for name in ("start_s", "exposure_s")
     )
     dark_s = starts - np.array([charge.off_s for charge in charges])
+    left = _left(bare, fit)[list(first)]
 
     def predicted(theta: FloatArray) -> FloatArray:
         """By k_r, amplitudes, k_e and ln of the light."""
         n = len(fit.states)
         light = np.array(irradiance.direct) * np.exp(theta[-1])
         sample = Charging(theta[2 * n : -1].reshape(n, -1), theta[:n], theta[n : 2 * n], light)
-        return sample.level(charge_s, np.zeros((len(rows), n)), dark_s, exposures)
+        return sample.level(charge_s, left, dark_s, exposures)
 
     theta = np.array(
         [
@@ -91,6 +93,7 @@ def predicted_charging(
         k_e_per_s=fit.k_e(),
         k_r_per_s=[state.k_r_per_s for state in fit.states],
         full_level=[state.amplitude for state in fit.states],
+        r0=left,
         dark_s=dark_s,
         exposure_s=exposures,
     )
@@ -105,6 +108,19 @@ def _at_full_light(bare: ChargingSeries, fit: ExcitationFit, direct: FloatArray)
     return np.array(
         [one.brightness * (one.off_s - one.on_s - lost_s + gained_s) for one in bare.charges]
     )
+
+
+def _left(bare: ChargingSeries, fit: ExcitationFit) -> FloatArray:
+    """(K, N) concentrations that each charge finds, of the one before it."""
+    k_r = np.array([state.k_r_per_s for state in fit.states])
+    ended = levels_at_off(bare, k_r, fit.k_e()).value.mean(axis=1)
+    on_s, off_s = (
+        np.array([getattr(one, name) for one in bare.charges]) for name in ("on_s", "off_s")
+    )
+    waited_s = on_s[1:] - off_s[:-1]
+    fresh = np.array([one.fresh for one in bare.charges[1:]])
+    left = np.where(fresh[:, None], 0.0, ended[:-1] * np.exp(-np.outer(waited_s, k_r)))
+    return np.vstack([np.zeros_like(k_r), left])
 
 
 def _slopes(

@@ -118,6 +118,7 @@ def test_rates_and_levels_are_the_true_ones(run: Path) -> None:
     )
     closure = next(line for line in result.lines if line.startswith("closure"))
     assert float(closure.split("within ")[1].split(" %")[0]) < 5
+    assert float(closure.split("(")[1].split(" σ")[0]) < 3
     assert (run / "result" / "figures").is_dir()
     fit = json.loads((run / "result" / "excitation.json").read_text())
     assert fit["states"][0]["k_e_upper_per_s"][5] < 1e-3
