@@ -8,6 +8,7 @@ import numpy as np
 from labrig.calibration import BlankFile, write_blank_file
 from labrig.process.blank.pictures import section
 from labrig.process.blank.stray_light import StrayLight, ambient, stray_light
+from labrig.process.hot_pixels import hot_pixels_of
 from labrig.process.stage import Stage, StageResult
 from labrig.process.stage_frames import stage_frames, stage_region
 from labrig.process.this_camera import insist_on_this_camera
@@ -29,8 +30,10 @@ def process(stage: Stage) -> StageResult:
     frames = intact_frames(run, stage.choices, "blank")
     insist_on_this_camera(camera, run, stage_frames(stage, "blank"))
     series = reduce_patches(frames.decay, {"blank": region}, frames.dark, camera=camera)["blank"]
+    # Hot pixels are of one colour: left in, they look like light.
+    hot = hot_pixels_of(frames.dark)
     darks = [
-        replace(measure(read_raw(frame.path), region), exposure_s=frame.exposure_s)
+        replace(measure(read_raw(frame.path), region, hot), exposure_s=frame.exposure_s)
         for frame in frames.dark
     ]
     least_dn = protocol.clean.share * (darks[0].white - max(darks[0].black))

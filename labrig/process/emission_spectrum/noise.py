@@ -14,15 +14,14 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from labrig.reduce import PixelMask, RawFrame, SeriesFrame, hot_pixels, read_raw
+from labrig.process.hot_pixels import hot_pixels_of
+from labrig.reduce import PixelMask, RawFrame, SeriesFrame, read_raw
 from labrig.reduce.noise import ROUNDING_VARIANCE
 from labrig.reduce.pairs import STRIPS
 from labrig.region import Region, region_pixels
 
 FloatArray = NDArray[np.float64]
 
-#: Frames from which hot pixels are told.
-DARKS_FOR_HOT = 4
 #: Rounds in which the weights follow the line.
 ROUNDS = 8
 #: A scatter so many times what it should be is none of noise.
@@ -77,9 +76,7 @@ def seen(
     frames: Sequence[SeriesFrame], places: Sequence[Region], darks: Sequence[SeriesFrame]
 ) -> list[Seen]:
     """Every frame in every place, hot pixels left out."""
-    longest_s = max((dark.exposure_s for dark in darks), default=0.0)
-    longest = [dark for dark in darks if dark.exposure_s == longest_s][:DARKS_FOR_HOT]
-    hot = hot_pixels([read_raw(dark.path) for dark in longest]) if len(longest) > 1 else None
+    hot = hot_pixels_of(darks)
     return [_seen(frame, read_raw(frame.path), places, hot) for frame in frames]
 
 

@@ -3,14 +3,12 @@
 from functools import cached_property
 
 from labrig.errors import DataError
+from labrig.process.hot_pixels import hot_pixels_of
 from labrig.process.lvf_calibration.picture import Picture, read_picture
 from labrig.process.stage import Stage
 from labrig.process.this_camera import insist_on_this_camera
 from labrig.process.timed_frames import steady_frames
-from labrig.reduce import PixelMask, SeriesFrame, hot_pixels, read_raw
-
-#: Dark frames that tell hot pixels.
-_DARKS_FOR_HOT = 5
+from labrig.reduce import PixelMask, SeriesFrame, read_raw
 
 
 class StripFrames:
@@ -55,8 +53,4 @@ class StripFrames:
     @cached_property
     def hot(self) -> PixelMask | None:
         """Pixels that are bright in the dark, where there are frames to tell."""
-        longest_s = max(frame.exposure_s for frame in self.dark)
-        longest = [frame for frame in self.dark if frame.exposure_s == longest_s]
-        if len(longest) < 2:
-            return None
-        return hot_pixels([read_raw(frame.path) for frame in longest[:_DARKS_FOR_HOT]])
+        return hot_pixels_of(self.dark)

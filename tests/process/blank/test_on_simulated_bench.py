@@ -57,6 +57,11 @@ def test_a_dark_bench_is_clean_as_soon_as_its_lamp_is(tmp_path: Path) -> None:
     assert list(resumed.completed()) == ["dark", "blank-1", "blank-2", "put-back"]
 
 
+def test_a_hot_pixel_is_no_light_that_leaks_in(tmp_path: Path) -> None:
+    """This sensor has one in blue, which makes 0.7 DN/s of the mean of that colour."""
+    assert process_run(record(tmp_path, PROTOCOL, with_light(seed=4))).run_warnings == ()
+
+
 def test_a_leak_is_found_and_told_and_a_decay_is_warned(tmp_path: Path) -> None:
     leaking = record(tmp_path / "leak", PROTOCOL, with_light(ambient=1e-6))
     result = process_run(leaking)
