@@ -51,7 +51,8 @@ def process(stage: Stage) -> StageResult:
         The rig file does not name the curves of lamp and camera.
     """
     protocol, camera = stage.protocol, stage.known.camera
-    curves, lamp = camera_curves(stage.rig, stage.choices), lamp_spectrum(stage.rig)
+    curves = camera_curves(stage.rig, stage.choices, stage.known.lvf)
+    lamp = lamp_spectrum(stage.rig)
     frames = stage_frames(stage, "fade", "rise", "steady")
     insist_on_this_camera(camera, stage.run, frames)
     darks = stage_frames(stage, "dark")
