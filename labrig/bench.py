@@ -13,7 +13,6 @@ import serial
 import usb.core
 from filelock import FileLock, Timeout
 
-from labrig import shipped
 from labrig.acquire import Device, Rig, RigFile, plugins
 from labrig.acquire.connections import SerialPort
 from labrig.acquire.rig import in_safe_order
@@ -26,7 +25,7 @@ from labrig.signals import interrupting
 from labrig.yaml_file import validate
 
 if TYPE_CHECKING:
-    from sim import OpenRoom
+    from labrig.sim import OpenRoom
 
 SERIAL_WRITE_TIMEOUT_S = 2.0
 TCP_CONNECT_TIMEOUT_S = 5.0
@@ -96,7 +95,8 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
     if file.simulation is None:
         yield Bench(file, source, SystemClock(), None)
         return
-    sim = shipped.load("sim")
+    from labrig import sim  # a real bench has no need of the room's physics
+
     with sim.open_room(file.simulation, source, not_before_s) as room:
         yield Bench(file, source, room.clock, room)
 
@@ -124,7 +124,9 @@ def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], No
         raise UsageError(
             f"{source}: expected a simulated rig, this one has no 'simulation:'; try --rig sim"
         )
-    sim, camera = shipped.load("sim"), shipped.load("sim.camera")
+    from labrig import sim
+    from labrig.sim import camera
+
     clock = SystemClock()
     with interrupting(clock), sim.open_room(file.simulation, source) as room:
         pace = camera.Pace(clock, room.clock)

@@ -11,7 +11,6 @@ from pydantic import BaseModel, Field, TypeAdapter, create_model
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from labrig import shipped
 from labrig.acquire import RigFile, plugins
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.acquire.roles import ROLES
@@ -56,13 +55,14 @@ def _rig() -> Any:
             summary = inspect.cleandoc(kind.__doc__ or "").splitlines()[0]
             roles[role] = (_one_of("driver", fitting), Field(None, description=summary))
     devices = create_model("Devices", __config__={"extra": "forbid"}, **roles)
-    simulation = shipped.load("sim.simulation").Simulation
+    from labrig.sim.simulation import Simulation
+
     return create_model(
         "Rig",
         __base__=RigFile,
         __doc__=RigFile.__doc__,
         devices=(devices, ...),
-        simulation=(simulation | None, None),
+        simulation=(Simulation | None, None),
     )
 
 

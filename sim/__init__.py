@@ -1,5 +1,8 @@
 """The simulated dark room: physics of its own, and boards that speak the real protocols."""
 
+if __name__ != "labrig.sim":
+    raise ImportError("this package is labrig.sim; import it by that name")
+
 from .opening import OpenRoom, open_room
 
 __all__ = ["OpenRoom", "open_room"]

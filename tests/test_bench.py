@@ -11,7 +11,7 @@ from labrig.acquire import read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import SystemClock
 from labrig.errors import DeviceError, UsageError
-from sim.boards import NumatoBoard
+from labrig.sim.boards import NumatoBoard
 
 pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
 

@@ -31,7 +31,7 @@ from labrig.acquire import (
 from labrig.bench import open_bench
 from labrig.errors import DeviceError, ProtocolError, UsageError
 from labrig.record import RunFolder, RunRecord
-from sim.door import FRAME_S
+from labrig.sim.door import FRAME_S
 from tests.acquire.fakes import Watching
 from tests.conftest import Ended
 

@@ -9,12 +9,12 @@ from typing import Any
 
 import pytest
 
-from labrig import shipped
 from labrig.acquire import Plan, RunObserver
 from labrig.clock import Clock, Interrupted
 from labrig.errors import DeviceError
 from labrig.record import read_run
 from labrig.run import Recording
+from labrig.sim.camera.usb.backend import CameraBackend
 from tests.acquire.fakes import Watching
 from tests.conftest import Ended
 from tests.test_run import lamp_after, make_folder
@@ -33,7 +33,7 @@ def quick(make_protocol: Make) -> Path:
 
 def transfers(rig: Path, protocol: Path, folder: Path, patch: pytest.MonkeyPatch) -> dict[str, Any]:
     """Where on the bulk pipes, in bytes since the beginning, each kind of transfer took place."""
-    backend = shipped.load("sim.camera.usb.backend").CameraBackend
+    backend = CameraBackend
     places: dict[str, list[int]] = {}
     carried = 0
 

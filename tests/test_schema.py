@@ -67,8 +67,12 @@ def test_what_is_shipped_is_valid_and_every_misspelt_key_is_not(
 def test_what_labrig_refuses_an_editor_underlines(
     kind: str, changes: dict[str, Any], validators: dict[str, Draft202012Validator]
 ) -> None:
-    name = {"protocol": "protocols/decay", "rig": "config/sim"}.get(kind)
-    content = read_yaml(shipped.ROOT / f"{name or 'config/materials/blue-paint'}.yaml")
+    place, name = {
+        "protocol": ("protocols", "decay"),
+        "rig": ("config", "sim"),
+        "material": ("config/materials", "blue-paint"),
+    }[kind]
+    content = read_yaml(shipped.find(place, kind, name))
     assert not validators[kind].is_valid(content | changes)
 
 

@@ -1,23 +1,27 @@
-"""Folders and modules of the user's own, named like labrig's, change nothing."""
+"""Every part of labrig has one import name, and modules of the user's own change nothing."""
 
+import importlib
 import subprocess
 import sys
+from importlib.metadata import distribution, entry_points
 from pathlib import Path
 
 import pytest
 
-from labrig import shipped
+from labrig.acquire import plugins
+from labrig.drivers.numato import NumatoRelay
 
+FOLDERS = ("drivers", "protocols", "sim", "config")
 NOTEBOOK = """
 import sys
 sys.path.insert(0, {folder!r})
 {before}
 import labrig
-from labrig import shipped
+from labrig import bench, shipped
 from labrig.acquire import plugins
-for module in ("sim", "drivers.numato", "protocols.decay"):
-    loaded = shipped.load(module)
-    assert "trap" not in vars(loaded), module
+import labrig.drivers.numato, labrig.protocols.decay, labrig.sim
+for module in (labrig.drivers, labrig.protocols, labrig.sim):
+    assert "trap" not in vars(module), module
 for group in (plugins.DRIVERS, plugins.PROTOCOLS):
     for name in plugins.names(group):
         plugins.load(group, name, "test")
@@ -34,7 +38,7 @@ print("fine")
 def test_a_users_own_modules_neither_replace_ours_nor_break_anything(
     tmp_path: Path, before: str, as_folders: bool
 ) -> None:
-    for name in ("sim", "config", "drivers", "protocols"):
+    for name in FOLDERS:
         if as_folders:
             (tmp_path / name).mkdir()
             (tmp_path / name / "__init__.py").write_text("trap = True\n")
@@ -51,8 +55,23 @@ def test_a_users_own_modules_neither_replace_ours_nor_break_anything(
     assert done.stdout.strip() == "fine", done.stderr
 
 
-def test_what_is_not_shipped_is_not_loaded() -> None:
-    with pytest.raises(ModuleNotFoundError, match="not shipped"):
-        shipped.load("numpy")
-    with pytest.raises(ModuleNotFoundError):
-        shipped.load("drivers.teleporter")
+def test_a_class_is_one_object_by_every_road() -> None:
+    (entry,) = entry_points(group=plugins.DRIVERS, name="numato_relay")
+    by_name = importlib.import_module("labrig.drivers.numato").NumatoRelay
+    by_rig_file = plugins.load(plugins.DRIVERS, "numato_relay", "test")
+    assert NumatoRelay is by_name is by_rig_file is entry.load()
+    assert NumatoRelay.__module__.startswith("labrig.drivers.numato")
+
+
+@pytest.mark.parametrize("folder", FOLDERS)
+def test_another_name_for_a_part_is_refused(folder: str) -> None:
+    # Tests run in the repository, where the folders lie on the import path.
+    with pytest.raises(ImportError, match=f"labrig.{folder}"):
+        importlib.import_module(folder)
+
+
+def test_the_installation_offers_one_top_level_name() -> None:
+    files = distribution("labrig").files or []
+    packages = {file.parts[0] for file in files if file.suffix == ".py" and len(file.parts) > 1}
+    assert packages <= {"labrig"}
+    assert not any(name in FOLDERS for name in packages)

@@ -4,11 +4,10 @@ A package adds its own by an entry point in `labrig.drivers` or `labrig.protocol
 runs are processed is registered under the same name in `labrig.processing`.
 """
 
-from importlib.metadata import EntryPoint, entry_points
+from importlib.metadata import entry_points
 from pathlib import Path
 from typing import Any
 
-from labrig import shipped
 from labrig.acquire.protocol import ProtocolModel
 from labrig.errors import UsageError
 from labrig.yaml_file import did_you_mean, read_yaml, validate
@@ -37,18 +36,11 @@ def load(group: str, name: str, source: str) -> Any:
     if name not in found:
         raise UsageError(f"{source}: unknown {kind} '{name}'; {did_you_mean(name, list(found))}")
     try:
-        return _import(found[name])
+        return found[name].load()
     except (ImportError, AttributeError) as error:
         raise UsageError(
             f"{source}: the {kind} '{name}' ({found[name].value}) cannot be imported ({error})"
         ) from None
-
-
-def _import(entry: EntryPoint) -> Any:
-    own = entry.dist is not None and entry.dist.name == "labrig"
-    if own and entry.module.partition(".")[0] in shipped.PACKAGES:
-        return getattr(shipped.load(entry.module), entry.attr)
-    return entry.load()
 
 
 def read_protocol(path: Path) -> ProtocolModel:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from labrig.reduce import Series
 from labrig.region import Region, region_pixels
-from sim.sensor import BAYER_RGGB, gain_electrons_per_dn, read_noise_electrons
+from labrig.sim.sensor import BAYER_RGGB, gain_electrons_per_dn, read_noise_electrons
 
 FloatArray = NDArray[np.float64]
 

@@ -19,11 +19,11 @@ from collections.abc import Iterator
 from contextlib import closing, contextmanager
 from typing import Any
 
-from drivers.gphoto2_camera import Gphoto2Camera
-from drivers.ptp import PtpCamera
 from labrig.acquire import ExposureSettings
 from labrig.clock import SystemClock, VirtualClock
-from sim.camera import BodySettings, Pace, PtpIpServer, SimulatedCamera
+from labrig.drivers.gphoto2_camera import Gphoto2Camera
+from labrig.drivers.ptp import PtpCamera
+from labrig.sim.camera import BodySettings, Pace, PtpIpServer, SimulatedCamera
 from tests.drivers.gphoto2_camera.bench import TIFF, Loopback
 
 #: A half press is over by then, as it is in a run.

@@ -30,9 +30,9 @@ from labrig import shipped
 from labrig.material import Material, read_material
 from labrig.process import process_run
 from labrig.record import read_run
-from sim.lamp import BURNING_K, filament_spectrum
-from sim.optics import emission
-from sim.phosphor import band_cells
+from labrig.sim.lamp import BURNING_K, filament_spectrum
+from labrig.sim.optics import emission
+from labrig.sim.phosphor import band_cells
 
 FloatArray = NDArray[np.float64]
 

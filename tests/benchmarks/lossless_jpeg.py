@@ -11,7 +11,7 @@ import struct
 import numpy as np
 import numpy.typing as npt
 
-from sim.dng import Shot, encode_dng
+from labrig.sim.dng import Shot, encode_dng
 
 _COMPRESSION, _STRIP_BYTES = 259, 279
 _LOSSLESS_JPEG = 7

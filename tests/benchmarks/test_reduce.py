@@ -11,7 +11,7 @@ import pytest
 import rawpy
 
 from labrig.reduce import SeriesFrame, measure, read_raw, reduce_patches
-from sim.dng import Shot, encode_dng
+from labrig.sim.dng import Shot, encode_dng
 from tests.benchmarks.lossless_jpeg import encode_compressed_dng
 
 Against = Callable[..., None]

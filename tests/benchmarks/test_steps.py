@@ -22,8 +22,8 @@ from labrig.acquire import (
 )
 from labrig.acquire.values import Frame
 from labrig.clock import VirtualClock
+from labrig.protocols.decay import Decay
 from labrig.record import ActionRecord, FrameRecord, RunFolder
-from protocols.decay import Decay
 from tests.acquire.fakes import Watching
 
 Against = Callable[..., None]

@@ -10,7 +10,8 @@ import numpy as np
 import pytest
 import yaml
 
-from labrig import shipped
+from labrig.drivers.numato import NumatoRelay
+from labrig.drivers.ptp.camera import PtpCamera
 from labrig.errors import DeviceError
 from tests.conftest import Ended
 
@@ -114,7 +115,7 @@ def test_a_room_that_is_not_dark_is_said(labrig: Labrig, make_rig: Make) -> None
 def test_a_device_that_fails_is_shown_and_the_others_are_still_checked(
     labrig: Labrig, make_rig: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    lamp = shipped.load("drivers.numato").NumatoRelay
+    lamp = NumatoRelay
     monkeypatch.setattr(lamp, "is_on", lambda self: False)
     ended = labrig("rig", "check", make_rig(), "--json")
     assert ended.code == 3
@@ -126,7 +127,7 @@ def test_a_device_that_fails_is_shown_and_the_others_are_still_checked(
 def test_a_fault_in_a_driver_is_one_line_too(
     labrig: Labrig, make_rig: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    camera = shipped.load("drivers.ptp.camera").PtpCamera
+    camera = PtpCamera
 
     def break_down(self: object) -> None:
         raise KeyError("oops")
@@ -141,7 +142,7 @@ def test_a_fault_in_a_driver_is_one_line_too(
 def test_an_unsafe_end_is_shown_beside_what_was_found(
     labrig: Labrig, make_rig: Make, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    numato = shipped.load("drivers.numato").NumatoRelay
+    numato = NumatoRelay
     made_safe: list[int] = []
 
     def fail_at_the_end(self: Any) -> None:

@@ -14,10 +14,10 @@ from contextlib import contextmanager
 from unittest.mock import patch
 
 from labrig.clock import VirtualClock
-from sim.camera import BodySettings
-from sim.camera.ptpip import server as ptpip_server
-from sim.camera.ptpip.connection import Connection
-from sim.camera.ptpip.packets import Packet, PacketType
+from labrig.sim.camera import BodySettings
+from labrig.sim.camera.ptpip import server as ptpip_server
+from labrig.sim.camera.ptpip.connection import Connection
+from labrig.sim.camera.ptpip.packets import Packet, PacketType
 
 from . import transcript
 from .served import EOS, EPOCH_S, STANDARD, Film, served

@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 from typing import NamedTuple
 
 from labrig.clock import Interrupted, SystemClock, VirtualClock
-from sim.camera import BodySettings, Pace, PtpIpServer, Sensor, SimulatedCamera
+from labrig.sim.camera import BodySettings, Pace, PtpIpServer, Sensor, SimulatedCamera
 
 EPOCH_S = 1_767_225_600.0
 #: A server that does not end by then hangs.

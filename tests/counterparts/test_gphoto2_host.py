@@ -15,8 +15,8 @@ from typing import Any
 import pytest
 
 from labrig.clock import VirtualClock
-from sim.room import Room
-from sim.simulation import Simulation
+from labrig.sim.room import Room
+from labrig.sim.simulation import Simulation
 
 from .served import EPOCH_S, STANDARD, Film, Taken, served
 

@@ -9,14 +9,14 @@ from pathlib import Path
 
 import pytest
 
-from drivers.ptp.codes import StandardEvent
-from drivers.ptp.containers import Kind, command
-from drivers.ptp.device_info import parse_device_info
-from drivers.ptp.eos.events import Event, ObjectOffered, parse_events
-from drivers.ptp.standard.object_info import parse_object_info
 from labrig.clock import VirtualClock
-from sim.camera.ptpip.packets import Packet
-from sim.camera.ptpip.transactions import Transactions
+from labrig.drivers.ptp.codes import StandardEvent
+from labrig.drivers.ptp.containers import Kind, command
+from labrig.drivers.ptp.device_info import parse_device_info
+from labrig.drivers.ptp.eos.events import Event, ObjectOffered, parse_events
+from labrig.drivers.ptp.standard.object_info import parse_object_info
+from labrig.sim.camera.ptpip.packets import Packet
+from labrig.sim.camera.ptpip.transactions import Transactions
 from tests.drivers.ptp.ip.wire import saying
 
 from . import transcript

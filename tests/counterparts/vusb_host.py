@@ -13,18 +13,18 @@ from typing import Any, NoReturn
 
 import usb.core
 
-from drivers.ptp import PtpCamera
-from drivers.ptp.codes import Standard, StandardEvent, StandardProperty
-from drivers.ptp.device_info import DeviceInfo, parse_device_info
-from drivers.ptp.object_transfer import ObjectTransfer
-from drivers.ptp.session import Session
-from drivers.ptp.standard.frames import StandardFrames
-from drivers.ptp.standard.object_info import FOLDER, parse_object_info
-from drivers.ptp.standard.properties import StandardProperties
-from drivers.ptp.usb.link import UsbLink
 from labrig.acquire import Camera, ExposureSettings
 from labrig.acquire.connections import SerialPort
 from labrig.clock import SystemClock
+from labrig.drivers.ptp import PtpCamera
+from labrig.drivers.ptp.codes import Standard, StandardEvent, StandardProperty
+from labrig.drivers.ptp.device_info import DeviceInfo, parse_device_info
+from labrig.drivers.ptp.object_transfer import ObjectTransfer
+from labrig.drivers.ptp.session import Session
+from labrig.drivers.ptp.standard.frames import StandardFrames
+from labrig.drivers.ptp.standard.object_info import FOLDER, parse_object_info
+from labrig.drivers.ptp.standard.properties import StandardProperties
+from labrig.drivers.ptp.usb.link import UsbLink
 from labrig.errors import DeviceError
 
 from .vusb import VirtualBus, VirtualCamera

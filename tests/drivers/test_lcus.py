@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.lcus import LcusRelay, command, relay_states
 from labrig.acquire import Checkable, Lamp
 from labrig.clock import Interrupted, VirtualClock
+from labrig.drivers.lcus import LcusRelay, command, relay_states
 from labrig.errors import DeviceError, DeviceLostError
-from sim.boards import LcusBoard
-from sim.boards.lcus import Answers
+from labrig.sim.boards import LcusBoard
+from labrig.sim.boards.lcus import Answers
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
 
 ON_1, OFF_1 = bytes.fromhex("A00101A2"), bytes.fromhex("A00100A1")

@@ -6,14 +6,14 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.maestro import MaestroDoor, MaestroShield
-from drivers.maestro.errors import ERRORS, told
-from drivers.maestro.servo import Wire, quarters, seven_bits
 from labrig.acquire import Guarded, LampShield, TrapDoor
 from labrig.clock import Interrupted, VirtualClock
+from labrig.drivers.maestro import MaestroDoor, MaestroShield
+from labrig.drivers.maestro.errors import ERRORS, told
+from labrig.drivers.maestro.servo import Wire, quarters, seven_bits
 from labrig.errors import DeviceError, DeviceLostError
+from labrig.sim.boards import MaestroBoard
 from labrig.yaml_file import validate
-from sim.boards import MaestroBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
 
 KEYS = {"channel": 2, "closed": "1000 us", "open": "1500 us", "travel": "280 ms"}

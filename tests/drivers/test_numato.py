@@ -4,12 +4,12 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.numato import NumatoRelay
-from drivers.serial_line import SerialLine
 from labrig.acquire import Lamp
 from labrig.clock import Interrupted, VirtualClock
+from labrig.drivers.numato import NumatoRelay
+from labrig.drivers.serial_line import SerialLine
 from labrig.errors import DeviceError
-from sim.boards import NumatoBoard
+from labrig.sim.boards import NumatoBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, ScriptedPort, Wired
 
 

@@ -6,12 +6,12 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from drivers.numato import NumatoRelay, NumatoThermometer
-from drivers.numato.thermometer import CONVERSIONS, PLAUSIBLE_C
 from labrig.acquire.roles import Thermometer
 from labrig.clock import Interrupted, VirtualClock
+from labrig.drivers.numato import NumatoRelay, NumatoThermometer
+from labrig.drivers.numato.thermometer import CONVERSIONS, PLAUSIBLE_C
 from labrig.errors import DeviceError
-from sim.boards import NumatoBoard
+from labrig.sim.boards import NumatoBoard
 from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
 
 OPENED = (b"\r", b"\n\r>")

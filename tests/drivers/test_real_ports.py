@@ -11,7 +11,7 @@ import pytest
 from labrig.acquire import read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import VirtualClock
-from sim.boards import LcusBoard, MaestroBoard
+from labrig.sim.boards import LcusBoard, MaestroBoard
 from tests.drivers.serial_wire import Board
 
 pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")

@@ -4,11 +4,11 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.text_hands import TextHands
 from labrig.acquire.roles import Hands
 from labrig.clock import VirtualClock
+from labrig.drivers.text_hands import TextHands
 from labrig.errors import DeviceError, DeviceLostError
-from sim.boards import HandsBoard
+from labrig.sim.boards import HandsBoard
 from tests.drivers.serial_wire import BoardPort, Script, ScriptedPort, Wired
 
 

@@ -7,9 +7,9 @@ import cv2
 import numpy as np
 import pytest
 
-from drivers.uvc_preview import UvcPreview
 from labrig.acquire.connections import Connections
 from labrig.acquire.roles import ROLES, LiveView
+from labrig.drivers.uvc_preview import UvcPreview
 from labrig.errors import DeviceError
 
 

@@ -12,9 +12,9 @@ from numpy.typing import NDArray
 
 from labrig.fit.excitation import Charge, ChargingSeries, Transient
 from labrig.material import Material, read_material
-from sim.lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
-from sim.phosphor import Phosphor, band_cells, phosphor
-from sim.simulation import LampSettings
+from labrig.sim.lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
+from labrig.sim.phosphor import Phosphor, band_cells, phosphor
+from labrig.sim.simulation import LampSettings
 
 FloatArray = NDArray[np.float64]
 

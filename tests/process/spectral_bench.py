@@ -26,10 +26,10 @@ from labrig.process.stage import Stage
 from labrig.record import read_run
 from labrig.region import region_pixels
 from labrig.run import Recording
-from sim.bench_settings import LvfSettings
-from sim.lamp import WAVELENGTH_NM as ROOM_NM
-from sim.lvf import PIECES, Lvf, pieces
-from sim.optics import emission
+from labrig.sim.bench_settings import LvfSettings
+from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
+from labrig.sim.lvf import PIECES, Lvf, pieces
+from labrig.sim.optics import emission
 from tests.acquire.fakes import Watching
 
 FloatArray = NDArray[np.float64]

@@ -11,7 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from sim.boards import NumatoBoard
+from labrig.sim.boards import NumatoBoard
 
 pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
 

@@ -1,7 +1,7 @@
 """Looks at a scene that is written down instead of photographed."""
 
+from labrig.protocols.steps.metering import Look
 from labrig.reduce import ChannelStats, FrameMeasurement
-from protocols.steps.metering import Look
 
 BLACK, WHITE = 1024.0, 15_600.0
 RANGE_DN = WHITE - BLACK

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from labrig.errors import DeviceError
-from protocols.steps.afterglow import (
+from labrig.protocols.steps.afterglow import (
     Afterglow,
     Glow,
     dark_level,

@@ -5,7 +5,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from protocols.steps.charge_times import CANDIDATES, FloatArray, most_telling_s, still_grows
+from labrig.protocols.steps.charge_times import CANDIDATES, FloatArray, most_telling_s, still_grows
 
 DOUBLED_S: FloatArray = np.geomspace(8.0, 256.0, 6)
 

@@ -10,7 +10,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from labrig.errors import DataError, DeviceError
-from protocols.steps.darkness import DARK, Darkness, darkness
+from labrig.protocols.steps.darkness import DARK, Darkness, darkness
 from tests.protocols.looks import RANGE_DN, look
 
 EXPOSURES_S = (0.05, 0.8, 3.2)

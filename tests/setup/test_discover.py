@@ -14,7 +14,7 @@ from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
 from labrig.setup import Process, Surroundings, discover
 from labrig.setup import surroundings as surroundings_module
-from sim.camera import SimulatedCamera
+from labrig.sim.camera import SimulatedCamera
 
 DRIVERS = ("numato_relay", "ptp_camera")
 

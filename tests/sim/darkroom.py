@@ -9,11 +9,11 @@ import rawpy
 from numpy.typing import NDArray
 
 from labrig.clock import VirtualClock
-from sim.arrangement import Arrangement
-from sim.bench_settings import DoorSettings
-from sim.boards import HandsBoard, Pulse
-from sim.room import Room
-from sim.simulation import Simulation
+from labrig.sim.arrangement import Arrangement
+from labrig.sim.bench_settings import DoorSettings
+from labrig.sim.boards import HandsBoard, Pulse
+from labrig.sim.room import Room
+from labrig.sim.simulation import Simulation
 
 FloatArray = NDArray[np.float64]
 

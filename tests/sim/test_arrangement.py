@@ -7,9 +7,9 @@ from labrig.acquire import read_rig_file
 from labrig.acquire.roles import Hands
 from labrig.bench import open_bench
 from labrig.errors import DeviceError, UsageError
-from sim import open_room
-from sim.arrangement import Arrangement, Arrangements
-from sim.boards import HandsBoard
+from labrig.sim import open_room
+from labrig.sim.arrangement import Arrangement, Arrangements
+from labrig.sim.boards import HandsBoard
 from tests.sim.darkroom import LVF, SMALL, Darkroom
 
 

@@ -3,9 +3,9 @@
 import numpy as np
 import pytest
 
-from sim.cards import COLUMNS, ROWS, reflectances, surfaces
-from sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
-from sim.optics import bent_curves
+from labrig.sim.cards import COLUMNS, ROWS, reflectances, surfaces
+from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
+from labrig.sim.optics import bent_curves
 from tests.sim.darkroom import DOOR, Darkroom, colours
 
 LIT = {"initial": {"lamp": "on"}}

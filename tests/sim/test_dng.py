@@ -12,7 +12,7 @@ from hypothesis import strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 
-from sim.dng import DIAL, Shot, encode_dng, exposure_label
+from labrig.sim.dng import DIAL, Shot, encode_dng, exposure_label
 
 SHOT = Shot(start_s=1767225600.75, exposure_s=2.0**-6, iso=800, f_number=5.6)
 

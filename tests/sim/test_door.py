@@ -17,17 +17,17 @@ from scipy.integrate import quad
 from labrig.clock import VirtualClock
 from labrig.errors import UsageError
 from labrig.material.file import read_material
+from labrig.sim import open_room
+from labrig.sim.bench_settings import DoorSettings
+from labrig.sim.boards import Pulse
+from labrig.sim.door import FRAME_S, Door, DoorDrive
+from labrig.sim.faults import Slowness, When
+from labrig.sim.lamp import Lamp
+from labrig.sim.lights import Lights
+from labrig.sim.phosphor import phosphor
+from labrig.sim.room import Room
+from labrig.sim.simulation import LampSettings, Simulation
 from labrig.yaml_file import validate
-from sim import open_room
-from sim.bench_settings import DoorSettings
-from sim.boards import Pulse
-from sim.door import FRAME_S, Door, DoorDrive
-from sim.faults import Slowness, When
-from sim.lamp import Lamp
-from sim.lights import Lights
-from sim.phosphor import phosphor
-from sim.room import Room
-from sim.simulation import LampSettings, Simulation
 
 SMALL = {"sample": "blue-paint", "sensor": {"width": 96, "height": 64, "flicker": 0.0}}
 DOOR = DoorSettings()

@@ -10,9 +10,9 @@ import pytest
 import serial
 
 from labrig.clock import VirtualClock
-from sim import OpenRoom, open_room
-from sim.disk import SimulatedDisk
-from sim.faults import AfterBytes, Slowness
+from labrig.sim import OpenRoom, open_room
+from labrig.sim.disk import SimulatedDisk
+from labrig.sim.faults import AfterBytes, Slowness
 
 
 @contextmanager

@@ -4,8 +4,8 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from sim.lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
-from sim.simulation import LampSettings
+from labrig.sim.lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
+from labrig.sim.simulation import LampSettings
 
 STEADY = LampSettings(warm_up_deficit=0.0, drift_per_hour=0.0)
 OFF_S = 100.0

@@ -9,13 +9,13 @@ from scipy.integrate import quad
 
 from labrig import shipped
 from labrig.errors import UsageError
-from sim.faults import When
-from sim.filters import Filters, read_curve
-from sim.lamp import BURNING_K, CELL_NM, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
-from sim.lamps import FilteredLamps
-from sim.lights import Lights, leak
-from sim.mercury import LINES, Mercury, line_spectrum
-from sim.simulation import LampSettings
+from labrig.sim.faults import When
+from labrig.sim.filters import Filters, read_curve
+from labrig.sim.lamp import BURNING_K, CELL_NM, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
+from labrig.sim.lamps import FilteredLamps
+from labrig.sim.lights import Lights, leak
+from labrig.sim.mercury import LINES, Mercury, line_spectrum
+from labrig.sim.simulation import LampSettings
 from tests.sim.darkroom import Darkroom
 
 SHIPPED = Filters(None, 0.0, 1)

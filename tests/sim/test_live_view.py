@@ -10,8 +10,8 @@ import pytest
 from labrig.acquire import LiveView, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import VirtualClock
-from sim.room import Room
-from sim.simulation import Simulation
+from labrig.sim.room import Room
+from labrig.sim.simulation import Simulation
 
 Make = Callable[..., Path]
 #: The middle of the frame is the sample, its corner is cloth.

@@ -8,11 +8,11 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from labrig.errors import UsageError
+from labrig.sim.bench_settings import LvfSettings, StripSettings
+from labrig.sim.lamp import WAVELENGTH_NM
+from labrig.sim.lvf import PIECES, Lvf, pieces
+from labrig.sim.simulation import Simulation
 from labrig.yaml_file import validate
-from sim.bench_settings import LvfSettings, StripSettings
-from sim.lamp import WAVELENGTH_NM
-from sim.lvf import PIECES, Lvf, pieces
-from sim.simulation import Simulation
 from tests.sim.darkroom import DOOR, LVF, SMALL, STRIP, Darkroom, colours, columns, mosaic
 
 BENT = LvfSettings(centre=(400, 700), bend_nm=5, fwhm_nm=25, leakage=0.002)

@@ -8,9 +8,9 @@ import pytest
 
 from labrig.errors import UsageError
 from labrig.material.file import Material, State, read_material
-from sim.lamp import CELL_NM, WAVELENGTH_NM
-from sim.optics import CameraCurves, bent_curves, emission, measured_curves, vignetting
-from sim.phosphor import band_cells
+from labrig.sim.lamp import CELL_NM, WAVELENGTH_NM
+from labrig.sim.optics import CameraCurves, bent_curves, emission, measured_curves, vignetting
+from labrig.sim.phosphor import band_cells
 
 
 @pytest.mark.parametrize("seed", range(8))

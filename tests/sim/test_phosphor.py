@@ -9,9 +9,9 @@ from scipy.special import hyp1f1
 
 from labrig import shipped
 from labrig.material.file import read_material
-from sim.lamp import BURNING_K, WAVELENGTH_NM, Lamp, filament_spectrum
-from sim.phosphor import Phosphor, band_cells, phosphor
-from sim.simulation import LampSettings
+from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, Lamp, filament_spectrum
+from labrig.sim.phosphor import Phosphor, band_cells, phosphor
+from labrig.sim.simulation import LampSettings
 
 FloatArray = NDArray[np.float64]
 STEADY = LampSettings(warm_up_deficit=0.0, drift_per_hour=0.0)

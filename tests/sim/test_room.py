@@ -15,8 +15,8 @@ from numpy.typing import NDArray
 from labrig import shipped
 from labrig.clock import VirtualClock
 from labrig.errors import UsageError
-from sim.room import Room
-from sim.simulation import Simulation
+from labrig.sim.room import Room
+from labrig.sim.simulation import Simulation
 
 SMALL = {"sample": "blue-paint", "sensor": {"width": 96, "height": 64, "flicker": 0.0}}
 BRIGHTEST = {"blue-paint": 2, "red-paint": 0, "stickers": 1}

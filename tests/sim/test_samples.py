@@ -3,11 +3,11 @@
 import numpy as np
 import pytest
 
-from sim.bench_settings import TemperatureSettings
-from sim.lamp import WAVELENGTH_NM, Lamp
-from sim.phosphor import Phosphor
-from sim.simulation import LampSettings, Simulation
-from sim.temperature import quickening
+from labrig.sim.bench_settings import TemperatureSettings
+from labrig.sim.lamp import WAVELENGTH_NM, Lamp
+from labrig.sim.phosphor import Phosphor
+from labrig.sim.simulation import LampSettings, Simulation
+from labrig.sim.temperature import quickening
 from tests.sim.darkroom import SMALL, Darkroom
 
 STEADY = LampSettings(warm_up_deficit=0.0, drift_per_hour=0.0)

@@ -3,7 +3,7 @@
 import numpy as np
 import pytest
 
-from sim.sensor import (
+from labrig.sim.sensor import (
     BLACK_DN,
     MAX_DN,
     WHITE_DN,

@@ -6,8 +6,8 @@ from pathlib import Path
 import pytest
 
 from labrig.errors import UsageError
+from labrig.sim.simulation import Simulation
 from labrig.yaml_file import parse_yaml, read_model, validate, write_yaml
-from sim.simulation import Simulation
 
 
 def parsed(text: str) -> Simulation:

@@ -4,10 +4,10 @@ import numpy as np
 import pytest
 
 from labrig.clock import VirtualClock
-from sim.bench_settings import TemperatureSettings
-from sim.boards import NumatoBoard
-from sim.faults import When
-from sim.temperature import SENSOR_SIGMA_K, TemperatureSensor
+from labrig.sim.bench_settings import TemperatureSettings
+from labrig.sim.boards import NumatoBoard
+from labrig.sim.faults import When
+from labrig.sim.temperature import SENSOR_SIGMA_K, TemperatureSensor
 
 
 def shown(board: NumatoBoard, number: int = 0) -> float:

@@ -11,11 +11,11 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from drivers.gphoto2_camera import Gphoto2Camera
 from labrig.acquire.connections import SerialPort
 from labrig.clock import Clock, SystemClock, VirtualClock
-from sim.room import Room
-from sim.simulation import Simulation
+from labrig.drivers.gphoto2_camera import Gphoto2Camera
+from labrig.sim.room import Room
+from labrig.sim.simulation import Simulation
 from tests.counterparts.served import EPOCH_S, Film, served
 
 TOY = Path(__file__).parent / "toy"

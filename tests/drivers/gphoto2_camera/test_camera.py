@@ -13,9 +13,9 @@ from pathlib import Path
 
 import pytest
 
-from drivers.gphoto2_camera import Gphoto2Camera
 from labrig.acquire import Camera, Checkable, ExposureSettings, KeptAwake, LiveView
 from labrig.clock import Interrupted, SystemClock
+from labrig.drivers.gphoto2_camera import Gphoto2Camera
 from labrig.errors import DeviceError, DeviceLostError
 from tests.conftest import Ended
 

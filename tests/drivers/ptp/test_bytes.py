@@ -8,9 +8,9 @@ import pytest
 from hypothesis import example, given, settings
 from hypothesis import strategies as st
 
-from drivers.ptp.containers import Container, Kind, command, decode, encode
-from drivers.ptp.device_info import parse_device_info
-from drivers.ptp.eos.codes import (
+from labrig.drivers.ptp.containers import Container, Kind, command, decode, encode
+from labrig.drivers.ptp.device_info import parse_device_info
+from labrig.drivers.ptp.eos.codes import (
     F_NUMBERS,
     ISOS,
     aperture_code,
@@ -19,7 +19,7 @@ from drivers.ptp.eos.codes import (
     shutter_time_s,
     third_stop_codes,
 )
-from drivers.ptp.eos.events import (
+from labrig.drivers.ptp.eos.events import (
     ChoicesChanged,
     Event,
     ObjectOffered,

@@ -6,9 +6,9 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.ptp.device_info import parse_device_info
-from drivers.ptp.standard.object_info import parse_object_info
-from drivers.ptp.standard.property_description import (
+from labrig.drivers.ptp.device_info import parse_device_info
+from labrig.drivers.ptp.standard.object_info import parse_object_info
+from labrig.drivers.ptp.standard.property_description import (
     PropertyDescription,
     parse_property_description,
 )

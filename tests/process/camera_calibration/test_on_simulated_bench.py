@@ -17,8 +17,8 @@ from labrig.process.choices import read_decay_protocol
 from labrig.process.decay import measure_decay
 from labrig.process.known import Known
 from labrig.record import read_run
-from sim.optics import vignetting
-from sim.sensor import gain_electrons_per_dn, read_noise_electrons
+from labrig.sim.optics import vignetting
+from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons
 from tests.process.recorded import cut_off_and_resumed, record
 
 PROTOCOL = {

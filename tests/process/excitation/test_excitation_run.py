@@ -25,10 +25,10 @@ from labrig.process.known import Known
 from labrig.process.stage import Stage
 from labrig.record import read_run
 from labrig.reduce import measure, read_raw
-from sim.bench_settings import LvfSettings
-from sim.lamp import BURNING_K, filament_spectrum
-from sim.lvf import Lvf
-from sim.phosphor import band_cells
+from labrig.sim.bench_settings import LvfSettings
+from labrig.sim.lamp import BURNING_K, filament_spectrum
+from labrig.sim.lvf import Lvf
+from labrig.sim.phosphor import band_cells
 from tests.calibration.test_camera_file import camera
 from tests.process.recorded import cut_off_and_resumed, record
 

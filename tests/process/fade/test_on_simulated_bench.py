@@ -15,8 +15,8 @@ from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.process import Result, process_run
 from labrig.record import read_run
-from sim.lamp import WAVELENGTH_NM, Lamp
-from sim.simulation import LampSettings
+from labrig.sim.lamp import WAVELENGTH_NM, Lamp
+from labrig.sim.simulation import LampSettings
 from tests.acquire.fakes import Watching
 from tests.process.recorded import cut_off_and_resumed, record
 

@@ -10,10 +10,10 @@ from scipy.interpolate import PchipInterpolator
 from labrig.calibration import Strip
 from labrig.fit.least_squares import FloatArray
 from labrig.region import region_pixels
-from sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
-from sim.lvf import Lvf, pieces
-from sim.phosphor import band_cells
-from sim.simulation import Simulation
+from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
+from labrig.sim.lvf import Lvf, pieces
+from labrig.sim.phosphor import band_cells
+from labrig.sim.simulation import Simulation
 
 FINE_NM = np.arange(383.0, 730.0, 0.05)
 

@@ -6,7 +6,7 @@ from contextlib import suppress
 from dataclasses import dataclass, field
 
 from labrig.clock import VirtualClock
-from sim.camera import PtpIpServer
+from labrig.sim.camera import PtpIpServer
 from tests.counterparts.served import EPOCH_S, Film, camera_on
 
 INTRODUCTION = bytes(16) + "host\0".encode("utf-16-le") + b"\0\0\1\0"

@@ -3,9 +3,9 @@
 import pytest
 
 from labrig.errors import UsageError
+from labrig.sim.camera import BodySettings
+from labrig.sim.simulation import Simulation
 from labrig.yaml_file import parse_yaml, validate
-from sim.camera import BodySettings
-from sim.simulation import Simulation
 
 
 def parsed(text: str) -> BodySettings:

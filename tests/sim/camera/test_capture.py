@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from sim.camera import BodySettings, CameraFaults
+from labrig.sim.camera import BodySettings, CameraFaults
 from tests.sim.camera.host import (
     AV,
     BUSY,

@@ -3,7 +3,7 @@ from itertools import pairwise
 
 import pytest
 
-from sim.camera import codes
+from labrig.sim.camera import codes
 
 LABELS_S = {0x10: 30, 0x13: 25, 0x15: 20, 0x38: 1, 0x3B: 0.8, 0x68: 1 / 60, 0x70: 1 / 125}
 

@@ -4,7 +4,7 @@ import pytest
 import usb.core
 import usb.util
 
-from sim.camera import CameraFaults
+from labrig.sim.camera import CameraFaults
 from tests.sim.camera.host import IN, OK, OUT, TV, Bench
 
 PIPE, GONE = 32, 19

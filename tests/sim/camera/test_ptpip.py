@@ -13,7 +13,7 @@ from hypothesis import strategies as st
 
 from labrig.clock import Interrupted, SystemClock, VirtualClock
 from labrig.errors import UsageError
-from sim.camera import Pace, PtpIpServer
+from labrig.sim.camera import Pace, PtpIpServer
 from tests.conftest import Ended
 from tests.counterparts import transcript
 from tests.counterparts.served import Film

@@ -8,8 +8,8 @@ import usb.core
 from hypothesis import given
 from hypothesis import strategies as st
 
-from sim.camera import BodySettings, CameraFaults, StandardHabits
-from sim.camera.vocabulary import ObjectFormat
+from labrig.sim.camera import BodySettings, CameraFaults, StandardHabits
+from labrig.sim.camera.vocabulary import ObjectFormat
 from tests.sim.camera.host import BUSY, OK, Bench, Host
 from tests.sim.camera.test_session import arrays, strings
 

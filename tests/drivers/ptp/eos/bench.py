@@ -2,9 +2,9 @@
 
 from dataclasses import dataclass
 
-from drivers.ptp import PtpCamera
 from labrig.acquire.values import ExposureSettings, Frame
 from labrig.clock import VirtualClock
+from labrig.drivers.ptp import PtpCamera
 
 from ..usb.wire import OneDevice, Wire
 from .toy import ToyEos

@@ -4,9 +4,9 @@ import math
 
 import pytest
 
-from drivers.ptp import PtpCamera
 from labrig.acquire.values import ExposureSettings
 from labrig.clock import Interrupted
+from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError
 
 from ..usb.wire import TRANSACTION_S

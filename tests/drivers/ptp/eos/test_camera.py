@@ -7,9 +7,9 @@ from typing import Any
 import pytest
 import usb.core
 
-from drivers.ptp import PtpCamera
 from labrig.acquire.roles import Camera
 from labrig.acquire.values import CameraOffers, ExposureSettings
+from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError
 
 from ..usb.wire import TRANSACTION_S, Wire

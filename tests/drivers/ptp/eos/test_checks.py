@@ -4,7 +4,11 @@ import struct
 
 import pytest
 
-from drivers.ptp.eos.custom_functions import CustomFunction, CustomFunctions, parse_custom_functions
+from labrig.drivers.ptp.eos.custom_functions import (
+    CustomFunction,
+    CustomFunctions,
+    parse_custom_functions,
+)
 
 from .bench import bench
 from .toy import OPERATIONS, ToyEos

@@ -6,9 +6,9 @@ from typing import Any
 
 import pytest
 
-from drivers.ptp import PtpCamera
 from labrig.acquire.values import ExposureSettings
 from labrig.clock import Interrupted, VirtualClock
+from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError
 
 from ..usb.wire import OneDevice, Wire

@@ -8,9 +8,9 @@ import re
 
 import pytest
 
-from drivers.ptp import PtpCamera
 from labrig.acquire.values import CameraOffers, ExposureSettings
 from labrig.clock import VirtualClock
+from labrig.drivers.ptp import PtpCamera
 
 from ..usb.wire import TRANSACTION_S, OneDevice, Wire
 

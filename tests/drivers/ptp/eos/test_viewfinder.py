@@ -7,10 +7,10 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.ptp import PtpCamera
-from drivers.ptp.eos.viewfinder import READY_TIMEOUT_S, jpeg_in
 from labrig.acquire.roles import LiveView
 from labrig.clock import VirtualClock
+from labrig.drivers.ptp import PtpCamera
+from labrig.drivers.ptp.eos.viewfinder import READY_TIMEOUT_S, jpeg_in
 from labrig.errors import DeviceError
 
 from ..usb.wire import OneDevice, Wire

@@ -12,12 +12,12 @@ import numpy as np
 import usb.core
 from numpy.typing import NDArray
 
-from drivers.ptp.ip import link as ip_link
 from labrig.acquire.connections import Connections, SerialPort
 from labrig.clock import VirtualClock
-from sim.camera import CameraFaults, PtpIpServer
-from sim.camera.responder import Responder
-from sim.camera.usb.still_image import CANCEL, RESET, StillImageFunction
+from labrig.drivers.ptp.ip import link as ip_link
+from labrig.sim.camera import CameraFaults, PtpIpServer
+from labrig.sim.camera.responder import Responder
+from labrig.sim.camera.usb.still_image import CANCEL, RESET, StillImageFunction
 from tests.counterparts.served import Film
 
 from ..usb.wire import (

@@ -20,11 +20,11 @@ from collections.abc import Callable, Iterator
 from dataclasses import dataclass, field
 from types import MappingProxyType
 
-from drivers.ptp import PtpCamera
-from drivers.ptp.failures import MalformedError, RefusedError
 from labrig.acquire.connections import Connections
 from labrig.acquire.values import CameraOffers, ExposureSettings
 from labrig.clock import VirtualClock
+from labrig.drivers.ptp import PtpCamera
+from labrig.drivers.ptp.failures import MalformedError, RefusedError
 from labrig.errors import DeviceError
 from tests.counterparts.served import EOS, EPOCH_S, STANDARD, camera_on
 

@@ -10,15 +10,15 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.ptp.codes import Standard
-from drivers.ptp.containers import Container, Kind, command
-from drivers.ptp.failures import MalformedError, NoAnswerError, UnpluggedError
-from drivers.ptp.ip import link as ip_link
-from drivers.ptp.ip.packets import PacketKind, encode
-from drivers.ptp.session import Patience, Session
 from labrig.acquire import ExposureSettings, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import SystemClock
+from labrig.drivers.ptp.codes import Standard
+from labrig.drivers.ptp.containers import Container, Kind, command
+from labrig.drivers.ptp.failures import MalformedError, NoAnswerError, UnpluggedError
+from labrig.drivers.ptp.ip import link as ip_link
+from labrig.drivers.ptp.ip.packets import PacketKind, encode
+from labrig.drivers.ptp.session import Patience, Session
 from labrig.errors import DeviceError, DeviceLostError, UsageError
 from tests.counterparts import transcript
 from tests.counterparts.served import STANDARD, Film, Taken, served

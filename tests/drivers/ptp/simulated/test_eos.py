@@ -4,11 +4,11 @@ from typing import Any
 
 import pytest
 
-from drivers.ptp import PtpCamera
 from labrig.acquire import Camera, Checkable, ExposureSettings, KeptAwake, Rig, Session
 from labrig.clock import Interrupted
+from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError, DeviceLostError
-from sim.camera import BodySettings, CameraFaults, SimulatedCamera
+from labrig.sim.camera import BodySettings, CameraFaults, SimulatedCamera
 from tests.drivers.ptp.simulated.wired import Picture, StoppingClock, Wired
 
 SETTINGS = ExposureSettings(1.0, 400, 4.0)

@@ -8,14 +8,14 @@ import numpy as np
 import pytest
 import yaml
 
-from drivers.ptp import PtpCamera
 from labrig import shipped
 from labrig.acquire import ExposureSettings
 from labrig.clock import Interrupted
+from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError, DeviceLostError
 from labrig.record import read_run
 from labrig.reduce.dark import fit_dark
-from sim.camera import BodySettings, CameraFaults, SimulatedCamera
+from labrig.sim.camera import BodySettings, CameraFaults, SimulatedCamera
 from tests.conftest import Ended
 from tests.drivers.ptp.simulated.wired import Picture, StoppingClock, Wired
 

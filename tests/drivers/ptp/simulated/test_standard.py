@@ -6,13 +6,13 @@ from typing import Any
 
 import pytest
 
-from drivers.ptp import PtpCamera
 from labrig.acquire import Camera, Checkable, ExposureSettings, KeptAwake
 from labrig.acquire.values import Frame
 from labrig.clock import Interrupted
+from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError, DeviceLostError
-from sim.camera import BodySettings, CameraFaults, SimulatedCamera, StandardHabits
-from sim.camera.vocabulary import ObjectFormat
+from labrig.sim.camera import BodySettings, CameraFaults, SimulatedCamera, StandardHabits
+from labrig.sim.camera.vocabulary import ObjectFormat
 from tests.conftest import Ended
 from tests.drivers.ptp.simulated.wired import Picture, StoppingClock, Wired
 

@@ -9,12 +9,12 @@ import pytest
 import usb.core
 import usb.util
 
-from drivers.ptp import PtpCamera
 from labrig.acquire import ExposureSettings, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import SystemClock, VirtualClock
+from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError
-from sim.camera import BodySettings, SimulatedCamera
+from labrig.sim.camera import BodySettings, SimulatedCamera
 from tests.counterparts.served import EOS, STANDARD, Film
 from tests.drivers.ptp.simulated.wired import Wired
 

@@ -8,7 +8,7 @@ import usb.core
 from labrig.acquire.connections import SerialPort
 from labrig.clock import VirtualClock
 from labrig.errors import DeviceError
-from sim.camera import SimulatedCamera
+from labrig.sim.camera import SimulatedCamera
 
 
 class Picture:

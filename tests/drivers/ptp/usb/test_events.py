@@ -9,10 +9,10 @@ import usb.core
 from hypothesis import given
 from hypothesis import strategies as st
 
-from drivers.ptp.containers import Container, Kind
-from drivers.ptp.failures import MalformedError, StallError, UnpluggedError
-from drivers.ptp.usb.link import UsbLink
 from labrig.clock import VirtualClock
+from labrig.drivers.ptp.containers import Container, Kind
+from labrig.drivers.ptp.failures import MalformedError, StallError, UnpluggedError
+from labrig.drivers.ptp.usb.link import UsbLink
 from labrig.errors import DeviceError
 
 from ..eos.toy import ToyEos

@@ -6,10 +6,10 @@ from collections import deque
 import pytest
 import usb.core
 
-from drivers.ptp.containers import Container, Kind, command
-from drivers.ptp.failures import MalformedError, NoAnswerError
-from drivers.ptp.usb.link import UsbLink
 from labrig.clock import VirtualClock
+from labrig.drivers.ptp.containers import Container, Kind, command
+from labrig.drivers.ptp.failures import MalformedError, NoAnswerError
+from labrig.drivers.ptp.usb.link import UsbLink
 from labrig.errors import DeviceError
 
 from .wire import PACKET, Wire
