@@ -1,6 +1,6 @@
 """Mean, noise and damage of each colour channel in a region of one frame."""
 
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -119,13 +119,23 @@ class FrameMeasurement:
 def measure(
     raw: RawFrame, region: Region | None = None, hot: PixelMask | None = None
 ) -> FrameMeasurement:
-    """Statistics of each channel of `raw`.
+    """Statistics of each channel of `raw` in a region; None is the whole frame.
+
+    The parameters and errors are those of `measure_regions`.
+    """
+    return measure_regions(raw, [region], hot)[0]
+
+
+def measure_regions(
+    raw: RawFrame, regions: Sequence[Region | None], hot: PixelMask | None = None
+) -> list[FrameMeasurement]:
+    """Statistics of each channel of `raw` in each region.
 
     Parameters
     ----------
     raw
         The frame.
-    region
+    regions
         Where; None is the whole frame.
     hot
         Shape (height, width): pixels to leave out, as `hot_pixels` finds them in dark frames.
@@ -133,7 +143,7 @@ def measure(
     Raises
     ------
     UsageError
-        The region leaves the frame.
+        A region leaves the frame.
     DataError
         `hot` is of another sensor, or leaves no pixel of a channel.
     """
@@ -142,10 +152,16 @@ def measure(
             f"expected a hot-pixel mask of shape {raw.mosaic.shape} as the frame has, got "
             f"{hot.shape}; take dark frames with the same camera and image size"
         )
-    area = (0, 0, raw.width, raw.height)
-    if region is not None:
-        area = region_pixels(region, raw.width, raw.height)
-    planes = count_planes(raw, area, hot)
+    areas = [
+        (0, 0, raw.width, raw.height)
+        if region is None
+        else region_pixels(region, raw.width, raw.height)
+        for region in regions
+    ]
+    return [_measured(raw, planes) for planes in count_planes(raw, areas, hot)]
+
+
+def _measured(raw: RawFrame, planes: Sequence[PlaneCount]) -> FrameMeasurement:
     return FrameMeasurement(
         channels={
             name: _channel(name, [plane for plane in planes if plane.colour == name])

@@ -18,6 +18,7 @@ noise: the variance comes out too large. Noise shared by whole rows does not: to
 frames tell both (`labrig.reduce.pairs`).
 """
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
 from typing import TypeAlias, TypeVar
@@ -84,30 +85,65 @@ class PlaneNoise:
         return np.maximum(self.darkest_variance + rise, ROUNDING_VARIANCE)
 
 
-def plane_noise(plane: Mosaic) -> PlaneNoise:
-    """Noise of `plane`, shape (rows, columns) ≥ (3, 3), pixels of one colour."""
-    tiles = _tiles(plane)
-    level = tiles.mean(axis=(1, 2))
+def plane_noise(planes: Sequence[Mosaic]) -> list[PlaneNoise]:
+    """Noise of each of `planes`, shape (rows, columns) ≥ (3, 3), pixels of one colour.
+
+    They are looked at together: many small planes cost little more than one.
+    """
+    tiles = [_tiles(plane) for plane in planes]
+    noises: dict[int, PlaneNoise] = {}
+    for shape in {of_plane.shape[1:] for of_plane in tiles}:
+        alike = [index for index, of_plane in enumerate(tiles) if of_plane.shape[1:] == shape]
+        stacked = np.concatenate([tiles[index] for index in alike])
+        level, variance = stacked.mean(axis=(1, 2)), _second_difference_variance(stacked)
+        sharing = _autocovariance(stacked) if shape == (TILE, TILE) else None
+        end = 0
+        for index in alike:
+            start, end = end, end + len(tiles[index])
+            noises[index] = _noise_of_plane(
+                level[start:end],
+                variance[start:end],
+                None if sharing is None else (sharing[0][start:end], sharing[1][start:end]),
+                _brightness(planes[index]),
+            )
+    return [noises[index] for index in range(len(planes))]
+
+
+def _noise_of_plane(
+    level: Floats,
+    variance: Floats,
+    sharing: tuple[Floats, npt.NDArray[np.bool_]] | None,
+    brightness: float,
+) -> PlaneNoise:
+    """Noise of a plane from its n tiles.
+
+    Parameters
+    ----------
+    level, variance
+        Mean and variance by differences of each tile, shape (n,).
+    sharing
+        Autocovariance of each tile, and whether it is clean; None of tiles that are too small.
+    brightness
+        Mean of the plane.
+    """
     darkest = float(level.min())
     above = level - darkest
-    variance = _second_difference_variance(tiles)
     at_darkest, slope = _photon_line(above, variance)
     correlation = 1.0
-    if tiles.shape[1:] == (TILE, TILE):
+    if sharing is not None:
         # Only tiles on the line say whether noise is shared: in the others it is the sample.
         line = at_darkest + slope * above
         plain = variance <= _ROUGH * line
-        autocovariance, clean = _autocovariance(tiles[plain])
-        correlation = _correlation(autocovariance[clean], line[plain][clean])
+        autocovariance, clean = sharing
+        correlation = _correlation(autocovariance[plain & clean], line[plain & clean])
         if correlation > 1:
             # Differences of pixels that share noise are too small: take C(0) itself.
-            variance = np.where(plain, 0.0, np.inf)
-            variance[plain] = autocovariance[:, 0]
+            variance = np.where(plain, autocovariance[:, 0], np.inf)
             at_darkest, slope = _photon_line(above[plain], variance[plain])
     expected = at_darkest + slope * above
     smooth = np.where(variance <= _ROUGH * expected, variance, expected)
     # Few tiles may miss how much of the plane is bright, thousands of single pixels do not.
-    missed = slope * (_brightness(plane) - float(level.mean()))
+    missed = slope * (brightness - float(level.mean()))
     mean_variance = max(float(smooth.mean()) + missed, 0.0) * correlation
     return PlaneNoise(darkest, at_darkest, slope, mean_variance, correlation)
 
@@ -159,7 +195,10 @@ def _photon_line(level: Floats, variance: Floats) -> tuple[float, float]:
     one with the least capped misfit, in logarithms: tiles with structure, however many at one
     brightness and however rough, pull no more than the cap.
     """
-    x, y = _medians_of_groups(level, variance, max(1, min(16, len(level) // 6)))
+    groups = max(1, min(16, len(level) // 6))
+    x, y = _medians_of_groups(level, variance, groups)
+    if groups == 1:
+        return float(y[0]), 0.0
     one, other = np.triu_indices(len(x), k=1)
     rising = (x[other] > x[one]) & (y[other] > y[one])
     one, other = one[rising], other[rising]

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 
 from labrig.errors import DataError
-from labrig.reduce.channels import FrameMeasurement, measure
+from labrig.reduce.channels import FrameMeasurement, measure_regions
 from labrig.reduce.noise import Floats
 from labrig.reduce.pairs import strip_deviations
 from labrig.reduce.planes import PixelMask
@@ -102,18 +102,19 @@ def _shot(
 ) -> Shot:
     if not frame.exposure_s > 0:
         raise DataError(f"{frame.path}: expected an exposure above 0 s, got {frame.exposure_s}")
+    regions = [*patches.values(), *([background] if background else [])]
+    try:
+        views = [
+            View(measured, strip_deviations(raw, region, hot))
+            for measured, region in zip(measure_regions(raw, regions, hot), regions, strict=True)
+        ]
+    except DataError as error:
+        raise type(error)(f"{frame.path}: {error}") from None
     return Shot(
         frame,
-        {name: _view(raw, region, hot, frame.path) for name, region in patches.items()},
-        _view(raw, background, hot, frame.path) if background else None,
+        dict(zip(patches, views, strict=False)),
+        views[-1] if background else None,
     )
-
-
-def _view(raw: RawFrame, region: Region, hot: PixelMask | None, path: Path) -> View:
-    try:
-        return View(measure(raw, region, hot), strip_deviations(raw, region, hot))
-    except DataError as error:
-        raise type(error)(f"{path}: {error}") from None
 
 
 def levels(views: Sequence[View]) -> tuple[Floats, Floats]:

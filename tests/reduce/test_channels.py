@@ -44,9 +44,9 @@ def test_bad_pixels_of_a_real_photograph_are_found(shared_data: Path) -> None:
         for name in ("u16le", "badpixels_u16le")
     )
     good, bad = good.reshape(512, 768), bad.reshape(512, 768)
-    noises = {
-        (row, column): plane_noise(bad[row::2, column::2]) for row in (0, 1) for column in (0, 1)
-    }
+    places = [(row, column) for row in (0, 1) for column in (0, 1)]
+    planes = [bad[row::2, column::2] for row, column in places]
+    noises = dict(zip(places, plane_noise(planes), strict=True))
     found = np.zeros(bad.shape, bool)
     found[isolated_outliers(bad, (0, 0), 2, noises)] = True
     hot = bad > good

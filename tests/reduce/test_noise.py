@@ -70,10 +70,12 @@ CASES = [
 
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_variance_of_a_mean(case: Case) -> None:
-    found = [
-        plane_noise(np.rint(case.frame(np.random.default_rng(seed))).astype(np.uint16))
-        for seed in range(12)
-    ]
+    found = plane_noise(
+        [
+            np.rint(case.frame(np.random.default_rng(seed))).astype(np.uint16)
+            for seed in range(12)
+        ]
+    )
     ratio = np.array([noise.mean_variance for noise in found]) / case.mean_variance
     # σ within 3.5 % on average and 10 % in any frame.
     assert ratio.mean() == pytest.approx(1, abs=0.07)
@@ -83,7 +85,7 @@ def test_variance_of_a_mean(case: Case) -> None:
 
 
 def test_noise_follows_brightness() -> None:
-    noise = plane_noise(np.random.default_rng(0).poisson(GRADIENT).astype(np.uint16))
+    (noise,) = plane_noise([np.random.default_rng(0).poisson(GRADIENT).astype(np.uint16)])
     levels = np.array([1500.0, 3000.0, 6000.0])
     assert noise.variance_at(levels) == pytest.approx(levels, rel=0.1)
 
