@@ -5,9 +5,14 @@ import os
 # As the command line does; has to be said before numpy is loaded.
 os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
+# What one process has compiled, the many that tests start need not compile again.
+os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
+
 import signal
+import sys
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
@@ -21,6 +26,8 @@ from labrig.signals import STOP_SIGNALS
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
+
+sys.dont_write_bytecode = False
 
 # In CI the same examples every time, so that a red run is about the change; new ones elsewhere.
 settings.register_profile("ci", derandomize=True, deadline=None)
@@ -55,6 +62,19 @@ def labrig(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., Ended]]:
     yield run
     for signum, handler in before.items():
         signal.signal(signum, handler)
+
+
+@pytest.fixture(autouse=True)
+def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
+    """Figures are made and not drawn, which takes longer than all else, but in `drawn` tests."""
+    if request.node.get_closest_marker("drawn") is None:
+        monkeypatch.setattr("matplotlib.figure.Figure.savefig", _leave_blank)
+
+
+def _leave_blank(figure: object, file: object, format: str = "", **_: object) -> None:
+    if format == "svg":
+        assert isinstance(file, BytesIO)
+        file.write(b'<svg viewBox="0 0 1 1"></svg>')
 
 
 @pytest.fixture

@@ -7,6 +7,8 @@ import sys
 from collections.abc import Callable
 from pathlib import Path
 
+import pytest
+
 from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
@@ -25,6 +27,7 @@ def contents(folder: Path) -> dict[str, bytes]:
     return {path.relative_to(folder).as_posix(): path.read_bytes() for path in files}
 
 
+@pytest.mark.drawn
 def test_a_result_is_made_again_bit_for_bit(
     labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
 ) -> None:

@@ -71,10 +71,7 @@ CASES = [
 @pytest.mark.parametrize("case", CASES, ids=lambda case: case.name)
 def test_variance_of_a_mean(case: Case) -> None:
     found = plane_noise(
-        [
-            np.rint(case.frame(np.random.default_rng(seed))).astype(np.uint16)
-            for seed in range(12)
-        ]
+        [np.rint(case.frame(np.random.default_rng(seed))).astype(np.uint16) for seed in range(12)]
     )
     ratio = np.array([noise.mean_variance for noise in found]) / case.mean_variance
     # σ within 3.5 % on average and 10 % in any frame.

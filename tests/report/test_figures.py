@@ -24,6 +24,8 @@ from labrig.report.timing import FrameTiming
 
 from .made import decay_series, fitted, patch
 
+pytestmark = pytest.mark.drawn
+
 SERIES = decay_series()
 FLAGGED = replace(SERIES, flag=("clipped", "excluded", *SERIES.flag[2:]))
 

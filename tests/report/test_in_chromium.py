@@ -8,10 +8,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import numpy as np
+import pytest
 
 from labrig.report import Interruption, PatchReport, RunReport, write_report
 
 from .made import decay_series, patch, run_report
+
+pytestmark = pytest.mark.drawn
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome

@@ -170,6 +170,7 @@ def test_what_people_type_stays_text(tmp_path: Path) -> None:
     assert evil in Page(text).text
 
 
+@pytest.mark.drawn
 def test_the_same_report_gives_the_same_bytes(plain: Made, tmp_path: Path) -> None:
     assert written(tmp_path, plain.report) == plain.text
     for path in (plain.folder / "figures").iterdir():
@@ -266,6 +267,7 @@ def test_a_steady_source_is_told_with_its_drift(tmp_path: Path) -> None:
     assert "do not decay" not in Page(written(tmp_path, run_report(tmp_path))).text
 
 
+@pytest.mark.drawn
 def test_many_patches(tmp_path: Path) -> None:
     patches = [patch(decay_series(seed=n, name=f"paint {n}")) for n in range(5)]
     page = Page(written(tmp_path, run_report(tmp_path, patches)))

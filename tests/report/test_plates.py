@@ -12,6 +12,8 @@ from labrig.report.plates import Plates
 
 from .made import decay_series
 
+pytestmark = pytest.mark.drawn
+
 SVG = "{http://www.w3.org/2000/svg}"
 
 
