@@ -1,0 +1,1 @@
+"""Small recorded runs with the numbers of their results, to hold every change of labrig against."""

@@ -1,0 +1,43 @@
+"""Results of recorded runs stay what they were, until a commit says otherwise."""
+
+import shutil
+from pathlib import Path
+
+import pytest
+
+from .numbers import differences
+from .runs import RUNS, Recorded
+
+
+@pytest.mark.parametrize("run", RUNS, ids=lambda run: run.name)
+def test_results_are_those_that_were_kept(run: Recorded, tmp_path: Path) -> None:
+    different = [str(one) for one in run.differences(run.processed(tmp_path)) if one.matters]
+    assert not different, "\n".join(["python -m tests.recordings tells all", *different[:5]])
+
+
+@pytest.mark.parametrize(
+    ("file", "key", "factor"),
+    [("fit.json", "k_r_per_s", 1 + 1e-6), ("material.yaml", "k_r_per_s_sigma", 1 + 1e-8)],
+)
+def test_a_small_change_of_a_rate_or_its_sigma_is_noticed(
+    file: str, key: str, factor: float, tmp_path: Path
+) -> None:
+    kept = RUNS[0].folder / "result"
+    planted = Path(shutil.copytree(kept, tmp_path / "result"))
+    line = next(line for line in (kept / file).read_text().splitlines() if f"{key}" in line)
+    number = line.split(":")[1].strip(" ,")
+    text = (kept / file).read_text().replace(number, repr(float(number) * factor), 1)
+    (planted / file).write_text(text)
+    (found,) = differences(kept, planted)
+    assert found.matters
+    assert found.relative == pytest.approx(factor - 1, rel=0.01)
+    assert not differences(kept, kept)
+
+
+def test_numbers_on_one_side_are_differences(tmp_path: Path) -> None:
+    kept = RUNS[0].folder / "result"
+    without = Path(shutil.copytree(kept, tmp_path / "result"))
+    (without / "series.csv").unlink()
+    assert all(one.matters for one in differences(kept, without))
+    assert all(one.matters for one in differences(without, kept))
+    assert len(differences(kept, without)) == len(differences(without, kept)) > 100
