@@ -185,7 +185,14 @@ def _trimmed_mean_square(magnitude: Floats, sigmas: float) -> Floats:
 
 def _robust_variance(magnitude: Floats) -> Floats:
     """Variance of a zero-mean normal from the median of |x| along the last axis."""
-    return np.square(1.4826 * np.median(magnitude, axis=-1))
+    return np.square(1.4826 * _median(magnitude))
+
+
+def _median(values: Floats) -> Floats:
+    """Median along the last axis: `np.median` is five times as slow where there are few values."""
+    low, high = (values.shape[-1] - 1) // 2, values.shape[-1] // 2
+    parted = np.partition(values, (low, high), axis=-1)
+    return np.asarray((parted[..., low] + parted[..., high]) / 2)
 
 
 def _photon_line(level: Floats, variance: Floats) -> tuple[float, float]:
@@ -251,9 +258,9 @@ def _correlation(autocovariance: Floats, line: Floats) -> float:
     if len(noisy) < 3:
         return 1.0
     ratio = np.log(noisy[:, 0] / np.maximum(line[counts], ROUNDING_VARIANCE))
-    if np.sqrt(_robust_variance(np.abs(ratio - np.median(ratio)))) > _UNIFORM:
+    if np.sqrt(_robust_variance(np.abs(ratio - _median(ratio)))) > _UNIFORM:
         return 1.0
-    lags = np.median(noisy / noisy[:, :1], axis=0)
+    lags = _median((noisy / noisy[:, :1]).T)
     near, far = lags[1 : len(_NEAR)], lags[len(_NEAR) :].reshape(-1, 2).mean(axis=1)
     # A lag in a tile of white noise scatters by 1/TILE, the median of n tiles by √(π/2n) of that.
     scatter = np.sqrt(np.pi / 2 / len(noisy)) / TILE

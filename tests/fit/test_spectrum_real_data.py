@@ -16,7 +16,7 @@ pytestmark = [
 
 def test_bands_of_real_dyes_cover_them() -> None:
     lvf, ours = made.curved_lvf(), made.of_the_house()
-    dyes = made.fluorophores(6)
+    dyes = made.fluorophores(3)
     exact = system_through_lvf(lvf, ours, made.KNOTS_NM)
     _, bright = coverage(dyes, ours, exact, lvf)
     assert bright[0] > 0.6
@@ -39,8 +39,8 @@ def test_the_colour_checker_through_the_filter() -> None:
 
 
 def test_peaks_told_by_a_real_sensor_of_18_channels() -> None:
-    found = [one for held_out in lightlogger.every(3) for one in lightlogger.told(held_out, (30,))]
-    errors = np.abs([one.error_nm for one in found])
-    assert len(errors) == 31
+    # One third of the wavelengths; python -m tests.acceptance.lightlogger holds out each in turn.
+    errors = np.abs([one.error_nm for one in lightlogger.told(lightlogger.every(3)[1], (30,))])
+    assert len(errors) == 10
     assert np.median(errors) < 2.0
     assert errors.max() < 10.0

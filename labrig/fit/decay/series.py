@@ -2,6 +2,7 @@
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -74,17 +75,17 @@ class DecaySeries:
         """Frames."""
         return len(self.t)
 
-    @property
+    @cached_property
     def n_values(self) -> int:
         """Values measured."""
         return int(np.count_nonzero(self.inverse_sigma))
 
-    @property
+    @cached_property
     def frame_levels(self) -> FloatArray:
         """(n, 1) what the values of each frame were divided by."""
         return self.levels[self.repeat][:, None]
 
-    @property
+    @cached_property
     def whiteners(self) -> FloatArray:
         """(n, C, C) W with Wᵀ W the inverse covariance of each frame's noise without flicker."""
         measured = self.inverse_sigma > 0
@@ -97,7 +98,7 @@ class DecaySeries:
         whiteners: FloatArray = roots * self.inverse_sigma[:, None, :]
         return whiteners
 
-    @property
+    @cached_property
     def offset_prior(self) -> FloatArray:
         """(p, m) rows that, times the offsets fitted, have unit variance by their prior."""
         known = np.flatnonzero(np.isfinite(self.offset_sigma) & (self.offset_sigma > 0))
@@ -118,12 +119,12 @@ class DecaySeries:
             levels=self.levels * gains,
         )
 
-    @property
+    @cached_property
     def fitted_offsets(self) -> NDArray[np.intp]:
         """(m,) channels whose offset is fitted."""
         return np.flatnonzero(self.offset_sigma)
 
-    @property
+    @cached_property
     def log_rate_bounds(self) -> tuple[float, float]:
         """Log of the slowest and the fastest rate these times can tell, in 1/spans."""
         steps = np.diff(self.t)
