@@ -3,7 +3,8 @@
 A Levenberg–Marquardt search with Moré's column scaling and Nielsen's damping finds the basin;
 undamped Gauss–Newton steps, each by an orthogonal factorisation of the scaled Jacobian (never the
 normal equations, which square its condition), then carry the minimum to the precision of the
-arithmetic.
+arithmetic. While it searches, a large problem is solved by its normal equations, in a third of the
+time: a step need not be exact to be tried.
 
 References
 ----------
@@ -36,6 +37,8 @@ INITIAL_DAMPING = 1e-3
 #: The damping falls to this share at most after a step that does what it promised; Nielsen's 1/3
 #: takes half as many steps again.
 LEAST_RELIEF = 1 / 10
+#: Entries of the Jacobian from which the search goes by the normal equations.
+LARGE_JACOBIAN = 100_000
 POLISH_STEPS = 60
 POLISH_PATIENCE = 3
 
@@ -188,15 +191,33 @@ class _Linearised:
         (p,) lengths of the columns of J, 1 where they are 0.
     """
 
-    def __init__(self, point: _Point) -> None:
+    def __init__(self, factors: FloatArray) -> None:
+        p = factors.shape[1] - 1
+        self.triangle: FloatArray = factors[:, :p] * _upper(len(factors), p)
+        self.turned: FloatArray = factors[:, p]
+        self.norms = _column_norms(self.triangle)
+
+    @classmethod
+    def exactly(cls, point: _Point) -> "_Linearised":
+        """By an orthogonal factorisation."""
         m, p = point.jacobian.shape
         columns = np.empty((m, p + 1), order="F")
         columns[:, :p], columns[:, p] = point.jacobian, point.residuals
-        rows = min(m, p)
-        factors = lapack.dgeqrf(columns, overwrite_a=True)[0][:rows]
-        self.triangle: FloatArray = factors[:, :p] * _upper(rows, p)
-        self.turned: FloatArray = factors[:, p]
-        self.norms = _column_norms(self.triangle)
+        return cls(lapack.dgeqrf(columns, overwrite_a=True)[0][: min(m, p)])
+
+    @classmethod
+    def roughly(cls, point: _Point) -> "_Linearised":
+        """By the normal equations, if the problem is large and they can be solved."""
+        m, p = point.jacobian.shape
+        if m <= p or m * p < LARGE_JACOBIAN:
+            return cls.exactly(point)
+        products = np.empty((p + 1, p + 1))
+        products[:p, :p] = point.jacobian.T @ point.jacobian
+        products[:p, p] = point.jacobian.T @ point.residuals
+        products[p, p] = point.chi2
+        lengths = np.sqrt(np.where(np.diag(products) > 0, np.diag(products), 1.0))
+        factors, failed = lapack.dpotrf(products / np.outer(lengths, lengths))
+        return cls.exactly(point) if failed else cls((factors * lengths)[:p])
 
     def directions(
         self, free: NDArray[np.bool_], scale: FloatArray
@@ -229,7 +250,7 @@ def _damped_search(
         free = _free(point, low, high)
         if not free.any():
             break
-        local = _Linearised(point)
+        local = _Linearised.roughly(point)
         # Moré: scales never shrink, so that a flat stretch does not set a parameter loose.
         scale = np.maximum(scale, local.norms)
         s, directions, along = local.directions(free, scale)
@@ -274,7 +295,7 @@ def _polish(
         free = _free(point, low, high)
         if not free.any():
             return point, 0.0
-        local = _Linearised(point)
+        local = _Linearised.exactly(point)
         s, directions, along = local.directions(free, local.norms)
         kept = s > _rank_tolerance(point.jacobian) * s[0]
         step = -(along[kept] / s[kept]) @ directions[kept]

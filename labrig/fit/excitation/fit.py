@@ -35,6 +35,7 @@ def fit_excitation(
     k_r_per_s: ArrayLike,
     shares: ArrayLike,
     uncertain: Uncertain | None = None,
+    near: ExcitationFit | None = None,
 ) -> ExcitationFit:
     """Fit all series together.
 
@@ -46,6 +47,9 @@ def fit_excitation(
         (N,) rates to start from and each state's part of the glow, such as a decay fit found.
     uncertain
         What else scatters; nothing by default.
+    near
+        A fit of nearly the same series, at which to start; by default a few levels of charge are
+        tried.
 
     Raises
     ------
@@ -58,7 +62,10 @@ def fit_excitation(
     rates = np.asarray(k_r_per_s, dtype=np.float64)
     reference = _brightest(series)
     problem = ExcitationProblem(series, len(rates), reference, uncertain)
-    begin = starts(problem, rates, np.asarray(shares, dtype=np.float64), reference)
+    if near is None:
+        begin = starts(problem, rates, np.asarray(shares, dtype=np.float64), reference)
+    else:
+        begin = iter([_as_fitted(problem, near, reference)])
     found = min((_least(problem, start, ROUGH) for start in begin), key=_chi2)
     for _ in range(WHITENINGS):
         problem.rewhiten(found.parameters)
@@ -76,6 +83,15 @@ def _brightest(series: Sequence[ChargingSeries]) -> int:
     if not total.max() > 0:
         raise FitError("expected sites that glow after a charge, got none; did the lamp light?")
     return int(np.argmax(total))
+
+
+def _as_fitted(problem: ExcitationProblem, fit: ExcitationFit, reference: int) -> FloatArray:
+    k_r, amplitude = np.array([(s.k_r_per_s, s.amplitude) for s in fit.states]).T
+    weights = fit.channel_weights
+    at_reference = weights[reference]
+    return problem.parameters.as_stated(
+        k_r, amplitude * at_reference, fit.k_e(), weights / at_reference
+    )
 
 
 def _least(problem: ExcitationProblem, start: FloatArray, tolerance: float) -> LeastSquaresFit:

@@ -84,7 +84,7 @@ def _of_patch(
     )
     fit = _fit(measured, start, uncertain)
     test = predicted_charging(
-        measured, irradiance, uncertain, lambda without: _fit(without, start, uncertain)
+        measured, irradiance, uncertain, lambda without: _fit(without, start, uncertain, fit)
     )
     frames = tuple(frame.path.name for purpose in GLOWING for frame in stage.run.frames(purpose))
     spectrum = patch.own(known.spectra)
@@ -118,11 +118,13 @@ def _start(stage: Stage, patch: StripPatch, measured: Charged) -> DecayFit:
     return fit_series(measured.whole, states)
 
 
-def _fit(measured: Charged, start: DecayFit, uncertain: Uncertain) -> ExcitationFit:
+def _fit(
+    measured: Charged, start: DecayFit, uncertain: Uncertain, near: ExcitationFit | None = None
+) -> ExcitationFit:
     rates = [state.k_r_per_s for state in start.states]
     amplitudes = np.array([state.amplitude for state in start.states])
     shares = np.maximum(amplitudes / amplitudes.sum(), 1e-3)
-    return fit_excitation([measured.through, measured.bare], rates, shares, uncertain)
+    return fit_excitation([measured.through, measured.bare], rates, shares, uncertain, near)
 
 
 def _flicker(stage: Stage, start: DecayFit) -> float:
