@@ -60,7 +60,7 @@ def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserv
     yield Watching()
 
 
-@pytest.mark.parametrize("share", [0.3, 0.97])
+@pytest.mark.parametrize("share", [pytest.param(0.3, marks=pytest.mark.campaign), 0.97])
 def test_unplugged_at_each_phase_of_a_transfer_the_decay_completes(
     quick: Path,
     make_rig: Make,

@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 import numpy as np
 import pytest
-from hypothesis import given
+from hypothesis import given, settings
 from hypothesis import strategies as st
 
 from labrig.errors import FitError
@@ -40,6 +40,7 @@ def fitted(seed: int, correlation: Sequence[Sequence[float]] | np.ndarray | None
     )
 
 
+@pytest.mark.campaign
 def test_sigma_is_right_where_it_is_known_and_too_small_where_not() -> None:
     def pulls(correlation: np.ndarray | None) -> np.ndarray:
         states = [fitted(seed, correlation).states[0] for seed in range(60)]
@@ -61,6 +62,7 @@ def test_independent_channels_are_the_default() -> None:
     assert one.chi2 == other.chi2
 
 
+@settings(max_examples=25)
 @given(st.floats(-0.4, 0.4), st.integers(0, 5))
 def test_the_order_of_channels_does_not_matter(r: float, seed: int) -> None:
     seen = observed(seed)
@@ -89,6 +91,7 @@ def test_what_is_no_correlation(matrix: np.ndarray) -> None:
         fitted(1, matrix)
 
 
+@pytest.mark.campaign
 def test_dark_levels_wrong_in_all_channels_alike() -> None:
     """A sensor that has warmed since its dark frames."""
     dark_sigma, common = 0.004, np.where(np.eye(3), 1.0, 0.99)

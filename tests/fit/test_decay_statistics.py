@@ -12,6 +12,7 @@ SINGLE = ((0.02, 1.0),)
 DOUBLE = ((0.08, 1.0), (0.015, 0.4))
 CLOSE = ((0.05, 1.0), (0.02, 1.0))
 SEEDS = range(30)
+CAMPAIGN = pytest.mark.campaign
 
 
 def _fits(
@@ -50,8 +51,12 @@ def _pulls(fits: list[DecayFit], truth: tuple[tuple[float, float], ...]) -> trut
     )
 
 
-@pytest.mark.parametrize("flicker", [0.007, None])
-@pytest.mark.parametrize("truth", [SINGLE, DOUBLE, CLOSE], ids=["1", "2", "2 close"])
+@pytest.mark.parametrize("flicker", [0.007, pytest.param(None, marks=CAMPAIGN)])
+@pytest.mark.parametrize(
+    "truth",
+    [pytest.param(SINGLE, marks=CAMPAIGN), DOUBLE, pytest.param(CLOSE, marks=CAMPAIGN)],
+    ids=["1", "2", "2 close"],
+)
 def test_number_and_rates_within_their_sigma(
     truth: tuple[tuple[float, float], ...], flicker: float | None
 ) -> None:
@@ -64,10 +69,17 @@ def test_number_and_rates_within_their_sigma(
     assert 0.8 < np.median([fit.reduced_chi2 for fit in fits]) < 1.2
 
 
-@pytest.mark.parametrize("dark_sigma", [0.004, 0.01])
-def test_dark_errors_of_opposite_signs_make_no_state(dark_sigma: float) -> None:
+@pytest.mark.parametrize(
+    ("dark_sigma", "seeds"),
+    [
+        (0.01, 20),
+        pytest.param(0.004, 100, marks=CAMPAIGN),
+        pytest.param(0.01, 100, marks=CAMPAIGN),
+    ],
+)
+def test_dark_errors_of_opposite_signs_make_no_state(dark_sigma: float, seeds: int) -> None:
     fits = []
-    for seed in range(100):
+    for seed in range(seeds):
         seen = truths.observe(truths.exponentials(*SINGLE), seed, snr=100)
         dark = dark_sigma * np.abs(np.random.default_rng(seed + 1000).normal(size=3)) * [-1, 1, -1]
         fits.append(
@@ -82,10 +94,11 @@ def test_dark_errors_of_opposite_signs_make_no_state(dark_sigma: float) -> None:
             )
         )
     single = [fit for fit in fits if fit.n_states == 1]
-    assert len(single) >= 99
+    assert len(single) >= seeds - 1
     pulls = _pulls(single, SINGLE)
     assert np.abs(pulls).max() < 4.5
-    assert 0.8 < np.sqrt(np.mean(pulls**2)) < 1.2
+    # Of 100, 7 % by chance.
+    assert abs(np.sqrt(np.mean(pulls**2)) - 1) < 2 / np.sqrt(seeds)
     assert 0.9 < np.median([fit.reduced_chi2 for fit in fits]) < 1.1
 
 
@@ -101,10 +114,14 @@ def test_sigma_is_the_cramer_rao_bound() -> None:
 
 @pytest.mark.parametrize(
     "decay",
-    [truths.exponentials(*DOUBLE), truths.power_law(10, 1.5), truths.stretched(20, 0.5)],
+    [
+        truths.exponentials(*DOUBLE),
+        pytest.param(truths.power_law(10, 1.5), marks=CAMPAIGN),
+        pytest.param(truths.stretched(20, 0.5), marks=CAMPAIGN),
+    ],
     ids=["2 states", "power law", "stretched"],
 )
-@pytest.mark.parametrize("true_flicker", [0.007, 0.02])
+@pytest.mark.parametrize("true_flicker", [0.007, pytest.param(0.02, marks=CAMPAIGN)])
 def test_flicker_from_the_data_whatever_the_law(decay: truths.Decay, true_flicker: float) -> None:
     fits = _fits(decay, range(20), true_flicker=true_flicker, n_states=1)
     found = np.array([fit.flicker for fit in fits])
@@ -123,7 +140,7 @@ def test_flicker_from_the_data_whatever_the_law(decay: truths.Decay, true_flicke
         (truths.stretched(20, 0.5), "stretched exponential"),
     ],
 )
-@pytest.mark.parametrize("flicker", [0.007, None])
+@pytest.mark.parametrize("flicker", [0.007, pytest.param(None, marks=CAMPAIGN)])
 def test_other_laws_are_named(decay: truths.Decay, name: str, flicker: float | None) -> None:
     fits = _fits(decay, range(15), flicker)
     named = [fit.better_rival is not None and fit.better_rival.name == name for fit in fits]
@@ -174,6 +191,7 @@ def test_growing_exposures_improve_the_slow_rate() -> None:
     assert sigma(0.25) / sigma(growing_s) > 2
 
 
+@pytest.mark.campaign
 def test_flicker_known_from_few_bright_frames_is_known_badly_and_counted_so() -> None:
     """A state that is gone after five frames: what flicker could be is in σ, and not twice."""
     truth = ((0.2, 1.0),)
@@ -186,7 +204,7 @@ def test_flicker_known_from_few_bright_frames_is_known_badly_and_counted_so() ->
     assert np.abs(pulls).max() < 4
 
 
-@pytest.mark.parametrize("n_channels", [1, 3])
+@pytest.mark.parametrize("n_channels", [pytest.param(1, marks=CAMPAIGN), 3])
 def test_repeats_reach_levels_of_their_own(n_channels: int) -> None:
     """Three charges under a lamp that ages: no flicker is made of it."""
     weights = truths.RGB_WEIGHTS[-n_channels:] / truths.RGB_WEIGHTS[-n_channels:].max()

@@ -118,7 +118,9 @@ def test_irradiance_known_badly_goes_into_every_rate() -> None:
     assert rough.k_r_sigma_per_s == pytest.approx(alone.k_r_sigma_per_s, rel=1e-3)
 
 
-@pytest.mark.parametrize("seed", [1, 2, 3])
+@pytest.mark.parametrize(
+    "seed", [1, *(pytest.param(seed, marks=pytest.mark.campaign) for seed in (2, 3))]
+)
 def test_a_dark_level_that_wanders_counts_for_no_more_than_it_tells(seed: int) -> None:
     """A sensor warms and cools between photographs: dim ones would tell a wrong rate."""
     bench = Bench(read_material("red-paint"), read_noise=0.01, photons=1e4, seed=seed)

@@ -18,13 +18,13 @@ from labrig.record import read_run
 from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
-FROZEN = Path(__file__).parent / "data" / "decay-0.1.0"
-LINES = (FROZEN / "journal.jsonl").read_text(encoding="utf-8").splitlines()
+RECORDED = Path(__file__).parent / "data" / "decay"
+LINES = (RECORDED / "journal.jsonl").read_text(encoding="utf-8").splitlines()
 
 
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
-    return Path(shutil.copytree(FROZEN, tmp_path / "run"))
+    return Path(shutil.copytree(RECORDED, tmp_path / "run"))
 
 
 def one_line(ended: Ended, code: int, *said: str) -> None:
@@ -107,7 +107,7 @@ ODD: tuple[object, ...] = (None, "x", -1, math.inf, math.nan, 1e300, [], {}, Tru
 
 @pytest.fixture(scope="module")
 def edited_run(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    return Path(shutil.copytree(FROZEN, tmp_path_factory.mktemp("edited") / "run"))
+    return Path(shutil.copytree(RECORDED, tmp_path_factory.mktemp("edited") / "run"))
 
 
 @settings(max_examples=150)

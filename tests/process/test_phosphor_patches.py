@@ -94,6 +94,7 @@ def states(run: Path, paint: str) -> tuple[Any, Any]:
     return found, true
 
 
+@pytest.mark.campaign
 @pytest.mark.parametrize(("paint", "other"), [tuple(PAINTS), tuple(PAINTS)[::-1]])
 def test_every_paint_has_its_own_material(
     run: Path, result: Result, paint: str, other: str
@@ -112,6 +113,7 @@ def test_every_paint_has_its_own_material(
     assert shape / shape.sum() == pytest.approx(wanted / wanted.sum(), abs=0.06)
 
 
+@pytest.mark.campaign
 def test_every_paint_has_its_own_spectrum(run: Path, result: Result) -> None:
     for paint in PAINTS:
         place = run / "result" / "emission_spectrum" / paint
@@ -121,6 +123,7 @@ def test_every_paint_has_its_own_spectrum(run: Path, result: Result) -> None:
         assert np.abs(value / value.sum() - emitted(paint)).max() < 0.02
 
 
+@pytest.mark.campaign
 def test_results_lie_in_folders_of_the_patches(run: Path, result: Result) -> None:
     made = run / "result"
     for paint in PAINTS:
@@ -137,6 +140,7 @@ def test_results_lie_in_folders_of_the_patches(run: Path, result: Result) -> Non
     assert [one.name for one in read_results(run)] == list(PAINTS)
 
 
+@pytest.mark.campaign
 def test_a_comparison_takes_the_whole_material_of_each(run: Path, result: Result) -> None:
     compared = read_patches(run)
     assert list(compared) == list(PAINTS)

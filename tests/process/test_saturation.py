@@ -55,6 +55,7 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
     assert len(found.sections[0].figures) == 2
 
 
+@pytest.mark.campaign
 def test_a_power_laws_rates_depend_on_the_charge(tmp_path: Path) -> None:
     stage = stage_of(
         record(tmp_path, QUICK | {"charges": ["20 s", "60 min"], "for": "150 s"},

@@ -220,6 +220,7 @@ def test_a_fault_is_one_clear_line_before_the_filters(
     assert unit not in read_run(folder).completed()
 
 
+@pytest.mark.campaign
 def test_a_filter_that_was_skipped_is_told_at_once_and_left_out(
     write: Make, make_rig: Make, labrig: Labrig, tmp_path: Path
 ) -> None:

@@ -3,6 +3,7 @@
 import csv
 import json
 import math
+import shutil
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -76,7 +77,15 @@ def differences(recorded: Path, now: Path) -> list[Difference]:
     return sorted(found, key=lambda one: (not one.matters, -abs(one.relative)))
 
 
-def number_files(folder: Path) -> list[Path]:
+def keep_numbers(result: Path, kept: Path) -> None:
+    """Copy the files of a result folder that hold numbers, in place of those kept before."""
+    shutil.rmtree(kept, ignore_errors=True)
+    for file in _number_files(result):
+        (kept / file).parent.mkdir(parents=True, exist_ok=True)
+        shutil.copy(result / file, kept / file)
+
+
+def _number_files(folder: Path) -> list[Path]:
     """The files in a result folder that hold numbers, relative to it."""
     return sorted(
         path.relative_to(folder)
@@ -93,7 +102,7 @@ def _numbers(folder: Path) -> dict[str, tuple[float, float]]:
     """Place → number and its σ."""
     return {
         f"{file.as_posix()} {place}": number
-        for file in number_files(folder)
+        for file in _number_files(folder)
         for place, number in _leaves(_READERS[file.suffix](folder / file), math.nan)
     }
 

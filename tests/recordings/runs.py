@@ -12,7 +12,7 @@ from tests.process.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.process.recorded import record
 from tests.process.spectral_bench import true_lvf_file
 
-from .numbers import Difference, differences, number_files
+from .numbers import Difference, differences, keep_numbers
 
 HERE = Path(__file__).parent
 RUN, RESULT = "run", "result"
@@ -95,11 +95,7 @@ class Recorded:
 
     def keep_numbers(self, result: Path) -> None:
         """Keep the numbers of a result as what later ones are held against."""
-        kept = self.folder / RESULT
-        shutil.rmtree(kept, ignore_errors=True)
-        for file in number_files(result):
-            (kept / file).parent.mkdir(parents=True, exist_ok=True)
-            shutil.copy(result / file, kept / file)
+        keep_numbers(result, self.folder / RESULT)
 
     def differences(self, result: Path) -> list[Difference]:
         """In what numbers `result` differs from those kept."""

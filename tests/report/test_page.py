@@ -267,6 +267,7 @@ def test_a_steady_source_is_told_with_its_drift(tmp_path: Path) -> None:
     assert "do not decay" not in Page(written(tmp_path, run_report(tmp_path))).text
 
 
+@pytest.mark.campaign
 @pytest.mark.drawn
 def test_many_patches(tmp_path: Path) -> None:
     patches = [patch(decay_series(seed=n, name=f"paint {n}")) for n in range(5)]

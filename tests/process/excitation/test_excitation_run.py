@@ -96,6 +96,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     return recorded(tmp_path_factory.mktemp("excitation"))
 
 
+@pytest.mark.campaign
 def test_rates_and_levels_are_the_true_ones(run: Path) -> None:
     result = process_run(run)
     found, true = read_material(run / "result" / "material.yaml"), read_material("blue-paint")
