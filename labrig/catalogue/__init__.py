@@ -9,20 +9,16 @@ from labrig.catalogue.listing import (
     list_runs,
     summarise,
 )
-from labrig.catalogue.results import Measured, PatchResult, read_results
 
 __all__ = [
     "Comparison",
     "Difference",
-    "Measured",
     "PatchComparison",
-    "PatchResult",
     "RunSummary",
     "Wanted",
     "compare_runs",
     "find_run",
     "is_being_written",
     "list_runs",
-    "read_results",
     "summarise",
 ]

@@ -9,8 +9,8 @@ from typing import Any
 from scipy import stats
 
 from labrig.catalogue.reference import gain
-from labrig.catalogue.results import Measured, PatchResult, read_results
 from labrig.errors import DataError
+from labrig.results import DecayResult, Measured, read_decay_results
 from labrig.yaml_file import read_yaml
 
 #: Chance alone makes two equal sets of numbers differ so much less often than this.
@@ -32,8 +32,7 @@ class Difference:
     @property
     def pull(self) -> float:
         """NaN where nothing is known of the σ."""
-        sigma = math.hypot(self.a.sigma, self.b.sigma)
-        return (self.b.value - self.a.value) / sigma if 0 < sigma < math.inf else math.nan
+        return self.b.sigmas_from(self.a)
 
 
 @dataclass(frozen=True)
@@ -107,7 +106,7 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
         of_b = dict(zip(of_a, of_b.values(), strict=True))
     shared = [name for name in of_a if name in of_b and name != reference]
     gains = {
-        name: NO_GAIN if reference is None else gain(a, b, reference, of_a[name].brightest)
+        name: NO_GAIN if reference is None else gain(a, b, reference, of_a[name].brightest_channel)
         for name in shared
     }
     return Comparison(
@@ -122,7 +121,7 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
     )
 
 
-def _compare(name: str, a: PatchResult, b: PatchResult, gain_of_b: Measured) -> PatchComparison:
+def _compare(name: str, a: DecayResult, b: DecayResult, gain_of_b: Measured) -> PatchComparison:
     counts = len(a.rates), len(b.rates)
     if counts[0] != counts[1]:
         return PatchComparison(name, counts, (), math.nan, gain_of_b)
@@ -130,8 +129,8 @@ def _compare(name: str, a: PatchResult, b: PatchResult, gain_of_b: Measured) -> 
         Difference(f"k_r {number}", "1/s", of_a, of_b)
         for number, (of_a, of_b) in enumerate(zip(a.rates, b.rates, strict=True), start=1)
     ]
-    channel = a.brightest
-    pairs = zip(a.amplitudes, b.amplitudes_in(channel), strict=True)
+    channel = a.brightest_channel
+    pairs = zip(a.amplitudes_in(channel), b.amplitudes_in(channel), strict=True)
     amplitudes = [
         Difference(f"a {number}", f"DN/s of channel {channel}", of_a, of_b.times(gain_of_b))
         for number, (of_a, of_b) in enumerate(pairs, start=1)
@@ -141,10 +140,11 @@ def _compare(name: str, a: PatchResult, b: PatchResult, gain_of_b: Measured) -> 
     return PatchComparison(name, counts, (*rates, *amplitudes), p_value, gain_of_b)
 
 
-def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, PatchResult]:
+def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, DecayResult]:
     """By the name of the patch, also where there is only one."""
     only = next(iter(protocol.get("patches") or ["sample"]))
-    results = {result.name or only: result for result in read_results(run)}
+    read = read_decay_results(run / "result")
+    results = {name or only: result for name, result in read.items()}
     if not results:
         raise DataError(f"{run}: it has no result to compare; make one: labrig process {run}")
     return results

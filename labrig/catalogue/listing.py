@@ -1,6 +1,6 @@
 """One line a run: what it was, how far it came, what it found."""
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
 from datetime import UTC, date, datetime
 from fnmatch import fnmatchcase
@@ -10,9 +10,9 @@ from typing import Literal, get_args
 from filelock import FileLock, Timeout
 
 from labrig.acquire import plugins
-from labrig.catalogue.results import PatchResult, read_results
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.record import read_run
+from labrig.results import DecayResult, read_decay_results
 from labrig.yaml_file import did_you_mean, read_yaml
 
 #: `running`: a labrig is writing to it now; `unfinished`: units are left to do; `recorded`: all
@@ -33,6 +33,8 @@ class RunSummary:
         Completed units, and all; None where the protocol is not installed here.
     frames
         Of completed units.
+    results
+        What was fitted to each patch, by its name; "" where there is only one.
     """
 
     folder: Path
@@ -43,7 +45,7 @@ class RunSummary:
     done: int
     units: int | None
     frames: int
-    results: tuple[PatchResult, ...]
+    results: Mapping[str, DecayResult]
 
 
 @dataclass(frozen=True)
@@ -115,11 +117,11 @@ def summarise(folder: Path) -> RunSummary:
     """What the run in `folder` holds; whatever cannot be read is told as its state."""
     sample, protocol, units = _asked(folder)
     try:
-        record, results = read_run(folder), read_results(folder)
+        record, results = read_run(folder), read_decay_results(folder / "result")
     except DataError:
         has_journal = (folder / "journal.jsonl").exists()
         state: State = "damaged" if has_journal else "unfinished"
-        return RunSummary(folder, sample, protocol, None, state, 0, units, 0, ())
+        return RunSummary(folder, sample, protocol, None, state, 0, units, 0, {})
     done = record.completed()
     return RunSummary(
         folder=folder,

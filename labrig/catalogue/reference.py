@@ -5,9 +5,9 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.catalogue.results import Measured, PatchResult, read_results
 from labrig.errors import DataError, UsageError
 from labrig.reduce import read_series
+from labrig.results import DecayResult, Measured, read_decay_results
 from labrig.yaml_file import did_you_mean
 
 #: What stands out of its own σ by less is no light to rely on.
@@ -34,7 +34,7 @@ def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
             f"--reference {name}: expected a patch of its own, in both runs, with a source that "
             f"is the same on both days; {hint}"
         )
-    fits = [next((one for one in read_results(run) if one.name == name), None) for run in (a, b)]
+    fits = [read_decay_results(run / "result").get(name) for run in (a, b)]
     if (fits[0] is None) != (fits[1] is None):
         raise UsageError(
             f"--reference {name}: it decays in one run and is steady in the other; expected a "
@@ -58,7 +58,7 @@ def _patches(run: Path) -> list[str]:
     return sorted(path.parent.name for path in (run / "result").glob("*/series.csv"))
 
 
-def _glow(fit: PatchResult, channel: str) -> Measured:
+def _glow(fit: DecayResult, channel: str) -> Measured:
     """All amplitudes together, their σ taken as independent."""
     amplitudes = fit.amplitudes_in(channel)
     return Measured(

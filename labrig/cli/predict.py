@@ -87,7 +87,7 @@ def _tell(prediction: "Prediction", duration_s: float) -> None:
 def _states(prediction: "Prediction", patch: str) -> "Table":
     from rich.table import Table
 
-    from labrig.fit.decay.result import with_uncertainty
+    from labrig.results import with_uncertainty
 
     found = prediction.patches[patch]
     table = Table(title=_title(prediction, patch), title_justify="left")

@@ -10,7 +10,8 @@ import typer
 from typer.core import TyperGroup
 
 if TYPE_CHECKING:
-    from labrig.catalogue import Comparison, PatchResult, RunSummary
+    from labrig.catalogue import Comparison, RunSummary
+    from labrig.results import DecayResult
 
 
 class _ListsByDefault(TyperGroup):
@@ -149,7 +150,7 @@ def _print_runs(found: list["RunSummary"]) -> None:
             run.sample,
             run.protocol,
             Text(_state(run), style=_STYLES.get(run.state, "")),
-            "\n".join(_short_rates(result) for result in run.results),
+            "\n".join(_short_rates(*patch) for patch in run.results.items()),
         )
     Console().print(table)
 
@@ -189,14 +190,14 @@ def _print_comparison(comparison: "Comparison") -> None:
 
 def _tell_results(folder: Path) -> None:
     """Each result and what it was made with otherwise than the one before it."""
-    from labrig.catalogue import read_results
     from labrig.process.changes import other_settings
+    from labrig.results import read_decay_results
 
     results = _result_folders(folder)
     for result, before in itertools.zip_longest(results, results[1:]):
-        for patch in read_results(folder, result):
-            typer.echo(f"  {result}: {_rates(patch)} /s")
-            for warning in patch.warnings:
+        for patch, fit in read_decay_results(folder / result).items():
+            typer.echo(f"  {result}: {_rates(patch, fit)} /s")
+            for warning in fit.warnings:
                 typer.echo(f"    warning: {warning}")
         if before is not None:
             for line in other_settings(folder / before, folder / result):
@@ -212,19 +213,19 @@ def _result_folders(folder: Path) -> list[str]:
     return ["result", *earlier]
 
 
-def _rates(result: "PatchResult") -> str:
+def _rates(patch: str, result: "DecayResult") -> str:
     from labrig.report.written_numbers import plus_minus
 
     rates = ",  ".join(plus_minus(rate.value, rate.sigma) for rate in result.rates)
-    return f"{result.name}: {rates}" if result.name else rates
+    return f"{patch}: {rates}" if patch else rates
 
 
-def _short_rates(result: "PatchResult") -> str:
+def _short_rates(patch: str, result: "DecayResult") -> str:
     """With σ in units of the last places, so that a line holds them."""
-    from labrig.fit.decay.result import with_uncertainty
+    from labrig.results import with_uncertainty
 
     rates = ",  ".join(with_uncertainty(rate.value, rate.sigma) for rate in result.rates)
-    return f"{result.name}: {rates}" if result.name else rates
+    return f"{patch}: {rates}" if patch else rates
 
 
 def _when(run: "RunSummary") -> str:

@@ -1,6 +1,5 @@
 """What a run's result says of each patch, read back from its files."""
 
-import json
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -9,6 +8,7 @@ import numpy as np
 from labrig.errors import DataError, UsageError
 from labrig.material import Material, read_material
 from labrig.reduce import Series, joined, read_series
+from labrig.results import find_decay_results, read_decay_result
 from labrig.yaml_file import read_yaml
 
 
@@ -48,7 +48,7 @@ def read_patches(run: Path) -> dict[str, MeasuredPatch]:
     """
     if not (run / "protocol.yaml").is_file():
         raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
-    fits = sorted((run / "result").rglob("fit.json"))
+    fits = find_decay_results(run / "result").values()
     places = [fit.parent for fit in fits if (fit.parent / "series.csv").is_file()]
     if not places:
         raise DataError(
@@ -66,20 +66,19 @@ def read_patches(run: Path) -> dict[str, MeasuredPatch]:
 
 
 def _read_patch(place: Path, name: str | None, of_chain: Path) -> MeasuredPatch:
-    path = place / "fit.json"
-    try:
-        fit = json.loads(path.read_text(encoding="utf-8"))
-        series = joined(read_series(place / "series.csv"))
-        offsets = np.array([float(fit["offsets"][channel]) for channel in series.channels])
-        flicker = float(fit["flicker"])
-    except (ValueError, KeyError, TypeError) as error:
+    fit = read_decay_result(place / "fit.json")
+    series = joined(read_series(place / "series.csv"))
+    if fit.channels != series.channels:
         raise DataError(
-            f"{path}: expected a fit as labrig writes it, got something else ({error!r}); make it "
-            "again: labrig process"
-        ) from None
+            f"{place}: expected fit.json and series.csv of the same channels, got "
+            f"{', '.join(fit.channels)} and {', '.join(series.channels)}; make them again: "
+            "labrig process RUN"
+        )
     rows = np.flatnonzero(series.usable)
     by_time = rows[np.argsort(series.t_s[rows], kind="stable")]
     usable = series.take(by_time, name)
     whole = of_chain / "material.yaml"
     material = read_material(whole if whole.is_file() else place / "material.yaml")
-    return MeasuredPatch(replace(usable, values=usable.values - offsets), flicker, material)
+    return MeasuredPatch(
+        replace(usable, values=usable.values - np.array(fit.offsets)), fit.flicker, material
+    )

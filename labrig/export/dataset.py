@@ -1,6 +1,5 @@
 """The result of a run as an xarray Dataset, for notebooks."""
 
-import json
 from collections.abc import Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
@@ -8,9 +7,10 @@ from typing import TYPE_CHECKING, Any
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.errors import DataError, UsageError
+from labrig.errors import UsageError
 from labrig.record import read_run
 from labrig.reduce import Series, read_series
+from labrig.results import DecayResult, read_decay_result
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -20,7 +20,6 @@ SECONDS, PER_S, DN_PER_S = {"units": "s"}, {"units": "1/s"}, {"units": "DN/s"}
 AFTER_LAMP_OFF = {"long_name": "start of the exposure after lamp off"}
 
 Column = tuple[Any, ...]
-Fit = dict[str, Any]
 
 
 def read_dataset(run: Path | str) -> "Dataset":
@@ -64,7 +63,7 @@ def read_dataset(run: Path | str) -> "Dataset":
         {
             "patch": [decays[0].region for decays in patches],
             "channel": list(channels),
-            "state": 1 + np.arange(max(len(fit.get("states", [])) for fit in fits)),
+            "state": 1 + np.arange(max((fit.n_states for fit in fits if fit), default=0)),
             "frame": _joined(patches[0], "frame"),
             "unit": ("frame", _joined(patches[0], "unit")),
             "t_s": ("frame", _joined(patches[0], "t_s"), SECONDS | AFTER_LAMP_OFF),
@@ -86,15 +85,9 @@ def _attributes(folder: Path) -> dict[str, str]:
     return {"run": folder.resolve().name, **known, **start.get("devices", {})}
 
 
-def _read_fit(path: Path) -> Fit:
-    """fit.json; empty where there was no fit."""
-    if not path.is_file():
-        return {}
-    try:
-        fit: Fit = json.loads(path.read_text(encoding="utf-8"))
-    except ValueError as error:
-        raise DataError(f"{path}: expected JSON, got something else ({error})") from None
-    return fit
+def _read_fit(path: Path) -> DecayResult | None:
+    """What was fitted; None where nothing was."""
+    return read_decay_result(path) if path.is_file() else None
 
 
 def _measured(patches: Sequence[Sequence[Series]]) -> dict[str, Column]:
@@ -116,15 +109,26 @@ def _joined(decays: Sequence[Series], name: str) -> NDArray[Any]:
     return np.concatenate([getattr(decay, name) for decay in decays])
 
 
-def _fitted(fits: Sequence[Fit], channels: Sequence[str]) -> dict[str, Column]:
-    most = max(len(fit.get("states", [])) for fit in fits)
+def _fitted(fits: Sequence[DecayResult | None], channels: Sequence[str]) -> dict[str, Column]:
+    most = max((fit.n_states for fit in fits if fit), default=0)
 
     def of_state(key: str) -> NDArray[np.float64]:
-        rows = [[state[key] for state in fit.get("states", [])] for fit in fits]
-        return _numbers([row + [None] * (most - len(row)) for row in rows])
+        rows = np.full((len(fits), most), np.nan)
+        for row, fit in zip(rows, fits, strict=True):
+            if fit:
+                row[: fit.n_states] = [getattr(state, key) for state in fit.states]
+        return rows
 
     def of_channel(key: str) -> NDArray[np.float64]:
-        return _numbers([[fit.get(key, {}).get(name) for name in channels] for fit in fits])
+        rows = np.full((len(fits), len(channels)), np.nan)
+        for row, fit in zip(rows, fits, strict=True):
+            if fit:
+                by_name = dict(zip(fit.channels, getattr(fit, key), strict=True))
+                row[:] = [by_name.get(name, np.nan) for name in channels]
+        return rows
+
+    def of_patch(key: str) -> NDArray[np.float64]:
+        return np.array([getattr(fit, key) if fit else np.nan for fit in fits])
 
     states, weights = ("patch", "state"), ("patch", "channel")
     return {
@@ -136,12 +140,7 @@ def _fitted(fits: Sequence[Fit], channels: Sequence[str]) -> dict[str, Column]:
         "channel_weight_sigma": (weights, of_channel("channel_weights_sigma")),
         "offset": (weights, of_channel("offsets"), DN_PER_S),
         "offset_sigma": (weights, of_channel("offsets_sigma"), DN_PER_S),
-        "flicker": ("patch", _numbers([fit.get("flicker") for fit in fits])),
-        "reduced_chi2": ("patch", _numbers([fit.get("reduced_chi2") for fit in fits])),
-        "fit_warnings": ("patch", ["\n".join(fit.get("warnings", [])) for fit in fits]),
+        "flicker": ("patch", of_patch("flicker")),
+        "reduced_chi2": ("patch", of_patch("reduced_chi2")),
+        "fit_warnings": ("patch", ["\n".join(fit.warnings) if fit else "" for fit in fits]),
     }
-
-
-def _numbers(values: Sequence[Any]) -> NDArray[np.float64]:
-    """NaN for None."""
-    return np.array(values, dtype=np.float64)

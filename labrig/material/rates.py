@@ -35,6 +35,29 @@ def phi2(x: ArrayLike) -> FloatArray:
     return _phi1_and_phi2(x, np.exp(-x))[1]
 
 
+def exponential_means(
+    rates_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray
+) -> FloatArray:
+    """Mean of e^(−k t) over each exposure, e^(−k t)(1 − e^(−k T))/(k T); its limit where T = 0.
+
+    Parameters
+    ----------
+    rates_per_s
+        (m,) k > 0.
+    t_s, exposure_s
+        (n,) start t and length T ≥ 0 of the exposures.
+
+    Returns
+    -------
+    (n, m), in (0, 1] for t ≥ 0.
+    """
+    decayed: FloatArray = np.exp(-np.multiply.outer(t_s, rates_per_s))
+    if not exposure_s.any():
+        return decayed
+    x = np.multiply.outer(exposure_s, rates_per_s)
+    return decayed * phi1(x)
+
+
 def _phi1_and_phi2(x: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Both, of x and e⁻ˣ."""
     near = x < _SERIES_BELOW

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from labrig.fit.decay.shapes import exponential_means
 from labrig.fit.least_squares import FloatArray
+from labrig.material.rates import exponential_means
 from labrig.predict.camera import CameraFigures
 from labrig.predict.glow import Glow
 from labrig.reduce import ChannelStats, FrameMeasurement

@@ -1,10 +1,8 @@
 """What an earlier run says about bench and camera: noise, flicker, brightness."""
 
-import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
@@ -21,6 +19,7 @@ from labrig.predict.frames import PEAK_SIGMAS
 from labrig.record import FrameRecord, RunRecord, read_run
 from labrig.reduce import FrameMeasurement, Series, fit_dark, measure, read_raw, read_series
 from labrig.region import Region
+from labrig.results import find_decay_results, read_decay_result
 from labrig.yaml_file import read_yaml
 
 #: A flicker known worse than this is not taken over.
@@ -62,11 +61,10 @@ def result_places(run: Path) -> dict[str, Path]:
     UsageError
         There is none.
     """
-    result = run / "result"
-    found = sorted(result.glob("**/fit.json"))
+    found = find_decay_results(run / "result")
     if not found:
         raise UsageError(f"{run}: expected a run with a fit in its result folder, got none")
-    return {"" if path.parent == result else path.parent.name: path.parent for path in found}
+    return {name: path.parent for name, path in found.items()}
 
 
 def run_of(place: Path) -> Path | None:
@@ -87,13 +85,12 @@ def read_reference(place: Path) -> Reference:
     folder = run_of(place)
     if folder is None:
         raise UsageError(f"{place}: expected the result folder of a run, got no run around it")
-    run, fit = read_run(folder), _read_fit(place / "fit.json")
+    run, fit = read_run(folder), read_decay_result(place / "fit.json")
     series = read_series(place / "series.csv")[0]
     region = _region(folder, series.region)
     frame = _first_usable(run, series)
     seen = measure(read_raw(frame.path), region)
-    weights: dict[str, float] = fit["channel_weights"]
-    brightest = seen.channels[max(weights, key=lambda name: weights[name])]
+    brightest = seen.channels[fit.brightest_channel]
     noise_dn = PEAK_SIGMAS * brightest.sigma * np.sqrt(brightest.n)
     darks = _darks(run, region)
     gain, read_noise_dn = _photon_transfer(series, seen, darks)
@@ -116,8 +113,8 @@ def read_reference(place: Path) -> Reference:
             channel_shares={name: stats.n / pixels for name, stats in seen.channels.items()},
         ),
         f_number=frame.f_number,
-        flicker=fit["flicker"] if fit["flicker_sigma"] < FLICKER_KNOWN * fit["flicker"] else None,
-        channel_weights=weights,
+        flicker=fit.flicker if fit.flicker_sigma < FLICKER_KNOWN * fit.flicker else None,
+        channel_weights=dict(zip(fit.channels, fit.channel_weights, strict=True)),
     )
 
 
@@ -128,16 +125,6 @@ def _region(folder: Path, patch: str) -> Region:
     patches = read_yaml(processed)["patches"] if processed.is_file() else protocol.patches
     region: Region = patches.get(patch) or next(iter(patches.values()))
     return region
-
-
-def _read_fit(path: Path) -> dict[str, Any]:
-    try:
-        fit: dict[str, Any] = json.loads(path.read_text(encoding="utf-8"))
-        return {key: fit[key] for key in ("channel_weights", "flicker", "flicker_sigma")}
-    except (OSError, ValueError, TypeError, KeyError) as error:
-        raise DataError(
-            f"{path}: expected fit.json of a decay ({error!r}); make it again with: labrig process"
-        ) from None
 
 
 def _first_usable(run: RunRecord, series: Series) -> FrameRecord:

@@ -6,8 +6,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.decay.shapes import exponential_means
 from labrig.fit.least_squares import FloatArray
+from labrig.material.rates import exponential_means
 from labrig.predict.frames import ExpectedFrames
 from labrig.predict.glow import Glow
 from labrig.reduce import fit_dark

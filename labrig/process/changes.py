@@ -1,14 +1,15 @@
 """What changed from one result of a run to the next, in a few lines for people."""
 
-import json
 import math
 from collections.abc import Iterator, Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from labrig.errors import UsageError
+from labrig.errors import DataError, UsageError
 from labrig.report.written_numbers import plus_minus, rounded
+from labrig.results import DecayResult, find_decay_results, read_decay_result
 from labrig.yaml_file import read_yaml
 
 #: Moves of less than this share of a parameter's σ, and changes of σ by less, are not worth a word.
@@ -102,34 +103,28 @@ def _other_settings(before: Mapping[str, str], after: Mapping[str, str]) -> Iter
 
 
 def _fits(result: Path) -> dict[str, Parameters]:
-    """The parameters of each patch's fit, by the name of its folder; unreadable ones are left out.
-
-    A run with one patch has its fit in the result folder itself, under the name "".
-    """
+    """The parameters of each patch's fit, by its name; unreadable ones are left out."""
     fits = {}
-    for path in sorted(result.rglob("fit.json")):
-        try:
-            fits[path.parent.name if path.parent != result else ""] = _parameters(path)
-        except (OSError, ValueError, KeyError, TypeError):
-            continue
+    for name, path in find_decay_results(result).items():
+        with suppress(DataError):
+            fits[name] = _parameters(read_decay_result(path))
     return fits
 
 
-def _parameters(path: Path) -> Parameters:
-    """Value and σ of every parameter in a fit.json; JSON has null for an infinite σ."""
-    fit = json.loads(path.read_text(encoding="utf-8"))
-    found: dict[str, tuple[Any, Any]] = {}
-    for number, state in enumerate(fit["states"], start=1):
-        found[f"k_r {number}"] = state["k_r_per_s"], state["k_r_sigma_per_s"]
-        found[f"a {number}"] = state["amplitude"], state["amplitude_sigma"]
-    for name, key in (("weight", "channel_weights"), ("offset", "offsets")):
-        for channel, value in fit[key].items():
-            found[f"{name} {channel}"] = value, fit[f"{key}_sigma"][channel]
-    found["flicker"] = fit["flicker"], fit["flicker_sigma"]
-    return {
-        name: (float(value), math.inf if sigma is None else float(sigma))
-        for name, (value, sigma) in found.items()
-    }
+def _parameters(fit: DecayResult) -> Parameters:
+    """Value and σ of every parameter of a fit."""
+    found: dict[str, tuple[float, float]] = {}
+    for number, state in enumerate(fit.states, start=1):
+        found[f"k_r {number}"] = state.k_r_per_s, state.k_r_sigma_per_s
+        found[f"a {number}"] = state.amplitude, state.amplitude_sigma
+    for name, values, sigmas in (
+        ("weight", fit.channel_weights, fit.channel_weights_sigma),
+        ("offset", fit.offsets, fit.offsets_sigma),
+    ):
+        for channel, value, sigma in zip(fit.channels, values, sigmas, strict=True):
+            found[f"{name} {channel}"] = value, sigma
+    found["flicker"] = fit.flicker, fit.flicker_sigma
+    return found
 
 
 def _other_numbers(

@@ -8,11 +8,12 @@ from pathlib import Path
 from typing import Any
 
 from labrig.acquire import Plan, ProtocolModel, plan, plugins, read_rig_file
-from labrig.catalogue import is_being_written, read_results, summarise
+from labrig.catalogue import is_being_written, summarise
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.record import Attempt, FrameRecord, RunRecord, read_run
 from labrig.region import Region
 from labrig.report.written_numbers import plus_minus
+from labrig.results import read_decay_results
 from labrig.watch.glance import Glance, glance
 
 PICTURE_WIDTH = 720
@@ -177,16 +178,16 @@ class Following:
 
     def _results(self) -> list[dict[str, str]]:
         try:
-            results = read_results(self.run)
+            results = read_decay_results(self.run / "result")
         except DataError:
             return []
         order = {name: number for number, name in enumerate(self.patches)}
         return [
             {
-                "patch": result.name or next(iter(self.patches), ""),
-                "rates": ", ".join(plus_minus(rate.value, rate.sigma) for rate in result.rates),
+                "patch": name or next(iter(self.patches), ""),
+                "rates": ", ".join(plus_minus(rate.value, rate.sigma) for rate in fit.rates),
             }
-            for result in sorted(results, key=lambda one: order.get(one.name, 0))
+            for name, fit in sorted(results.items(), key=lambda one: order.get(one[0], 0))
         ]
 
 

@@ -14,7 +14,9 @@ from filelock import FileLock
 from labrig.catalogue import compare_runs, list_runs, summarise
 from labrig.catalogue.listing import Wanted
 from labrig.cli.ending import guarded
+from labrig.results import write_decay_result
 from tests.conftest import Ended
+from tests.results.made import decay_result
 
 Labrig = Callable[..., Ended]
 
@@ -157,19 +159,9 @@ def two_days(tmp_path: Path) -> tuple[Path, Path]:
             (place / "series.csv").write_text(table)
             if patch == "diode":
                 continue
-            state = {
-                "k_r_per_s": 0.01,
-                "k_r_sigma_per_s": 1e-4,
-                "amplitude": signal.max(),
-                "amplitude_sigma": 0.2,
-            }
-            fit = {
-                "states": [state],
-                "warnings": [],
-                "channel_weights": dict(zip("RG", signal / signal.max(), strict=True)),
-                "channel_weights_sigma": {"R": 0.0, "G": 0.0},
-            }
-            (place / "fit.json").write_text(json.dumps(fit))
+            weights = dict(zip("RG", signal / signal.max(), strict=True))
+            fit = decay_result((0.01, float(signal.max())), sigma=0.004, weights=weights)
+            write_decay_result(place / "fit.json", fit)
         (tmp_path / run / "protocol.yaml").write_text("protocol: decay\n")
     return tmp_path / "a", tmp_path / "b"
 

@@ -10,6 +10,7 @@ from tests.conftest import Ended
 Labrig = Callable[..., Ended]
 
 
+@pytest.mark.drawn
 def test_a_shipped_camera(labrig: Labrig, tmp_path: Path) -> None:
     picture = tmp_path / "camera.svg"
     ended = labrig("optics", "show", "canon_eos_5d_mark_ii", "--picture", picture)
@@ -33,6 +34,7 @@ def test_one_curve_of_many(labrig: Labrig, tmp_path: Path) -> None:
     assert "400-601 nm, 3 points" in one.out
 
 
+@pytest.mark.drawn
 @pytest.mark.parametrize(
     ("arguments", "said"),
     [

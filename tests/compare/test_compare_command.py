@@ -82,6 +82,7 @@ def test_the_white_and_normalisation_asked_for_are_used_and_said(labrig: Labrig,
     assert glow["mean"] != compared(labrig, run)["glow"]["double-wide"]["mean"]
 
 
+@pytest.mark.drawn
 def test_it_tells_a_person_and_draws(labrig: Labrig, run: Path, tmp_path: Path) -> None:
     ended = labrig("compare", run, "--material", "double-wide", "--figures", tmp_path / "drawn")
     assert (ended.code, ended.err) == (0, "")

@@ -9,7 +9,7 @@ import pytest
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.fit.decay.result import with_uncertainty
+from labrig.results import with_uncertainty
 from tests.fit import truths
 
 DOUBLE = truths.exponentials((0.08, 1.0), (0.015, 0.4))

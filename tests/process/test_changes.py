@@ -1,6 +1,5 @@
 """What is said of two results, and where the older one goes."""
 
-import json
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -10,52 +9,40 @@ import yaml
 
 from labrig.process.changes import changes
 from labrig.process.result_folder import new_result, put_in_place
+from labrig.results import DecayResult, write_decay_result
+from tests.results.made import decay_result as fit
 
 Put = Callable[..., Path]
 
 MADE_WITH = {"labrig": "0.1.0", "libraries": {"numpy": "2.0.0"}, "excluded": []}
 
 
-def fit(*states: tuple[float, float], offset: float = 0.0, sigma: float = 0.001) -> dict[str, Any]:
-    """What `fit.json` says of rates and amplitudes, each with a σ of 1 %."""
-    return {
-        "states": [
-            {"k_r_per_s": k, "k_r_sigma_per_s": k / 100, "amplitude": a, "amplitude_sigma": a / 100}
-            for k, a in states
-        ],
-        "channel_weights": {"G": 1.0},
-        "channel_weights_sigma": {"G": 0.0},
-        "offsets": {"G": offset},
-        "offsets_sigma": {"G": sigma},
-        "flicker": 0.005,
-        "flicker_sigma": None,
-    }
-
-
 @pytest.fixture
 def put(tmp_path: Path) -> Put:
-    def write(name: str, patch: str = ".", made_with: Any = MADE_WITH, **content: Any) -> Path:
+    def write(
+        name: str, fit: DecayResult | None = None, patch: str = ".", made_with: Any = MADE_WITH
+    ) -> Path:
         folder = tmp_path / name
         (folder / patch).mkdir(parents=True, exist_ok=True)
         if made_with:
             (folder / "provenance.yaml").write_text(yaml.safe_dump(made_with))
-        if content:
-            (folder / patch / "fit.json").write_text(json.dumps(content))
+        if fit:
+            write_decay_result(folder / patch / "fit.json", fit)
         return folder
 
     return write
 
 
 def test_equal_results(put: Put) -> None:
-    old, new = put("old", **fit((0.03, 800.0))), put("new", **fit((0.03, 800.0)))
+    old, new = put("old", fit((0.03, 800.0))), put("new", fit((0.03, 800.0)))
     (old / "notes.txt").write_text("a person's own")
     assert changes(old, new) == ()
 
 
 def test_moves_are_told_in_sigma(put: Put) -> None:
     made_with = MADE_WITH | {"labrig": "0.2.0", "libraries": {"numpy": "2.1.0"}}
-    old = put("old", **fit((0.03, 800.0)))
-    new = put("new", made_with=made_with, **fit((0.0306, 800.0), offset=0.002))
+    old = put("old", fit((0.03, 800.0)))
+    new = put("new", fit((0.0306, 800.0), offset=0.002), made_with=made_with)
     assert changes(old, new) == (
         "labrig: 0.1.0 → 0.2.0",
         "libraries numpy: 2.0.0 → 2.1.0",
@@ -64,15 +51,15 @@ def test_moves_are_told_in_sigma(put: Put) -> None:
 
 
 def test_rounding_is_not_told_number_by_number(put: Put) -> None:
-    old, new = put("old", **fit((0.03, 800.0))), put("new", **fit((0.03000001, 800.0)))
+    old, new = put("old", fit((0.03, 800.0))), put("new", fit((0.03000001, 800.0)))
     (numbers, why) = changes(old, new)
     assert numbers == "every parameter within 0.01 σ"
     assert "nothing that is recorded explains it" in why
 
 
 def test_another_number_of_states(put: Put) -> None:
-    old = put("old", "left", **fit((0.03, 800.0)))
-    new = put("new", "left", MADE_WITH | {"states": 2}, **fit((0.1, 90.0), (0.03, 700.0)))
+    old = put("old", fit((0.03, 800.0)), "left")
+    new = put("new", fit((0.1, 90.0), (0.03, 700.0)), "left", MADE_WITH | {"states": 2})
     settings, numbers = changes(old, new)
     assert settings == "states: none → 2"
     assert numbers == (
@@ -82,7 +69,7 @@ def test_another_number_of_states(put: Put) -> None:
 
 
 def test_fits_that_come_and_go(put: Put) -> None:
-    old, new = put("old", "left", **fit((0.03, 8.0))), put("new", "right", **fit((0.03, 8.0)))
+    old, new = put("old", fit((0.03, 8.0)), "left"), put("new", fit((0.03, 8.0)), "right")
     assert changes(old, new)[:2] == ("left: fitted before, not now", "right: not fitted before")
 
 

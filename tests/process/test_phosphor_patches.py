@@ -12,7 +12,6 @@ from hypothesis import strategies as st
 
 from labrig.acquire import plugins, read_rig_file
 from labrig.calibration import Strip, write_irradiance_file, write_lvf_file
-from labrig.catalogue.results import read_results
 from labrig.compare.result import read_patches
 from labrig.errors import DataError, FitError, UsageError
 from labrig.material import read_material
@@ -28,6 +27,7 @@ from labrig.reduce import RawFrame
 from labrig.region import Region
 from labrig.report import figure_style
 from labrig.report.sections import Section
+from labrig.results import read_decay_results
 from tests.process.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.process.recorded import record
 from tests.process.spectral_bench import emitted, true_lvf_file
@@ -137,7 +137,7 @@ def test_results_lie_in_folders_of_the_patches(run: Path, result: Result) -> Non
     for part in ("Material", "Emission spectrum", "Excitation"):
         assert all(f"<h2>{part}: {paint}</h2>" in page for paint in PAINTS)
     assert any(line.startswith("excitation: orange-paint: state 1") for line in result.lines)
-    assert [one.name for one in read_results(run)] == list(PAINTS)
+    assert list(read_decay_results(run / "result")) == list(PAINTS)
 
 
 @pytest.mark.campaign

@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import chdtrc, fdtrc, ndtr
 
-from labrig.fit.decay.result import DecayState
 from labrig.fit.decay.states import APART_SIGMAS, sigmas_apart
 from labrig.fit.least_squares import FloatArray
+from labrig.results import DecayState
 
 #: Chance at which data that are as assumed get a misfit warning, per test.
 MISFIT_LEVEL = 5e-4

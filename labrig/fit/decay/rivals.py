@@ -16,6 +16,7 @@ from labrig.fit.decay.search import projection
 from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
+from labrig.results import Rival
 
 #: τ from this share of the shortest step between frames …
 SHORTEST_STEPS = 0.01
@@ -67,29 +68,6 @@ RIVALS = (
         exponents=(0.1, 0.95),
     ),
 )
-
-
-@dataclass(frozen=True)
-class Rival:
-    """A rival fitted, in the brightest channel, in the values' units.
-
-    Attributes
-    ----------
-    name, formula
-        Which, and how it reads.
-    amplitude, tau_s, exponent, exponent_sigma
-        A at lamp off, τ, p or β and its σ.
-    bic
-        Bayesian information criterion, comparable with the candidates'.
-    """
-
-    name: str
-    formula: str
-    amplitude: float
-    tau_s: float
-    exponent: float
-    exponent_sigma: float
-    bic: float
 
 
 def fit_rival(

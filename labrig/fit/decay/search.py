@@ -17,9 +17,9 @@ from math import comb
 import nlopt
 import numpy as np
 
-from labrig.fit.decay.shapes import exponential_means
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
+from labrig.material.rates import exponential_means
 
 #: Combinations of rates looked at; decides how fine the grid can be.
 COMBINATIONS = 4000

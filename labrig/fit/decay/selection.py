@@ -6,8 +6,6 @@ The F-test's denominator is the frames' own scatter along the signal, so that ne
 underestimated σ nor channels that flicker together can argue a state into being.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.special import fdtrc
 
@@ -15,34 +13,13 @@ from labrig.fit.decay.joint import JointFit
 from labrig.fit.decay.states import StatesFit, fit_states
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
+from labrig.results import Candidate
 
 #: Chance of a state too many, were its rate known. It is searched for, which multiplies chances;
 #: the BIC divides them again: ≤ 0.3 % of single exponentials come out double (tests/acceptance).
 F_TEST_LEVEL = 0.002
 #: How much lower a power law's BIC must be: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
-
-
-@dataclass(frozen=True)
-class Candidate:
-    """What n states achieved, all candidates at the same weights.
-
-    Attributes
-    ----------
-    n_states
-        States tried.
-    reduced_chi2
-        χ² per degree of freedom; NaN if there are none.
-    bic
-        χ² + parameters · log(independent data).
-    f_p_value
-        Chance of such a gain over one state fewer if that were enough; None for the first tried.
-    """
-
-    n_states: int
-    reduced_chi2: float
-    bic: float
-    f_p_value: float | None
 
 
 def bic(data: WhitenedSeries, joint: JointFit) -> float:

@@ -9,33 +9,10 @@ from labrig.material.rates import phi1
 SERIES_BELOW = 0.03
 
 
-def exponential_means(
-    rates_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray
-) -> FloatArray:
-    """Mean of e^(−k t) over each exposure, e^(−k t)(1 − e^(−k T))/(k T); its limit where T = 0.
-
-    Parameters
-    ----------
-    rates_per_s
-        (m,) k > 0.
-    t_s, exposure_s
-        (n,) start t and length T ≥ 0 of the exposures.
-
-    Returns
-    -------
-    (n, m), in (0, 1] for t ≥ 0.
-    """
-    decayed: FloatArray = np.exp(-np.multiply.outer(t_s, rates_per_s))
-    if not exposure_s.any():
-        return decayed
-    x = np.multiply.outer(exposure_s, rates_per_s)
-    return decayed * phi1(x)
-
-
 def exponential_means_and_slopes(
     rates_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """`exponential_means` and their derivatives with respect to log k, both (n, m)."""
+    """`labrig.material.rates.exponential_means` and their derivatives by log k, both (n, m)."""
     phase = np.multiply.outer(t_s, rates_per_s)
     decayed: FloatArray = np.exp(-phase)
     if not exposure_s.any():

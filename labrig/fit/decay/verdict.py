@@ -14,12 +14,10 @@ from labrig.fit.decay.diagnostics import (
     state_warnings,
 )
 from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
-from labrig.fit.decay.result import DecayState
-from labrig.fit.decay.rivals import Rival
-from labrig.fit.decay.selection import Candidate
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
+from labrig.results import Candidate, DecayState, Rival
 
 RISING_SIGMAS = 5.0
 #: A rate this close to the slowest one searched, in log k, has come to rest there.

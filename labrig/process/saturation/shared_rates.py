@@ -15,8 +15,8 @@ from scipy.special import chdtrc, fdtrc
 
 from labrig.errors import FitError
 from labrig.fit import DecayFit
-from labrig.fit.decay.shapes import exponential_means
 from labrig.fit.least_squares import EPSILON
+from labrig.material.rates import exponential_means
 from labrig.reduce import Series
 
 FloatArray = NDArray[np.float64]
