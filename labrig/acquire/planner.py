@@ -133,6 +133,8 @@ class _PlannedDevice:
 
 
 class _PlannedLamp(_PlannedDevice):
+    reads_back = False
+
     def __init__(self) -> None:
         self._on = False
 

@@ -12,6 +12,8 @@ Note = Callable[[str], None]
 class NotingLamp:
     """A lamp; fails on demand."""
 
+    reads_back = True
+
     def __init__(self, clock: VirtualClock, note: Note, fail: Exception | None = None) -> None:
         self.lit = False
         self.fail = fail
