@@ -4,8 +4,8 @@ from labrig.acquire.rig import Rig
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 
-#: How often while something is waited for.
-READ_PERIOD_S = 60.0
+#: How often while something is waited for: with looks every 30 s about once a minute.
+READ_PERIOD_S = 50.0
 
 
 class LampReadback:

@@ -66,6 +66,8 @@ def test_planned_steps(against: Against) -> None:
 class NothingLamp:
     """Does nothing, in no time."""
 
+    reads_back = False
+
     def identity(self) -> str:
         return "nothing"
 
