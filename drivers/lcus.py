@@ -71,7 +71,6 @@ class LcusRelay:
         self._send(on=False)
         self._answers = self._query() is not None
 
-    @property
     def reads_back(self) -> bool:
         """Whether the board answers its query."""
         return self._answers

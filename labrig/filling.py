@@ -86,7 +86,7 @@ def fill(
             _tell_what_was_exchanged(folder, devices, observer)
             told: dict[str, Any] = {"rig": rig.name, "devices": devices}
             if "lamp" in rig.devices:
-                told["lamp_reads_back"] = rig.lamp.reads_back
+                told["lamp_reads_back"] = rig.lamp.reads_back()
             run_units(units, rig, folder, observer, {**metadata, **told})
 
         try:

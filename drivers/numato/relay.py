@@ -38,7 +38,6 @@ class NumatoRelay:
         self._clock = connections.clock
         self._board = Board(address, connections)
 
-    @property
     def reads_back(self) -> bool:
         """Every Numato board tells the states of its relays."""
         return True

@@ -15,11 +15,16 @@ class LampReadback:
     ----------
     rig
         Whose lamp was made safe, and is switched by nobody else from now on.
+
+    Attributes
+    ----------
+    is_told
+        Whether there is a lamp whose board tells.
     """
 
     def __init__(self, rig: Rig) -> None:
         self._rig = rig
-        self._is_told = "lamp" in rig.devices and rig.lamp.reads_back
+        self.is_told = "lamp" in rig.devices and rig.lamp.reads_back()
         self._asked_on = False
         self._asked_s = self._read_s = rig.clock.now()
 
@@ -41,7 +46,7 @@ class LampReadback:
         DeviceError
             It is not as it was switched.
         """
-        if not self._is_told:
+        if not self.is_told:
             return
         self._read_s = self._rig.clock.now()
         if self._rig.lamp.is_on() == self._asked_on:

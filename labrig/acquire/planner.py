@@ -133,10 +133,11 @@ class _PlannedDevice:
 
 
 class _PlannedLamp(_PlannedDevice):
-    reads_back = False
-
     def __init__(self) -> None:
         self._on = False
+
+    def reads_back(self) -> bool:
+        return False
 
     def on(self) -> None:
         self._on = True

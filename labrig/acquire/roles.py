@@ -31,7 +31,6 @@ class Device(Protocol):
 class Lamp(Device, Protocol):
     """A light that charges the sample. Safe: off."""
 
-    @property
     def reads_back(self) -> bool:
         """Whether `is_on` is what the device says; else it is what was asked last."""
 

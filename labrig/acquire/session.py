@@ -234,7 +234,10 @@ class Session:
 
     def _sleep_until(self, deadline_s: float) -> None:
         """Wait; keep from falling asleep what would, and from striking what guards."""
-        while deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
+        looked_after = (
+            self._sleepy or self._guarded or self._temperature.is_kept or self._lamp.is_told
+        )
+        while looked_after and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
             self.clock.sleep(AWAKE_PERIOD_S)
             self._look_after()
         if deadline_s - self.clock.now() > QUIET_BEFORE_S:

@@ -12,8 +12,6 @@ Note = Callable[[str], None]
 class NotingLamp:
     """A lamp; fails on demand."""
 
-    reads_back = True
-
     def __init__(self, clock: VirtualClock, note: Note, fail: Exception | None = None) -> None:
         self.lit = False
         self.fail = fail
@@ -34,6 +32,9 @@ class NotingLamp:
         self._clock.sleep(0.001)
         self.lit = False
         self._note("lamp off")
+
+    def reads_back(self) -> bool:
+        return True
 
     def is_on(self) -> bool:
         return self.lit

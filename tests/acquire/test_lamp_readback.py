@@ -22,6 +22,10 @@ class SharedLamp(NotingLamp):
         super().__init__(clock, lambda text: None)
         self.at_s = list(at_s)
         self.read_s: list[float] = []
+        self.tells = True
+
+    def reads_back(self) -> bool:
+        return self.tells
 
     def is_on(self) -> bool:
         now_s = self._clock.now()
@@ -75,6 +79,6 @@ def test_what_somebody_else_switched_ends_the_unit(
 def test_what_no_board_tells_is_not_asked(tmp_path: Path) -> None:
     clock = VirtualClock()
     lamp = SharedLamp(clock, [100.0])
-    lamp.reads_back = False
+    lamp.tells = False
     assert list(charged(tmp_path, lamp, clock).completed()) == ["charge"]
     assert lamp.read_s == []

@@ -66,8 +66,6 @@ def test_planned_steps(against: Against) -> None:
 class NothingLamp:
     """Does nothing, in no time."""
 
-    reads_back = False
-
     def identity(self) -> str:
         return "nothing"
 
@@ -76,6 +74,9 @@ class NothingLamp:
 
     def off(self) -> None:
         pass
+
+    def reads_back(self) -> bool:
+        return False
 
     def is_on(self) -> bool:
         return False
