@@ -10,7 +10,7 @@ import socket
 import stat
 import sys
 from collections.abc import Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import Any
 from urllib.parse import quote, urlsplit
@@ -18,6 +18,9 @@ from urllib.parse import quote, urlsplit
 from filelock import FileLock, Timeout
 
 from labrig.errors import UsageError
+
+if sys.platform != "win32":
+    import fcntl
 
 #: In memory and never tidied up; open to everybody on Debian, Ubuntu and Arch, not on Fedora.
 RUN_LOCK = Path("/run/lock")
@@ -40,24 +43,19 @@ def held(device: str, address: str) -> Iterator[None]:
         Another labrig has it.
     """
     path = lock_folder() / f"labrig-{quote(os.fsencode(device), safe='')}.lock"
-    # For every user of this PC.
-    lock = FileLock(path, mode=0o666)
-    try:
-        path.parent.mkdir(exist_ok=True)
-        lock.acquire(timeout=0)
-    except Timeout:
-        raise UsageError(
-            f"{address} is held by another labrig on this PC; wait until it has ended"
-        ) from None
-    except OSError as error:
-        raise UsageError(
-            f"{address} cannot be kept from other labrigs on this PC, because {path} cannot be "
-            f"locked ({error.strerror}); see that every user may write there"
-        ) from None
-    try:
+    with ExitStack() as stack:
+        try:
+            stack.enter_context(_locked(path))
+        except (BlockingIOError, Timeout):
+            raise UsageError(
+                f"{address} is held by another labrig on this PC; wait until it has ended"
+            ) from None
+        except OSError as error:
+            raise UsageError(
+                f"{address} cannot be kept from other labrigs on this PC, because {path} cannot be "
+                f"locked ({error.strerror}); see that every user may write there"
+            ) from None
         yield
-    finally:
-        lock.release()
 
 
 def lock_folder(platform: str = sys.platform) -> Path:
@@ -66,6 +64,30 @@ def lock_folder(platform: str = sys.platform) -> Path:
         return Path(os.environ["PROGRAMDATA"]) / "labrig"
     is_for_everybody = RUN_LOCK.is_dir() and RUN_LOCK.stat().st_mode & stat.S_IWOTH
     return RUN_LOCK if is_for_everybody else Path("/tmp")
+
+
+@contextmanager
+def _locked(path: Path) -> Iterator[None]:
+    """A lock on a file that any user may have made.
+
+    Of such a file in a folder for everybody, Linux forbids others to open it as if to make it
+    (fs.protected_regular), and filelock does not trust it: hence both steps are done here.
+    """
+    if sys.platform == "win32":
+        path.parent.mkdir(exist_ok=True)
+        with FileLock(path, timeout=0):
+            yield
+        return
+    with suppress(FileExistsError):
+        made = os.open(path, os.O_CREAT | os.O_EXCL)
+        os.fchmod(made, 0o444)
+        os.close(made)
+    lock = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+    try:
+        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        yield
+    finally:
+        os.close(lock)
 
 
 def serial_devices(port: str, platform: str = sys.platform) -> list[str]:

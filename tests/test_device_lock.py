@@ -70,7 +70,7 @@ def test_the_place_of_the_locks_is_one_for_all(
 def test_what_is_held_is_held_once_and_free_afterwards(
     monkeypatch: pytest.MonkeyPatch, tmp_path: Path
 ) -> None:
-    monkeypatch.setattr("labrig.device_lock.lock_folder", lambda: tmp_path / "locks")
+    monkeypatch.setattr("labrig.device_lock.lock_folder", lambda: tmp_path)
     for _ in range(2):
         with (
             held("serial-1-2", "COM3"),
@@ -79,6 +79,22 @@ def test_what_is_held_is_held_once_and_free_afterwards(
             held("serial-1-2", "COM3"),
         ):
             pass
+
+
+def test_a_lock_file_that_another_user_left_is_a_lock_file(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("labrig.device_lock.lock_folder", lambda: tmp_path)
+    before = os.umask(0o077)
+    try:
+        with held("serial-1-2", "COM3"):
+            pass
+    finally:
+        os.umask(before)
+    (left,) = tmp_path.iterdir()
+    assert left.stat().st_mode & 0o777 == 0o444, "everybody can lock it, nobody has to write"
+    with held("serial-1-2", "COM3"):
+        pass
 
 
 def test_a_lock_that_cannot_be_made_is_one_line(
