@@ -2,6 +2,8 @@
 
 import ctypes
 import os
+import subprocess
+import sys
 import time
 from collections.abc import Callable
 from pathlib import Path
@@ -21,6 +23,12 @@ while [ "${1#--}" != "$1" ]; do shift; done
 echo ended >> "$0.log"
 """
 REFUSES = "echo 'Failed to inhibit: Access denied' >&2; exit 1"
+KILLED = """
+import os
+from labrig.awake import kept_awake
+with kept_awake(print, "linux"):
+    os.kill(os.getpid(), 9)
+"""
 ENDS_BY_ITSELF = 'echo "$@" >> "$0.log"; exec sleep 60'
 
 Stand = Callable[[str, str], Path]
@@ -46,6 +54,13 @@ def test_linux_holds_a_lock_of_the_desktops_service(stand_in: Stand) -> None:
         assert "sleep" in log.read_text()
         assert "ended" not in log.read_text()
     assert not told
+
+
+def test_linux_holds_it_no_longer_than_labrig_lives(stand_in: Stand) -> None:
+    log = stand_in("systemd-inhibit", INHIBITS)
+    assert subprocess.run([sys.executable, "-c", KILLED], check=False).returncode == -9
+    while "ended" not in log.read_text():
+        time.sleep(0.01)
 
 
 @pytest.mark.parametrize("script", [REFUSES, None])

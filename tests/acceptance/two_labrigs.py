@@ -3,7 +3,7 @@
     python -m tests.acceptance.two_labrigs [--trials 60] [--seed 1]
 
 In half of the trials the first labrig is held in the middle of its work while the second one comes;
-in the others both start at once. The second one is another user, too, where this one is root.
+in the others both start at once.
 """
 
 import argparse
@@ -15,77 +15,62 @@ import sys
 import tempfile
 import time
 from collections import Counter
-from dataclasses import dataclass
 from pathlib import Path
 
 from tests.acceptance.board_on_a_terminal import RIG, WatchedBoard, on_a_terminal
 
 SPELLINGS = ("path", "link", "relative path", "two slashes", "other TMPDIR")
-NOBODY = 65534
 PATIENCE_S = 60.0
 
 
-@dataclass(frozen=True)
-class Caller:
-    """How one of the two calls the port."""
-
-    spelling: str
-    other_user: bool
-
-    def start(self, address: str, folder: Path) -> subprocess.Popen[str]:
-        """`labrig rig check` of a rig with that port alone."""
-        folder.mkdir()
-        (folder / "by-id").symlink_to(address)
-        called = {
-            "link": "by-id",
-            "relative path": os.path.relpath(address, folder),
-            "two slashes": f"/{address}",
-        }.get(self.spelling, address)
-        (folder / "rig.yaml").write_text(RIG.format(address=called))
-        here = str(Path.cwd())
-        environment = os.environ | {"PYTHONPATH": here}
-        if self.spelling == "other TMPDIR":
-            environment["TMPDIR"] = str(folder)
-        return subprocess.Popen(
-            [sys.executable, "-m", "labrig", "rig", "check", "rig.yaml"],
-            cwd=folder,
-            env=environment,
-            user=NOBODY if self.other_user else None,
-            stdout=subprocess.PIPE,
-            stderr=subprocess.PIPE,
-            text=True,
-        )
+def start(spelling: str, address: str, folder: Path) -> subprocess.Popen[str]:
+    """`labrig rig check` of a rig with that port alone, called so."""
+    folder.mkdir()
+    (folder / "by-id").symlink_to(address)
+    called = {
+        "link": "by-id",
+        "relative path": os.path.relpath(address, folder),
+        "two slashes": f"/{address}",
+    }.get(spelling, address)
+    (folder / "rig.yaml").write_text(RIG.format(address=called))
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
+    if spelling == "other TMPDIR":
+        environment["TMPDIR"] = str(folder)
+    return subprocess.Popen(
+        [sys.executable, "-m", "labrig", "rig", "check", "rig.yaml"],
+        cwd=folder,
+        env=environment,
+        stdout=subprocess.PIPE,
+        stderr=subprocess.PIPE,
+        text=True,
+    )
 
 
 def held(rng: random.Random, folder: Path, spelling: str) -> str:
     """The first is stopped in mid-work; the second must leave, unheard."""
     board = WatchedBoard()
     with on_a_terminal(board) as address:
-        first = Caller(rng.choice(SPELLINGS), other_user=False).start(address, folder / "first")
+        first = start(rng.choice(SPELLINGS), address, folder / "first")
         deadline_s = time.monotonic() + PATIENCE_S
         while not board.switched and time.monotonic() < deadline_s:
             time.sleep(0.001)
         first.send_signal(signal.SIGSTOP)
         time.sleep(0.1)
         before = board.heard_bytes, board.lamp_on
-        second = Caller(spelling, other_user=os.geteuid() == 0 and rng.random() < 0.3)
-        code, complaint = _ended(second.start(address, folder / "second"))
+        code, complaint = _ended(start(spelling, address, folder / "second"))
         after = board.heard_bytes, board.lamp_on
         first.kill()
         first.communicate()
         if code == 2 and before == after and "held by another labrig" in complaint:
             return ""
-        return f"{second}: code {code}; {before} → {after}; {complaint!r}"
+        return f"{spelling}: code {code}; {before} → {after}; {complaint!r}"
 
 
 def at_once(rng: random.Random, folder: Path, alone_bytes: int) -> str:
     """At least one gets in, and only those that do are heard."""
     board = WatchedBoard()
     with on_a_terminal(board) as address:
-        both = [
-            Caller(rng.choice(SPELLINGS), other_user=False).start(address, folder / str(number))
-            for number in range(2)
-        ]
+        both = [start(rng.choice(SPELLINGS), address, folder / str(number)) for number in range(2)]
         codes = sorted(_ended(one)[0] for one in both)
         heard = board.heard_bytes == alone_bytes * codes.count(0)
         return "" if codes in ([0, 0], [0, 2]) and heard else f"at once: {codes}, heard {heard}"
@@ -100,7 +85,7 @@ def _alone(folder: Path) -> int:
     """Bytes that one labrig sends."""
     board = WatchedBoard()
     with on_a_terminal(board) as address:
-        code, complaint = _ended(Caller("path", other_user=False).start(address, folder))
+        code, complaint = _ended(start("path", address, folder))
     assert code == 0, complaint
     return board.heard_bytes
 
@@ -116,7 +101,6 @@ def main() -> None:
     wrong = []
     with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
-        folder.chmod(0o755)
         alone_bytes = _alone(folder / "alone")
         for number in range(asked.trials):
             within = folder / f"trial-{number}"
