@@ -1,4 +1,4 @@
-"""Keeps this PC from falling asleep; tried on Linux alone, not on Windows and macOS."""
+"""Keeps this PC from falling asleep, by each system's own means; untried on macOS and Windows."""
 
 import ctypes
 import os
