@@ -71,6 +71,10 @@ class LcusRelay:
         self._send(on=False)
         self._answers = self._query() is not None
 
+    def reads_back(self) -> bool:
+        """Whether the board answers its query."""
+        return self._answers
+
     def identity(self) -> str:
         """What the board shows of itself: how many relays it tells of, or that it tells nothing."""
         states = self._query() if self._answers else None

@@ -1,25 +1,24 @@
 """Opens a rig: the one place where drivers, clock and, in a simulated rig, the room meet."""
 
 import socket
-import tempfile
-from collections.abc import Callable, Iterator
-from contextlib import ExitStack, closing, contextmanager
+from collections.abc import Callable, Iterable, Iterator
+from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
 from dataclasses import dataclass
-from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
 import serial
 import usb.core
-from filelock import FileLock, Timeout
 
 from labrig.acquire import Device, Rig, RigFile, plugins
 from labrig.acquire.connections import SerialPort
 from labrig.acquire.rig import in_safe_order
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.acquire.roles import ROLES
+from labrig.awake import kept_awake
 from labrig.clock import Clock, SystemClock
-from labrig.errors import DeviceError, UsageError
+from labrig.device_lock import held, network_devices, serial_devices, usb_device
+from labrig.errors import DeviceError, LabrigError, UsageError
 from labrig.record import REAL_DISK, Disk
 from labrig.signals import interrupting
 from labrig.yaml_file import validate
@@ -49,6 +48,10 @@ class Bench:
     def disk(self) -> Disk:
         """The disk of the PC that the rig hangs on."""
         return REAL_DISK if self.room is None else self.room.disk
+
+    def kept_awake(self, warn: Callable[[str], None]) -> AbstractContextManager[None]:
+        """Keep the PC from falling asleep meanwhile; time in a simulated room would sleep, too."""
+        return kept_awake(warn) if self.room is None else nullcontext()
 
     @contextmanager
     def devices(self) -> Iterator[Rig]:
@@ -149,34 +152,40 @@ def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str
 
 
 class _Connections:
-    """Opens each address once; real ones under a lock that other labrigs respect."""
+    """Opens each port once, by whatever name; what is real under a lock that labrigs respect."""
 
     def __init__(self, clock: Clock, room: "OpenRoom | None", stack: ExitStack) -> None:
         self.clock = clock
         self._room = room
         self._stack = stack
-        self._ports: dict[str, SerialPort] = {}
-        self._hosts: set[str] = set()
+        self._ports: dict[tuple[str, ...], SerialPort] = {}
+        self._held: set[str] = set()
 
     def serial(self, address: str, baudrate: int) -> SerialPort:
-        if address not in self._ports:
-            self._hold(address)
-            try:
-                port = serial.serial_for_url(
-                    address, baudrate=baudrate, timeout=0, write_timeout=SERIAL_WRITE_TIMEOUT_S
-                )
-            except (serial.SerialException, OSError, ValueError) as error:
-                raise DeviceError(
-                    f"cannot open the serial port {address} ({' '.join(str(error).split())}); "
-                    "check that it is plugged in and that no other program uses it"
-                ) from None
-            self._stack.callback(port.close)
-            self._ports[address] = port
-        return self._ports[address]
+        try:
+            port = serial.serial_for_url(
+                address,
+                do_not_open=True,
+                baudrate=baudrate,
+                timeout=0,
+                write_timeout=SERIAL_WRITE_TIMEOUT_S,
+                exclusive=True,
+            )
+            devices = tuple(serial_devices(str(port.port)))
+            if devices not in self._ports:
+                self._hold(devices, address)
+                port.open()
+                self._stack.callback(port.close)
+                self._ports[devices] = port
+        except (serial.SerialException, OSError, ValueError) as error:
+            raise DeviceError(
+                f"cannot open the serial port {address} ({' '.join(str(error).split())}); "
+                "check that it is plugged in and that no other program uses it"
+            ) from None
+        return self._ports[devices]
 
     def usb(self, address: str, serial_of: Callable[[Any], str] | None = None) -> Any:
         url = urlsplit(address)
-        self._hold(address)
         if url.scheme == "sim":
             backend = None if self._room is None else self._room.usb(url.path.strip("/"))
             found = None if backend is None else usb.core.find(backend=backend)
@@ -196,8 +205,8 @@ class _Connections:
 
     def tcp(self, address: str, default_port: int) -> socket.socket:
         host, port = _host_and_port(address, default_port)
-        self._hold_host(f"{urlsplit(address).scheme}://{host}:{port}")
         try:
+            self._hold(network_devices(host, port), address)
             connected = socket.create_connection((host, port), TCP_CONNECT_TIMEOUT_S)
             # commands are small, and somebody waits for the answer to each
             connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -222,8 +231,12 @@ class _Connections:
         try:
             alike = list(usb.core.find(find_all=True, idVendor=vendor, idProduct=product))
             if serial:
-                return _with_serial(alike, serial, serial_of)
-            return alike[0] if alike else None
+                found = _with_serial(alike, serial, address, serial_of)
+            else:
+                found = alike[0] if alike else None
+            if found is not None:
+                self._hold([usb_device(found)], address)
+            return found
         except usb.core.NoBackendError:
             raise DeviceError(
                 "libusb is not installed, so USB cameras cannot be reached; install libusb-1.0 "
@@ -236,37 +249,30 @@ class _Connections:
                 "give the camera the WinUSB driver"
             ) from None
 
-    def _hold_host(self, address: str) -> None:
-        if address not in self._hosts:
-            self._hold(address)
-            self._hosts.add(address)
-
-    def _hold(self, address: str) -> None:
-        """Lock a real address; a simulated room is private to its process."""
-        if address.startswith("sim://"):
-            return
-        name = "".join(c if c.isalnum() else "-" for c in address)
-        # For every user of this PC, hence not in a user's own folder.
-        lock = FileLock(Path(tempfile.gettempdir()) / f"labrig-{name}.lock", mode=0o666)
-        try:
-            lock.acquire(timeout=0)
-        except (Timeout, PermissionError):
-            raise UsageError(
-                f"{address} is held by another labrig on this PC; wait until it has ended"
-            ) from None
-        self._stack.callback(lock.release)
+    def _hold(self, devices: Iterable[str], address: str) -> None:
+        """Keep other labrigs from real devices; a simulated room is private to its process."""
+        for device in devices:
+            if device not in self._held and not address.startswith("sim://"):
+                self._stack.enter_context(held(device, address))
+                self._held.add(device)
 
 
-def _with_serial(alike: list[Any], serial: str, serial_of: Callable[[Any], str] | None) -> Any:
+def _with_serial(
+    alike: list[Any], serial: str, address: str, serial_of: Callable[[Any], str] | None
+) -> Any:
     """The device with that serial number; those that tell none on the bus are asked in turn."""
-    others, problem = [], None
+    others = []
+    problem: LabrigError | None = None
     for device in sorted(alike, key=lambda device: not device.iSerialNumber):
         try:
             if device.iSerialNumber:
                 said = device.serial_number
+            elif serial_of:
+                with held(usb_device(device), address):
+                    said = serial_of(device)
             else:
-                said = serial_of(device) if serial_of else ""
-        except DeviceError as failure:
+                said = ""
+        except (DeviceError, UsageError) as failure:
             problem = failure
             continue
         if said.strip().lstrip("0") == serial.lstrip("0"):

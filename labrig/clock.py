@@ -4,13 +4,26 @@ Times are seconds of the clock's own monotonic scale; `Clock.wall` turns them in
 1970, anchored once, so that a stepped PC clock cannot bend a measurement.
 """
 
+import ctypes
+import sys
 import time
 from abc import ABC, abstractmethod
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 from contextlib import contextmanager
+from functools import partial
+from typing import Any
 
 #: A sleeping PC looks up this often, so that Ctrl-C is answered at once on every system.
 LOOK_UP_S = 0.05
+#: Clocks of a PC that is awake agree within much less.
+SLEPT_S = 0.3
+#: A clock that goes on while the PC sleeps, and one that stands still, by `sys.platform`.
+SLEEP_CLOCKS = {
+    "linux": ("CLOCK_BOOTTIME", "CLOCK_MONOTONIC"),
+    "darwin": ("CLOCK_MONOTONIC_RAW", "CLOCK_UPTIME_RAW"),
+}
+
+Reading = Callable[[], float]
 
 
 class Interrupted(BaseException):
@@ -21,6 +34,14 @@ class Interrupted(BaseException):
         self.signum = signum
 
 
+class Slept(BaseException):
+    """The PC fell asleep and woke up again; delivered at a wait."""
+
+    def __init__(self, slept_s: float) -> None:
+        super().__init__(f"this PC slept for {slept_s:.1f} s")
+        self.slept_s = slept_s
+
+
 class Clock(ABC):
     """Time, and the only place where a run can be interrupted."""
 
@@ -28,10 +49,15 @@ class Clock(ABC):
         self.epoch_s = epoch_s
         self._signum: int | None = None
         self._shields = 0
+        self._slept_before_s: float | None = None
 
     @abstractmethod
     def now(self) -> float:
-        """Seconds on the clock's own scale, never stepping back."""
+        """Seconds on the clock's own scale, never stepping back; goes on while the PC sleeps."""
+
+    @abstractmethod
+    def slept_s(self) -> float:
+        """Seconds that the PC has slept since some time, as far as it tells."""
 
     @abstractmethod
     def _pause_until(self, deadline_s: float) -> None:
@@ -65,23 +91,87 @@ class Clock(ABC):
         finally:
             self._shields -= 1
 
+    @contextmanager
+    def noticing_sleep(self) -> Iterator[None]:
+        """What is timed inside must not be slept through: raises `Slept` at a wait, or at the end.
+
+        Raises
+        ------
+        Slept
+            The PC slept since the beginning.
+        """
+        self._slept_before_s = self.slept_s()
+        try:
+            yield
+            self._notice_sleep()
+        finally:
+            self._slept_before_s = None
+
     def _look_up(self) -> None:
-        if self._signum is not None and not self._shields:
+        if self._shields:
+            return
+        if self._signum is not None:
             signum, self._signum = self._signum, None
             raise Interrupted(signum)
+        self._notice_sleep()
+
+    def _notice_sleep(self) -> None:
+        if self._slept_before_s is None:
+            return
+        slept_s = self.slept_s() - self._slept_before_s
+        if slept_s > SLEPT_S:
+            raise Slept(slept_s)
 
 
 class SystemClock(Clock):
-    """The PC's monotonic clock."""
+    """The PC's monotonic clock.
 
-    def __init__(self) -> None:
-        super().__init__(epoch_s=time.time() - time.perf_counter())
+    Parameters
+    ----------
+    platform
+        As `sys.platform`. Whether the PC slept is known on Linux, and, though not tried there, on
+        macOS and Windows.
+    """
+
+    def __init__(self, platform: str = sys.platform) -> None:
+        self._now, self._through_sleep, self._awake = _readings(platform)
+        super().__init__(epoch_s=time.time() - self._now())
 
     def now(self) -> float:
-        return time.perf_counter()
+        return self._now()
+
+    def slept_s(self) -> float:
+        # In this order: a process that is stopped between the two has not slept.
+        through_sleep_s = self._through_sleep()
+        return through_sleep_s - self._awake()
 
     def _pause_until(self, deadline_s: float) -> None:
-        time.sleep(min(max(deadline_s - time.perf_counter(), 0.0), LOOK_UP_S))
+        time.sleep(min(max(deadline_s - self._now(), 0.0), LOOK_UP_S))
+
+
+def _readings(platform: str) -> tuple[Reading, Reading, Reading]:
+    """The clock that measures, one that goes on while the PC sleeps, one that stands still."""
+    if platform == "win32":
+        kernel32 = vars(ctypes)["windll"].kernel32
+        # The performance counter goes on, too, but runs apart from the other two by 0.3 s an hour.
+        return time.perf_counter, partial(_ticks_s, kernel32), partial(_unbiased_s, kernel32)
+    if platform not in SLEEP_CLOCKS:
+        return time.perf_counter, time.perf_counter, time.perf_counter
+    through_sleep, awake = (
+        partial(time.clock_gettime, getattr(time, name)) for name in SLEEP_CLOCKS[platform]
+    )
+    return through_sleep, through_sleep, awake
+
+
+def _ticks_s(kernel32: Any) -> float:
+    kernel32.GetTickCount64.restype = ctypes.c_uint64
+    return float(kernel32.GetTickCount64()) * 1e-3
+
+
+def _unbiased_s(kernel32: Any) -> float:
+    ticks = ctypes.c_uint64()
+    kernel32.QueryUnbiasedInterruptTime(ctypes.byref(ticks))
+    return ticks.value * 1e-7
 
 
 class VirtualClock(Clock):
@@ -99,6 +189,9 @@ class VirtualClock(Clock):
 
     def now(self) -> float:
         return self._now_s
+
+    def slept_s(self) -> float:
+        return 0.0
 
     def spend(self, duration_s: float) -> None:
         """Let a simulated transaction cost time; no interruption inside a transaction."""

@@ -6,12 +6,12 @@ from collections.abc import Callable, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from importlib.metadata import version
-from typing import Any, Protocol
+from typing import Any, Protocol, TypeVar
 
 from labrig.acquire import Checkable, Plan, ProtocolModel, Rig, RunObserver, Unit, run_units
 from labrig.acquire.roles import LIGHTS
 from labrig.bench import Bench
-from labrig.clock import Clock, Interrupted
+from labrig.clock import Clock, Interrupted, Slept
 from labrig.errors import (
     DataError,
     DeviceError,
@@ -23,6 +23,8 @@ from labrig.errors import (
 from labrig.quantity import duration_text
 from labrig.record import ActionRecord, RunFolder
 from labrig.signals import interrupting
+
+ErrorT = TypeVar("ErrorT", bound=BaseException)
 
 #: How long a lost device is waited for: somebody has to notice and walk to the bench.
 COMES_BACK_S = 300.0
@@ -43,7 +45,9 @@ class Watch(Protocol):
 def fill(
     folder: RunFolder, protocol: ProtocolModel, stand: Bench, laid_out: Plan, watch: Watch
 ) -> None:
-    """Do all units that `folder` lacks; a unit cut off by a crash or a lost device is done again.
+    """Do all units that `folder` lacks, with this PC kept awake.
+
+    A unit that was cut off by a crash or a lost device, or in which the PC slept, is done again.
 
     Raises
     ------
@@ -80,12 +84,14 @@ def fill(
             devices = rig.identities()
             _arrange_again(left, rig, observer)
             _tell_what_was_exchanged(folder, devices, observer)
-            run_units(
-                units, rig, folder, observer, {**metadata, "rig": rig.name, "devices": devices}
-            )
+            told: dict[str, Any] = {"rig": rig.name, "devices": devices}
+            if "lamp" in rig.devices:
+                told["lamp_reads_back"] = rig.lamp.reads_back()
+            run_units(units, rig, folder, observer, {**metadata, **told})
 
         try:
-            _Reconnecting(stand, folder, observer).run(use)
+            with stand.kept_awake(observer.warn):
+                _Reconnecting(stand, folder, observer).run(use)
         except Interrupted as stop:
             _close(folder, stand, "abort", f"signal {stop.signum}")
             name = signal.Signals(stop.signum).name
@@ -100,7 +106,10 @@ def fill(
 
 @dataclass
 class _Reconnecting:
-    """Connects, and connects again when a device was lost: unplugged, asleep, switched off."""
+    """Connects, and connects again when a device was lost: unplugged, asleep, switched off.
+
+    The devices of a PC that slept were without it, and often without power: they are lost, too.
+    """
 
     stand: Bench
     folder: RunFolder
@@ -131,10 +140,10 @@ class _Reconnecting:
                 if connected or lost is None or LIGHTS.isdisjoint(lost.unsafe):
                     raise
                 raise lost from None  # nobody knows whether the light is off
-            except DeviceError as error:
-                if connected and isinstance(error, DeviceLostError) and not _stopped(error):
-                    lost, back_by_s = error, self.stand.clock.now() + COMES_BACK_S
-                    self._give_up_units(error)
+            except (DeviceError, Slept) as error:
+                if connected and (loss := _loss(error)):
+                    lost, back_by_s = loss, self.stand.clock.now() + COMES_BACK_S
+                    self._give_up_units(loss)
                 elif connected or lost is None:
                     raise
                 elif self.stand.clock.now() >= back_by_s:
@@ -148,14 +157,30 @@ class _Reconnecting:
             raise error
         again = "".join(f"; the unit {unit} is done again" for unit in units)
         self.observer.warn(
-            f"{error}; waiting up to {duration_text(COMES_BACK_S)} for it to come back{again}"
+            f"{error}; waiting up to {duration_text(COMES_BACK_S)} for all devices to answer{again}"
         )
 
 
-def _stopped(error: BaseException) -> bool:
-    """Whether somebody asked to stop, and the way to the safe state then met `error`."""
-    before = error.__context__
-    return before is not None and (isinstance(before, Interrupted) or _stopped(before))
+def _loss(error: DeviceError | Slept) -> DeviceLostError | None:
+    """What may come back, where that can be waited for: nobody asked to stop."""
+    if _met(error, Interrupted):
+        return None
+    nap = _met(error, Slept)
+    said = nap and f"this PC slept for {duration_text(nap.slept_s)} (switch its energy saving off)"
+    if isinstance(error, Slept):
+        return DeviceLostError(said)
+    if not isinstance(error, DeviceLostError):
+        return None
+    if said:
+        error.args = (f"{said}; {error}",)
+    return error
+
+
+def _met(error: BaseException | None, kind: type[ErrorT]) -> ErrorT | None:
+    """`error`, or what was raised before it on the way to the safe state, if of that kind."""
+    while error is not None and not isinstance(error, kind):
+        error = error.__context__
+    return error
 
 
 def _refuse_what_spoils(rig: Rig) -> None:

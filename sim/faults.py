@@ -60,6 +60,12 @@ class Slowness(When):
     takes: DurationS = 2.0
 
 
+class Nap(When):
+    """`for`: how long the PC sleeps, an hour if that is not said."""
+
+    lasting: DurationS = Field(3600.0, alias="for")
+
+
 class Step(When):
     """`by`: how far a clock is stepped."""
 
@@ -134,6 +140,8 @@ class Fault(_Part):
     clock_ahead, clock_back
         The PC's own clock is stepped, by hand, by a time server or for the summer. A program that
         is running keeps its own time; the next one starts with the new one.
+    pc_asleep
+        The PC falls asleep and wakes up again: to save energy, or because its lid was closed.
     """
 
     model_config = ConfigDict(json_schema_extra=_or_its_name)
@@ -159,6 +167,7 @@ class Fault(_Part):
     disk_slow: Slowness | None = None
     clock_ahead: Step | None = None
     clock_back: Step | None = None
+    pc_asleep: Nap | None = None
 
     @model_validator(mode="before")
     @classmethod

@@ -15,6 +15,7 @@ from . import protocol_sim
 from .boards import HandsBoard, LcusBoard, MaestroBoard, NumatoBoard, SerialCable
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
+from .clock import RoomClock
 from .disk import SimulatedDisk
 from .faults import Fault, When, given
 from .room import Room
@@ -116,7 +117,8 @@ def open_room(
         The description does not fit.
     """
     simulation = validate(content, Simulation, f"{source}, simulation").opened_at(not_before_s)
-    room = OpenRoom(simulation, VirtualClock(simulation.wall_at_opening_s))
+    naps = given(fault.pc_asleep for fault in simulation.faults)
+    room = OpenRoom(simulation, RoomClock(simulation.wall_at_opening_s, naps))
     protocol_sim.open_door(NAME, room)
     try:
         yield room

@@ -6,6 +6,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import serial
 
 from labrig.acquire import read_rig_file
 from labrig.bench import open_bench
@@ -22,10 +23,20 @@ devices:
 """
 
 
+class HearingBoard(NumatoBoard):
+    """Knows how many bytes it was sent."""
+
+    heard_bytes = 0
+
+    def receive(self, data: bytes) -> bytes:
+        self.heard_bytes += len(data)
+        return super().receive(data)
+
+
 @pytest.fixture
-def wired() -> Iterator[tuple[str, NumatoBoard]]:
+def wired() -> Iterator[tuple[str, HearingBoard]]:
     """A board on a terminal device, its relay 3 left on by somebody."""
-    board = NumatoBoard(8, lambda relay, on: None)
+    board = HearingBoard(8, lambda relay, on: None)
     board.states[3] = True
     ours, theirs = pty.openpty()
     os.set_blocking(ours, True)
@@ -55,7 +66,7 @@ def rig(tmp_path: Path) -> Callable[[str], Path]:
 
 
 def test_the_real_driver_on_a_real_port_with_the_systems_clock(
-    wired: tuple[str, NumatoBoard], rig: Callable[[str], Path]
+    wired: tuple[str, HearingBoard], rig: Callable[[str], Path]
 ) -> None:
     address, board = wired
     path = rig(address)
@@ -70,19 +81,65 @@ def test_the_real_driver_on_a_real_port_with_the_systems_clock(
         assert not board.states[3], "off at the end"
 
 
-def test_a_rig_in_use_is_refused(
-    wired: tuple[str, NumatoBoard], rig: Callable[[str], Path]
+@pytest.mark.parametrize("spelling", ["as it is", "link", "relative path", "other TMPDIR"])
+def test_a_rig_in_use_is_refused_by_every_name_and_not_touched(
+    wired: tuple[str, HearingBoard],
+    rig: Callable[[str], Path],
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+    spelling: str,
 ) -> None:
+    address, board = wired
+    path = rig(address)
+    with open_bench(read_rig_file(path), str(path)) as first, first.devices() as devices:
+        devices.lamp.on()
+        before = board.heard_bytes
+        match spelling:
+            case "link":
+                (tmp_path / "by-id").symlink_to(address)
+                path = rig(str(tmp_path / "by-id"))
+            case "relative path":
+                path = rig(os.path.relpath(address))
+            case "other TMPDIR":
+                monkeypatch.setenv("TMPDIR", str(tmp_path))
+                monkeypatch.setattr("tempfile.tempdir", None)
+        with (
+            open_bench(read_rig_file(path), str(path)) as second,
+            pytest.raises(UsageError, match="held by another labrig"),
+            second.devices(),
+        ):
+            pass
+        assert board.heard_bytes == before
+        assert devices.lamp.is_on()
+
+
+def test_a_program_that_knows_no_labrig_is_refused_too(
+    wired: tuple[str, HearingBoard], rig: Callable[[str], Path]
+) -> None:
+    """At least if it asks for the port alone, as labrig does."""
     path = rig(wired[0])
-    file = read_rig_file(path)
-    with (
-        open_bench(file, str(path)) as first,
-        first.devices(),
-        open_bench(file, str(path)) as second,
-        pytest.raises(UsageError, match="held by another labrig"),
-        second.devices(),
-    ):
-        pass
+    with open_bench(read_rig_file(path), str(path)) as bench:
+        with bench.devices(), pytest.raises(serial.SerialException, match="lock"):
+            serial.Serial(wired[0], exclusive=True)
+        with (
+            serial.Serial(wired[0], exclusive=True),
+            pytest.raises(DeviceError, match="no other program uses it"),
+            bench.devices(),
+        ):
+            pass
+
+
+def test_two_names_of_one_board_are_one_port(
+    wired: tuple[str, HearingBoard], rig: Callable[[str], Path], tmp_path: Path
+) -> None:
+    address, _ = wired
+    link = tmp_path / "by-id"
+    link.symlink_to(address)
+    path = rig(address)
+    thermometer = f"  thermometer: {{driver: numato_thermometer, address: '{link}'}}\n"
+    path.write_text(path.read_text() + thermometer)
+    with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
+        assert set(devices.identities()) == {"lamp", "thermometer"}
 
 
 def test_a_port_that_is_not_there(rig: Callable[[str], Path], tmp_path: Path) -> None:
@@ -107,7 +164,7 @@ def test_what_is_no_usb_address(tmp_path: Path, address: str) -> None:
         pass
 
 
-def test_a_driver_in_the_wrong_role(tmp_path: Path, wired: tuple[str, NumatoBoard]) -> None:
+def test_a_driver_in_the_wrong_role(tmp_path: Path, wired: tuple[str, HearingBoard]) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(
         f"name: x\ndevices:\n  camera: {{driver: numato_relay, address: '{wired[0]}', relay: 1}}\n"

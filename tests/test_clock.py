@@ -1,10 +1,15 @@
 """Clocks wait, and are the only place where a run is interrupted."""
 
+import ctypes
 import signal
+import time
+from types import SimpleNamespace
+from typing import Any
 
 import pytest
 
-from labrig.clock import Clock, Interrupted, SystemClock, VirtualClock
+from labrig.clock import SLEEP_CLOCKS, Clock, Interrupted, Slept, SystemClock, VirtualClock
+from labrig.errors import DeviceError
 
 
 @pytest.mark.parametrize("clock", [SystemClock(), VirtualClock(1e9)], ids=["system", "virtual"])
@@ -40,3 +45,122 @@ def test_a_transaction_costs_time_and_is_not_interrupted() -> None:
     clock.interrupt(signal.SIGINT)
     clock.spend(2.5)
     assert clock.now() == 2.5
+
+
+class SleepyClock(VirtualClock):
+    """Sleeps as told."""
+
+    asleep_s = 0.0
+
+    def slept_s(self) -> float:
+        return self.asleep_s
+
+
+def test_sleep_is_noticed_at_the_next_wait_and_once() -> None:
+    clock = SleepyClock()
+    clock.asleep_s = 50.0
+
+    def timed() -> None:
+        clock.sleep(5.0)
+        clock.asleep_s += 3600.0
+        with clock.shielded():
+            clock.sleep(5.0)
+        clock.sleep(1000.0)
+
+    with pytest.raises(Slept) as caught, clock.noticing_sleep():
+        timed()
+    assert caught.value.slept_s == 3600.0
+    assert clock.now() == 10.0
+    clock.sleep(5.0)
+
+
+def test_sleep_after_the_last_wait_is_noticed_at_the_end() -> None:
+    clock = SleepyClock()
+    with pytest.raises(Slept), clock.noticing_sleep():
+        clock.asleep_s += 1.0
+
+
+def test_nobody_is_told_of_sleep_who_did_not_ask_or_of_a_hiccup() -> None:
+    clock = SleepyClock()
+    clock.asleep_s += 3600.0
+    clock.sleep(5.0)
+    with clock.noticing_sleep():
+        clock.asleep_s += 0.1
+        clock.sleep(5.0)
+
+
+def test_what_went_wrong_is_more_than_the_sleep() -> None:
+    clock = SleepyClock()
+
+    def failing() -> None:
+        clock.asleep_s += 3600.0
+        raise DeviceError("gone")
+
+    with pytest.raises(DeviceError), clock.noticing_sleep():
+        failing()
+
+
+class Pc:
+    """A PC whose clocks are read by each system's own calls."""
+
+    def __init__(self, platform: str, monkeypatch: pytest.MonkeyPatch) -> None:
+        self.now_s, self.asleep_s = 1000.0, 10.0
+        if platform == "win32":
+            kernel32 = SimpleNamespace(
+                GetTickCount64=Function(lambda: int(1e3 * self.now_s)),
+                QueryUnbiasedInterruptTime=self.unbiased,
+            )
+            windll = SimpleNamespace(kernel32=kernel32)
+            monkeypatch.setattr(ctypes, "windll", windll, raising=False)
+            monkeypatch.setattr(time, "perf_counter", lambda: self.now_s)
+            return
+        through_sleep, awake = SLEEP_CLOCKS[platform]
+        monkeypatch.setattr(time, through_sleep, "through sleep", raising=False)
+        monkeypatch.setattr(time, awake, "awake", raising=False)
+        monkeypatch.setattr(time, "clock_gettime", self.gettime)
+
+    def sleep(self, duration_s: float) -> None:
+        self.now_s += duration_s
+        self.asleep_s += duration_s
+
+    def gettime(self, clock: str) -> float:
+        return {"through sleep": self.now_s, "awake": self.now_s - self.asleep_s}[clock]
+
+    def unbiased(self, ticks: Any) -> int:
+        ticks._obj.value = int(1e7 * (self.now_s - self.asleep_s))
+        return 1
+
+
+class Function:
+    """A function of a DLL, whose result has a type."""
+
+    restype: Any = None
+
+    def __init__(self, call: Any) -> None:
+        self._call = call
+
+    def __call__(self) -> Any:
+        assert self.restype is ctypes.c_uint64, "a DLL gives 32 bits unless it is told"
+        return self._call()
+
+
+@pytest.mark.parametrize("platform", ["linux", "darwin", "win32"])
+def test_each_system_is_asked_how_long_it_slept(
+    monkeypatch: pytest.MonkeyPatch, platform: str
+) -> None:
+    pc = Pc(platform, monkeypatch)
+    clock = SystemClock(platform)
+    before_s, before_wall = clock.now(), clock.wall()
+    with clock.noticing_sleep():
+        clock.sleep(0.0)
+    with pytest.raises(Slept) as caught, clock.noticing_sleep():
+        pc.sleep(3600.0)
+    assert caught.value.slept_s == pytest.approx(3600.0, abs=0.01)
+    assert clock.now() - before_s == pytest.approx(3600.0), "time goes on in sleep"
+    assert clock.wall() - before_wall == pytest.approx(3600.0)
+
+
+def test_a_system_that_does_not_tell_is_taken_to_be_awake() -> None:
+    clock = SystemClock("plan9")
+    with clock.noticing_sleep():
+        clock.sleep(0.01)

@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+import serial
 import yaml
 
 from labrig.acquire import read_rig_file
@@ -172,6 +173,9 @@ def test_a_fault_that_stays_ends_the_run_which_goes_on_when_it_is_mended(
         ({"disk_slow": {"takes": "3 s"}}, "the disk cannot keep up, it took up to 3 s for a frame"),
         ({"lamp_dead": {"at": "1 s", "for": "5 s"}}, ""),
         ({"clock_back": {"at": "30 s"}}, ""),
+        ({"pc_asleep": {"at": "2 s"}}, "slept for 1 h (switch its energy saving off)"),
+        ({"pc_asleep": {"at": "30 s", "for": "5 s"}}, "the unit decay-1 is done again"),
+        ({"pc_asleep": {"at": "30 s", "for": "100 ms"}}, ""),
     ],
     ids=str,
 )
@@ -195,6 +199,47 @@ def test_a_fault_that_passes_costs_time_and_no_data(
     times = [doc["time"] for _, doc in read_journal(record.folder / "journal.jsonl").documents]
     assert times == sorted(times)
     assert not lamp_is_on(stands[-1])
+
+
+def test_a_sleep_is_in_the_record_and_in_the_report(
+    labrig: Labrig, rig: Make, protocol: Path, tmp_path: Path
+) -> None:
+    bench = rig({"pc_asleep": {"at": "30 s", "for": "2 h"}})
+    ended = labrig("run", protocol, "--rig", bench, "--runs", tmp_path)
+    assert ended.code == 0, ended.err
+    _, slept, again = read_run(ended.run_folder).attempts
+    assert (slept.unit, slept.exit_status) == ("decay-1", "fail")
+    assert "slept for 2 h" in slept.reason
+    assert again.start["time"] > slept.start["time"] + 7200.0, "the room went on meanwhile"
+    assert "slept for 2 h" in (ended.run_folder / "result" / "report.html").read_text()
+
+
+def test_a_lamp_that_another_program_switches_off_ends_the_run(
+    labrig: Labrig,
+    rig: Make,
+    make_protocol: Make,
+    tmp_path: Path,
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    doing, meddled = PlainProgress.doing, list[str]()
+
+    def meddle(self: PlainProgress, what: str, until_s: float | None = None) -> None:
+        doing(self, what, until_s)
+        if "charging" in what and not meddled:
+            meddled.append(what)
+            with serial.serial_for_url("sim://room/relays") as port:
+                port.write(b"\rrelay off 0\r")
+
+    monkeypatch.setattr(PlainProgress, "doing", meddle)
+    protocol = make_protocol(charge="10 min", exposure="1/4 s", **{"for": "20 s"})
+    runs = tmp_path / "runs"
+    ended = labrig("run", protocol, "--rig", rig(), "--runs", runs, "--no-process")
+    assert ended.code == 3, ended.err
+    assert "was switched on 1 min ago and reads off" in complaint(ended)
+    record = recorded(runs)
+    assert list(record.completed()) == ["dark"]
+    assert labrig("resume", record.folder, "--no-process").code == 0
+    assert list(recorded(runs).completed()) == ["dark", "decay-1"]
 
 
 def test_late_frames_are_in_the_record(

@@ -38,6 +38,10 @@ class NumatoRelay:
         self._clock = connections.clock
         self._board = Board(address, connections)
 
+    def reads_back(self) -> bool:
+        """Every Numato board tells the states of its relays."""
+        return True
+
     def identity(self) -> str:
         """Maker, firmware version and id, as the board says."""
         return f"Numato relay board, {self._board.identity()}, relay {self._relay}"

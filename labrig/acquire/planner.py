@@ -136,6 +136,9 @@ class _PlannedLamp(_PlannedDevice):
     def __init__(self) -> None:
         self._on = False
 
+    def reads_back(self) -> bool:
+        return False
+
     def on(self) -> None:
         self._on = True
 

@@ -31,6 +31,9 @@ class Device(Protocol):
 class Lamp(Device, Protocol):
     """A light that charges the sample. Safe: off."""
 
+    def reads_back(self) -> bool:
+        """Whether `is_on` is what the device says; else it is what was asked last."""
+
     def on(self) -> None:
         """Switch on, read back where the device can."""
 
@@ -38,7 +41,7 @@ class Lamp(Device, Protocol):
         """Switch off, read back where the device can."""
 
     def is_on(self) -> bool:
-        """What the device says, not what was asked; a driver whose device says nothing says so."""
+        """What the device says, not what was asked, where it reads back."""
 
 
 @runtime_checkable

@@ -4,6 +4,7 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
 from labrig.acquire.by_hand import TakenBack
+from labrig.acquire.lamp_readback import LampReadback
 from labrig.acquire.protocol import Unit
 from labrig.acquire.rig import Rig
 from labrig.acquire.session import Observer, Session
@@ -44,7 +45,12 @@ def run_units(
     A unit that ends by an exception leaves its attempt open: the caller first reaches the safe
     state, then closes the attempt with `RunFolder.close_open_attempts`. Where a person takes back
     what was done by hand last, its unit counts no longer and is done again. The temperature is
-    read at both ends of a unit, and while it waits.
+    read at both ends of a unit, and while it waits; the lamp is read back while it waits.
+
+    Raises
+    ------
+    Slept
+        The PC slept in a unit.
     """
     temperature = TemperatureLog(rig, observer.warn)
     while True:
@@ -68,20 +74,22 @@ def _run_what_is_left(
     done = record.completed()
     frames = [frame for attempt in done.values() for frame in attempt.frames]
     actions = [action for attempt in done.values() for action in attempt.actions]
+    lamp = LampReadback(rig)
     for number, unit in enumerate(units, start=1):
         if unit.name in done:
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
         recorder = _Recorder(rig.clock, writer, frames, actions, observer)
-        session = Session(rig, recorder, observer, temperature)
-        session.read_temperature()
+        session = Session(rig, recorder, observer, temperature, lamp)
         try:
-            unit.run(session)
+            with rig.clock.noticing_sleep():
+                session.read_temperature()
+                unit.run(session)
+                session.read_temperature()
         except TakenBack:
             recorder.take_back()
             raise
-        session.read_temperature()
         writer.stop("success")
         frames, actions = recorder.kept, recorder.done
 

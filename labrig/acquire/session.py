@@ -9,8 +9,9 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Protocol, TypeVar
 
-from labrig.acquire.actions import Action, Missed, Shoot, Timed
+from labrig.acquire.actions import Action, Missed, Shoot, Switch, Timed
 from labrig.acquire.by_hand import ByHand, TakenBack
+from labrig.acquire.lamp_readback import LampReadback
 from labrig.acquire.rig import Rig
 from labrig.acquire.roles import Guarded, KeptAwake
 from labrig.acquire.temperature import TemperatureLog
@@ -99,6 +100,8 @@ class Session:
     ----------
     temperature
         Reads the thermometer, for all units of a run; None: one of this unit's own.
+    lamp
+        Reads the lamp back, for all units of a run; None: one of this unit's own.
     """
 
     def __init__(
@@ -107,11 +110,13 @@ class Session:
         recorder: Recorder,
         observer: Observer,
         temperature: TemperatureLog | None = None,
+        lamp: LampReadback | None = None,
     ) -> None:
         self.rig = rig
         self._recorder = recorder
         self._observer = observer
         self._temperature = temperature or TemperatureLog(rig, observer.warn)
+        self._lamp = lamp or LampReadback(rig)
         self._in_force: ExposureSettings | None = None
         self._beaten_s = rig.clock.now()
 
@@ -135,6 +140,7 @@ class Session:
     def perform(self, action: Action) -> None:
         """Do one thing now."""
         self._beat_if_due()
+        self._read_lamp_before(action)
         self._prepare(action)
         self._execute(action, late_s=0.0)
 
@@ -144,8 +150,9 @@ class Session:
         """Do things at their times after now, against absolute deadlines.
 
         The camera is set and half-pressed for its next photograph as soon as the previous one is
-        over, for the first one before the sequence begins. An action whose time has passed is done
-        at once and recorded as late; of lamp, door and shield that is said, too.
+        over, for the first one before the sequence begins. Before it, the lamp is read back if the
+        sequence switches it. An action whose time has passed is done at once and recorded as late;
+        of lamp, door and shield that is said, too.
 
         Returns
         -------
@@ -153,6 +160,7 @@ class Session:
             What began more than `tolerance_s` after its time, for protocols that then repeat it.
         """
         missed = []
+        self._read_lamp_before(*(timed.action for timed in sequence))
         photographs = [timed.action for timed in sequence if isinstance(timed.action, Shoot)]
         if photographs:
             self._prepare(photographs.pop(0))
@@ -204,7 +212,7 @@ class Session:
     def within(self, part: str) -> "Session":
         """The session of a unit of one part of a chain: it sees frames of its part only."""
         recorder = _PartRecorder(self._recorder, part)
-        return Session(self.rig, recorder, self._observer, self._temperature)
+        return Session(self.rig, recorder, self._observer, self._temperature, self._lamp)
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         """A choice that rests on frames already taken; the plan assumes `worst`.
@@ -226,11 +234,14 @@ class Session:
 
     def _sleep_until(self, deadline_s: float) -> None:
         """Wait; keep from falling asleep what would, and from striking what guards."""
-        spoken_to = self._sleepy or self._guarded or self._temperature.is_kept
-        while spoken_to and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
+        looked_after = (
+            self._sleepy or self._guarded or self._temperature.is_kept or self._lamp.is_told
+        )
+        while looked_after and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
             self.clock.sleep(AWAKE_PERIOD_S)
             self._look_after()
         if deadline_s - self.clock.now() > QUIET_BEFORE_S:
+            self._read_lamp_if_due()
             self._temperature.read_if_due(self._recorder.temperature)
         if deadline_s - self.clock.now() > BEAT_S:
             self._beat_if_due()
@@ -254,7 +265,18 @@ class Session:
             with _device_errors(key):
                 device.keep_awake()
         self._beat()
+        self._read_lamp_if_due()
         self._temperature.read_if_due(self._recorder.temperature)
+
+    def _read_lamp_if_due(self) -> None:
+        with _device_errors("lamp"):
+            self._lamp.read_if_due()
+
+    def _read_lamp_before(self, *actions: Action) -> None:
+        """A charge that ends now was one only if nobody else has ended it already."""
+        if any(isinstance(action, Switch) for action in actions):
+            with _device_errors("lamp"):
+                self._lamp.read()
 
     def _beat_if_due(self) -> None:
         if self.clock.now() - self._beaten_s >= AWAKE_PERIOD_S:
@@ -296,6 +318,8 @@ class Session:
         start_s = self.clock.now()
         with _device_errors(action.device):
             action.begin(self.rig)
+        if isinstance(action, Switch):
+            self._lamp.asked(action.on)
         self._recorder.acted(action.device, str(action), start_s, self.clock.now(), late_s)
 
 

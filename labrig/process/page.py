@@ -8,7 +8,7 @@ from labrig.errors import UsageError
 from labrig.fit import DecayFit
 from labrig.optics import CameraResponse, read_camera
 from labrig.process.choices import DecayProtocol
-from labrig.process.history import charges_s, interruptions, written_time
+from labrig.process.history import charges_s, interruptions, lamp_sections, written_time
 from labrig.process.provenance import library_versions
 from labrig.process.temperature import temperature_sections
 from labrig.record import FrameRecord, RunRecord, read_notes
@@ -38,7 +38,7 @@ def run_report(
     identities: Mapping[str, str] = first.get("devices", {})
     sample = protocol.sample.model_dump(exclude={"name"}, exclude_none=True)
     with figure_style():
-        sections = temperature_sections(run)
+        sections = (*lamp_sections(run), *temperature_sections(run))
     return RunReport(
         title=protocol.sample.name,
         run=run_name(run),

@@ -9,7 +9,7 @@ from pathlib import Path
 from labrig.acquire import ProtocolModel, RigFile, plugins
 from labrig.process.choices import Choices, read_run_protocol
 from labrig.process.decay import process_decay
-from labrig.process.history import interruptions, written_time
+from labrig.process.history import interruptions, lamp_sections, written_time
 from labrig.process.known import Known
 from labrig.process.provenance import StageProvenance, library_versions
 from labrig.process.result import Result
@@ -49,7 +49,7 @@ def process_run(folder: Path, choices: Choices | None = None) -> Result:
         found: StageResult = process(Stage(run, protocol, rig, choices, Known.of(rig), made))
         found = replace(
             found,
-            sections=(*found.sections, *temperature_sections(run)),
+            sections=(*found.sections, *lamp_sections(run), *temperature_sections(run)),
             warnings=(*found.warnings, *temperature_warnings(run)),
         )
         write_stage_page(made / "report.html", _page(run, protocol, rig, found))

@@ -53,6 +53,7 @@ CODES: dict[str, set[int]] = {
     "disk_slow": set(),
     "clock_ahead": set(),
     "clock_back": set(),
+    "pc_asleep": set(),
 }
 STOPS = {signal.SIGINT: 130, signal.SIGTERM: 143, signal.SIGKILL: -signal.SIGKILL}
 #: While these last, the lamp cannot be switched off; a person is told to.

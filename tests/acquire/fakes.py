@@ -33,6 +33,9 @@ class NotingLamp:
         self.lit = False
         self._note("lamp off")
 
+    def reads_back(self) -> bool:
+        return True
+
     def is_on(self) -> bool:
         return self.lit
 

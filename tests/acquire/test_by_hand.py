@@ -73,6 +73,7 @@ class Bench:
     def run(self, answers: list[str | None], count: int = 3) -> RunRecord:
         self.watching.answers = answers
         units = [Filter(number) for number in range(1, count + 1)]
+        self.rig.make_safe()
         run_units(units, self.rig, self.folder, self.watching, {})
         return self.folder.read()
 

@@ -75,6 +75,9 @@ class NothingLamp:
     def off(self) -> None:
         pass
 
+    def reads_back(self) -> bool:
+        return False
+
     def is_on(self) -> bool:
         return False
 

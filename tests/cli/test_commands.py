@@ -147,7 +147,7 @@ def test_a_run_ends_in_a_result_that_agrees_with_itself(labrig: Labrig, finished
 
 def test_processing_otherwise(labrig: Labrig, finished: Path) -> None:
     ended = labrig(
-        "process", finished, "--roi", "36,24,12,12", "--exclude", "3", "--states", "2", "--json"
+        "process", finished, "--roi", "36,24,24,16", "--exclude", "3", "--states", "2", "--json"
     )
     assert ended.code == 0, ended.err
     excluded = [

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig.process.history import charges_s, interruptions
+from labrig.process.history import charges_s, interruptions, lamp_sections
 from labrig.record import ActionRecord, Attempt, FrameRecord, RunRecord
 from tests.conftest import Ended
 
@@ -57,6 +57,24 @@ def test_attempts_that_did_not_count_are_told() -> None:
     assert {(one.unit, one.began) for one in told} == {("decay-1", "2026-01-01 00:00:00 UTC")}
 
 
+@pytest.mark.parametrize(
+    ("reads_back", "said"),
+    [(True, "nothing else had switched it"), (False, "could not be checked"), (None, "")],
+)
+def test_whether_the_lamp_was_read_back_is_told(reads_back: bool | None, said: str) -> None:
+    charged = attempt([taken("decay", 11.0)], [lamp("on", 0), lamp("off", 10)])
+    charged.start["lamp_reads_back"] = reads_back
+    told = [text for section in lamp_sections(run_of(charged)) for text in section.text]
+    assert len(told) == (reads_back is not None)
+    assert all(said in text for text in told)
+
+
+def test_without_a_lamp_nothing_is_told_of_it() -> None:
+    dark = attempt([taken("dark", 0.0)], [])
+    dark.start["lamp_reads_back"] = True
+    assert lamp_sections(run_of(dark)) == ()
+
+
 def test_the_report_says_what_was_done(
     labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
 ) -> None:
@@ -73,5 +91,6 @@ def test_the_report_says_what_was_done(
         "averaged over a region of the frame of 48 × 32 pixels",
         "(4 dark frames of 1 s, taken before the decay)",
         "The number of states was set to 1.",
+        "The lamp's relay was read back about once a minute",
     ):
         assert expected in text

@@ -1,4 +1,7 @@
-"""Two labrigs, two real processes, one relay board: the first has it until it ends, even by -9."""
+"""Two labrigs, two real processes, one relay board: the first has it until it ends, even by -9.
+
+The second calls it by a link, relatively, and has another TMPDIR.
+"""
 
 import os
 import signal
@@ -61,16 +64,22 @@ def test_the_second_is_refused_and_the_lock_dies_with_the_first(
     rig = tmp_path / "rig.yaml"
     rig.write_text(RIG.format(address=wired.address))
     command = [sys.executable, "-m", "labrig", "rig", "check", str(rig)]
+    link = tmp_path / "by-id"
+    link.symlink_to(wired.address)
+    (tmp_path / "other.yaml").write_text(RIG.format(address=link.name))
+    other = [*command[:-1], "other.yaml"]
     first = subprocess.Popen(command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True)
     try:
         assert wired.lit.wait(PATIENCE_S), "the first labrig has the board"
         first.send_signal(signal.SIGSTOP)
-        second = subprocess.run(command, capture_output=True, text=True, check=False)
+        elsewhere = os.environ | {"TMPDIR": str(tmp_path)}
+        second = subprocess.run(
+            other, capture_output=True, text=True, check=False, cwd=tmp_path, env=elsewhere
+        )
         assert second.returncode == 2
         assert second.stdout == ""
         assert second.stderr == (
-            f"labrig: {wired.address} is held by another labrig on this PC; wait until it has "
-            "ended\n"
+            "labrig: by-id is held by another labrig on this PC; wait until it has ended\n"
         )
     finally:
         first.kill()

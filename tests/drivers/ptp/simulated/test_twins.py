@@ -1,6 +1,6 @@
 """Two cameras of one model on one bus, told apart by what they say of themselves in PTP."""
 
-from collections.abc import Callable
+from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from pathlib import Path
 from typing import Any
@@ -13,7 +13,7 @@ from labrig.acquire import ExposureSettings, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import SystemClock, VirtualClock
 from labrig.drivers.ptp import PtpCamera
-from labrig.errors import DeviceError
+from labrig.errors import DeviceError, UsageError
 from labrig.sim.camera import BodySettings, SimulatedCamera
 from tests.counterparts.served import EOS, STANDARD, Film
 from tests.drivers.ptp.simulated.wired import Wired
@@ -50,8 +50,16 @@ class Twins:
         """As `usb.core.find`, where it is not told on which bus to look."""
         if backend is not None:
             return pyusb_find(backend=backend, **wanted)
-        buses = [camera.backend for camera in self.cameras.values()]
-        return chain.from_iterable(pyusb_find(backend=bus, **wanted) for bus in buses)
+        return chain.from_iterable(
+            _on_bus(number, pyusb_find(backend=camera.backend, **wanted))
+            for number, camera in enumerate(self.cameras.values(), start=1)
+        )
+
+
+def _on_bus(number: int, devices: Iterable[Any]) -> Iterator[Any]:
+    for device in devices:
+        device.bus = number
+        yield device
 
 
 pyusb_find = usb.core.find
@@ -126,6 +134,20 @@ def test_a_twin_that_somebody_else_uses_is_passed_over(
         photograph(rig(f"usb://{EOS_IDS}/0111"))
     usb.util.dispose_resources(first)
     assert photograph(rig(f"usb://{EOS_IDS}/0111")) == twins.films["0111"].delivered[0]
+
+
+@pytest.mark.parametrize("serial", ["", "/0111"])
+def test_one_that_another_labrig_has_is_not_even_asked(
+    plug_in: Callable[[BodySettings], Twins], rig: Callable[..., Path], serial: str
+) -> None:
+    twins = plug_in(EOS)
+    path = rig(f"usb://{EOS_IDS}/0111")
+    with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
+        with pytest.raises(UsageError, match="held by another labrig"):
+            photograph(rig(f"usb://{EOS_IDS}{serial}"))
+        assert photograph(rig(f"usb://{EOS_IDS}/0222")) == twins.films["0222"].delivered[0]
+        devices.camera.configure(SETTINGS)
+        assert devices.camera.shoot().data == twins.films["0111"].delivered[0]
 
 
 def test_one_whose_program_died_is_asked_and_then_taken_over(

@@ -1,0 +1,42 @@
+"""Time in the simulated room, where the PC may fall asleep."""
+
+from collections.abc import Iterable
+
+from labrig.clock import VirtualClock
+
+from .faults import Nap
+
+
+class RoomClock(VirtualClock):
+    """The room's time, which goes on while the PC sleeps.
+
+    Parameters
+    ----------
+    epoch_s
+        Seconds since 1970 at the clock's zero.
+    naps
+        When the PC sleeps; those that began before the room was opened are over.
+    """
+
+    def __init__(self, epoch_s: float, naps: Iterable[Nap] = ()) -> None:
+        super().__init__(epoch_s)
+        self._naps = sorted((nap for nap in naps if nap.at >= 0.0), key=lambda nap: nap.at)
+        self._slept_s = 0.0
+
+    def slept_s(self) -> float:
+        return self._slept_s
+
+    def spend(self, duration_s: float) -> None:
+        """As of a virtual clock; one that is slept through takes longer by that."""
+        super().spend(duration_s)
+        self._sleep_if_tired()
+
+    def _pause_until(self, deadline_s: float) -> None:
+        super()._pause_until(min(deadline_s, self._naps[0].at) if self._naps else deadline_s)
+        self._sleep_if_tired()
+
+    def _sleep_if_tired(self) -> None:
+        while self._naps and self._naps[0].at <= self._now_s:
+            lasting_s = self._naps.pop(0).lasting
+            self._now_s += lasting_s
+            self._slept_s += lasting_s
