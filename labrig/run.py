@@ -83,10 +83,10 @@ class Recording:
                 f"{self.protocol.protocol}_{self.protocol.sample.name}",
                 stand.clock.wall(),
                 {
+                    "rig.yaml": yaml_text(self.rig.model_dump(mode="json", exclude_none=True)),
                     "protocol.yaml": yaml_text(
                         self.protocol.model_dump(mode="json", by_alias=True)
                     ),
-                    "rig.yaml": yaml_text(self.rig.model_dump(mode="json", exclude_none=True)),
                 },
                 stand.seed,
                 stand.disk,
@@ -95,8 +95,8 @@ class Recording:
                 with folder:
                     fill(folder, self.protocol, stand, self.plan, watch)
             except BaseException:
-                if not read_run(folder.path).attempts:
-                    shutil.rmtree(folder.path)  # no device was reached, nothing happened
+                if not folder.read().attempts:  # no device was reached, nothing happened
+                    shutil.rmtree(folder.path, ignore_errors=True)
                 raise
         return folder.path
 

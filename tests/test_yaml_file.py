@@ -112,6 +112,6 @@ def test_any_text_is_a_mapping_or_one_line(text: str) -> None:
         assert "\n" not in str(error)
 
 
-@given(st.floats(allow_nan=False), st.integers(-(10**15), 10**15))
+@given(st.floats(allow_nan=False, allow_infinity=False), st.integers(-(10**15), 10**15))
 def test_numbers_survive_writing(real: float, whole: int) -> None:
     assert parse_yaml(yaml_text({"a": real, "b": whole}), "test") == {"a": real, "b": whole}

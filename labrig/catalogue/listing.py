@@ -11,7 +11,7 @@ from filelock import FileLock, Timeout
 
 from labrig.acquire import plugins
 from labrig.catalogue.results import PatchResult, read_results
-from labrig.errors import DataError, LabrigError, UsageError
+from labrig.errors import DataError, DiskError, LabrigError, UsageError
 from labrig.record import read_run
 from labrig.yaml_file import did_you_mean, read_yaml
 
@@ -116,7 +116,7 @@ def summarise(folder: Path) -> RunSummary:
     sample, protocol, units = _asked(folder)
     try:
         record, results = read_run(folder), read_results(folder)
-    except DataError:
+    except (DataError, DiskError):
         has_journal = (folder / "journal.jsonl").exists()
         state: State = "damaged" if has_journal else "unfinished"
         return RunSummary(folder, sample, protocol, None, state, 0, units, 0, ())

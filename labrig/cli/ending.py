@@ -48,7 +48,9 @@ def _run(arguments: Sequence[str]) -> int:
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
-        return _complain(f"{error.filename or 'disk'}: {error.strerror}", DiskError.exit_code)
+        return _complain(
+            f"{error.filename or 'disk'}: {error.strerror or error}", DiskError.exit_code
+        )
     except Exception as error:
         return _complain(_fault(error), 1)
     return 0

@@ -4,6 +4,7 @@ import re
 import shutil
 import uuid
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -14,11 +15,9 @@ from filelock import FileLock, Timeout
 from labrig.errors import DiskError, UsageError
 from labrig.record.attempt import AttemptWriter
 from labrig.record.disk import REAL_DISK, Disk
-from labrig.record.durable import write_durably
-from labrig.record.journal import Journal
-from labrig.record.reading import RunRecord, read_run
-
-_JOURNAL = "journal.jsonl"
+from labrig.record.durable import sync_folder, write_durably
+from labrig.record.journal import JOURNAL, Journal
+from labrig.record.reading import RunRecord, run_record
 
 
 class RunFolder:
@@ -43,8 +42,10 @@ class RunFolder:
             self._lock.acquire(timeout=0)
         except Timeout:
             raise UsageError(f"{path}: another labrig is writing to this run") from None
+        except OSError as error:
+            raise DiskError(f"{path}: the run cannot be written to ({error.strerror})") from None
         self._frame_number = _highest_frame(path / "frames")
-        self._journal = Journal(path / _JOURNAL, disk)
+        self._journal = Journal(path / JOURNAL, disk)
 
     @classmethod
     def create(
@@ -63,12 +64,18 @@ class RunFolder:
         started
             Seconds since 1970.
         texts
-            File name → content: the protocol and the rig, as resolved.
+            File name → content: the protocol and the rig, as resolved. The last one is what a
+            run folder is known by: by then all before it is there.
+
+        Raises
+        ------
+        DiskError
+            The disk is full, or gone; no run is left.
         """
         stamp = datetime.fromtimestamp(started, UTC).strftime("%Y-%m-%dT%H-%M-%S")
         wanted = f"{stamp}_{_slug(name)}"
         try:
-            runs.mkdir(parents=True, exist_ok=True)
+            _make_durably(runs)
             path = _make_new(runs, wanted)
         except OSError as error:
             raise DiskError(
@@ -78,6 +85,7 @@ class RunFolder:
             (path / "frames").mkdir()
             for file_name, text in texts.items():
                 write_durably(path / file_name, text.encode(), disk)
+            sync_folder(runs)
             return cls(path, seed, disk)
         except (OSError, DiskError) as error:
             shutil.rmtree(path, ignore_errors=True)
@@ -86,8 +94,15 @@ class RunFolder:
             ) from None
 
     def read(self) -> RunRecord:
-        """What the journal says so far."""
-        return read_run(self.path)
+        """What was acknowledged so far; the disk is not asked, it may be gone."""
+        return run_record(self.path, self._journal.read())
+
+    def unknown_files(self) -> list[str]:
+        """Files among the frames that no line of the journal tells of: a crash left them."""
+        known = {frame.path.name for one in self.read().attempts for frame in one.frames}
+        return sorted(
+            path.name for path in (self.path / "frames").glob("*") if path.name not in known
+        )
 
     def attempt(
         self, unit: str, wall: Callable[[], float], metadata: Mapping[str, Any]
@@ -137,7 +152,8 @@ class RunFolder:
     def close(self) -> None:
         """Release the folder."""
         self._journal.close()
-        self._lock.release()
+        with suppress(OSError):  # the system lets go of it when labrig ends
+            self._lock.release()
 
     def __enter__(self) -> Self:
         return self
@@ -159,6 +175,13 @@ class RunFolder:
     def _next_frame_number(self) -> int:
         self._frame_number += 1
         return self._frame_number
+
+
+def _make_durably(runs: Path) -> None:
+    missing = [folder for folder in (runs, *runs.parents) if not folder.exists()]
+    runs.mkdir(parents=True, exist_ok=True)
+    for folder in missing:
+        sync_folder(folder.parent)
 
 
 def _make_new(runs: Path, wanted: str) -> Path:
