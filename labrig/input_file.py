@@ -1,8 +1,12 @@
 """Files that somebody hands in, read with an error that says what is wrong with them."""
 
+import errno
 from pathlib import Path
 
 from labrig.errors import DiskError, UsageError
+
+#: What no other name and no permission would mend.
+DISK_ERRORS = {errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.ETIMEDOUT}
 
 #: A table of a year's measurements is smaller; `/dev/zero` is not.
 MOST_TEXT_BYTES = 50_000_000
@@ -23,10 +27,9 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
             content = file.read(most_bytes + 1)
     except FileNotFoundError:
         raise UsageError(f"{path}: no such file") from None
-    except (IsADirectoryError, NotADirectoryError, PermissionError) as error:
-        raise UsageError(f"{path}: cannot be read ({error.strerror})") from None
     except OSError as error:
-        raise DiskError(f"{path}: cannot be read ({error.strerror})") from None
+        kind = DiskError if error.errno in DISK_ERRORS else UsageError
+        raise kind(f"{path}: cannot be read ({error.strerror})") from None
     if len(content) > most_bytes:
         raise UsageError(f"{path}: expected a file of at most {most_bytes} bytes, got more")
     return content

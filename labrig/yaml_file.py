@@ -55,7 +55,8 @@ class _Loader(yaml.SafeLoader):
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         if (tag := getattr(event, "tag", None)) is not None:
-            raise _problem(f"the tag '{tag}' has no meaning here; leave it out", event)
+            written = tag.replace("tag:yaml.org,2002:", "!!")
+            raise _problem(f"the tag '{_shown(written)}' has no meaning here; leave it out", event)
         if isinstance(event, yaml.ScalarEvent) and _NO_TEXT.search(event.value):
             raise _problem(f"expected text, got {_shown(ascii(event.value))}", event)
         if self._depth > MOST_DEPTH:

@@ -113,6 +113,8 @@ def _parsed(path: Path, raw: bytes) -> JournalContent:
     for number, line in enumerate(lines, start=1):
         try:
             entry = json.loads(line, parse_constant=_refuse)
+            if b"\\ud" in line.lower():  # perhaps half of a surrogate pair, which is no text
+                json.dumps(entry, ensure_ascii=False).encode()
             documents.append((str(entry["name"]), dict(entry["doc"])))
         except (ValueError, KeyError, TypeError, RecursionError):
             raise DataError(
