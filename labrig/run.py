@@ -83,10 +83,10 @@ class Recording:
                 f"{self.protocol.protocol}_{self.protocol.sample.name}",
                 stand.clock.wall(),
                 {
-                    "rig.yaml": yaml_text(self.rig.model_dump(mode="json", exclude_none=True)),
                     "protocol.yaml": yaml_text(
                         self.protocol.model_dump(mode="json", by_alias=True)
                     ),
+                    "rig.yaml": yaml_text(self.rig.model_dump(mode="json", exclude_none=True)),
                 },
                 stand.seed,
                 stand.disk,
@@ -96,7 +96,7 @@ class Recording:
                     fill(folder, self.protocol, stand, self.plan, watch)
             except BaseException:
                 if not folder.read().attempts:  # no device was reached, nothing happened
-                    shutil.rmtree(folder.path, ignore_errors=True)
+                    folder.discard()
                 raise
         return folder.path
 

@@ -15,6 +15,7 @@ from pathlib import Path
 
 from labrig import shipped
 from labrig.cli.ending import guarded
+from tests.forked import forked
 
 #: A refusal takes no longer, in seconds of computing; nor does anything hang for longer than this.
 QUICK_S, HANGS_S = 2.0, 60.0
@@ -149,17 +150,7 @@ def try_one(victim: Victim, rng: random.Random, place: Path) -> Outcome:
         folder.mkdir(parents=True)
     file = folder / victim.file.name
     file.write_bytes(mutated(victim.file.read_bytes(), rng))
-    pid = os.fork()
-    if pid == 0:
-        code = 70
-        try:
-            with said.open("wb") as err, Path(os.devnull).open("wb") as out:
-                os.dup2(err.fileno(), 2)
-                os.dup2(out.fileno(), 1)
-            code = guarded(victim.command(file))
-        finally:
-            os._exit(code)
-    code, took_s = _waited(pid)
+    code, took_s = _waited(forked(lambda: guarded(victim.command(file)), said))
     lines = said.read_text(errors="replace").splitlines()
     return Outcome(code, took_s, _wrong(code, took_s, lines))
 

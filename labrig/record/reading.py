@@ -8,7 +8,7 @@ from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from labrig.errors import DataError
+from labrig.errors import DataError, DiskError
 from labrig.record.frames import (
     TAKEN_BACK,
     ActionRecord,
@@ -120,7 +120,10 @@ def read_run(run: str | os.PathLike[str]) -> RunRecord:
         The disk does not give it back.
     """
     folder = Path(run)
-    return run_record(folder, read_journal(folder / JOURNAL))
+    record = run_record(folder, read_journal(folder / JOURNAL))
+    for frame in (frame for attempt in record.attempts for frame in attempt.frames):
+        _refuse_what_is_no_file(frame.path)
+    return record
 
 
 def run_record(folder: Path, content: JournalContent) -> RunRecord:
@@ -157,7 +160,7 @@ def _take(
         run_uid, stream = streams[doc["descriptor"]]
         attempt, data = attempts[run_uid], dict(doc["data"])
         if stream == "frames":
-            path = _frame_file(folder, data.pop("frame"))
+            path = folder / _frame_name(data.pop("frame"))
             frame = _FRAME.validate_python({**data, "path": path, "unit": attempt.unit})
             attempt.frames.append(_dated(frame))
         elif stream == "actions":
@@ -168,14 +171,23 @@ def _take(
             attempt.temperatures.append(_sensible(reading))
 
 
-def _frame_file(folder: Path, name: str) -> Path:
-    """The frame of that name in the run folder: a file of its own, if it is there at all."""
+def _frame_name(name: str) -> str:
+    """`name`, if it is one within the run folder."""
     if not _FRAME_NAME.fullmatch(name):
         raise ValueError(f"'{name}' is no name of a frame, such as frames/000001.cr2")
-    path = folder / name
-    if path.is_symlink() or (path.exists() and not path.is_file()):
-        raise ValueError(f"{name} is a link or a device; expected a file")
-    return path
+    return name
+
+
+def _refuse_what_is_no_file(frame: Path) -> None:
+    """A link leads out of the run folder, a device has no end; what is missing is told of later."""
+    try:
+        is_something_else = frame.is_symlink() or (frame.exists() and not frame.is_file())
+    except OSError as error:
+        raise DiskError(f"{frame}: cannot be read ({error.strerror})") from None
+    if is_something_else:
+        raise DataError(
+            f"{frame}: expected a file, got a link or a device; put the frame itself there"
+        )
 
 
 def _opened(doc: dict[str, Any]) -> Attempt:

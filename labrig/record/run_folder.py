@@ -19,6 +19,9 @@ from labrig.record.durable import sync_folder, write_durably
 from labrig.record.journal import JOURNAL, Journal
 from labrig.record.reading import RunRecord, run_record
 
+#: What a run folder is known by.
+PROTOCOL = "protocol.yaml"
+
 
 class RunFolder:
     """A run folder open for writing; held by one labrig at a time.
@@ -64,8 +67,8 @@ class RunFolder:
         started
             Seconds since 1970.
         texts
-            File name → content: the protocol and the rig, as resolved. The last one is what a
-            run folder is known by: by then all before it is there.
+            File name → content: the protocol and the rig, as resolved. The protocol, which a run
+            folder is known by, is written last.
 
         Raises
         ------
@@ -83,12 +86,12 @@ class RunFolder:
             ) from None
         try:
             (path / "frames").mkdir()
-            for file_name, text in texts.items():
-                write_durably(path / file_name, text.encode(), disk)
+            for file_name in sorted(texts, key=lambda name: name == PROTOCOL):
+                write_durably(path / file_name, texts[file_name].encode(), disk)
             sync_folder(runs)
             return cls(path, seed, disk)
         except (OSError, DiskError) as error:
-            shutil.rmtree(path, ignore_errors=True)
+            _discard(path)
             raise DiskError(
                 f"{runs}: a run folder cannot be made there ({error}); give another --runs"
             ) from None
@@ -149,6 +152,10 @@ class RunFolder:
             )
         return [attempt.unit for attempt in opened]
 
+    def discard(self) -> None:
+        """Take away a run in which nothing happened, as far as the disk lets it."""
+        _discard(self.path)
+
     def close(self) -> None:
         """Release the folder."""
         self._journal.close()
@@ -175,6 +182,13 @@ class RunFolder:
     def _next_frame_number(self) -> int:
         self._frame_number += 1
         return self._frame_number
+
+
+def _discard(path: Path) -> None:
+    """No half of a run is left: first goes what it is known by, and if that stays, so does all."""
+    with suppress(OSError):
+        (path / PROTOCOL).unlink(missing_ok=True)
+        shutil.rmtree(path)
 
 
 def _make_durably(runs: Path) -> None:

@@ -32,6 +32,7 @@ from labrig import shipped
 from labrig.cli.ending import guarded
 from labrig.errors import LabrigError
 from labrig.record import read_run
+from tests.forked import forked
 
 KINDS = {"lost": 0, "done": 1, "dead": 2}
 PROTOCOL = {
@@ -189,20 +190,15 @@ def _intact(run: Path) -> int:
 def labrig(arguments: Sequence[object], place: Path, kind: str = "lost", at: int = 0) -> Ended:
     """`labrig ARGUMENTS` in a process whose disk fails below `place` at call `at`; 0: at none."""
     said, told = place.parent / "said.txt", place.parent / "calls.txt"
-    pid = os.fork()
-    if pid == 0:
-        code = 70
-        try:
-            with said.open("wb") as err, Path(os.devnull).open("wb") as out:
-                os.dup2(err.fileno(), 2)
-                os.dup2(out.fileno(), 1)
-            disk = ctypes.CDLL(None)
-            disk.arm(str(place).encode(), ctypes.c_long(at), KINDS[kind])
-            code = guarded([str(argument) for argument in arguments])
-            told.write_text(str(disk.cut_power()))
-        finally:
-            os._exit(code)
-    _, status = os.waitpid(pid, 0)
+
+    def run() -> int:
+        disk = ctypes.CDLL(None)
+        disk.arm(str(place).encode(), ctypes.c_long(at), KINDS[kind])
+        code = guarded([str(argument) for argument in arguments])
+        told.write_text(str(disk.cut_power()))
+        return code
+
+    _, status = os.waitpid(forked(run, said), 0)
     lines = said.read_text().splitlines()
     return Ended(os.waitstatus_to_exitcode(status), lines, int(told.read_text()))
 

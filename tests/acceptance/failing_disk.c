@@ -180,7 +180,7 @@ int fsync(int fd) {
 
 int close(int fd) { /* Linux gives the descriptor back whatever it answers. */
     int fail = file_below(fd) && for_writing[fd] && fails();
-    if (folder[0] && fd >= 0 && fd < MOST_FILES) note_lost(fd);
+    if (folder[0] && fd >= 0 && fd < MOST_FILES) note_lost(fd), for_writing[fd] = 0;
     int done = REAL(close)(fd);
     return fail ? failed() : done;
 }
