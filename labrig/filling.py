@@ -2,7 +2,7 @@
 
 import signal
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
 from dataclasses import dataclass, field
 from importlib.metadata import version
@@ -21,7 +21,7 @@ from labrig.errors import (
     ProtocolError,
 )
 from labrig.quantity import duration_text
-from labrig.record import ActionRecord, RunFolder
+from labrig.record import ActionRecord, RunFolder, RunRecord
 from labrig.signals import interrupting
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
@@ -31,6 +31,8 @@ COMES_BACK_S = 300.0
 LOOK_PERIOD_S = 2.0
 #: A unit that has lost a device so often is not going to get through.
 MOST_LOSSES = 3
+#: Files named in a warning.
+MOST_NAMED = 4
 
 
 class Watch(Protocol):
@@ -63,6 +65,8 @@ def fill(
     with interrupting(stand.clock), watch(laid_out, list(done), stand.clock) as observer:
         for unit in dead:
             observer.warn(f"the unit {unit} was cut off and is done again")
+        for oddity in _oddities(folder, record):
+            observer.warn(oddity)
         if record.last_time > stand.clock.wall():
             observer.warn(
                 "the clock of this PC was set back since the run began: times of day in its "
@@ -224,6 +228,26 @@ def _tell_what_was_exchanged(
                 f"{key}: completed units of this run were made with {before[key]}, now it is "
                 f"{identity}; their frames do not belong together"
             )
+
+
+def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
+    """What is not as the journal says among the frames of a run that goes on, in lines."""
+    if unknown := folder.unknown_files():
+        yield (
+            f"{folder.path / 'frames'}: the journal does not tell of {_listed(unknown)}, which a "
+            "crash or a failing disk left; they are kept, and nothing is made of them"
+        )
+    frames = [frame for attempt in record.completed().values() for frame in attempt.frames]
+    if damaged := [f"{frame.path.name} {said}" for frame in frames if (said := frame.damage())]:
+        yield (
+            f"{folder.path / 'frames'}: {_listed(damaged)}; restore from a copy, or begin a new "
+            "run: labrig process refuses them"
+        )
+
+
+def _listed(names: Sequence[str]) -> str:
+    more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
 
 
 def _close(folder: RunFolder, stand: Bench, exit_status: str, reason: str) -> None:

@@ -10,6 +10,7 @@ from typing import Annotated, Any
 
 from pydantic import (
     BeforeValidator,
+    Field,
     GetCoreSchemaHandler,
     GetJsonSchemaHandler,
     PlainSerializer,
@@ -126,6 +127,9 @@ class WordOrDuration:
             raise ValueError(f"expected {expected}, or a duration; {error}") from None
 
 
+#: How often something is done; nobody waits for more.
+MOST_COUNT = 1000
+Count = Annotated[int, Field(le=MOST_COUNT)]
 #: Seconds, written with a unit of time.
 DurationS = Annotated[
     float, _validator(TIME_S, bare=False), _written("s"), _schema(TIME_S, bare=False)

@@ -6,8 +6,10 @@ from pydantic import AfterValidator, Field, TypeAdapter
 
 from labrig.errors import UsageError
 
-Corner = Annotated[float, Field(ge=0)]
-Extent = Annotated[float, Field(gt=0)]
+#: No sensor is as wide; infinity is wider.
+MOST_PIXELS = 1_000_000
+Corner = Annotated[float, Field(ge=0, le=MOST_PIXELS)]
+Extent = Annotated[float, Field(gt=0, le=MOST_PIXELS)]
 
 
 def _whole_or_fractions(region: tuple[float, float, float, float]) -> tuple[float, ...]:

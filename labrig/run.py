@@ -95,8 +95,8 @@ class Recording:
                 with folder:
                     fill(folder, self.protocol, stand, self.plan, watch)
             except BaseException:
-                if not read_run(folder.path).attempts:
-                    shutil.rmtree(folder.path)  # no device was reached, nothing happened
+                if not folder.read().attempts:  # no device was reached, nothing happened
+                    folder.discard()
                 raise
         return folder.path
 

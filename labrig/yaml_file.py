@@ -1,7 +1,8 @@
 """YAML files a person writes, read into models, with errors a person understands.
 
 PyYAML's safe loader with YAML 1.2 scalars (`1:30` and `0100` are not numbers in disguise, `1e-3`
-is one, `no` is a word) that refuses duplicate keys.
+is one, `no` is a word) that refuses what no such file needs: duplicate keys, tags, numbers that are
+not finite, characters that are none, and aliases that stand for more than anybody would write.
 """
 
 import difflib
@@ -15,9 +16,20 @@ import yaml
 from pydantic import BaseModel, ValidationError
 
 from labrig.errors import UsageError
+from labrig.input_file import read_text
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
+#: Longer than any such file, and read in a few seconds.
+MOST_BYTES = 500_000
+#: Deeper and more than any such file has, aliases written out.
+MOST_DEPTH = 30
+MOST_NODES = 100_000
+#: Of a text that is shown in a message.
+MOST_SHOWN = 80
+
+#: A text that holds them is neither a name nor a path: NUL, and halves of surrogate pairs.
+_NO_TEXT = re.compile("[\0\ud800-\udfff]")
 _INT = re.compile(r"[-+]?(?:0|[1-9][0-9]*)")
 _FLOAT = re.compile(
     r"[-+]?(?:(?:0|[1-9][0-9]*)\.[0-9]*|\.[0-9]+|(?:0|[1-9][0-9]*))(?:[eE][-+]?[0-9]+)?"
@@ -30,24 +42,80 @@ class _Loader(yaml.SafeLoader):
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
 
+    def __init__(self, text: str) -> None:
+        super().__init__(text)
+        self._depth = 0
+
+    def get_single_node(self) -> yaml.Node | None:
+        node = super().get_single_node()
+        if node is not None:
+            _extent(node, {})
+        return node
+
+    def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
+        event: Any = self.peek_event()  # type: ignore[no-untyped-call]
+        if (tag := getattr(event, "tag", None)) is not None:
+            written = tag.replace("tag:yaml.org,2002:", "!!")
+            raise _problem(f"the tag '{_shown(written)}' has no meaning here; leave it out", event)
+        if isinstance(event, yaml.ScalarEvent) and _NO_TEXT.search(event.value):
+            raise _problem(f"expected text, got {_shown(ascii(event.value))}", event)
+        if self._depth > MOST_DEPTH:
+            raise _problem(f"nested more than {MOST_DEPTH} deep", event)
+        self._depth += 1
+        node: yaml.Node | None = super().compose_node(parent, index)
+        self._depth -= 1
+        return node
+
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
         seen: dict[str, int] = {}
         for key_node, _ in node.value:
+            if not isinstance(key_node, yaml.ScalarNode):
+                raise _problem("expected a word as key, got a list or a mapping", key_node)
             key, line = str(key_node.value), key_node.start_mark.line + 1
             if key in seen:
-                raise yaml.constructor.ConstructorError(
-                    problem=f"the key '{key}' stands twice (also in line {seen[key]}); keep one",
-                    problem_mark=key_node.start_mark,
+                raise _problem(
+                    f"the key '{_shown(key)}' stands twice (also in line {seen[key]}); keep one",
+                    key_node,
                 )
             seen[key] = line
         return super().construct_mapping(node, deep)
 
 
+def _problem(text: str, at: Any) -> yaml.MarkedYAMLError:
+    """What to raise about a node or an event."""
+    return yaml.MarkedYAMLError(problem=text, problem_mark=at.start_mark)
+
+
+def _extent(node: yaml.Node, known: dict[yaml.Node, tuple[int, int]]) -> tuple[int, int]:
+    """How many nodes there are in `node`, and how deep, with its aliases written out.
+
+    `known` has those that were counted before: all that an alias may stand for. Of a node that is
+    still being counted it has (0, 0).
+    """
+    if node in known:
+        if not known[node][0]:
+            raise _problem("an alias stands within what it stands for", node)
+        return known[node]
+    known[node] = 0, 0
+    inner: list[yaml.Node] = []
+    if isinstance(node, yaml.MappingNode):
+        inner = [part for pair in node.value for part in pair]
+    elif isinstance(node, yaml.SequenceNode):
+        inner = node.value
+    extents = [_extent(part, known) for part in inner]
+    number = 1 + sum(nodes for nodes, _ in extents)
+    depth = 1 + max((deep for _, deep in extents), default=0)
+    if number > MOST_NODES or depth > MOST_DEPTH + 1:
+        raise _problem("its aliases stand for more than any such file holds; write it out", node)
+    known[node] = number, depth
+    return number, depth
+
+
 def _construct_float(loader: _Loader, node: yaml.ScalarNode) -> float:
-    text = str(node.value).lower().lstrip("+")
-    if text.lstrip("-") == ".inf":
-        return -math.inf if text.startswith("-") else math.inf
-    return math.nan if text == ".nan" else float(text)
+    text = str(node.value)
+    if not text.lstrip("+-.")[:1].isdigit() or math.isinf(float(text)):
+        raise _problem(f"expected a finite number, got {_shown(text)}", node)
+    return float(text)
 
 
 for _tag, _pattern, _first in (
@@ -69,14 +137,10 @@ def read_yaml(path: Path) -> dict[str, Any]:
     ------
     UsageError
         Not readable, not YAML, a duplicate key, or not a mapping.
+    DiskError
+        The disk does not give it back.
     """
-    try:
-        text = path.read_text(encoding="utf-8")
-    except FileNotFoundError:
-        raise UsageError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: cannot be read as UTF-8 text ({error})") from None
-    return parse_yaml(text, str(path))
+    return parse_yaml(read_text(path, MOST_BYTES), str(path))
 
 
 def parse_yaml(text: str, source: str) -> dict[str, Any]:
@@ -88,7 +152,7 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
         place = "" if mark is None else f", line {mark.line + 1}"
         problem = " ".join(str(error.problem or error.context).split())
         raise UsageError(f"{source}{place}: {problem}") from None
-    except (yaml.YAMLError, ValueError, RecursionError) as error:
+    except (yaml.YAMLError, ValueError) as error:
         raise UsageError(f"{source}: not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(content, dict):
         raise UsageError(f"{source}: expected 'key: value' lines, got {_kind(content)}")
@@ -137,7 +201,7 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> str:
     place = ".".join(str(part) for part in problem["loc"])
     if problem["type"] == "extra_forbidden":
         keys = list(_sibling_keys(model, problem["loc"]))
-        return f"unknown key '{place}'; {did_you_mean(str(problem['loc'][-1]), keys)}"
+        return f"unknown key '{_shown(place)}'; {did_you_mean(str(problem['loc'][-1]), keys)}"
     if problem["type"] == "missing":
         return f"the key '{place}' is missing; it is required"
     said = problem["msg"].removeprefix("Value error, ")
@@ -173,4 +237,8 @@ def _kind(value: Any) -> str:
         return "nothing"
     if isinstance(value, (dict, list)):
         return "a mapping" if isinstance(value, dict) else "a list"
-    return f"'{value}'"
+    return f"'{_shown(str(value))}'"
+
+
+def _shown(text: str) -> str:
+    return text if len(text) <= MOST_SHOWN else text[:MOST_SHOWN] + "…"

@@ -26,6 +26,7 @@ from labrig.region import CENTRE, Region
 
 from .steps.arrangement import Arrangement
 from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
+from .steps.frame_times import frame_times_s
 from .steps.posing import charge, face_camera, lights_out, seen_s
 from .steps.prepared import PutBackUnit
 from .steps.watching import Watcher
@@ -90,8 +91,7 @@ class Blank(ProtocolModel):
     def times_s(self, earliest_s: float, later_s: float) -> list[float]:
         """Begin of each frame of a sequence after lamp off."""
         first_s = (earliest_s if self.first == "auto" else self.first) + later_s
-        count = int((self.duration - first_s) / self.every + 1e-9) + 1
-        return [first_s + number * self.every for number in range(count)]
+        return frame_times_s(first_s, self.every, self.duration)
 
 
 @dataclass(frozen=True)

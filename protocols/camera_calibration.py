@@ -11,7 +11,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import ExposureSettings, ProtocolModel, Unit
-from labrig.quantity import DurationS
+from labrig.quantity import Count, DurationS
 from labrig.region import CENTRE, Region
 
 from .camera_calibration_units import (
@@ -40,8 +40,8 @@ class CameraCalibration(ProtocolModel):
     f_numbers: tuple[float, ...] = (2.8, 4.0, 5.6, 8.0, 11.0)
     card: Region = CENTRE
     levels: int = Field(6, ge=3, le=30)
-    repeats: int = Field(24, ge=6)
-    cycles: int = Field(4, ge=2)
+    repeats: Count = Field(24, ge=6)
+    cycles: Count = Field(4, ge=2)
     every_nth_shutter_time: int = Field(2, ge=1, le=9)
     longest_dark: DurationS = Field(8.0, gt=0)
 

@@ -6,11 +6,12 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel, Session
-from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
+from labrig.quantity import Count, DurationS, Fraction, WordOrDuration, duration_text
 from labrig.reduce import FrameMeasurement
 from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, dark_exposures_s
+from .steps.frame_times import frame_times_s
 from .steps.metering import DecayMeter, Look, Schedule
 from .steps.patch_names import Patches
 from .steps.posing import charge
@@ -36,7 +37,7 @@ class DecaySettings(ProtocolModel):
     every: DurationS = Field(5.0, gt=0)
     duration: DurationS = Field(180.0, gt=0, alias="for")
     first: DurationS = Field(0.5, ge=0)
-    repeats: int = Field(1, ge=1)
+    repeats: Count = Field(1, ge=1)
     camera: CameraSettings = CameraSettings()
     exposure: Annotated[float | Literal["auto", "grow"], WordOrDuration("auto", "grow")] = "auto"
     grow_at_most: float = Field(16.0, ge=1)
@@ -67,8 +68,7 @@ class DecaySettings(ProtocolModel):
 
     def frame_times_s(self) -> list[float]:
         """Planned begin of each frame, seconds after lamp off."""
-        count = int((self.duration - self.first) / self.every + 1e-9) + 1
-        return [self.first + number * self.every for number in range(count)]
+        return frame_times_s(self.first, self.every, self.duration)
 
     def settings(self, exposure_s: float) -> ExposureSettings:
         """Camera settings with that shutter time."""

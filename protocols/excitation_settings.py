@@ -7,7 +7,7 @@ from typing import ClassVar, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel
-from labrig.quantity import DurationS, Fraction, duration_text
+from labrig.quantity import Count, DurationS, Fraction, duration_text
 from labrig.region import Region
 
 from .steps.camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
@@ -44,15 +44,15 @@ class ExcitationSettings(ProtocolModel):
     protocol: Literal["excitation"] = "excitation"
     first_charge: DurationS = Field(8.0, gt=0)
     growth: Fraction = Field(0.03, gt=0, lt=1)
-    at_most: int = Field(9, ge=2)
-    refine: int = Field(3, ge=0)
+    at_most: Count = Field(9, ge=2)
+    refine: Count = Field(3, ge=0)
     bare: tuple[DurationS, ...] = Field((3.0, 10.0, 60.0, 900.0), min_length=1)
     first: DurationS = Field(1.0, ge=0)
     every: DurationS = Field(4.0, gt=0)
     duration: DurationS = Field(90.0, gt=0, alias="for")
     last_decay: DurationS = Field(180.0, gt=0)
     rest: Rest = Rest()
-    samples: int = Field(1, ge=1)
+    samples: Count = Field(1, ge=1)
     camera: CameraSettings = CameraSettings()
     sites: Region = Field((0.1, 0.4, 0.8, 0.2))
     patches: FilterPatches = Field(default_factory=dict)

@@ -24,12 +24,13 @@ from labrig.acquire import (
     Unit,
     at,
 )
-from labrig.quantity import DurationS, duration_text
+from labrig.quantity import Count, DurationS, duration_text
 from labrig.region import CENTRE, Region
 
 from .camera_calibration_units import HALF, CardDarkUnit
 from .steps.arrangement import Arrangement
 from .steps.camera_settings import CameraSettings
+from .steps.frame_times import frame_times_s
 from .steps.lit_card import CardLight, CardMeterUnit, card_light, light_card
 from .steps.prepared import PutBackUnit
 
@@ -56,10 +57,10 @@ class Fade(ProtocolModel):
     camera: CameraSettings = CameraSettings(iso=400, f_number=4.0)
     every: DurationS = Field(0.03, gt=0)
     until: DurationS = Field(0.45, gt=0)
-    passes: int = Field(4, ge=2)
+    passes: Count = Field(4, ge=2)
     longest: DurationS = Field(1.0, gt=0)
     rise: bool = True
-    repeat_late: int = Field(2, ge=0)
+    repeat_late: Count = Field(2, ge=0)
     warming: bool = True
     through_lvf: bool = False
     card: Region = CENTRE
@@ -83,8 +84,7 @@ class Fade(ProtocolModel):
     def delays_s(self, number: int) -> list[float]:
         """From the switch to the release in one pass; each pass begins a little later."""
         first_s = number / self.passes * self.every
-        count = int((self.until - first_s) / self.every + 1e-9) + 1
-        return [first_s + step * self.every for step in range(count)]
+        return frame_times_s(first_s, self.every, self.until)
 
     def fade_exposure_s(self, delay_s: float, light: CardLight, offers: CameraOffers) -> float:
         """Longest shutter time in which even a slowly fading lamp fills no more than its share."""

@@ -11,7 +11,7 @@ from typing import Annotated, ClassVar, Literal, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import ProtocolModel, Unit
-from labrig.quantity import DurationS
+from labrig.quantity import Count, DurationS
 
 from .lvf_units import StripUnit
 from .steps.arrangement import Arrangement
@@ -38,8 +38,8 @@ class Irradiance(ProtocolModel):
     vector_length: float = Field(1.0, gt=0, allow_inf_nan=False)
     camera: CameraSettings = CameraSettings(iso=100)
     longest: DurationS = Field(8.0, gt=0)
-    repeats: int = Field(2, ge=1)
-    rounds: int = Field(2, ge=1)
+    repeats: Count = Field(2, ge=1)
+    rounds: Count = Field(2, ge=1)
 
     @model_validator(mode="after")
     def _bands_rise(self) -> Self:

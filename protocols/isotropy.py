@@ -10,7 +10,7 @@ from typing import Annotated, Literal, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import ByHand, Session, Shoot, Unit, at
-from labrig.quantity import DurationS, duration_text
+from labrig.quantity import Count, DurationS, duration_text
 from labrig.region import Region
 
 from .steps.glow_settings import GlowSettings, metered_schedule
@@ -31,7 +31,7 @@ class Isotropy(GlowSettings):
     angles: tuple[Angle, ...] = Field((20, 40, 60, 80), min_length=1)
     first: DurationS = Field(60.0, gt=0)
     every: DurationS = Field(10.0, gt=0)
-    frames: int = Field(4, ge=2)
+    frames: Count = Field(4, ge=2)
     patch: Literal["inside", "around"] = "inside"
     patches: Patches = Field({"sample": (0.48, 0.35, 0.04, 0.3)}, min_length=1)
 

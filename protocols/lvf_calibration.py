@@ -11,7 +11,7 @@ from pydantic import Field, model_validator
 
 from labrig.acquire import ProtocolModel, RigFile, Unit
 from labrig.acquire.rig_file import Optics
-from labrig.quantity import DurationS, WordOrDuration
+from labrig.quantity import Count, DurationS, WordOrDuration
 
 from .lvf_units import NO_FILTER, FilterUnit, LinesUnit, StripesUnit, StripUnit, filter_unit
 from .steps.arrangement import Arrangement
@@ -48,7 +48,7 @@ class LvfCalibration(ProtocolModel):
     filters: Literal["all"] | tuple[FilterName, ...] = "all"
     camera: CameraSettings = CameraSettings(iso=100)
     longest: DurationS = Field(8.0, gt=0)
-    repeats: int = Field(2, ge=1)
+    repeats: Count = Field(2, ge=1)
     mercury_warm_up: DurationS = Field(300.0, ge=0)
     stripes: Annotated[float | Literal["none"], WordOrDuration("none")] = 600.0
 

@@ -143,6 +143,24 @@ def test_ctrl_c_while_waiting_for_a_device_ends_the_wait(
     assert "labrig resume" in str(caught.value)
 
 
+def test_frames_that_are_not_as_the_journal_says_are_named_at_resume(
+    labrig: Labrig, make_rig: Make, quick: Path, tmp_path: Path
+) -> None:
+    run = labrig("run", quick, "--rig", make_rig(), "--runs", tmp_path, "--no-process").run_folder
+    assert "warning" not in labrig("resume", run, "--no-process").err
+    frames = run / "frames"
+    (frames / "000099.dng").write_bytes(b"its line never came")
+    (frames / "000100.dng.part").write_bytes(b"half")
+    (frames / "000001.dng").unlink()
+    (frames / "000002.dng").write_bytes((frames / "000003.dng").read_bytes())
+    ended = labrig("resume", run, "--no-process")
+    assert ended.code == 0
+    unknown, damaged = [line for line in ended.err.splitlines() if "warning: " in line]
+    assert "000099.dng, 000100.dng.part" in unknown
+    assert "000001.dng is missing, 000002.dng was changed" in damaged
+    assert (frames / "000099.dng").exists()
+
+
 def test_a_device_that_is_missing_at_the_start_is_not_waited_for(
     quick: Path, make_rig: Make, tmp_path: Path
 ) -> None:

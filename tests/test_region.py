@@ -29,8 +29,12 @@ def test_what_lies_in_the_frame_is_in_it_as_pixels(
 
 
 @pytest.mark.parametrize(
-    "text", ["", "1,2,3", "1,2,3,x", "-1,2,3,4", "1,2,0,4", "1.5,2,3,4", "nan,0,1,1"]
-)
+    "text",
+    [
+        "", "1,2,3", "1,2,3,x", "-1,2,3,4", "1,2,0,4", "1.5,2,3,4", "nan,0,1,1",
+        "inf,0,1,1", "0,0,inf,1", "-inf,0,1,1", "1e308,0,1e308,1",
+    ],
+)  # fmt: skip
 def test_what_is_no_region_is_refused(text: str) -> None:
     with pytest.raises(UsageError, match="x,y,width,height"):
         parse_region(text)

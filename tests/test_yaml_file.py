@@ -1,6 +1,8 @@
 """YAML as people write it: 1.2 scalars, no duplicate keys, one clear line when it is wrong."""
 
+from itertools import pairwise
 from pathlib import Path
+from time import process_time
 
 import pytest
 from hypothesis import given
@@ -68,6 +70,57 @@ def test_malformed_text_is_one_clear_line(text: str, expected: str) -> None:
     assert "\n" not in str(caught.value)
 
 
+BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
+    f"{name}: &{name} [{', '.join(9 * [f'*{before}'])}]\n" for before, name in pairwise("abcdefghi")
+)
+
+
+@pytest.mark.parametrize(
+    ("text", "expected"),
+    [
+        (BOMB, "write it out"),
+        ("a: &a [*a]", "within what it stands for"),
+        ("a: &a {b: {c: *a}}", "within what it stands for"),
+        ("a: " + "[" * 5000, "deep"),
+        (
+            "a: &a [[[[[[[[[[[[[[[x]]]]]]]]]]]]]]]\nb: [[[[[[[[[[[[[[[[[*a]]]]]]]]]]]]]]]]]",
+            "write it out",
+        ),
+        ("a: !!timestamp x", "!!timestamp"),
+        ("a: !!bool x", "!!bool"),
+        ("a: !!python/object/apply:os.getcwd []", "tag"),
+        ("a: !mine [b]", "tag"),
+        ("a: .inf", "finite"),
+        ("a: -.INF", "finite"),
+        ("a: .nan", "finite"),
+        ("a: 1e400", "finite"),
+        ("a: " + "9" * 5000, "digits"),
+        ('a: "\\ud800"', "text"),
+        ('a: "b\\0c"', "text"),
+        ("? [a]\n: b", "key"),
+    ],
+)
+def test_what_no_file_needs_is_refused_at_once(text: str, expected: str) -> None:
+    began_s = process_time()
+    with pytest.raises(UsageError, match="test") as caught:
+        parse_yaml(text, "test")
+    assert process_time() - began_s < 2.0
+    assert expected in str(caught.value)
+    assert "\n" not in str(caught.value)
+    assert len(str(caught.value)) < 300
+
+
+def test_an_alias_is_what_it_stands_for() -> None:
+    read = parse_yaml("a: &here [0.1, 0.2, 0.3, 0.4]\nb: {c: *here}", "test")
+    assert read == {"a": [0.1, 0.2, 0.3, 0.4], "b": {"c": [0.1, 0.2, 0.3, 0.4]}}
+
+
+def test_a_file_without_end_is_refused(tmp_path: Path) -> None:
+    (tmp_path / "long.yaml").write_text("a: b\n" + "# more\n" * 100_000)
+    with pytest.raises(UsageError, match="at most"):
+        read_model(tmp_path / "long.yaml", Outer)
+
+
 @pytest.mark.parametrize(
     ("content", "expected"),
     [
@@ -112,6 +165,6 @@ def test_any_text_is_a_mapping_or_one_line(text: str) -> None:
         assert "\n" not in str(error)
 
 
-@given(st.floats(allow_nan=False), st.integers(-(10**15), 10**15))
+@given(st.floats(allow_nan=False, allow_infinity=False), st.integers(-(10**15), 10**15))
 def test_numbers_survive_writing(real: float, whole: int) -> None:
     assert parse_yaml(yaml_text({"a": real, "b": whole}), "test") == {"a": real, "b": whole}

@@ -15,7 +15,6 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-import labrig
 from labrig.clock import LOOK_UP_S, Clock
 from labrig.errors import DeviceLostError, UsageError
 
@@ -49,6 +48,7 @@ class HelperProcess:
         self.end()
         self._pipe, theirs = Pipe()
         with theirs:
+            # -P: nothing beside the helper or in the working folder is taken for a module.
             self._process = subprocess.Popen(
                 [sys.executable, "-P", str(HELPER), str(theirs.fileno())],
                 env=_environment(),
@@ -155,7 +155,5 @@ def require_gphoto2() -> None:
 
 
 def _environment() -> dict[str, str]:
-    """With this labrig to be found, and libgphoto2's labels in English."""
-    here = str(Path(labrig.__file__).resolve().parent.parent)
-    path = os.pathsep.join(filter(None, (here, os.environ.get("PYTHONPATH"))))
-    return os.environ | {"PYTHONPATH": path, "LC_ALL": "C", "LANGUAGE": ""}
+    """With libgphoto2's labels in English."""
+    return os.environ | {"LC_ALL": "C", "LANGUAGE": ""}

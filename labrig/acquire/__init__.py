@@ -18,7 +18,7 @@ from labrig.acquire.actions import (
 from labrig.acquire.by_hand import ByHand, TakenBack
 from labrig.acquire.findings import Finding
 from labrig.acquire.part import PartUnit
-from labrig.acquire.planner import Plan, plan
+from labrig.acquire.planner import MOST_STEPS, Plan, plan
 from labrig.acquire.protocol import ProtocolModel, Sample, Unit
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile, read_rig_file
@@ -46,6 +46,7 @@ __all__ = [
     "DOOR_OPEN",
     "LAMP_OFF",
     "LAMP_ON",
+    "MOST_STEPS",
     "SHIELD_COVER",
     "SHIELD_UNCOVER",
     "ByHand",

@@ -19,6 +19,9 @@ from labrig.quantity import duration_text
 from labrig.record import PERSON, ActionRecord, FrameRecord
 from labrig.yaml_file import validate
 
+#: More than any run has, and laid out in about a second.
+MOST_STEPS = 50_000
+
 T = TypeVar("T")
 
 
@@ -253,5 +256,10 @@ class _PlanRecorder:
                 f"{self.unit}: '{action}' would begin {duration_text(late_s)} late, because "
                 f"'{before.action}' is not over; leave more time between frames (every:) or "
                 "expose for less"
+            )
+        if len(self.steps) == MOST_STEPS:
+            raise ProtocolError(
+                f"expected at most {MOST_STEPS} steps, got more in {self.unit}; ask for fewer "
+                "repeats or frames"
             )
         self.steps.append(Step(at_s, self.unit, device, action))

@@ -10,7 +10,7 @@ from typing import Literal, get_args
 from filelock import FileLock, Timeout
 
 from labrig.acquire import plugins
-from labrig.errors import DataError, LabrigError, UsageError
+from labrig.errors import DataError, DiskError, LabrigError, UsageError
 from labrig.record import read_run
 from labrig.results import DecayResult, read_decay_results
 from labrig.yaml_file import did_you_mean, read_yaml
@@ -118,7 +118,7 @@ def summarise(folder: Path) -> RunSummary:
     sample, protocol, units = _asked(folder)
     try:
         record, results = read_run(folder), read_decay_results(folder / "result")
-    except DataError:
+    except (DataError, DiskError):
         has_journal = (folder / "journal.jsonl").exists()
         state: State = "damaged" if has_journal else "unfinished"
         return RunSummary(folder, sample, protocol, None, state, 0, units, 0, {})

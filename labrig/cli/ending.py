@@ -1,13 +1,20 @@
 """How a command ends: an exit code, and one line where something went wrong."""
 
+import errno
+import re
 import signal
 import sys
 from collections.abc import Sequence
 
 from labrig.cli.closed_pipe import say_no_more
 from labrig.clock import Interrupted
-from labrig.errors import DiskError, LabrigError
+from labrig.errors import DiskError, LabrigError, UsageError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
+
+#: Of a file's name, in a message.
+MOST_SHOWN = 200
+#: What Python makes of bytes of an argument that are no UTF-8.
+_NO_TEXT = re.compile("[\ud800-\udfff]")
 
 
 def guarded(arguments: Sequence[str]) -> int:
@@ -33,6 +40,8 @@ def _run(arguments: Sequence[str]) -> int:
 
     from labrig.cli.app import app
 
+    if any(_NO_TEXT.search(argument) for argument in arguments):
+        return _complain(f"expected arguments in UTF-8, got {' '.join(map(ascii, arguments))}", 2)
     try:
         app(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
     except Interrupted as interrupted:
@@ -48,7 +57,9 @@ def _run(arguments: Sequence[str]) -> int:
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
-        return _complain(f"{error.filename or 'disk'}: {error.strerror}", DiskError.exit_code)
+        name = str(error.filename or "disk")[:MOST_SHOWN]
+        kind = UsageError if error.errno == errno.ENAMETOOLONG else DiskError
+        return _complain(f"{name}: {error.strerror or error}", kind.exit_code)
     except Exception as error:
         return _complain(_fault(error), 1)
     return 0

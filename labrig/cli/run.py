@@ -84,6 +84,10 @@ def resume(
     runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
     yes: Yes = False,
     no_process: NoProcess = False,
+    on_finish: Annotated[
+        bool,
+        typer.Option("--on-finish", help="Run the command in 'on_finish' of the run's rig.yaml."),
+    ] = False,
     json: Json = False,
 ) -> None:
     """Go on with a run that was interrupted: completed units are kept, the rest is done."""
@@ -97,7 +101,15 @@ def resume(
     path = folder / "rig.yaml"
     rig = read_rig_file(path) if path.is_file() else None
     watch = partial(progress, yes=yes, has_hands=rig is not None and "hands" in rig.devices)
-    with told_at_end(None if rig is None else rig.on_finish) as ending:
+    wanted = None if rig is None else rig.on_finish
+    if isinstance(wanted, tuple) and not on_finish:
+        typer.echo(
+            f"note: 'on_finish' in {path} is not run, in case somebody else wrote it: "
+            f"{' '.join(map(ascii, wanted))}; to run it, add --on-finish",
+            err=True,
+        )
+        wanted = None
+    with told_at_end(wanted) as ending:
         _finish(resume_run(folder, watch), no_process, json)
         ending.message = str(folder)
 

@@ -5,6 +5,7 @@ definition describes a decay.
 """
 
 from datetime import UTC, datetime
+from io import BytesIO
 from pathlib import Path
 
 import h5py
@@ -40,14 +41,16 @@ def write_nexus(path: Path, run: RunRecord, report: RunReport) -> None:
     DiskError
         The file cannot be written.
     """
+    # Made in memory: HDF5 has no plain way to say that a disk has failed it.
+    content = BytesIO()
+    with h5py.File(content, "w") as file:
+        file.attrs["NX_class"] = "NXroot"
+        file.attrs["creator"] = "labrig"
+        file.attrs["creator_version"] = report.labrig_version
+        file.attrs["default"] = "entry"
+        _add_entry(file, run, report)
     try:
-        # Nobody else has the file yet, and a network drive may know no locks.
-        with h5py.File(path, "w", locking=False) as file:
-            file.attrs["NX_class"] = "NXroot"
-            file.attrs["creator"] = "labrig"
-            file.attrs["creator_version"] = report.labrig_version
-            file.attrs["default"] = "entry"
-            _add_entry(file, run, report)
+        path.write_bytes(content.getbuffer())
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error})") from None
 

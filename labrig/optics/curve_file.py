@@ -13,6 +13,7 @@ from pathlib import Path
 from typing import NamedTuple, TypeVar
 
 from labrig.errors import UsageError
+from labrig.input_file import read_text
 from labrig.optics.curve_json import curves_from_json
 from labrig.optics.curve_text import curves_from_text
 from labrig.optics.piecewise import FloatArray
@@ -87,12 +88,7 @@ def read_curve_file(path: str | os.PathLike[str]) -> CurveFile:
         It cannot be read, or is none of the formats.
     """
     place = Path(path)
-    try:
-        text = place.read_text(encoding="utf-8-sig")
-    except OSError as error:
-        raise UsageError(f"{place}: cannot be read ({error.strerror})") from None
-    except UnicodeDecodeError:
-        raise UsageError(f"{place}: not text in UTF-8; save it as UTF-8") from None
+    text = read_text(place)
     if place.suffix.lower() == ".json":
         try:
             content = json.loads(text)

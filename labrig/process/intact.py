@@ -1,7 +1,6 @@
 """Whether frames are as they were recorded."""
 
 from collections.abc import Mapping, Sequence
-from hashlib import file_digest
 
 from labrig.errors import DataError
 from labrig.process.choices import Choices
@@ -30,7 +29,7 @@ def damaged_frames(run: RunRecord, purposes: Sequence[str]) -> dict[FrameRecord,
         for frame in attempt.frames
         if frame.purpose in purposes
     ]
-    return {frame: damage for frame in frames if (damage := _damage(frame))}
+    return {frame: damage for frame in frames if (damage := frame.damage())}
 
 
 def insist(run: RunRecord, damaged: Mapping[FrameRecord, str], choices: Choices) -> None:
@@ -44,16 +43,6 @@ def insist(run: RunRecord, damaged: Mapping[FrameRecord, str], choices: Choices)
     refused = {f: damage for f, damage in damaged.items() if not choices.excludes(f)}
     if refused:
         raise DataError(f"{run.folder}: {_told(refused)}")
-
-
-def _damage(frame: FrameRecord) -> str:
-    """What is wrong with the file, nothing if it is as recorded."""
-    try:
-        with frame.path.open("rb") as file:
-            checksum = file_digest(file, "sha256").hexdigest()
-    except OSError as error:
-        return "is missing" if not frame.path.exists() else f"cannot be read ({error.strerror})"
-    return "" if checksum == frame.sha256 else "was changed after the run (its checksum differs)"
 
 
 def _told(damaged: Mapping[FrameRecord, str]) -> str:

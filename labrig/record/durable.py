@@ -14,24 +14,25 @@ def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
     Raises
     ------
     DiskError
-        The disk is full or gone; nothing named `path` is left.
+        The disk is full or gone; `path` is as it was, or as it should be.
     """
     part = path.with_name(path.name + ".part")
     try:
         with part.open("wb", buffering=0) as file:
             disk.write(file, data)
         part.replace(path)
-        _sync_folder(path.parent)
+        sync_folder(path.parent)
     except OSError as error:
         with suppress(OSError):
             part.unlink(missing_ok=True)
         raise DiskError(
-            f"{path}: {len(data) / 1e6:.2g} MB cannot be written ({error.strerror}); make room"
+            f"{path}: {len(data) / 1e6:.2g} MB cannot be written ({error.strerror}); see that "
+            "the disk is there and has room"
         ) from None
 
 
-def _sync_folder(folder: Path) -> None:
-    """Make the rename itself durable, where the system has a way to (Windows has none)."""
+def sync_folder(folder: Path) -> None:
+    """Make what was made or renamed in `folder` durable, where there is a way (not on Windows)."""
     if hasattr(os, "O_DIRECTORY"):
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:

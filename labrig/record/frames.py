@@ -1,6 +1,8 @@
 """What is known of a recorded photograph and of anything else that was done or read."""
 
+import os
 from dataclasses import dataclass
+from hashlib import file_digest
 from pathlib import Path
 
 
@@ -34,6 +36,20 @@ class FrameRecord:
     end_time: float
     late_s: float
     disk_s: float = 0.0
+
+    def damage(self) -> str:
+        """What is wrong with the file, nothing if it is as recorded."""
+        try:
+            with self.path.open("rb") as file:
+                # A file of another size need not be read; one made up by somebody may have no end.
+                same_size = os.fstat(file.fileno()).st_size == self.size_bytes
+                if same_size and file_digest(file, "sha256").hexdigest() == self.sha256:
+                    return ""
+        except FileNotFoundError:
+            return "is missing"
+        except OSError as error:
+            return f"cannot be read ({error.strerror})"
+        return "was changed after the run (its checksum differs)"
 
 
 #: Devices of actions that are a person's: what was done by hand, and the unit that does not count

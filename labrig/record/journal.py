@@ -3,6 +3,7 @@
 import json
 import os
 from collections.abc import Mapping
+from contextlib import suppress
 from dataclasses import dataclass
 from pathlib import Path
 from types import TracebackType
@@ -10,7 +11,9 @@ from typing import Any, BinaryIO, Self
 
 from labrig.errors import DataError, DiskError
 from labrig.record.disk import REAL_DISK, Disk
+from labrig.record.durable import write_durably
 
+JOURNAL = "journal.jsonl"
 Document = tuple[str, dict[str, Any]]
 
 
@@ -25,42 +28,52 @@ class JournalContent:
 class Journal:
     """Appends documents durably: when `append` returns, the line survives a power cut.
 
-    A torn last line, of a crash or of a full disk, is cut off before the next one is written: it
-    was never acknowledged.
+    What a file holds after a write or an fsync that failed, nobody can know: the line may be there
+    as a whole, in part, or only until the power goes. So the lines that were acknowledged are
+    remembered, `read` gives back nothing else, and whatever stands behind them in the file is cut
+    off before the next line is written. The journal of an earlier process is written anew when it
+    is opened, since some of what is read there may not be on the disk.
     """
 
     def __init__(self, path: Path, disk: Disk = REAL_DISK) -> None:
         self.path = path
         self._disk = disk
         try:
-            self._file: BinaryIO = path.open("a+b", buffering=0)
-            self._file.seek(0)
-            self._acknowledged = self._file.read().rfind(b"\n") + 1
+            raw = path.read_bytes() if path.exists() else b""
+            self._acknowledged = bytearray(raw[: raw.rfind(b"\n") + 1])
+            write_durably(path, bytes(self._acknowledged), disk)
+            self._file: BinaryIO = path.open("ab", buffering=0)
         except OSError as error:
             raise DiskError(f"{path}: the journal cannot be opened ({error})") from None
 
     @property
     def size_bytes(self) -> int:
         """Of all acknowledged lines."""
-        return self._acknowledged
+        return len(self._acknowledged)
+
+    def read(self) -> JournalContent:
+        """All that was acknowledged, also when the disk is gone."""
+        return _parsed(self.path, bytes(self._acknowledged))
 
     def append(self, name: str, doc: Mapping[str, Any]) -> None:
         """Write `{"name": name, "doc": doc}` and wait until the disk has it."""
         text = json.dumps({"name": name, "doc": doc}, ensure_ascii=False, allow_nan=False)
         line = text.encode() + b"\n"
         try:
-            if os.fstat(self._file.fileno()).st_size > self._acknowledged:
-                self._file.truncate(self._acknowledged)
+            if os.fstat(self._file.fileno()).st_size > self.size_bytes:
+                self._file.truncate(self.size_bytes)
             self._disk.write(self._file, line)
         except OSError as error:
             raise DiskError(
-                f"{self.path}: the journal cannot be written ({error.strerror}); free some space"
+                f"{self.path}: the journal cannot be written ({error.strerror}); see that the disk "
+                "is there and has room"
             ) from None
-        self._acknowledged += len(line)
+        self._acknowledged += line
 
     def close(self) -> None:
         """Release the file."""
-        self._file.close()
+        with suppress(OSError):  # every line in it was acknowledged before
+            self._file.close()
 
     def __enter__(self) -> Self:
         return self
@@ -81,19 +94,29 @@ def read_journal(path: Path) -> JournalContent:
     ------
     DataError
         There is none, or a line other than the last is damaged.
+    DiskError
+        The disk does not give it back.
     """
     try:
+        if not path.is_file():
+            raise DataError(f"{path}: there is no journal")
         raw = path.read_bytes()
     except OSError as error:
-        raise DataError(f"{path}: no journal to read ({error.strerror})") from None
+        raise DiskError(f"{path}: the journal cannot be read ({error.strerror})") from None
+    return _parsed(path, raw)
+
+
+def _parsed(path: Path, raw: bytes) -> JournalContent:
     lines = raw.split(b"\n")
     torn = lines.pop() != b""
     documents: list[Document] = []
     for number, line in enumerate(lines, start=1):
         try:
             entry = json.loads(line, parse_constant=_refuse)
+            if b"\\ud" in line.lower():  # perhaps half of a surrogate pair, which is no text
+                json.dumps(entry, ensure_ascii=False).encode()
             documents.append((str(entry["name"]), dict(entry["doc"])))
-        except (ValueError, KeyError, TypeError):
+        except (ValueError, KeyError, TypeError, RecursionError):
             raise DataError(
                 f"{path}, line {number}: expected a journal document, got {line[:40]!r}; "
                 "the file was changed after the run"

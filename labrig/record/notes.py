@@ -4,6 +4,8 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from labrig.errors import DiskError, UsageError
+from labrig.record.disk import REAL_DISK
+from labrig.record.durable import sync_folder
 
 _NAME = "notes.md"
 
@@ -31,8 +33,9 @@ def add_note(run: Path, text: str, written_time: float) -> Path:
     written = datetime.fromtimestamp(written_time, UTC)
     entry = f"## {written:%Y-%m-%d %H:%M} UTC\n\n{text.strip()}\n\n"
     try:
-        with path.open("a", encoding="utf-8", newline="\n") as notes:
-            notes.write(entry)
+        with path.open("ab", buffering=0) as notes:
+            REAL_DISK.write(notes, entry.encode())
+        sync_folder(run)
     except OSError as error:
         raise DiskError(f"{path}: the note cannot be written ({error.strerror})") from None
     return path

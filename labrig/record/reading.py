@@ -1,13 +1,14 @@
 """Reading a run folder back: which units completed, and what they hold."""
 
 import os
+import re
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any, TypeVar
 
 from pydantic import TypeAdapter, ValidationError
 
-from labrig.errors import DataError
+from labrig.errors import DataError, DiskError
 from labrig.record.frames import (
     TAKEN_BACK,
     ActionRecord,
@@ -15,12 +16,15 @@ from labrig.record.frames import (
     TemperatureRecord,
     unit_within,
 )
-from labrig.record.journal import Document, read_journal
+from labrig.record.journal import JOURNAL, Document, JournalContent, read_journal
 
 #: End of the year 9999 in seconds since 1970: no calendar reaches further.
 LATEST = 253_402_300_799.0
 #: No thermometer on a bench reads more, or as little, in degrees Celsius.
 HOTTEST_C = 1000.0
+
+#: As frames are called when they are written.
+_FRAME_NAME = re.compile(r"frames/\d{6,}[\w.-]*")
 
 Recorded = TypeVar("Recorded", FrameRecord, ActionRecord)
 _FRAME, _ACTION = TypeAdapter(FrameRecord), TypeAdapter(ActionRecord)
@@ -112,10 +116,18 @@ def read_run(run: str | os.PathLike[str]) -> RunRecord:
     ------
     DataError
         Not a run folder, or its journal is damaged or was edited into something that does not fit.
+    DiskError
+        The disk does not give it back.
     """
     folder = Path(run)
-    path = folder / "journal.jsonl"
-    content = read_journal(path)
+    record = run_record(folder, read_journal(folder / JOURNAL))
+    for frame in (frame for attempt in record.attempts for frame in attempt.frames):
+        _refuse_what_is_no_file(frame.path)
+    return record
+
+
+def run_record(folder: Path, content: JournalContent) -> RunRecord:
+    """What the documents of a journal say of the run in `folder`; errors as of `read_run`."""
     attempts: dict[str, Attempt] = {}
     streams: dict[str, tuple[str, str]] = {}
     last_time = 0.0
@@ -125,8 +137,8 @@ def read_run(run: str | os.PathLike[str]) -> RunRecord:
             _take(folder, (name, doc), attempts, streams)
         except (KeyError, TypeError, ValueError) as error:
             raise DataError(
-                f"{path}, line {number}: a '{name}' document that does not fit ({_said(error)}); "
-                "the file was changed after the run"
+                f"{folder / JOURNAL}, line {number}: a '{name}' document that does not fit "
+                f"({_said(error)}); the file was changed after the run"
             ) from None
     return RunRecord(folder, list(attempts.values()), content.torn, last_time)
 
@@ -148,7 +160,7 @@ def _take(
         run_uid, stream = streams[doc["descriptor"]]
         attempt, data = attempts[run_uid], dict(doc["data"])
         if stream == "frames":
-            path = folder / data.pop("frame")
+            path = folder / _frame_name(data.pop("frame"))
             frame = _FRAME.validate_python({**data, "path": path, "unit": attempt.unit})
             attempt.frames.append(_dated(frame))
         elif stream == "actions":
@@ -157,6 +169,25 @@ def _take(
         elif stream == "temperatures":
             reading = _TEMPERATURE.validate_python({**data, "unit": attempt.unit})
             attempt.temperatures.append(_sensible(reading))
+
+
+def _frame_name(name: str) -> str:
+    """`name`, if it is one within the run folder."""
+    if not _FRAME_NAME.fullmatch(name):
+        raise ValueError(f"'{name}' is no name of a frame, such as frames/000001.cr2")
+    return name
+
+
+def _refuse_what_is_no_file(frame: Path) -> None:
+    """A link leads out of the run folder, a device has no end; what is missing is told of later."""
+    try:
+        is_something_else = frame.is_symlink() or (frame.exists() and not frame.is_file())
+    except OSError as error:
+        raise DiskError(f"{frame}: cannot be read ({error.strerror})") from None
+    if is_something_else:
+        raise DataError(
+            f"{frame}: expected a file, got a link or a device; put the frame itself there"
+        )
 
 
 def _opened(doc: dict[str, Any]) -> Attempt:

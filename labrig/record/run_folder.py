@@ -4,6 +4,7 @@ import re
 import shutil
 import uuid
 from collections.abc import Callable, Mapping
+from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
@@ -14,11 +15,12 @@ from filelock import FileLock, Timeout
 from labrig.errors import DiskError, UsageError
 from labrig.record.attempt import AttemptWriter
 from labrig.record.disk import REAL_DISK, Disk
-from labrig.record.durable import write_durably
-from labrig.record.journal import Journal
-from labrig.record.reading import RunRecord, read_run
+from labrig.record.durable import sync_folder, write_durably
+from labrig.record.journal import JOURNAL, Journal
+from labrig.record.reading import RunRecord, run_record
 
-_JOURNAL = "journal.jsonl"
+#: What a run folder is known by.
+PROTOCOL = "protocol.yaml"
 
 
 class RunFolder:
@@ -43,8 +45,10 @@ class RunFolder:
             self._lock.acquire(timeout=0)
         except Timeout:
             raise UsageError(f"{path}: another labrig is writing to this run") from None
+        except OSError as error:
+            raise DiskError(f"{path}: the run cannot be written to ({error.strerror})") from None
         self._frame_number = _highest_frame(path / "frames")
-        self._journal = Journal(path / _JOURNAL, disk)
+        self._journal = Journal(path / JOURNAL, disk)
 
     @classmethod
     def create(
@@ -63,12 +67,18 @@ class RunFolder:
         started
             Seconds since 1970.
         texts
-            File name → content: the protocol and the rig, as resolved.
+            File name → content: the protocol and the rig, as resolved. The protocol, which a run
+            folder is known by, is written last.
+
+        Raises
+        ------
+        DiskError
+            The disk is full, or gone; no run is left.
         """
         stamp = datetime.fromtimestamp(started, UTC).strftime("%Y-%m-%dT%H-%M-%S")
         wanted = f"{stamp}_{_slug(name)}"
         try:
-            runs.mkdir(parents=True, exist_ok=True)
+            _make_durably(runs)
             path = _make_new(runs, wanted)
         except OSError as error:
             raise DiskError(
@@ -76,18 +86,26 @@ class RunFolder:
             ) from None
         try:
             (path / "frames").mkdir()
-            for file_name, text in texts.items():
-                write_durably(path / file_name, text.encode(), disk)
+            for file_name in sorted(texts, key=lambda name: name == PROTOCOL):
+                write_durably(path / file_name, texts[file_name].encode(), disk)
+            sync_folder(runs)
             return cls(path, seed, disk)
         except (OSError, DiskError) as error:
-            shutil.rmtree(path, ignore_errors=True)
+            _discard(path)
             raise DiskError(
                 f"{runs}: a run folder cannot be made there ({error}); give another --runs"
             ) from None
 
     def read(self) -> RunRecord:
-        """What the journal says so far."""
-        return read_run(self.path)
+        """What was acknowledged so far; the disk is not asked, it may be gone."""
+        return run_record(self.path, self._journal.read())
+
+    def unknown_files(self) -> list[str]:
+        """Files among the frames that no line of the journal tells of: a crash left them."""
+        known = {frame.path.name for one in self.read().attempts for frame in one.frames}
+        return sorted(
+            path.name for path in (self.path / "frames").glob("*") if path.name not in known
+        )
 
     def attempt(
         self, unit: str, wall: Callable[[], float], metadata: Mapping[str, Any]
@@ -134,10 +152,15 @@ class RunFolder:
             )
         return [attempt.unit for attempt in opened]
 
+    def discard(self) -> None:
+        """Take away a run in which nothing happened, as far as the disk lets it."""
+        _discard(self.path)
+
     def close(self) -> None:
         """Release the folder."""
         self._journal.close()
-        self._lock.release()
+        with suppress(OSError):  # the system lets go of it when labrig ends
+            self._lock.release()
 
     def __enter__(self) -> Self:
         return self
@@ -159,6 +182,20 @@ class RunFolder:
     def _next_frame_number(self) -> int:
         self._frame_number += 1
         return self._frame_number
+
+
+def _discard(path: Path) -> None:
+    """No half of a run is left: first goes what it is known by, and if that stays, so does all."""
+    with suppress(OSError):
+        (path / PROTOCOL).unlink(missing_ok=True)
+        shutil.rmtree(path)
+
+
+def _make_durably(runs: Path) -> None:
+    missing = [folder for folder in (runs, *runs.parents) if not folder.exists()]
+    runs.mkdir(parents=True, exist_ok=True)
+    for folder in missing:
+        sync_folder(folder.parent)
 
 
 def _make_new(runs: Path, wanted: str) -> Path:

@@ -7,7 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from labrig.errors import FrameError, UsageError
+from labrig.errors import FrameError
+from labrig.input_file import read_bytes
 from labrig.reduce.cfa import channels_of, side_of
 from labrig.reduce.exif import Exif, read_exif
 from labrig.reduce.noise import Mosaic
@@ -15,6 +16,8 @@ from labrig.reduce.quiet import quiet_stderr
 from labrig.reduce.saturation import clip_level
 from labrig.reduce.sensor import sensor_pattern
 
+#: No camera's file is larger.
+MOST_BYTES = 1_000_000_000
 #: Rows and columns of one position of the CFA, the least from which noise can be told.
 _LEAST_PIXELS = 3
 _EXPECTED = "expected a RAW file with one colour in every pixel"
@@ -109,17 +112,14 @@ def read_raw(source: Path | bytes, name: str = "the frame") -> RawFrame:
     ------
     UsageError
         The file is missing or not readable.
+    DiskError
+        The disk does not give it back.
     FrameError
         Not a RAW file, cut off or damaged, or from a sensor of another kind.
     """
     if isinstance(source, Path):
         name = str(source)
-        try:
-            content = source.read_bytes()
-        except FileNotFoundError:
-            raise UsageError(f"{source}: no such file") from None
-        except OSError as error:
-            raise UsageError(f"{source}: cannot be read ({error.strerror})") from None
+        content = read_bytes(source, MOST_BYTES)
     else:
         content = source
     try:

@@ -10,6 +10,7 @@ from pathlib import Path
 import numpy as np
 
 from labrig.errors import DataError, LabrigError, UsageError
+from labrig.input_file import read_text
 from labrig.reduce.noise import Floats
 from labrig.reduce.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 
@@ -44,13 +45,7 @@ def read_series(path: str | os.PathLike[str]) -> list[Series]:
     DataError
         A number that is not finite, a missing value, or no rows.
     """
-    try:
-        text = Path(path).read_text(encoding="utf-8-sig")
-    except FileNotFoundError:
-        raise UsageError(f"{path}: no such file") from None
-    except (OSError, UnicodeDecodeError) as error:
-        raise UsageError(f"{path}: cannot be read as UTF-8 text ({error})") from None
-    return parse_series(text, str(path))
+    return parse_series(read_text(Path(path)), str(path))
 
 
 def parse_series(text: str, source: str) -> list[Series]:

@@ -39,9 +39,10 @@ class Glances:
 
     def __init__(self, run: Path, width: int) -> None:
         self.latest: Seen | None = None
+        # -P: nothing that lies in the working folder is taken for a module.
         # Ctrl-C on a terminal goes to all of a group: this one ends when it is told to.
         self._process = subprocess.Popen(
-            [sys.executable, "-m", "labrig.watch.glances", str(run), str(width)],
+            [sys.executable, "-P", "-m", "labrig.watch.glances", str(run), str(width)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,

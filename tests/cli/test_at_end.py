@@ -57,6 +57,23 @@ def test_a_bell_rings_and_resumed_runs_ring_it_too(
     assert labrig("resume", ended.run_folder, "--no-process").err.count("\a") == 1
 
 
+def test_a_command_in_a_folder_from_elsewhere_is_run_only_if_asked_for(
+    labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
+) -> None:
+    told = tmp_path / "told.json"
+    run = labrig("run", make_protocol(), "--rig", make_rig(), "--runs", tmp_path, "--no-process")
+    path = run.run_folder / "rig.yaml"
+    command = [sys.executable, "-c", NOTES, str(told)]
+    path.write_text(yaml.safe_dump(yaml.safe_load(path.read_text()) | {"on_finish": command}))
+    ended = labrig("resume", run.run_folder, "--no-process")
+    assert (ended.code, told.exists()) == (0, False)
+    (note,) = [line for line in ended.err.splitlines() if line.startswith("note:")]
+    assert str(told) in note
+    assert "--on-finish" in note
+    assert labrig("resume", run.run_folder, "--no-process", "--on-finish").code == 0
+    assert json.loads(told.read_text())["LABRIG_STATUS"] == "done"
+
+
 def test_a_command_that_fails_costs_a_warning_only(
     labrig: Labrig, make_rig: Make, make_protocol: Make, tmp_path: Path
 ) -> None:

@@ -57,6 +57,7 @@ def test_the_shipped_decay_runs(
         ({"camera": {"iso": 3200, "f_number": 4}}, "does not offer ISO 3200"),
         ({"camera": {"iso": 400, "f_number": 1.2}}, "cannot be set to f/1.2"),
         ({"exposure": "1/100000 s"}, "does not offer an exposure"),
+        ({"exposure": "1/4096 s", "every": "1 ms", "for": "100000 h"}, "take fewer"),
     ],
 )
 def test_a_plan_that_cannot_work_is_refused(
@@ -66,6 +67,14 @@ def test_a_plan_that_cannot_work_is_refused(
         planned(make_protocol(**keys))
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
+
+
+def test_a_plan_without_end_is_refused(
+    make_protocol: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
+) -> None:
+    monkeypatch.setattr("labrig.acquire.planner.MOST_STEPS", 300)
+    with pytest.raises(ProtocolError, match="at most 300 steps"):
+        planned(make_protocol(repeats=1000))
 
 
 @pytest.mark.parametrize(
@@ -82,6 +91,7 @@ def test_a_plan_that_cannot_work_is_refused(
         ({"states": 4}, "states"),
         ({"sample": {"nam": "x"}}, "did you mean 'name'?"),
         ({"repeats": 0}, "repeats"),
+        ({"repeats": 100_000_000}, "repeats"),
     ],
 )
 def test_a_misspelt_or_impossible_key_is_one_clear_line(

@@ -87,6 +87,52 @@ def test_a_temperature_that_cannot_be_is_refused(
         read_run(folder.path)
 
 
+@pytest.mark.parametrize(
+    "name",
+    [
+        "/dev/zero",
+        "../../x.cr2",
+        "frames/../../x.cr2",
+        "frames/000001.cr2/../../x",
+        "",
+        "frames/..",
+    ],
+)
+def test_a_frame_outside_of_the_run_is_refused(
+    tmp_path: Path, wall: Callable[[], float], name: str
+) -> None:
+    with make(tmp_path) as folder:
+        photograph(folder.attempt("dark", wall, {}), b"x")
+    path = folder.path / "journal.jsonl"
+    path.write_text(path.read_text().replace("frames/000001.cr2", name))
+    with pytest.raises(DataError, match="was changed after the run"):
+        read_run(folder.path)
+
+
+def test_a_frame_that_is_a_link_or_a_device_is_refused(
+    tmp_path: Path, wall: Callable[[], float]
+) -> None:
+    with make(tmp_path) as folder:
+        frame = photograph(folder.attempt("dark", wall, {}), b"x")
+    frame.path.unlink()
+    assert len(read_run(folder.path).attempts[0].frames) == 1  # missing: processing says so
+    frame.path.symlink_to("/dev/zero")
+    with pytest.raises(DataError, match="link or a device"):
+        read_run(folder.path)
+
+
+def test_half_a_surrogate_pair_in_a_journal_is_refused(
+    tmp_path: Path, wall: Callable[[], float]
+) -> None:
+    with make(tmp_path) as folder:
+        folder.attempt("dark", wall, {"where": "C:\\udo"})
+    assert len(read_run(folder.path).attempts) == 1
+    path = folder.path / "journal.jsonl"
+    path.write_text(path.read_text().replace('"dark"', '"\\ud800"'))
+    with pytest.raises(DataError, match="was changed after the run"):
+        read_run(folder.path)
+
+
 def test_only_success_counts_and_the_last_success_wins(
     tmp_path: Path, wall: Callable[[], float]
 ) -> None:

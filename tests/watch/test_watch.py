@@ -128,7 +128,11 @@ def test_a_frame_that_cannot_be_read_is_passed_over(growing: Growing) -> None:
     assert following.state()["frame"]["name"] != last.name
 
 
-def test_another_process_looks_at_frames(finished: Path) -> None:
+def test_another_process_looks_at_frames_and_runs_nothing_that_lies_about(
+    finished: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    (tmp_path / "numpy.py").write_text("open('was-run', 'w')\n")
+    monkeypatch.chdir(tmp_path)
     glances = Glances(finished, 48)
     try:
         glances.ask("nothing.dng")
@@ -139,6 +143,7 @@ def test_another_process_looks_at_frames(finished: Path) -> None:
         seen = glances.latest
     finally:
         glances.close()
+    assert not (tmp_path / "was-run").exists()
     assert seen is not None
     assert seen.name == "000005.dng"
     assert seen.picture.shape == (32, 48, 3)
