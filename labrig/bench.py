@@ -4,7 +4,8 @@ import socket
 import tempfile
 from collections.abc import Callable, Iterator
 from contextlib import ExitStack, closing, contextmanager
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
@@ -20,8 +21,10 @@ from labrig.acquire.rig_file import DeviceEntry
 from labrig.acquire.roles import ROLES
 from labrig.clock import Clock, SystemClock
 from labrig.errors import DeviceError, UsageError
+from labrig.guard import Guard, guarding
 from labrig.record import REAL_DISK, Disk
-from labrig.signals import interrupting
+from labrig.serial_ports import SerialPorts
+from labrig.signals import interrupting, pausing
 from labrig.yaml_file import validate
 
 if TYPE_CHECKING:
@@ -39,6 +42,15 @@ class Bench:
     source: str
     clock: Clock
     room: "OpenRoom | None"
+    guard: Guard | None = None
+    ports: SerialPorts = field(default_factory=SerialPorts)
+
+    @property
+    def guarded_by(self) -> str:
+        """What switches the lights off if this process cannot, as the run's record says it."""
+        if self.guard is not None:
+            return self.guard.described
+        return "nothing: no light of this rig outlives the process that runs it"
 
     @property
     def seed(self) -> int | None:
@@ -67,17 +79,25 @@ class Bench:
         """
         with ExitStack() as stack:
             stack.enter_context(interrupting(self.clock))
+            stack.enter_context(pausing(self.clock))
             # Entered first, so that ports close after the devices on them are safe.
             transports = stack.enter_context(ExitStack())
-            connections = _Connections(self.clock, self.room, transports)
+            connections = _Connections(self.clock, self.room, transports, self.ports)
             warm_up_s = {key: entry.warm_up for key, entry in self.file.devices.items()}
             rig = Rig(self.file.name, self.clock, {}, warm_up_s)
             stack.callback(rig.disconnect)
-            stack.callback(rig.make_safe)
+            stack.callback(self._make_safe, rig)
             for key in in_safe_order(self.file.devices):
-                rig.devices[key] = _open(key, self.file.devices[key], connections, self.source)
-                rig.devices[key].make_safe()
+                entry = self.file.devices[key]
+                rig.connect(key, partial(_open, key, entry, connections, self.source))
+            if self.guard is not None:
+                self.guard.watch()
             yield rig
+
+    def _make_safe(self, rig: Rig) -> None:
+        rig.make_safe()
+        if self.guard is not None and self.guard.lights <= rig.devices.keys():
+            self.guard.stand_down()
 
 
 @contextmanager
@@ -93,7 +113,8 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
         goes on after its last journal line.
     """
     if file.simulation is None:
-        yield Bench(file, source, SystemClock(), None)
+        with guarding(file, source) as guard:
+            yield Bench(file, source, SystemClock(), None, guard)
         return
     from labrig import sim  # a real bench has no need of the room's physics
 
@@ -151,19 +172,23 @@ def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str
 class _Connections:
     """Opens each address once; real ones under a lock that other labrigs respect."""
 
-    def __init__(self, clock: Clock, room: "OpenRoom | None", stack: ExitStack) -> None:
+    def __init__(
+        self, clock: Clock, room: "OpenRoom | None", stack: ExitStack, names: SerialPorts
+    ) -> None:
         self.clock = clock
         self._room = room
         self._stack = stack
+        self._names = names
         self._ports: dict[str, SerialPort] = {}
         self._hosts: set[str] = set()
 
     def serial(self, address: str, baudrate: int) -> SerialPort:
         if address not in self._ports:
-            self._hold(address)
+            name = self._names.look_up(address)
+            self._hold(name)
             try:
                 port = serial.serial_for_url(
-                    address, baudrate=baudrate, timeout=0, write_timeout=SERIAL_WRITE_TIMEOUT_S
+                    name, baudrate=baudrate, timeout=0, write_timeout=SERIAL_WRITE_TIMEOUT_S
                 )
             except (serial.SerialException, OSError, ValueError) as error:
                 raise DeviceError(

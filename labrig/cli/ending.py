@@ -12,8 +12,6 @@ from labrig.signals import STOP_SIGNALS, raise_interrupted
 
 def guarded(arguments: Sequence[str]) -> int:
     """Run the command line and return its exit code."""
-    for signum in STOP_SIGNALS:
-        signal.signal(signum, raise_interrupted)
     try:
         code = _run(arguments)
         sys.stdout.flush()
@@ -33,10 +31,12 @@ def _run(arguments: Sequence[str]) -> int:
 
     from labrig.cli.app import app
 
+    for signum in STOP_SIGNALS:
+        signal.signal(signum, raise_interrupted)
     try:
         app(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
     except Interrupted as interrupted:
-        return _complain(str(interrupted), 130 if interrupted.signum == signal.SIGINT else 143)
+        return _complain(str(interrupted), 128 + interrupted.signum)
     except LabrigError as error:
         return _complain(str(error), error.exit_code)
     except typer.Exit as ending:
