@@ -133,8 +133,8 @@ class LcusRelay:
         states = self._query()
         if states is None:
             raise UnclearAnswerError(
-                f"{self._name} answered its query before and does not within {LATEST_ANSWER_S:g} s now; "
-                "check its power and cable"
+                f"{self._name} answered its query before and does not within {LATEST_ANSWER_S:g} s "
+                "now; check its power and cable"
             )
         return states[self._relay - 1]
 

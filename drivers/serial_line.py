@@ -16,6 +16,8 @@ POLL_S = 0.002
 LATEST_ANSWER_S = 0.25
 #: A line that is not quiet by then never will be.
 DRAIN_S = 1.0
+#: How often it is looked whether it is.
+DRAIN_POLL_S = 0.01
 
 
 class SerialLine:
@@ -109,7 +111,7 @@ class SerialLine:
                 came += self._read_one()
                 quiet_since_s = self._clock.now()
             else:
-                self._clock.sleep(POLL_S)
+                self._clock.sleep(DRAIN_POLL_S)
         return came
 
     def read_burst(self, quiet_s: float) -> bytes:

@@ -38,26 +38,33 @@ listed_relay = tests.lit_bench:ListedRelay
 #: Names the file with the serial ports that a PC has, for `listed_relay`.
 PORTS_FILE = "LABRIG_TEST_PORTS"
 
-Receive = Callable[[bytes], bytes]
-
 
 class Hold(ProtocolModel):
-    """Lamp on, for long, and off; `cycles` times."""
+    """Lamp on, for long, and off.
+
+    Attributes
+    ----------
+    eats_bytes
+        Memory that is asked for a second after the lamp has been switched on.
+    """
 
     hold_s: float = 600.0
-    cycles: int = 1
+    eats_bytes: int = 0
 
     def units(self) -> Sequence[Unit]:
-        return [HoldUnit(f"hold-{number}", self.hold_s) for number in range(1, self.cycles + 1)]
+        return [HoldUnit(self.hold_s, self.eats_bytes)]
 
 
 @dataclass(frozen=True)
 class HoldUnit:
-    name: str
     hold_s: float
+    eats_bytes: int
+    name: str = "hold"
 
     def run(self, session: Session) -> None:
         session.perform(LAMP_ON)
+        session.wait(1.0, "charging")
+        bytearray(self.eats_bytes)
         session.wait(self.hold_s, "charging")
         session.perform(LAMP_OFF)
 
@@ -77,7 +84,7 @@ def _listed_ports() -> list[ListPortInfo]:
 
 
 if PORTS_FILE in os.environ:
-    list_ports.comports = _listed_ports
+    setattr(list_ports, "comports", _listed_ports)  # noqa: B010
 
 
 class Stubborn:
@@ -127,20 +134,17 @@ class BoardProcess:
     def __init__(
         self, late_s: float = 0.0, stubborn: Callable[[NumatoBoard], Stubborn] | None = None
     ) -> None:
-        told, tells = os.pipe()
-        ours, theirs = pty.openpty()
-        self.address = os.ttyname(theirs)
-        self._told = told
+        self._told, tells = os.pipe()
+        hears, self._orders = os.pipe()
         self.pid = os.fork()
         if self.pid == 0:
             try:
-                os.close(told)
-                _serve(ours, tells, late_s, stubborn)
+                _serve(tells, hears, late_s, stubborn)
             finally:
                 os._exit(0)
         os.close(tells)
-        os.close(ours)
-        os.close(theirs)
+        os.close(hears)
+        self.address = os.read(self._told, 64).decode().strip()
 
     def wait_for(self, on: bool, within_s: float) -> float | None:
         """When the lamp went on or off, on the monotonic clock; None if it does not."""
@@ -153,15 +157,22 @@ class BoardProcess:
                 return float(at_s)
         return None
 
+    def plug_in_again(self) -> None:
+        """Pull its cable and put it back: the terminal is another one. It has its own power."""
+        os.write(self._orders, b"!")
+        self.address = os.read(self._told, 64).decode().strip()
+
     def end(self) -> None:
+        """Take it away."""
         os.kill(self.pid, signal.SIGKILL)
         os.waitpid(self.pid, 0)
         os.close(self._told)
+        os.close(self._orders)
 
 
 def _serve(
-    line: int,
     tells: int,
+    hears: int,
     late_s: float,
     stubborn: Callable[[NumatoBoard], Stubborn] | None,
 ) -> None:
@@ -170,12 +181,21 @@ def _serve(
             os.write(tells, f"{'on' if on else 'off'} {time.monotonic()}\n".encode())
 
     board = NumatoBoard(8, moved)
-    receive: Receive = board.receive if stubborn is None else stubborn(board).receive
+    receive = board.receive if stubborn is None else stubborn(board).receive
+    ours, theirs = pty.openpty()
     while True:
-        data = os.read(line, 100)
-        answer = receive(data)
-        time.sleep(late_s)
-        os.write(line, answer)
+        os.write(tells, f"{os.ttyname(theirs)}\n".encode())
+        while True:
+            ready = select.select([ours, hears], [], [])[0]
+            if hears in ready:
+                os.read(hears, 1)
+                break
+            answer = receive(os.read(ours, 100))
+            time.sleep(late_s)
+            os.write(ours, answer)
+        before, (ours, theirs) = (ours, theirs), pty.openpty()  # so that its name is another one
+        for descriptor in before:
+            os.close(descriptor)
 
 
 @dataclass
@@ -193,6 +213,17 @@ class LitBench:
             *("--rig", str(self.folder / "rig.yaml"), "--runs", str(self.folder / "runs")),
             "--no-process",
         ]
+
+    def list_port(self) -> Path:
+        """Say in a file on which port the board is."""
+        path = self.folder / "ports.json"
+        path.write_text(json.dumps({self.board.address: "00000001"}))
+        return path
+
+    def plug_in_again(self) -> None:
+        """Pull the board's cable and put it back: it gets another name."""
+        self.board.plug_in_again()
+        self.list_port()
 
     def start(self, **keys: Any) -> "subprocess.Popen[str]":
         """labrig, as soon as the lamp is on; `keys` are Popen's."""
@@ -223,6 +254,8 @@ def lit_bench(
     (folder / "hold.yaml").write_text(yaml.safe_dump({"protocol": "hold", **protocol}))
     path = os.pathsep.join((str(info.parent), str(ROOT)))
     try:
-        yield LitBench(folder, board, os.environ | {"PYTHONPATH": path})
+        bench = LitBench(folder, board, os.environ | {"PYTHONPATH": path})
+        bench.environment[PORTS_FILE] = str(bench.list_port())
+        yield bench
     finally:
         board.end()

@@ -321,7 +321,7 @@ def test_a_board_that_is_silent_for_a_moment_is_asked_again(rig: Make) -> None:
     with open_bench(read_rig_file(bench), str(bench)) as stand, stand.devices() as devices:
         devices.lamp.on()
         stand.clock.sleep_until(10.5)
-        devices.lamp.make_safe()
+        devices.make_safe()
         assert not lamp_is_on(stand)
 
 

@@ -99,8 +99,10 @@ class Rig:
 
         Raises
         ------
-        LabrigError
+        DeviceError
             It cannot be opened, or does not answer clearly for `PATIENCE_S`.
+        UsageError
+            The rig file asks for something that it is not, or does not know.
         """
 
         def step() -> None:
@@ -110,8 +112,10 @@ class Rig:
         failures = insist(
             self.clock, {key: step}, unless=lambda error: not isinstance(error, UnclearAnswerError)
         )
-        if failures:
-            raise failures[key]
+        if key in failures:
+            if isinstance(failures[key], LabrigError):
+                raise failures[key]
+            raise DeviceError(f"{key}: its driver failed ({failures[key]!r})") from failures[key]
 
     def make_safe(self) -> None:
         """Lamp off, LEDs off, door closed: every device is tried, whatever the others answered.

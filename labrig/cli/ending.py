@@ -4,7 +4,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from labrig.cli.closed_pipe import say_no_more
+from labrig.cli.closed_pipe import ToWhoeverIsThere
 from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
@@ -14,12 +14,10 @@ def guarded(arguments: Sequence[str]) -> int:
     """Run the command line and return its exit code."""
     try:
         code = _run(arguments)
-        sys.stdout.flush()
     except BrokenPipeError:
-        # It has read what it wanted: head, less.
-        say_no_more(sys.stdout)
-        code = 0
+        code = 0  # whoever read it has what it wanted: head, less
     finally:
+        ToWhoeverIsThere(sys.stdout).flush()
         for signum in STOP_SIGNALS:
             signal.signal(signum, signal.SIG_IGN)
     return code
@@ -67,8 +65,5 @@ def _fault(error: Exception) -> str:
 
 
 def _complain(text: str, code: int) -> int:
-    try:
-        print(f"labrig: {' '.join(text.split())}", file=sys.stderr)
-    except BrokenPipeError:
-        say_no_more(sys.stderr)
+    print(f"labrig: {' '.join(text.split())}", file=ToWhoeverIsThere(sys.stderr), flush=True)
     return code
