@@ -95,7 +95,13 @@ class Bench:
             yield rig
 
     def _make_safe(self, rig: Rig) -> None:
-        rig.make_safe()
+        """As the rig's; the guard may go when all lights are off, and not before."""
+        try:
+            rig.make_safe()
+        except DeviceError as error:
+            if self.guard is not None and not self.guard.lights.isdisjoint(error.unsafe):
+                error.args = (f"{error}; when labrig has ended, {self.guard.goes_on}",)
+            raise
         if self.guard is not None and self.guard.lights <= rig.devices.keys():
             self.guard.stand_down()
 

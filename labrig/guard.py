@@ -20,6 +20,7 @@ from typing import IO, Any
 from labrig.acquire import RigFile
 from labrig.acquire.roles import LIGHTS
 from labrig.errors import DeviceError
+from labrig.quantity import duration_text
 
 #: What it is told: a light may be on, or all are off.
 MAY_BE_ON, ALL_OFF = b"+", b"-"
@@ -28,6 +29,8 @@ READY = "ready"
 BEAT_S = 1.0
 #: Longer than any call that holds the interpreter.
 HANGS_S = 30
+#: For so long the guard tries to switch a light off: somebody may have to plug its board in again.
+TRIES_FOR_S = 300.0
 #: Importing the drivers takes a second, on a PC that is busy with other things several.
 STARTS_WITHIN_S = 60.0
 
@@ -61,6 +64,7 @@ class Guard:
         "a process of its own: it switches the lights off at once if labrig dies, and after "
         f"{HANGS_S} s if labrig hangs"
     )
+    goes_on = f"its guard goes on trying for {duration_text(TRIES_FOR_S)}"
 
     def __init__(self, file: RigFile, source: str) -> None:
         self.lights = frozenset(file.devices)

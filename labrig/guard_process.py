@@ -20,11 +20,9 @@ from labrig.acquire import RigFile, plugins
 from labrig.bench import Bench
 from labrig.clock import SystemClock
 from labrig.errors import LabrigError
-from labrig.guard import ALL_OFF, BEAT_S, HANGS_S, MAY_BE_ON, READY
+from labrig.guard import ALL_OFF, BEAT_S, HANGS_S, MAY_BE_ON, READY, TRIES_FOR_S
 from labrig.serial_ports import SerialPorts
 
-#: For so long it is tried to switch a light off: somebody may have to plug its board in again.
-TRIES_FOR_S = 300.0
 #: Between two tries. The first ones come quickly: the port of a process that was killed is free
 #: some milliseconds after its end.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 2.0

@@ -50,7 +50,6 @@ def interrupting(clock: Clock) -> Iterator[None]:
     try:
         with _closing_console(clock):
             yield
-            clock.sleep(0.0)
     except Interrupted:
         stopped = True
         raise
@@ -58,6 +57,7 @@ def interrupting(clock: Clock) -> Iterator[None]:
         for signum, handler in before.items():
             ending = stopped and handler is raise_interrupted
             signal.signal(signum, signal.SIG_IGN if ending else handler)
+    clock.sleep(0.0)
 
 
 @contextmanager
