@@ -71,7 +71,7 @@ class Bench:
         Raises
         ------
         DeviceError
-            A device is missing, or cannot confirm that it is safe.
+            A device is missing, or cannot confirm that it is safe; the guard cannot be started.
         UsageError
             Another labrig holds one of the addresses.
         Interrupted

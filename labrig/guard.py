@@ -33,6 +33,7 @@ HANGS_S = 30
 TRIES_FOR_S = 300.0
 #: Importing the drivers takes a second, on a PC that is busy with other things several.
 STARTS_WITHIN_S = 60.0
+ENDS_WITHIN_S = 10.0
 
 
 @contextmanager
@@ -104,6 +105,9 @@ class Guard:
         if self._process is not None:
             self._pipe.close()
             if self._state == ALL_OFF:
+                with suppress(subprocess.TimeoutExpired):
+                    self._process.wait(ENDS_WITHIN_S)
+                self._process.kill()  # nobody needs it any more
                 self._process.wait()
 
     def _beat(self) -> None:
