@@ -12,21 +12,16 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire import Finding
 from labrig.acquire.connections import Connections
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.errors import UnclearAnswerError
 
-from .serial_line import SerialLine
+from .serial_line import LATEST_ANSWER_S, SerialLine
 
 BAUDRATE = 9600
 QUERY = b"\xff"
-#: The board has begun to answer by then, and does not pause for so long inside an answer.
+#: The board does not pause for so long inside an answer.
 QUIET_S = 0.05
-#: Eight lines of text take 0.1 s.
-ANSWER_TIMEOUT_S = 0.5
 #: Until the last bit of a command has left at 9600 baud: ten bits a byte.
 COMMAND_S = 4 * 10 / BAUDRATE
-#: Before it is given up that a lamp could be switched off.
-SAFE_TRIES = 5
-RETRY_S = 1.0
 MOST_RELAYS = 8
 _LINE = re.compile(rb"CH(\d+): *(ON|OFF) *\r\n")
 
@@ -119,28 +114,16 @@ class LcusRelay:
 
         Raises
         ------
-        DeviceError
-            It reads on.
-        DeviceLostError
-            It has answered before and does not now.
+        UnclearAnswerError
+            It reads on, or has answered before and does not now.
         """
-        for tries_left in reversed(range(SAFE_TRIES)):
-            self._send(on=False)
-            self._send(on=False)
-            if not self._answers:
-                return
-            try:
-                if self._read():
-                    raise DeviceError(
-                        f"relay {self._relay} of {self._name} was switched off but reads on; "
-                        "switch off by hand and check the board"
-                    )
-            except DeviceLostError:
-                if not tries_left:
-                    raise
-                self._clock.sleep(RETRY_S)
-            else:
-                return
+        self._send(on=False)
+        self._send(on=False)
+        if self._answers and self._read():
+            raise UnclearAnswerError(
+                f"relay {self._relay} of {self._name} was switched off but reads on; switch off by "
+                "hand and check the board"
+            )
 
     def disconnect(self) -> None:
         """The port belongs to the connections, which close it."""
@@ -153,23 +136,23 @@ class LcusRelay:
     def _read(self) -> bool:
         states = self._query()
         if states is None:
-            raise DeviceLostError(
-                f"{self._name} answered its query before and does not within {QUIET_S:g} s now; "
-                "check its power and cable"
+            raise UnclearAnswerError(
+                f"{self._name} answered its query before and does not within {LATEST_ANSWER_S:g} s "
+                "now; check its power and cable"
             )
         return states[self._relay - 1]
 
     def _query(self) -> tuple[bool, ...] | None:
         """States of all relays; None if nothing comes. Asked twice: the first answer may be old."""
-        self._line.drain(QUIET_S, ANSWER_TIMEOUT_S)
+        self._line.drain()
         for _ in range(2):
             self._line.write(QUERY)
-            came = self._line.drain(QUIET_S, ANSWER_TIMEOUT_S)
+            came = self._line.read_burst(QUIET_S)
         if not came:
             return None
         states = relay_states(came)
         if len(states) < self._relay:
-            raise DeviceError(
+            raise UnclearAnswerError(
                 f"{self._name} was asked for relay {self._relay}: expected 'CH{self._relay}: ON' "
                 f"or 'OFF', or a byte for each relay, got {came!r}; is it an LCUS board, and has "
                 "it that many relays?"

@@ -7,10 +7,17 @@ import serial
 
 from labrig.acquire.connections import SerialPort
 from labrig.clock import Clock
-from labrig.errors import DeviceLostError
+from labrig.errors import DeviceLostError, UnclearAnswerError
 
 #: How often the line is looked at; USB serial adapters deliver once a millisecond at best.
 POLL_S = 0.002
+#: Answers come at once; through a slow hub or into a busy PC some are a tenth of a second late.
+#: Whoever wants to be sure that nothing is on its way any more waits for longer than that.
+LATEST_ANSWER_S = 0.25
+#: A line that is not quiet by then never will be.
+DRAIN_S = 1.0
+#: How often it is looked whether it is.
+DRAIN_POLL_S = 0.01
 
 
 class SerialLine:
@@ -30,9 +37,21 @@ class SerialLine:
         self._name = name
 
     def write(self, data: bytes) -> None:
-        """Send `data`."""
+        """Send `data`.
+
+        Raises
+        ------
+        UnclearAnswerError
+            The device does not take it.
+        DeviceLostError
+            The device is gone.
+        """
         try:
             self._port.write(data)
+        except serial.SerialTimeoutException:
+            raise UnclearAnswerError(
+                f"{self._name} does not take what is sent to it; check its power, cable and address"
+            ) from None
         except (serial.SerialException, OSError) as error:
             raise self._gone(error) from None
 
@@ -41,7 +60,7 @@ class SerialLine:
 
         Raises
         ------
-        DeviceLostError
+        UnclearAnswerError
             `end` did not come in time; shows what came.
         """
         deadline_s = self._clock.now() + timeout_s
@@ -51,7 +70,7 @@ class SerialLine:
             if came.endswith(end):
                 break
             if self._clock.now() >= deadline_s:
-                raise DeviceLostError(
+                raise UnclearAnswerError(
                     f"{self._name} did not answer within {timeout_s:g} s: expected {end!r} at the "
                     f"end, got {came!r}; check its power, cable and address"
                 )
@@ -64,7 +83,7 @@ class SerialLine:
 
         Raises
         ------
-        DeviceLostError
+        UnclearAnswerError
             They did not come in time; shows what came.
         """
         deadline_s = self._clock.now() + timeout_s
@@ -74,7 +93,7 @@ class SerialLine:
             if len(came) == count:
                 break
             if self._clock.now() >= deadline_s:
-                raise DeviceLostError(
+                raise UnclearAnswerError(
                     f"{self._name} did not answer within {timeout_s:g} s: expected {count} bytes, "
                     f"got {came!r}; check its power, cable and address"
                 )
@@ -82,7 +101,7 @@ class SerialLine:
                 self._clock.sleep(POLL_S)
         return came
 
-    def drain(self, quiet_s: float, timeout_s: float) -> bytes:
+    def drain(self, quiet_s: float = LATEST_ANSWER_S, timeout_s: float = DRAIN_S) -> bytes:
         """What comes until the line is quiet for `quiet_s`."""
         deadline_s = self._clock.now() + timeout_s
         quiet_since_s = self._clock.now()
@@ -92,8 +111,15 @@ class SerialLine:
                 came += self._read_one()
                 quiet_since_s = self._clock.now()
             else:
-                self._clock.sleep(POLL_S)
+                self._clock.sleep(DRAIN_POLL_S)
         return came
+
+    def read_burst(self, quiet_s: float) -> bytes:
+        """What comes in one go: begun within `LATEST_ANSWER_S`, ended by a pause of `quiet_s`."""
+        deadline_s = self._clock.now() + LATEST_ANSWER_S
+        while not self._waiting() and self._clock.now() < deadline_s:
+            self._clock.sleep(POLL_S)
+        return self.drain(quiet_s) if self._waiting() else b""
 
     def _read_one(self) -> bytes:
         try:

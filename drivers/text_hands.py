@@ -7,14 +7,12 @@ or `cannot`, the reason and `\n`. The simulated room's hands speak the same.
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire.connections import Connections
-from labrig.errors import DeviceError
+from labrig.errors import DeviceError, UnclearAnswerError
 from labrig.quantity import DurationS
 
 from .serial_line import SerialLine
 
 BAUDRATE = 115_200
-QUIET_S = 0.03
-DRAIN_S = 1.0
 
 
 class TextHands:
@@ -62,13 +60,16 @@ class TextHands:
         Raises
         ------
         DeviceError
-            They cannot, or answer something else.
+            They cannot.
+        UnclearAnswerError
+            They answer something else, or nothing.
         """
         self._line.write(task.encode() + b"\n")
         came = self._line.read_until(b"\n", self._settings.takes_at_most)
         said = " ".join(came.decode(errors="replace").split())
         if said != "done":
-            raise DeviceError(
+            kind = DeviceError if said.startswith("cannot") else UnclearAnswerError
+            raise kind(
                 f"{self._name} were told '{task}': expected 'done', got '{said}'; do it by hand, "
                 "without 'hands:' in the rig file, or teach them"
             )
@@ -76,7 +77,7 @@ class TextHands:
     def make_safe(self) -> None:
         """End a half-written line and forget old answers; hands that move come to their end."""
         self._line.write(b"\n")
-        self._line.drain(QUIET_S, DRAIN_S)
+        self._line.drain()
 
     def disconnect(self) -> None:
         """The port belongs to the connections, which close it."""

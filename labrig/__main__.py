@@ -1,7 +1,10 @@
 """The command `labrig`."""
 
 import os
+import signal
 import sys
+
+from labrig.signals import STOP_SIGNALS, end_at_once
 
 # The matrices here are small: threads of the linear algebra would only wait for one another, six
 # times as long where another program computes, too. Has to be said before numpy is loaded.
@@ -10,6 +13,8 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 def main() -> None:
     """Run the command line; every ending has its exit code and at most one line of complaint."""
+    for signum in STOP_SIGNALS:
+        signal.signal(signum, end_at_once)
     from labrig.cli.ending import guarded
 
     sys.exit(guarded(sys.argv[1:]))

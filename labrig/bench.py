@@ -3,7 +3,8 @@
 import socket
 from collections.abc import Callable, Iterable, Iterator
 from contextlib import AbstractContextManager, ExitStack, closing, contextmanager, nullcontext
-from dataclasses import dataclass
+from dataclasses import dataclass, field
+from functools import partial
 from typing import TYPE_CHECKING, Any
 from urllib.parse import urlsplit
 
@@ -19,8 +20,10 @@ from labrig.awake import kept_awake
 from labrig.clock import Clock, SystemClock
 from labrig.device_lock import held, network_devices, serial_devices, usb_device
 from labrig.errors import DeviceError, LabrigError, UsageError
+from labrig.guard import Guard, guarding
 from labrig.record import REAL_DISK, Disk
-from labrig.signals import interrupting
+from labrig.serial_ports import SerialPorts
+from labrig.signals import interrupting, pausing
 from labrig.yaml_file import validate
 
 if TYPE_CHECKING:
@@ -38,6 +41,15 @@ class Bench:
     source: str
     clock: Clock
     room: "OpenRoom | None"
+    guard: Guard | None = None
+    ports: SerialPorts = field(default_factory=SerialPorts)
+
+    @property
+    def guarded_by(self) -> str:
+        """What switches the lights off if this process cannot, as the run's record says it."""
+        if self.guard is not None:
+            return self.guard.described
+        return "nothing: no light of this rig outlives the process that runs it"
 
     @property
     def seed(self) -> int | None:
@@ -62,7 +74,7 @@ class Bench:
         Raises
         ------
         DeviceError
-            A device is missing, or cannot confirm that it is safe.
+            A device is missing, or cannot confirm that it is safe; the guard cannot be started.
         UsageError
             Another labrig holds one of the addresses.
         Interrupted
@@ -70,17 +82,31 @@ class Bench:
         """
         with ExitStack() as stack:
             stack.enter_context(interrupting(self.clock))
+            stack.enter_context(pausing(self.clock))
             # Entered first, so that ports close after the devices on them are safe.
             transports = stack.enter_context(ExitStack())
-            connections = _Connections(self.clock, self.room, transports)
+            connections = _Connections(self.clock, self.room, transports, self.ports)
             warm_up_s = {key: entry.warm_up for key, entry in self.file.devices.items()}
             rig = Rig(self.file.name, self.clock, {}, warm_up_s)
             stack.callback(rig.disconnect)
-            stack.callback(rig.make_safe)
+            stack.callback(self._make_safe, rig)
             for key in in_safe_order(self.file.devices):
-                rig.devices[key] = _open(key, self.file.devices[key], connections, self.source)
-                rig.devices[key].make_safe()
+                entry = self.file.devices[key]
+                rig.connect(key, partial(_open, key, entry, connections, self.source))
+            if self.guard is not None:
+                self.guard.watch()
             yield rig
+
+    def _make_safe(self, rig: Rig) -> None:
+        """As the rig's; the guard may go when all lights are off, and not before."""
+        try:
+            rig.make_safe()
+        except DeviceError as error:
+            if self.guard is not None and not self.guard.lights.isdisjoint(error.unsafe):
+                error.args = (f"{error}; when labrig has ended, {self.guard.goes_on}",)
+            raise
+        if self.guard is not None and self.guard.lights <= rig.devices.keys():
+            self.guard.stand_down()
 
 
 @contextmanager
@@ -96,7 +122,8 @@ def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterato
         goes on after its last journal line.
     """
     if file.simulation is None:
-        yield Bench(file, source, SystemClock(), None)
+        with guarding(file, source) as guard:
+            yield Bench(file, source, SystemClock(), None, guard)
         return
     from labrig import sim  # a real bench has no need of the room's physics
 
@@ -154,17 +181,20 @@ def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str
 class _Connections:
     """Opens each port once, by whatever name; what is real under a lock that labrigs respect."""
 
-    def __init__(self, clock: Clock, room: "OpenRoom | None", stack: ExitStack) -> None:
+    def __init__(
+        self, clock: Clock, room: "OpenRoom | None", stack: ExitStack, names: SerialPorts
+    ) -> None:
         self.clock = clock
         self._room = room
         self._stack = stack
+        self._names = names
         self._ports: dict[tuple[str, ...], SerialPort] = {}
         self._held: set[str] = set()
 
     def serial(self, address: str, baudrate: int) -> SerialPort:
         try:
             port = serial.serial_for_url(
-                address,
+                self._names.look_up(address),
                 do_not_open=True,
                 baudrate=baudrate,
                 timeout=0,

@@ -27,7 +27,7 @@ Reading = Callable[[], float]
 
 
 class Interrupted(BaseException):
-    """Ctrl-C, SIGTERM or SIGBREAK, delivered at a wait (never inside a device transaction)."""
+    """Ctrl-C or another signal, delivered at a wait (never inside a device transaction)."""
 
     def __init__(self, signum: int, text: str = "interrupted") -> None:
         super().__init__(text)

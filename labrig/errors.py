@@ -40,6 +40,10 @@ class DeviceLostError(DeviceError):
     """A device that is gone: unplugged, switched off, asleep; it may come back."""
 
 
+class UnclearAnswerError(DeviceLostError):
+    """A device that is there but silent or not to be understood; asked again, it may answer."""
+
+
 class DataError(LabrigError):
     """Data that cannot be used; what was recorded is kept."""
 

@@ -1,6 +1,5 @@
 """Fills a run folder: unit after unit, and once more where a device was lost and came back."""
 
-import signal
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import AbstractContextManager
@@ -22,7 +21,7 @@ from labrig.errors import (
 )
 from labrig.quantity import duration_text
 from labrig.record import ActionRecord, RunFolder, RunRecord
-from labrig.signals import interrupting
+from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
 
@@ -79,6 +78,7 @@ def fill(
             "protocol": protocol.protocol,
             "sample": protocol.sample.name,
             "labrig_version": version("labrig"),
+            "guard": stand.guarded_by,
         }
 
         left = [action for attempt in record.attempts for action in attempt.actions if action.task]
@@ -98,9 +98,9 @@ def fill(
                 _Reconnecting(stand, folder, observer).run(use)
         except Interrupted as stop:
             _close(folder, stand, "abort", f"signal {stop.signum}")
-            name = signal.Signals(stop.signum).name
             raise Interrupted(
-                stop.signum, f"stopped by {name}, safe state reached; {_kept(folder, units)}"
+                stop.signum,
+                f"stopped by {name_of(stop.signum)}, safe state reached; {_kept(folder, units)}",
             ) from None
         except LabrigError as error:
             _close(folder, stand, "fail", str(error))
@@ -140,10 +140,12 @@ class _Reconnecting:
                     connected = True
                     use(rig)
                 return
-            except Interrupted:
-                if connected or lost is None or LIGHTS.isdisjoint(lost.unsafe):
+            except Interrupted as stop:
+                if not (connected or lost is None or LIGHTS.isdisjoint(lost.unsafe)):
+                    raise lost from None  # nobody knows whether the light is off
+                if stop.signum != PAUSE_SIGNAL:
                     raise
-                raise lost from None  # nobody knows whether the light is off
+                self._pause()
             except (DeviceError, Slept) as error:
                 if connected and (loss := _loss(error)):
                     lost, back_by_s = loss, self.stand.clock.now() + COMES_BACK_S
@@ -152,6 +154,13 @@ class _Reconnecting:
                     raise
                 elif self.stand.clock.now() >= back_by_s:
                     raise lost from error
+
+    def _pause(self) -> None:
+        """Ctrl-Z: all is safe, so this process may stop; what was under way is done again."""
+        units = self.folder.close_open_attempts(self.stand.clock.wall, "abort", "paused by Ctrl-Z")
+        again = "".join(f"; the unit {unit} is done again" for unit in units)
+        self.observer.warn(f"paused, safe state reached{again} when it goes on (fg)")
+        stop_here()
 
     def _give_up_units(self, error: DeviceLostError) -> None:
         """Close what was under way, so that it is done again; not for ever."""

@@ -1,17 +1,32 @@
-"""Ctrl-C, SIGTERM and Windows' Ctrl-Break, made to wait for a moment when stopping is safe."""
+"""Signals that would end or stop labrig, made to wait for a moment when that is safe."""
 
+import os
 import signal
+import sys
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
 from types import FrameType
+from typing import NoReturn
 
 from labrig.clock import Clock, Interrupted
 
-#: What stops a run.
+#: Signals that end nothing, and faults in the program's own machine code, in which nothing that is
+#: written in Python is called any more (the lights are the guard's then). All others end a process.
+_OTHERS = {
+    *("SIGKILL", "SIGSTOP", "SIGTSTP", "SIGTTIN", "SIGTTOU", "SIGCONT"),
+    *("SIGCHLD", "SIGURG", "SIGWINCH", "SIGINFO", "SIGPIPE", "SIGXFSZ"),
+    *("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL"),
+}
+#: What ends labrig, with the exit code 128 + number: Ctrl-C, SIGTERM, a terminal that is closed, a
+#: limit of the system. What was ignored when labrig began (`nohup`) stays so.
 STOP_SIGNALS = [
-    getattr(signal, name) for name in ("SIGINT", "SIGTERM", "SIGBREAK") if hasattr(signal, name)
+    signum
+    for signum in sorted(signal.valid_signals() - {getattr(signal, n, 0) for n in _OTHERS})
+    if signal.getsignal(signum) != signal.SIG_IGN
 ]
+#: Ctrl-Z.
+PAUSE_SIGNAL = getattr(signal, "SIGTSTP", None)
 
 
 @contextmanager
@@ -33,8 +48,8 @@ def interrupting(clock: Clock) -> Iterator[None]:
     before = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
     stopped = False
     try:
-        yield
-        clock.sleep(0.0)
+        with _closing_console(clock):
+            yield
     except Interrupted:
         stopped = True
         raise
@@ -42,6 +57,47 @@ def interrupting(clock: Clock) -> Iterator[None]:
         for signum, handler in before.items():
             ending = stopped and handler is raise_interrupted
             signal.signal(signum, signal.SIG_IGN if ending else handler)
+    clock.sleep(0.0)
+
+
+@contextmanager
+def pausing(clock: Clock) -> Iterator[None]:
+    """With devices open, nothing stops this process where it stands.
+
+    Ctrl-Z is answered at the clock's next wait, as an interruption. In the background, reading
+    from the terminal fails and writing to it is done, where either would stop the process.
+    """
+    if threading.current_thread() is not threading.main_thread():
+        yield
+        return
+
+    def ask(signum: int, frame: FrameType | None) -> None:
+        clock.interrupt(signum)
+
+    before = {}
+    for name in ("SIGTSTP", "SIGTTIN", "SIGTTOU"):
+        signum = getattr(signal, name, None)  # Windows has none of them
+        if signum is not None and signal.getsignal(signum) != signal.SIG_IGN:
+            before[signum] = signal.signal(signum, ask if name == "SIGTSTP" else signal.SIG_IGN)
+    try:
+        yield
+    finally:
+        for signum, handler in before.items():
+            signal.signal(signum, handler)
+
+
+def stop_here() -> None:
+    """Stop as Ctrl-Z asks for; returns when somebody has this process go on."""
+    if sys.platform != "win32":
+        os.kill(os.getpid(), signal.SIGSTOP)
+
+
+def name_of(signum: int) -> str:
+    """Its name, of most of them."""
+    try:
+        return signal.Signals(signum).name
+    except ValueError:  # most real-time signals have none
+        return f"signal {signum}"
 
 
 def raise_interrupted(signum: int, frame: FrameType | None) -> None:
@@ -49,3 +105,37 @@ def raise_interrupted(signum: int, frame: FrameType | None) -> None:
     for ignored in STOP_SIGNALS:
         signal.signal(ignored, signal.SIG_IGN)
     raise Interrupted(signum)
+
+
+def end_at_once(signum: int, frame: FrameType | None) -> NoReturn:
+    """Handler for when nothing is open yet, and libraries that are being imported would stumble."""
+    os.write(2, b"labrig: interrupted\n")
+    os._exit(128 + signum)
+
+
+@contextmanager
+def _closing_console(clock: Clock) -> Iterator[None]:
+    """Windows ends a process whose console is closed, or whose user logs off; not tried yet.
+
+    It does so when the handler returns, and after 5 s in any case: time for the safe state.
+    """
+    if sys.platform == "win32":
+        import ctypes
+
+        events = {2, 5, 6}  # CTRL_CLOSE_EVENT, CTRL_LOGOFF_EVENT, CTRL_SHUTDOWN_EVENT
+
+        @ctypes.WINFUNCTYPE(ctypes.c_int, ctypes.c_uint)
+        def closing(event: int) -> int:
+            if event in events:
+                clock.interrupt(signal.SIGBREAK)
+                threading.Event().wait()  # in a thread of its own, until the process has ended
+            return 0
+
+        set_handler = ctypes.windll.kernel32.SetConsoleCtrlHandler
+        set_handler(closing, True)
+        try:
+            yield
+        finally:
+            set_handler(closing, False)
+    else:
+        yield

@@ -22,6 +22,7 @@ from labrig.cli.progress import PlainProgress
 from labrig.clock import SystemClock
 from labrig.record import RunRecord, read_run
 from labrig.record.journal import read_journal
+from labrig.sim.boards import SerialCable
 from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
 
@@ -366,8 +367,26 @@ def test_a_board_that_is_silent_for_a_moment_is_asked_again(rig: Make) -> None:
     with open_bench(read_rig_file(bench), str(bench)) as stand, stand.devices() as devices:
         devices.lamp.on()
         stand.clock.sleep_until(10.5)
-        devices.lamp.make_safe()
+        devices.make_safe()
         assert not lamp_is_on(stand)
+
+
+def test_stray_bytes_cost_a_unit_and_not_the_run(
+    labrig: Labrig, rig: Make, protocol: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    carry = SerialCable.carry
+    strays = [b"!", b">"]
+
+    def disturbed(self: SerialCable, data: bytes) -> bytes:
+        answer = carry(self, data)
+        return strays.pop() + answer if data.startswith(b"relay on") and strays else answer
+
+    monkeypatch.setattr(SerialCable, "carry", disturbed)
+    ended = labrig("run", protocol, "--rig", rig(), "--runs", tmp_path / "runs", "--no-process")
+    assert ended.code == 0, ended.err
+    record = recorded(tmp_path / "runs")
+    assert list(record.completed()) == ["dark", "decay-1"]
+    assert [attempt.exit_status for attempt in record.attempts].count("fail") == 2
 
 
 def test_who_stops_waiting_for_a_lost_relay_is_told_that_the_lamp_may_be_on(

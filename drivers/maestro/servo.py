@@ -12,7 +12,7 @@ from typing import Annotated
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire.connections import Connections
-from labrig.errors import DeviceError
+from labrig.errors import UnclearAnswerError
 from labrig.quantity import DurationS
 
 from ..serial_line import SerialLine
@@ -21,8 +21,6 @@ from .errors import told
 #: The USB port ignores it; a Maestro's own default where it is wired to a UART adapter.
 BAUDRATE = 9600
 ANSWER_TIMEOUT_S = 0.5
-#: Longer than any pause inside an answer.
-QUIET_S = 0.03
 #: In this time a new pulse is sent at the latest: five servo frames.
 READ_BACK_S = 0.1
 LOOK_AGAIN_S = 0.005
@@ -116,7 +114,7 @@ class Servo:
 
         Raises
         ------
-        DeviceError
+        UnclearAnswerError
             The Maestro reports an error, or sends another pulse and does not ramp to this one.
         """
         self._tell(SET_TARGET, *seven_bits(quarters(pulse_s)))
@@ -132,7 +130,7 @@ class Servo:
 
         Raises
         ------
-        DeviceError
+        UnclearAnswerError
             As `go`.
         """
         self._resynchronise()
@@ -154,11 +152,11 @@ class Servo:
 
         Raises
         ------
-        DeviceError
+        UnclearAnswerError
             Names each error that has happened since they were read last.
         """
         if bits := self._errors():
-            raise DeviceError(
+            raise UnclearAnswerError(
                 f"{self.name} reports that {told(bits)}; it has sent all its channels home"
             )
 
@@ -172,9 +170,9 @@ class Servo:
     def _is_moving(self) -> bool:
         return self._ask(GET_MOVING, 1) != b"\0"
 
-    def _refused(self, pulse_s: float) -> DeviceError:
+    def _refused(self, pulse_s: float) -> UnclearAnswerError:
         channel, sent_s = self._settings.channel, self.pulse_s
-        return DeviceError(
+        return UnclearAnswerError(
             f"channel {channel} of {self.name} was told to send {pulse_s * 1e6:.2f} µs and sends "
             f"{sent_s * 1e6:.2f} µs; in the Maestro Control Center look whether it is a servo "
             "channel and its range (Min, Max) wide enough"
@@ -192,7 +190,7 @@ class Servo:
 
     def _resynchronise(self) -> None:
         """Forget old errors and a half-read answer; a half-written command is an error itself."""
-        self._line.drain(QUIET_S, ANSWER_TIMEOUT_S)
+        self._line.drain()
         for _ in range(2):
             self._errors()
 

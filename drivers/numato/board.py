@@ -7,15 +7,13 @@ board and their public sample code.
 import re
 
 from labrig.acquire.connections import Connections
-from labrig.errors import DeviceLostError
+from labrig.errors import UnclearAnswerError
 
 from ..serial_line import SerialLine
 
 #: USB CDC ignores it; Numato's own samples use this one.
 BAUDRATE = 19200
 ANSWER_TIMEOUT_S = 1.0
-#: Longer than any pause inside an answer.
-QUIET_S = 0.03
 #: How relays and inputs are counted in commands.
 CHANNELS = "0123456789ABCDEFGHIJKLMNOPQRSTUV"
 
@@ -47,14 +45,14 @@ class Board:
 
         Raises
         ------
-        DeviceLostError
+        UnclearAnswerError
             No answer in time, or no echo.
         """
         self._line.write(command.encode("ascii") + b"\r")
         came = self._line.read_until(b">", ANSWER_TIMEOUT_S)
         lines = re.split(r"[\r\n]+", came.decode("ascii", errors="replace").removesuffix(">"))
         if lines[0] != command:
-            raise DeviceLostError(
+            raise UnclearAnswerError(
                 f"{self.name} did not echo '{command}': got {came!r}; is it a Numato board, and "
                 "its cable well?"
             )
@@ -63,4 +61,4 @@ class Board:
     def resynchronise(self) -> None:
         """A bare return ends a half-typed command; whatever comes is of no interest."""
         self._line.write(b"\r")
-        self._line.drain(QUIET_S, ANSWER_TIMEOUT_S)
+        self._line.drain()

@@ -3,13 +3,9 @@
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire.connections import Connections
-from labrig.errors import DeviceError, DeviceLostError
+from labrig.errors import UnclearAnswerError
 
 from .board import CHANNELS, Board
-
-#: Before it is given up that a lamp could be switched off.
-SAFE_TRIES = 5
-RETRY_S = 1.0
 
 
 class NumatoRelay:
@@ -35,7 +31,6 @@ class NumatoRelay:
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._channel = CHANNELS[settings.relay]
         self._relay = settings.relay
-        self._clock = connections.clock
         self._board = Board(address, connections)
 
     def reads_back(self) -> bool:
@@ -59,17 +54,9 @@ class NumatoRelay:
         return self._read() == "on"
 
     def make_safe(self) -> None:
-        """Bring the line back into step, then off; again if the board does not answer at once."""
-        for tries_left in reversed(range(SAFE_TRIES)):
-            try:
-                self._board.resynchronise()
-                self.off()
-            except DeviceLostError:
-                if not tries_left:
-                    raise
-                self._clock.sleep(RETRY_S)
-            else:
-                return
+        """Bring the line back into step, then off."""
+        self._board.resynchronise()
+        self.off()
 
     def disconnect(self) -> None:
         """The port belongs to the connections, which close it."""
@@ -77,13 +64,13 @@ class NumatoRelay:
     def _switch(self, state: str) -> None:
         said = self._board.ask(f"relay {state} {self._channel}")
         if said:
-            raise DeviceError(
+            raise UnclearAnswerError(
                 f"{self._board.name} refused 'relay {state} {self._channel}': expected a bare "
                 f"prompt, got '{said}'; is relay {self._relay} on this board?"
             )
         read = self._read()
         if read != state:
-            raise DeviceError(
+            raise UnclearAnswerError(
                 f"relay {self._relay} of {self._board.name} was switched {state} but reads {read}; "
                 "switch off by hand and check the board"
             )
@@ -91,7 +78,7 @@ class NumatoRelay:
     def _read(self) -> str:
         state = self._board.ask(f"relay read {self._channel}")
         if state not in ("on", "off"):
-            raise DeviceError(
+            raise UnclearAnswerError(
                 f"{self._board.name} was asked for relay {self._relay}: expected 'on' or 'off', "
                 f"got '{state}'"
             )

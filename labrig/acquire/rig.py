@@ -1,6 +1,6 @@
 """The devices of one bench, open, with the clock they share."""
 
-from collections.abc import Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping
 from typing import cast
 
 from labrig.acquire.roles import (
@@ -14,7 +14,18 @@ from labrig.acquire.roles import (
     TrapDoor,
 )
 from labrig.clock import Clock
-from labrig.errors import DeviceError, DeviceLostError, LabrigError, ProtocolError
+from labrig.errors import (
+    DeviceError,
+    DeviceLostError,
+    LabrigError,
+    ProtocolError,
+    UnclearAnswerError,
+)
+
+#: For so long a device is told again that does not confirm what it was told.
+PATIENCE_S = 30.0
+#: Between two rounds of telling: at first, and at most.
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.1, 2.0
 
 
 class Rig:
@@ -83,31 +94,57 @@ class Rig:
         """Key → what each device says it is."""
         return {key: device.identity() for key, device in self.devices.items()}
 
+    def connect(self, key: str, open_device: Callable[[], Device]) -> None:
+        """Open a device and bring it to its safe state.
+
+        Raises
+        ------
+        DeviceError
+            It cannot be opened, or does not answer clearly for `PATIENCE_S`.
+        UsageError
+            The rig file asks for something that it is not, or does not know.
+        """
+
+        def step() -> None:
+            self.devices[key] = open_device()
+            self.devices[key].make_safe()
+
+        failures = insist(
+            self.clock, {key: step}, unless=lambda error: not isinstance(error, UnclearAnswerError)
+        )
+        if key in failures:
+            if isinstance(failures[key], LabrigError):
+                raise failures[key]
+            raise DeviceError(f"{key}: its driver failed ({failures[key]!r})") from failures[key]
+
     def make_safe(self) -> None:
         """Lamp off, LEDs off, door closed: every device is tried, whatever the others answered.
 
-        Lights first: a door that closes turns its sample to the lamp.
+        Lights first: a door that closes turns its sample to the lamp. A device that does not
+        confirm is told again, for up to `PATIENCE_S`; one that is gone is not, since only
+        connecting again helps.
 
         Raises
         ------
         DeviceError
             Some device could not confirm its safe state; names all of them.
         DeviceLostError
-            All of those are gone, and may come back.
+            All of those are gone or do not answer clearly, and may come back.
         """
-        failures, gone = {}, True
         with self.clock.shielded():
-            for key in in_safe_order(self.devices):
-                try:
-                    self.devices[key].make_safe()
-                except Exception as error:
-                    said = str(error) if isinstance(error, LabrigError) else repr(error)
-                    failures[key] = f"{key}: {said}"
-                    gone = gone and isinstance(error, DeviceLostError)
+            failures = insist(
+                self.clock,
+                {key: self.devices[key].make_safe for key in in_safe_order(self.devices)},
+                unless=_is_gone,
+            )
         if failures:
-            refusal = (DeviceLostError if gone else DeviceError)(
-                "the safe state is not confirmed; switch off by hand: "
-                + "; ".join(failures.values())
+            lost = all(isinstance(error, DeviceLostError) for error in failures.values())
+            said = [
+                f"{key}: {error if isinstance(error, LabrigError) else repr(error)}"
+                for key, error in failures.items()
+            ]
+            refusal = (DeviceLostError if lost else DeviceError)(
+                f"the safe state is not confirmed; switch off by hand: {'; '.join(said)}"
             )
             refusal.unsafe = tuple(failures)
             raise refusal
@@ -125,6 +162,46 @@ class Rig:
                 f"(only {', '.join(sorted(self.devices)) or 'nothing'}); add it under 'devices:'"
             )
         return self.devices[key]
+
+
+def insist(
+    clock: Clock,
+    steps: Mapping[str, Callable[[], None]],
+    unless: Callable[[Exception], bool],
+) -> dict[str, Exception]:
+    """Go round until every step has succeeded once, for up to `PATIENCE_S`; what failed to the end.
+
+    No step waits for another one's patience to be over.
+
+    Parameters
+    ----------
+    steps
+        Key → what is to be done, in this order in every round.
+    unless
+        Whether after this failure there is no use in trying that step again.
+    """
+    failures: dict[str, Exception] = {}
+    left = dict(steps)
+    deadline_s, pause_s = clock.now() + PATIENCE_S, FIRST_PAUSE_S
+    while True:
+        for key, step in list(left.items()):
+            try:
+                step()
+            except Exception as error:
+                failures[key] = error
+                if unless(error):
+                    del left[key]
+            else:
+                failures.pop(key, None)
+                del left[key]
+        if not left or clock.now() >= deadline_s:
+            return failures
+        clock.sleep(pause_s)
+        pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+
+def _is_gone(error: Exception) -> bool:
+    return isinstance(error, DeviceLostError) and not isinstance(error, UnclearAnswerError)
 
 
 def in_safe_order(keys: Iterable[str]) -> list[str]:

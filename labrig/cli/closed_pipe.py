@@ -1,9 +1,32 @@
-"""When whoever read what a command prints has gone."""
+"""When whoever read what a command prints has gone: a pipe's reader, a terminal."""
 
 import os
-from typing import TextIO
+from typing import Any, TextIO
 
 
-def say_no_more(stream: TextIO) -> None:
-    """What is still written to `stream` is dropped."""
-    os.dup2(os.open(os.devnull, os.O_WRONLY), stream.fileno())
+class ToWhoeverIsThere:
+    """A stream that can be written to even when its reader has gone: the run goes on."""
+
+    def __init__(self, stream: TextIO) -> None:
+        self._stream = stream
+
+    def write(self, text: str) -> int:
+        """Write `text`, if anybody is there."""
+        try:
+            return self._stream.write(text)
+        except OSError:
+            self._drop_the_rest()
+            return len(text)
+
+    def flush(self) -> None:
+        """Have it arrive, if anybody is there."""
+        try:
+            self._stream.flush()
+        except OSError:
+            self._drop_the_rest()
+
+    def __getattr__(self, name: str) -> Any:
+        return getattr(self._stream, name)
+
+    def _drop_the_rest(self) -> None:
+        os.dup2(os.open(os.devnull, os.O_WRONLY), self._stream.fileno())

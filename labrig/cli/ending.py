@@ -6,7 +6,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from labrig.cli.closed_pipe import say_no_more
+from labrig.cli.closed_pipe import ToWhoeverIsThere
 from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError, UsageError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
@@ -19,16 +19,12 @@ _NO_TEXT = re.compile("[\ud800-\udfff]")
 
 def guarded(arguments: Sequence[str]) -> int:
     """Run the command line and return its exit code."""
-    for signum in STOP_SIGNALS:
-        signal.signal(signum, raise_interrupted)
     try:
         code = _run(arguments)
-        sys.stdout.flush()
     except BrokenPipeError:
-        # It has read what it wanted: head, less.
-        say_no_more(sys.stdout)
-        code = 0
+        code = 0  # whoever read it has what it wanted: head, less
     finally:
+        ToWhoeverIsThere(sys.stdout).flush()
         for signum in STOP_SIGNALS:
             signal.signal(signum, signal.SIG_IGN)
     return code
@@ -42,10 +38,12 @@ def _run(arguments: Sequence[str]) -> int:
 
     if any(_NO_TEXT.search(argument) for argument in arguments):
         return _complain(f"expected arguments in UTF-8, got {' '.join(map(ascii, arguments))}", 2)
+    for signum in STOP_SIGNALS:
+        signal.signal(signum, raise_interrupted)
     try:
         app(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
     except Interrupted as interrupted:
-        return _complain(str(interrupted), 130 if interrupted.signum == signal.SIGINT else 143)
+        return _complain(str(interrupted), 128 + interrupted.signum)
     except LabrigError as error:
         return _complain(str(error), error.exit_code)
     except typer.Exit as ending:
@@ -78,8 +76,5 @@ def _fault(error: Exception) -> str:
 
 
 def _complain(text: str, code: int) -> int:
-    try:
-        print(f"labrig: {' '.join(text.split())}", file=sys.stderr)
-    except BrokenPipeError:
-        say_no_more(sys.stderr)
+    print(f"labrig: {' '.join(text.split())}", file=ToWhoeverIsThere(sys.stderr), flush=True)
     return code

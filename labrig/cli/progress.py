@@ -5,6 +5,7 @@ import sys
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
 from pathlib import Path
+from typing import TextIO, cast
 
 import numpy as np
 from numpy.typing import NDArray
@@ -16,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from labrig.acquire import ByHand, ExposureSettings, Plan, RunObserver
-from labrig.cli.closed_pipe import say_no_more
+from labrig.cli.closed_pipe import ToWhoeverIsThere
 from labrig.cli.prompt import Terminal
 from labrig.clock import Clock
 from labrig.errors import UsageError
@@ -67,7 +68,7 @@ def progress(
     if not sys.stderr.isatty():
         yield PlainProgress(state)
         return
-    console = Console(stderr=True)
+    console = Console(file=cast(TextIO, ToWhoeverIsThere(sys.stderr)))
     with Live(console=console, refresh_per_second=4, transient=True) as live:
         shown = LiveProgress(state, live, console)
         try:
@@ -174,10 +175,7 @@ class PlainProgress:
 
     def _say(self, text: str) -> None:
         left = _countdown(self._state.left_s())
-        try:
-            print(f"[{left} left] {text}", file=sys.stderr, flush=True)
-        except BrokenPipeError:  # whoever read the log has gone; the run goes on
-            say_no_more(sys.stderr)
+        print(f"[{left} left] {text}", file=ToWhoeverIsThere(sys.stderr), flush=True)
 
 
 class LiveProgress:

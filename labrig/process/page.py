@@ -55,6 +55,7 @@ def run_report(
             DeviceLine(role, entry.address, identities.get(role, ""))
             for role, entry in rig.devices.items()
         ),
+        guard=first.get("guard", ""),
         protocol_text=(run.folder / "protocol.yaml").read_text(encoding="utf-8"),
         rig_text=(run.folder / "rig.yaml").read_text(encoding="utf-8"),
         frames=tuple(frame for attempt in attempts for frame in attempt.frames),

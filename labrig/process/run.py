@@ -77,6 +77,7 @@ def _page(run: RunRecord, protocol: ProtocolModel, rig: RigFile, found: StageRes
             DeviceLine(role, entry.address, identities.get(role, ""))
             for role, entry in rig.devices.items()
         ),
+        guard=start.get("guard", ""),
         protocol_text=(run.folder / "protocol.yaml").read_text(encoding="utf-8"),
         rig_text=(run.folder / "rig.yaml").read_text(encoding="utf-8"),
         frames=tuple(frame for attempt in attempts for frame in attempt.frames),

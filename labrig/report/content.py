@@ -103,8 +103,9 @@ class RunReport:
         One or more.
     sample
         Pairs of what and value: thickness, batch, …
-    devices, protocol_text, rig_text, frames
-        Provenance; the texts are YAML. Frames of the purpose `decay` tell the timing.
+    devices, guard, protocol_text, rig_text, frames
+        Provenance; `guard` is what would have switched the lights off, had labrig died; the texts
+        are YAML. Frames of the purpose `decay` tell the timing.
     warnings
         Shown on top, one line each.
     daylight
@@ -141,6 +142,7 @@ class RunReport:
     patches: tuple[PatchReport, ...]
     sample: tuple[tuple[str, str], ...] = ()
     devices: tuple[DeviceLine, ...] = ()
+    guard: str = ""
     protocol_text: str = ""
     rig_text: str = ""
     frames: tuple[FrameRecord, ...] = ()

@@ -24,7 +24,9 @@ class StagePage:
     ----------
     title, kind
         The sample's name, and what was done with it.
-    run, started, ended, rig, simulated, labrig_version, libraries, devices, protocol_text, rig_text
+    run, started, ended, rig, simulated, labrig_version, libraries, devices, guard
+        As in `RunReport`.
+    protocol_text, rig_text
         As in `RunReport`.
     frames
         All of them, for the list with checksums.
@@ -46,6 +48,7 @@ class StagePage:
     labrig_version: str
     libraries: tuple[tuple[str, str], ...]
     devices: tuple[DeviceLine, ...]
+    guard: str
     protocol_text: str
     rig_text: str
     frames: tuple[FrameRecord, ...]

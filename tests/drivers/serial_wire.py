@@ -41,15 +41,19 @@ class ScriptedPort:
 
 
 class BoardPort(ScriptedPort):
-    """The same line with an emulated board at its end."""
+    """The same line with an emulated board at its end; each answer is late by `late_s`."""
 
-    def __init__(self, clock: VirtualClock, board: Board) -> None:
+    def __init__(self, clock: VirtualClock, board: Board, late_s: float = 0.0) -> None:
         super().__init__(clock, [])
         self._board = board
+        self._late_s = late_s
 
     def write(self, data: bytes, /) -> int:
-        self.script.append((data, self._board.receive(data)))
-        return super().write(data)
+        now_s = self._clock.now()
+        begins_s = max([now_s + self._late_s, *(due_s for due_s, _ in self._coming[-1:])])
+        for n, byte in enumerate(self._board.receive(data)):
+            self._coming.append((begins_s + 0.001 * n, bytes((byte,))))
+        return len(data)
 
 
 class Wired:

@@ -1,0 +1,185 @@
+"""The guard: a process of its own that switches the lights off when this one no longer can.
+
+It is told once a second whether a light may be on. If this process ends without having said that
+all lights are off (kill -9, out of memory, a crash of a library), or says nothing for `HANGS_S`
+(stopped by a signal, hung in a call), the guard opens the lights' ports by the same drivers and
+switches them off, after having killed a process that hangs. What runs in it is `guard_process`.
+"""
+
+import json
+import os
+import subprocess
+import sys
+import threading
+from collections.abc import Iterator
+from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import TimeoutError as TooSlow
+from contextlib import contextmanager, suppress
+from typing import IO, Any
+
+from labrig.acquire import RigFile
+from labrig.acquire.roles import LIGHTS
+from labrig.errors import DeviceError
+from labrig.quantity import duration_text
+
+#: What it is told: a light may be on, or all are off.
+MAY_BE_ON, ALL_OFF = b"+", b"-"
+#: What it says when it is ready.
+READY = "ready"
+BEAT_S = 1.0
+#: Longer than any call that holds the interpreter.
+HANGS_S = 30
+#: For so long the guard tries to switch a light off: somebody may have to plug its board in again.
+TRIES_FOR_S = 300.0
+#: Importing the drivers takes a second, on a PC that is busy with other things several.
+STARTS_WITHIN_S = 60.0
+ENDS_WITHIN_S = 10.0
+
+
+@contextmanager
+def guarding(file: RigFile, source: str) -> Iterator["Guard | None"]:
+    """A guard for a rig's lights, which is started when it is to watch; None without lights."""
+    lights = {key: entry for key, entry in file.devices.items() if key in LIGHTS}
+    if not lights:
+        yield None
+        return
+    guard = Guard(RigFile(name=file.name, devices=lights), source)
+    try:
+        yield guard
+    finally:
+        guard.close()
+
+
+class Guard:
+    """Starts the guard and tells it, from a thread of its own, that this process is well.
+
+    Parameters
+    ----------
+    file
+        The lights alone.
+    source
+        Path of the rig file, for messages.
+    """
+
+    described = (
+        "a process of its own: it switches the lights off at once if labrig dies, and after "
+        f"{HANGS_S} s if labrig hangs"
+    )
+    goes_on = f"its guard goes on trying for {duration_text(TRIES_FOR_S)}"
+
+    def __init__(self, file: RigFile, source: str) -> None:
+        self.lights = frozenset(file.devices)
+        self._order = {
+            "file": file.model_dump(mode="json", exclude_none=True),
+            "source": source,
+            "pid": os.getpid(),
+        }
+        self._state = ALL_OFF
+        self._process: subprocess.Popen[bytes] | None = None
+        self._lock = threading.Lock()
+        self._closed = threading.Event()
+        self._beating = threading.Thread(target=self._beat, daemon=True)
+
+    def watch(self) -> None:
+        """From now on a light may be on.
+
+        Raises
+        ------
+        DeviceError
+            The guard cannot be started.
+        """
+        self._tell(MAY_BE_ON)
+        if not self._beating.is_alive():
+            self._beating.start()
+
+    def stand_down(self) -> None:
+        """All lights are off, read back."""
+        if self._process is not None:
+            self._tell(ALL_OFF)
+
+    def close(self) -> None:
+        """Let it go if all lights are off; else it switches them off as soon as it can."""
+        self._closed.set()
+        if self._beating.is_alive():
+            self._beating.join()
+        if self._process is not None:
+            self._pipe.close()
+            if self._state == ALL_OFF:
+                with suppress(subprocess.TimeoutExpired):
+                    self._process.wait(ENDS_WITHIN_S)
+                self._process.kill()  # nobody needs it any more
+                self._process.wait()
+
+    def _beat(self) -> None:
+        while not self._closed.wait(BEAT_S):
+            with self._lock, suppress(DeviceError):  # tried again with the next beat
+                self._send()
+
+    def _tell(self, state: bytes) -> None:
+        with self._lock:
+            self._state = state
+            self._send()
+
+    def _send(self) -> None:
+        """Say how things are, to another guard if somebody has killed this one."""
+        if self._process is not None and self._process.poll() is not None:
+            self._pipe.close()
+            self._process = None
+        if self._process is None:
+            self._process = _started(self._order)
+        with suppress(OSError):  # it died just now, which the next beat finds out
+            self._pipe.write(self._state)
+
+    @property
+    def _pipe(self) -> IO[bytes]:
+        assert self._process is not None
+        assert self._process.stdin is not None
+        return self._process.stdin
+
+
+def _started(order: dict[str, Any]) -> "subprocess.Popen[bytes]":
+    """The guard's process, once it says that it is ready.
+
+    Raises
+    ------
+    DeviceError
+        It does not, or cannot be started at all.
+    """
+    try:
+        process = subprocess.Popen(
+            [sys.executable, "-P", "-m", "labrig.guard_process"],
+            stdin=subprocess.PIPE,
+            stdout=subprocess.PIPE,
+            stderr=subprocess.STDOUT,
+            bufsize=0,
+            # What ends the processes of a terminal does not end it.
+            start_new_session=os.name != "nt",
+            creationflags=getattr(subprocess, "DETACHED_PROCESS", 0)
+            | getattr(subprocess, "CREATE_NEW_PROCESS_GROUP", 0),
+        )
+    except OSError as error:
+        raise _cannot_start(str(error)) from None
+    assert process.stdin is not None
+    assert process.stdout is not None
+    said = "it ended at once"
+    with process.stdout, suppress(OSError), ThreadPoolExecutor(1) as beside:
+        process.stdin.write(json.dumps(order).encode() + b"\n")
+        line = beside.submit(process.stdout.readline)
+        try:
+            said = line.result(STARTS_WITHIN_S).decode(errors="replace").strip()
+        except TooSlow:
+            process.kill()  # which ends its line, too
+            said = f"no answer within {STARTS_WITHIN_S:g} s"
+    if said == READY:
+        return process
+    process.kill()
+    process.wait()
+    process.stdin.close()
+    raise _cannot_start(said)
+
+
+def _cannot_start(why: str) -> DeviceError:
+    return DeviceError(
+        f"the guard, which switches the lights off if labrig dies, cannot start ({why}); without "
+        "it no light is lit"
+    )

@@ -1,0 +1,127 @@
+"""What runs in the guard's process: waits until labrig dies or hangs, then switches the lights off.
+
+    python -P -m labrig.guard_process
+
+reads from its standard input what it is to switch off, a line of JSON, then a byte a second: may a
+light be on? The end of its input is the end of labrig.
+"""
+
+import json
+import os
+import queue
+import signal
+import sys
+import threading
+from concurrent.futures import ThreadPoolExecutor
+from contextlib import suppress
+from typing import BinaryIO
+
+from labrig.acquire import RigFile, plugins
+from labrig.bench import Bench
+from labrig.clock import SystemClock
+from labrig.errors import LabrigError
+from labrig.guard import ALL_OFF, BEAT_S, HANGS_S, MAY_BE_ON, READY, TRIES_FOR_S
+from labrig.serial_ports import SerialPorts
+
+#: Between two tries. The first ones come quickly: the port of a process that was killed is free
+#: some milliseconds after its end.
+FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 2.0
+
+
+def main() -> None:
+    """Serve one labrig; ends when all lights are off."""
+    # What ends labrig is what the guard is there for.
+    for signum in signal.valid_signals():
+        with suppress(OSError, ValueError):  # SIGKILL and SIGSTOP
+            signal.signal(signum, signal.SIG_IGN)
+    source = sys.stdin.buffer
+    order = json.loads(source.readline())
+    try:
+        lights = Lights(RigFile.model_validate(order["file"]), order["source"])
+    except LabrigError as error:
+        print(error, flush=True)
+        return
+    print(READY, flush=True)
+    for descriptor in (1, 2):  # nobody reads what is printed from now on
+        os.dup2(os.open(os.devnull, os.O_WRONLY), descriptor)
+    if labrig_is_gone(source, order["pid"]):
+        lights.switch_off()
+
+
+def labrig_is_gone(source: BinaryIO, pid: int) -> bool:
+    """Wait until labrig has ended, or hangs and is ended; may a light be on?"""
+    heard: queue.Queue[bytes] = queue.Queue()
+    threading.Thread(target=_listen, args=(source, heard), daemon=True).start()
+    state, silent_s = ALL_OFF, 0.0
+    while True:
+        try:
+            said = heard.get(timeout=BEAT_S)
+        except queue.Empty:
+            # Counted, not looked up on a clock: a PC that slept has not been silent.
+            silent_s += BEAT_S
+            if state == MAY_BE_ON and silent_s >= HANGS_S:
+                _kill(pid)
+                return True
+            continue
+        if not said:
+            return state == MAY_BE_ON
+        state, silent_s = said, 0.0
+
+
+class Lights:
+    """The lights of a rig that another process runs, for when that has ended.
+
+    Parameters
+    ----------
+    file
+        The lights alone.
+    source
+        Path of the rig file, for messages.
+
+    Raises
+    ------
+    UsageError
+        A driver is not installed here.
+    """
+
+    def __init__(self, file: RigFile, source: str) -> None:
+        self._clock = SystemClock()
+        self._benches = []
+        ports = SerialPorts()
+        for key, entry in file.devices.items():
+            plugins.load(plugins.DRIVERS, entry.driver, source)  # imported now, not in an emergency
+            ports.look_up(entry.address)
+            alone = file.model_copy(update={"devices": {key: entry}})
+            self._benches.append(Bench(alone, source, self._clock, None, ports=ports))
+
+    def switch_off(self) -> None:
+        """Switch all of them off, none waiting for another one, for up to `TRIES_FOR_S`."""
+        with ThreadPoolExecutor(len(self._benches)) as each:
+            list(each.map(self._switch_off, self._benches))
+
+    def _switch_off(self, bench: Bench) -> None:
+        deadline_s, pause_s = self._clock.now() + TRIES_FOR_S, FIRST_PAUSE_S
+        while self._clock.now() < deadline_s:
+            try:
+                with bench.devices():
+                    return  # what is opened is off
+            except Exception:  # nobody is there to be told, and the next try may do it
+                self._clock.sleep(pause_s)
+                pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
+
+
+def _listen(source: BinaryIO, heard: "queue.Queue[bytes]") -> None:
+    while said := source.read(1):
+        heard.put(said)
+    heard.put(b"")
+
+
+def _kill(pid: int) -> None:
+    """End labrig where it hangs: by SIGKILL, or what Windows has in its place."""
+    if sys.platform == "win32" or os.getppid() == pid:  # else it has ended, and the number is free
+        with suppress(OSError):
+            os.kill(pid, getattr(signal, "SIGKILL", signal.SIGTERM))
+
+
+if __name__ == "__main__":
+    main()

@@ -1,0 +1,116 @@
+"""Serial lines that are not in order: answers that come late, bytes that nobody sent."""
+
+from collections.abc import Callable
+
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from labrig.clock import Interrupted, VirtualClock
+from labrig.drivers.lcus import LcusRelay
+from labrig.drivers.maestro import MaestroDoor
+from labrig.drivers.numato import NumatoRelay
+from labrig.drivers.text_hands import TextHands
+from labrig.errors import UnclearAnswerError
+from labrig.sim.boards import HandsBoard, LcusBoard, MaestroBoard, NumatoBoard
+from labrig.yaml_file import validate
+from tests.drivers.serial_wire import Board, BoardPort, InterruptingClock, Wired
+
+LATE_S = 0.06
+DOOR = {"channel": 0, "closed": "1000 us", "open": "1500 us", "travel": "20 ms"}
+
+
+def numato(clock: VirtualClock, late_s: float) -> tuple[NumatoRelay, NumatoBoard]:
+    board = NumatoBoard(8, lambda relay, on: None)
+    wired = Wired(clock, BoardPort(clock, board, late_s))
+    return NumatoRelay("COM3", NumatoRelay.Settings(relay=0), wired), board
+
+
+def lcus(clock: VirtualClock, late_s: float) -> tuple[LcusRelay, LcusBoard]:
+    board = LcusBoard(2, lambda relay, on: None, "text")
+    wired = Wired(clock, BoardPort(clock, board, late_s))
+    return LcusRelay("COM5", LcusRelay.Settings(relay=1), wired), board
+
+
+@pytest.mark.parametrize("make", [numato, lcus])
+def test_a_relay_board_that_answers_late_is_usable(
+    make: Callable[[VirtualClock, float], tuple[NumatoRelay, NumatoBoard]],
+) -> None:
+    driver, board = make(VirtualClock(), LATE_S)
+    driver.make_safe()
+    for state in (True, False, True):
+        (driver.on if state else driver.off)()
+        assert driver.is_on() == state == board.states[0]
+    assert "relay" in driver.identity()
+    driver.make_safe()
+    assert not board.states[0]
+
+
+def test_a_servo_board_that_answers_late_is_usable() -> None:
+    clock = VirtualClock()
+    board = MaestroBoard(clock, {0: 1000e-6})
+    settings = validate(DOOR, MaestroDoor.Settings, "rig.yaml")
+    door = MaestroDoor("COM6", settings, Wired(clock, BoardPort(clock, board, LATE_S)))
+    door.make_safe()
+    door.open()
+    door.make_safe()
+    assert [round(pulse.width_s * 1e6) for pulse in board.pulses(0)] == [1000, 1500, 1000]
+
+
+@pytest.mark.parametrize("make", [numato, lcus])
+@given(waits=st.integers(0, 120))
+def test_interrupted_while_answers_are_on_their_way_it_is_made_safe(
+    make: Callable[[VirtualClock, float], tuple[NumatoRelay, NumatoBoard]], waits: int
+) -> None:
+    clock = InterruptingClock()
+    driver, board = make(clock, LATE_S)
+    clock.waits_left = waits
+    try:
+        driver.on()
+        driver.is_on()
+        driver.off()
+        driver.on()
+    except Interrupted:
+        pass
+    clock.waits_left = 10**9
+    driver.make_safe()
+    assert not board.states[0]
+    assert not driver.is_on()
+
+
+class Straying:
+    """A board on whose line bytes turn up before an answer, once."""
+
+    def __init__(self, board: Board) -> None:
+        self._board = board
+        self.stray = b""
+
+    def receive(self, data: bytes) -> bytes:
+        stray, self.stray = self.stray, b""
+        return stray + self._board.receive(data)
+
+
+@given(st.sampled_from([b"!", b">", b"\0", b"\xff", b"on\n\r>", b"CH1: ON \r\n"]))
+def test_stray_bytes_are_an_unclear_answer_and_the_next_one_is_clear(stray: bytes) -> None:
+    clock = VirtualClock()
+    board = Straying(NumatoBoard(8, lambda relay, on: None))
+    relay = NumatoRelay(
+        "COM3", NumatoRelay.Settings(relay=0), Wired(clock, BoardPort(clock, board))
+    )
+    for act in (relay.on, relay.off, relay.is_on):
+        board.stray = stray
+        with pytest.raises(UnclearAnswerError):
+            act()
+        relay.make_safe()
+        assert not relay.is_on()
+
+
+def test_hands_that_babble_are_asked_again_and_hands_that_cannot_are_not() -> None:
+    clock = VirtualClock()
+    board = Straying(HandsBoard({"fresh sample": lambda: None}))
+    hands = TextHands("COM7", TextHands.Settings(), Wired(clock, BoardPort(clock, board)))
+    board.stray = b"\xff"
+    with pytest.raises(UnclearAnswerError):
+        hands.do("fresh sample")
+    hands.make_safe()
+    hands.do("fresh sample")
