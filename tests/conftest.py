@@ -28,6 +28,7 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 sys.dont_write_bytecode = False
+HANDLERS = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
 
 # In CI the same examples every time, so that a red run is about the change; new ones elsewhere.
 settings.register_profile("ci", derandomize=True, deadline=None)
@@ -49,9 +50,8 @@ class Ended:
 
 
 @pytest.fixture
-def labrig(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., Ended]]:
+def labrig(capfd: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
     """Runs `labrig ARGUMENTS…` in this process."""
-    before = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
 
     def run(*arguments: object) -> Ended:
         capfd.readouterr()
@@ -59,8 +59,16 @@ def labrig(capfd: pytest.CaptureFixture[str]) -> Iterator[Callable[..., Ended]]:
         said = capfd.readouterr()
         return Ended(code, said.out, said.err)
 
-    yield run
-    for signum, handler in before.items():
+    return run
+
+
+@pytest.fixture(autouse=True)
+def answered_signals() -> Iterator[None]:
+    """A command that ended ignores signals, as would all processes that later tests start."""
+    for signum, handler in HANDLERS.items():
+        signal.signal(signum, handler)
+    yield
+    for signum, handler in HANDLERS.items():
         signal.signal(signum, handler)
 
 

@@ -39,7 +39,7 @@ def test_one_curve_of_many(labrig: Labrig, tmp_path: Path) -> None:
     ("arguments", "said"),
     [
         (["nope"], "no shipped camera is called 'nope'"),
-        (["none.csv"], "none.csv: cannot be read"),
+        (["none.csv"], "none.csv: no such file"),
         (["bad.csv"], "something is not a number"),
         (["twice.csv"], "a wavelength stands twice"),
         (["canon_eos_5d_mark_ii", "--curve", "X"], "no curve is called 'X'"),

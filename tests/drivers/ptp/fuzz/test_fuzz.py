@@ -4,7 +4,7 @@ import pytest
 
 from .sessions import WAYS, Tally, sessions
 
-CASES = 200
+CASES = 350
 
 
 @pytest.mark.parametrize("way", WAYS)
