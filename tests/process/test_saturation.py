@@ -124,6 +124,16 @@ def test_rates_are_not_judged_where_exponentials_do_not_fit() -> None:
     assert not compare_rates(curves, [0.1, 0.01]).misfit
 
 
+def test_noise_that_is_known_badly_is_no_misfit() -> None:
+    """Twelve frames tell a flicker to a quarter; one that was found too low is no other law."""
+    curves = [decay([0.05], [1.0], seed) for seed in range(6)]
+    told_low = [replace(one, sigma=one.sigma / 1.5) for one in curves]
+    assert compare_rates(told_low, [0.05]).misfit
+    assert not compare_rates(told_low, [0.05], noise_dof=9.0).misfit
+    of_two = [decay([0.2, 0.005], [1.0, 0.3], seed) for seed in range(6)]
+    assert compare_rates(of_two, [0.05], noise_dof=9.0).misfit
+
+
 def test_rates_that_differ_by_a_few_per_cent_are_told_apart() -> None:
     curves = [decay([0.05], [1.0], 0), decay([0.053], [0.3], 1)]
     test = compare_rates(curves, [0.04])

@@ -12,7 +12,7 @@ from labrig.process.clean import cleaned
 from labrig.process.history import charges_s
 from labrig.process.saturation.found import Saturation
 from labrig.process.saturation.level import Level, level
-from labrig.process.saturation.shared_rates import RatesTest, compare_rates, curve
+from labrig.process.saturation.shared_rates import RatesTest, compare_rates, curve, flicker_dof
 from labrig.process.saturation.telling import lines, section, verdicts
 from labrig.process.series_fit import fit_series
 from labrig.process.stage import Stage, StageResult
@@ -94,7 +94,7 @@ def _saturation(
     fit = fit_series(longest, states, fixed_rates_per_s=stage.choices.fixed_rates_per_s)
     curves = {unit: curve(one, fit) for unit, one in decays.items()}
     rates = [state.k_r_per_s for state in fit.states]
-    test = compare_rates(list(curves.values()), rates)
+    test = compare_rates(list(curves.values()), rates, flicker_dof(fit))
     rows = {light: [list(decays).index(unit) for unit in by_light[light]] for light in by_light}
     return Saturation(
         fit=fit,

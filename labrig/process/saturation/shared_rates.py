@@ -24,7 +24,7 @@ FloatArray = NDArray[np.float64]
 #: Chance at which rates that are the same are said to differ.
 LEVEL = 1e-3
 #: Chance at which decays that are exponentials are said to be none.
-MISFIT_LEVEL = 1e-6
+MISFIT_LEVEL = 5e-4
 
 
 @dataclass(frozen=True, eq=False)
@@ -72,6 +72,8 @@ class RatesTest:
         (d, s) of every decay at lamp off, the rates shared.
     chi2_shared, chi2_own, dof_own
         Sums of all decays.
+    noise_dof
+        Degrees of freedom from which the noise itself was estimated; infinite if it is known.
     p_value
         Of an F-test: chance that rates which are the same come out so different.
     """
@@ -84,6 +86,7 @@ class RatesTest:
     chi2_shared: float
     chi2_own: float
     dof_own: int
+    noise_dof: float
     p_value: float
 
     @property
@@ -94,7 +97,10 @@ class RatesTest:
     @property
     def misfit(self) -> bool:
         """Whether not even rates of their own describe the decays."""
-        return float(chdtrc(self.dof_own, self.chi2_own)) < MISFIT_LEVEL
+        if np.isinf(self.noise_dof):
+            return float(chdtrc(self.dof_own, self.chi2_own)) < MISFIT_LEVEL
+        excess = self.chi2_own / self.dof_own
+        return float(fdtrc(self.dof_own, self.noise_dof, excess)) < MISFIT_LEVEL
 
 
 def curve(series: Series, fit: DecayFit) -> Curve:
@@ -110,13 +116,24 @@ def curve(series: Series, fit: DecayFit) -> Curve:
     return Curve(series.t_s[rows], series.exposure_s[rows], value, sigma, float(shares @ dark))
 
 
-def compare_rates(curves: Sequence[Curve], start_per_s: Sequence[float]) -> RatesTest:
+def flicker_dof(fit: DecayFit) -> float:
+    """Degrees of freedom from which a fit estimated its flicker; infinite if it was given."""
+    if not fit.flicker_sigma > 0:
+        return np.inf
+    return max(0.5 * (fit.flicker / fit.flicker_sigma) ** 2, 1.0)
+
+
+def compare_rates(
+    curves: Sequence[Curve], start_per_s: Sequence[float], noise_dof: float = np.inf
+) -> RatesTest:
     """Fit all decays with shared rates, then each with its own, as many states each.
 
     Parameters
     ----------
     start_per_s
         Rates to start from; their number is that of the states.
+    noise_dof
+        Degrees of freedom from which the curves' σ was estimated; infinite if it is known.
 
     Raises
     ------
@@ -149,6 +166,7 @@ def compare_rates(curves: Sequence[Curve], start_per_s: Sequence[float]) -> Rate
         chi2_shared=shared_chi2,
         chi2_own=own_chi2,
         dof_own=dof,
+        noise_dof=noise_dof,
         p_value=float(fdtrc(added, dof, gain / scatter)),
     )
 
