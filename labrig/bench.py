@@ -15,7 +15,6 @@ from labrig.acquire import Device, Rig, RigFile, plugins
 from labrig.acquire.connections import SerialPort
 from labrig.acquire.rig import in_safe_order
 from labrig.acquire.rig_file import DeviceEntry
-from labrig.acquire.roles import ROLES
 from labrig.awake import kept_awake
 from labrig.clock import Clock, SystemClock
 from labrig.device_lock import held, network_devices, serial_devices, usb_device
@@ -166,15 +165,9 @@ def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], No
 
 
 def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str) -> Device:
-    driver = plugins.load(plugins.DRIVERS, entry.driver, source)
+    driver = plugins.load_driver(key, entry.driver, source)
     settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
     device: Device = driver(entry.address, settings, connections)
-    if not isinstance(device, ROLES[key]):
-        device.disconnect()
-        raise UsageError(
-            f"{source}: the driver '{entry.driver}' is no {key}; choose another driver for "
-            f"'devices.{key}'"
-        )
     return device
 
 

@@ -20,11 +20,11 @@ from labrig.input_file import read_text
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
-#: Longer than any such file, and read in a few seconds.
-MOST_BYTES = 500_000
-#: Deeper and more than any such file has, aliases written out.
+#: More than any such file has; the longest are the calibrations that labrig writes, 0.1 MB.
+MOST_BYTES = 5_000_000
+#: Deeper than any such file goes, and more values than anybody leaves to aliases.
 MOST_DEPTH = 30
-MOST_NODES = 100_000
+MOST_ALIASED = 100_000
 #: Of a text that is shown in a message.
 MOST_SHOWN = 80
 
@@ -49,7 +49,10 @@ class _Loader(yaml.SafeLoader):
     def get_single_node(self) -> yaml.Node | None:
         node = super().get_single_node()
         if node is not None:
-            _extent(node, {})
+            known: dict[yaml.Node, tuple[int, int]] = {}
+            nodes, depth = _extent(node, known)
+            if nodes - len(known) > MOST_ALIASED or depth > MOST_DEPTH + 1:
+                raise _problem("its aliases stand for more than fits such a file", node)
         return node
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
@@ -103,12 +106,11 @@ def _extent(node: yaml.Node, known: dict[yaml.Node, tuple[int, int]]) -> tuple[i
     elif isinstance(node, yaml.SequenceNode):
         inner = node.value
     extents = [_extent(part, known) for part in inner]
-    number = 1 + sum(nodes for nodes, _ in extents)
-    depth = 1 + max((deep for _, deep in extents), default=0)
-    if number > MOST_NODES or depth > MOST_DEPTH + 1:
-        raise _problem("its aliases stand for more than any such file holds; write it out", node)
-    known[node] = number, depth
-    return number, depth
+    known[node] = (
+        1 + sum(nodes for nodes, _ in extents),
+        1 + max((depth for _, depth in extents), default=0),
+    )
+    return known[node]
 
 
 def _construct_float(loader: _Loader, node: yaml.ScalarNode) -> float:

@@ -78,13 +78,13 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
 @pytest.mark.parametrize(
     ("text", "expected"),
     [
-        (BOMB, "write it out"),
+        (BOMB, "aliases"),
         ("a: &a [*a]", "within what it stands for"),
         ("a: &a {b: {c: *a}}", "within what it stands for"),
         ("a: " + "[" * 5000, "deep"),
         (
             "a: &a [[[[[[[[[[[[[[[x]]]]]]]]]]]]]]]\nb: [[[[[[[[[[[[[[[[[*a]]]]]]]]]]]]]]]]]",
-            "write it out",
+            "aliases",
         ),
         ("a: !!timestamp x", "!!timestamp"),
         ("a: !!bool x", "!!bool"),
@@ -116,7 +116,7 @@ def test_an_alias_is_what_it_stands_for() -> None:
 
 
 def test_a_file_without_end_is_refused(tmp_path: Path) -> None:
-    (tmp_path / "long.yaml").write_text("a: b\n" + "# more\n" * 100_000)
+    (tmp_path / "long.yaml").write_text("a: b\n" + "# more\n" * 800_000)
     with pytest.raises(UsageError, match="at most"):
         read_model(tmp_path / "long.yaml", Outer)
 

@@ -99,7 +99,7 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
     devices: dict[str, Device] = {}
     offers = CameraOffers((), ())
     for key, entry in rig.devices.items():
-        driver = plugins.load(plugins.DRIVERS, entry.driver, source)
+        driver = plugins.load_driver(key, entry.driver, source)
         settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
         if key == "camera":
             offers = driver.declared_offers(settings)

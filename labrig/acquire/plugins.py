@@ -9,6 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from labrig.acquire.protocol import ProtocolModel
+from labrig.acquire.roles import ROLES
 from labrig.errors import UsageError
 from labrig.yaml_file import did_you_mean, read_yaml, validate
 
@@ -41,6 +42,22 @@ def load(group: str, name: str, source: str) -> Any:
         raise UsageError(
             f"{source}: the {kind} '{name}' ({found[name].value}) cannot be imported ({error})"
         ) from None
+
+
+def load_driver(key: str, name: str, source: str) -> Any:
+    """The driver registered as `name`, for the device `key` of the rig file `source`.
+
+    Raises
+    ------
+    UsageError
+        As of `load`; or it is the driver of a device of another kind.
+    """
+    driver = load(DRIVERS, name, source)
+    if not issubclass(driver, ROLES[key]):
+        raise UsageError(
+            f"{source}: the driver '{name}' is no {key}; choose another driver for 'devices.{key}'"
+        )
+    return driver
 
 
 def read_protocol(path: Path) -> ProtocolModel:

@@ -69,6 +69,15 @@ def test_a_plan_that_cannot_work_is_refused(
     assert "\n" not in str(caught.value)
 
 
+def test_a_plan_for_a_driver_of_another_kind_is_refused(
+    make_protocol: Callable[..., Path], make_rig: Callable[..., Path]
+) -> None:
+    rig = make_rig()
+    rig.write_text(rig.read_text().replace("ptp_camera", "numato_relay"))
+    with pytest.raises(UsageError, match="is no camera"):
+        plan(plugins.read_protocol(make_protocol()), read_rig_file(rig), str(rig))
+
+
 def test_a_plan_without_end_is_refused(
     make_protocol: Callable[..., Path], monkeypatch: pytest.MonkeyPatch
 ) -> None:
