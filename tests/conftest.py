@@ -23,6 +23,7 @@ from hypothesis import settings
 from labrig import shipped
 from labrig.cli.ending import guarded
 from labrig.signals import STOP_SIGNALS
+from tests.process import recorded
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
@@ -60,6 +61,15 @@ def labrig(capfd: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
         return Ended(code, said.out, said.err)
 
     return run
+
+
+@pytest.fixture(scope="session", autouse=True)
+def shared_recordings(tmp_path_factory: pytest.TempPathFactory) -> None:
+    """One folder of recorded runs for all workers."""
+    of_worker = tmp_path_factory.getbasetemp()
+    is_worker = "PYTEST_XDIST_WORKER" in os.environ
+    recorded.SHARED = (of_worker.parent if is_worker else of_worker) / "recorded"
+    recorded.SHARED.mkdir(exist_ok=True)
 
 
 @pytest.fixture(autouse=True)

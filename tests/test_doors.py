@@ -228,7 +228,7 @@ def test_the_watchdog_is_fed_between_frames(rig: Make, tmp_path: Path) -> None:
     [
         ({"door": {"open": "1000 us"}}, "two different pulses"),
         ({"door": {"open": "5 ms"}}, "devices.door"),
-        ({"door": {"driver": "maestro_shield"}}, "known: acceleration, channel, covering"),
+        ({"door": {"driver": "maestro_shield"}}, "the driver 'maestro_shield' is no door"),
         ({"lamp": {"relay": 0}}, "relay"),
     ],
 )

@@ -2,8 +2,6 @@
 
 import os
 import signal
-import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
 from datetime import UTC, datetime
@@ -419,16 +417,3 @@ def test_a_clock_that_is_stepped_does_not_bend_a_running_one(
     before = clock.wall()
     monkeypatch.setattr("time.time", lambda: 0.0)
     assert 0.0 <= clock.wall() - before < 60.0
-
-
-def test_faults_at_moments_that_nobody_chose() -> None:
-    """One of the many that can be run by hand; CI runs a dozen."""
-    done = subprocess.run(
-        [sys.executable, "-m", "tests.acceptance.faults_at_any_moment", "--trials", "1"],
-        cwd=Path(__file__).parent.parent,
-        capture_output=True,
-        text=True,
-        check=False,
-    )
-    assert done.returncode == 0, done.stdout + done.stderr
-    assert "0 of 1 went wrong" in done.stdout

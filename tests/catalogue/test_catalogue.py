@@ -32,7 +32,7 @@ def week(tmp_path_factory: pytest.TempPathFactory) -> Path:
     ):
         rig = yaml.safe_load((Path(__file__).parents[2] / "config" / "sim.yaml").read_text())
         rig["simulation"] |= {
-            "sensor": {"width": 192, "height": 128},
+            "sensor": {"width": 96, "height": 64},
             "epoch": f"2026-01-0{day}T00:00:00Z",
             "initial": {"lamp": "off"},
             "sample": sample,

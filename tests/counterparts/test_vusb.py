@@ -67,6 +67,7 @@ def test_as_a_rigs_camera_it_is_known_set_and_refused_for_its_jpegs(picture: Pat
         assert "\n" not in refused
 
 
+@pytest.mark.campaign
 def test_its_card_fills_up(picture: Path) -> None:
     *others, reported, refused = drive("until-full", picture.parent)["said"]
     assert len(others) > 10

@@ -27,6 +27,7 @@ def test_bands_of_real_dyes_cover_them() -> None:
     assert bright[1] > 0.8
 
 
+@pytest.mark.campaign
 def test_the_colour_checker_through_the_filter() -> None:
     lvf, ours = made.curved_lvf(), made.of_the_house()
     exact = system_through_lvf(lvf, ours, made.KNOTS_NM)

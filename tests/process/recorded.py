@@ -1,11 +1,14 @@
 """Runs of protocols on the simulated bench, without a terminal; cut off and resumed."""
 
+import shutil
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager
+from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
 import yaml
+from filelock import FileLock
 
 from labrig import shipped
 from labrig.acquire import Plan, RunObserver
@@ -14,6 +17,9 @@ from labrig.filling import Watch
 from labrig.record import RunRecord, read_run
 from labrig.run import Recording, resume_run
 from tests.acquire.fakes import Watching
+
+#: Where the workers of one run of the tests keep what they recorded; set by `tests.conftest`.
+SHARED: Path | None = None
 
 
 @contextmanager
@@ -27,7 +33,10 @@ def record(
     change: Callable[[dict[str, Any]], None] = lambda rig: None,
     watch: Watch = quietly,
 ) -> Path:
-    """The folder of a run of `protocol` on the shipped rig for phosphors, as `change` leaves it."""
+    """The folder of a run of `protocol` on the shipped rig for phosphors, as `change` leaves it.
+
+    In one run of the tests what is the same is recorded once, and copied.
+    """
     folder.mkdir(parents=True, exist_ok=True)
     rig = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
@@ -38,8 +47,19 @@ def record(
     change(rig)
     (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
     (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
-    recording = Recording.prepare(folder / "protocol.yaml", folder / "rig.yaml", folder / "runs")
-    return recording.record(watch)
+    runs = folder / "runs"
+    recording = Recording.prepare(folder / "protocol.yaml", folder / "rig.yaml", runs)
+    if watch is not quietly or SHARED is None:
+        return recording.record(watch)
+    asked = b"".join(path.read_bytes() for path in sorted(folder.glob("*.yaml")))
+    place = SHARED / sha256(asked.replace(bytes(folder), b"")).hexdigest()
+    with FileLock(place.with_suffix(".lock")):
+        if not place.is_dir():
+            made = recording.record(watch)
+            shutil.copytree(made, place / made.name)
+            return made
+    (kept,) = place.iterdir()
+    return Path(shutil.copytree(kept, runs / kept.name))
 
 
 def cut_off_and_resumed(run: Path, unit: str) -> tuple[RunRecord, RunRecord]:

@@ -12,9 +12,10 @@ from labrig.errors import UsageError
 from labrig.material import read_material
 from labrig.process import process_run
 from labrig.record import read_run
-from tests.process.excitation.test_excitation_run import HEIGHT, QUICK, WIDTH, true_irradiance
+from tests.process.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.process.recorded import cut_off_and_resumed, record
 
+WIDTH, HEIGHT = 192, 48
 DECAY = {
     "protocol": "decay", "charge": "5 min", "first": "1 s", "every": "4 s", "for": "80 s",
     "daylight": False,
@@ -27,7 +28,7 @@ SHORT = {key: value for key, value in QUICK.items() if key != "sample"} | {
 @pytest.fixture(scope="module")
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     folder = tmp_path_factory.mktemp("phosphor")
-    write_irradiance_file(folder / "irradiance.yaml", true_irradiance())
+    write_irradiance_file(folder / "irradiance.yaml", true_irradiance(WIDTH, HEIGHT))
 
     def change(rig: dict[str, dict[str, object]]) -> None:
         rig["optics"]["irradiance"] = str(folder / "irradiance.yaml")

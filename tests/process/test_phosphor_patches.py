@@ -148,6 +148,7 @@ def test_a_comparison_takes_the_whole_material_of_each(run: Path, result: Result
         assert patch.material == read_material(run / "result" / paint / "material.yaml")
 
 
+@pytest.mark.campaign
 def test_a_patch_that_does_not_reach_along_the_filter_is_left_out(
     run: Path, tmp_path: Path
 ) -> None:

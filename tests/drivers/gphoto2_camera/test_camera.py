@@ -165,6 +165,7 @@ def serving(rig: Path) -> Iterator[tuple[str, "subprocess.Popen[str]"]]:
             server.kill()
 
 
+@pytest.mark.campaign
 def test_rig_check_then_the_camera_is_switched_off(
     labrig: Callable[..., Ended], make_rig: Callable[..., Path], tmp_path: Path
 ) -> None:

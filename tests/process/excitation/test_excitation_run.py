@@ -144,6 +144,7 @@ def test_charges_double_until_the_glow_stops_growing(run: Path) -> None:
     assert asked == [("strip-meter", "lvf on sample"), ("bare-meter", "lvf away")]
 
 
+@pytest.mark.campaign
 def test_killed_in_the_middle_it_goes_on_with_the_filter_where_it_was(
     run: Path, tmp_path: Path
 ) -> None:
