@@ -101,10 +101,11 @@ class Lights:
 
     def _switch_off(self, bench: Bench) -> None:
         deadline_s, pause_s = self._clock.now() + TRIES_FOR_S, FIRST_PAUSE_S
-        while self._clock.now() < deadline_s:
+        is_off = False
+        while not is_off and self._clock.now() < deadline_s:
             try:
                 with bench.devices():
-                    return  # what is opened is off
+                    is_off = True  # what is opened was switched off and read back
             except Exception:  # nobody is there to be told, and the next try may do it
                 self._clock.sleep(pause_s)
                 pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
