@@ -157,7 +157,9 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
     except (yaml.YAMLError, ValueError) as error:
         raise UsageError(f"{source}: not YAML ({' '.join(str(error).split())})") from None
     if not isinstance(content, dict):
-        raise UsageError(f"{source}: expected 'key: value' lines, got {_kind(content)}")
+        raise UsageError(
+            f"{source}: expected 'key: value' lines, got {' '.join(_kind(content).split())}"
+        )
     return content
 
 
@@ -243,4 +245,5 @@ def _kind(value: Any) -> str:
 
 
 def _shown(text: str) -> str:
+    text = " ".join(text.split())
     return text if len(text) <= MOST_SHOWN else text[:MOST_SHOWN] + "…"

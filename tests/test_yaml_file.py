@@ -5,7 +5,7 @@ from pathlib import Path
 from time import process_time
 
 import pytest
-from hypothesis import given
+from hypothesis import example, given
 from hypothesis import strategies as st
 from pydantic import BaseModel, ConfigDict
 
@@ -158,6 +158,7 @@ def test_an_unknown_word_with_nothing_near_lists_what_is_known() -> None:
 
 
 @given(st.text())
+@example("0\n0")
 def test_any_text_is_a_mapping_or_one_line(text: str) -> None:
     try:
         assert isinstance(parse_yaml(text, "test"), dict)
