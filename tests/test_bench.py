@@ -1,7 +1,6 @@
 """A rig opened for real: pyserial on a terminal device whose other end is an emulated board."""
 
 import os
-import threading
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -13,8 +12,7 @@ from labrig.bench import open_bench
 from labrig.clock import SystemClock
 from labrig.errors import DeviceError, UsageError
 from labrig.sim.boards import NumatoBoard
-
-pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
+from tests.terminal import on_a_terminal
 
 RIG = """
 name: half a bench
@@ -38,21 +36,8 @@ def wired() -> Iterator[tuple[str, HearingBoard]]:
     """A board on a terminal device, its relay 3 left on by somebody."""
     board = HearingBoard(8, lambda relay, on: None)
     board.states[3] = True
-    ours, theirs = pty.openpty()
-    os.set_blocking(ours, True)
-
-    def serve() -> None:
-        while True:
-            try:
-                data = os.read(ours, 100)
-                os.write(ours, board.receive(data))
-            except OSError:
-                return
-
-    threading.Thread(target=serve, daemon=True).start()
-    yield os.ttyname(theirs), board
-    os.close(theirs)
-    os.close(ours)
+    with on_a_terminal(board) as address:
+        yield address, board
 
 
 @pytest.fixture

@@ -1,11 +1,6 @@
 """An emulated relay board at the far end of a pseudo-terminal, in this process, in real time."""
 
-import os
-import pty
-import threading
 import time
-from collections.abc import Iterator
-from contextlib import contextmanager
 
 from labrig.sim.boards import NumatoBoard
 
@@ -38,23 +33,3 @@ class WatchedBoard(NumatoBoard):
     def receive(self, data: bytes) -> bytes:
         self.heard_bytes += len(data)
         return super().receive(data)
-
-
-@contextmanager
-def on_a_terminal(board: WatchedBoard) -> Iterator[str]:
-    """The terminal device at whose other end `board` is."""
-    ours, theirs = pty.openpty()
-
-    def serve() -> None:
-        while True:
-            try:
-                os.write(ours, board.receive(os.read(ours, 100)))
-            except OSError:
-                return
-
-    threading.Thread(target=serve, daemon=True).start()
-    try:
-        yield os.ttyname(theirs)
-    finally:
-        os.close(theirs)
-        os.close(ours)

@@ -18,7 +18,8 @@ from collections import Counter
 from pathlib import Path
 
 from labrig.setup.check import SWITCHINGS
-from tests.acceptance.board_on_a_terminal import RIG, WatchedBoard, on_a_terminal
+from tests.acceptance.board_on_a_terminal import RIG, WatchedBoard
+from tests.terminal import on_a_terminal
 
 SPELLINGS = ("path", "link", "relative path", "two slashes", "other TMPDIR")
 PATIENCE_S = 60.0

@@ -1,9 +1,7 @@
 """The drivers' bytes through pyserial and a terminal device, on the system's clock."""
 
-import os
-import threading
 from collections.abc import Callable, Iterator
-from contextlib import ExitStack, contextmanager
+from contextlib import ExitStack
 from pathlib import Path
 
 import pytest
@@ -13,8 +11,7 @@ from labrig.bench import open_bench
 from labrig.clock import VirtualClock
 from labrig.sim.boards import LcusBoard, MaestroBoard
 from tests.drivers.serial_wire import Board
-
-pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
+from tests.terminal import on_a_terminal
 
 RIG = """
 name: two boards
@@ -25,30 +22,10 @@ devices:
 """
 
 
-@contextmanager
-def wired(board: Board) -> Iterator[str]:
-    """The terminal device at whose other end `board` is."""
-    ours, theirs = pty.openpty()
-
-    def serve() -> None:
-        while True:
-            try:
-                os.write(ours, board.receive(os.read(ours, 100)))
-            except OSError:
-                return
-
-    threading.Thread(target=serve, daemon=True).start()
-    try:
-        yield os.ttyname(theirs)
-    finally:
-        os.close(theirs)
-        os.close(ours)
-
-
 @pytest.fixture
 def open_ports() -> Iterator[Callable[[Board], str]]:
     with ExitStack() as stack:
-        yield lambda board: stack.enter_context(wired(board))
+        yield lambda board: stack.enter_context(on_a_terminal(board))
 
 
 def test_lamp_and_door(open_ports: Callable[[Board], str], tmp_path: Path) -> None:

@@ -9,14 +9,13 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from pathlib import Path
 
 import pytest
 
 from labrig.sim.boards import NumatoBoard
-
-pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
+from tests.terminal import on_a_terminal
 
 RIG = """
 name: half a bench
@@ -31,31 +30,19 @@ class Wired:
     """A board at a terminal device; `lit` is set when somebody switches its lamp on."""
 
     address: str
-    lit: threading.Event = field(default_factory=threading.Event)
+    lit: threading.Event
 
 
 @pytest.fixture
 def wired() -> Iterator[Wired]:
-    ours, theirs = pty.openpty()
-    wired = Wired(os.ttyname(theirs))
+    lit = threading.Event()
 
     def switched(relay: int, on: bool) -> None:
         if on:
-            wired.lit.set()
+            lit.set()
 
-    board = NumatoBoard(8, switched)
-
-    def serve() -> None:
-        while True:
-            try:
-                os.write(ours, board.receive(os.read(ours, 100)))
-            except OSError:
-                return
-
-    threading.Thread(target=serve, daemon=True).start()
-    yield wired
-    os.close(theirs)
-    os.close(ours)
+    with on_a_terminal(NumatoBoard(8, switched)) as address:
+        yield Wired(address, lit)
 
 
 def test_the_second_is_refused_and_the_lock_dies_with_the_first(
