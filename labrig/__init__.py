@@ -16,8 +16,10 @@ if TYPE_CHECKING:
     from labrig.acquire import ExposureSettings as ExposureSettings
     from labrig.acquire import Plan as Plan
     from labrig.acquire import plan as plan
+    from labrig.acquire import read_protocol as read_protocol
     from labrig.acquire import read_rig_file as read_rig_file
-    from labrig.acquire.plugins import read_protocol as read_protocol
+    from labrig.analyse import Choices as Choices
+    from labrig.analyse import fit_series as fit_series
     from labrig.bench import open_bench as open_bench
     from labrig.errors import DataError as DataError
     from labrig.errors import DeviceError as DeviceError
@@ -34,15 +36,13 @@ if TYPE_CHECKING:
     from labrig.material import write_material as write_material
     from labrig.optics import CameraResponse as CameraResponse
     from labrig.optics import read_camera as read_camera
-    from labrig.process import Choices as Choices
-    from labrig.process import fit_series as fit_series
     from labrig.process import process_run as process_run
     from labrig.record import RunRecord as RunRecord
     from labrig.record import read_run as read_run
-    from labrig.reduce import Series as Series
     from labrig.reduce import measure as measure
     from labrig.reduce import read_raw as read_raw
-    from labrig.reduce import read_series as read_series
+    from labrig.results import Series as Series
+    from labrig.results import read_series as read_series
 
 #: Public name → module. Loaded when first used, so that `labrig --help` answers at once.
 _HOME = {
@@ -58,7 +58,7 @@ _HOME = {
     "Material": "material",
     "Plan": "acquire",
     "RunRecord": "record",
-    "Series": "reduce",
+    "Series": "results",
     "UsageError": "errors",
     "open_bench": "bench",
     "fit_decay": "fit",
@@ -69,11 +69,11 @@ _HOME = {
     "read_camera": "optics",
     "read_dataset": "export",
     "read_material": "material",
-    "read_protocol": "acquire.plugins",
+    "read_protocol": "acquire",
     "read_raw": "reduce",
     "read_rig_file": "acquire",
     "read_run": "record",
-    "read_series": "reduce",
+    "read_series": "results",
     "to_tiled": "export",
     "write_material": "material",
 }

@@ -11,7 +11,7 @@ from urllib.parse import urlsplit
 import serial
 import usb.core
 
-from labrig.acquire import Device, Rig, RigFile, plugins
+from labrig.acquire import Device, Rig, RigFile, load_driver
 from labrig.acquire.connections import SerialPort
 from labrig.acquire.rig import in_safe_order
 from labrig.acquire.rig_file import DeviceEntry
@@ -165,7 +165,7 @@ def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], No
 
 
 def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str) -> Device:
-    driver = plugins.load_driver(key, entry.driver, source)
+    driver = load_driver(key, entry.driver, source)
     settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
     device: Device = driver(entry.address, settings, connections)
     return device

@@ -16,7 +16,8 @@ from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from typing import BinaryIO
 
-from labrig.acquire import RigFile, plugins
+from labrig import plugins
+from labrig.acquire import RigFile
 from labrig.bench import Bench
 from labrig.clock import SystemClock
 from labrig.errors import LabrigError

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Self
 
-from labrig.acquire import Plan, ProtocolModel, RigFile, plan, plugins, read_rig_file
+from labrig.acquire import Plan, ProtocolModel, RigFile, plan, read_protocol, read_rig_file
 from labrig.bench import open_bench
 from labrig.errors import DiskError, UsageError
 from labrig.filling import Watch, fill
@@ -39,7 +39,7 @@ class Recording:
         DiskError
             The frames will not fit.
         """
-        asked = plugins.read_protocol(protocol_path)
+        asked = read_protocol(protocol_path)
         rig = read_rig_file(rig_path)
         protocol = asked.suited_to(rig)
         if rig.optics.camera is not None:
@@ -111,7 +111,7 @@ def resume_run(path: Path, watch: Watch) -> Path:
     """
     if not (path / "protocol.yaml").is_file():
         raise UsageError(f"{path}: expected a run folder with protocol.yaml in it; see --runs")
-    protocol = plugins.read_protocol(path / "protocol.yaml")
+    protocol = read_protocol(path / "protocol.yaml")
     rig = read_rig_file(path / "rig.yaml")
     last_time = read_run(path).last_time if (path / "journal.jsonl").exists() else 0.0
     laid_out = plan(protocol, rig, str(path / "rig.yaml"))

@@ -11,7 +11,8 @@ from pydantic import BaseModel, Field, TypeAdapter, create_model
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
-from labrig.acquire import RigFile, plugins
+from labrig import plugins
+from labrig.acquire import RigFile
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.acquire.roles import ROLES
 from labrig.errors import UsageError

@@ -8,7 +8,8 @@ from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import PartUnit, ProtocolModel, RigFile, Unit, plugins
+from labrig import plugins
+from labrig.acquire import PartUnit, ProtocolModel, RigFile, Unit
 from labrig.yaml_file import validate
 
 from .steps.patch_names import FilterPatches

@@ -23,12 +23,13 @@ from hypothesis import settings
 from labrig import shipped
 from labrig.cli.ending import guarded
 from labrig.signals import STOP_SIGNALS
-from tests.process import recorded
+from tests.analyse import recorded
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 sys.dont_write_bytecode = False
+SHARED = Path(__file__).parents[2] / "shared" / "data"
 HANDLERS = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
 
 # In CI the same examples every time, so that a red run is about the change; new ones elsewhere.
@@ -61,6 +62,14 @@ def labrig(capfd: pytest.CaptureFixture[str]) -> Callable[..., Ended]:
         return Ended(code, said.out, said.err)
 
     return run
+
+
+@pytest.fixture(scope="session")
+def shared_data() -> Path:
+    """Real measured data beside the checkout."""
+    if not SHARED.is_dir():
+        pytest.skip(f"needs the real measured data in {SHARED}")
+    return SHARED
 
 
 @pytest.fixture(scope="session", autouse=True)

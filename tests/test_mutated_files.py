@@ -10,17 +10,17 @@ from pathlib import Path
 import pytest
 
 from labrig import shipped
-from labrig.acquire import plugins, read_rig_file
+from labrig.acquire import read_protocol, read_rig_file
 from labrig.errors import LabrigError
 from labrig.material import read_material
 from labrig.optics import read_curve_file
 from labrig.record import RunFolder, read_run
-from labrig.reduce import read_series
+from labrig.results import read_series
 from tests.mutated_files import mutated
 
 TIMES = 60
 READERS: dict[str, Callable[[Path], object]] = {
-    "protocols/decay.yaml": plugins.read_protocol,
+    "protocols/decay.yaml": read_protocol,
     "config/sim.yaml": read_rig_file,
     "config/materials/blue-paint.yaml": read_material,
     "config/optics/grey_card_18.csv": read_curve_file,

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.reduce import read_series
+from labrig.results import read_series
 from tests.conftest import Ended
 
 DATA = Path(__file__).parents[2] / "shared" / "data"

@@ -14,8 +14,7 @@ from pathlib import Path
 import event_model
 import pytest
 
-from labrig.acquire import Plan, RunObserver, plan, read_rig_file
-from labrig.acquire.plugins import read_protocol
+from labrig.acquire import Plan, RunObserver, plan, read_protocol, read_rig_file
 from labrig.bench import Bench, open_bench
 from labrig.clock import Clock, Interrupted, VirtualClock
 from labrig.errors import DeviceError

@@ -8,7 +8,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig.acquire import plugins
+from labrig import plugins
 from labrig.drivers.numato import NumatoRelay
 
 FOLDERS = ("drivers", "protocols", "sim", "config")
@@ -18,7 +18,7 @@ sys.path.insert(0, {folder!r})
 {before}
 import labrig
 from labrig import bench, shipped
-from labrig.acquire import plugins
+from labrig import plugins
 import labrig.drivers.numato, labrig.protocols.decay, labrig.sim
 for module in (labrig.drivers, labrig.protocols, labrig.sim):
     assert "trap" not in vars(module), module

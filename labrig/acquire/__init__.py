@@ -20,6 +20,7 @@ from labrig.acquire.findings import Finding
 from labrig.acquire.part import PartUnit
 from labrig.acquire.planner import MOST_STEPS, Plan, plan
 from labrig.acquire.protocol import ProtocolModel, Sample, Unit
+from labrig.acquire.registered import load_driver, read_protocol
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile, read_rig_file
 from labrig.acquire.roles import (
@@ -84,7 +85,9 @@ __all__ = [
     "TrapDoor",
     "Unit",
     "at",
+    "load_driver",
     "plan",
+    "read_protocol",
     "read_rig_file",
     "run_units",
 ]

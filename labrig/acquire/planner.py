@@ -5,9 +5,9 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TypeVar
 
-from labrig.acquire import plugins
 from labrig.acquire.by_hand import ByHand
 from labrig.acquire.protocol import ProtocolModel
+from labrig.acquire.registered import load_driver
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.roles import Device
@@ -99,7 +99,7 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
     devices: dict[str, Device] = {}
     offers = CameraOffers((), ())
     for key, entry in rig.devices.items():
-        driver = plugins.load_driver(key, entry.driver, source)
+        driver = load_driver(key, entry.driver, source)
         settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
         if key == "camera":
             offers = driver.declared_offers(settings)

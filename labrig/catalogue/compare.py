@@ -10,7 +10,7 @@ from scipy import stats
 
 from labrig.catalogue.reference import gain
 from labrig.errors import DataError
-from labrig.results import DecayResult, Measured, read_decay_results
+from labrig.results import FittedDecay, Measured, read_fitted_decays
 from labrig.yaml_file import read_yaml
 
 #: Chance alone makes two equal sets of numbers differ so much less often than this.
@@ -121,7 +121,7 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
     )
 
 
-def _compare(name: str, a: DecayResult, b: DecayResult, gain_of_b: Measured) -> PatchComparison:
+def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_of_b: Measured) -> PatchComparison:
     counts = len(a.rates), len(b.rates)
     if counts[0] != counts[1]:
         return PatchComparison(name, counts, (), math.nan, gain_of_b)
@@ -140,10 +140,10 @@ def _compare(name: str, a: DecayResult, b: DecayResult, gain_of_b: Measured) -> 
     return PatchComparison(name, counts, (*rates, *amplitudes), p_value, gain_of_b)
 
 
-def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, DecayResult]:
+def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, FittedDecay]:
     """By the name of the patch, also where there is only one."""
     only = next(iter(protocol.get("patches") or ["sample"]))
-    read = read_decay_results(run / "result")
+    read = read_fitted_decays(run / "result")
     results = {name or only: result for name, result in read.items()}
     if not results:
         raise DataError(f"{run}: it has no result to compare; make one: labrig process {run}")

@@ -9,10 +9,10 @@ from typing import Literal, get_args
 
 from filelock import FileLock, Timeout
 
-from labrig.acquire import plugins
+from labrig.acquire import read_protocol
 from labrig.errors import DataError, DiskError, LabrigError, UsageError
 from labrig.record import read_run
-from labrig.results import DecayResult, read_decay_results
+from labrig.results import FittedDecay, read_fitted_decays
 from labrig.yaml_file import did_you_mean, read_yaml
 
 #: `running`: a labrig is writing to it now; `unfinished`: units are left to do; `recorded`: all
@@ -45,7 +45,7 @@ class RunSummary:
     done: int
     units: int | None
     frames: int
-    results: Mapping[str, DecayResult]
+    results: Mapping[str, FittedDecay]
 
 
 @dataclass(frozen=True)
@@ -117,7 +117,7 @@ def summarise(folder: Path) -> RunSummary:
     """What the run in `folder` holds; whatever cannot be read is told as its state."""
     sample, protocol, units = _asked(folder)
     try:
-        record, results = read_run(folder), read_decay_results(folder / "result")
+        record, results = read_run(folder), read_fitted_decays(folder / "result")
     except (DataError, DiskError):
         has_journal = (folder / "journal.jsonl").exists()
         state: State = "damaged" if has_journal else "unfinished"
@@ -153,7 +153,7 @@ def _asked(folder: Path) -> tuple[str, str, int | None]:
     sample = content.get("sample")
     name = sample.get("name", "?") if isinstance(sample, dict) else "?"
     try:
-        units = len(plugins.read_protocol(folder / "protocol.yaml").units())
+        units = len(read_protocol(folder / "protocol.yaml").units())
     except LabrigError:
         units = None
     return str(name), str(content.get("protocol", "?")), units

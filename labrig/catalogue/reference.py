@@ -6,8 +6,7 @@ from pathlib import Path
 import numpy as np
 
 from labrig.errors import DataError, UsageError
-from labrig.reduce import read_series
-from labrig.results import DecayResult, Measured, read_decay_results
+from labrig.results import FittedDecay, Measured, read_fitted_decays, read_series
 from labrig.yaml_file import did_you_mean
 
 #: What stands out of its own σ by less is no light to rely on.
@@ -34,7 +33,7 @@ def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
             f"--reference {name}: expected a patch of its own, in both runs, with a source that "
             f"is the same on both days; {hint}"
         )
-    fits = [read_decay_results(run / "result").get(name) for run in (a, b)]
+    fits = [read_fitted_decays(run / "result").get(name) for run in (a, b)]
     if (fits[0] is None) != (fits[1] is None):
         raise UsageError(
             f"--reference {name}: it decays in one run and is steady in the other; expected a "
@@ -58,7 +57,7 @@ def _patches(run: Path) -> list[str]:
     return sorted(path.parent.name for path in (run / "result").glob("*/series.csv"))
 
 
-def _glow(fit: DecayResult, channel: str) -> Measured:
+def _glow(fit: FittedDecay, channel: str) -> Measured:
     """All amplitudes together, their σ taken as independent."""
     amplitudes = fit.amplitudes_in(channel)
     return Measured(

@@ -8,8 +8,8 @@ import typer
 if TYPE_CHECKING:
     from labrig.compare import RunComparison
     from labrig.fit import DecayFit
-    from labrig.reduce import Series
     from labrig.report.sections import Section
+    from labrig.results import Series
 
 
 def compare(
@@ -63,7 +63,7 @@ def compare(
 
 
 def _refit(series: "Series", states: int, flicker: float) -> "DecayFit":
-    from labrig.process import fit_series
+    from labrig.analyse import fit_series
 
     return fit_series(series, states, flicker=flicker)
 

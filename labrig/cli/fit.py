@@ -43,7 +43,7 @@ def decay(
     json: Annotated[bool, typer.Option("--json", help="Print fit.json.")] = False,
 ) -> None:
     """Rates and amplitudes of a sum of exponentials, with uncertainties."""
-    from labrig.process import fit_table
+    from labrig.analyse import fit_table
 
     for name, fit in fit_table(series, states, offset, flicker, weights, origin, start):
         typer.echo(fit.to_json() if json else f"{name}\n{fit}".strip())

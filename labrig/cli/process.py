@@ -1,13 +1,12 @@
 """`labrig process`: from a recorded run to its result."""
 
-from json import dumps
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
 import typer
 
 if TYPE_CHECKING:
-    from labrig.process import Choices
+    from labrig.analyse import Choices
 
 
 def process(
@@ -47,8 +46,8 @@ def process(
 
     An earlier result that differs is kept as result-1, result-2, …
     """
+    from labrig.analyse import Choices
     from labrig.catalogue import find_run
-    from labrig.process import Choices
 
     choices = Choices.parse(roi or [], exclude or [], states, rate or [], camera, optics or [])
     folder = find_run(run, runs)
@@ -58,18 +57,16 @@ def process(
 
 def process_and_tell(run: Path, choices: "Choices | None" = None, *, json: bool) -> None:
     """Process the run in `run` and print what came out."""
-    from labrig.process import process_run
+    from labrig.process import process_and_report
 
-    result = process_run(run, choices)
+    done = process_and_report(run, choices)
     if json:
-        fits = ", ".join(f'"{name}": {fit.to_json()}' for name, fit in result.fits.items())
-        told = {"lines": result.lines, "warnings": result.run_warnings}
-        typer.echo(f"{{{fits}}}" if result.fits else dumps(told, ensure_ascii=False))
+        typer.echo(done.result.to_json())
         return
-    for warning in result.run_warnings:
+    for warning in done.result.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    for line in result.lines:
+    for line in done.lines:
         typer.echo(line)
-    for number, line in enumerate(result.changes):
+    for number, line in enumerate(done.changes):
         typer.echo(f"  {line}" if number else line)
-    typer.echo(f"report: {result.report}")
+    typer.echo(f"report: {done.report}")

@@ -12,10 +12,10 @@ app = typer.Typer(help="The protocols that can be run.")
 def list_protocols() -> None:
     """Shipped protocol files and what each of them does."""
     from labrig import shipped
-    from labrig.acquire import plugins
+    from labrig.acquire import read_protocol
 
     for path in shipped.names("protocols").values():
-        model = plugins.read_protocol(path)
+        model = read_protocol(path)
         said = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("#").strip()
         typer.echo(f"{path.stem:16} ({model.protocol})  {said}")
 

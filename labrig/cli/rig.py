@@ -32,7 +32,7 @@ def list_devices(
     from dataclasses import asdict
     from json import dumps
 
-    from labrig.acquire import plugins
+    from labrig import plugins
     from labrig.setup import Surroundings, discover
 
     found = discover(Surroundings.of_this_pc(), plugins.names(plugins.DRIVERS))

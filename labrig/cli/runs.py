@@ -11,7 +11,7 @@ from typer.core import TyperGroup
 
 if TYPE_CHECKING:
     from labrig.catalogue import Comparison, RunSummary
-    from labrig.results import DecayResult
+    from labrig.results import FittedDecay
 
 
 class _ListsByDefault(TyperGroup):
@@ -191,11 +191,11 @@ def _print_comparison(comparison: "Comparison") -> None:
 def _tell_results(folder: Path) -> None:
     """Each result and what it was made with otherwise than the one before it."""
     from labrig.process.changes import other_settings
-    from labrig.results import read_decay_results
+    from labrig.results import read_fitted_decays
 
     results = _result_folders(folder)
     for result, before in itertools.zip_longest(results, results[1:]):
-        for patch, fit in read_decay_results(folder / result).items():
+        for patch, fit in read_fitted_decays(folder / result).items():
             typer.echo(f"  {result}: {_rates(patch, fit)} /s")
             for warning in fit.warnings:
                 typer.echo(f"    warning: {warning}")
@@ -213,14 +213,14 @@ def _result_folders(folder: Path) -> list[str]:
     return ["result", *earlier]
 
 
-def _rates(patch: str, result: "DecayResult") -> str:
+def _rates(patch: str, result: "FittedDecay") -> str:
     from labrig.report.written_numbers import plus_minus
 
     rates = ",  ".join(plus_minus(rate.value, rate.sigma) for rate in result.rates)
     return f"{patch}: {rates}" if patch else rates
 
 
-def _short_rates(patch: str, result: "DecayResult") -> str:
+def _short_rates(patch: str, result: "FittedDecay") -> str:
     """With σ in units of the last places, so that a line holds them."""
     from labrig.results import with_uncertainty
 

@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 from labrig.compare.colorimetry import FloatArray, Viewing, delta_e, lab
 from labrig.compare.paper import DELTA_E
 from labrig.errors import DataError
-from labrig.reduce import Series
 from labrig.report.fitted_curve import middles_s
 from labrig.report.sections import Table
+from labrig.results import Series
 
 RGB = ("R", "G", "B")
 #: Photographs drawn anew to tell what their noise alone makes.

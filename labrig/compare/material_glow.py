@@ -8,7 +8,7 @@ from labrig.errors import UsageError
 from labrig.material import Material
 from labrig.material.rates import phi1
 from labrig.optics import CameraResponse, Spectrum
-from labrig.reduce import Series
+from labrig.results import Series
 
 
 def in_colour(values: FloatArray, spectrum: Spectrum, camera: CameraResponse) -> FloatArray:

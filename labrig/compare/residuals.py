@@ -9,8 +9,8 @@ from labrig.compare.colorimetry import FloatArray
 from labrig.compare.paper import LAST_RESIDUALS, RESIDUALS
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.reduce import Series
 from labrig.report.sections import Table
+from labrig.results import Series
 
 #: A fit to a series: so many states, and so much flicker.
 Refit = Callable[[Series, int, float], DecayFit]

@@ -7,8 +7,7 @@ import numpy as np
 
 from labrig.errors import DataError, UsageError
 from labrig.material import Material, read_material
-from labrig.reduce import Series, joined, read_series
-from labrig.results import find_decay_results, read_decay_result
+from labrig.results import Series, find_fitted_decays, joined, read_fitted_decay, read_series
 from labrig.yaml_file import read_yaml
 
 
@@ -48,7 +47,7 @@ def read_patches(run: Path) -> dict[str, MeasuredPatch]:
     """
     if not (run / "protocol.yaml").is_file():
         raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
-    fits = find_decay_results(run / "result").values()
+    fits = find_fitted_decays(run / "result").values()
     places = [fit.parent for fit in fits if (fit.parent / "series.csv").is_file()]
     if not places:
         raise DataError(
@@ -66,7 +65,7 @@ def read_patches(run: Path) -> dict[str, MeasuredPatch]:
 
 
 def _read_patch(place: Path, name: str | None, of_chain: Path) -> MeasuredPatch:
-    fit = read_decay_result(place / "fit.json")
+    fit = read_fitted_decay(place / "fit.json")
     series = joined(read_series(place / "series.csv"))
     if fit.channels != series.channels:
         raise DataError(

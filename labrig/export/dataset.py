@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.record import read_run
-from labrig.reduce import Series, read_series
-from labrig.results import DecayResult, read_decay_result
+from labrig.results import FittedDecay, Series, read_fitted_decay, read_series
 
 if TYPE_CHECKING:
     from xarray import Dataset
@@ -85,9 +84,9 @@ def _attributes(folder: Path) -> dict[str, str]:
     return {"run": folder.resolve().name, **known, **start.get("devices", {})}
 
 
-def _read_fit(path: Path) -> DecayResult | None:
+def _read_fit(path: Path) -> FittedDecay | None:
     """What was fitted; None where nothing was."""
-    return read_decay_result(path) if path.is_file() else None
+    return read_fitted_decay(path) if path.is_file() else None
 
 
 def _measured(patches: Sequence[Sequence[Series]]) -> dict[str, Column]:
@@ -109,7 +108,7 @@ def _joined(decays: Sequence[Series], name: str) -> NDArray[Any]:
     return np.concatenate([getattr(decay, name) for decay in decays])
 
 
-def _fitted(fits: Sequence[DecayResult | None], channels: Sequence[str]) -> dict[str, Column]:
+def _fitted(fits: Sequence[FittedDecay | None], channels: Sequence[str]) -> dict[str, Column]:
     most = max((fit.n_states for fit in fits if fit), default=0)
 
     def of_state(key: str) -> NDArray[np.float64]:

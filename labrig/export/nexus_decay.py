@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 
 from labrig.export.hdf5 import add_group, add_note, add_number, add_text
 from labrig.fit import DecayFit
-from labrig.reduce import Series
 from labrig.report import PatchReport
+from labrig.results import Series
 
 DN_PER_S = "DN/s"
 #: silx and h5web plot it so: a decay is looked at on a logarithmic scale.

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.acquire import plugins
+from labrig.acquire import read_protocol
 from labrig.errors import DataError, UsageError
 from labrig.fit.nonnegative import nonnegative_least_squares
 from labrig.predict.camera import (
@@ -17,9 +17,9 @@ from labrig.predict.camera import (
 from labrig.predict.expectation import predictable
 from labrig.predict.frames import PEAK_SIGMAS
 from labrig.record import FrameRecord, RunRecord, read_run
-from labrig.reduce import FrameMeasurement, Series, fit_dark, measure, read_raw, read_series
+from labrig.reduce import FrameMeasurement, fit_dark, measure, read_raw
 from labrig.region import Region
-from labrig.results import find_decay_results, read_decay_result
+from labrig.results import Series, find_fitted_decays, read_fitted_decay, read_series
 from labrig.yaml_file import read_yaml
 
 #: A flicker known worse than this is not taken over.
@@ -61,7 +61,7 @@ def result_places(run: Path) -> dict[str, Path]:
     UsageError
         There is none.
     """
-    found = find_decay_results(run / "result")
+    found = find_fitted_decays(run / "result")
     if not found:
         raise UsageError(f"{run}: expected a run with a fit in its result folder, got none")
     return {name: path.parent for name, path in found.items()}
@@ -85,7 +85,7 @@ def read_reference(place: Path) -> Reference:
     folder = run_of(place)
     if folder is None:
         raise UsageError(f"{place}: expected the result folder of a run, got no run around it")
-    run, fit = read_run(folder), read_decay_result(place / "fit.json")
+    run, fit = read_run(folder), read_fitted_decay(place / "fit.json")
     series = read_series(place / "series.csv")[0]
     region = _region(folder, series.region)
     frame = _first_usable(run, series)
@@ -120,7 +120,7 @@ def read_reference(place: Path) -> Reference:
 
 def _region(folder: Path, patch: str) -> Region:
     """Where the patch was when it was processed, or else where the protocol has it."""
-    protocol = predictable(plugins.read_protocol(folder / "protocol.yaml"))
+    protocol = predictable(read_protocol(folder / "protocol.yaml"))
     processed = folder / "result" / "provenance.yaml"
     patches = read_yaml(processed)["patches"] if processed.is_file() else protocol.patches
     region: Region = patches.get(patch) or next(iter(patches.values()))

@@ -1,8 +1,5 @@
-"""Run folder → reduce → fit → material → report."""
+"""A run folder through analysis, report and exports to its result."""
 
-from labrig.process.choices import Choices
-from labrig.process.result import Result
-from labrig.process.run import process_run
-from labrig.process.series_fit import fit_series, fit_table
+from labrig.process.run import Processed, process_and_report, process_run
 
-__all__ = ["Choices", "Result", "fit_series", "fit_table", "process_run"]
+__all__ = ["Processed", "process_and_report", "process_run"]

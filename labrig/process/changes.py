@@ -9,7 +9,7 @@ from typing import Any
 
 from labrig.errors import DataError, UsageError
 from labrig.report.written_numbers import plus_minus, rounded
-from labrig.results import DecayResult, find_decay_results, read_decay_result
+from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
 from labrig.yaml_file import read_yaml
 
 #: Moves of less than this share of a parameter's σ, and changes of σ by less, are not worth a word.
@@ -105,13 +105,13 @@ def _other_settings(before: Mapping[str, str], after: Mapping[str, str]) -> Iter
 def _fits(result: Path) -> dict[str, Parameters]:
     """The parameters of each patch's fit, by its name; unreadable ones are left out."""
     fits = {}
-    for name, path in find_decay_results(result).items():
+    for name, path in find_fitted_decays(result).items():
         with suppress(DataError):
-            fits[name] = _parameters(read_decay_result(path))
+            fits[name] = _parameters(read_fitted_decay(path))
     return fits
 
 
-def _parameters(fit: DecayResult) -> Parameters:
+def _parameters(fit: FittedDecay) -> Parameters:
     """Value and σ of every parameter of a fit."""
     found: dict[str, tuple[float, float]] = {}
     for number, state in enumerate(fit.states, start=1):

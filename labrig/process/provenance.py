@@ -5,8 +5,8 @@ from importlib.metadata import version
 
 from pydantic import BaseModel, ConfigDict
 
-from labrig.process.choices import Choices, DecayProtocol
-from labrig.process.timed_frames import IntactFrames
+from labrig.analyse.choices import Choices, DecayProtocol
+from labrig.analyse.timed_frames import IntactFrames
 from labrig.record import FrameRecord
 from labrig.region import Region
 

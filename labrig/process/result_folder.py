@@ -8,8 +8,7 @@ from labrig.fit import DecayFit
 from labrig.material import Material, Provenance, State, write_material
 from labrig.process.changes import changes
 from labrig.process.provenance import StageProvenance
-from labrig.reduce import Series, write_series
-from labrig.results import write_decay_result
+from labrig.results import Series, write_fitted_decay, write_series
 from labrig.yaml_file import write_yaml
 
 _EARLIER = "result-"
@@ -74,7 +73,7 @@ def write_patch(
     place.mkdir(exist_ok=True)
     write_series(place / "series.csv", [series])
     if isinstance(fit, DecayFit):
-        write_decay_result(place / "fit.json", fit)
+        write_fitted_decay(place / "fit.json", fit)
         made = _material(series, fit, material, run, temperature_c)
         write_material(place / "material.yaml", made)
 

@@ -6,8 +6,8 @@ import numpy as np
 
 from labrig.calibration import CameraFile
 from labrig.errors import DataError
-from labrig.reduce.series import Series
 from labrig.region import Region
+from labrig.results import Series
 
 
 def calibrated(

@@ -15,9 +15,9 @@ from labrig.reduce.noise import Floats
 from labrig.reduce.pairs import PatchFrames, PatchNoise, paired_dark_sigma, paired_noise
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
-from labrig.reduce.series import Series, add_flag, is_usable
 from labrig.reduce.shots import SeriesFrame, Shot, View, levels, read_shots, strips
 from labrig.region import Region
+from labrig.results import Series, add_flag, is_usable
 
 #: Share of a patch's pixels that may be saturated before its mean is too small.
 CLIPPED_SHARE = 0.001

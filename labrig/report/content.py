@@ -5,9 +5,9 @@ from dataclasses import dataclass, field
 from labrig.fit import DecayFit
 from labrig.optics import CameraResponse
 from labrig.record.frames import ActionRecord, FrameRecord
-from labrig.reduce import Series
 from labrig.region import Region
 from labrig.report.sections import Section
+from labrig.results import Series
 
 #: What every decay measured with a camera rests on, for `RunReport.assumptions`.
 DECAY_ASSUMPTIONS = (

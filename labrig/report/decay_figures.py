@@ -10,7 +10,6 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from labrig.fit import DecayFit
-from labrig.reduce import Series
 from labrig.report.figure_style import (
     DASHED,
     INK,
@@ -28,6 +27,7 @@ from labrig.report.fitted_curve import fitted_curve, middles_s
 from labrig.report.legend import BAND_OPACITY, legend_above, lined, marked, shaded
 from labrig.report.log_axis import mark_decades
 from labrig.report.written_numbers import power_of_ten, rounded
+from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
 

@@ -7,7 +7,7 @@ from numpy.typing import NDArray
 
 from labrig.fit import DecayFit
 from labrig.fit.decay.shapes import exponential_means_and_slopes
-from labrig.reduce import Series
+from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.fit import DecayFit, nonnegative_least_squares
-from labrig.reduce import Series
+from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
 

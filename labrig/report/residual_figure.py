@@ -8,7 +8,6 @@ from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
 from labrig.fit import DecayFit
-from labrig.reduce import Series
 from labrig.report.decay_figures import TIME_LABEL
 from labrig.report.figure_style import (
     INK,
@@ -26,6 +25,7 @@ from labrig.report.figure_style import (
 from labrig.report.fitted_curve import middles_s
 from labrig.report.legend import legend_above, marked
 from labrig.report.written_numbers import rounded
+from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
 

@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit import DecayFit
-from labrig.reduce import Series
 from labrig.report.residual_figure import residuals
+from labrig.results import Series
 
 #: What stands out of its own σ by less was dark.
 SEEN_SIGMA = 5.0

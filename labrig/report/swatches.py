@@ -5,9 +5,9 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.reduce import Series
 from labrig.report.colours import Screen, css_colour, into_gamut
 from labrig.report.written_numbers import rounded
+from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
 

@@ -1,26 +1,45 @@
 """What was found, as frozen values with uncertainties and units; one reader and writer a file."""
 
-from labrig.results.decay import (
+from labrig.results.arrays import BoolArray, FloatArray, IntArray
+from labrig.results.fitted_decay import (
     Candidate,
-    DecayResult,
     DecayState,
+    FittedDecay,
     Rival,
-    find_decay_results,
-    read_decay_result,
-    read_decay_results,
-    write_decay_result,
+    find_fitted_decays,
+    read_fitted_decay,
+    read_fitted_decays,
+    write_fitted_decay,
 )
+from labrig.results.joined_series import joined
 from labrig.results.measured import Measured, with_uncertainty
+from labrig.results.run_result import AnyResult, RunResult, read_result, write_result
+from labrig.results.series import Series, add_flag, is_usable, write_series
+from labrig.results.series_table import parse_series, read_series
 
 __all__ = [
+    "AnyResult",
+    "BoolArray",
     "Candidate",
-    "DecayResult",
     "DecayState",
+    "FittedDecay",
+    "FloatArray",
+    "IntArray",
     "Measured",
     "Rival",
-    "find_decay_results",
-    "read_decay_result",
-    "read_decay_results",
+    "RunResult",
+    "Series",
+    "add_flag",
+    "find_fitted_decays",
+    "is_usable",
+    "joined",
+    "parse_series",
+    "read_fitted_decay",
+    "read_fitted_decays",
+    "read_result",
+    "read_series",
     "with_uncertainty",
-    "write_decay_result",
+    "write_fitted_decay",
+    "write_result",
+    "write_series",
 ]

@@ -4,7 +4,7 @@ from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from labrig.acquire import plugins
+from labrig.acquire import read_protocol
 from labrig.errors import UsageError
 from labrig.region import Region
 from labrig.setup.patches_block import KEY, rounded, write_patches
@@ -60,7 +60,7 @@ class AimedProtocol:
         return self.in_fractions()
 
     def _read(self) -> dict[str, Region]:
-        model = plugins.read_protocol(self.path)
+        model = read_protocol(self.path)
         regions = getattr(model, KEY, None)
         if regions is None:
             raise UsageError(

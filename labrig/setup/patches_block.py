@@ -11,7 +11,7 @@ from pathlib import Path
 
 import yaml
 
-from labrig.acquire import plugins
+from labrig.acquire import read_protocol
 from labrig.errors import UsageError
 from labrig.record.durable import write_durably
 from labrig.region import Region
@@ -48,7 +48,7 @@ def write_patches(path: Path, patches: Mapping[str, Region]) -> None:
     trial = path.with_name(f".{path.name}.trial.yaml")
     try:
         write_durably(trial, changed.encode("utf-8"))
-        plugins.read_protocol(trial)
+        read_protocol(trial)
     except UsageError as error:
         raise UsageError(str(error).replace(str(trial), str(path))) from None
     finally:

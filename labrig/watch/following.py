@@ -7,13 +7,13 @@ from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
-from labrig.acquire import Plan, ProtocolModel, plan, plugins, read_rig_file
+from labrig.acquire import Plan, ProtocolModel, plan, read_protocol, read_rig_file
 from labrig.catalogue import is_being_written, summarise
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.record import Attempt, FrameRecord, RunRecord, read_run
 from labrig.region import Region
 from labrig.report.written_numbers import plus_minus
-from labrig.results import read_decay_results
+from labrig.results import read_fitted_decays
 from labrig.watch.glance import Glance, glance
 
 PICTURE_WIDTH = 720
@@ -52,7 +52,7 @@ class Following:
         if not (run / "protocol.yaml").is_file():
             raise UsageError(f"{run}: expected a run folder with protocol.yaml in it; see --runs")
         self.run = run
-        self.protocol: ProtocolModel = plugins.read_protocol(run / "protocol.yaml")
+        self.protocol: ProtocolModel = read_protocol(run / "protocol.yaml")
         rig = read_rig_file(run / "rig.yaml")
         self.is_simulated = rig.simulation is not None
         self.plan: Plan = plan(self.protocol, rig, str(run / "rig.yaml"))
@@ -178,7 +178,7 @@ class Following:
 
     def _results(self) -> list[dict[str, str]]:
         try:
-            results = read_decay_results(self.run / "result")
+            results = read_fitted_decays(self.run / "result")
         except DataError:
             return []
         order = {name: number for number, name in enumerate(self.patches)}

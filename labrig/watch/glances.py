@@ -91,10 +91,10 @@ class Glances:
 def answer(run: Path, width: int, names: Iterable[str], out: TextIO) -> None:
     """Look at the frames that are named, one JSON line each; what cannot be read is left out."""
     # only in the process that looks: the one that runs the rig starts without what this loads
-    from labrig.acquire import plugins
+    from labrig.acquire import read_protocol
     from labrig.watch.glance import glance
 
-    patches = getattr(plugins.read_protocol(run / "protocol.yaml"), "patches", {})
+    patches = getattr(read_protocol(run / "protocol.yaml"), "patches", {})
     for name in names:
         try:
             seen = glance(run / "frames" / name.strip(), patches, width)

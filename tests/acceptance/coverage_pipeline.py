@@ -28,15 +28,16 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
+from labrig.analyse import Choices, fit_series
+from labrig.analyse.timed_frames import intact_frames
 from labrig.cli.ending import guarded
 from labrig.errors import FitError
 from labrig.fit import DecayFit
 from labrig.material import read_material
-from labrig.process import Choices, fit_series
-from labrig.process.timed_frames import intact_frames
 from labrig.record import RunRecord, read_run
-from labrig.reduce import Series, reduce_patches
+from labrig.reduce import reduce_patches
 from labrig.region import Region
+from labrig.results import Series
 from tests.acceptance.cramer_rao import Noise, rate_bound
 from tests.acceptance.decays_of_all_materials import shipped_rig
 

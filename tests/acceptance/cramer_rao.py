@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.reduce import Series
 from labrig.region import Region, region_pixels
+from labrig.results import Series
 from labrig.sim.sensor import BAYER_RGGB, gain_electrons_per_dn, read_noise_electrons
 
 FloatArray = NDArray[np.float64]

@@ -15,11 +15,11 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.process import Choices
-from labrig.process.emission_spectrum import EmissionSpectrum, process
+from labrig.analyse import Choices
+from labrig.analyse.emission_spectrum import EmissionSpectrum, process
 from labrig.record import read_run
 from labrig.report import figure_style
-from tests.process.spectral_bench import FloatArray, emitted, record, stage_of
+from tests.analyse.spectral_bench import FloatArray, emitted, record, stage_of
 
 MATERIALS = ("blue-paint", "green-paint", "orange-paint", "red-paint", "white-paint")
 PROTOCOL = {"protocol": "emission_spectrum", "charge": "5 min", "times": ["2 s", "12 s", "30 s"],

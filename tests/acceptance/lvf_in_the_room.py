@@ -24,7 +24,7 @@ from labrig.calibration import read_irradiance_file, read_lvf_file
 from labrig.cli.ending import guarded
 from labrig.fit.least_squares import FloatArray
 from labrig.optics import read_curve_file
-from tests.process.lvf_calibration.room_truth import (
+from tests.analyse.lvf_calibration.room_truth import (
     FINE_NM,
     bands_of,
     simulation_of,

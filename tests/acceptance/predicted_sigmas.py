@@ -23,11 +23,11 @@ from typing import Any
 import numpy as np
 import yaml
 
+from labrig.analyse.choices import Choices, read_decay_protocol
+from labrig.analyse.series_fit import fit_series
+from labrig.analyse.timed_frames import intact_frames
 from labrig.cli.ending import guarded
 from labrig.errors import FitError
-from labrig.process.choices import Choices, read_decay_protocol
-from labrig.process.series_fit import fit_series
-from labrig.process.timed_frames import intact_frames
 from labrig.record import read_run
 from labrig.reduce import reduce_patches
 from tests.acceptance.decays_of_all_materials import shipped_rig

@@ -10,9 +10,9 @@ import numpy.typing as npt
 import pytest
 from scipy.optimize import curve_fit
 
+from labrig.analyse import fit_series
 from labrig.fit.least_squares import least_squares
-from labrig.process import fit_series
-from labrig.reduce import Series
+from labrig.results import Series
 
 Floats = npt.NDArray[np.float64]
 Against = Callable[..., None]

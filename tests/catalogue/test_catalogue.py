@@ -14,7 +14,7 @@ from filelock import FileLock
 from labrig.catalogue import compare_runs, list_runs, summarise
 from labrig.catalogue.listing import Wanted
 from labrig.cli.ending import guarded
-from labrig.results import write_decay_result
+from labrig.results import write_fitted_decay
 from tests.conftest import Ended
 from tests.results.made import decay_result
 
@@ -161,7 +161,7 @@ def two_days(tmp_path: Path) -> tuple[Path, Path]:
                 continue
             weights = dict(zip("RG", signal / signal.max(), strict=True))
             fit = decay_result((0.01, float(signal.max())), sigma=0.004, weights=weights)
-            write_decay_result(place / "fit.json", fit)
+            write_fitted_decay(place / "fit.json", fit)
         (tmp_path / run / "protocol.yaml").write_text("protocol: decay\n")
     return tmp_path / "a", tmp_path / "b"
 

@@ -7,15 +7,15 @@ import pytest
 import yaml
 
 from labrig import shipped
-from labrig.acquire import Plan, plan, plugins, read_rig_file
+from labrig.acquire import Plan, plan, read_protocol, read_rig_file
 from labrig.errors import DeviceError, ProtocolError, UsageError
-from tests.process.recorded import record
+from tests.analyse.recorded import record
 
 FOLDER = Path(__file__).parent
 
 
 def planned(protocol: Path, rig: Path) -> Plan:
-    return plan(plugins.read_protocol(protocol), read_rig_file(rig), str(rig))
+    return plan(read_protocol(protocol), read_rig_file(rig), str(rig))
 
 
 @pytest.mark.parametrize("name", ["blank", "camera_calibration", "fade"])
@@ -48,7 +48,7 @@ def test_an_impossible_key_is_one_clear_line(
     path = tmp_path / "protocol.yaml"
     path.write_text(yaml.safe_dump({"protocol": name} | keys))
     with pytest.raises(UsageError) as caught:
-        plugins.read_protocol(path)
+        read_protocol(path)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -64,7 +64,7 @@ def test_a_lens_that_does_not_tell_its_aperture_has_one_flat_field(tmp_path: Pat
     path = tmp_path / "protocol.yaml"
     keys = {"camera": {"iso": 100, "f_number": None}, "f_numbers": []}
     path.write_text(yaml.safe_dump({"protocol": "camera_calibration"} | keys))
-    units = [unit.name for unit in plugins.read_protocol(path).units()]
+    units = [unit.name for unit in read_protocol(path).units()]
     assert [unit for unit in units if unit.startswith("flat")] == ["flat"]
 
 

@@ -8,7 +8,7 @@ import pytest
 import yaml
 
 from labrig import shipped
-from labrig.acquire import Plan, plan, plugins, read_rig_file
+from labrig.acquire import Plan, plan, read_protocol, read_rig_file
 from labrig.errors import ProtocolError, UsageError
 from labrig.record import read_run
 from labrig.yaml_file import read_yaml
@@ -20,7 +20,7 @@ PROTOCOLS = sorted(path.stem for path in shipped.folder("protocols").glob("*.yam
 
 def planned(protocol: Path, rig: str | Path = "sim") -> Plan:
     rig_path = shipped.find("config", "rig", rig)
-    return plan(plugins.read_protocol(protocol), read_rig_file(rig_path), str(rig_path))
+    return plan(read_protocol(protocol), read_rig_file(rig_path), str(rig_path))
 
 
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
@@ -75,7 +75,7 @@ def test_a_plan_for_a_driver_of_another_kind_is_refused(
     rig = make_rig()
     rig.write_text(rig.read_text().replace("ptp_camera", "numato_relay"))
     with pytest.raises(UsageError, match="is no camera"):
-        plan(plugins.read_protocol(make_protocol()), read_rig_file(rig), str(rig))
+        plan(read_protocol(make_protocol()), read_rig_file(rig), str(rig))
 
 
 def test_a_plan_without_end_is_refused(
@@ -108,7 +108,7 @@ def test_a_misspelt_or_impossible_key_is_one_clear_line(
 ) -> None:
     path = make_protocol(**keys)
     with pytest.raises(UsageError) as caught:
-        plugins.read_protocol(path)
+        read_protocol(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert said in str(caught.value)
 
@@ -116,10 +116,10 @@ def test_a_misspelt_or_impossible_key_is_one_clear_line(
 def test_a_written_protocol_reads_back_as_itself(make_protocol: Callable[..., Path]) -> None:
     for keys in ({}, {"charge": "plateau", "exposure": "grow"}, {"dark": "background",
                  "background": [0, 0, 0.1, 0.1]}):  # fmt: skip
-        protocol = plugins.read_protocol(make_protocol(**keys))
+        protocol = read_protocol(make_protocol(**keys))
         path = make_protocol()
         path.write_text(yaml.safe_dump(protocol.model_dump(mode="json", by_alias=True)))
-        assert plugins.read_protocol(path) == protocol
+        assert read_protocol(path) == protocol
 
 
 def test_metering_keeps_an_unknown_brightness_from_clipping(

@@ -7,18 +7,18 @@ import pytest
 import yaml
 
 from labrig import shipped
-from labrig.acquire import Plan, plan, plugins, read_rig_file
+from labrig.acquire import Plan, plan, read_protocol, read_rig_file
 from labrig.cli.ending import guarded
 from labrig.errors import ProtocolError, UsageError
 from labrig.record import read_run
-from tests.process.spectral_bench import write_bench
+from tests.analyse.spectral_bench import write_bench
 
 PROTOCOLS = ("emission_spectrum", "isotropy", "saturation")
 
 
 def planned(protocol: Path, rig: str | Path = "sim-phosphor") -> Plan:
     path = shipped.find("config", "rig", rig)
-    return plan(plugins.read_protocol(protocol), read_rig_file(path), str(path))
+    return plan(read_protocol(protocol), read_rig_file(path), str(path))
 
 
 def written(folder: Path, **keys: Any) -> Path:
@@ -56,7 +56,7 @@ def test_the_timeline_of_the_shipped_protocol_is_as_agreed(name: str) -> None:
 def test_what_cannot_be_is_one_clear_line(tmp_path: Path, keys: dict[str, Any], said: str) -> None:
     path = written(tmp_path, **keys)
     with pytest.raises(UsageError) as caught:
-        plugins.read_protocol(path)
+        read_protocol(path)
     assert str(caught.value).startswith(f"{path}: ")
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
@@ -87,10 +87,10 @@ def test_a_written_protocol_reads_back_as_itself(tmp_path: Path) -> None:
         {"protocol": "saturation", "weaker": {"distance": "1.4 m", "share": "50 %"},
          "exposure": "2 s"},
     ):  # fmt: skip
-        protocol = plugins.read_protocol(written(tmp_path, **keys))
+        protocol = read_protocol(written(tmp_path, **keys))
         again = yaml.safe_dump(protocol.model_dump(mode="json", by_alias=True))
         (tmp_path / "again.yaml").write_text(again)
-        assert plugins.read_protocol(tmp_path / "again.yaml") == protocol
+        assert read_protocol(tmp_path / "again.yaml") == protocol
 
 
 def by_hand(tmp_path: Path, **keys: Any) -> list[tuple[str, str]]:

@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from labrig import shipped
-from labrig.acquire import ByHand, Plan, RunObserver, plan, plugins, read_rig_file
+from labrig.acquire import ByHand, Plan, RunObserver, plan, read_protocol, read_rig_file
 from labrig.calibration import read_irradiance_file, read_lvf_file
 from labrig.clock import Clock, Interrupted
 from labrig.errors import UsageError
@@ -18,14 +18,14 @@ from labrig.process import process_run
 from labrig.record import read_run
 from labrig.run import Recording, resume_run
 from tests.acquire.fakes import Watching
-from tests.conftest import Ended
-from tests.process.lvf_calibration.room_truth import (
+from tests.analyse.lvf_calibration.room_truth import (
     FINE_NM,
     bands_of,
     simulation_of,
     true_bands,
     true_irradiance,
 )
+from tests.conftest import Ended
 
 Make = Callable[..., Path]
 Labrig = Callable[..., Ended]
@@ -58,7 +58,7 @@ def write(tmp_path: Path) -> Make:
 def test_the_timeline_is_as_agreed(name: str, write: Make) -> None:
     filters = {"filters": list(FEW[:2])} if name == "lvf_calibration" else {}
     rig = shipped.find("config", "rig", "sim-phosphor")
-    laid_out = plan(plugins.read_protocol(write(name, **filters)), read_rig_file(rig), str(rig))
+    laid_out = plan(read_protocol(write(name, **filters)), read_rig_file(rig), str(rig))
     golden = GOLDEN / f"{name}.timeline.txt"
     assert "\n".join(laid_out.lines()) + "\n" == golden.read_text(encoding="utf-8")
 
@@ -80,7 +80,7 @@ def test_a_misspelt_or_impossible_key_is_one_clear_line(
 ) -> None:
     path = write(**keys)
     with pytest.raises(UsageError) as caught:
-        plugins.read_protocol(path)
+        read_protocol(path)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -110,7 +110,7 @@ def test_all_filters_are_those_that_the_rig_has(
     # What is recorded holds for resume and processing, whatever becomes of the folder.
     recorded = recording.protocol.model_dump(mode="json", by_alias=True)
     (tmp_path / "recorded.yaml").write_text(yaml.safe_dump(recorded))
-    again = plugins.read_protocol(tmp_path / "recorded.yaml")
+    again = read_protocol(tmp_path / "recorded.yaml")
     assert tuple(unit.name for unit in again.units()) == recording.plan.units
     shutil.rmtree(own)
     with pytest.raises(UsageError, match="expected a table NAME"):

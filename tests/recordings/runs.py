@@ -8,9 +8,9 @@ from typing import Any
 
 from labrig.calibration import write_irradiance_file, write_lvf_file
 from labrig.process import process_run
-from tests.process.excitation.test_excitation_run import QUICK, true_irradiance
-from tests.process.recorded import record
-from tests.process.spectral_bench import true_lvf_file
+from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
+from tests.analyse.recorded import record
+from tests.analyse.spectral_bench import true_lvf_file
 
 from .numbers import Difference, differences, keep_numbers
 

@@ -1,7 +1,6 @@
 import io
 import struct
 from collections.abc import Callable, Sequence
-from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -11,17 +10,8 @@ import tifffile
 
 from labrig.reduce import RawFrame
 
-SHARED = Path(__file__).parents[3] / "shared" / "data"
-
 WriteDng = Callable[..., bytes]
 MakeRaw = Callable[..., RawFrame]
-
-
-@pytest.fixture(scope="session")
-def shared_data() -> Path:
-    if not SHARED.is_dir():
-        pytest.skip(f"needs the real measured data in {SHARED}")
-    return SHARED
 
 
 @pytest.fixture(scope="session")

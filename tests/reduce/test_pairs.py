@@ -7,7 +7,8 @@ import numpy as np
 import numpy.typing as npt
 import pytest
 
-from labrig.reduce import Series, SeriesFrame, measure, read_raw, reduce_series
+from labrig.reduce import SeriesFrame, measure, read_raw, reduce_series
+from labrig.results import Series
 
 WriteDng = Callable[..., bytes]
 Floats = npt.NDArray[np.float64]

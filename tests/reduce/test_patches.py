@@ -9,8 +9,9 @@ import numpy.typing as npt
 import pytest
 
 from labrig.errors import DataError, FrameError
-from labrig.reduce import Series, SeriesFrame, reduce_patches, reduce_series
+from labrig.reduce import SeriesFrame, reduce_patches, reduce_series
 from labrig.reduce.patches import TWO_DEGREES
+from labrig.results import Series
 
 WriteDng = Callable[..., bytes]
 Take = Callable[..., SeriesFrame]

@@ -11,8 +11,8 @@ from labrig.errors import LabrigError
 from labrig.fit import DecayFit, fit_decay
 from labrig.optics import read_camera
 from labrig.record.frames import FrameRecord
-from labrig.reduce import Series
 from labrig.report import DeviceLine, GlowPhotograph, PatchReport, RunReport
+from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
 

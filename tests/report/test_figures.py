@@ -9,7 +9,6 @@ import pytest
 from matplotlib.figure import Figure
 
 from labrig.fit import DecayFit
-from labrig.reduce import Series
 from labrig.report.decay_figures import (
     linear_decay,
     logarithmic_decay,
@@ -21,6 +20,7 @@ from labrig.report.plates import Plates
 from labrig.report.residual_figure import residual_figure, residuals
 from labrig.report.run_figures import overview_figures, timing_figure
 from labrig.report.timing import FrameTiming
+from labrig.results import Series
 
 from .made import decay_series, fitted, patch
 

@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from labrig.fit import DecayFit
-from labrig.reduce import Series
 from labrig.report.figure_style import figure_style
 from labrig.report.noise_budget import noise_budget, noise_parts
 from labrig.report.noise_figure import noise_figure
+from labrig.results import Series
 
 from .made import decay_series, fitted
 

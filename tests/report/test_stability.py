@@ -6,10 +6,10 @@ import numpy as np
 import pytest
 
 from labrig.fit import DecayFit
-from labrig.reduce import Series
 from labrig.report.fitted_curve import fitted_curve
 from labrig.report.stability import repeats, steady
 from labrig.report.timing import FrameTiming, lateness
+from labrig.results import Series
 
 from .made import decay_series, fitted
 

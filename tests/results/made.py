@@ -5,7 +5,7 @@ from collections.abc import Mapping
 
 import numpy as np
 
-from labrig.results import DecayResult, DecayState
+from labrig.results import DecayState, FittedDecay
 
 
 def decay_result(
@@ -14,11 +14,11 @@ def decay_result(
     weights: Mapping[str, float] | None = None,
     offset: float = 0.0,
     offset_sigma: float = 0.001,
-) -> DecayResult:
+) -> FittedDecay:
     """A result with rates and amplitudes (k_r, a) that are known to a relative `sigma`."""
     weights = weights or {"G": 1.0}
     n = len(weights)
-    return DecayResult(
+    return FittedDecay(
         states=tuple(DecayState(k, sigma * k, a, sigma * a) for k, a in states),
         channels=tuple(weights),
         channel_weights=tuple(weights.values()),

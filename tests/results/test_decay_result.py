@@ -12,12 +12,12 @@ import pytest
 from labrig.errors import DataError
 from labrig.fit import DecayFit, fit_decay
 from labrig.results import (
-    DecayResult,
+    FittedDecay,
     Measured,
-    find_decay_results,
-    read_decay_result,
-    read_decay_results,
-    write_decay_result,
+    find_fitted_decays,
+    read_fitted_decay,
+    read_fitted_decays,
+    write_fitted_decay,
 )
 from tests.fit import truths
 
@@ -31,8 +31,8 @@ def fit() -> DecayFit:
     )  # fmt: skip
 
 
-def assert_same(one: DecayResult, other: DecayResult) -> None:
-    for field in fields(DecayResult):
+def assert_same(one: FittedDecay, other: FittedDecay) -> None:
+    for field in fields(FittedDecay):
         of_one, of_other = getattr(one, field.name), getattr(other, field.name)
         if isinstance(of_one, np.ndarray):
             np.testing.assert_array_equal(of_one, of_other)
@@ -41,8 +41,8 @@ def assert_same(one: DecayResult, other: DecayResult) -> None:
 
 
 def test_what_is_written_is_read_back(fit: DecayFit, tmp_path: Path) -> None:
-    write_decay_result(tmp_path / "fit.json", fit)
-    again = read_decay_result(tmp_path / "fit.json")
+    write_fitted_decay(tmp_path / "fit.json", fit)
+    again = read_fitted_decay(tmp_path / "fit.json")
     assert_same(fit, again)
     np.testing.assert_array_equal(again.predict([0.0, 10.0], 1.0), fit.predict([0.0, 10.0], 1.0))
     assert str(again) == str(fit)
@@ -51,9 +51,9 @@ def test_what_is_written_is_read_back(fit: DecayFit, tmp_path: Path) -> None:
 def test_what_nothing_is_known_of_is_read_back(fit: DecayFit, tmp_path: Path) -> None:
     states = (replace(fit.states[0], amplitude_sigma=math.inf), *fit.states[1:])
     unknown = replace(fit, states=states, flicker_sigma=math.inf)
-    write_decay_result(tmp_path / "fit.json", unknown)
+    write_fitted_decay(tmp_path / "fit.json", unknown)
     assert "Infinity" not in (tmp_path / "fit.json").read_text()
-    assert_same(unknown, read_decay_result(tmp_path / "fit.json"))
+    assert_same(unknown, read_fitted_decay(tmp_path / "fit.json"))
 
 
 def test_the_covariance_says_whose_it_is(fit: DecayFit) -> None:
@@ -85,7 +85,7 @@ def test_a_damaged_file_is_one_line(fit: DecayFit, tmp_path: Path, change: dict[
     path = tmp_path / "fit.json"
     path.write_text(json.dumps(fit.to_dict() | change))
     with pytest.raises(DataError, match="expected the fit of a decay") as caught:
-        read_decay_result(path)
+        read_fitted_decay(path)
     assert "\n" not in str(caught.value)
 
 
@@ -94,18 +94,18 @@ def test_a_file_of_something_else_is_one_line(tmp_path: Path, text: str) -> None
     path = tmp_path / "fit.json"
     path.write_text(text)
     with pytest.raises(DataError, match="make it again"):
-        read_decay_result(path)
+        read_fitted_decay(path)
 
 
 def test_results_go_by_the_names_of_their_folders(fit: DecayFit, tmp_path: Path) -> None:
-    assert read_decay_results(tmp_path) == {}
-    write_decay_result(tmp_path / "fit.json", fit)
-    assert list(find_decay_results(tmp_path)) == [""]
+    assert read_fitted_decays(tmp_path) == {}
+    write_fitted_decay(tmp_path / "fit.json", fit)
+    assert list(find_fitted_decays(tmp_path)) == [""]
     (tmp_path / "fit.json").unlink()
     for patch in ("left", "right"):
         (tmp_path / patch).mkdir()
-        write_decay_result(tmp_path / patch / "fit.json", fit)
-    assert list(read_decay_results(tmp_path)) == ["left", "right"]
+        write_fitted_decay(tmp_path / patch / "fit.json", fit)
+    assert list(read_fitted_decays(tmp_path)) == ["left", "right"]
 
 
 def test_amplitudes_in_another_channel(fit: DecayFit) -> None:

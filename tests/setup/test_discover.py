@@ -9,7 +9,7 @@ import pytest
 import usb.core
 import yaml
 
-from labrig.acquire import plugins
+from labrig import plugins
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
 from labrig.setup import Process, Surroundings, discover

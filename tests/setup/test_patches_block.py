@@ -7,7 +7,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from labrig import shipped
-from labrig.acquire.plugins import read_protocol
+from labrig.acquire import read_protocol
 from labrig.errors import UsageError
 from labrig.setup.patches_block import rounded, with_patches, write_patches
 from labrig.yaml_file import parse_yaml

@@ -16,7 +16,7 @@ import cv2
 import numpy as np
 import pytest
 
-from labrig.acquire.plugins import read_protocol
+from labrig.acquire import read_protocol
 from labrig.clock import Interrupted, SystemClock
 from labrig.errors import DeviceError, UsageError
 from labrig.local_server import KINDS

@@ -13,8 +13,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.wait import WebDriverWait
 
-from labrig.acquire import LiveView, read_rig_file
-from labrig.acquire.plugins import read_protocol
+from labrig.acquire import LiveView, read_protocol, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import Interrupted
 from labrig.setup.aimed_protocol import AimedProtocol

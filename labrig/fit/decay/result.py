@@ -3,11 +3,11 @@
 from dataclasses import dataclass
 
 from labrig.fit.least_squares import FloatArray
-from labrig.results import DecayResult
+from labrig.results import FittedDecay
 
 
 @dataclass(frozen=True)
-class DecayFit(DecayResult):
+class DecayFit(FittedDecay):
     """A decay's result with the residuals of its fit.
 
     Attributes

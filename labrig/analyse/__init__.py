@@ -1,0 +1,8 @@
+"""From the frames of a run to numbers: one file or package a protocol, each to its typed result."""
+
+from labrig.analyse.choices import Choices
+from labrig.analyse.inputs import Inputs
+from labrig.analyse.part import Part
+from labrig.analyse.series_fit import fit_series, fit_table
+
+__all__ = ["Choices", "Inputs", "Part", "fit_series", "fit_table"]

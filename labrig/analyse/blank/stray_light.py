@@ -1,0 +1,83 @@
+"""What is left of light after lamp-off, from frames of something that does not glow."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from labrig.errors import DataError
+from labrig.reduce import FrameMeasurement, fit_dark
+from labrig.results import FloatArray, Series
+from labrig.results.blank import StrayLight
+
+#: Share of the frames, the latest ones, that tell the constant level.
+LATE = 1 / 2
+#: Fewer frames tell nothing about what stays.
+FEWEST = 4
+
+
+def stray_light(series: Series, sigmas: float, least_dn: float) -> StrayLight:
+    """What `series` shows.
+
+    Parameters
+    ----------
+    sigmas, least_dn
+        A frame is clean if it is less than that above the constant level: in its own σ, or in DN.
+
+    Raises
+    ------
+    DataError
+        Too few frames.
+    """
+    middle_s = series.t_s + series.exposure_s / 2
+    order = np.argsort(middle_s, kind="stable")
+    # A clipped frame is a lower limit: it stays, and is not clean.
+    late = order[int(len(order) * (1 - LATE)) :]
+    late = late[series.usable[late]]
+    if len(late) < FEWEST:
+        raise DataError(
+            f"expected {FEWEST} frames or more in the later half of a blank, got {len(late)}; "
+            "record it for longer"
+        )
+    constant, own_sigma = _mean(series.values[late], series.sigma[late])
+    half = len(late) // 2
+    early_level, early_sigma = _mean(series.values[late[:half]], series.sigma[late[:half]])
+    last_level, last_sigma = _mean(series.values[late[half:]], series.sigma[late[half:]])
+    fades = bool(((early_level - last_level) > sigmas * np.hypot(early_sigma, last_sigma)).any())
+    rate = series.values[order] - constant
+    sigma = np.hypot(series.sigma[order], own_sigma)
+    counts = rate * series.exposure_s[order][:, np.newaxis]
+    unclean = ((rate > sigmas * sigma) & (counts > least_dn)).any(axis=1)
+    unclean |= ~series.usable[order]
+    start_s = series.t_s[order]
+    last = int(np.flatnonzero(unclean)[-1]) + 1 if unclean.any() else 0
+    clean_s = None if fades or last >= len(start_s) else float(start_s[last])
+    dark = np.where(np.isnan(series.dark_sigma), 0.0, series.dark_sigma)
+    return StrayLight(
+        start_s, middle_s[order], rate, sigma, constant, np.hypot(own_sigma, dark), fades,
+        unclean, clean_s,
+    )  # fmt: skip
+
+
+def ambient(darks: Sequence[FrameMeasurement]) -> tuple[FloatArray, FloatArray]:
+    """Light in the dark frames in DN/s beyond dark current and its σ, each (channels,).
+
+    Dark current is the same in all channels, light is not: what a channel has more than the one
+    with least is light. It is a lower limit.
+    """
+    exposure_s = np.array([one.exposure_s or 0.0 for one in darks])
+    pairs = [[(c.mean, c.sigma) for c in one.channels.values()] for one in darks]
+    level, sigma = np.moveaxis(np.array(pairs), 2, 0)
+    model = fit_dark(exposure_s, level, sigma)
+    rate, of_rate = model.rate_per_s, np.sqrt(model.covariance[:, 1, 1])
+    least = int(np.argmin(rate))
+    apart = np.hypot(of_rate, of_rate[least])
+    apart[least] = of_rate[least]
+    return rate - rate[least], apart
+
+
+def _mean(values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Weighted mean of rows, and its σ by their own and by how they scatter."""
+    weights = 1 / np.square(sigma)
+    mean = np.average(values, axis=0, weights=weights)
+    misfit = (weights * np.square(values - mean)).sum(axis=0) / max(len(values) - 1, 1)
+    return mean, np.sqrt(np.maximum(misfit, 1.0) / weights.sum(axis=0))

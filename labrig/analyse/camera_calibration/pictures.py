@@ -1,0 +1,202 @@
+"""What a camera calibration looks like."""
+
+from collections.abc import Sequence
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from labrig.analyse.camera_calibration.factors import Factors
+from labrig.analyse.camera_calibration.flat_fit import FittedFlat
+from labrig.analyse.camera_calibration.photon_transfer import PhotonTransfer
+from labrig.calibration import CameraFile, Factor, Linearity
+from labrig.report.figure_style import (
+    INK,
+    LEFT_PT,
+    MARKERS,
+    MUTED,
+    OTHER_CHANNELS,
+    PAPER,
+    channel_colour,
+    error_bars,
+    new_figure,
+    place,
+    points,
+)
+from labrig.report.legend import legend_above, marked
+from labrig.report.sections import Picture, Section, Table
+from labrig.report.written_numbers import exposure_text, plus_minus, rounded
+
+HEIGHT_PT = 230.0
+
+
+def sections(
+    file: CameraFile,
+    transfers: Sequence[PhotonTransfer],
+    factors: Factors,
+    flats: Sequence[FittedFlat],
+) -> tuple[Section, ...]:
+    """Noise, linearity, settings, flat field."""
+    found = [_noise(file, transfers)]
+    if file.linearity is not None:
+        found.append(_linearity(file.linearity))
+    return (*found, _settings(file, factors), _flat_field(file, flats))
+
+
+def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
+    rows = tuple(
+        (
+            f"{one.iso:g}",
+            plus_minus(one.gain_e_per_dn, one.gain_e_per_dn_sigma),
+            plus_minus(one.read_noise_e, one.read_noise_e_sigma),
+            f"{one.row_noise_e:.2g}",
+        )
+        for one in file.noise
+    )
+    return Section(
+        "Noise of the sensor",
+        ("Variance of the difference of two frames of the same light, over their level.",),
+        (
+            Picture(
+                "photon-transfer",
+                _transfer_figure(transfers),
+                "Variance of a pixel from frame to frame, dark subtracted, in DN². Lines: photons "
+                "of the gain found.",
+            ),
+        ),
+        (Table(("ISO", "gain / e/DN", "read noise / e", "row noise / e"), rows),),
+    )
+
+
+def _transfer_figure(transfers: Sequence[PhotonTransfer]) -> Figure:
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+    _logarithmic(axes)
+    axes.set_yscale("log")
+    entries = []
+    for number, one in enumerate(transfers):
+        colour, marker = OTHER_CHANNELS[number % len(OTHER_CHANNELS)], MARKERS[number % 8]
+        level = np.array([point.level_dn for point in one.points])
+        read = one.noise.read_noise_e / one.noise.gain_e_per_dn
+        variance = np.array([one.variance(point) for point in one.points]) - read**2
+        points(axes, level, variance, marker, colour, PAPER)
+        axes.plot(level, level / one.noise.gain_e_per_dn, color=colour, linewidth=1.0)
+        entries.append(marked(f"ISO {one.noise.iso:g}", marker, colour, PAPER))
+    axes.set_xlabel("Level above dark / DN")
+    axes.set_ylabel("Photon variance / DN²")
+    legend_above(figure, entries, columns=6)
+    return figure
+
+
+def _logarithmic(axes: Axes) -> None:
+    """The horizontal axis, with plain numbers."""
+    axes.set_xscale("log")
+    axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+    axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
+    axes.xaxis.set_minor_locator(NullLocator())
+
+
+def _linearity(found: Linearity) -> Section:
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
+    axes.axhline(0, color=MUTED, linewidth=0.8)
+    level = np.array([0.0, *found.level_dn])
+    percent = 100 * np.array([0.0, *found.deviation])
+    sigma = 100 * np.array([0.0, *found.sigma])
+    axes.plot(level, percent, color=INK, linewidth=1.0)
+    error_bars(axes, level, percent, sigma, INK)
+    points(axes, level, percent, "o", INK, PAPER)
+    axes.set_xlabel("Level above dark / DN")
+    axes.set_ylabel("Off a straight line / %")
+    full = "is not known" if found.saturation_dn is None else f"is {found.saturation_dn:.0f} DN"
+    return Section(
+        "Linearity",
+        (
+            "From the channels' ratios along a bracket of shutter times: what shutter and lamp do "
+            f"in a frame is common to the channels. The level at which the sensor is full {full}.",
+        ),
+        (Picture("linearity", figure, "Deviation from a linear sensor; bars are ± 1 σ."),),
+    )
+
+
+def _settings(file: CameraFile, factors: Factors) -> Section:
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
+    _logarithmic(axes)
+    axes.axhline(1, color=MUTED, linewidth=0.8)
+    times_s = np.array([one.setting for one in file.shutter])
+    factor = np.array([one.factor for one in file.shutter])
+    error_bars(axes, times_s, factor, np.array([one.sigma for one in file.shutter]), INK)
+    points(axes, times_s, factor, "o", INK, PAPER)
+    axes.set_xlabel("Shutter time as the camera tells / s")
+    axes.set_ylabel("True over told")
+    repeated, flicker = (
+        plus_minus(100 * value, 100 * sigma) for value, sigma in (factors.repeated, factors.flicker)
+    )
+    tables = (
+        _table("ISO", file.iso_gain, "{:g}", "Signal over that of the label."),
+        _table("f-number", file.aperture, "f/{:g}", "Light over that of the label."),
+    )
+    return Section(
+        "Shutter, ISO, aperture",
+        (
+            f"Light flickers from frame to frame by {flicker} % in brackets, by {repeated} % in "
+            "frames of the same exposure. The longest shutter time measured counts as exact: "
+            f"{exposure_text(file.shutter[-1].setting)}.",
+        ),
+        (Picture("shutter", figure, "Shutter times; bars are ± 1 σ."),),
+        tuple(table for table in tables if table.rows),
+    )
+
+
+def _table(name: str, factors: Sequence[Factor], form: str, caption: str) -> Table:
+    rows = tuple(
+        (form.format(one.setting), plus_minus(one.factor, one.sigma) if one.sigma else "1")
+        for one in factors
+    )
+    return Table((name, "factor"), rows, caption)
+
+
+def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
+    shown = flats[0]
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+    rho = np.linspace(0, 1, 101)
+    entries = []
+    for number, name in enumerate(file.channels):
+        colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
+        distance = np.sqrt(shown.rho2[number])
+        points(axes, distance, shown.light[number], marker, colour, PAPER, size=2.6)
+        axes.plot(rho, shown.flat.at(rho**2)[:, number], color=colour, linewidth=1.2)
+        entries.append(marked(name, marker, colour, PAPER))
+    axes.set_xlabel("Distance from the middle / half the diagonal")
+    axes.set_ylabel("Light over that in the middle")
+    legend_above(figure, entries, columns=4)
+    rows = tuple(
+        (
+            "–" if flat.f_number is None else f"f/{flat.f_number:g}",
+            *(f"{100 * left:.1f}" for left in flat.at(1.0)),
+            f"{100 * max(abs(g) for row in flat.gradient for g in row):.1f}",
+        )
+        for flat in (one.flat for one in flats)
+    )
+    head = ("aperture", *(f"{name} in the corner / %" for name in file.channels), "gradient / %")
+    stop = shown.flat.f_number
+    return Section(
+        "Flat field",
+        (
+            "What is even about the middle of the frame is taken for the lens's and divided out. "
+            "The gradient across the card is the lamp's and stays.",
+        ),
+        (
+            Picture(
+                "flat-field",
+                figure,
+                "Blocks of the card"
+                + ("" if stop is None else f" at f/{stop:g}")
+                + ", the gradient divided out, and the fall-off fitted.",
+            ),
+        ),
+        (Table(head, rows, "Light left in the corners, and the lamp's gradient."),),
+    )

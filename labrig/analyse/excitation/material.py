@@ -1,0 +1,79 @@
+"""The material that an excitation, with the emission spectrum, says there is."""
+
+from importlib.metadata import version
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.analyse.emission_file import EmissionSpectrum
+from labrig.calibration.irradiance_file import IrradianceFile
+from labrig.fit.excitation import ExcitationFit, ExcitedState
+from labrig.material import IrradianceNorm, Material, Provenance, State
+
+FloatArray = NDArray[np.float64]
+
+SOURCE = (
+    "decay and excitation measured with labrig; amplitudes in DN/s of the brightest channel, Λ = "
+    "Λ* amplitude(r = 1) / k_r relative to the spectrum's peak, r(0) after the longest charge by "
+    "the lamp itself"
+)
+
+
+def excited_material(
+    fit: ExcitationFit,
+    irradiance: IrradianceFile,
+    spectrum: EmissionSpectrum | None,
+    name: str,
+    run: str,
+    frames: tuple[str, ...],
+) -> Material:
+    """Everything the fit knows; Λ only with a spectrum."""
+    at_off = fit.at_off[-1]
+    bands = np.array(irradiance.bands_nm)
+    return Material(
+        name=name,
+        kind="phosphor",
+        bands_nm=irradiance.bands_nm,
+        irradiance_norm=IrradianceNorm(kind="vector_length", value=irradiance.vector_length),
+        states=tuple(
+            State(
+                k_r_per_s=state.k_r_per_s,
+                k_r_per_s_sigma=state.k_r_sigma_per_s,
+                amplitude=float(max(at_off.amplitude[number], 0.0)),
+                amplitude_sigma=float(at_off.amplitude_sigma[number]),
+                r0=float(np.clip(at_off.r0[number], 0.0, 1.0)),
+                r0_sigma=float(at_off.r0_sigma[number]),
+                k_e_per_s=tuple(state.k_e_per_s.tolist()),
+                k_e_per_s_sigma=tuple(state.k_e_sigma_per_s.tolist()),
+                **_reradiation(fit, number, state, spectrum, bands),
+            )
+            for number, state in enumerate(fit.states)
+        ),
+        spectrum=None if spectrum is None else spectrum.for_material(),
+        provenance=Provenance(source=SOURCE, run=run, frames=frames, version=version("labrig")),
+    )
+
+
+def _reradiation(
+    fit: ExcitationFit,
+    number: int,
+    state: ExcitedState,
+    spectrum: EmissionSpectrum | None,
+    bands_nm: FloatArray,
+) -> dict[str, tuple[float, ...]]:
+    """Λ of every band: A_i / k_r,i times the spectrum's mean there, errors of all three."""
+    if spectrum is None:
+        return {}
+    states = len(fit.states)
+    level = state.amplitude / state.k_r_per_s
+    both = [number, states + number]
+    slope = np.array([-1 / state.k_r_per_s, 1 / max(state.amplitude, 1e-300)])
+    relative = float(slope @ fit.covariance[np.ix_(both, both)] @ slope)
+    shape, covariance = spectrum.in_bands(bands_nm)
+    shape_sigma = np.sqrt(np.diag(covariance))
+    value = level * shape
+    sigma = level * np.hypot(shape_sigma, shape * np.sqrt(relative))
+    return {
+        "reradiation": tuple(np.maximum(value, 0.0).tolist()),
+        "reradiation_sigma": tuple(sigma.tolist()),
+    }

@@ -1,0 +1,131 @@
+"""Whether what charges through the filter tell predicts charging by the lamp itself."""
+
+from collections.abc import Callable
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.analyse.excitation.charges import Charged
+from labrig.analyse.excitation.first_photographs import first_photographs
+from labrig.calibration.irradiance_file import IrradianceFile
+from labrig.compare.closure import Charging, Closure, closure
+from labrig.fit.excitation import ChargingSeries, ExcitationFit, Uncertain
+from labrig.fit.excitation.levels import levels_at_off
+
+FloatArray = NDArray[np.float64]
+
+#: Of σ, for derivatives.
+STEP = 0.01
+
+
+def predicted_charging(
+    measured: Charged,
+    irradiance: IrradianceFile,
+    uncertain: Uncertain,
+    fit_of: Callable[[Charged], ExcitationFit],
+) -> Closure | None:
+    """Charging by the lamp itself as predicted from charges through the filter.
+
+    The longest bare charge stays in the fit, since it tells how far the sample is charged; the
+    shorter ones are predicted. With fewer than two of those there is no test.
+
+    Parameters
+    ----------
+    fit_of
+        Fits what is left without the charges that are predicted.
+    """
+    bare = measured.bare
+    lengths = np.array([charge.off_s - charge.on_s for charge in bare.charges])
+    longest = int(np.argmax(lengths))
+    of_charge = np.repeat(np.arange(len(lengths)), [len(one.start_s) for one in bare.charges])
+    kept = of_charge == longest
+    alone = replace(
+        measured,
+        bare=replace(bare, values=np.where(kept[:, None, None], bare.values, np.nan)),
+    )
+    channel = int(np.argmax(np.nanmean(bare.values, axis=(0, 1))))
+    usable = np.asarray(np.isfinite(bare.values[..., channel]).all(axis=1))
+    first = first_photographs(bare, usable)
+    if len(first) < 3:
+        return None
+    fit = fit_of(alone)
+    rows = np.array(list(first.values()))
+    charges = [bare.charges[number] for number in first]
+    values, sigma = bare.values[rows, :, channel], bare.sigma[rows, :, channel]
+    level = values.mean(axis=1)
+    noise = np.hypot(np.sqrt((sigma**2).sum(axis=1)) / sigma.shape[1], uncertain.flicker * level)
+    charge_s = _at_full_light(bare, fit, np.array(irradiance.direct))[list(first)]
+    starts, exposures = (
+        np.concatenate([getattr(one, name) for one in bare.charges])[rows]
+        for name in ("start_s", "exposure_s")
+    )
+    dark_s = starts - np.array([charge.off_s for charge in charges])
+    left = _left(bare, fit)[list(first)]
+
+    def predicted(theta: FloatArray) -> FloatArray:
+        """By k_r, amplitudes, k_e and ln of the light."""
+        n = len(fit.states)
+        light = np.array(irradiance.direct) * np.exp(theta[-1])
+        sample = Charging(theta[2 * n : -1].reshape(n, -1), theta[:n], theta[n : 2 * n], light)
+        return sample.level(charge_s, left, dark_s, exposures)
+
+    theta = np.array(
+        [
+            *(state.k_r_per_s for state in fit.states),
+            *(state.amplitude for state in fit.states),
+            *fit.k_e().ravel(),
+            0.0,
+        ]
+    )
+    unsure = np.sqrt(np.append(np.diag(fit.covariance), max(uncertain.scale, 1e-6) ** 2))
+    slopes = _slopes(predicted, theta, unsure)
+    cold = np.array([charge.cold for charge in charges])
+    of_charges = slopes[-1] ** 2 * (
+        uncertain.scale**2 + uncertain.lamp**2 + (uncertain.cold * cold) ** 2
+    )
+    of_rates = np.einsum("ic,ij,jc->c", slopes[:-1], fit.covariance, slopes[:-1])
+    return closure(
+        charge_s,
+        level,
+        np.sqrt(noise**2 + np.maximum(of_rates, 0.0) + of_charges),
+        irradiance=irradiance.direct,
+        k_e_per_s=fit.k_e(),
+        k_r_per_s=[state.k_r_per_s for state in fit.states],
+        full_level=[state.amplitude for state in fit.states],
+        r0=left,
+        dark_s=dark_s,
+        exposure_s=exposures,
+    )
+
+
+def _at_full_light(bare: ChargingSeries, fit: ExcitationFit, direct: FloatArray) -> FloatArray:
+    """(K,) s: how long the charges would have lasted by the steady lamp, for what they charge."""
+    weight = fit.k_e().sum(axis=0) * direct
+    weight /= weight.sum()
+    lost_s = bare.rise.duration_s @ (1 - bare.rise.share @ weight)
+    gained_s = bare.fade.duration_s @ (bare.fade.share @ weight)
+    return np.array(
+        [one.brightness * (one.off_s - one.on_s - lost_s + gained_s) for one in bare.charges]
+    )
+
+
+def _left(bare: ChargingSeries, fit: ExcitationFit) -> FloatArray:
+    """(K, N) concentrations that each charge finds, of the one before it."""
+    k_r = np.array([state.k_r_per_s for state in fit.states])
+    ended = levels_at_off(bare, k_r, fit.k_e()).value.mean(axis=1)
+    on_s, off_s = (
+        np.array([getattr(one, name) for one in bare.charges]) for name in ("on_s", "off_s")
+    )
+    waited_s = on_s[1:] - off_s[:-1]
+    fresh = np.array([one.fresh for one in bare.charges[1:]])
+    left = np.where(fresh[:, None], 0.0, ended[:-1] * np.exp(-np.outer(waited_s, k_r)))
+    return np.vstack([np.zeros_like(k_r), left])
+
+
+def _slopes(
+    of: Callable[[FloatArray], FloatArray], theta: FloatArray, unsure: FloatArray
+) -> FloatArray:
+    """(θ, n), by differences of a part of each one's σ."""
+    steps = np.diag(STEP * np.maximum(unsure, 1e-12))
+    return np.array([(of(theta + step) - of(theta - step)) / (2 * step.sum()) for step in steps])

@@ -1,0 +1,232 @@
+"""Finds the lamp's change that explains photographs of it.
+
+A photograph begins at a time after the switch that is known but for a constant lag and some jitter,
+which all its places and colours share, as they share its flicker.
+"""
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.analyse.fade.change import Change, Fit
+from labrig.analyse.fade.shapes import REFERENCE_NM, SCALE_S, Cooling, Shape, Smooth, share_of
+from labrig.analyse.fade.shots import Shots
+from labrig.errors import FitError
+from labrig.fit.least_squares import least_squares
+
+FloatArray = NDArray[np.float64]
+
+#: On which shares are integrated.
+STEP_S = 2e-3
+DEGREES = (2, 3, 4)
+#: What is known of p beforehand, and of the lag if nothing else is; one standard deviation.
+EXPONENT_SIGMA = 0.2
+ANY_LAG_S = (0.0, 6e-3)
+#: Jitters that are tried, the first one first.
+JITTERS_S = np.geomspace(3e-4, 2e-2, 31)
+FIRST_JITTER_S = 3e-3
+#: Rounds in which covariances follow the model; steps of a fit, and when it is good enough.
+ROUNDS, MOST_STEPS, TOLERANCE = 3, 100, 1e-6
+#: A lamp is a filament unless something else is likelier by so much in −2 ln L.
+CLEARLY = 10.0
+
+
+def fit_change(
+    shots: Shots,
+    weights: FloatArray,
+    nm: FloatArray,
+    flicker: float,
+    *,
+    rises: bool,
+    lag_s: tuple[float, float] = ANY_LAG_S,
+) -> Change:
+    """The change that explains the photographs.
+
+    Parameters
+    ----------
+    weights
+        (S, wavelengths) what each place or colour sees of the steady lamp at `nm`; sums to 1.
+    flicker
+        Of a photograph's light.
+    rises
+        Whether the lamp comes on.
+    lag_s
+        By which shutters are thought to open late, and its σ.
+
+    Raises
+    ------
+    FitError
+        The photographs show no such change.
+    """
+    last_s = float(shots.start_s.max())
+    smooth = [Smooth(rises, degree, last_s) for degree in DEGREES]
+    shapes: list[Shape] = [*smooth] if rises else [Cooling(), *smooth]
+    fits = [
+        _fit(shots, weights, nm, flicker, shape, lag_s)
+        for shape in shapes
+        if len(shots.start_s) > shape.free + 3
+    ]
+    if not fits:
+        raise FitError(f"expected more photographs of the lamp, got {len(shots.start_s)}")
+    # What no shape explains (curves that are not quite this bench's) must not decide.
+    scatter = max(min(fit.reduced_chi2 for fit in fits), 1.0)
+    aic = np.array(
+        [fit.log_determinant + fit.chi2 / scatter + 2 * len(fit.parameters) for fit in fits]
+    )
+    if isinstance(fits[0].shape, Cooling) and aic[0] < aic.min() + CLEARLY:
+        return Change((fits[0],), np.ones(1))
+    likely = np.exp((aic.min() - aic) / 2)
+    return Change(tuple(fits), likely / likely.sum())
+
+
+def _fit(
+    shots: Shots,
+    weights: FloatArray,
+    nm: FloatArray,
+    flicker: float,
+    shape: Shape,
+    lag_s: tuple[float, float],
+) -> Fit:
+    problem = _Problem(shots, weights, nm, flicker, shape, lag_s)
+    theta, jitter_s = problem.start(), FIRST_JITTER_S
+    for _ in range(ROUNDS):
+        problem.whiten(theta, jitter_s)
+        found = least_squares(
+            problem.residuals, theta, max_iterations=MOST_STEPS, tolerance=TOLERANCE
+        )
+        theta = found.parameters
+        jitter_s = problem.likeliest_jitter(theta)
+    problem.whiten(theta, jitter_s)
+    chi2, dof = problem.chi2(theta), max(problem.values - len(theta), 1)
+    covariance = found.covariance * max(chi2 / dof, 1.0)
+    return Fit(shape, theta, covariance, jitter_s, chi2, dof, problem.log_determinant)
+
+
+class _Problem:
+    """Residuals of all photographs, whitened by what the values of each share."""
+
+    def __init__(
+        self,
+        shots: Shots,
+        weights: FloatArray,
+        nm: FloatArray,
+        flicker: float,
+        shape: Shape,
+        lag_s: tuple[float, float],
+    ) -> None:
+        self._shots, self._weights, self._nm = shots, weights, nm
+        self._flicker, self._shape = flicker, shape
+        expected, sigma = shape.expected()
+        self._expected = np.array([*expected, 1.0, lag_s[0]])
+        self._sigma = np.array([*sigma, EXPONENT_SIGMA, lag_s[1]])
+        last_s = float((shots.start_s + shots.exposure_s).max()) + 0.05
+        self._grid_s = np.arange(0.0, last_s + STEP_S, STEP_S)
+        self._used = np.isfinite(shots.value) & np.isfinite(shots.sigma)
+        self.values = int(self._used.sum())
+        known = np.where(self._used, shots.sigma, 1.0)
+        self._inverse_sigma = np.where(self._used, 1 / known, 0.0)
+        self._along, self._common = np.empty((0, 0, 2)), np.empty((0, 2))
+        self.log_determinant = 0.0
+
+    def start(self) -> FloatArray:
+        """A first guess from the photographs' brightest colour."""
+        shots = self._shots
+        column = int(np.argmax(shots.steady))
+        value, start_s = shots.value[:, column], shots.start_s
+        middle_nm = float(self._weights[column] @ self._nm)
+        used = self._used[:, column] & (value > 5 * shots.sigma[:, column])
+        if self._shape.rises:
+            share = np.clip(value / shots.exposure_s, 1e-6, 1 - 1e-6)
+            used &= (share > 0.02) & (share < 0.95)
+            target = np.log(-np.log(share[used]) * middle_nm / REFERENCE_NM)
+        else:
+            target = np.log(value[used])
+        if np.count_nonzero(used) < 3:
+            changes = "comes on" if self._shape.rises else "fades"
+            raise FitError(
+                f"expected photographs of a lamp that {changes}, got none that show it: is the "
+                "card lit, does the lamp's relay switch?"
+            )
+        slope, level = np.polyfit(start_s[used] / SCALE_S, target, 1)
+        if not self._shape.rises:
+            slope *= middle_nm / REFERENCE_NM
+        first = self._shape.start(float(level), float(slope))
+        return np.array([*first, 1.0, self._expected[-1]])
+
+    def model(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """∫ share dt of every photograph, and its slope by its begin; (n, S) each."""
+        share = share_of(self._shape, theta, self._nm, self._grid_s) @ self._weights.T
+        steps = STEP_S * (share[1:] + share[:-1]) / 2
+        integral = np.vstack([np.zeros(share.shape[1]), np.cumsum(steps, axis=0)])
+        begin_s = self._shots.start_s + theta[-1]
+        first, before = _until(begin_s, integral, share)
+        last, after = _until(begin_s + self._shots.exposure_s, integral, share)
+        return last - first, after - before
+
+    def whiten(self, theta: FloatArray, jitter_s: float) -> None:
+        """Take covariances from the model there."""
+        value, slope = self.model(theta)
+        self._along, self._common = self._shared(value, slope, jitter_s)
+        own = np.log(np.square(self._shots.sigma[self._used]))
+        self.log_determinant = float(own.sum() + np.log1p(self._common).sum())
+
+    def likeliest_jitter(self, theta: FloatArray) -> float:
+        """Of `JITTERS_S`, given what is left of the photographs."""
+        value, slope = self.model(theta)
+        rest = self._scaled(value)
+
+        def unlikely(jitter_s: float) -> float:
+            along, common = self._shared(value, slope, jitter_s)
+            explained = np.square(np.einsum("nsk,ns->nk", along, rest)) * common / (1 + common)
+            return float(np.log1p(common).sum() - explained.sum())
+
+        return float(JITTERS_S[np.argmin([unlikely(tried) for tried in JITTERS_S])])
+
+    def _scaled(self, value: FloatArray) -> FloatArray:
+        """What a model leaves, in σ; 0 of values that are not used."""
+        return np.where(self._used, (self._shots.value - value) * self._inverse_sigma, 0.0)
+
+    def _shared(
+        self, value: FloatArray, slope: FloatArray, jitter_s: float
+    ) -> tuple[FloatArray, FloatArray]:
+        """What values of a photograph share, in σ: unit vectors (n, S, 2) and variances (n, 2)."""
+        both = np.stack([self._flicker * value, jitter_s * slope], axis=2)
+        both *= self._inverse_sigma[..., np.newaxis]
+        variance, turned = np.linalg.eigh(np.einsum("nsk,nsl->nkl", both, both))
+        variance = np.maximum(variance, np.finfo(np.float64).tiny)
+        along: FloatArray = both @ turned / np.sqrt(variance)[:, np.newaxis, :]
+        return along, variance
+
+    def _whitened(self, theta: FloatArray) -> FloatArray:
+        """Times (1 + Σ v e eᵀ)^(−1/2), e the unit vectors and v the variances."""
+        rest = self._scaled(self.model(theta)[0])
+        shared = np.einsum("nsk,ns->nk", self._along, rest) * (1 - 1 / np.sqrt(1 + self._common))
+        result: FloatArray = (rest - np.einsum("nsk,nk->ns", self._along, shared)).ravel()
+        return result
+
+    def chi2(self, theta: FloatArray) -> float:
+        """Of the photographs alone."""
+        return float(np.square(self._whitened(theta)).sum())
+
+    def residuals(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Whitened, then what is known beforehand; and their slopes."""
+
+        def all_of(at: FloatArray) -> FloatArray:
+            return np.append(self._whitened(at), (at - self._expected) / self._sigma)
+
+        here = all_of(theta)
+        jacobian = np.empty((len(here), len(theta)))
+        for number in range(len(theta)):
+            step = np.zeros_like(theta)
+            step[number] = 1e-6
+            jacobian[:, number] = (all_of(theta + step) - all_of(theta - step)) / (2 * step[number])
+        return here, jacobian
+
+
+def _until(
+    at_s: FloatArray, integral: FloatArray, share: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """Integral of a share that is straight between the times of the grid, and the share there."""
+    left = np.clip((at_s / STEP_S).astype(np.intp), 0, len(share) - 2)
+    x = (at_s - left * STEP_S)[:, np.newaxis]
+    slope = (share[left + 1] - share[left]) / STEP_S
+    return integral[left] + (share[left] + slope * x / 2) * x, share[left] + slope * x

@@ -1,0 +1,86 @@
+"""What is known of a bench before a part is processed."""
+
+from collections.abc import Callable, Mapping
+from dataclasses import dataclass, field
+from pathlib import Path
+from typing import Self, TypeVar
+
+from labrig.acquire import RigFile
+from labrig.analyse.emission_file import EmissionSpectrum
+from labrig.calibration import (
+    BlankFile,
+    CameraFile,
+    FadeFile,
+    IrradianceFile,
+    LvfFile,
+    read_blank_file,
+    read_camera_file,
+    read_fade_file,
+    read_irradiance_file,
+    read_lvf_file,
+)
+from labrig.errors import UsageError
+from labrig.fit import DecayFit
+from labrig.material import Material
+
+FileT = TypeVar("FileT")
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Calibrations and earlier results; None or empty where nothing is known.
+
+    Attributes
+    ----------
+    camera, blank, fade, lvf, irradiance
+        From a rig file's `optics:`, or measured earlier in the same run.
+    spectra
+        By patch; under "" of the only one.
+    decays
+        By patch.
+    materials
+        As excitation, decay and spectrum together say, by patch; under "" the only one.
+    """
+
+    camera: CameraFile | None = None
+    blank: BlankFile | None = None
+    fade: FadeFile | None = None
+    lvf: LvfFile | None = None
+    irradiance: IrradianceFile | None = None
+    spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)
+    decays: Mapping[str, DecayFit] = field(default_factory=dict)
+    materials: Mapping[str, Material] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, rig: RigFile) -> Self:
+        """Read the files that the rig file names.
+
+        Raises
+        ------
+        UsageError
+            One is missing or malformed.
+        """
+        optics = rig.optics
+        return cls(
+            camera=_read(optics.camera_file, "camera.yaml", read_camera_file),
+            blank=_read(optics.blank, "blank.yaml", read_blank_file),
+            fade=_read(optics.fade, "fade.yaml", read_fade_file),
+            lvf=_read(optics.lvf, "lvf.yaml", read_lvf_file),
+            irradiance=_read(optics.irradiance, "irradiance.yaml", read_irradiance_file),
+        )
+
+
+def _read(named: str | None, name: str, read: Callable[[Path], FileT]) -> FileT | None:
+    """The file itself, or the one in a run folder's result, be it one part of a chain."""
+    if named is None:
+        return None
+    path = Path(named)
+    if not path.is_dir():
+        return read(path)
+    found = [*path.glob(f"result/{name}"), *path.glob(f"result/*/{name}")]
+    if len(found) != 1:
+        raise UsageError(
+            f"{path}: expected a run with one {name} in its result, got {len(found)}; process it "
+            "first, or name the file itself"
+        )
+    return read(found[0])

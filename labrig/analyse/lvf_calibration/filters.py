@@ -1,0 +1,207 @@
+"""Colour filters over a grey card: whether each was in its place, and what they say together."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.analyse.lvf_calibration.picture import FloatArray
+from labrig.analyse.lvf_calibration.slices import FLICKER, SliceValues
+from labrig.fit.lvf import LvfCalibration, calibrate_lvf
+from labrig.fit.spectrum import CurveError
+from labrig.optics import (
+    CameraResponse,
+    Lvf,
+    Spectrum,
+    Transmittance,
+    WavelengthMap,
+    nominal_lvf,
+)
+from labrig.optics.piecewise import quadrature
+
+#: Root mean square by which transmittances along a strip may be off: the map, bands of another
+#: shape, a filter that is not quite as its table.
+EXPECTED = 0.05
+#: A picture is of another filter if that one explains it so many times better.
+BETTER = 3.0
+#: Beyond this it is of none that is known.
+FAR_OFF = 0.15
+#: Places say what filter is in if they see this share of what the brightest one sees.
+BRIGHT = 0.25
+#: What a gel differs from its table by, and a table of few points from the curve, relative.
+TABLE = 0.02
+#: Curves of cameras are worst at the ends of the spectrum and where a channel is nearly blind;
+#: neighbouring bands tell of it, but only if so much is allowed for.
+CURVES = CurveError(added=0.03)
+#: A place says something of a filter if its value without one is this many of its σ.
+CLEAR = 30.0
+
+NO_FILTER = Transmittance("none", np.array([300.0, 900.0]), np.ones(2))
+
+
+@dataclass(frozen=True, eq=False)
+class FilterScenes:
+    """Pictures through the strip, with each filter.
+
+    Attributes
+    ----------
+    position
+        (p,) rising.
+    filters
+        (f,) the first is `NO_FILTER`.
+    values
+        (f,) in the same order.
+    card
+        The card at the same places without the strip.
+    """
+
+    position: FloatArray
+    filters: Sequence[Transmittance]
+    values: Sequence[SliceValues]
+    card: SliceValues
+
+    def without(self, names: set[str]) -> "FilterScenes":
+        """Leave some filters out."""
+        kept = [number for number, one in enumerate(self.filters) if one.name not in names]
+        return replace(
+            self,
+            filters=[self.filters[number] for number in kept],
+            values=[self.values[number] for number in kept],
+        )
+
+
+@dataclass(frozen=True)
+class Bench:
+    """What is known of the light's way: lamp, card, camera."""
+
+    lamp: Spectrum
+    card: Transmittance
+    camera: CameraResponse
+
+    def card_values(self) -> FloatArray:
+        """(channels,) ∫ L R S_c dλ: the card by itself."""
+        nodes, light = self._light()
+        values: FloatArray = light @ self.camera.at(nodes)
+        return values
+
+    def relative(self, lvf: Lvf, filters: Sequence[Transmittance]) -> FloatArray:
+        """(filters, p, channels) values over those without a filter."""
+        nodes, light = self._light(*(one.wavelength_nm for one in filters))
+        seen = lvf.transmission(nodes) * light
+        sensitivity = self.camera.at(nodes)
+        bare = seen @ sensitivity
+        passed = [(seen * one.at(nodes)) @ sensitivity for one in filters]
+        relative: FloatArray = np.stack(passed) / np.maximum(bare, 1e-12 * bare.max())
+        return relative
+
+    def _light(self, *knots: FloatArray) -> tuple[FloatArray, FloatArray]:
+        curves = (self.camera.wavelength_nm, self.lamp.wavelength_nm, self.card.wavelength_nm)
+        low, high = float(curves[0][0]), float(curves[0][-1])
+        nodes, weights = quadrature(low, high, *curves, *knots)
+        return nodes, weights * self.lamp.at(nodes) * self.card.at(nodes)
+
+
+@dataclass(frozen=True)
+class Misfit:
+    """How far the picture of a filter is from the transmittances, rms along the strip.
+
+    Attributes
+    ----------
+    name
+        Of the filter that should have been in.
+    own, best
+        Of its own transmittance, and of the best one.
+    like
+        Whose that is.
+    """
+
+    name: str
+    own: float
+    best: float
+    like: str
+
+    @property
+    def is_wrong(self) -> bool:
+        """Whether another filter, none or something else was in its place."""
+        another = self.like != self.name and self.own > BETTER * self.best
+        return self.own > FAR_OFF or (self.own > EXPECTED and another)
+
+    def __str__(self) -> str:
+        looks = (
+            f"it looks like {'no filter' if self.like == NO_FILTER.name else self.like} "
+            f"({self.best:.3f})"
+            if self.like != self.name and self.own > BETTER * self.best
+            else "it looks like none of the others"
+        )
+        return (
+            f"colour filter {self.name}: its picture is off its transmittance by {self.own:.3f} "
+            f"(rms along the strip), {looks}; it was not in its place, and is left out (put it in "
+            "and take its unit again, or correct its file)"
+        )
+
+
+def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> list[Misfit]:
+    """Of every filter but the first.
+
+    The bands that the maker states will do: what counts is where along the strip a filter bites,
+    and the camera's curves cancel in the ratio to the picture without it.
+    """
+    lvf = nominal_lvf(wavelengths, wavelengths.wavelength_nm(scenes.position))
+    expected = bench.relative(lvf, scenes.filters)
+    bare = scenes.values[0].value
+    # In its brightest colour a place sees its band, in the others and at dim ends what leaks.
+    share = np.nan_to_num(bare / scenes.card.value)
+    own = np.argmax(share, axis=1)
+    bright = share.max(axis=1) > BRIGHT * share.max()
+    at = np.flatnonzero(bright), own[bright]
+    found = []
+    for number, seen in enumerate(scenes.values[1:], start=1):
+        ratio = seen.value[at] / bare[at]
+        off = np.sqrt(np.nanmean((expected[:, *at] - ratio) ** 2, axis=1))
+        best = int(np.argmin(off))
+        name = scenes.filters[number].name
+        found.append(Misfit(name, float(off[number]), float(off[best]), scenes.filters[best].name))
+    return found
+
+
+def calibrated(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> LvfCalibration:
+    """T_p(λ) at every position, in units of the card seen without the strip.
+
+    What lens, lamp and card do to a place is divided out by the picture of the card itself; so is
+    how high the camera's channels stand to one another under this lamp.
+    """
+    reference = bench.card_values() / scenes.card.value
+    value = np.stack([one.value * reference for one in scenes.values], axis=1)
+    sigma = [
+        np.hypot(seen.sigma, (FLICKER if one is NO_FILTER else TABLE) * seen.value) * reference
+        for one, seen in zip(scenes.filters, scenes.values, strict=True)
+    ]
+    return calibrate_lvf(
+        scenes.position,
+        value,
+        np.stack(sigma, axis=1),
+        filters=scenes.filters,
+        lamp=bench.lamp,
+        card=bench.card,
+        camera=bench.camera,
+        wavelengths=wavelengths,
+        curve_error=CURVES,
+    )
+
+
+def residuals(scenes: FilterScenes, bench: Bench, lvf: Lvf) -> NDArray[np.float64]:
+    """(filters, p) transmittance measured minus what the calibrated strip lets expect, mean of the
+    channels by their light; NaN where it says nothing.
+    """
+    expected = bench.relative(lvf, scenes.filters)
+    bare = scenes.values[0]
+    clear = bare.value > CLEAR * bare.sigma
+    weight = np.where(clear, bare.value, 0.0)
+    total = weight.sum(axis=1)
+    rows = []
+    for one, want in zip(scenes.values, expected, strict=True):
+        off = np.where(clear, one.value / np.where(clear, bare.value, 1.0) - want, 0.0)
+        mean = (weight * np.nan_to_num(off)).sum(axis=1) / np.where(total > 0, total, 1.0)
+        rows.append(np.where(total > 0, mean, np.nan))
+    return np.array(rows)

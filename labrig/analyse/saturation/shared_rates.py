@@ -1,0 +1,190 @@
+"""Decays after several charges, with rates in common and with rates of their own.
+
+All are one channel wide here: the channels of a frame, weighed as the fit of the brightest decay
+has them, say the same with less noise. Amplitudes are linear, so only the rates are searched for
+(variable projection).
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+from scipy.optimize import least_squares
+from scipy.special import chdtrc, fdtrc
+
+from labrig.errors import FitError
+from labrig.fit import DecayFit
+from labrig.fit.least_squares import EPSILON
+from labrig.material.rates import exponential_means
+from labrig.results import Series
+
+FloatArray = NDArray[np.float64]
+
+#: Chance at which rates that are the same are said to differ.
+LEVEL = 1e-3
+#: Chance at which decays that are exponentials are said to be none.
+MISFIT_LEVEL = 5e-4
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """One decay: (n,) times, exposures, values and σ; σ of a constant that may be in all."""
+
+    t_s: FloatArray
+    exposure_s: FloatArray
+    value: FloatArray
+    sigma: FloatArray
+    offset_sigma: float
+
+    def design(self, rates_per_s: FloatArray) -> FloatArray:
+        """(n + 1, states + 1) whitened, its last row the offset's prior."""
+        shapes = exponential_means(rates_per_s, self.t_s, self.exposure_s)
+        offset = np.full((len(self.t_s), 1), self.offset_sigma)
+        rows = np.hstack([shapes, offset]) / self.sigma[:, np.newaxis]
+        prior = np.zeros((1, rows.shape[1]))
+        prior[0, -1] = 1.0
+        return np.vstack([rows, prior])
+
+    @property
+    def target(self) -> FloatArray:
+        """(n + 1,) whitened."""
+        return np.append(self.value / self.sigma, 0.0)
+
+    def residuals(self, rates_per_s: FloatArray) -> FloatArray:
+        """(n + 1,) of the best amplitudes."""
+        design = self.design(rates_per_s)
+        solution, *_ = np.linalg.lstsq(design, self.target, rcond=None)
+        return np.asarray(design @ solution - self.target)
+
+
+@dataclass(frozen=True, eq=False)
+class RatesTest:
+    """What sharing the rates costs.
+
+    Attributes
+    ----------
+    shared_per_s
+        (s,) by falling rate.
+    own_per_s, own_sigma_per_s
+        (d, s) of every decay by itself.
+    amplitude, amplitude_sigma
+        (d, s) of every decay at lamp off, the rates shared.
+    chi2_shared, chi2_own, dof_own
+        Sums of all decays.
+    noise_dof
+        Degrees of freedom from which the noise itself was estimated; infinite if it is known.
+    p_value
+        Of an F-test: chance that rates which are the same come out so different.
+    """
+
+    shared_per_s: FloatArray
+    own_per_s: FloatArray
+    own_sigma_per_s: FloatArray
+    amplitude: FloatArray
+    amplitude_sigma: FloatArray
+    chi2_shared: float
+    chi2_own: float
+    dof_own: int
+    noise_dof: float
+    p_value: float
+
+    @property
+    def differ(self) -> bool:
+        """Whether the rates depend on the charge."""
+        return self.p_value < LEVEL
+
+    @property
+    def misfit(self) -> bool:
+        """Whether not even rates of their own describe the decays."""
+        if np.isinf(self.noise_dof):
+            return float(chdtrc(self.dof_own, self.chi2_own)) < MISFIT_LEVEL
+        excess = self.chi2_own / self.dof_own
+        return float(fdtrc(self.dof_own, self.noise_dof, excess)) < MISFIT_LEVEL
+
+
+def curve(series: Series, fit: DecayFit) -> Curve:
+    """A series with its channels weighed as in `fit`, flicker in its σ."""
+    rows = series.usable
+    weights = np.array(fit.channel_weights)
+    y, s = series.values[rows], series.sigma[rows]
+    information = (weights / s**2) @ weights
+    value = (y / s**2) @ weights / information
+    sigma = np.hypot(1 / np.sqrt(information), fit.flicker * np.maximum(value, 0.0))
+    dark = np.nan_to_num(series.dark_sigma)
+    shares = np.mean(weights / s**2, axis=0) / np.mean(information)
+    return Curve(series.t_s[rows], series.exposure_s[rows], value, sigma, float(shares @ dark))
+
+
+def flicker_dof(fit: DecayFit) -> float:
+    """Degrees of freedom from which a fit estimated its flicker; infinite if it was given."""
+    if not fit.flicker_sigma > 0:
+        return np.inf
+    return max(0.5 * (fit.flicker / fit.flicker_sigma) ** 2, 1.0)
+
+
+def compare_rates(
+    curves: Sequence[Curve], start_per_s: Sequence[float], noise_dof: float = np.inf
+) -> RatesTest:
+    """Fit all decays with shared rates, then each with its own, as many states each.
+
+    Parameters
+    ----------
+    start_per_s
+        Rates to start from; their number is that of the states.
+    noise_dof
+        Degrees of freedom from which the curves' σ was estimated; infinite if it is known.
+
+    Raises
+    ------
+    FitError
+        Too few frames, or some decay that has none of these states.
+    """
+    start = np.log(np.asarray(start_per_s, dtype=np.float64))
+    states = len(start)
+    dof = sum(len(one.t_s) for one in curves) - 2 * states * len(curves)
+    if dof < 1 or min(len(one.t_s) for one in curves) <= 2 * states:
+        raise FitError(
+            f"expected more than {2 * states} frames of each decay for {states} state(s); record "
+            "more, or ask for fewer states"
+        )
+    shared, shared_chi2, _ = _fit(curves, start)
+    alone = [_fit([one], shared) for one in curves]
+    own_chi2 = sum(chi2 for _, chi2, _ in alone)
+    amplitudes = [_amplitudes(one, np.exp(shared)) for one in curves]
+    added = states * (len(curves) - 1)
+    gain = max(shared_chi2 - own_chi2, 0.0) / added
+    # σ may be a little too large, never too small by less scatter than it says.
+    scatter = max(own_chi2 / dof, 1.0)
+    falling = np.argsort(-shared)
+    return RatesTest(
+        shared_per_s=np.exp(shared)[falling],
+        own_per_s=np.array([np.exp(found)[falling] for found, _, _ in alone]),
+        own_sigma_per_s=np.array([(np.exp(found) * sigma)[falling] for found, _, sigma in alone]),
+        amplitude=np.array([value[falling] for value, _ in amplitudes]),
+        amplitude_sigma=np.array([sigma[falling] for _, sigma in amplitudes]),
+        chi2_shared=shared_chi2,
+        chi2_own=own_chi2,
+        dof_own=dof,
+        noise_dof=noise_dof,
+        p_value=float(fdtrc(added, dof, gain / scatter)),
+    )
+
+
+def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float, FloatArray]:
+    """Log rates (s,), χ² and σ of the log rates."""
+
+    def residuals(log_rates: FloatArray) -> FloatArray:
+        return np.concatenate([one.residuals(np.exp(log_rates)) for one in curves])
+
+    found = least_squares(residuals, start, x_scale=0.1, xtol=1e-10, ftol=1e-12)
+    jacobian = np.asarray(found.jac, dtype=np.float64)
+    covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e3 * EPSILON)
+    return found.x, float(2 * found.cost), np.sqrt(np.diag(covariance))
+
+
+def _amplitudes(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    design = one.design(rates_per_s)
+    covariance = np.linalg.pinv(design.T @ design, rcond=1e3 * EPSILON)
+    solution = covariance @ design.T @ one.target
+    return solution[:-1], np.sqrt(np.diag(covariance))[:-1]

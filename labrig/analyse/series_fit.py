@@ -1,0 +1,147 @@
+"""From a series to its decay fit: what a run's processing and `labrig fit decay` have in common."""
+
+from collections.abc import Sequence
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from labrig.errors import FitError, UsageError
+from labrig.fit import DecayFit, fit_decay
+from labrig.quantity import FRACTION, parse
+from labrig.results import Series, joined, read_series
+
+#: Counts below which a Poisson weight would trust a point too much.
+LEAST_COUNTS = 5.0
+#: Fewer frames do not tell their flicker; shutters and apertures scatter by 0.5-1 %.
+FRAMES_FOR_FLICKER = 6
+TYPICAL_FLICKER = 0.007
+#: A decay whose every amplitude is less certain than this was not seen.
+SEEN_SIGMA = 3.0
+
+
+def fit_series(
+    series: Series,
+    states: int | None = None,
+    offset_sigma: ArrayLike | None = None,
+    flicker: float | None = None,
+    fixed_rates_per_s: Sequence[float] = (),
+) -> DecayFit:
+    """Fit the usable rows of `series`.
+
+    Parameters
+    ----------
+    states
+        Number of states; None chooses.
+    offset_sigma
+        Prior σ of a constant background, one for all channels or one each, in the unit of the
+        values: 0 fixes it at zero, infinity leaves it free. None takes what the dark subtraction
+        left uncertain in each channel.
+    flicker
+        Relative scatter common to the channels of a frame; None measures it.
+    fixed_rates_per_s
+        Rates that take part and are held; they count as states.
+
+    Raises
+    ------
+    FitError
+        The data do not allow a fit.
+    """
+    if not series.usable.any():
+        raise FitError(
+            "expected usable frames, got none: all are clipped or excluded; expose for less"
+        )
+    usable = series.take(np.flatnonzero(series.usable))
+    if offset_sigma is None:
+        offset_sigma = np.where(np.isnan(series.dark_sigma), 0.0, series.dark_sigma)
+    if flicker is None and len(usable.t_s) < FRAMES_FOR_FLICKER:
+        flicker = TYPICAL_FLICKER
+    fit = fit_decay(
+        usable.t_s,
+        usable.values,
+        None if np.isnan(usable.sigma).all() else usable.sigma,
+        exposure_s=usable.exposure_s,
+        channels=usable.channels,
+        n_states=states,
+        offset_sigma=offset_sigma,
+        flicker=flicker,
+        fixed_rates=fixed_rates_per_s,
+        repeats=usable.unit,
+        correlation=usable.correlation,
+        offset_correlation=usable.dark_correlation,
+    )
+    if all(state.amplitude < SEEN_SIGMA * state.amplitude_sigma for state in fit.states):
+        raise FitError(
+            "expected a decay, got nothing that stands out of the noise by "
+            f"{SEEN_SIGMA:g} σ; did the lamp light, is the region on the sample, is the exposure "
+            "long enough?"
+        )
+    return fit
+
+
+def fit_table(
+    path: Path,
+    states: int | None,
+    offset: str,
+    flicker: str,
+    weights: str,
+    origin_s: float,
+    from_s: float | None,
+) -> list[tuple[str, DecayFit]]:
+    """Fit every region in anybody's table; see `labrig fit decay --help` for the texts.
+
+    Raises
+    ------
+    UsageError
+        A text that is none of those.
+    DataError
+        The table or the data in it.
+    """
+    offset_sigma = {"zero": 0.0, "free": np.inf}.get(offset)
+    if offset_sigma is None:
+        offset_sigma = _sigma(offset)
+    rho = None if flicker == "auto" else _flicker(flicker)
+    if weights not in ("given", "counts"):
+        raise UsageError(f"--weights: expected 'given' or 'counts', got '{weights}'")
+    fits = []
+    for series in _by_region(read_series(path)):
+        rows = np.flatnonzero(series.t_s >= (-np.inf if from_s is None else from_s))
+        if not len(rows):
+            raise UsageError(f"{path}: no point at {from_s:g} s or later; give an earlier --from")
+        part = series.take(rows)
+        part = replace(part, t_s=part.t_s - origin_s)
+        if weights == "counts":
+            part = replace(part, sigma=np.sqrt(np.maximum(part.values, LEAST_COUNTS)))
+        fits.append((part.region, fit_series(part, states, offset_sigma, rho)))
+    return fits
+
+
+def _by_region(parts: Sequence[Series]) -> list[Series]:
+    """Repeats of a decay joined: they share rates and amplitudes."""
+    regions: dict[str, list[Series]] = {}
+    for part in parts:
+        regions.setdefault(part.region, []).append(part)
+    return [joined(same) for same in regions.values()]
+
+
+def _sigma(text: str) -> float:
+    try:
+        sigma = float(text)
+    except ValueError:
+        sigma = -1.0
+    if not sigma >= 0:
+        raise UsageError(
+            f"--offset: expected 'zero', 'free' or the σ of a background in the data's unit, got "
+            f"'{text}'"
+        )
+    return sigma
+
+
+def _flicker(text: str) -> float:
+    try:
+        return parse(text, FRACTION) if "%" in text else float(text)
+    except ValueError:
+        raise UsageError(
+            f"--flicker: expected 'auto', a percentage such as '0.7 %' or 0, got '{text}'"
+        ) from None

@@ -1,0 +1,181 @@
+"""Patches below the filter: rows of its strip, each of a material of its own.
+
+A patch is seen in those rows of the strip's slices that lie in its region. The light there is that
+of the same place along the strip.
+"""
+
+from collections.abc import Callable, Mapping, Sequence
+from dataclasses import dataclass, replace
+from typing import TypeVar
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.analyse.inputs import Inputs
+from labrig.analyse.part import Part, StageResult
+from labrig.calibration.lvf_file import SLICES, Strip
+from labrig.errors import DataError, FitError
+from labrig.reduce import RawFrame
+from labrig.region import Region, region_pixels
+
+FloatArray = NDArray[np.float64]
+Found = TypeVar("Found")
+Slices = dict[str, Region]
+
+#: Rows of cells of the colour filter that a patch has at least: one tells no noise.
+LEAST_CELLS = 2
+
+
+@dataclass(frozen=True)
+class StripPatch:
+    """Rows of a strip.
+
+    Attributes
+    ----------
+    name
+        As the protocol has it; empty where it names none.
+    material
+        What the sample in it is called.
+    region
+        In the frame; None: all of the strip.
+    alone
+        Whether it is the only one.
+    """
+
+    name: str
+    material: str
+    region: Region | None = None
+    alone: bool = True
+
+    @property
+    def folder(self) -> str:
+        """Below a result, where there are several."""
+        return "" if self.alone else self.name
+
+    def own(self, found: Mapping[str, Found]) -> Found | None:
+        """What belongs to it of what an earlier part found by patch; one alone has the only one."""
+        if self.alone and len(found) == 1:
+            return next(iter(found.values()))
+        return found.get(self.name)
+
+
+def strip_patches(part: Part) -> list[StripPatch]:
+    """Those of a part's protocol, moved where a person wants them.
+
+    Raises
+    ------
+    UsageError
+        There is no patch of a name that a person wants moved.
+    """
+    protocol = part.protocol
+    if not protocol.patches:
+        return [StripPatch("", protocol.sample.name)]
+    regions = part.choices.patches(protocol)
+    alone = len(regions) == 1
+    return [
+        StripPatch(name, protocol.sample.name if alone else name, region, alone)
+        for name, region in regions.items()
+    ]
+
+
+def cut(
+    patches: Sequence[StripPatch], strip: Strip, raw: RawFrame, count: int = SLICES
+) -> tuple[dict[StripPatch, Slices], tuple[str, ...]]:
+    """The strip's slices in the rows of every patch, and why a patch has none, a line each.
+
+    Parameters
+    ----------
+    raw
+        Any frame: its size and colours.
+
+    Raises
+    ------
+    DataError
+        No patch has any.
+    """
+    found, refused = {}, []
+    for patch in patches:
+        try:
+            found[patch] = _rows(patch, strip, raw, count)
+        except DataError as error:
+            refused.append(str(error))
+    if not found:
+        raise DataError("; ".join(refused))
+    return found, tuple(refused)
+
+
+def _rows(patch: StripPatch, strip: Strip, raw: RawFrame, count: int) -> Slices:
+    whole = strip.slices(count)
+    if patch.region is None:
+        return whole
+    x, y, wide, high = region_pixels(patch.region, raw.width, raw.height)
+    top, bottom = y / raw.height, (y + high) / raw.height
+    found: Slices = {}
+    for name, (left, upper, width, height) in whole.items():
+        first, last = max(upper, top), min(upper + height, bottom)
+        found[name] = (left, first, width, last - first)
+    rows = [round((y + h) * raw.height) - round(y * raw.height) for _, y, _, h in found.values()]
+    ends = [round(end[0] * raw.width) for end in (strip.left, strip.right)]
+    if min(rows) >= LEAST_CELLS * raw.cfa_side and x <= ends[0] and x + wide >= ends[1]:
+        return found
+    upper = min(y for _, y, _, _ in whole.values()) * raw.height
+    lower = max(y + h for _, y, _, h in whole.values()) * raw.height
+    where = (
+        f"expected patch {patch.name} below the filter from end to end, in "
+        f"{LEAST_CELLS * raw.cfa_side} rows or more of its own: the filter lies in columns "
+        f"{ends[0]} to {ends[1]} and rows {upper:.0f} to {lower:.0f}, the patch in columns {x} to "
+        f"{x + wide} and rows {y} to {y + high} ({max(min(rows), 0)} in common)"
+    )
+    raise DataError(f"{where}; move it: labrig process RUN --roi {patch.name}=x,y,width,height")
+
+
+def lean(strip: Strip, slices: Slices, raw: RawFrame) -> FloatArray:
+    """(P,) by how much further right along a tilted strip slices lie than their columns say.
+
+    0 in its middle rows; rows above and below belong to other places of it, in shares of its
+    length.
+    """
+    size = np.array([raw.width, raw.height])
+    left, right = np.array(strip.left) * size, np.array(strip.right) * size
+    across, down = right - left
+    middles = np.array([(x + width / 2, y + height / 2) for x, y, width, height in slices.values()])
+    x, y = (middles * size).T
+    below = y - (left[1] + (x - left[0]) * down / across)
+    return np.asarray(below * down / (across**2 + down**2))
+
+
+def of_each(
+    patches: Sequence[StripPatch],
+    known: Inputs,
+    process: Callable[[StripPatch, Inputs], StageResult],
+) -> StageResult:
+    """What `process` finds of every patch, what is known growing from one to the next.
+
+    A patch that cannot be processed is a warning, as long as another one can.
+
+    Raises
+    ------
+    DataError, FitError
+        No patch can.
+    """
+    if len(patches) == 1 and patches[0].alone:
+        return process(patches[0], known)
+    found, failures = StageResult(known), []
+    for patch in patches:
+        name = patch.name
+        try:
+            one = process(patch, found.known)
+        except (DataError, FitError) as error:
+            failures.append(type(error)(f"{name}: {error}"))
+            found = replace(found, warnings=(*found.warnings, str(failures[-1])))
+            continue
+        titled = (replace(section, title=f"{section.title}: {name}") for section in one.sections)
+        found = StageResult(
+            known=one.known,
+            sections=(*found.sections, *titled),
+            lines=(*found.lines, *(f"{name}: {line}" for line in one.lines)),
+            warnings=(*found.warnings, *(f"{name}: {warning}" for warning in one.warnings)),
+        )
+    if len(failures) == len(patches):
+        raise failures[0]
+    return found

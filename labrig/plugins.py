@@ -1,0 +1,58 @@
+"""Drivers, protocols and what is made of their runs, by name: the shipped and those of packages.
+
+A package adds its own by entry points: a driver in `labrig.drivers`; a protocol in
+`labrig.protocols`, and under the same name its analysis in `labrig.analyses`, the type of its
+result in `labrig.results` and, unless plain tables will do, its part of a report in
+`labrig.reports`.
+"""
+
+from functools import cache
+from importlib.metadata import EntryPoint, entry_points
+from typing import Any
+
+from labrig.errors import UsageError
+from labrig.yaml_file import did_you_mean
+
+DRIVERS = "labrig.drivers"
+PROTOCOLS = "labrig.protocols"
+ANALYSES = "labrig.analyses"
+RESULTS = "labrig.results"
+REPORTS = "labrig.reports"
+_KINDS = {
+    DRIVERS: "driver",
+    PROTOCOLS: "protocol",
+    ANALYSES: "analysis of protocol",
+    RESULTS: "result of protocol",
+    REPORTS: "report of protocol",
+}
+
+
+def names(group: str) -> list[str]:
+    """Names that can be used, sorted."""
+    return sorted(_registered(group))
+
+
+def load(group: str, name: str, source: str) -> Any:
+    """The class or function registered as `name`; `source` says in messages who asked for it.
+
+    Raises
+    ------
+    UsageError
+        There is none, or it cannot be imported.
+    """
+    found = _registered(group)
+    kind = _KINDS[group]
+    if name not in found:
+        raise UsageError(f"{source}: unknown {kind} '{name}'; {did_you_mean(name, list(found))}")
+    try:
+        return found[name].load()
+    except (ImportError, AttributeError) as error:
+        raise UsageError(
+            f"{source}: the {kind} '{name}' ({found[name].value}) cannot be imported ({error})"
+        ) from None
+
+
+@cache
+def _registered(group: str) -> dict[str, EntryPoint]:
+    """Reading them takes milliseconds, and what is installed does not change while labrig runs."""
+    return {entry.name: entry for entry in entry_points(group=group)}

@@ -1,5 +1,0 @@
-"""From the frames of a camera calibration to its camera file."""
-
-from labrig.process.camera_calibration.stage import process
-
-__all__ = ["process"]

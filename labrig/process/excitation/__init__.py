@@ -1,5 +1,0 @@
-"""Excitation rates, from a run to a material."""
-
-from labrig.process.excitation.processing import process
-
-__all__ = ["process"]

@@ -1,5 +1,0 @@
-"""Calibration of a linear variable filter: strip, mercury lines, colour filters."""
-
-from labrig.process.lvf_calibration.stage import process
-
-__all__ = ["process"]

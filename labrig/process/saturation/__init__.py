@@ -1,5 +1,0 @@
-"""Processing of `saturation`: is r(0) = 1, and do rates depend on the charge."""
-
-from labrig.process.saturation.process import process
-
-__all__ = ["process"]

@@ -1,0 +1,90 @@
+"""A blank in a report."""
+
+from collections.abc import Iterator
+
+import numpy as np
+
+from labrig.calibration import BlankFile
+from labrig.report.figure_style import (
+    DASHED,
+    LEFT_PT,
+    MARKERS,
+    MUTED,
+    PAPER,
+    channel_colour,
+    error_bars,
+    new_figure,
+    place,
+    points,
+)
+from labrig.report.legend import legend_above, lined, marked
+from labrig.report.rendering import Rendered, Source
+from labrig.report.sections import Picture, Section, Table
+from labrig.report.written_numbers import plus_minus, rounded
+from labrig.results.blank import BlankResult
+
+HEIGHT_PT = 250.0
+
+
+def render(result: BlankResult, source: Source) -> Rendered:
+    """Show stray light over time, and what stays."""
+    return Rendered((_section(result),), tuple(_lines(result.calibration)))
+
+
+def _section(result: BlankResult) -> Section:
+    file, found, channels = result.calibration, result.stray_light, result.calibration.channels
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+    axes.set_xscale("log")
+    least = 4 * float(np.median(found.sigma))
+    axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(least)))
+    axes.axhline(0, color=MUTED, linewidth=0.8)
+    entries = []
+    for number, name in enumerate(channels):
+        colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
+        error_bars(axes, found.start_s, found.rate[:, number], found.sigma[:, number], colour)
+        points(axes, found.start_s, found.rate[:, number], marker, colour, PAPER)
+        entries.append(marked(name, marker, colour, PAPER))
+    if file.first_clean_s is not None:
+        axes.axvline(file.first_clean_s, color=MUTED, linewidth=1.0, linestyle=DASHED)
+        entries.append(lined("first clean frame", MUTED, DASHED))
+    axes.set_xlabel("Begin of the exposure after lamp off / s")
+    axes.set_ylabel("Above what stays / DN/s")
+    legend_above(figure, entries, columns=4)
+    rows = tuple(
+        (
+            name,
+            plus_minus(file.constant_dn_per_s[number], file.constant_sigma_dn_per_s[number]),
+            plus_minus(file.ambient_dn_per_s[number], file.ambient_sigma_dn_per_s[number]),
+        )
+        for number, name in enumerate(channels)
+    )
+    clean = file.first_clean_s
+    said = (
+        "No frame is clean: some light fades as slowly as the sequence lasts."
+        if clean is None
+        else f"Frames that begin {rounded(clean, 3)} s or later after lamp off show nothing that "
+        "fades."
+    )
+    return Section(
+        "What is seen without a glow",
+        (
+            said,
+            "What stays is seen after lamp off but not in the dark frames. What leaks in is in "
+            "both, so that dark frames take care of it as long as it stays the same; it is told "
+            "from dark current by its colour, and may be more.",
+        ),
+        (Picture("blank", figure, "Light of the blank over time; bars are ± 1 σ."),),
+        (Table(("channel", "stays / DN/s", "leaks in / DN/s"), rows),),
+    )
+
+
+def _lines(file: BlankFile) -> Iterator[str]:
+    clean = file.first_clean_s
+    yield "never clean" if clean is None else f"clean from {rounded(clean, 3)} s after lamp-off"
+    for what, level, sigma in (
+        ("stays", file.constant_dn_per_s, file.constant_sigma_dn_per_s),
+        ("leaks in", file.ambient_dn_per_s, file.ambient_sigma_dn_per_s),
+    ):
+        named = zip(file.channels, level, sigma, strict=True)
+        yield f"{what}: {', '.join(f'{n} {plus_minus(v, s)}' for n, v, s in named)} DN/s"

@@ -1,0 +1,57 @@
+"""What a protocol's part of a report is made from, and what it is."""
+
+from dataclasses import dataclass
+from typing import Any, Protocol
+
+from labrig.acquire import RigFile
+from labrig.optics import CameraResponse
+from labrig.record import RunRecord
+from labrig.report.sections import Section
+
+
+@dataclass(frozen=True)
+class Source:
+    """What a result was found in.
+
+    Attributes
+    ----------
+    run
+        The protocol's part of the run; its photographs may be shown.
+    protocol
+        Its model.
+    rig
+        The bench as it was.
+    camera
+        The camera's curves, for colours; None if they are not known.
+    """
+
+    run: RunRecord
+    protocol: Any
+    rig: RigFile
+    camera: CameraResponse | None = None
+
+
+@dataclass(frozen=True)
+class Rendered:
+    """A result for people.
+
+    Attributes
+    ----------
+    sections
+        Of the report, in this order.
+    lines
+        The numbers that matter, for the terminal.
+    """
+
+    sections: tuple[Section, ...]
+    lines: tuple[str, ...]
+
+
+class Renderer(Protocol):
+    """A protocol's part of a report, registered in `labrig.reports` under the protocol's name.
+
+    It is called inside of `figure_style()`.
+    """
+
+    def __call__(self, result: Any, source: Source, /) -> Rendered:
+        """Show a result of the protocol's own type."""

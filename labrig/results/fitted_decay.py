@@ -1,0 +1,417 @@
+"""What a decay told: rates, amplitudes and how well they are known; the file `fit.json`."""
+
+import json
+import math
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict, dataclass
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from labrig.errors import DataError, FitError
+from labrig.material.rates import exponential_means
+from labrig.results.arrays import FloatArray
+from labrig.results.measured import Measured, with_uncertainty
+
+FILE = "fit.json"
+#: Of that file: another number says that keys were renamed or mean something else.
+SCHEMA_VERSION = 1
+
+
+@dataclass(frozen=True)
+class DecayState:
+    """One exponential a e^(−k t); its σ are standard uncertainties.
+
+    Attributes
+    ----------
+    k_r_per_s, k_r_sigma_per_s
+        Rate; σ 0 if it was held.
+    amplitude, amplitude_sigma
+        At lamp off, in the brightest channel, in the values' units.
+    """
+
+    k_r_per_s: float
+    k_r_sigma_per_s: float
+    amplitude: float
+    amplitude_sigma: float
+
+
+@dataclass(frozen=True)
+class Candidate:
+    """What n states achieved, all candidates at the same weights.
+
+    Attributes
+    ----------
+    n_states
+        States tried.
+    reduced_chi2
+        χ² per degree of freedom; NaN if there are none.
+    bic
+        χ² + parameters · log(independent data).
+    f_p_value
+        Chance of such a gain over one state fewer if that were enough; None for the first tried.
+    """
+
+    n_states: int
+    reduced_chi2: float
+    bic: float
+    f_p_value: float | None
+
+
+@dataclass(frozen=True)
+class Rival:
+    """A rival fitted, in the brightest channel, in the values' units.
+
+    Attributes
+    ----------
+    name, formula
+        Which, and how it reads.
+    amplitude, tau_s, exponent, exponent_sigma
+        A at lamp off, τ, p or β and its σ.
+    bic
+        Bayesian information criterion, comparable with the candidates'.
+    """
+
+    name: str
+    formula: str
+    amplitude: float
+    tau_s: float
+    exponent: float
+    exponent_sigma: float
+    bic: float
+
+
+@dataclass(frozen=True)
+class FittedDecay:
+    """Σ_i a_i e^(−k_i t) times one weight per channel, plus its offset; with uncertainties.
+
+    Attributes
+    ----------
+    states
+        By falling rate.
+    channels, channel_weights, channel_weights_sigma
+        Names, weights (maximum 1, which is held), their σ.
+    offsets, offsets_sigma
+        Of the channels, in the values' units; σ 0 if held at 0.
+    repeats, levels
+        Names of the charges, and how bright the decay after each was over their mean.
+    flicker, flicker_sigma
+        Relative noise common to the channels of a frame; σ 0 if given.
+    chi2, dof
+        Sum of squared residuals in units of the noise, and its degrees of freedom.
+    bic
+        χ² + parameters · log(independent data).
+    covariance
+        Of the `covariance_parameters`; channel weights and the other channels' offsets
+        marginalised.
+    warnings
+        What to distrust, and what to do about it.
+    candidates
+        The numbers of states tried.
+    rivals
+        Power law and stretched exponential, fitted to the same series.
+    better_rival
+        The one of them that does clearly better than exponentials, if one does.
+    """
+
+    states: tuple[DecayState, ...]
+    channels: tuple[str, ...]
+    channel_weights: tuple[float, ...]
+    channel_weights_sigma: tuple[float, ...]
+    offsets: tuple[float, ...]
+    offsets_sigma: tuple[float, ...]
+    repeats: tuple[str, ...]
+    levels: tuple[float, ...]
+    flicker: float
+    flicker_sigma: float
+    chi2: float
+    dof: int
+    bic: float
+    covariance: FloatArray
+    warnings: tuple[str, ...]
+    candidates: tuple[Candidate, ...]
+    rivals: tuple[Rival, ...]
+    better_rival: Rival | None
+
+    @property
+    def covariance_parameters(self) -> tuple[str, ...]:
+        """Names of the rows of `covariance`: rate and amplitude of each state, then the offset."""
+        of_states = [
+            name
+            for number in range(1, self.n_states + 1)
+            for name in (f"k_r_per_s {number}", f"amplitude {number}")
+        ]
+        return (*of_states, "offset")
+
+    @property
+    def rates(self) -> tuple[Measured, ...]:
+        """Decay rate of every state in 1/s, falling."""
+        return tuple(Measured(s.k_r_per_s, s.k_r_sigma_per_s, "1/s") for s in self.states)
+
+    @property
+    def brightest_channel(self) -> str:
+        """Name of the channel of weight 1, in whose DN/s the amplitudes are."""
+        return self.channels[self.brightest]
+
+    def amplitudes_in(self, channel: str) -> tuple[Measured, ...]:
+        """Amplitude of every state in the DN/s of a channel.
+
+        Raises
+        ------
+        DataError
+            There is no such channel.
+        """
+        if channel not in self.channels:
+            raise DataError(
+                f"expected the same channels in both runs, got {channel} in one of them and "
+                f"{', '.join(self.channels)} in the other"
+            )
+        at = self.channels.index(channel)
+        weight = Measured(self.channel_weights[at], self.channel_weights_sigma[at])
+        return tuple(
+            Measured(s.amplitude, s.amplitude_sigma, "DN/s").times(weight) for s in self.states
+        )
+
+    @property
+    def n_states(self) -> int:
+        """Number of states."""
+        return len(self.states)
+
+    @property
+    def brightest(self) -> int:
+        """The channel of weight 1, in whose units the amplitudes are."""
+        return int(np.argmax(self.channel_weights))
+
+    @property
+    def offset(self) -> float:
+        """Of the brightest channel."""
+        return self.offsets[self.brightest]
+
+    @property
+    def offset_sigma(self) -> float:
+        """Of the brightest channel."""
+        return self.offsets_sigma[self.brightest]
+
+    @property
+    def reduced_chi2(self) -> float:
+        """χ² per degree of freedom; NaN if there are none."""
+        return self.chi2 / self.dof if self.dof > 0 else math.nan
+
+    def predict(self, t_s: ArrayLike, exposure_s: ArrayLike = 0.0) -> FloatArray:
+        """Mean signal during exposures, (n, C), offsets included.
+
+        Parameters
+        ----------
+        t_s
+            (n,) start of the exposures after lamp off, ≥ 0.
+        exposure_s
+            Their length ≥ 0, one for all or (n,).
+
+        Raises
+        ------
+        FitError
+            Shapes that do not agree.
+        """
+        t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
+        exposure = np.asarray(exposure_s, dtype=np.float64)
+        if t.ndim != 1 or exposure.shape not in {(), t.shape}:
+            raise FitError(
+                f"expected times (n,) and one exposure or (n,), got {t.shape} and "
+                f"{exposure.shape}; give one exposure per time"
+            )
+        rates = np.array([state.k_r_per_s for state in self.states])
+        amplitudes = np.array([state.amplitude for state in self.states])
+        signal = exponential_means(rates, t, np.broadcast_to(exposure, t.shape)) @ amplitudes
+        predicted: FloatArray = np.multiply.outer(signal, self.channel_weights) + self.offsets
+        return predicted
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `fit.json`; None for what is not finite."""
+        fields: dict[str, Any] = {
+            "schema_version": SCHEMA_VERSION,
+            "n_states": self.n_states,
+            "states": [asdict(state) for state in self.states],
+            "channel_weights": self._by_channel(self.channel_weights),
+            "channel_weights_sigma": self._by_channel(self.channel_weights_sigma),
+            "offset": self.offset,
+            "offset_sigma": self.offset_sigma,
+            "offsets": self._by_channel(self.offsets),
+            "offsets_sigma": self._by_channel(self.offsets_sigma),
+            "levels": dict(zip(self.repeats, self.levels, strict=True)),
+            "flicker": self.flicker,
+            "flicker_sigma": self.flicker_sigma,
+            "chi2": self.chi2,
+            "dof": self.dof,
+            "reduced_chi2": self.reduced_chi2,
+            "bic": self.bic,
+            "covariance_parameters": list(self.covariance_parameters),
+            "covariance": self.covariance.tolist(),
+            "warnings": list(self.warnings),
+            "candidates": [asdict(candidate) for candidate in self.candidates],
+            "rivals": [asdict(rival) for rival in self.rivals],
+            "better_rival": self.better_rival.name if self.better_rival else None,
+        }
+        finite: dict[str, Any] = _finite(fields)
+        return finite
+
+    def to_json(self) -> str:
+        """The text of `fit.json`."""
+        return json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+
+    def __str__(self) -> str:
+        """A table for people; digits in brackets are σ in units of the last places."""
+        rows = [
+            [
+                str(number),
+                with_uncertainty(state.k_r_per_s, state.k_r_sigma_per_s),
+                with_uncertainty(1 / state.k_r_per_s, state.k_r_sigma_per_s / state.k_r_per_s**2),
+                with_uncertainty(state.amplitude, state.amplitude_sigma),
+            ]
+            for number, state in enumerate(self.states, start=1)
+        ]
+        lines = _table([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
+        lines.append(f"weights  {self._written(self.channel_weights, self.channel_weights_sigma)}")
+        if any(self.offsets_sigma):
+            lines.append(f"offsets  {self._written(self.offsets, self.offsets_sigma)}")
+        if len(self.repeats) > 1:
+            pairs = zip(self.repeats, self.levels, strict=True)
+            lines.append(f"levels   {', '.join(f'{name} {level:.4f}' for name, level in pairs)}")
+        if self.flicker or self.flicker_sigma:
+            percent = with_uncertainty(100 * self.flicker, 100 * self.flicker_sigma)
+            lines.append(f"flicker  {percent} %")
+        lines.append(f"reduced χ² {self.reduced_chi2:.3g} ({self.dof} dof), BIC {self.bic:.1f}")
+        lines += [f"! {warning}" for warning in self.warnings]
+        return "\n".join(lines)
+
+    def _by_channel(self, values: tuple[float, ...]) -> dict[str, float]:
+        return dict(zip(self.channels, values, strict=True))
+
+    def _written(self, values: tuple[float, ...], sigmas: tuple[float, ...]) -> str:
+        return ", ".join(
+            f"{name} {with_uncertainty(value, sigma)}"
+            for name, value, sigma in zip(self.channels, values, sigmas, strict=True)
+        )
+
+
+def write_fitted_decay(path: Path, result: FittedDecay) -> None:
+    """Write `fit.json`.
+
+    Raises
+    ------
+    OSError
+        It cannot be written.
+    """
+    path.write_text(result.to_json(), encoding="utf-8", newline="\n")
+
+
+def read_fitted_decay(path: Path) -> FittedDecay:
+    """Read `fit.json`.
+
+    Raises
+    ------
+    DataError
+        It is missing, damaged, or of another version.
+    """
+    try:
+        return _from_dict(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError) as error:
+        raise DataError(
+            f"{path}: expected the fit of a decay as this labrig writes it, got something else "
+            f"({error!r}); make it again: labrig process RUN"
+        ) from None
+
+
+def find_fitted_decays(folder: Path) -> dict[str, Path]:
+    """The `fit.json` of every patch in a result folder, by the name of the patch's folder.
+
+    A run with one patch has its fit in the result folder itself, under the name "".
+    """
+    return {
+        path.parent.name if path.parent != folder else "": path
+        for path in sorted(folder.rglob(FILE))
+    }
+
+
+def read_fitted_decays(folder: Path) -> dict[str, FittedDecay]:
+    """What was fitted to every patch, by name as in `find_fitted_decays`; none if nothing was.
+
+    Raises
+    ------
+    DataError
+        A file is damaged.
+    """
+    return {name: read_fitted_decay(path) for name, path in find_fitted_decays(folder).items()}
+
+
+def _from_dict(content: Any) -> FittedDecay:
+    if content["schema_version"] != SCHEMA_VERSION:
+        raise ValueError(f"schema_version {content['schema_version']}, not {SCHEMA_VERSION}")
+    weights: Mapping[str, float] = content["channel_weights"]
+    rivals = tuple(
+        Rival(**one | {"exponent_sigma": _known(one["exponent_sigma"])})
+        for one in content["rivals"]
+    )
+    better = content["better_rival"]
+    return FittedDecay(
+        states=tuple(
+            DecayState(
+                k_r_per_s=float(one["k_r_per_s"]),
+                k_r_sigma_per_s=_known(one["k_r_sigma_per_s"]),
+                amplitude=float(one["amplitude"]),
+                amplitude_sigma=_known(one["amplitude_sigma"]),
+            )
+            for one in content["states"]
+        ),
+        channels=tuple(weights),
+        channel_weights=tuple(map(float, weights.values())),
+        channel_weights_sigma=_in_order(weights, content["channel_weights_sigma"]),
+        offsets=tuple(float(content["offsets"][name]) for name in weights),
+        offsets_sigma=_in_order(weights, content["offsets_sigma"]),
+        repeats=tuple(content["levels"]),
+        levels=tuple(map(float, content["levels"].values())),
+        flicker=float(content["flicker"]),
+        flicker_sigma=_known(content["flicker_sigma"]),
+        chi2=float(content["chi2"]),
+        dof=int(content["dof"]),
+        bic=float(content["bic"]),
+        covariance=np.array(
+            [[_known(value) for value in row] for row in content["covariance"]], dtype=np.float64
+        ),
+        warnings=tuple(content["warnings"]),
+        candidates=tuple(
+            Candidate(**one | {"reduced_chi2": _known(one["reduced_chi2"], math.nan)})
+            for one in content["candidates"]
+        ),
+        rivals=rivals,
+        better_rival=next((one for one in rivals if one.name == better), None),
+    )
+
+
+def _in_order(channels: Mapping[str, Any], sigma: Mapping[str, float | None]) -> tuple[float, ...]:
+    return tuple(_known(sigma[name]) for name in channels)
+
+
+def _known(value: float | None, unknown: float = math.inf) -> float:
+    """JSON has no infinity: what nothing is known of is null there."""
+    return unknown if value is None else float(value)
+
+
+def _table(rows: Sequence[Sequence[str]]) -> list[str]:
+    widths = [max(len(row[column]) for row in rows) for column in range(len(rows[0]))]
+    return [
+        "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
+        for row in rows
+    ]
+
+
+def _finite(item: Any) -> Any:
+    """JSON knows no infinity and no NaN."""
+    if isinstance(item, dict):
+        return {key: _finite(value) for key, value in item.items()}
+    if isinstance(item, list):
+        return [_finite(value) for value in item]
+    if isinstance(item, float) and not math.isfinite(item):
+        return None
+    return item

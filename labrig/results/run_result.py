@@ -1,0 +1,180 @@
+"""What the analysis of a run gives: a frozen type for each protocol, and its file `result.json`."""
+
+import json
+import math
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Annotated, Any, ClassVar, Self
+
+from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, ValidationError
+
+from labrig.errors import DataError, DiskError, UsageError
+from labrig.plugins import RESULTS, load
+
+FILE = "result.json"
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class RunResult:
+    """What one protocol's analysis found.
+
+    A result holds numbers, with units in the names of its fields or in a `Measured`; arrays are
+    `FloatArray`, `BoolArray` or `IntArray`. All that a report shows, an export writes or a
+    notebook computes with is in it. A protocol's own type is a frozen dataclass on top of this,
+    registered by an entry point in `labrig.results` under the protocol's name.
+
+    Attributes
+    ----------
+    kind
+        Name of the protocol, as it is registered.
+    schema_version
+        Of the type's fields: another number says that fields were renamed or mean something else.
+    warnings
+        What to distrust, and what to do about it, a line each.
+    """
+
+    kind: ClassVar[str]
+    schema_version: ClassVar[int] = 1
+    __pydantic_config__: ClassVar[ConfigDict] = ConfigDict(
+        arbitrary_types_allowed=True, extra="forbid", ser_json_inf_nan="strings"
+    )
+
+    warnings: tuple[str, ...] = ()
+
+    def provides(self) -> Mapping[str, Any]:
+        """What later parts of a chain may use, by the name of a field of their `Inputs`."""
+        return {}
+
+    def failures(self) -> tuple[str, ...]:
+        """Why there is no result at all, a line each; none if there is one."""
+        return ()
+
+    def write_files(self, folder: Path) -> None:
+        """Write what later runs and other programs read into a folder, such as a material file.
+
+        Raises
+        ------
+        DiskError
+            A file cannot be written.
+        """
+
+    def to_dict(self) -> dict[str, Any]:
+        """The content of `result.json`; what is not finite is the text `Infinity` or `NaN`."""
+        fields = TypeAdapter(type(self)).dump_python(self, mode="json")
+        content: dict[str, Any] = _finite(
+            {"kind": self.kind, "schema_version": self.schema_version} | fields
+        )
+        return content
+
+    def to_json(self) -> str:
+        """The text of `result.json`, a field of the result a line."""
+        lines = [
+            f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False, allow_nan=False)}"
+            for key, value in self.to_dict().items()
+        ]
+        return "{\n" + ",\n".join(lines) + "\n}\n"
+
+    @classmethod
+    def from_dict(cls, content: Mapping[str, Any]) -> Self:
+        """The result whose `to_dict` is `content`.
+
+        Raises
+        ------
+        ValueError
+            It is another protocol's, of another version, or no result at all.
+        """
+        fields = dict(content)
+        kind, version = fields.pop("kind", None), fields.pop("schema_version", None)
+        if (kind, version) != (cls.kind, cls.schema_version):
+            raise ValueError(
+                f"a result of '{kind}', version {version}, not of '{cls.kind}', version "
+                f"{cls.schema_version}"
+            )
+        return TypeAdapter(cls).validate_python(fields)
+
+
+def _of_its_kind(content: Any) -> RunResult:
+    """A result as its protocol's own type; one that is already is left as it is."""
+    if isinstance(content, RunResult):
+        return content
+    if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
+        raise ValueError("a result must say which protocol's it is")
+    result_type: type[RunResult] = load(RESULTS, content["kind"], FILE)
+    return result_type.from_dict(content)
+
+
+#: A field that holds the result of any protocol.
+AnyResult = Annotated[
+    RunResult, PlainValidator(_of_its_kind), PlainSerializer(lambda result: result.to_dict())
+]
+
+
+def write_result(folder: Path, result: RunResult) -> None:
+    """Write `result.json` and the other files of a result into a folder.
+
+    Raises
+    ------
+    DiskError
+        One cannot be written.
+    """
+    path = folder / FILE
+    try:
+        path.write_text(result.to_json(), encoding="utf-8", newline="\n")
+    except OSError as error:
+        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    result.write_files(folder)
+
+
+def read_result(run: Path | str) -> RunResult:
+    """What the latest analysis of a run found, of the type that belongs to its protocol.
+
+    Parameters
+    ----------
+    run
+        A run folder, or a result folder in one.
+
+    Raises
+    ------
+    UsageError
+        There is no result, or its protocol belongs to a package that is not installed.
+    DataError
+        The file was changed, or another version of labrig wrote it.
+
+    Examples
+    --------
+    >>> result = labrig.read_result("runs/2026-01-01T00-00-00_decay_blue-paint")  # doctest: +SKIP
+    >>> result.patches["paint"].fit.rates[0]  # doctest: +SKIP
+    Measured(value=0.0802, sigma=0.0013, unit='1/s')
+    """
+    place = Path(run)
+    path = place / "result" / FILE if (place / "result").is_dir() else place / FILE
+    if not path.is_file():
+        raise UsageError(
+            f"{place}: expected a run with a result; make it with: labrig process {place}"
+        )
+    try:
+        return _of_its_kind(json.loads(path.read_text(encoding="utf-8")))
+    except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
+        raise DataError(
+            f"{path}: expected a result as this labrig writes it, got something else "
+            f"({_first(error)}); make it again: labrig process {place}"
+        ) from None
+
+
+def _first(error: Exception) -> str:
+    if isinstance(error, ValidationError):
+        first = error.errors()[0]
+        return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
+    return " ".join(str(error).split())
+
+
+def _finite(item: Any) -> Any:
+    """`item` without numbers that JSON does not know."""
+    if isinstance(item, dict):
+        return {key: _finite(value) for key, value in item.items()}
+    if isinstance(item, list | tuple):
+        return [_finite(value) for value in item]
+    if isinstance(item, float) and not math.isfinite(item):
+        return "NaN" if math.isnan(item) else "Infinity" if item > 0 else "-Infinity"
+    return item

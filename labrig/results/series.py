@@ -1,0 +1,213 @@
+"""A time series: what one patch of the sample gave, frame by frame."""
+
+import csv
+import io
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+import numpy.typing as npt
+
+from labrig.errors import DataError, DiskError
+from labrig.results.arrays import FloatArray
+
+#: Columns of series.csv that are not channels (contracts.md).
+TIME, EXPOSURE, SIGMA_SUFFIX = "t_s", "exposure_s", "_sigma"
+RESERVED = ("iso", "f_number", "frame", "unit", "region", "flag")
+#: Flags of rows that a fit must leave out, and what joins the flags of one row.
+EXCLUDING = frozenset({"clipped", "excluded", "afterglow"})
+FLAG_JOINER = "+"
+
+
+@dataclass(frozen=True, eq=False)
+class Series:
+    """Values of one patch over n frames and C channels.
+
+    Parameters
+    ----------
+    t_s, exposure_s
+        Shape (n,): start of each exposure (after lamp off) and its length; 0 if not known.
+    values
+        Shape (n, C), DN/s: black and dark subtracted, exposure divided out. Read from somebody's
+        table: in the table's unit.
+    sigma
+        Shape (n, C), in the unit of `values`: photon, read and dark noise of that very frame, NaN
+        where not known. Flicker of lamp, shutter and aperture is not in it: it moves all channels
+        of a frame together, and the fit measures it.
+    dark_sigma
+        Shape (C,), DN/s: uncertainty of the dark level that was subtracted, common to all frames:
+        the prior of a fit's offset. 0 if a background region was subtracted in each frame, NaN if
+        nothing is known. Not a column of series.csv.
+    channels
+        C names, such as `("R", "G", "B")`.
+    iso, f_number
+        Shape (n,), NaN where not known.
+    frame, unit, flag
+        n texts: file name, unit of the run, and `""` or flags such as `clipped`, `late`,
+        `excluded`, joined by `+`.
+    region
+        Name of the patch.
+    correlation
+        Shape (C, C), of the channels' noise in one frame; None if not known. Not a column of
+        series.csv.
+    dark_correlation
+        Shape (C, C), of what `dark_sigma` is the σ of; None if not known. No column, either.
+    """
+
+    t_s: FloatArray
+    exposure_s: FloatArray
+    values: FloatArray
+    sigma: FloatArray
+    dark_sigma: FloatArray
+    channels: tuple[str, ...]
+    iso: FloatArray
+    f_number: FloatArray
+    frame: tuple[str, ...]
+    unit: tuple[str, ...]
+    flag: tuple[str, ...]
+    region: str = ""
+    correlation: FloatArray | None = None
+    dark_correlation: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        _check_shapes(self)
+        _check_numbers(self)
+        _check_texts(self)
+
+    @property
+    def usable(self) -> npt.NDArray[np.bool_]:
+        """Shape (n,): rows that no flag excludes."""
+        return np.array([is_usable(flag) for flag in self.flag])
+
+    def take(self, rows: npt.NDArray[np.intp], region: str | None = None) -> "Series":
+        """The given rows, in that order, as of `region` if that is given."""
+        return Series(
+            t_s=self.t_s[rows],
+            exposure_s=self.exposure_s[rows],
+            values=self.values[rows],
+            sigma=self.sigma[rows],
+            dark_sigma=self.dark_sigma,
+            channels=self.channels,
+            iso=self.iso[rows],
+            f_number=self.f_number[rows],
+            frame=tuple(self.frame[row] for row in rows),
+            unit=tuple(self.unit[row] for row in rows),
+            flag=tuple(self.flag[row] for row in rows),
+            region=self.region if region is None else region,
+            correlation=self.correlation,
+            dark_correlation=self.dark_correlation,
+        )
+
+    def by_unit(self) -> list["Series"]:
+        """One series per unit, in order of appearance."""
+        units = np.array(self.unit)
+        return [self.take(np.flatnonzero(units == unit)) for unit in dict.fromkeys(self.unit)]
+
+    def write_csv(self, path: Path) -> None:
+        """Write series.csv (contracts.md); `read_series` gives the same numbers back."""
+        write_series(path, [self])
+
+
+def write_series(path: Path, series: Sequence[Series]) -> None:
+    """Write several patches into one series.csv, one below the other.
+
+    Raises
+    ------
+    DataError
+        The patches have different channels.
+    DiskError
+        The file cannot be written.
+    """
+    channels = {part.channels for part in series}
+    if len(channels) != 1:
+        raise DataError(f"expected series of the same channels, got {sorted(channels)}")
+    text = io.StringIO()
+    writer = csv.writer(text, lineterminator="\n")
+    columns = [column for name in channels.pop() for column in (name, name + SIGMA_SUFFIX)]
+    writer.writerow([TIME, EXPOSURE, *columns, *RESERVED])
+    for part in series:
+        writer.writerows(_rows(part))
+    try:
+        path.write_text(text.getvalue(), encoding="utf-8", newline="")
+    except OSError as error:
+        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+
+
+def _rows(series: Series) -> Iterator[list[str]]:
+    for i in range(len(series.t_s)):
+        pairs = zip(series.values[i], series.sigma[i], strict=True)
+        yield [
+            _number(series.t_s[i]),
+            _number(series.exposure_s[i]),
+            *(_number(number) for pair in pairs for number in pair),
+            _number(series.iso[i]),
+            _number(series.f_number[i]),
+            series.frame[i],
+            series.unit[i],
+            series.region,
+            series.flag[i],
+        ]
+
+
+def _number(value: np.float64) -> str:
+    """The shortest text that reads back as the same number; nothing for NaN."""
+    return "" if np.isnan(value) else repr(float(value))
+
+
+def _check_shapes(series: Series) -> None:
+    n, c = len(series.t_s), len(series.channels)
+    if n == 0 or c == 0:
+        raise DataError(f"expected rows and channels, got {n} rows of {c} channels")
+    if series.values.shape != (n, c) or series.sigma.shape != (n, c):
+        raise DataError(
+            f"expected values and sigma of shape {(n, c)}, got {series.values.shape} "
+            f"and {series.sigma.shape}"
+        )
+    numbers = [len(column) for column in (series.exposure_s, series.iso, series.f_number)]
+    texts = [len(column) for column in (series.frame, series.unit, series.flag)]
+    if {*numbers, *texts} != {n} or series.dark_sigma.shape != (c,):
+        raise DataError(f"expected {n} entries in every column and {c} dark_sigma")
+
+
+def _check_numbers(series: Series) -> None:
+    for name, column in (
+        (TIME, series.t_s),
+        (EXPOSURE, series.exposure_s),
+        ("values", series.values),
+    ):
+        if not np.isfinite(column).all():
+            raise DataError(f"expected finite numbers in {name}, got NaN or infinity")
+    if (series.exposure_s < 0).any():
+        raise DataError("expected exposures of 0 s or more, got a negative one")
+    if np.isinf(series.sigma).any() or (series.sigma <= 0).any():
+        raise DataError(
+            "expected sigma above 0 (a value without uncertainty would outweigh all others), got "
+            "0, less or infinity; leave it empty where it is not known"
+        )
+
+
+def _check_texts(series: Series) -> None:
+    taken = {TIME, EXPOSURE, *RESERVED}
+    for name in series.channels:
+        if not name or name in taken or name.endswith(SIGMA_SUFFIX) or not _is_plain(name):
+            raise DataError(f"{name!r} cannot name a channel; rename it")
+        taken.add(name)
+    for text in {*series.frame, *series.unit, *series.flag, series.region}:
+        if not _is_plain(text):
+            raise DataError(f"expected a text on one line without outer spaces, got {text!r}")
+
+
+def _is_plain(text: str) -> bool:
+    return text.isprintable() and text == text.strip()
+
+
+def is_usable(flag: str) -> bool:
+    """Whether no word in `flag` excludes its row."""
+    return EXCLUDING.isdisjoint(flag.split(FLAG_JOINER))
+
+
+def add_flag(flag: str, word: str) -> str:
+    """`flag` with `word` in it, once."""
+    words = [known for known in flag.split(FLAG_JOINER) if known]
+    return FLAG_JOINER.join(dict.fromkeys([*words, word]))

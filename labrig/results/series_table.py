@@ -1,0 +1,217 @@
+"""Reads series.csv, and anybody's table of a decay: comma, tab, semicolon or blanks."""
+
+import csv
+import math
+import os
+from collections.abc import Sequence
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from labrig.errors import DataError, LabrigError, UsageError
+from labrig.input_file import read_text
+from labrig.results.arrays import FloatArray
+from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
+
+_TIME_NAMES = frozenset({TIME, "t", "time_s", "time", "t (s)", "time (s)"})
+_EXPOSURE_NAMES = frozenset({EXPOSURE, "exposure"})
+#: The column of uncertainties where there is one channel.
+_LONE_SIGMA = "sigma"
+_COMMENT = "#"
+_EXPECTED = "expected a table with a column t_s (or t, time_s) and one or more of values"
+
+
+@dataclass(frozen=True)
+class _Table:
+    """Cells of a table, as many in each row as in the header; `lines` are their line numbers."""
+
+    header: tuple[str, ...]
+    rows: tuple[tuple[str, ...], ...]
+    lines: tuple[int, ...]
+
+
+def read_series(path: str | os.PathLike[str]) -> list[Series]:
+    """The series in a table, one for each region and unit in it, in order of appearance.
+
+    The header may be missing: then the columns are time, value and perhaps sigma. `#` begins a
+    comment. Every column that is not reserved (contracts.md) is a channel, except one that only
+    the first row fills: some programs put the settings of a measurement there.
+
+    Raises
+    ------
+    UsageError
+        No such file, or not such a table.
+    DataError
+        A number that is not finite, a missing value, or no rows.
+    """
+    return parse_series(read_text(Path(path)), str(path))
+
+
+def parse_series(text: str, source: str) -> list[Series]:
+    """As `read_series`, from text; `source` names it in messages."""
+    try:
+        return _series(_table(text))
+    except LabrigError as error:
+        # In one line, though a cell may hold a form feed or another of Unicode's line ends.
+        raise type(error)(f"{source}: {' '.join(str(error).split())}") from None
+
+
+def _table(text: str) -> _Table:
+    content = [
+        (number, line)
+        for number, line in enumerate(text.replace("\r\n", "\n").split("\n"), start=1)
+        if line.strip() and not line.lstrip().startswith(_COMMENT)
+    ]
+    if not content:
+        raise DataError(f"{_EXPECTED}, got no rows")
+    delimiter = next((mark for mark in "\t,;" if mark in content[0][1]), None)
+    cells = [_cells(line, delimiter, number) for number, line in content]
+    first = cells[0]
+    if all(_is_number(cell) for cell in first if cell):
+        if len(first) not in (2, 3):
+            raise UsageError(
+                f"{_EXPECTED}, got {len(first)} columns without names; name them in the first line"
+            )
+        header: tuple[str, ...] = (TIME, "value", _LONE_SIGMA)[: len(first)]
+    else:
+        header = tuple(cell.strip() for cell in first)
+        content, cells = content[1:], cells[1:]
+    if not cells:
+        raise DataError(f"{_EXPECTED}, got a header without rows")
+    numbers = tuple(number for number, _ in content)
+    rows = [_fitted(row, len(header), line) for row, line in zip(cells, numbers, strict=True)]
+    return _Table(header, tuple(rows), numbers)
+
+
+def _cells(line: str, delimiter: str | None, number: int) -> list[str]:
+    if delimiter is None:
+        return line.split()
+    try:
+        return next(csv.reader([line], delimiter=delimiter, skipinitialspace=True), [])
+    except csv.Error as error:
+        raise UsageError(f"line {number}: not a row of a table ({error})") from None
+
+
+def _fitted(row: list[str], columns: int, line: int) -> tuple[str, ...]:
+    """`row` with as many cells as the header: empty ones at its end may be left out or too many."""
+    if any(cell.strip() for cell in row[columns:]):
+        raise UsageError(
+            f"line {line}: expected {columns} columns as in the first line, got {len(row)}"
+        )
+    return (*row[:columns], *[""] * (columns - len(row)))
+
+
+def _series(table: _Table) -> list[Series]:
+    columns = _columns(table)
+    names = list(columns)
+    time = _only(names, _TIME_NAMES)
+    if time is None:
+        raise UsageError(f"{_EXPECTED}, got {', '.join(names)}")
+    exposure = _only(names, _EXPOSURE_NAMES)
+    others = [name for name in names if name not in (time, exposure, *RESERVED)]
+    channels = [name for name in others if not _is_sigma(name, others)]
+    if not channels:
+        raise UsageError(f"{_EXPECTED}, got {', '.join(names)}; a column of values is missing")
+    sigmas = [_sigma_name(channel, channels, others) for channel in channels]
+
+    def numbers(name: str | None, empty: float | None) -> FloatArray:
+        if name is None:
+            return np.full(len(table.rows), empty, dtype=np.float64)
+        return _numbers(name, columns[name], table.lines, empty)
+
+    def texts(name: str) -> tuple[str, ...]:
+        return tuple(columns.get(name, [""] * len(table.rows)))
+
+    whole = Series(
+        t_s=numbers(time, None),
+        exposure_s=numbers(exposure, 0.0),
+        values=np.stack([numbers(channel, None) for channel in channels], axis=1),
+        sigma=np.stack([numbers(sigma, math.nan) for sigma in sigmas], axis=1),
+        dark_sigma=np.full(len(channels), math.nan),
+        channels=tuple(channels),
+        iso=numbers("iso" if "iso" in columns else None, math.nan),
+        f_number=numbers("f_number" if "f_number" in columns else None, math.nan),
+        frame=texts("frame"),
+        unit=texts("unit"),
+        flag=texts("flag"),
+    )
+    groups: dict[tuple[str, str], list[int]] = {}
+    for row, key in enumerate(zip(texts("region"), whole.unit, strict=True)):
+        groups.setdefault(key, []).append(row)
+    return [whole.take(np.array(rows), region) for (region, _), rows in groups.items()]
+
+
+def _columns(table: _Table) -> dict[str, list[str]]:
+    """Cells by column name, without the columns that hold no series."""
+    columns: dict[str, list[str]] = {}
+    for position, name in enumerate(table.header):
+        cells = [row[position] for row in table.rows]
+        blank = not any(cell.strip() for cell in cells[1:])
+        setting = blank and (len(cells) > 1 or not cells[0].strip())
+        if setting and name not in RESERVED and not name.endswith(SIGMA_SUFFIX):
+            continue
+        if not name or name in columns:
+            raise UsageError(
+                f"expected a name of its own for every column, got '{name}' for column "
+                f"{position + 1}; rename it"
+            )
+        columns[name] = cells
+    return columns
+
+
+def _only(names: Sequence[str], wanted: frozenset[str]) -> str | None:
+    """The one of `names` that is among the `wanted`."""
+    found = [name for name in names if name.lower() in wanted]
+    if len(found) > 1:
+        raise UsageError(f"expected one of the columns {', '.join(found)}, got several; keep one")
+    return found[0] if found else None
+
+
+def _is_sigma(name: str, others: Sequence[str]) -> bool:
+    return name == _LONE_SIGMA or name.removesuffix(SIGMA_SUFFIX) in set(others) - {name}
+
+
+def _sigma_name(channel: str, channels: Sequence[str], others: Sequence[str]) -> str | None:
+    if channel + SIGMA_SUFFIX in others:
+        return channel + SIGMA_SUFFIX
+    if _LONE_SIGMA not in others:
+        return None
+    if len(channels) > 1:
+        raise UsageError(
+            f"expected a column <name>{SIGMA_SUFFIX} for each of {', '.join(channels)}, got one "
+            f"'{_LONE_SIGMA}' for all; rename it"
+        )
+    return _LONE_SIGMA
+
+
+def _numbers(
+    name: str, cells: Sequence[str], lines: Sequence[int], empty: float | None
+) -> FloatArray:
+    """The cells of a column as numbers, blank ones as `empty` (None: there may be none)."""
+    values = np.empty(len(cells))
+    for row, (cell, line) in enumerate(zip(cells, lines, strict=True)):
+        if not cell.strip():
+            if empty is None:
+                raise DataError(f"line {line}: expected a number for '{name}', got nothing")
+            values[row] = empty
+            continue
+        if not _is_number(cell):
+            raise UsageError(
+                f"line {line}: expected a number with a decimal point for '{name}', got '{cell}'"
+            )
+        values[row] = float(cell)
+        if not math.isfinite(values[row]):
+            raise DataError(
+                f"line {line}: expected a finite number for '{name}', got '{cell}'; "
+                "leave the row out"
+            )
+    return values
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return "_" not in cell  # which Python takes for a thousands separator

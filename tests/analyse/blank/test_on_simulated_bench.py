@@ -1,0 +1,112 @@
+"""A blank on the simulated bench: clean when nothing shines, and what it says when it is not."""
+
+import shutil
+from collections.abc import Callable
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+from labrig.analyse import Choices
+from labrig.analyse.choices import read_decay_protocol
+from labrig.analyse.decay import measure_decay
+from labrig.analyse.inputs import Inputs
+from labrig.analyse.timed_frames import intact_frames
+from labrig.calibration import read_blank_file
+from labrig.errors import DataError
+from labrig.process import process_run
+from labrig.record import read_run
+from tests.analyse.recorded import cut_off_and_resumed, record
+
+PROTOCOL: dict[str, Any] = {
+    "protocol": "blank",
+    "sample": {"name": "blank"},
+    "charge": "30 s",
+    "for": "40 s",
+    "later_by": ["0 s", "400 ms"],
+}
+
+
+def without_door(rig: dict[str, Any]) -> None:
+    del rig["devices"]["door"], rig["devices"]["shield"]
+    rig["simulation"] |= {"door": None, "shield": None}
+
+
+def with_light(**simulation: Any) -> Callable[[dict[str, Any]], None]:
+    def change(rig: dict[str, Any]) -> None:
+        without_door(rig)
+        rig["simulation"] |= simulation
+
+    return change
+
+
+def test_a_dark_bench_is_clean_as_soon_as_its_lamp_is(tmp_path: Path) -> None:
+    run = record(tmp_path, PROTOCOL, without_door)
+    result = process_run(run)
+    blank = read_blank_file(run / "result" / "blank.yaml")
+    assert blank.first_clean_s is not None
+    # At 160 ms the filament still glows, at 560 ms it does not.
+    assert blank.first_clean_s == pytest.approx(0.56, abs=0.02)
+    assert blank.rate_dn_per_s[0][1] > 100 * blank.sigma_dn_per_s[0][1]
+    assert result.warnings == ()
+    constant = np.array(blank.constant_dn_per_s)
+    assert np.all(np.abs(constant) < 4 * np.array(blank.constant_sigma_dn_per_s))
+
+    cut, resumed = cut_off_and_resumed(run, "blank-2")
+    assert list(cut.completed()) == ["dark", "blank-1"]
+    assert list(resumed.completed()) == ["dark", "blank-1", "blank-2", "put-back"]
+
+
+def test_a_hot_pixel_is_no_light_that_leaks_in(tmp_path: Path) -> None:
+    """This sensor has one in blue, which makes 0.7 DN/s of the mean of that colour."""
+    assert process_run(record(tmp_path, PROTOCOL, with_light(seed=4))).warnings == ()
+
+
+def test_a_leak_is_found_and_told_and_a_decay_is_warned(tmp_path: Path) -> None:
+    leaking = record(tmp_path / "leak", PROTOCOL, with_light(ambient=1e-6))
+    result = process_run(leaking)
+    blank = read_blank_file(leaking / "result" / "blank.yaml")
+    green = blank.channels.index("G")
+    assert blank.ambient_dn_per_s[green] > 10 * blank.ambient_sigma_dn_per_s[green]
+    # Dark frames hold it, too: nothing is left once they are subtracted.
+    assert abs(blank.constant_dn_per_s[green]) < 4 * blank.constant_sigma_dn_per_s[green]
+    assert any("all the time: find where it leaks in" in said for said in result.warnings)
+
+    decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "40 s",
+             "first": "1 s", "exposure": "1 s"}  # fmt: skip
+    run = read_run(record(tmp_path / "decay", decay))
+    found = measure_decay(run, read_decay_protocol(run.folder), Choices(), Inputs(blank=blank))
+    assert any("all the time" in said for said in found.run_warnings)
+
+
+def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
+    lamp = {"afterglow": 1e-5, "afterglow_fades": "20 s"}
+    run = record(tmp_path, PROTOCOL, with_light(lamp=lamp))
+    result = process_run(run)
+    blank = read_blank_file(run / "result" / "blank.yaml")
+    assert blank.first_clean_s is None
+    assert any("still gets darker at its end" in said for said in result.warnings)
+    decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "20 s",
+             "first": "1 s", "exposure": "1 s"}  # fmt: skip
+    decayed = read_run(record(tmp_path / "decay", decay))
+    protocol = read_decay_protocol(decayed.folder)
+    with pytest.raises(DataError, match="never became clean"):
+        measure_decay(decayed, protocol, Choices(), Inputs(blank=blank))
+    # One that is clean from the third frame on: the earlier ones are left out, and it is said.
+    third = sorted(frame.t_s for frame in intact_frames(decayed, Choices()).decay)[2]
+    ends = blank.model_copy(update={"first_clean_s": third, "ambient_dn_per_s": (0.0, 0.0, 0.0)})
+    found = measure_decay(decayed, protocol, Choices(), Inputs(blank=ends))
+    (series,) = found.series.values()
+    assert list(series.usable[:4]) == [False, False, True, True]
+    assert any("2 frames begin before the bench is dark" in said for said in found.run_warnings)
+    rate = np.array(blank.rate_dn_per_s)[:, 1]
+    assert rate[1] > rate[-1]
+
+
+def test_frames_that_were_changed_are_refused(tmp_path: Path) -> None:
+    run = record(tmp_path, PROTOCOL, without_door)
+    first, *_, last = sorted((run / "frames").iterdir())
+    shutil.copy(last, first)
+    with pytest.raises(Exception, match="was changed after the run"):
+        process_run(run)

@@ -1,0 +1,226 @@
+"""Excitation rates of a simulated sample, light on it known, against the truth."""
+
+import json
+import shutil
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import yaml
+
+from labrig.acquire import read_rig_file
+from labrig.analyse.choices import Choices, read_run_protocol
+from labrig.analyse.excitation.charges import charged
+from labrig.analyse.excitation.lit import glowing
+from labrig.analyse.excitation.processing import USUAL
+from labrig.analyse.inputs import Inputs
+from labrig.analyse.part import Part
+from labrig.calibration import BlankFile
+from labrig.calibration.irradiance_file import IrradianceFile, write_irradiance_file
+from labrig.calibration.lvf_file import SLICES, Strip
+from labrig.errors import DataError
+from labrig.material import read_material
+from labrig.process import process_run
+from labrig.record import read_run
+from labrig.reduce import measure, read_raw
+from labrig.sim.bench_settings import LvfSettings
+from labrig.sim.lamp import BURNING_K, filament_spectrum
+from labrig.sim.lvf import Lvf
+from labrig.sim.phosphor import band_cells
+from tests.analyse.recorded import cut_off_and_resumed, record
+from tests.calibration.test_camera_file import camera
+
+#: Wide, so that a slice of the strip is ten pixels; low, so that it is fast.
+WIDTH, HEIGHT = 384, 48
+QUICK: dict[str, Any] = {
+    "protocol": "excitation",
+    "sample": {"name": "blue-paint"},
+    "growth": "30 %",
+    "at_most": 4,
+    "refine": 1,
+    "bare": ["10 s", "1 min", "4 min"],
+    "for": "40 s",
+    "last_decay": "60 s",
+    "rest": {"at_least": "1 min", "check_every": "3 min", "at_most": "4 min"},
+}
+TILT = np.radians(1.0)
+
+
+def true_irradiance(width: int = WIDTH, height: int = HEIGHT) -> IrradianceFile:
+    """What an irradiance run without error would find on the shipped rig with such a sensor."""
+    lvf_settings = yaml.safe_load(Path("config/sim-phosphor.yaml").read_text())["simulation"]["lvf"]
+    lvf = Lvf(LvfSettings.model_validate(lvf_settings))
+    down = 0.42 * width / height * np.tan(TILT)
+    strip = Strip(left=(0.08, 0.5 + down), right=(0.92, 0.5 - down), height=0.3, rising=False)
+    bands_nm = read_material("blue-paint").bands_nm
+    assert bands_nm is not None
+    cells, lamp = band_cells(bands_nm), filament_spectrum(BURNING_K)
+    position = np.array(strip.positions(width, height))
+    about = np.linspace(-0.5, 0.5, 41) / SLICES
+    passed = np.array([lvf.transmission(np.clip(u + about, 0, 1)).mean(axis=0) for u in position])
+    norm = np.linalg.norm(cells @ lamp)
+    through, direct = (passed * lamp) @ cells.T / norm, cells @ lamp / norm
+    ratio = direct.sum() / through.sum(axis=1)
+    return IrradianceFile(
+        lamp="the room's own",
+        bands_nm=bands_nm,
+        direct=tuple(direct),
+        direct_sigma=tuple(0.003 * direct),
+        position=tuple(position),
+        through=tuple(map(tuple, through)),
+        through_sigma=tuple(map(tuple, 0.005 * through)),
+        scale_sigma=0.005,
+        ratio=tuple(ratio),
+        ratio_sigma=tuple(0.005 * ratio),
+        strip=strip,
+    )
+
+
+def recorded(folder: Path) -> Path:
+    folder.mkdir(exist_ok=True)
+    write_irradiance_file(folder / "irradiance.yaml", true_irradiance())
+
+    def change(rig: dict[str, Any]) -> None:
+        rig["optics"]["irradiance"] = str(folder / "irradiance.yaml")
+        rig["simulation"]["sensor"] = {"width": WIDTH, "height": HEIGHT}
+        rig["simulation"]["sample"] = [{"material": "blue-paint", "region": [0.03, 0.1, 0.94, 0.8]}]
+        rig["devices"]["lamp"]["warm_up"] = "0 s"
+
+    return record(folder, QUICK, change)
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return recorded(tmp_path_factory.mktemp("excitation"))
+
+
+@pytest.mark.campaign
+def test_rates_and_levels_are_the_true_ones(run: Path) -> None:
+    result = process_run(run)
+    found, true = read_material(run / "result" / "material.yaml"), read_material("blue-paint")
+    (state,), (truth,) = found.states, true.states
+    assert state.k_e_per_s is not None
+    assert state.k_e_per_s_sigma is not None
+    assert truth.k_e_per_s is not None
+    assert state.k_r_per_s_sigma is not None
+    assert state.r0 is not None
+    assert state.r0_sigma is not None
+    assert abs(state.k_r_per_s - truth.k_r_per_s) < 4 * state.k_r_per_s_sigma
+    # The room's lamp is four times as bright as the irradiance to which Table 1's rates belong.
+    rates, sigma = np.array(state.k_e_per_s) / 4, np.array(state.k_e_per_s_sigma) / 4
+    off = rates - np.array(truth.k_e_per_s)
+    assert (np.abs(off) < np.maximum(4 * sigma, 1e-5)).all()
+    assert rates[:3] == pytest.approx(truth.k_e_per_s[:3], rel=0.1)
+    kappa = 4 * float(np.array(truth.k_e_per_s) @ true_irradiance().direct)
+    assert state.r0 == pytest.approx(
+        kappa / (kappa + truth.k_r_per_s), abs=4 * state.r0_sigma + 0.01
+    )
+    closure = next(line for line in result.lines if line.startswith("closure"))
+    assert float(closure.split("within ")[1].split(" %")[0]) < 5
+    assert float(closure.split("(")[1].split(" σ")[0]) < 3
+    assert (run / "result" / "figures").is_dir()
+    fit = json.loads((run / "result" / "excitation.json").read_text())
+    assert fit["states"][0]["k_e_upper_per_s"][5] < 1e-3
+
+
+def test_charges_double_until_the_glow_stops_growing(run: Path) -> None:
+    record_ = read_run(run)
+    lit = {
+        unit: [action for action in attempt.actions if action.device == "lamp"]
+        for unit, attempt in record_.completed().items()
+    }
+    seconds = {u: a[1].start_time - a[0].end_time for u, a in lit.items() if len(a) == 2}
+    doubled = [seconds[f"strip-{n}"] for n in range(1, 5) if f"strip-{n}" in seconds]
+    assert doubled == pytest.approx([8.0 * 2**n for n in range(len(doubled))], abs=0.1)
+    assert 8 <= seconds["refine-1"] <= doubled[-1] + 0.1
+    asked = [
+        (action.unit, action.task)
+        for attempt in record_.completed().values()
+        for action in attempt.actions
+        if action.is_by_hand
+    ]
+    assert asked == [("strip-meter", "lvf on sample"), ("bare-meter", "lvf away")]
+
+
+@pytest.mark.campaign
+def test_killed_in_the_middle_it_goes_on_with_the_filter_where_it_was(
+    run: Path, tmp_path: Path
+) -> None:
+    again = tmp_path / run.name
+    shutil.copytree(run, again)
+    cut, resumed = cut_off_and_resumed(again, "strip-3")
+    assert list(cut.completed())[-1] == "strip-2"
+    assert list(resumed.completed()) == list(read_run(run).completed())
+    # The room is opened anew; had its hands not put the filter back, all places would glow alike.
+    last = resumed.frames("strip")[-1]
+    places = [
+        measure(read_raw(last.path), region)
+        for region in true_irradiance().strip.slices(9).values()
+    ]
+    glow = [place.channels["B"].mean for place in places]
+    assert max(glow) > 5 * min(glow)
+
+
+def test_without_knowing_the_light_it_says_what_to_do(run: Path) -> None:
+    path = run / "rig.yaml"
+    kept = path.read_text()
+    try:
+        path.write_text("\n".join(line for line in kept.splitlines() if "irradiance:" not in line))
+        with pytest.raises(DataError, match="run irradiance and name its run"):
+            process_run(run)
+    finally:
+        path.write_text(kept)
+
+
+def test_a_frame_that_was_changed_is_refused(run: Path) -> None:
+    frame = read_run(run).frames("strip")[0].path
+    kept = frame.read_bytes()
+    try:
+        frame.write_bytes(kept[:-1] + b"x")
+        with pytest.raises(DataError, match="was changed after the run"):
+            process_run(run)
+    finally:
+        frame.write_bytes(kept)
+
+
+def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: Path) -> None:
+    blank = BlankFile(
+        iso=400, f_number=4.0, channels=("G",), t_s=(0.5,), rate_dn_per_s=((0.0,),),
+        sigma_dn_per_s=((1.0,),), constant_dn_per_s=(0.0,), constant_sigma_dn_per_s=(1.0,),
+        ambient_dn_per_s=(0.0,), ambient_sigma_dn_per_s=(1.0,), first_clean_s=10.0,
+    )  # fmt: skip
+    whole = glowing(read_run(run), Choices(), 150.0)
+    clean = glowing(read_run(run), Choices(), 150.0, blank)
+    early = [frame for frame, one in whole.charge.items() if frame.start_time < one.off_s + 9.98]
+    assert early
+    assert set(clean.charge) == set(whole.charge) - set(early)
+    (said,) = clean.left_out
+    assert said.startswith(f"{len(early)} frames begin before the bench is dark and are left out")
+    with pytest.raises(DataError, match="all frames begin before"):
+        glowing(read_run(run), Choices(), 150.0, blank.model_copy(update={"first_clean_s": 1e4}))
+
+
+def stage_of(run: Path, **known: Any) -> Part:
+    rig = read_rig_file(run / "rig.yaml")
+    return Part(
+        read_run(run),
+        read_run_protocol(run),
+        rig,
+        Choices(),
+        replace(Inputs.of(rig), **known),
+        run / "result",
+    )
+
+
+def test_charges_are_missing(run: Path) -> None:
+    part = stage_of(run)
+    some = [one for one in part.run.attempts if not one.unit.startswith("bare")]
+    with pytest.raises(DataError, match="through the filter and without it"):
+        charged(replace(part, run=replace(part.run, attempts=some)), true_irradiance(), USUAL)
+
+
+def test_a_calibration_of_another_camera_is_refused(run: Path) -> None:
+    with pytest.raises(DataError, match="calibration of another camera"):
+        charged(stage_of(run, camera=camera()), true_irradiance(), USUAL)

@@ -1,0 +1,41 @@
+"""What is said of the light behind a filter, and when a lamp was cold."""
+
+import numpy as np
+import pytest
+
+from labrig.analyse.excitation.light import across_sites, band_sigma, site_modes
+from labrig.analyse.excitation.lit import Lit, with_warmth
+from tests.analyse.excitation.test_excitation_run import true_irradiance
+
+
+def test_across_a_place_the_light_runs_as_along_the_filter() -> None:
+    irradiance = true_irradiance()
+    across = across_sites(irradiance)
+    through = np.array(irradiance.through)
+    np.testing.assert_allclose(across.mean(axis=0), 1.0)
+    # Between Gauss's two places in a slice the light changes as from slice to slice.
+    change = np.gradient(np.log(through), axis=0) / np.sqrt(3)
+    found = np.log(across[1] / across[0])
+    assert np.corrcoef(found.ravel(), change.ravel())[0, 1] > 0.95
+    assert np.median(np.abs(found[np.abs(change) > 0.1])) > 0.1
+
+
+def test_what_is_told_of_a_place_is_what_its_modes_add_up_to() -> None:
+    irradiance = true_irradiance()
+    through = np.array(irradiance.through)
+    leaks = np.where(through < 0.01 * through.max(axis=0), 0.5, 0.02)
+    sure = irradiance.model_copy(update={"through_sigma": tuple(map(tuple, 0.02 * through))})
+    unsure = irradiance.model_copy(update={"through_sigma": tuple(map(tuple, leaks * through))})
+    variance = [(site_modes(one) ** 2).sum(axis=0) for one in (sure, unsure)]
+    far = leaks == 0.5
+    assert np.sqrt(np.median((variance[1] - variance[0])[far])) == pytest.approx(0.5, rel=0.1)
+    assert band_sigma(sure) == pytest.approx(np.full(8, 0.003))
+
+
+def test_a_lamp_is_warm_after_a_long_charge_and_cools_in_the_dark() -> None:
+    first = Lit("a", 0.0, 10.0)
+    after_long = Lit("b", 20.0, 2000.0), Lit("c", 2010.0, 2020.0), Lit("d", 4000.0, 4010.0)
+    cold = [one.cold for one in with_warmth([first, *after_long], 150.0)]
+    assert cold[0] == pytest.approx(1 - 10 / 150 / 2, abs=0.002)
+    assert cold[2] < 0.1
+    assert cold[3] > 0.95

@@ -1,0 +1,135 @@
+"""The fade and rise of the simulated lamp, a filament whose heat capacity changes as it cools."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from numpy.typing import NDArray
+
+from labrig.acquire import Plan, RunObserver
+from labrig.analyse.result import Result
+from labrig.calibration import Change, FadeFile, read_fade_file
+from labrig.clock import Clock
+from labrig.errors import UsageError
+from labrig.process import process_run
+from labrig.record import read_run
+from labrig.sim.lamp import WAVELENGTH_NM, Lamp
+from labrig.sim.simulation import LampSettings
+from tests.acquire.fakes import Watching
+from tests.analyse.recorded import cut_off_and_resumed, record
+
+FloatArray = NDArray[np.float64]
+
+PROTOCOL: dict[str, Any] = {
+    "protocol": "fade",
+    "sample": {"name": "lamp"},
+    "every": "50 ms",
+    "until": "400 ms",
+    "passes": 2,
+}
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    return record(tmp_path_factory.mktemp("fade"), PROTOCOL)
+
+
+@pytest.fixture(scope="module")
+def result(run: Path) -> Any:
+    return process_run(run)
+
+
+@pytest.fixture(scope="module")
+def fade(result: Result) -> FadeFile:
+    return read_fade_file(result.report.parent / "fade.yaml")
+
+
+def true_shares(file: FadeFile, change: Change, *, rises: bool) -> FloatArray:
+    lamp = Lamp.found(LampSettings(warm_up_deficit=0, drift_per_hour=0), on=not rises)
+    steady = Lamp.found(lamp.settings, on=True).irradiance(0.0)
+    switched = lamp.switched(rises, 10.0)
+    light = np.array([switched.irradiance(10.0 + t_s) for t_s in change.t_s])
+    edges = np.array(file.bands_nm)
+    inside = (edges[:-1, None] < WAVELENGTH_NM) & (edges[1:, None] > WAVELENGTH_NM)
+    shares: FloatArray = (light @ inside.T) / (inside @ steady)
+    return shares
+
+
+def test_the_fade_is_the_lamps_in_every_band(fade: FadeFile) -> None:
+    true = true_shares(fade, fade.fade, rises=False)
+    share, sigma = np.array(fade.fade.share), np.array(fade.fade.sigma)
+    assert np.abs(share - true).max() < 0.06
+    assert np.all(np.abs(share - true) < 3 * sigma + 1e-3)
+    steps = np.diff(fade.fade.t_s)
+    missing = steps @ (true[1:] + true[:-1]) / 2
+    assert fade.fade.missing_s() == pytest.approx(missing, abs=5e-3)
+    # The blue goes first.
+    assert np.all(np.diff(fade.fade.missing_s()) > 0)
+
+
+def test_the_rise_is_the_lamps_in_every_band(fade: FadeFile) -> None:
+    assert fade.rise is not None
+    true = true_shares(fade, fade.rise, rises=True)
+    share, sigma = np.array(fade.rise.share), np.array(fade.rise.sigma)
+    assert np.all(np.abs(share - true) < 3 * sigma + 0.02)
+    assert np.abs(share - true).max() < 0.08
+
+
+def test_it_is_told_as_a_glowing_bodys(result: Result) -> None:
+    assert result.run_warnings == ()
+    assert any(line.startswith("the fade is worth") for line in result.lines)
+
+
+def test_killed_within_a_pass_it_goes_on_there(run: Path, result: Result) -> None:
+    units = list(read_run(run).completed())
+    cut, resumed = cut_off_and_resumed(run, "pass-2")
+    assert list(cut.completed()) == units[:-3]
+    assert list(resumed.completed()) == units
+
+
+def test_without_the_lamps_spectrum_it_says_what_is_missing(run: Path, result: Result) -> None:
+    path = run / "rig.yaml"
+    path.write_text(path.read_text().replace("lamp: halogen_3000k\n", "lamp: null\n"))
+    with pytest.raises(UsageError, match="which lamp it has"):
+        process_run(run)
+
+
+def test_what_a_cold_lamp_lacks_is_the_rooms(fade: FadeFile, result: Result) -> None:
+    """The room's lamp lacks 3 % and warms in 150 s."""
+    assert fade.warming is not None
+    assert abs(fade.warming.lacks - 0.03) < 3 * fade.warming.lacks_sigma
+    assert fade.warming.lacks_sigma < 0.006
+    assert 50 < fade.warming.warms_s < 450
+    assert any("a cold lamp lacks" in line for line in result.lines)
+
+
+class Busy(Watching):
+    """A PC that does something else once, just when it should release the shutter."""
+
+    def __init__(self, clock: Clock) -> None:
+        super().__init__()
+        self._clock, self._busy = clock, False
+
+    def doing(self, what: str, until_s: float | None = None) -> None:
+        """Be late for the second photograph of the rise."""
+        super().doing(what, until_s)
+        if not self._busy and self.told.count("kept rise") == 1 and what == "lamp on":
+            self._busy = True
+            self._clock.sleep(1.0)
+
+
+def test_what_began_late_is_photographed_again(run: Path, tmp_path: Path) -> None:
+    @contextmanager
+    def busy(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+        yield Busy(clock)
+
+    again = read_run(record(tmp_path, PROTOCOL | {"warming": False}, watch=busy))
+    counts = [
+        len([frame for frame in one.frames("rise") if frame.unit == "pass-1"])
+        for one in (read_run(run), again)
+    ]
+    assert counts[1] == counts[0] + 1
+    assert max(frame.late_s for frame in again.frames("rise")) > 0.5

@@ -1,0 +1,101 @@
+"""Colour filters seen through a strip: which was not in its place, and what the rest say."""
+
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from labrig.analyse.lvf_calibration.filters import (
+    NO_FILTER,
+    Bench,
+    FilterScenes,
+    calibrated,
+    misfits,
+    residuals,
+)
+from labrig.analyse.lvf_calibration.slices import SliceValues
+from labrig.fit.least_squares import FloatArray
+from labrig.optics import Lvf, Transmittance, nominal_lvf, read_camera
+from labrig.optics.piecewise import quadrature
+from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
+
+CARD = Transmittance("card", np.array([380.0, 780.0]), np.array([0.17, 0.19]))
+BENCH = Bench(halogen(), CARD, read_camera("canon_eos_5d_mark_ii"))
+#: Fall-off of lens and lamp along the strip.
+FALL_OFF = 1 - 0.3 * np.linspace(-1, 1, 11) ** 2
+
+
+def edge(name: str, at_nm: float, sign: float) -> Transmittance:
+    nm = np.arange(380.0, 781.0, 5.0)
+    return Transmittance(name, nm, 0.02 + 0.9 / (1 + np.exp(-sign * (nm - at_nm) / 10)))
+
+
+FILTERS = [
+    NO_FILTER,
+    *(edge(f"long-{at}", at, 1) for at in range(410, 700, 40)),
+    *(edge(f"short-{at}", at, -1) for at in range(430, 700, 40)),
+]
+
+
+def strip() -> Lvf:
+    return nominal_lvf(TRUE_MAP, np.linspace(402.0, 700.0, 11), fwhm_nm=24.0, leakage=0.002)
+
+
+def values(lvf: Lvf | None, one: Transmittance, seed: int) -> SliceValues:
+    """Of 11 places, with noise; without a strip the card by itself."""
+    camera, lamp = BENCH.camera, BENCH.lamp
+    curves = (camera.wavelength_nm, lamp.wavelength_nm, one.wavelength_nm)
+    nodes, weights = quadrature(380.0, 780.0, *curves)
+    light = weights * lamp.at(nodes) * CARD.at(nodes) * one.at(nodes)
+    seen = (0.5 * lvf.transmission(nodes) if lvf else np.ones((11, len(nodes)))) * light
+    value = FALL_OFF[:, np.newaxis] * (seen @ camera.at(nodes))
+    sigma: FloatArray = np.sqrt(value * value.max() + (0.002 * value.max()) ** 2) / 1000
+    rng = np.random.default_rng(seed)
+    return SliceValues(value + sigma * rng.standard_normal(value.shape), sigma)
+
+
+def scenes(**in_their_place: Transmittance) -> FilterScenes:
+    """All filters; named ones, `-` as `_`, replaced by others."""
+    really = [in_their_place.get(one.name.replace("-", "_"), one) for one in FILTERS]
+    seen = [values(strip(), one, seed) for seed, one in enumerate(really)]
+    return FilterScenes(strip().position, FILTERS, seen, values(None, NO_FILTER, 99))
+
+
+def test_filters_in_their_place_calibrate_the_strip() -> None:
+    all_of_them = scenes()
+    assert not [str(one) for one in misfits(all_of_them, BENCH, TRUE_MAP) if one.is_wrong]
+    found = calibrated(all_of_them, BENCH, TRUE_MAP)
+    truth = strip().bands
+    np.testing.assert_allclose(found.lvf.bands.centre_nm, truth.centre_nm, atol=1.0)
+    np.testing.assert_allclose(found.lvf.bands.fwhm_nm, truth.fwhm_nm, rtol=0.1)
+    # The card by itself takes lamp and lens out: the strip lets half of the light through.
+    np.testing.assert_allclose(found.lvf.bands.peak[1:], 0.5 * truth.peak[1:], rtol=0.06)
+    left = residuals(all_of_them, BENCH, found.lvf)
+    assert np.nanmax(np.abs(left)) < 0.02
+
+
+@pytest.mark.parametrize("really", [FILTERS[0], FILTERS[4]], ids=["none", "the one before"])
+def test_a_filter_that_was_skipped_is_named(really: Transmittance) -> None:
+    (wrong,) = (one for one in misfits(scenes(long_570=really), BENCH, TRUE_MAP) if one.is_wrong)
+    said = str(wrong)
+    assert said.startswith("colour filter long-570: its picture is off its transmittance by 0.")
+    like = "no filter" if really is NO_FILTER else really.name
+    assert f"it looks like {like} (" in said
+    assert "\n" not in said
+
+
+def test_a_filter_whose_file_is_of_another_one_is_named() -> None:
+    unknown = Transmittance("unknown", np.array([380.0, 780.0]), np.array([0.6, 0.3]))
+    (wrong,) = (one for one in misfits(scenes(short_550=unknown), BENCH, TRUE_MAP) if one.is_wrong)
+    assert "short-550" in str(wrong)
+    assert "none of the others" in str(wrong)
+
+
+def test_what_clips_everywhere_is_left_out() -> None:
+    one = scenes()
+    dark = one.values[3]
+    holes = replace(dark, value=np.where(dark.value > np.median(dark.value), np.nan, dark.value))
+    with_holes = replace(one, values=[*one.values[:3], holes, *one.values[4:]])
+    assert not [m for m in misfits(with_holes, BENCH, TRUE_MAP) if m.is_wrong]
+    bands = calibrated(with_holes, BENCH, TRUE_MAP).lvf.bands
+    np.testing.assert_allclose(bands.centre_nm, strip().bands.centre_nm, atol=1.0)

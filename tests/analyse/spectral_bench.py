@@ -1,0 +1,124 @@
+"""The simulated bench for spectra, its LVF calibrated without error."""
+
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from functools import cache
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import yaml
+from numpy.typing import NDArray
+
+from labrig import shipped
+from labrig.acquire import Plan, RunObserver, read_rig_file
+from labrig.analyse import Choices
+from labrig.analyse.choices import read_run_protocol
+from labrig.analyse.emission_file import WAVELENGTH_NM
+from labrig.analyse.inputs import Inputs
+from labrig.analyse.part import Part
+from labrig.calibration import LvfFile, Strip, write_lvf_file
+from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
+from labrig.clock import Clock
+from labrig.material import read_material
+from labrig.optics import Bands
+from labrig.optics.piecewise import band_means, edges_about
+from labrig.record import read_run
+from labrig.region import region_pixels
+from labrig.run import Recording
+from labrig.sim.bench_settings import LvfSettings
+from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM
+from labrig.sim.lvf import PIECES, Lvf, pieces
+from labrig.sim.optics import emission
+from tests.acquire.fakes import Watching
+
+FloatArray = NDArray[np.float64]
+
+#: Left out at the strip's long sides, as a share of its height.
+MARGIN = 0.12
+WIDTH, HEIGHT = 96, 64
+
+
+def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path:
+    """The shipped rig for phosphors, changed as told, with its true LVF beside it."""
+    content = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
+    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    content["simulation"] |= simulation
+    for device in content["devices"].values():
+        device.pop("warm_up", None)
+    content["optics"]["lvf"] = "lvf.yaml"
+    write_lvf_file(folder / "lvf.yaml", true_lvf_file())
+    path = folder / name
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+@cache
+def true_lvf_file(width: int = WIDTH, height: int = HEIGHT) -> LvfFile:
+    """What a calibration without error would find of the shipped rig's LVF before the camera."""
+    content = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    settings = LvfSettings.model_validate(content["simulation"]["lvf"])
+    x, y, wide, high = settings.before_camera.region
+    strip = Strip(
+        left=(x, y + high / 2), right=(x + wide, y + high / 2), height=high * (1 - 2 * MARGIN),
+        rising=settings.before_camera.rising,
+    )  # fmt: skip
+    of_piece = Lvf(settings).seen(settings.before_camera, turned=False)
+    piece = pieces(settings.before_camera, width, height)
+    passed = []
+    for region in strip.slices().values():
+        left, top, across, down = region_pixels(region, width, height)
+        passed.append(of_piece[piece[top : top + down, left : left + across]].mean(axis=(0, 1)))
+    transmission = np.array(passed)
+    position = np.array(strip.positions(width, height))
+    centre = Lvf(settings).centre_nm(position)
+    even = np.ones_like(centre)
+    peak = transmission.max(axis=1)
+    leakage = even * settings.leakage
+    bands = Bands(centre, even * settings.fwhm_nm, 0 * even, peak, leakage)
+    sigma = Bands(0.3 * even, 0.6 * even, 0 * even, 0.005 * peak, 0 * even)
+    remainder = (transmission - bands.transmission(ROOM_NM))[:, ::2]
+    fine = (np.arange(PIECES) + 0.5) / PIECES
+    slope, start = np.polyfit(fine, Lvf(settings).centre_nm(fine), 1)
+    return LvfFile(
+        position=tuple(position.tolist()),
+        bands=BandColumns.of(bands),
+        sigma=BandColumns.of(sigma),
+        remainder_nm=tuple(ROOM_NM[::2].tolist()),
+        remainder=tuple(tuple(row) for row in remainder.tolist()),
+        wavelengths=WavelengthColumns(
+            coefficients=(float(start + slope / 2), float(slope / 2)),
+            span=(0.0, 1.0),
+            covariance=((0.0, 0.0), (0.0, 0.0)),
+        ),
+        before_camera=strip,
+        source="the simulated room's truth",
+    )
+
+
+@contextmanager
+def _quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserver]:
+    yield Watching()
+
+
+def record(folder: Path, protocol: dict[str, Any], **simulation: Any) -> Path:
+    """The folder of a run of that protocol on `write_bench`'s rig."""
+    path = folder / "protocol.yaml"
+    path.write_text(yaml.safe_dump({"sample": {"name": "test"}} | protocol))
+    rig = write_bench(folder, **simulation)
+    return Recording.prepare(path, rig, folder / "runs").record(_quietly)
+
+
+def stage_of(run: Path, folder: Path) -> Part:
+    """What its processing is given."""
+    rig = read_rig_file(run / "rig.yaml")
+    protocol = read_run_protocol(run)
+    return Part(read_run(run), protocol, rig, Choices(), Inputs.of(rig), folder)
+
+
+def emitted(material: str) -> FloatArray:
+    """A shipped or written material's emission in the bands of `WAVELENGTH_NM`, of sum 1."""
+    light = emission(read_material(material)).sum(axis=0)
+    means = band_means(ROOM_NM, light, edges_about(WAVELENGTH_NM))
+    return np.asarray(means / means.sum())

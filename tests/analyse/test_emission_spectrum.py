@@ -1,0 +1,317 @@
+"""The emission spectrum of a simulated sample against the truth, and what it must not miss."""
+
+import csv
+import struct
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+import tifffile
+import yaml
+
+from labrig.analyse import Choices
+from labrig.analyse.emission_file import WAVELENGTH_NM
+from labrig.analyse.emission_spectrum import (
+    EmissionSpectrum,
+    process,
+    read_emission_spectrum,
+    write_emission_spectrum,
+)
+from labrig.analyse.emission_spectrum.bench import spectral_benches
+from labrig.analyse.emission_spectrum.constancy import compared, differ, over_time
+from labrig.analyse.emission_spectrum.picture import Pictures, combined, visible
+from labrig.analyse.emission_spectrum.reading import read_places
+from labrig.analyse.inputs import Inputs
+from labrig.analyse.part import StageResult
+from labrig.errors import DataError, UsageError
+from labrig.fit.spectrum import fit_spectrum, system_through_lvf
+from labrig.optics import Spectrum
+from labrig.record import read_run
+from labrig.reduce import SeriesFrame
+from labrig.region import region_pixels
+from labrig.report import figure_style
+from tests.analyse.spectral_bench import (
+    HEIGHT,
+    WIDTH,
+    FloatArray,
+    emitted,
+    record,
+    stage_of,
+)
+from tests.fit import lvf_pictures as made
+
+QUICK = {"protocol": "emission_spectrum", "charge": "2 min", "times": ["2 s", "12 s", "30 s"],
+         "longest": "8 s"}  # fmt: skip
+ANOTHER_LABORATORY = made.CAMERAS / "ampas_rawtoaces_2017" / "canon_eos_5d_mark_ii_380_780_5.json"
+
+
+def processed(run: Path, folder: Path, excluded: frozenset[str] = frozenset()) -> StageResult:
+    folder.mkdir(parents=True, exist_ok=True)
+    with figure_style():
+        return process(replace(stage_of(run, folder), choices=Choices(excluded=excluded)))
+
+
+def error(spectrum: EmissionSpectrum, material: str) -> tuple[FloatArray, FloatArray]:
+    """Found less true, of one integral; and in σ."""
+    value = np.array(spectrum.value)
+    difference = value - emitted(material) * value.sum()
+    return difference, difference / np.array(spectrum.sigma)
+
+
+def two_colours(path: Path) -> Path:
+    """A fast state that glows in the blue and a slow one in the green."""
+    content = {
+        "name": "two-colours", "kind": "phosphor",
+        "bands_nm": [400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0],
+        "irradiance_norm": {"kind": "vector_length", "value": 1.0},
+        "states": [
+            {"k_r_per_s": k, "k_e_per_s": [k, k, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
+             "reradiation": [share / k for share in shares]}
+            for k, shares in (
+                (0.08, (0.0, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)),
+                (0.01, (0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0)),
+            )
+        ],
+    }  # fmt: skip
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+@pytest.fixture(scope="module")
+def blue(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    """Blue paint, charged by both lamps."""
+    return record(tmp_path_factory.mktemp("blue"), QUICK | {"lamps": ["halogen", "mercury"]})
+
+
+@pytest.fixture(scope="module")
+def found(blue: Path) -> StageResult:
+    return processed(blue, blue / "result")
+
+
+def test_the_spectrum_is_the_samples(blue: Path, found: StageResult) -> None:
+    spectrum = found.known.spectra[""]
+    difference, in_sigma = error(spectrum, "blue-paint")
+    assert max(spectrum.value) == 1
+    assert np.sqrt(np.mean(difference**2)) < 0.025
+    assert np.abs(in_sigma).max() < 4
+    assert np.mean(np.abs(in_sigma) < 2) > 0.8
+    assert found.warnings == ()
+    assert "over time: the same" in found.lines[1]
+    assert "mercury against halogen: the same" in found.lines[2]
+    assert {f.name for s in found.sections for f in s.figures} == {
+        "spectrum", "over-time", "shift", "lamps",
+    }  # fmt: skip
+    assert read_emission_spectrum(blue / "result" / "emission.yaml") == spectrum
+    rows = list(csv.reader((blue / "result" / "spectrum.csv").read_text().splitlines()))
+    assert [float(row[0]) for row in rows[1:]] == WAVELENGTH_NM.tolist()
+
+
+def test_without_a_calibrated_lvf_there_is_no_spectrum(blue: Path, tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match=r"lvf_calibration.*optics"):
+        process(replace(stage_of(blue, tmp_path), inputs=Inputs()))
+
+
+def test_damaged_frames_are_named(blue: Path, tmp_path: Path) -> None:
+    frame = read_run(blue).frames("spectrum")[1].path
+    content = frame.read_bytes()
+    frame.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
+    try:
+        with pytest.raises(DataError, match=f"{frame.name} was changed after the run"):
+            processed(blue, tmp_path)
+    finally:
+        frame.write_bytes(content)
+
+
+def test_states_of_different_colours_are_told(tmp_path: Path) -> None:
+    material = two_colours(tmp_path / "two-colours.yaml")
+    run = record(tmp_path, QUICK | {"white": False}, sample=str(material))
+    found = processed(run, tmp_path / "result")
+    assert any("the spectrum changes with time" in warning for warning in found.warnings)
+    assert "over time: changes" in found.lines[1]
+
+
+def test_a_mercury_lamp_that_did_not_light_is_told(tmp_path: Path) -> None:
+    keys = QUICK | {"lamps": ["halogen", "mercury"], "white": False, "times": ["2 s", "12 s"]}
+    run = record(tmp_path, keys, faults=["mercury_dead"])
+    found = processed(run, tmp_path / "result")
+    assert any("did not light" in warning for warning in found.warnings)
+
+
+@pytest.mark.shared_data
+@pytest.mark.skipif(not ANOTHER_LABORATORY.exists(), reason="needs the measured camera curves")
+def test_a_white_picture_mends_the_curves_of_another_laboratory(tmp_path: Path) -> None:
+    keys = QUICK | {"times": ["2 s", "12 s"]}
+    run = record(tmp_path, keys, sensor={"width": 96, "height": 64,
+                                         "curves": str(ANOTHER_LABORATORY)})  # fmt: skip
+    white = frozenset(frame.path.name for frame in read_run(run).frames("white"))
+    errors = []
+    for name, excluded in (("with", frozenset[str]()), ("without", white)):
+        spectrum = processed(run, tmp_path / name, excluded=excluded).known.spectra[""]
+        difference, in_sigma = error(spectrum, "blue-paint")
+        assert np.abs(in_sigma).max() < 4.5
+        errors.append(float(np.sqrt(np.mean(difference**2))))
+    assert errors[0] < 0.02
+    assert errors[0] < errors[1]
+
+
+def test_what_is_narrower_than_the_band_comes_out_in_its_place() -> None:
+    light = made.lines({532.0: 30.0}, 1e-6)
+    lvf, camera = made.curved_lvf(), made.of_the_house()
+    picture = made.photographed(light, lvf, camera, np.random.default_rng(0))
+    fit = fit_spectrum(picture.value, picture.sigma, system_through_lvf(lvf, camera, made.KNOTS_NM))
+    spectrum = EmissionSpectrum.of(fit, "line", "halogen", "run")
+    value = np.array(spectrum.value)
+    assert WAVELENGTH_NM[np.argmax(value)] == 530
+    assert np.count_nonzero(value > 0.5) <= 3
+
+
+def monochrome_dng(path: Path, counts: FloatArray) -> SeriesFrame:
+    """A frame of two seconds at ISO 100 without colour filters, its black at 1000."""
+    mosaic = np.random.default_rng(len(path.name)).poisson(counts) + 1000
+    about: list[tuple[int, str, int, Any, bool]] = [
+        (50706, "B", 4, bytes([1, 4, 0, 0]), True),
+        (50708, "s", 0, "test mono", True),
+    ]
+    about += [(50717, "H", 1, 60000, True), (50713, "H", 2, (1, 1), True)]
+    about += [(50714, "2I", 1, (1000, 1), True)]
+    with tifffile.TiffWriter(path) as writer:
+        writer.write(mosaic.astype(np.uint16), photometric="minisblack", extratags=about,
+                     metadata=None, software=False)  # fmt: skip
+    # tifffile knows LinearRaw (34892) as three colours only.
+    as_gray, as_raw = (struct.pack("<HHIHH", 262, 3, 1, kind, 0) for kind in (1, 34892))
+    path.write_bytes(path.read_bytes().replace(as_gray, as_raw))
+    return SeriesFrame(path, 1.0, 2.0, 100, unit="spectrum")
+
+
+def test_a_monochrome_camera_will_do(blue: Path, tmp_path: Path) -> None:
+    curve = tmp_path / "mono.csv"
+    sensitivity = np.column_stack([[350, 400, 500, 600, 700, 800], [0.2, 0.5, 1, 0.9, 0.6, 0.3]])
+    np.savetxt(curve, sensitivity, delimiter=",", header="wavelength_nm,L", comments="")
+    part = stage_of(blue, tmp_path)
+    part = replace(part, choices=Choices(camera=str(curve)))
+    light = Spectrum("green", np.arange(380.0, 721.0, 5.0),
+                     np.exp(-(((np.arange(380.0, 721.0, 5.0) - 530) / 35) ** 2)))  # fmt: skip
+    dark = np.full((HEIGHT, 10 * WIDTH), 4.0)
+    darks = [monochrome_dng(tmp_path / f"dark{number}.dng", dark) for number in range(2)]
+    (bench,) = spectral_benches(part, darks[0])[0].values()
+    seen = bench.seen_of(light)
+    scene = dark.copy()
+    for region, value in zip(bench.slices.values(), seen / seen.max(), strict=True):
+        x, y, width, height = region_pixels(region, 10 * WIDTH, HEIGHT)
+        scene[y : y + height, x : x + width] += 8000 * value
+    frames = [
+        monochrome_dng(tmp_path / f"glow{'-' * number}.dng", scene / (1 + number))
+        for number in range(2)
+    ]
+    (read,) = read_places(frames, darks, {"": bench.slices}, None).values()
+    picture = combined(read.pictures("spectrum"))
+    fit = fit_spectrum(picture.value, picture.sigma, bench.system)
+    value = np.array(EmissionSpectrum.of(fit, "green", "halogen", "run").value)
+    true = light.in_bands(made.EDGES_NM)
+    assert bench.camera.channels == ("L",)
+    assert value / value.sum() == pytest.approx(true / true.sum(), abs=0.01)
+
+
+def test_bands_of_a_spectrum_carry_its_covariance(found: StageResult) -> None:
+    spectrum = found.known.spectra[""]
+    edges = np.arange(400.0, 701.0, 37.5)
+    value, covariance = spectrum.in_bands(edges)
+    draws = np.random.default_rng(0).multivariate_normal(
+        spectrum.value, np.array(spectrum.covariance), 400
+    )
+    scattered = [
+        spectrum.model_copy(update={"value": tuple(draw)}).in_bands(edges)[0][1] for draw in draws
+    ]
+    assert value[1] == pytest.approx(np.mean(scattered), abs=0.005)
+    assert np.sqrt(covariance[1, 1]) == pytest.approx(np.std(scattered), rel=0.15)
+
+
+def test_bands_that_cut_through_the_grid_are_those_of_the_spectrum(found: StageResult) -> None:
+    """Steep flanks, of which straight lines through means over 10 nm make too much."""
+    fine = np.arange(395.0, 705.0, 0.1) + 0.05
+    steep = np.exp(-(((fine - 460) / 20) ** 2))
+    grid = steep.reshape(31, -1).mean(axis=1)
+    spectrum = found.known.spectra[""].model_copy(update={"value": tuple(grid.tolist())})
+    edges = np.arange(400.0, 701.0, 37.5)
+    value, _ = spectrum.in_bands(edges)
+    true = [steep[(fine > a) & (fine < b)].mean() for a, b in pairwise(edges)]
+    np.testing.assert_allclose(value, true, atol=1e-3)
+
+
+def test_a_malformed_file_is_refused_in_one_line(tmp_path: Path) -> None:
+    path = tmp_path / "emission.yaml"
+    ones = (1.0, 1.0)
+    write_emission_spectrum(
+        path,
+        EmissionSpectrum(
+            sample="x", wavelength_nm=(400.0, 410.0), value=ones, sigma=ones, low=ones,
+            high=ones, covariance=(ones, ones),
+        ),
+    )  # fmt: skip
+    path.write_text(path.read_text().replace("- 410.0", "- 390.0"))
+    with pytest.raises(UsageError, match="rising wavelengths"):
+        read_emission_spectrum(path)
+
+
+def glow(seed: int, brightness: FloatArray, shape: FloatArray, snr: float = 200.0) -> Pictures:
+    """Frames of one shape and several brightnesses with photon noise."""
+    rng = np.random.default_rng(seed)
+    true = np.outer(brightness, shape)
+    sigma = np.sqrt(true * shape.max() + 1e-4) / snr
+    value = true + sigma * rng.standard_normal(true.shape)
+    return Pictures(np.arange(1.0, 1 + len(true)), value, sigma, np.zeros_like(true))
+
+
+POSITIONS_NM = np.repeat(np.linspace(395.0, 705.0, 31), 3)
+SHAPE = np.exp(-(((POSITIONS_NM - 500) / 40) ** 2))
+
+
+def test_what_only_gets_darker_is_seldom_said_to_change() -> None:
+    p_values = []
+    for seed in range(100):
+        frames = glow(seed, np.array([1.0, 0.4, 0.1]), SHAPE)
+        p_values += [one.p_value for one in over_time(frames, POSITIONS_NM)]
+    low, middle, high = np.quantile(p_values, [0.1, 0.5, 0.9])
+    assert low == pytest.approx(0.1, abs=0.05)
+    assert middle == pytest.approx(0.5, abs=0.1)
+    assert high == pytest.approx(0.9, abs=0.05)
+
+
+def test_a_sensor_that_has_warmed_is_no_change_of_colour() -> None:
+    frames = glow(4, np.array([1.0, 0.4, 0.1]), SHAPE)
+    offset = np.array([[0.0], [1e-4], [2e-4]])
+    assert offset.max() > 3 * frames.sigma.min()
+    warmed = replace(frames, value=frames.value + offset)
+    assert not differ(over_time(warmed, POSITIONS_NM))
+
+
+def test_a_shift_by_a_nanometre_is_found_and_measured() -> None:
+    moved = np.exp(-(((POSITIONS_NM - 501) / 40) ** 2))
+    before = combined(glow(0, np.array([1.0, 0.5]), SHAPE))
+    found = compared("later", glow(1, np.array([0.3]), moved), before, POSITIONS_NM)
+    assert differ([found])
+    assert abs(found.shift_nm - 1.0) < 4 * found.shift_sigma_nm
+    assert found.brightness == pytest.approx(0.3, rel=0.02)
+    assert found.beyond_noise == pytest.approx(0.025, rel=0.5)
+
+
+def test_clipped_places_are_taken_from_the_frames_that_do_not_clip() -> None:
+    frames = glow(2, np.array([1.0, 0.2]), SHAPE)
+    frames.value[0, SHAPE > 0.5] = np.nan
+    frames.value[:, 0] = np.nan
+    sigma = np.where(np.isnan(frames.value), np.nan, frames.sigma)
+    picture = combined(replace(frames, sigma=sigma))
+    assert np.isnan(picture.value[0])
+    assert np.isfinite(picture.value[1:]).all()
+    assert picture.value[SHAPE > 0.5] == pytest.approx(SHAPE[SHAPE > 0.5], rel=0.1)
+
+
+def test_darkness_is_no_spectrum() -> None:
+    lit = glow(3, np.array([1.0, 1.0]), SHAPE)
+    noise = lit.sigma * np.random.default_rng(3).standard_normal(lit.value.shape)
+    for value in (noise, noise - 0.1):
+        with pytest.raises(DataError, match="none above the noise"):
+            visible(replace(lit, value=value))

@@ -1,0 +1,89 @@
+"""A chain of protocols: each part alone in its own eyes, one material at the end."""
+
+import json
+from pathlib import Path
+
+import pytest
+import yaml
+
+from labrig.acquire import read_protocol
+from labrig.calibration import write_irradiance_file
+from labrig.errors import UsageError
+from labrig.material import read_material
+from labrig.process import process_run
+from labrig.record import read_run
+from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
+from tests.analyse.recorded import cut_off_and_resumed, record
+
+WIDTH, HEIGHT = 192, 48
+DECAY = {
+    "protocol": "decay", "charge": "5 min", "first": "1 s", "every": "4 s", "for": "80 s",
+    "daylight": False,
+}  # fmt: skip
+SHORT = {key: value for key, value in QUICK.items() if key != "sample"} | {
+    "at_most": 2, "refine": 0, "bare": ["10 s", "4 min"]
+}  # fmt: skip
+
+
+@pytest.fixture(scope="module")
+def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
+    folder = tmp_path_factory.mktemp("phosphor")
+    write_irradiance_file(folder / "irradiance.yaml", true_irradiance(WIDTH, HEIGHT))
+
+    def change(rig: dict[str, dict[str, object]]) -> None:
+        rig["optics"]["irradiance"] = str(folder / "irradiance.yaml")
+        rig["simulation"]["sensor"] = {"width": WIDTH, "height": HEIGHT}
+
+    chain = {"protocol": "phosphor", "sample": {"name": "blue-paint"}, "parts": [DECAY, SHORT]}
+    made = record(folder, chain, change)
+    cut, resumed = cut_off_and_resumed(made, "excitation/strip-1")
+    assert list(cut.completed())[-1] == "excitation/strip-meter"
+    assert list(resumed.completed())[-1] == "excitation/bare-2"
+    return made
+
+
+def test_a_chain_that_was_killed_and_resumed_ends_in_one_material(run: Path) -> None:
+    result = process_run(run)
+    material = read_material(run / "result" / "material.yaml")
+    (state,) = material.states
+    assert material.provenance is not None
+    assert material.provenance.temperature_c == pytest.approx(21, abs=1)
+    assert state.k_r_per_s == pytest.approx(0.032, rel=0.02)
+    assert state.k_e_per_s is not None
+    assert state.k_e_per_s[1] / 4 == pytest.approx(0.05, rel=0.2)
+    assert (run / "result" / "decay" / "series.csv").is_file()
+    fit = json.loads((run / "result" / "decay" / "fit.json").read_text())
+    assert fit["states"][0]["k_r_per_s"] == pytest.approx(0.032, rel=0.02)
+    page = (run / "result" / "report.html").read_text()
+    assert "Beside blue-paint" in page or "beside blue-paint of Nalbach" in page
+    assert any(line.startswith("excitation: closure") for line in result.lines)
+
+
+def test_parts_see_their_own_frames_only(run: Path) -> None:
+    whole = read_run(run)
+    decay, excitation = whole.part("decay"), whole.part("excitation")
+    assert {frame.unit for frame in decay.frames("dark")} == {"dark"}
+    assert len(decay.frames("dark")) + len(excitation.frames("dark")) == len(whole.frames("dark"))
+    assert not decay.frames("strip")
+
+
+@pytest.mark.parametrize(
+    ("parts", "said"),
+    [
+        ([DECAY, DECAY], "every protocol once"),
+        ([{"charge": "5 min"}], "expected 'protocol: NAME' in every part"),
+        ([{"protocol": "phosphor", "parts": []}], "expected 'protocol: NAME' in every part"),
+        ([{"protocol": "decai"}], "did you mean 'decay'"),
+        ([DECAY | {"evry": "5 s"}], "did you mean 'every'"),
+        ([], "parts"),
+    ],
+)
+def test_a_chain_that_cannot_be_is_one_clear_line(
+    parts: list[dict[str, object]], said: str, tmp_path: Path
+) -> None:
+    path = tmp_path / "chain.yaml"
+    path.write_text(yaml.safe_dump({"protocol": "phosphor", "parts": parts}))
+    with pytest.raises(UsageError) as caught:
+        read_protocol(path)
+    assert said in str(caught.value)
+    assert "\n" not in str(caught.value)

@@ -1,0 +1,149 @@
+"""Saturation and the rates after several charges, against the truth."""
+
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from labrig.acquire import read_rig_file
+from labrig.analyse.saturation import process
+from labrig.analyse.saturation.level import charged, level
+from labrig.analyse.saturation.shared_rates import Curve, compare_rates
+from labrig.bench import open_bench
+from labrig.errors import DataError
+from labrig.report import figure_style
+from tests.analyse.spectral_bench import record, stage_of
+
+QUICK: dict[str, Any] = {
+    "protocol": "saturation", "charges": ["30 s", "10 min", "20 min"], "first": "800 ms",
+    "for": "60 s",
+}  # fmt: skip
+HALF = {"weaker": {"filter": "neutral-50", "share": "50 %"}}
+
+
+def true_level(rig: Path, charge_s: float) -> float:
+    with open_bench(read_rig_file(rig), str(rig)) as bench:
+        assert bench.room is not None
+        room = bench.room.room
+        room.switch_lamp(True)
+        bench.room.clock.sleep(charge_s)
+        room.switch_lamp(False)
+        bench.room.clock.sleep(1.0)
+        level = room.truth().patches[0].states[0].concentration
+    assert level is not None
+    return level
+
+
+def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
+    part = stage_of(record(tmp_path, QUICK | HALF, seed=2), tmp_path)
+    with figure_style():
+        found = process(part)
+    in_time, of_level, rates = found.lines
+    assert "saturated in time" in in_time
+    r, sigma = (float(text) for text in of_level.split("r(0) = ")[1].split(";")[0].split(" ± "))
+    assert abs(r - true_level(tmp_path / "rig.yaml", 1200.0)) < 3 * sigma
+    assert sigma < 0.05
+    assert of_level.endswith("r(0) = 1 may be believed: no")
+    assert "rates are the same after all 6 charges" in rates
+    assert any("r(0) = 1 does not hold" in warning for warning in found.warnings)
+    rows = (tmp_path / "saturation.csv").read_text().splitlines()
+    assert len(rows) == 1 + 6
+    assert len(found.sections[0].figures) == 2
+
+
+@pytest.mark.campaign
+def test_a_power_laws_rates_depend_on_the_charge(tmp_path: Path) -> None:
+    part = stage_of(
+        record(tmp_path, QUICK | {"charges": ["20 s", "60 min"], "for": "150 s"},
+               sample="power-law"),
+        tmp_path,
+    )  # fmt: skip
+    with figure_style():
+        found = process(part)
+    assert "not saturated" in found.lines[0]
+    assert "nothing can be said without a weaker light" in found.lines[1]
+    assert "rates differ with all 2 charges" in found.lines[2]
+    assert any("the rates depend on the charge" in warning for warning in found.warnings)
+    attempts = [attempt for attempt in part.run.attempts if attempt.unit != "full-2"]
+    run = replace(part.run, attempts=attempts)
+    with pytest.raises(DataError, match="two or more complete decays"):
+        process(replace(part, run=run))
+
+
+@given(
+    k=st.floats(1e-3, 0.3),
+    times=st.floats(0.02, 20.0),
+    share=st.floats(0.1, 0.8),
+    charge_s=st.floats(60.0, 7200.0),
+)
+def test_the_level_is_what_was_charged(
+    k: float, times: float, share: float, charge_s: float
+) -> None:
+    kappa = times * k
+    full, weak = charged(kappa, k, charge_s), charged(share * kappa, k, charge_s)
+    found = level(weak / full, 1e-4, share, 0.0, k, (charge_s, charge_s))
+    assert found.r == pytest.approx(full, rel=1e-6)
+    assert found.sigma > 0
+
+
+@pytest.mark.parametrize(
+    ("ratio", "r", "verdict"), [(0.5, 0.0, "no"), (0.999, 1.0, "yes"), (0.4, 0.0, "no")]
+)
+def test_ends_of_the_range_are_levels_too(ratio: float, r: float, verdict: str) -> None:
+    found = level(ratio, 0.002, 0.5, 0.01, 0.03, (5400.0, 5400.0))
+    assert found.r == pytest.approx(r, abs=0.01)
+    assert found.verdict == verdict
+
+
+def decay(rates: list[float], amplitudes: list[float], seed: int) -> Curve:
+    t_s = np.arange(1.0, 120.0, 4.0)
+    true = np.exp(-np.outer(t_s, rates)) @ np.array(amplitudes)
+    sigma = 0.005 * true + 0.001
+    noise = sigma * np.random.default_rng(seed).standard_normal(len(t_s))
+    return Curve(t_s, np.zeros_like(t_s), true + noise, sigma, 0.0)
+
+
+def test_p_values_of_rates_that_are_the_same_are_even() -> None:
+    p_values = [
+        compare_rates(
+            [decay([0.05], [1.0], seed), decay([0.05], [0.3], 1000 + seed)], [0.04]
+        ).p_value
+        for seed in range(100)
+    ]
+    assert np.quantile(p_values, [0.1, 0.5, 0.9]) == pytest.approx([0.1, 0.5, 0.9], abs=0.12)
+
+
+def test_rates_are_not_judged_where_exponentials_do_not_fit() -> None:
+    curves = [decay([0.1, 0.01], [1.0, share], seed) for seed, share in ((0, 0.3), (1, 0.28))]
+    test = compare_rates(curves, [0.05])
+    assert test.misfit
+    assert not compare_rates(curves, [0.1, 0.01]).misfit
+
+
+def test_noise_that_is_known_badly_is_no_misfit() -> None:
+    """Twelve frames tell a flicker to a quarter; one that was found too low is no other law."""
+    curves = [decay([0.05], [1.0], seed) for seed in range(6)]
+    told_low = [replace(one, sigma=one.sigma / 1.5) for one in curves]
+    assert compare_rates(told_low, [0.05]).misfit
+    assert not compare_rates(told_low, [0.05], noise_dof=9.0).misfit
+    of_two = [decay([0.2, 0.005], [1.0, 0.3], seed) for seed in range(6)]
+    assert compare_rates(of_two, [0.05], noise_dof=9.0).misfit
+
+
+def test_rates_that_differ_by_a_few_per_cent_are_told_apart() -> None:
+    curves = [decay([0.05], [1.0], 0), decay([0.053], [0.3], 1)]
+    test = compare_rates(curves, [0.04])
+    assert test.differ
+    assert test.own_per_s[:, 0] == pytest.approx([0.05, 0.053], rel=0.02)
+
+
+def test_amplitudes_of_two_states_change_without_their_rates() -> None:
+    curves = [decay([0.1, 0.01], [1.0, 0.2], 0), decay([0.1, 0.01], [0.5, 0.19], 1)]
+    test = compare_rates(curves, [0.08, 0.02])
+    assert not test.differ
+    assert test.shared_per_s == pytest.approx([0.1, 0.01], rel=0.05)
+    assert test.amplitude == pytest.approx(np.array([[1.0, 0.2], [0.5, 0.19]]), rel=0.05)

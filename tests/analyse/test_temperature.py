@@ -1,0 +1,85 @@
+"""What becomes of a temperature: from a drifting room to the report's warning."""
+
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from labrig import shipped
+from labrig.acquire import plan, read_protocol, read_rig_file
+from labrig.material import read_material
+from labrig.process import process_run
+from labrig.record import read_run
+from tests.analyse.recorded import record
+
+DECAY: dict[str, Any] = {
+    "protocol": "decay", "charge": "30 s", "first": "1 s", "every": "25 s", "for": "10 min",
+    "exposure": "1/4 s", "daylight": False,
+}  # fmt: skip
+
+
+def recorded(folder: Path, **simulation: Any) -> Path:
+    def change(rig: dict[str, Any]) -> None:
+        rig["devices"]["lamp"]["warm_up"] = "30 s"
+        rig["devices"]["camera"]["warm_up"] = "5 s"
+        rig["simulation"] |= {"sensor": {"width": 48, "height": 32}, **simulation}
+
+    return record(folder, DECAY, change)
+
+
+def test_a_drifting_room_is_shown_and_said(tmp_path: Path) -> None:
+    run = recorded(tmp_path, temperature={"start": 19, "drift_per_hour": 9})
+    result = process_run(run)
+    (said,) = [line for line in result.run_warnings if "temperature" in line]
+    moved = float(said.partition("moved by ")[2].split()[0])
+    frames = read_run(run).frames("decay")
+    hours = (frames[-1].start_time - frames[0].start_time) / 3600
+    assert moved == pytest.approx(9 * hours, abs=0.3)
+    percent = float(said.partition("changes by about ")[2].split()[0])
+    assert percent == pytest.approx(100 * (1.089**moved - 1), abs=1.5)
+    page = (run / "result" / "report.html").read_text()
+    assert "<h2>Temperature</h2>" in page
+    assert "the temperature moved by" in page
+    assert list((run / "result" / "figures").glob("*temperature*.svg"))
+    provenance = read_material(run / "result" / "material.yaml").provenance
+    assert provenance is not None
+    middle = (frames[0].start_time + frames[-1].end_time) / 2 - frames[0].start_time
+    began = read_run(run).attempts[0].start["time"]
+    true_c = 19 + 9 * (frames[0].start_time + middle - began) / 3600
+    assert provenance.temperature_c == pytest.approx(true_c, abs=1.0)
+
+
+def test_a_steady_room_is_shown_without_a_warning(tmp_path: Path) -> None:
+    run = recorded(tmp_path)
+    result = process_run(run)
+    assert not [line for line in result.run_warnings if "temperature" in line]
+    assert "<h2>Temperature</h2>" in (run / "result" / "report.html").read_text()
+
+
+@pytest.mark.parametrize(
+    ("off", "readings", "told"),
+    [("0 s", 0, "told nothing: check it"), ("1 min", 3, "told nothing after 2026-01-01 00:0")],
+)
+def test_a_thermometer_that_fails_does_not_end_a_run(
+    tmp_path: Path, off: str, readings: int, told: str
+) -> None:
+    run = recorded(tmp_path, faults=[{"thermometer_off": {"at": off}}])
+    assert [attempt.exit_status for attempt in read_run(run).attempts] == ["success"] * 2
+    assert len(read_run(run).temperatures()) == readings
+    result = process_run(run)
+    (said,) = [line for line in result.run_warnings if "thermometer" in line]
+    assert told in said
+
+
+def test_no_plan_takes_longer_for_it(tmp_path: Path) -> None:
+    content = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    (tmp_path / "decay.yaml").write_text(yaml.safe_dump(DECAY))
+    protocol = read_protocol(tmp_path / "decay.yaml")
+    plans = []
+    for name in ("with", "without"):
+        (tmp_path / f"{name}.yaml").write_text(yaml.safe_dump(content))
+        plans.append(plan(protocol, read_rig_file(tmp_path / f"{name}.yaml"), name))
+        content["devices"].pop("thermometer", None)
+    assert plans[0] == plans[1]
