@@ -12,11 +12,12 @@ from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Choices, Inputs, Part
 from labrig.analyse.choices import read_run_protocol
 from labrig.analyse.history import interruptions, lamp_sections, written_time
-from labrig.analyse.page import camera_response
 from labrig.analyse.part import StageResult
-from labrig.analyse.result import Result
 from labrig.analyse.temperature import temperature_sections, temperature_warnings
+from labrig.process.decay import process_decay
+from labrig.process.page import camera_response
 from labrig.process.provenance import StageProvenance, library_versions
+from labrig.process.result import Result
 from labrig.process.result_folder import new_result, put_in_place, write_provenance
 from labrig.record import Attempt, RunRecord, read_notes, read_run
 from labrig.report import DeviceLine, StagePage, figure_style, write_stage_page
@@ -84,8 +85,6 @@ def process_and_report(folder: Path | str, choices: Choices | None = None) -> Pr
     folder, choices = Path(folder), choices or Choices()
     protocol = read_run_protocol(folder)
     if protocol.protocol == "decay":
-        from labrig.analyse.decay import process_decay
-
         old = process_decay(folder, choices)
         return Processed(old, old.report, old.lines, old.changes)
     rig, run = choices.bench(folder), read_run(folder)

@@ -16,13 +16,13 @@ from labrig.analyse.emission_file import read_emission_spectrum
 from labrig.analyse.emission_spectrum import process as spectra
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.part import Part, StageResult
-from labrig.analyse.result import Result
 from labrig.analyse.strip_patches import StripPatch, cut, lean, of_each
 from labrig.calibration import Strip, write_irradiance_file, write_lvf_file
 from labrig.compare.result import read_patches
 from labrig.errors import DataError, FitError, UsageError
 from labrig.material import read_material
 from labrig.process import process_run
+from labrig.process.result import Result
 from labrig.record import read_run
 from labrig.reduce import RawFrame
 from labrig.region import Region

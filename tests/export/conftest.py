@@ -11,9 +11,9 @@ import yaml
 from labrig import shipped
 from labrig.acquire import Plan, RunObserver, read_rig_file
 from labrig.analyse.choices import read_decay_protocol
-from labrig.analyse.page import run_report
 from labrig.clock import Clock
 from labrig.process import process_run
+from labrig.process.page import run_report
 from labrig.record import read_run
 from labrig.report import RunReport
 from labrig.run import Recording

@@ -10,12 +10,12 @@ import pytest
 
 from labrig.analyse import Choices
 from labrig.analyse.choices import read_decay_protocol
-from labrig.analyse.decay import measure_decay
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.timed_frames import intact_frames
 from labrig.calibration import read_blank_file
 from labrig.errors import DataError
 from labrig.process import process_run
+from labrig.process.decay import measure_decay
 from labrig.record import read_run
 from tests.analyse.recorded import cut_off_and_resumed, record
 

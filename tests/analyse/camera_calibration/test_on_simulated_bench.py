@@ -12,12 +12,12 @@ import pytest
 
 from labrig.analyse import Choices
 from labrig.analyse.choices import read_decay_protocol
-from labrig.analyse.decay import measure_decay
 from labrig.analyse.inputs import Inputs
-from labrig.analyse.result import Result
 from labrig.calibration import CameraFile, read_camera_file
 from labrig.errors import DataError
 from labrig.process import process_run
+from labrig.process.decay import measure_decay
+from labrig.process.result import Result
 from labrig.record import read_run
 from labrig.sim.optics import vignetting
 from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons

@@ -10,11 +10,11 @@ import pytest
 from numpy.typing import NDArray
 
 from labrig.acquire import Plan, RunObserver
-from labrig.analyse.result import Result
 from labrig.calibration import Change, FadeFile, read_fade_file
 from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.process import process_run
+from labrig.process.result import Result
 from labrig.record import read_run
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.simulation import LampSettings

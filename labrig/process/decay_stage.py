@@ -2,11 +2,11 @@
 
 from dataclasses import replace
 
-from labrig.analyse.decay import fit_warnings, measure_decay
 from labrig.analyse.part import Part, StageResult
 from labrig.analyse.temperature import glow_temperature_c
 from labrig.errors import FitError
 from labrig.fit import DecayFit
+from labrig.process.decay import fit_warnings, measure_decay
 from labrig.process.result_folder import write_patch
 from labrig.report.decay_figures import linear_decay, logarithmic_decay
 from labrig.report.residual_figure import residual_figure

@@ -7,8 +7,6 @@ from pathlib import Path
 from labrig.analyse.choices import Choices, DecayProtocol, read_decay_protocol
 from labrig.analyse.clean import cleaned
 from labrig.analyse.inputs import Inputs
-from labrig.analyse.page import camera_response, run_name, run_report
-from labrig.analyse.result import Result
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.temperature import glow_temperature_c, temperature_warnings
 from labrig.analyse.this_camera import insist_on_this_camera
@@ -16,7 +14,9 @@ from labrig.analyse.timed_frames import IntactFrames, intact_frames, timing_warn
 from labrig.errors import FitError
 from labrig.export import write_nexus
 from labrig.fit import DecayFit
+from labrig.process.page import camera_response, run_name, run_report
 from labrig.process.provenance import provenance
+from labrig.process.result import Result
 from labrig.process.result_folder import (
     new_result,
     put_in_place,
