@@ -31,8 +31,8 @@ from labrig.report.figure_style import (
 )
 from labrig.report.legend import legend_above, marked, shaded
 from labrig.report.sections import Picture, Section, Table
-from labrig.report.written_numbers import plus_minus
 from labrig.results import Series
+from labrig.written_numbers import plus_minus
 
 FloatArray = NDArray[np.float64]
 

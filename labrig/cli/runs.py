@@ -159,7 +159,7 @@ def _print_comparison(comparison: "Comparison") -> None:
     from rich.console import Console
     from rich.table import Table
 
-    from labrig.report.written_numbers import plus_minus
+    from labrig.written_numbers import plus_minus
 
     for key, of_a, of_b in comparison.asked:
         typer.echo(f"asked differently: {key}: {of_a} | {of_b}")
@@ -214,7 +214,7 @@ def _result_folders(folder: Path) -> list[str]:
 
 
 def _rates(patch: str, result: "FittedDecay") -> str:
-    from labrig.report.written_numbers import plus_minus
+    from labrig.written_numbers import plus_minus
 
     rates = ",  ".join(plus_minus(rate.value, rate.sigma) for rate in result.rates)
     return f"{patch}: {rates}" if patch else rates

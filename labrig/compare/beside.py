@@ -14,7 +14,7 @@ import numpy as np
 from labrig.compare.colorimetry import FloatArray
 from labrig.material import Material, State
 from labrig.report.sections import Table
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 UNKNOWN = "–"
 

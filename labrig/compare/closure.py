@@ -21,7 +21,7 @@ from labrig.report.figure_style import (
 )
 from labrig.report.legend import legend_above, lined, marked
 from labrig.report.sections import Picture
-from labrig.report.written_numbers import rounded
+from labrig.written_numbers import rounded
 
 FloatArray = NDArray[np.float64]
 

@@ -20,7 +20,7 @@ from labrig.report.figure_style import (
     WIDTH_PT,
     new_figure,
 )
-from labrig.report.written_numbers import rounded
+from labrig.written_numbers import rounded
 
 #: Photographs side by side, and how their times are spread: dense where the glow changes most.
 COLUMNS = 9

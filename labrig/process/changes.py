@@ -8,8 +8,8 @@ from pathlib import Path
 from typing import Any
 
 from labrig.errors import DataError, UsageError
-from labrig.report.written_numbers import plus_minus, rounded
 from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
+from labrig.written_numbers import plus_minus, rounded
 from labrig.yaml_file import read_yaml
 
 #: Moves of less than this share of a parameter's σ, and changes of σ by less, are not worth a word.

@@ -11,7 +11,7 @@ from labrig.process.result_folder import write_patch
 from labrig.report.decay_figures import linear_decay, logarithmic_decay
 from labrig.report.residual_figure import residual_figure
 from labrig.report.sections import Picture, Section, Table
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 
 def process(part: Part) -> StageResult:

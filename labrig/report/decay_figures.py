@@ -26,8 +26,8 @@ from labrig.report.figure_style import (
 from labrig.report.fitted_curve import fitted_curve, middles_s
 from labrig.report.legend import BAND_OPACITY, legend_above, lined, marked, shaded
 from labrig.report.log_axis import mark_decades
-from labrig.report.written_numbers import power_of_ten, rounded
 from labrig.results import Series
+from labrig.written_numbers import power_of_ten, rounded
 
 FloatArray = NDArray[np.float64]
 

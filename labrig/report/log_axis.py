@@ -8,7 +8,7 @@ from matplotlib.markers import TICKLEFT
 from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
 
 from labrig.report.figure_style import MUTED
-from labrig.report.written_numbers import power_of_ten
+from labrig.written_numbers import power_of_ten
 
 #: An axis of fewer decades than this has labels between them, too.
 FEW_DECADES = 2.0

@@ -8,7 +8,7 @@ from labrig.report.content import RunReport
 from labrig.report.photographs import Sensor
 from labrig.report.recording_text import listed, recording
 from labrig.report.timing import Lateness
-from labrig.report.written_numbers import rounded
+from labrig.written_numbers import rounded
 
 EQUATION_LATEX = (
     r"s_c(t, T) = w_c \sum_{i=1}^{n} a_i \, e^{-k_i t} \, \frac{1 - e^{-k_i T}}{k_i T} + b_c"

@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from markupsafe import Markup
 
 from labrig.fit import DecayFit
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 #: Relative σ of a rate from which its reciprocal is given without one.
 WORST_FOR_LIFETIME = 0.5

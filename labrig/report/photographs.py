@@ -15,7 +15,7 @@ from labrig.region import region_pixels
 from labrig.report.colours import Screen, encoded, into_gamut
 from labrig.report.content import GlowPhotograph, PatchReport
 from labrig.report.pictures import Picture, binned, is_grey, jpeg, saturated_cells, small
-from labrig.report.written_numbers import exposure_text, rounded
+from labrig.written_numbers import exposure_text, rounded
 
 DAYLIGHT_WIDTH = 1000
 GLOW_WIDTH = 420

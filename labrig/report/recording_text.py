@@ -12,7 +12,7 @@ from labrig.region import region_pixels
 from labrig.report.content import RunReport
 from labrig.report.photographs import Sensor
 from labrig.report.timing import DECAY, ON_TIME_S, Lateness
-from labrig.report.written_numbers import exposure_text, rounded
+from labrig.written_numbers import exposure_text, rounded
 
 #: Durations and exposures that differ by less are said as one.
 ALIKE = 0.02

@@ -24,8 +24,8 @@ from labrig.report.figure_style import (
 )
 from labrig.report.fitted_curve import middles_s
 from labrig.report.legend import legend_above, marked
-from labrig.report.written_numbers import rounded
 from labrig.results import Series
+from labrig.written_numbers import rounded
 
 FloatArray = NDArray[np.float64]
 

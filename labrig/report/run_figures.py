@@ -26,7 +26,7 @@ from labrig.report.fitted_curve import fitted_curve, middles_s
 from labrig.report.legend import legend_above, marked
 from labrig.report.log_axis import mark_decades
 from labrig.report.timing import FrameTiming
-from labrig.report.written_numbers import rounded
+from labrig.written_numbers import rounded
 
 SMALL_WIDTH_PT, SMALL_HEIGHT_PT = 190.0, 140.0
 SMALL_FONT_PT = 9.5

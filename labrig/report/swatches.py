@@ -6,8 +6,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.report.colours import Screen, css_colour, into_gamut
-from labrig.report.written_numbers import rounded
 from labrig.results import Series
+from labrig.written_numbers import rounded
 
 FloatArray = NDArray[np.float64]
 

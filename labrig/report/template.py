@@ -9,7 +9,7 @@ from markupsafe import Markup, escape
 
 from labrig.quantity import duration_text
 from labrig.record.frames import FrameRecord
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 _FOLDER = Path(__file__).parent
 _SYMBOL = re.compile(r"\b([a-z])_([a-z])\b")

@@ -7,7 +7,7 @@ import numpy as np
 
 from labrig.record.frames import ActionRecord, FrameRecord
 from labrig.report.content import PatchReport
-from labrig.report.written_numbers import rounded
+from labrig.written_numbers import rounded
 
 DECAY = "decay"
 #: Devices and what they do between a charge and its first frame.

@@ -12,9 +12,9 @@ from labrig.catalogue import is_being_written, summarise
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.record import Attempt, FrameRecord, RunRecord, read_run
 from labrig.region import Region
-from labrig.report.written_numbers import plus_minus
 from labrig.results import read_fitted_decays
 from labrig.watch.glance import Glance, glance
+from labrig.written_numbers import plus_minus
 
 PICTURE_WIDTH = 720
 

@@ -4,7 +4,7 @@ import math
 
 import pytest
 
-from labrig.report.written_numbers import exposure_text, plus_minus, rounded
+from labrig.written_numbers import exposure_text, plus_minus, rounded
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from labrig.errors import DiskError
 from labrig.fit import DecayFit
 from labrig.report import Interruption, PatchReport, RunReport, write_report
 from labrig.report.parameters import quality_rows
-from labrig.report.written_numbers import plus_minus
+from labrig.written_numbers import plus_minus
 
 from .made import decay_series, patch, run_report
 

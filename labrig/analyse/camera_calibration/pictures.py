@@ -26,7 +26,7 @@ from labrig.report.figure_style import (
 )
 from labrig.report.legend import legend_above, marked
 from labrig.report.sections import Picture, Section, Table
-from labrig.report.written_numbers import exposure_text, plus_minus, rounded
+from labrig.written_numbers import exposure_text, plus_minus, rounded
 
 HEIGHT_PT = 230.0
 

@@ -23,7 +23,7 @@ from labrig.calibration import CameraFile, Factor, write_camera_file
 from labrig.errors import DataError
 from labrig.record import FrameRecord
 from labrig.reduce import read_raw
-from labrig.report.written_numbers import exposure_text, plus_minus
+from labrig.written_numbers import exposure_text, plus_minus
 
 LIT = ("photon", "repeat", "bracket", "flat")
 #: χ² per degree of freedom beyond which the photon-transfer line is none.

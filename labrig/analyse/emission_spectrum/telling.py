@@ -15,7 +15,7 @@ from labrig.analyse.emission_spectrum.figures import (
 from labrig.analyse.emission_spectrum.picture import Pictures
 from labrig.report.sections import Picture as Plate
 from labrig.report.sections import Section, Table
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 
 def peak_line(spectrum: EmissionSpectrum) -> str:

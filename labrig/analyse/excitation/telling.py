@@ -17,7 +17,7 @@ from labrig.calibration.irradiance_file import IrradianceFile
 from labrig.compare.closure import Closure
 from labrig.fit.excitation import ExcitationFit
 from labrig.report.sections import Section, Table
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 FloatArray = NDArray[np.float64]
 

@@ -22,7 +22,7 @@ from labrig.optics import CameraResponse, Spectrum
 from labrig.record import FrameRecord
 from labrig.reduce import read_raw
 from labrig.region import Region
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 FloatArray = NDArray[np.float64]
 

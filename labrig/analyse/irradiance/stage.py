@@ -16,7 +16,7 @@ from labrig.errors import UsageError
 from labrig.optics import Lvf, Spectrum
 from labrig.optics.piecewise import band_integrals
 from labrig.report import Picture, Section, Table
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 #: Change of the lamp between rounds that is worth a warning.
 DRIFT = 0.03

@@ -12,7 +12,7 @@ from labrig.analyse.lvf_calibration.lines import Stripes, told
 from labrig.analyse.part import Part, StageResult
 from labrig.calibration import write_lvf_file
 from labrig.report import Picture, Section, Table
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 #: Rows of the table of positions; the file has them all.
 _ROWS = 11

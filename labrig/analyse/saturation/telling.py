@@ -8,7 +8,7 @@ from labrig.analyse.saturation.figures import decays_figure, plateau_figure
 from labrig.analyse.saturation.found import Saturation
 from labrig.quantity import duration_text
 from labrig.report.sections import Picture, Section, Table
-from labrig.report.written_numbers import plus_minus, rounded
+from labrig.written_numbers import plus_minus, rounded
 
 #: Where a longer charge brightens the glow by less, the plateau is reached.
 PLATEAU = 0.02
