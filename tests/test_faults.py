@@ -15,11 +15,11 @@ import serial
 import yaml
 
 from labrig.acquire import read_rig_file
-from labrig.analyse.history import interruptions
 from labrig.bench import Bench, open_bench
 from labrig.cli.progress import PlainProgress
 from labrig.clock import SystemClock
 from labrig.record import RunRecord, read_run
+from labrig.record.history import interruptions
 from labrig.record.journal import read_journal
 from labrig.sim.boards import SerialCable
 from labrig.yaml_file import read_yaml

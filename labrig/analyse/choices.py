@@ -4,24 +4,14 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from pathlib import Path
-from typing import Literal, Protocol, Self, cast
+from typing import Any, Self
 
-from labrig.acquire import ProtocolModel, RigFile, Sample, read_protocol, read_rig_file
+from labrig.acquire import ProtocolModel, RigFile, read_protocol, read_rig_file
 from labrig.acquire.rig_file import Optics
 from labrig.errors import UsageError
 from labrig.record import FrameRecord
 from labrig.region import Region, parse_region
 from labrig.yaml_file import did_you_mean
-
-
-class DecayProtocol(Protocol):
-    """The keys of a decay protocol that its processing needs."""
-
-    sample: Sample
-    patches: dict[str, Region]
-    dark: Literal["frames", "background"]
-    background: Region | None
-    states: Literal["auto", 1, 2, 3]
 
 
 def read_run_protocol(run: Path) -> ProtocolModel:
@@ -36,20 +26,6 @@ def read_run_protocol(run: Path) -> ProtocolModel:
     if not path.is_file():
         raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
     return read_protocol(path)
-
-
-def read_decay_protocol(run: Path) -> DecayProtocol:
-    """The protocol in a run folder of a decay.
-
-    Raises
-    ------
-    UsageError
-        Not a run folder, or not one of a decay.
-    """
-    protocol = read_run_protocol(run)
-    if protocol.protocol != "decay":
-        raise UsageError(f"{run}: expected a run of 'decay', got one of '{protocol.protocol}'")
-    return cast(DecayProtocol, protocol)
 
 
 @dataclass(frozen=True)
@@ -123,8 +99,8 @@ class Choices:
         rig = read_rig_file(run / "rig.yaml")
         return rig.model_copy(update={"optics": rig.optics.model_copy(update=dict(self.optics))})
 
-    def patches(self, protocol: DecayProtocol) -> dict[str, Region]:
-        """The protocol's patches, moved where a person wants them.
+    def patches(self, protocol: Any) -> dict[str, Region]:
+        """The patches of a protocol that has some, moved where a person wants them.
 
         Raises
         ------

@@ -20,8 +20,8 @@ from labrig.calibration import (
     read_lvf_file,
 )
 from labrig.errors import UsageError
-from labrig.fit import DecayFit
 from labrig.material import Material
+from labrig.results import FittedDecay
 
 FileT = TypeVar("FileT")
 
@@ -48,7 +48,7 @@ class Inputs:
     lvf: LvfFile | None = None
     irradiance: IrradianceFile | None = None
     spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)
-    decays: Mapping[str, DecayFit] = field(default_factory=dict)
+    decays: Mapping[str, FittedDecay] = field(default_factory=dict)
     materials: Mapping[str, Material] = field(default_factory=dict)
 
     @classmethod

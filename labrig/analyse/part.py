@@ -36,7 +36,7 @@ class Part:
     rig: RigFile
     choices: Choices
     inputs: Inputs
-    folder: Path
+    folder: Path = Path()
 
 
 @dataclass(frozen=True)

@@ -5,7 +5,6 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labrig.acquire import read_rig_file
-from labrig.compare.beside import Beside, beside
 from labrig.compare.colorimetry import DEFAULT_WHITE, FloatArray, viewing
 from labrig.compare.emission import emission, emission_grid
 from labrig.compare.glow import GlowComparison, compare_glow, predicted_by
@@ -23,7 +22,7 @@ from labrig.compare.result import MeasuredPatch, read_patches
 from labrig.compare.three_channels import ThreeChannels, three_channels
 from labrig.errors import DataError, UsageError
 from labrig.fit import DecayFit
-from labrig.material import Material, read_material
+from labrig.material import Material, MaterialComparison, compare_materials, read_material
 from labrig.optics import CameraResponse, read_camera
 from labrig.yaml_file import did_you_mean
 
@@ -55,7 +54,7 @@ class RunComparison:
     words: str
     glows: tuple[GlowComparison, ...]
     residuals: tuple[Residuals, ...]
-    beside: tuple[Beside, ...]
+    beside: tuple[MaterialComparison, ...]
     spectra: tuple[tuple[ThreeChannels, str], ...]
     left_out: tuple[str, ...]
 
@@ -110,7 +109,9 @@ def compare_run(
         words=" ".join([seen.words, *_whence(list(patches.values()), curves, bool(references))]),
         glows=tuple(glows),
         residuals=tuple(ratios),
-        beside=tuple(beside(patches[name].material, one) for name, one in references.items()),
+        beside=tuple(
+            compare_materials(patches[name].material, one) for name, one in references.items()
+        ),
         spectra=() if curves is None else _spectra(patches, references, curves, white),
         left_out=tuple(left_out),
     )

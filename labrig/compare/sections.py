@@ -9,6 +9,7 @@ from labrig.compare.run import RunComparison
 from labrig.compare.spectra_figure import spectra_figure
 from labrig.compare.three_channels import three_channels_table
 from labrig.report.figure_style import figure_style
+from labrig.report.material_tables import comparison_table
 from labrig.report.sections import Picture, Section
 
 
@@ -32,7 +33,9 @@ def _sections(comparison: RunComparison) -> Iterator[Section]:
         table = residuals_table(comparison.residuals)
         yield Section("What more states gain", tables=(table,))
     for one in comparison.beside:
-        yield Section(f"Measured: {one.names[0]}; reference: {one.names[1]}", tables=(one.table(),))
+        yield Section(
+            f"Measured: {one.names[0]}; reference: {one.names[1]}", tables=(comparison_table(one),)
+        )
     if comparison.spectra and comparison.camera is not None:
         table = three_channels_table(comparison.spectra, comparison.camera, comparison.white)
         shown = Picture(

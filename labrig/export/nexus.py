@@ -14,16 +14,19 @@ import numpy as np
 from labrig.errors import DiskError
 from labrig.export.hdf5 import add_group, add_note, add_number, add_text
 from labrig.export.nexus_decay import add_decays, add_fit, valid_names
+from labrig.export.nexus_fields import add_fields
 from labrig.record import RunRecord
-from labrig.report import DeviceLine, RunReport
+from labrig.results import DeviceLine, RunDescription, RunResult
+from labrig.results.decay import DecayResult
+from labrig.results.phosphor import PhosphorResult
 
 YAML = "application/yaml"
 #: NeXus classes of the devices that have one.
 DEVICE_CLASSES = {"camera": "NXdetector", "lamp": "NXsource", "leds": "NXsource"}
 
 
-def write_nexus(path: Path, run: RunRecord, report: RunReport) -> None:
-    """Write a run and what its report shows; from the same objects, so with the same numbers.
+def write_nexus(path: Path, run: RunRecord, about: RunDescription, result: RunResult) -> None:
+    """Write a run and its result.
 
     The bytes follow from the run and labrig's version; nothing in them is of the moment of writing.
 
@@ -33,8 +36,10 @@ def write_nexus(path: Path, run: RunRecord, report: RunReport) -> None:
         The file, such as `result/run.nxs`.
     run
         The run, with one completed unit at the least.
-    report
-        Its patches with their series and fits.
+    about
+        The run, its bench and what its result was made with.
+    result
+        Of any protocol.
 
     Raises
     ------
@@ -46,47 +51,64 @@ def write_nexus(path: Path, run: RunRecord, report: RunReport) -> None:
     with h5py.File(content, "w") as file:
         file.attrs["NX_class"] = "NXroot"
         file.attrs["creator"] = "labrig"
-        file.attrs["creator_version"] = report.labrig_version
+        file.attrs["creator_version"] = about.labrig_version
         file.attrs["default"] = "entry"
-        _add_entry(file, run, report)
+        _add_entry(file, run, about, result)
     try:
         path.write_bytes(content.getbuffer())
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error})") from None
 
 
-def _add_entry(file: h5py.File, run: RunRecord, report: RunReport) -> None:
+def _add_entry(file: h5py.File, run: RunRecord, about: RunDescription, result: RunResult) -> None:
     start_time = _start_time(run)
     entry = add_group(file, "entry", "NXentry")
-    add_text(entry, "title", report.title)
-    add_text(entry, "experiment_identifier", report.run)
-    simulated = " in a simulated dark room" if report.simulated else ""
-    add_text(entry, "experiment_description", f"phosphorescent decay{simulated}")
+    add_text(entry, "title", about.title)
+    add_text(entry, "experiment_identifier", about.run)
+    simulated = " in a simulated dark room" if about.simulated else ""
+    add_text(entry, "experiment_description", f"{_subject(result)}{simulated}")
     add_text(entry, "start_time", _iso(start_time))
     add_text(entry, "end_time", _iso(run.last_time))
     program = add_text(entry, "program_name", "labrig")
-    program.attrs["version"] = report.labrig_version
-    add_note(entry, "protocol", report.protocol_text, YAML, "protocol.yaml")
-    add_note(entry, "rig", report.rig_text, YAML, "rig.yaml")
-    versions = [f"{name} {version}" for name, version in report.libraries]
+    program.attrs["version"] = about.labrig_version
+    add_note(entry, "protocol", about.protocol_text, YAML, "protocol.yaml")
+    add_note(entry, "rig", about.rig_text, YAML, "rig.yaml")
+    versions = [f"{name} {version}" for name, version in about.libraries]
     add_note(entry, "libraries", "\n".join(versions), "text/plain")
-    if report.warnings:
-        add_note(entry, "warnings", "\n".join(report.warnings), "text/plain")
+    if result.warnings:
+        add_note(entry, "warnings", "\n".join(result.warnings), "text/plain")
 
     sample = add_group(entry, "sample", "NXsample")
-    add_text(sample, "name", report.title)
-    if report.sample:
-        lines = [f"{what}: {value}" for what, value in report.sample]
+    add_text(sample, "name", about.title)
+    if about.sample:
+        lines = [f"{what}: {value}" for what, value in about.sample]
         add_text(sample, "description", "\n".join(lines))
 
     instrument = add_group(entry, "instrument", "NXinstrument")
-    add_text(instrument, "name", report.rig)
-    for device in report.devices:
+    add_text(instrument, "name", about.rig)
+    for device in about.devices:
         _add_device(instrument, device, run, start_time)
-    names = valid_names([patch.name for patch in report.patches])
-    for name, patch in zip(names, report.patches, strict=True):
-        add_decays(entry, name, patch)
-        add_fit(entry, name, patch, report.labrig_version)
+    _add_results(entry, result, about.labrig_version)
+
+
+def _subject(result: RunResult) -> str:
+    return (
+        "phosphorescent decay" if isinstance(result, DecayResult) else result.kind.replace("_", " ")
+    )
+
+
+def _add_results(entry: h5py.Group, result: RunResult, version: str, part: str = "") -> None:
+    """Decays as plots with their fits, all other results field by field; of a chain every part."""
+    if isinstance(result, PhosphorResult):
+        for name, one in result.parts.items():
+            _add_results(entry, one, version, name)
+    if isinstance(result, DecayResult):
+        names = valid_names([" ".join(filter(None, (part, name))) for name in result.patches])
+        for valid, (name, patch) in zip(names, result.patches.items(), strict=True):
+            add_decays(entry, valid, name, patch)
+            add_fit(entry, valid, name, patch, version)
+    else:
+        add_fields(entry, result, part or result.kind, version)
 
 
 def _add_device(

@@ -9,9 +9,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.export.hdf5 import add_group, add_note, add_number, add_text
-from labrig.fit import DecayFit
-from labrig.report import PatchReport
-from labrig.results import Series
+from labrig.results import FittedDecay, Series
+from labrig.results.decay import DecayPatch
 
 DN_PER_S = "DN/s"
 #: silx and h5web plot it so: a decay is looked at on a logarithmic scale.
@@ -29,11 +28,11 @@ def valid_names(names: Sequence[str]) -> list[str]:
     return valid
 
 
-def add_decays(entry: h5py.Group, name: str, patch: PatchReport) -> None:
+def add_decays(entry: h5py.Group, name: str, title: str, patch: DecayPatch) -> None:
     """An NXdata `decay_1_<name>` for each decay of a patch; the first is the entry's default."""
     for decay, rows in _decays(patch.series):
         series = patch.series.take(rows)
-        data = _add_plot(entry, f"{decay}_{name}", "", patch, series)
+        data = _add_plot(entry, f"{decay}_{name}", title, patch, series)
         data.attrs["SILX_style"] = LOGARITHMIC
         _add_signals(data, series.channels, series.values)
         for number, channel in enumerate(series.channels):
@@ -50,25 +49,27 @@ def add_decays(entry: h5py.Group, name: str, patch: PatchReport) -> None:
         entry.attrs.setdefault("default", f"{decay}_{name}")
 
 
-def add_fit(entry: h5py.Group, name: str, patch: PatchReport, version: str) -> None:
+def add_fit(entry: h5py.Group, name: str, title: str, patch: DecayPatch, version: str) -> None:
     """An NXprocess `fit_<name>`: parameters, curves, residuals, or why there is no fit."""
     process, fit = add_group(entry, f"fit_{name}", "NXprocess"), patch.fit
     add_text(process, "program", "labrig")
     add_text(process, "version", version)
-    if not isinstance(fit, DecayFit):
-        add_note(process, "not_fitted", fit, "text/plain")
+    if fit is None or patch.normalised_residuals is None:
+        add_note(process, "not_fitted", patch.failure, "text/plain")
         return
     add_note(process, "fit", fit.to_json(), "application/json", "fit.json")
     _add_parameters(process, fit)
     residuals = np.full(patch.series.values.shape, np.nan)  # NaN where a frame was left out
-    residuals[patch.series.usable] = fit.normalised_residuals
+    residuals[patch.series.usable] = patch.normalised_residuals
     for decay, rows in _decays(patch.series):
         series = patch.series.take(rows)
-        curve = _add_plot(process, f"{decay}_curve", "fit of ", patch, series)
+        curve = _add_plot(process, f"{decay}_curve", f"fit of {title}", patch, series)
         curve.attrs["SILX_style"] = LOGARITHMIC
         predicted = fit.predict(series.t_s, series.exposure_s)
         _add_signals(curve, series.channels, predicted)
-        left = _add_plot(process, f"{decay}_residuals", "whitened residuals of ", patch, series)
+        left = _add_plot(
+            process, f"{decay}_residuals", f"whitened residuals of {title}", patch, series
+        )
         for number, channel in enumerate(series.channels):
             add_number(left, channel, residuals[rows, number], "", f"{channel} / σ")
         process.attrs.setdefault("default", f"{decay}_curve")
@@ -82,11 +83,11 @@ def _decays(series: Series) -> Iterator[tuple[str, NDArray[np.intp]]]:
 
 
 def _add_plot(
-    parent: h5py.Group, name: str, what: str, patch: PatchReport, series: Series
+    parent: h5py.Group, name: str, title: str, patch: DecayPatch, series: Series
 ) -> h5py.Group:
     """A new NXdata with its time axis, that shows the brightest channel first."""
     data = add_group(parent, name, "NXdata")
-    add_text(data, "title", f"{what}{patch.name}, {series.unit[0]}")
+    add_text(data, "title", f"{title}, {series.unit[0]}")
     data.attrs["axes"] = ["time"]
     data.attrs["time_indices"] = [0]
     middle_s = series.t_s + series.exposure_s / 2
@@ -104,7 +105,7 @@ def _add_signals(data: h5py.Group, channels: Sequence[str], values: NDArray[np.f
         add_number(data, channel, values[:, number], DN_PER_S, f"{channel} / ({DN_PER_S})")
 
 
-def _add_parameters(process: h5py.Group, fit: DecayFit) -> None:
+def _add_parameters(process: h5py.Group, fit: FittedDecay) -> None:
     parameters = add_group(process, "parameters", "NXparameters")
 
     def add(name: str, values: Sequence[float], errors: Sequence[float], units: str = "") -> None:
@@ -123,8 +124,8 @@ def _add_parameters(process: h5py.Group, fit: DecayFit) -> None:
     add_number(parameters, "covariance", fit.covariance, "", order)
 
 
-def _brightest(patch: PatchReport) -> int:
+def _brightest(patch: DecayPatch) -> int:
     """Number of the channel that a plot shows first."""
-    if isinstance(patch.fit, DecayFit):
+    if patch.fit is not None:
         return patch.fit.brightest
     return int(np.argmax(patch.series.values.mean(axis=0)))

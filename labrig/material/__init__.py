@@ -1,5 +1,6 @@
 """Materials: their file, their rates and what follows from them."""
 
+from labrig.material.comparison import MaterialComparison, Pair, compare_materials
 from labrig.material.file import (
     IrradianceNorm,
     Material,
@@ -13,9 +14,12 @@ from labrig.material.file import (
 __all__ = [
     "IrradianceNorm",
     "Material",
+    "MaterialComparison",
+    "Pair",
     "Provenance",
     "Spectrum",
     "State",
+    "compare_materials",
     "read_material",
     "write_material",
 ]

@@ -1,25 +1,31 @@
 """What a result was made with: labrig, the libraries its numbers pass through, what was asked."""
 
-from collections.abc import Mapping, Sequence
+from collections import Counter
 from importlib.metadata import version
+from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
-from labrig.analyse.choices import Choices, DecayProtocol
-from labrig.analyse.timed_frames import IntactFrames
-from labrig.record import FrameRecord
+from labrig.analyse import Choices
+from labrig.record import RunRecord
 from labrig.region import Region
 
 _LIBRARIES = ("numpy", "scipy", "nlopt", "rawpy", "matplotlib", "colour-science", "h5py")
 
 
-class StageProvenance(BaseModel):
+class Provenance(BaseModel):
     """`provenance.yaml` of a result: the same in all of these gives the same result.
 
     Attributes
     ----------
     labrig, libraries
         Versions.
+    regions
+        Of the patches, by name, as they were used.
+    states, fixed_rates_per_s
+        What a person asked of the fits of decays, otherwise than the protocol.
+    camera
+        Name of the curves that coloured the report's pictures.
     frames
         How many went in, by purpose.
     excluded
@@ -32,45 +38,28 @@ class StageProvenance(BaseModel):
 
     labrig: str
     libraries: dict[str, str]
-    frames: dict[str, int]
-    excluded: tuple[str, ...]
-    optics: dict[str, str] = {}
-
-
-class ResultProvenance(StageProvenance):
-    """Of a decay: what was used besides, whoever asked for it; the camera by its curves' name."""
-
-    patches: dict[str, Region]
-    background: Region | None
+    regions: dict[str, Region]
     states: str | int
     fixed_rates_per_s: tuple[float, ...]
     camera: str | None
+    frames: dict[str, int]
+    excluded: tuple[str, ...]
+    optics: dict[str, str]
 
 
-def provenance(
-    protocol: DecayProtocol,
-    choices: Choices,
-    patches: Mapping[str, Region],
-    background: Region | None,
-    frames: IntactFrames,
-    recorded: Sequence[FrameRecord],
-    camera: str | None,
-) -> ResultProvenance:
-    """Gather it; `recorded` are all frames there are."""
-    excluded = tuple(frame.path.name for frame in recorded if choices.excludes(frame))
-    return ResultProvenance(
+def provenance(run: RunRecord, protocol: Any, choices: Choices, camera: str | None) -> Provenance:
+    """Gather it; `camera` names the curves that coloured the pictures."""
+    frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
+    patches = hasattr(protocol, "patches")
+    return Provenance(
         labrig=version("labrig"),
         libraries=library_versions(),
-        patches=dict(patches),
-        background=background,
-        states=choices.states or protocol.states,
+        regions=choices.patches(protocol) if patches else dict(choices.regions),
+        states=choices.states or getattr(protocol, "states", "auto"),
         fixed_rates_per_s=choices.fixed_rates_per_s,
         camera=camera,
-        frames={
-            "decay": sum(frame.path.name not in excluded for frame in frames.decay),
-            "dark": len(frames.dark),
-        },
-        excluded=excluded,
+        frames=dict(Counter(frame.purpose for frame in frames if not choices.excludes(frame))),
+        excluded=tuple(frame.path.name for frame in frames if choices.excludes(frame)),
         optics=dict(choices.optics),
     )
 

@@ -62,6 +62,11 @@ class RunRecord:
     torn: bool
     last_time: float
 
+    @property
+    def name(self) -> str:
+        """The name of its folder, whatever path leads there."""
+        return self.folder.resolve().name
+
     def completed(self) -> dict[str, Attempt]:
         """The attempt that counts, of each completed unit, in order of completion.
 

@@ -1,30 +1,22 @@
-"""The report of a run: what was measured, for people."""
+"""The report of a run: what was measured, for people; figures and words, from results."""
 
-from labrig.report.content import (
-    DECAY_ASSUMPTIONS,
-    DeviceLine,
-    GlowPhotograph,
-    Interruption,
-    PatchReport,
-    RunReport,
-)
 from labrig.report.figure_style import figure_style
-from labrig.report.page import write_report
+from labrig.report.page import Report, write_report
+from labrig.report.render import render
+from labrig.report.rendering import Rendered, Source
+from labrig.report.run_sections import lamp_sections, temperature_sections
 from labrig.report.sections import Picture, Section, Table
-from labrig.report.stage_page import StagePage, write_stage_page
 
 __all__ = [
-    "DECAY_ASSUMPTIONS",
-    "DeviceLine",
-    "GlowPhotograph",
-    "Interruption",
-    "PatchReport",
     "Picture",
-    "RunReport",
+    "Rendered",
+    "Report",
     "Section",
-    "StagePage",
+    "Source",
     "Table",
     "figure_style",
+    "lamp_sections",
+    "render",
+    "temperature_sections",
     "write_report",
-    "write_stage_page",
 ]

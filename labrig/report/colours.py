@@ -86,6 +86,15 @@ def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
     return np.stack(columns, axis=1)
 
 
+def spectrum_colour(wavelength_nm: FloatArray, value: FloatArray) -> str:
+    """The colour of a spectrum (n,) at full brightness, as `#rrggbb`; cut off at sRGB's edge."""
+    import colour
+
+    xyz = colour_matching(wavelength_nm).T @ (value * np.gradient(wavelength_nm))
+    linear = into_gamut(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB @ xyz)
+    return css_colour(linear / max(float(linear.max()), 1e-12))
+
+
 def into_gamut(linear: FloatArray) -> FloatArray:
     """Linear sRGB, shape (…, 3), as near as a screen can show it: what is negative becomes 0.
 

@@ -9,7 +9,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from labrig.fit import DecayFit
 from labrig.report.figure_style import (
     DASHED,
     INK,
@@ -26,7 +25,7 @@ from labrig.report.figure_style import (
 from labrig.report.fitted_curve import fitted_curve, middles_s
 from labrig.report.legend import BAND_OPACITY, legend_above, lined, marked, shaded
 from labrig.report.log_axis import mark_decades
-from labrig.results import Series
+from labrig.results import FittedDecay, Series
 from labrig.written_numbers import power_of_ten, rounded
 
 FloatArray = NDArray[np.float64]
@@ -44,7 +43,7 @@ PLAIN_FROM, PLAIN_TO = 0.02, 1e5
 LEFT_OUT_SHOWN = 3.0
 
 
-def linear_decay(series: Series, fit: DecayFit | None) -> Figure:
+def linear_decay(series: Series, fit: FittedDecay | None) -> Figure:
     """Signal over time."""
     figure, axes = _axes()
     _draw(axes, series, fit)
@@ -60,7 +59,7 @@ def linear_decay(series: Series, fit: DecayFit | None) -> Figure:
     return figure
 
 
-def logarithmic_decay(series: Series, fit: DecayFit | None) -> Figure:
+def logarithmic_decay(series: Series, fit: FittedDecay | None) -> Figure:
     """Signal over time with a logarithmic axis; what is not positive stands at its foot."""
     figure, axes = _axes()
     axes.set_yscale("log", nonpositive="clip")
@@ -129,7 +128,7 @@ def _highest(series: Series) -> float:
     return min(float(series.values.max()), LEFT_OUT_SHOWN * used) if used > 0 else used
 
 
-def _draw(axes: Axes, series: Series, fit: DecayFit | None) -> None:
+def _draw(axes: Axes, series: Series, fit: FittedDecay | None) -> None:
     t_s, usable = middles_s(series), series.usable
     for number, name in enumerate(series.channels):
         marker = MARKERS[number % len(MARKERS)]
@@ -160,11 +159,11 @@ def _draw(axes: Axes, series: Series, fit: DecayFit | None) -> None:
     axes.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
 
 
-def _brightest_colour(fit: DecayFit) -> str:
+def _brightest_colour(fit: FittedDecay) -> str:
     return channel_colour(fit.channels[fit.brightest], fit.brightest)
 
 
-def _legend(figure: Figure, series: Series, fit: DecayFit | None) -> None:
+def _legend(figure: Figure, series: Series, fit: FittedDecay | None) -> None:
     entries: list[Artist] = [
         marked(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
         for number, name in enumerate(series.channels)

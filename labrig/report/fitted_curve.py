@@ -5,9 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit import DecayFit
 from labrig.fit.decay.shapes import exponential_means_and_slopes
-from labrig.results import Series
+from labrig.results import FittedDecay, Series
 
 FloatArray = NDArray[np.float64]
 
@@ -45,7 +44,7 @@ def middles_s(series: Series) -> FloatArray:
     return series.t_s + series.exposure_s / 2
 
 
-def fitted_curve(series: Series, fit: DecayFit) -> Curve:
+def fitted_curve(series: Series, fit: FittedDecay) -> Curve:
     """`fit` along the times of `series`, for the exposures that frames had around them."""
     order = np.argsort(series.t_s, kind="stable")
     known_t, known_exposure = series.t_s[order], series.exposure_s[order]
@@ -62,7 +61,7 @@ def fitted_curve(series: Series, fit: DecayFit) -> Curve:
     )
 
 
-def _sigma(fit: DecayFit, t_s: FloatArray, exposure_s: FloatArray) -> FloatArray:
+def _sigma(fit: FittedDecay, t_s: FloatArray, exposure_s: FloatArray) -> FloatArray:
     """σ = √(J Cov Jᵀ), J the derivatives by k₁, a₁, k₂, a₂, …, offset."""
     if not np.isfinite(fit.covariance).all():
         return np.full_like(t_s, np.inf)

@@ -3,11 +3,11 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 
-from labrig.fit import DecayFit
-from labrig.report.content import RunReport
+from labrig.report.content import DecayReport
 from labrig.report.photographs import Sensor
 from labrig.report.recording_text import listed, recording
 from labrig.report.timing import Lateness
+from labrig.results import FittedDecay
 from labrig.written_numbers import rounded
 
 EQUATION_LATEX = (
@@ -48,9 +48,9 @@ class Methods:
         return "\n\n".join([self.recording, *fitted, self.analysis, "\n".join(references)])
 
 
-def methods(report: RunReport, sensor: Sensor | None, late: Lateness | None) -> Methods:
+def methods(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -> Methods:
     """Of the run in `report`, with its camera and the lateness of its frames where known."""
-    fits = [patch.fit for patch in report.patches if isinstance(patch.fit, DecayFit)]
+    fits = [patch.fit for patch in report.patches if isinstance(patch.fit, FittedDecay)]
     software = list(_software(report))
     return Methods(
         recording=" ".join(recording(report, sensor, late)),
@@ -59,7 +59,7 @@ def methods(report: RunReport, sensor: Sensor | None, late: Lateness | None) -> 
     )
 
 
-def _model(report: RunReport) -> str:
+def _model(report: DecayReport) -> str:
     channel = "" if len(report.patches[0].series.channels) == 1 else " in channel c"
     return (
         f"The signal{channel} of an exposure from t to t + T after lamp off was modelled, after "
@@ -67,7 +67,7 @@ def _model(report: RunReport) -> str:
     )
 
 
-def _analysis(report: RunReport, fits: list[DecayFit]) -> Iterator[str]:
+def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
     offset = (
         "an offset b_c, which the uncertainty of the dark level restrains"
         if any(any(fit.offsets_sigma) for fit in fits)
@@ -97,7 +97,7 @@ def _analysis(report: RunReport, fits: list[DecayFit]) -> Iterator[str]:
     yield "Uncertainties are standard uncertainties (1 σ) from the covariance of the fit."
 
 
-def _flicker(fits: list[DecayFit]) -> str:
+def _flicker(fits: list[FittedDecay]) -> str:
     """Patches of a frame share their flicker, so that the one which knows it best tells it."""
     measured = [fit for fit in fits if fit.flicker_sigma > 0]
     best = min(measured, key=lambda fit: fit.flicker_sigma, default=fits[0])
@@ -108,8 +108,8 @@ def _flicker(fits: list[DecayFit]) -> str:
     return f" and a flicker of {percent} % that the channels of a frame share, {source}"
 
 
-def _software(report: RunReport) -> Iterator[str]:
-    versions = dict(report.libraries)
+def _software(report: DecayReport) -> Iterator[str]:
+    versions = dict(report.about.libraries)
     used = [text.format(versions[name]) for name, text in _SOFTWARE.items() if name in versions]
     with_them = f" with {listed(used)}" if used else ""
-    yield f"Recording and analysis were done by labrig {report.labrig_version}{with_them}."
+    yield f"Recording and analysis were done by labrig {report.about.labrig_version}{with_them}."

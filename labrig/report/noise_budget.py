@@ -5,8 +5,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit import DecayFit, nonnegative_least_squares
-from labrig.results import Series
+from labrig.fit import nonnegative_least_squares
+from labrig.results import FittedDecay, Series
 
 FloatArray = NDArray[np.float64]
 
@@ -62,7 +62,7 @@ class NoiseBudget:
         }
 
 
-def noise_budget(series: Series, fit: DecayFit) -> NoiseBudget | None:
+def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
     """Of the frames of the first decay that were fitted; None if they are too few, or σ unknown."""
     brightest = fit.brightest
     signal = fit.predict(series.t_s, series.exposure_s)[:, brightest] - fit.offset

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from markupsafe import Markup
 
-from labrig.fit import DecayFit
+from labrig.results import FittedDecay
 from labrig.written_numbers import plus_minus, rounded
 
 #: Relative σ of a rate from which its reciprocal is given without one.
@@ -32,7 +32,7 @@ class CandidateRow:
     chosen: bool
 
 
-def state_rows(fit: DecayFit) -> list[Row]:
+def state_rows(fit: FittedDecay) -> list[Row]:
     """Rates, times and amplitudes, one column a state."""
     rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in fit.states]
     lifetimes = [_lifetime(rate, sigma) for rate, sigma in rates]
@@ -46,7 +46,7 @@ def state_rows(fit: DecayFit) -> list[Row]:
     ]
 
 
-def quality_rows(fit: DecayFit) -> list[Row]:
+def quality_rows(fit: FittedDecay) -> list[Row]:
     """What the states share."""
     rows = []
     several = len(fit.channels) > 1
@@ -71,7 +71,7 @@ def quality_rows(fit: DecayFit) -> list[Row]:
     return [*rows, Row("Reduced χ²", "", (chi2,))]
 
 
-def paper_rows(fit: DecayFit) -> list[Row]:
+def paper_rows(fit: FittedDecay) -> list[Row]:
     """Λᵢ = aᵢ/kᵢ in each channel, as if every state had been full: rᵢ(0) = 1."""
     rows = []
     for name, weight, weight_sigma in zip(
@@ -93,7 +93,7 @@ def paper_rows(fit: DecayFit) -> list[Row]:
     return rows
 
 
-def candidate_rows(fit: DecayFit) -> list[CandidateRow]:
+def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
     """The numbers of states tried, and their rivals."""
     bics = [candidate.bic for candidate in fit.candidates] + [rival.bic for rival in fit.rivals]
     best = min(bics, default=math.inf)
@@ -113,7 +113,7 @@ def candidate_rows(fit: DecayFit) -> list[CandidateRow]:
     return rows
 
 
-def why_so_many_states(fit: DecayFit) -> str:
+def why_so_many_states(fit: FittedDecay) -> str:
     """In a sentence or two."""
     tried = {candidate.n_states: candidate for candidate in fit.candidates}
     here = tried.get(fit.n_states)

@@ -9,7 +9,7 @@ from labrig.errors import UsageError
 from labrig.quantity import duration_text
 from labrig.record.frames import FrameRecord
 from labrig.region import region_pixels
-from labrig.report.content import RunReport
+from labrig.report.content import DecayReport
 from labrig.report.photographs import Sensor
 from labrig.report.timing import DECAY, ON_TIME_S, Lateness
 from labrig.written_numbers import exposure_text, rounded
@@ -18,10 +18,10 @@ from labrig.written_numbers import exposure_text, rounded
 ALIKE = 0.02
 
 
-def recording(report: RunReport, sensor: Sensor | None, late: Lateness | None) -> Iterator[str]:
+def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -> Iterator[str]:
     """From the charge to the values, a sentence each."""
-    how = "simulated" if report.simulated else "measured"
-    yield f"The decay of the phosphorescence of {report.title} was {how} with labrig."
+    how = "simulated" if report.about.simulated else "measured"
+    yield f"The decay of the phosphorescence of {report.about.title} was {how} with labrig."
     decays = [frame for frame in report.frames if frame.purpose == DECAY]
     if decays:
         yield from _charge(report, decays)
@@ -33,7 +33,7 @@ def recording(report: RunReport, sensor: Sensor | None, late: Lateness | None) -
     yield from _left_out(report)
 
 
-def _charge(report: RunReport, decays: Sequence[FrameRecord]) -> Iterator[str]:
+def _charge(report: DecayReport, decays: Sequence[FrameRecord]) -> Iterator[str]:
     if not report.charges_s:
         return
     repeats = len({frame.unit for frame in decays})
@@ -43,7 +43,7 @@ def _charge(report: RunReport, decays: Sequence[FrameRecord]) -> Iterator[str]:
 
 
 def _frames(
-    report: RunReport, sensor: Sensor | None, decays: Sequence[FrameRecord]
+    report: DecayReport, sensor: Sensor | None, decays: Sequence[FrameRecord]
 ) -> Iterator[str]:
     name = sensor.camera if sensor and sensor.camera else "camera"
     camera = f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
@@ -88,7 +88,7 @@ def _interval(decays: Sequence[FrameRecord]) -> str:
     return f", one every {duration_text(float(np.median(gaps_s)))}" if gaps_s else ""
 
 
-def _mean(report: RunReport, sensor: Sensor | None) -> str:
+def _mean(report: DecayReport, sensor: Sensor | None) -> str:
     channels = report.patches[0].series.channels
     place = "regions" if len(report.patches) > 1 else "a region"
     size = _sizes(report, sensor)
@@ -100,7 +100,7 @@ def _mean(report: RunReport, sensor: Sensor | None) -> str:
     )
 
 
-def _sizes(report: RunReport, sensor: Sensor | None) -> str:
+def _sizes(report: DecayReport, sensor: Sensor | None) -> str:
     sizes = set()
     for patch in report.patches:
         if sensor is None or patch.region is None:
@@ -114,7 +114,7 @@ def _sizes(report: RunReport, sensor: Sensor | None) -> str:
     return " to ".join(dict.fromkeys((texts[0], texts[-1]))) + " pixels"
 
 
-def _dark(report: RunReport) -> Iterator[str]:
+def _dark(report: DecayReport) -> Iterator[str]:
     darks = [frame for frame in report.frames if frame.purpose == "dark"]
     decays = [frame for frame in report.frames if frame.purpose == DECAY]
     if report.background is not None:
@@ -128,7 +128,7 @@ def _dark(report: RunReport) -> Iterator[str]:
         )
 
 
-def _left_out(report: RunReport) -> Iterator[str]:
+def _left_out(report: DecayReport) -> Iterator[str]:
     all_of = "frames" if len(report.patches) == 1 else "values of all patches"
     flags = [flag for patch in report.patches for flag in patch.series.flag]
     out = len(flags) - sum(int(patch.series.usable.sum()) for patch in report.patches)

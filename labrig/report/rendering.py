@@ -7,6 +7,7 @@ from labrig.acquire import RigFile
 from labrig.optics import CameraResponse
 from labrig.record import RunRecord
 from labrig.report.sections import Section
+from labrig.results import RunDescription
 
 
 @dataclass(frozen=True)
@@ -21,14 +22,20 @@ class Source:
         Its model.
     rig
         The bench as it was.
+    about
+        The run, its bench and what its result was made with.
     camera
         The camera's curves, for colours; None if they are not known.
+    anchor
+        Begins the names of places in the page that links lead to.
     """
 
     run: RunRecord
     protocol: Any
     rig: RigFile
+    about: RunDescription
     camera: CameraResponse | None = None
+    anchor: str = ""
 
 
 @dataclass(frozen=True)
@@ -41,10 +48,13 @@ class Rendered:
         Of the report, in this order.
     lines
         The numbers that matter, for the terminal.
+    methods
+        How it was done, for the end of the report.
     """
 
     sections: tuple[Section, ...]
     lines: tuple[str, ...]
+    methods: tuple[Section, ...] = ()
 
 
 class Renderer(Protocol):

@@ -7,7 +7,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter
 from numpy.typing import NDArray
 
-from labrig.fit import DecayFit
 from labrig.report.decay_figures import TIME_LABEL
 from labrig.report.figure_style import (
     INK,
@@ -24,7 +23,7 @@ from labrig.report.figure_style import (
 )
 from labrig.report.fitted_curve import middles_s
 from labrig.report.legend import legend_above, marked
-from labrig.results import Series
+from labrig.results import FittedDecay, Series
 from labrig.written_numbers import rounded
 
 FloatArray = NDArray[np.float64]
@@ -57,7 +56,7 @@ class Residuals:
     common_sigma: FloatArray
 
 
-def residuals(series: Series, fit: DecayFit) -> Residuals:
+def residuals(series: Series, fit: FittedDecay) -> Residuals:
     """Of all rows of `series`, those left out of the fit, too."""
     model = fit.predict(series.t_s, series.exposure_s)
     signal = model - fit.offsets
@@ -74,7 +73,7 @@ def residuals(series: Series, fit: DecayFit) -> Residuals:
     )
 
 
-def residual_figure(series: Series, fit: DecayFit) -> Figure:
+def residual_figure(series: Series, fit: FittedDecay) -> Figure:
     """Normalised residuals; with several channels below them what a frame's channels share."""
     left = residuals(series, fit)
     several = len(series.channels) > 1

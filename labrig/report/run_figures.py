@@ -6,7 +6,6 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
-from labrig.fit import DecayFit
 from labrig.report.content import PatchReport
 from labrig.report.decay_figures import (
     TIME_LABEL,
@@ -26,6 +25,7 @@ from labrig.report.fitted_curve import fitted_curve, middles_s
 from labrig.report.legend import legend_above, marked
 from labrig.report.log_axis import mark_decades
 from labrig.report.timing import FrameTiming
+from labrig.results import FittedDecay
 from labrig.written_numbers import rounded
 
 SMALL_WIDTH_PT, SMALL_HEIGHT_PT = 190.0, 140.0
@@ -53,7 +53,7 @@ def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> 
     axes.set_xlabel("Time / s", fontsize=SMALL_FONT_PT)
     axes.set_ylabel("DN/s", fontsize=SMALL_FONT_PT)
     series = patch.series
-    curve = fitted_curve(series, patch.fit) if isinstance(patch.fit, DecayFit) else None
+    curve = fitted_curve(series, patch.fit) if isinstance(patch.fit, FittedDecay) else None
     for number, name in enumerate(series.channels):
         colour = channel_colour(name, number)
         axes.plot(

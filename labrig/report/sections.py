@@ -1,6 +1,7 @@
 """Parts of a report that any protocol can have: text, figures, tables."""
 
 from dataclasses import dataclass
+from typing import Any
 
 from matplotlib.figure import Figure
 
@@ -21,7 +22,7 @@ class Picture:
 
     name: str
     figure: Figure
-    caption: str
+    caption: str = ""
 
 
 @dataclass(frozen=True)
@@ -31,13 +32,37 @@ class Table:
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
     caption: str = ""
+    title: str = ""
 
 
 @dataclass(frozen=True)
 class Section:
-    """What one thing that was measured looks like in a report; text in paragraphs."""
+    """What one thing that was measured looks like in a report.
+
+    Attributes
+    ----------
+    title
+        Its heading.
+    text
+        Paragraphs.
+    figures, tables
+        In this order.
+    points
+        Sentences of a list, after the text.
+    part
+        The part of a chain that it belongs to; empty if the run is none.
+    anchor
+        What links to it are made to; empty if there are none.
+    template, content
+        How it is laid out, and what that needs besides the figures.
+    """
 
     title: str
     text: tuple[str, ...] = ()
     figures: tuple[Picture, ...] = ()
     tables: tuple[Table, ...] = ()
+    points: tuple[str, ...] = ()
+    part: str = ""
+    anchor: str = ""
+    template: str = "section.html.j2"
+    content: Any = None

@@ -1,6 +1,6 @@
 """Sections of a report with their figures drawn."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 from labrig.report.plates import Plate, Plates
@@ -9,10 +9,19 @@ from labrig.report.sections import Section
 
 @dataclass(frozen=True)
 class Shown:
-    """A section whose figures are drawn; captions stand beside them."""
+    """A section whose figures are drawn; captions stand beside them.
+
+    Attributes
+    ----------
+    plates
+        The figures with their captions, in order.
+    plate
+        The same by name.
+    """
 
     section: Section
     plates: tuple[tuple[Plate, str], ...]
+    plate: Mapping[str, Plate]
 
 
 def draw(sections: Sequence[Section], plates: Plates) -> list[Shown]:
@@ -21,11 +30,8 @@ def draw(sections: Sequence[Section], plates: Plates) -> list[Shown]:
 
 
 def _drawn(number: int, section: Section, plates: Plates) -> Shown:
-    drawn = [
-        (
-            plates.add(one.figure, f"{number}-{one.name}", f"{section.title}: {one.name}"),
-            one.caption,
-        )
+    plate = {
+        one.name: plates.add(one.figure, f"{number}-{one.name}", f"{section.title}: {one.name}")
         for one in section.figures
-    ]
-    return Shown(section, tuple(drawn))
+    }
+    return Shown(section, tuple((plate[one.name], one.caption) for one in section.figures), plate)

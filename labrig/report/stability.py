@@ -4,9 +4,8 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.fit import DecayFit
 from labrig.report.residual_figure import residuals
-from labrig.results import Series
+from labrig.results import FittedDecay, Series
 
 #: What stands out of its own σ by less was dark.
 SEEN_SIGMA = 5.0
@@ -21,7 +20,7 @@ class Repeat:
     sigma: float
 
 
-def repeats(series: Series, fit: DecayFit) -> tuple[Repeat, ...]:
+def repeats(series: Series, fit: FittedDecay) -> tuple[Repeat, ...]:
     """All units of `series` but the first; those without usable frames are left out.
 
     Each unit's factor to the common fit is the mean of what the channels of its frames have in

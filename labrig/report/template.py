@@ -1,6 +1,7 @@
 """What the templates of reports share."""
 
 import re
+import shlex
 from datetime import UTC, datetime
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from markupsafe import Markup, escape
 
 from labrig.quantity import duration_text
 from labrig.record.frames import FrameRecord
+from labrig.report import parameters
 from labrig.written_numbers import plus_minus, rounded
 
 _FOLDER = Path(__file__).parent
@@ -25,8 +27,17 @@ def environment() -> Environment:
         lstrip_blocks=True,
     )
     made.globals.update(
-        duration_text=duration_text, plus_minus=plus_minus, rounded=rounded, utc=_utc
+        duration_text=duration_text,
+        plus_minus=plus_minus,
+        rounded=rounded,
+        utc=_utc,
+        state_rows=parameters.state_rows,
+        quality_rows=parameters.quality_rows,
+        paper_rows=parameters.paper_rows,
+        candidate_rows=parameters.candidate_rows,
+        why_so_many_states=parameters.why_so_many_states,
     )
+    made.filters["quoted"] = shlex.quote
     made.filters["indexed"] = _indexed
     return made
 

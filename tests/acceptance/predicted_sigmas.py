@@ -23,7 +23,7 @@ from typing import Any
 import numpy as np
 import yaml
 
-from labrig.analyse.choices import Choices, read_decay_protocol
+from labrig.analyse.choices import Choices, read_run_protocol
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.timed_frames import intact_frames
 from labrig.cli.ending import guarded
@@ -109,7 +109,7 @@ def fitted(case: Case, day: int) -> Fitted:
     """What one day finds, with the true number of states; without the report's pictures."""
     with tempfile.TemporaryDirectory() as folder:
         made = run(Path(folder), case, day, "--no-process")
-        patches = read_decay_protocol(made).patches
+        patches = Choices().patches(read_run_protocol(made))
         frames = intact_frames(read_run(made), Choices())
         (series,) = reduce_patches(frames.decay, patches, frames.dark).values()
     try:

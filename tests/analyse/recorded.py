@@ -12,6 +12,8 @@ from filelock import FileLock
 
 from labrig import shipped
 from labrig.acquire import Plan, RunObserver
+from labrig.analyse import Choices, Inputs, Part
+from labrig.analyse.choices import read_run_protocol
 from labrig.clock import Clock
 from labrig.filling import Watch
 from labrig.record import RunRecord, read_run
@@ -74,3 +76,11 @@ def cut_off_and_resumed(run: Path, unit: str) -> tuple[RunRecord, RunRecord]:
             path.unlink()
     resume_run(run, quietly)
     return cut, read_run(run)
+
+
+def whole(run: Path, inputs: Inputs | None = None, choices: Choices | None = None) -> Part:
+    """A run as what an analysis is given: no part of a chain, and as told beside it."""
+    choices = choices or Choices()
+    return Part(
+        read_run(run), read_run_protocol(run), choices.bench(run), choices, inputs or Inputs()
+    )

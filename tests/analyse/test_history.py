@@ -6,8 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from labrig.analyse.history import charges_s, interruptions, lamp_sections
 from labrig.record import ActionRecord, Attempt, FrameRecord, RunRecord
+from labrig.record.history import charges_s, interruptions
+from labrig.report.run_sections import lamp_sections
 from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]

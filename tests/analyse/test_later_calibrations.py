@@ -29,9 +29,9 @@ def test_one_that_came_later_is_used_and_recorded(tmp_path: Path) -> None:
         "ambient_sigma_dn_per_s": (0.1,) * 3,
     }
     write_blank_file(file, BLANK.model_copy(update=three | leaking))
-    assert not any("falls on the blank" in said for said in process_run(run).run_warnings)
+    assert not any("falls on the blank" in said for said in process_run(run).warnings)
     result = process_run(run, Choices.parse([], [], optics=[f"blank={file}"]))
-    assert any("DN/s in G falls on the blank" in said for said in result.run_warnings)
+    assert any("DN/s in G falls on the blank" in said for said in result.warnings)
     made_with = yaml.safe_load((run / "result" / "provenance.yaml").read_text())
     assert made_with["optics"] == {"blank": str(file)}
 

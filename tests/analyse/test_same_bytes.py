@@ -31,7 +31,7 @@ def test_a_result_is_made_again_bit_for_bit(
     assert ended.code == 0, ended.err
     result = contents(ended.run_folder / "result")
     names = {"fit.json", "material.yaml", "series.csv"}
-    ours = {"provenance.yaml", "report.html", "run.nxs"}
+    ours = {"provenance.yaml", "report.html", "result.json", "run.nxs"}
     ours |= {f"{patch}/{name}" for patch in PATCHES for name in names}
     assert ours == {name for name in result if not name.startswith("figures/")}
     shutil.rmtree(ended.run_folder / "result")
@@ -62,7 +62,7 @@ def test_processing_again_says_so_and_keeps_one_result(
 
     said = labrig("process", run, "--exclude", "7", "--roi", "20,20,30,30").out
     assert "kept as result-1:\n" in said
-    assert "  patches sample: 0.25, 0.25, 0.5, 0.5 → 20.0, 20.0, 30.0, 30.0\n" in said
+    assert "  regions sample: 0.25, 0.25, 0.5, 0.5 → 20.0, 20.0, 30.0, 30.0\n" in said
     assert "  frames decay: 12 → 11\n" in said
     assert "  excluded: none → 000007.dng\n" in said
     (line,) = (line for line in said.splitlines() if line.startswith("  k_r 1 "))

@@ -31,7 +31,7 @@ def recorded(folder: Path, **simulation: Any) -> Path:
 def test_a_drifting_room_is_shown_and_said(tmp_path: Path) -> None:
     run = recorded(tmp_path, temperature={"start": 19, "drift_per_hour": 9})
     result = process_run(run)
-    (said,) = [line for line in result.run_warnings if "temperature" in line]
+    (said,) = [line for line in result.warnings if "temperature" in line]
     moved = float(said.partition("moved by ")[2].split()[0])
     frames = read_run(run).frames("decay")
     hours = (frames[-1].start_time - frames[0].start_time) / 3600
@@ -53,7 +53,7 @@ def test_a_drifting_room_is_shown_and_said(tmp_path: Path) -> None:
 def test_a_steady_room_is_shown_without_a_warning(tmp_path: Path) -> None:
     run = recorded(tmp_path)
     result = process_run(run)
-    assert not [line for line in result.run_warnings if "temperature" in line]
+    assert not [line for line in result.warnings if "temperature" in line]
     assert "<h2>Temperature</h2>" in (run / "result" / "report.html").read_text()
 
 
@@ -68,7 +68,7 @@ def test_a_thermometer_that_fails_does_not_end_a_run(
     assert [attempt.exit_status for attempt in read_run(run).attempts] == ["success"] * 2
     assert len(read_run(run).temperatures()) == readings
     result = process_run(run)
-    (said,) = [line for line in result.run_warnings if "thermometer" in line]
+    (said,) = [line for line in result.warnings if "thermometer" in line]
     assert told in said
 
 

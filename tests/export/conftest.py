@@ -10,26 +10,27 @@ import yaml
 
 from labrig import shipped
 from labrig.acquire import Plan, RunObserver, read_rig_file
-from labrig.analyse.choices import read_decay_protocol
+from labrig.analyse.choices import read_run_protocol
 from labrig.clock import Clock
 from labrig.process import process_run
-from labrig.process.page import run_report
+from labrig.process.description import describe_run
 from labrig.record import read_run
-from labrig.report import RunReport
+from labrig.results import RunDescription, read_result
+from labrig.results.decay import DecayResult
 from labrig.run import Recording
 from tests.acquire.fakes import Watching
 
 #: The rest of the frame stays dark.
 SAMPLE = [{"material": "blue-paint", "region": [0.25, 0.25, 0.5, 0.5]}]
-NO_FIT = "nothing glows"
 
 
 @dataclass(frozen=True)
 class Finished:
-    """A processed run and what its report shows."""
+    """A processed run, its description and its result as read back."""
 
     folder: Path
-    report: RunReport
+    about: RunDescription
+    result: DecayResult
 
 
 @pytest.fixture(scope="session")
@@ -62,18 +63,12 @@ def finish(folder: Path, **keys: object) -> Finished:
         paths[name] = folder / f"{name}.yaml"
         paths[name].write_text(yaml.safe_dump(content))
     run = Recording.prepare(paths["protocol"], paths["rig"], folder / "runs").record(quietly)
-    result = process_run(run)
-    asked = read_decay_protocol(run)
-    report = run_report(
-        read_run(run),
-        asked,
-        read_rig_file(run / "rig.yaml"),
-        asked.patches,
-        result.series,
-        {name: result.fits.get(name, NO_FIT) for name in result.series},
-        result.run_warnings,
-    )
-    return Finished(run, report)
+    process_run(run)
+    record = read_run(run)
+    about = describe_run(record, read_run_protocol(run), read_rig_file(run / "rig.yaml"))
+    result = read_result(run)
+    assert isinstance(result, DecayResult)
+    return Finished(run, about, result)
 
 
 @contextmanager

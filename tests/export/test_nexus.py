@@ -18,7 +18,7 @@ import labrig
 from labrig.errors import DiskError
 from labrig.export import write_nexus
 from labrig.record import read_run
-from tests.export.conftest import NO_FIT, Finished
+from tests.export.conftest import Finished
 
 
 @pytest.fixture
@@ -26,7 +26,7 @@ def written(tmp_path: Path) -> Callable[[Finished], Path]:
     """Writes the NeXus file of a run."""
 
     def write(run: Finished, name: str = "run.nxs") -> Path:
-        write_nexus(tmp_path / name, read_run(run.folder), run.report)
+        write_nexus(tmp_path / name, read_run(run.folder), run.about, run.result)
         return tmp_path / name
 
     return write
@@ -134,7 +134,8 @@ def test_of_a_patch_without_a_fit_it_has_the_values_and_the_reason(
         dark = entry["decay_1_l_2_"]
         assert dark["title"].asstr()[()] == "Öl; 2 %, decay-1"
         assert abs(dark["B"][()].mean()) < entry["decay_1_l_2/B"][()].mean() / 100
-        assert entry["fit_l_2_/not_fitted/data"].asstr()[()] == NO_FIT
+        reason = entry["fit_l_2_/not_fitted/data"].asstr()[()]
+        assert reason == with_dark_patch.result.patches["Öl; 2 %"].failure
         assert "parameters" in entry["fit_l_2"]
 
 
@@ -151,5 +152,5 @@ def test_a_file_that_cannot_be_written_is_said_in_one_line(
 ) -> None:
     path = tmp_path / "nowhere" / "run.nxs"
     with pytest.raises(DiskError, match=r"run\.nxs: cannot be written") as caught:
-        write_nexus(path, read_run(finished.folder), finished.report)
+        write_nexus(path, read_run(finished.folder), finished.about, finished.result)
     assert "\n" not in str(caught.value)

@@ -160,7 +160,7 @@ def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
     assert list(record.completed())[-1] == "put-back"
 
     result = process_run(folder)
-    assert not result.run_warnings
+    assert not result.warnings
     file = read_lvf_file(folder / "result" / "lvf.yaml")
     room = simulation_of(folder)
     assert file.before_camera is not None

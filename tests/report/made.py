@@ -11,8 +11,11 @@ from labrig.errors import LabrigError
 from labrig.fit import DecayFit, fit_decay
 from labrig.optics import read_camera
 from labrig.record.frames import FrameRecord
-from labrig.report import DeviceLine, GlowPhotograph, PatchReport, RunReport
-from labrig.results import Series
+from labrig.report import Report
+from labrig.report.content import DecayReport, GlowPhotograph, PatchReport
+from labrig.report.decay import decay_sections
+from labrig.report.figure_style import figure_style
+from labrig.results import DeviceLine, RunDescription, Series
 
 FloatArray = NDArray[np.float64]
 
@@ -115,9 +118,7 @@ def frame(
     )
 
 
-def run_report(
-    folder: Path, patches: Sequence[PatchReport] | None = None, warnings: Sequence[str] = ()
-) -> RunReport:
+def decay_report(folder: Path, patches: Sequence[PatchReport] | None = None) -> DecayReport:
     """With one photograph under the lamp and two of the glow in `folder`."""
     patches = [patch(decay_series())] if patches is None else patches
     day = write_dng(folder / "000101.dng", np.array([6000.0, 9000.0, 4000.0]))
@@ -126,22 +127,31 @@ def run_report(
         for number, factor in ((1, 1.0), (20, 0.02))
     ]
     decay = [frame(glow[0], 1), frame(glow[1], 20)]
-    return RunReport(
-        title="blue-paint",
-        run="2026-01-01T00-00-00_decay_blue-paint",
-        started="2026-01-01 00:00:00 UTC",
-        ended="2026-01-01 02:00:00 UTC",
-        rig="dark room",
-        simulated=False,
-        labrig_version="1.2.3",
+    return DecayReport(
+        about=RunDescription(
+            title="blue-paint",
+            protocol="decay",
+            run="2026-01-01T00-00-00_decay_blue-paint",
+            started="2026-01-01 00:00:00 UTC",
+            ended="2026-01-01 02:00:00 UTC",
+            rig="dark room",
+            simulated=False,
+            labrig_version="1.2.3",
+            sample=(("thickness", "0.4 mm"),),
+            devices=(DeviceLine("lamp", "COM3", "Numato relay 00000009"),),
+            protocol_text="protocol: decay\n",
+            rig_text="name: dark room\n",
+        ),
         patches=tuple(patches),
-        sample=(("thickness", "0.4 mm"),),
-        devices=(DeviceLine("lamp", "COM3", "Numato relay 00000009"),),
-        protocol_text="protocol: decay\n",
-        rig_text="name: dark room\n",
         frames=(*decay, frame(day, 101, "daylight", 1 / 64)),
-        warnings=tuple(warnings),
         daylight=(frame(day, 101, "daylight", 1 / 64),),
         glow=(GlowPhotograph(decay[0], 0.5), GlowPhotograph(decay[1], 95.5)),
         camera=read_camera("canon_eos_5d_mark_ii"),
     )
+
+
+def page_of(report: DecayReport, warnings: Sequence[str] = ()) -> Report:
+    """The page of a decay."""
+    with figure_style():
+        found, methods = decay_sections(report)
+    return Report(report.about, tuple(warnings), found, methods, report.frames, report.camera)

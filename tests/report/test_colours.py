@@ -9,7 +9,6 @@ import pytest
 from numpy.typing import NDArray
 
 from labrig.optics import CameraResponse, read_camera
-from labrig.report import GlowPhotograph
 from labrig.report.colours import (
     HALOGEN_K,
     camera_to_xyz,
@@ -18,6 +17,7 @@ from labrig.report.colours import (
     into_gamut,
     screen_for,
 )
+from labrig.report.content import GlowPhotograph
 from labrig.report.photographs import daylight_picture, glow_pictures
 from labrig.report.swatches import MOST_SWATCHES, swatches
 

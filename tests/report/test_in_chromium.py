@@ -10,9 +10,11 @@ from typing import TYPE_CHECKING
 import numpy as np
 import pytest
 
-from labrig.report import Interruption, PatchReport, RunReport, write_report
+from labrig.record.history import Interruption
+from labrig.report import Report, write_report
+from labrig.report.content import PatchReport
 
-from .made import decay_series, patch, run_report
+from .made import decay_report, decay_series, page_of, patch
 
 pytestmark = pytest.mark.drawn
 
@@ -34,20 +36,19 @@ return getComputedStyle(tick).fill;
 """
 
 
-def crowded(folder: Path) -> RunReport:
+def crowded(folder: Path) -> Report:
     """Long words, a failed fit, repeats, warnings, notes."""
     series = decay_series(name="a patch-with-a-very-long-name-that-is-not-to-be-broken-anywhere")
     unit = tuple(np.where(np.arange(30) % 2, "decay-2", "decay-1"))
     failed = PatchReport("nothing", None, decay_series(seed=2, name="nothing"), "nothing glows")
-    report = run_report(
-        folder, [patch(replace(series, unit=unit)), failed], ["warned/of/" + "something/" * 20]
-    )
-    return replace(
-        report,
+    report = decay_report(folder, [patch(replace(series, unit=unit)), failed])
+    about = replace(
+        report.about,
         title="sample_" * 12,
         notes="## today\n\n" + "noted" * 60,
         interruptions=(Interruption("decay-2", "2026-01-01 00:40:00 UTC", "lost " + "it" * 70),),
     )
+    return page_of(replace(report, about=about), ["warned/of/" + "something/" * 20])
 
 
 def test_nothing_overflows_and_no_printed_page_is_blank(chromium: "Chrome", tmp_path: Path) -> None:
@@ -66,7 +67,7 @@ def test_nothing_overflows_and_no_printed_page_is_blank(chromium: "Chrome", tmp_
     chromium.execute_cdp_cmd("Emulation.setEmulatedMedia", dark)
     assert chromium.execute_script(TICK_COLOUR) == "rgb(152, 164, 174)"
 
-    button = chromium.find_element("id", "copy-methods")
+    button = chromium.find_element("css selector", ".copy")
     button.click()
     chromium.execute_async_script("setTimeout(arguments[0], 200)")
     assert button.text.startswith(("Copied", "Selected"))

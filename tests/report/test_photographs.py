@@ -12,8 +12,8 @@ import numpy.typing as npt
 import pytest
 
 from labrig.optics import read_camera
-from labrig.report import GlowPhotograph
 from labrig.report.colours import encoded, screen_for
+from labrig.report.content import GlowPhotograph
 from labrig.report.photographs import daylight_picture, glow_pictures
 from tests.reduce.conftest import _dng as write_dng
 

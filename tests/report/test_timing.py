@@ -1,15 +1,9 @@
 """Lamp, shield and door in the report: when they began, against when they were to begin."""
 
-from dataclasses import replace
-from pathlib import Path
-
 import pytest
 
 from labrig.record import ActionRecord
-from labrig.report import write_report
 from labrig.report.timing import moves_text
-
-from .made import run_report
 
 
 def move(device: str, action: str, late_s: float, unit: str = "decay-1") -> ActionRecord:
@@ -42,11 +36,3 @@ def test_a_lamp_alone_that_goes_off_in_time_is_not_worth_a_word(moves: list[Acti
 
 def test_a_lamp_alone_that_goes_off_late_is() -> None:
     assert "lamp off at most 30 ms (decay-1)" in moves_text([move("lamp", "off", 0.03)])
-
-
-def test_the_page_says_it_where_it_tells_the_timing(tmp_path: Path) -> None:
-    late = [*IN_TIME, move("door", "open", 0.038, "decay-2")]
-    write_report(tmp_path / "report.html", replace(run_report(tmp_path), actions=tuple(late)))
-    page = (tmp_path / "report.html").read_text(encoding="utf-8")
-    timing = page[page.index('id="timing"') :]
-    assert moves_text(late) in timing[: timing.index("</section>")]

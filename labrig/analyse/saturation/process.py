@@ -8,7 +8,6 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.analyse.clean import cleaned
-from labrig.analyse.history import charges_s
 from labrig.analyse.part import Part, StageResult
 from labrig.analyse.saturation.found import Saturation
 from labrig.analyse.saturation.level import Level, level
@@ -19,6 +18,7 @@ from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.errors import DataError
 from labrig.record import RunRecord
+from labrig.record.history import charges_s
 from labrig.reduce import reduce_patches
 from labrig.results import Series
 

@@ -9,15 +9,14 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Choices
-from labrig.analyse.choices import read_decay_protocol
+from labrig.analyse import decay as decay_analysis
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.timed_frames import intact_frames
 from labrig.calibration import read_blank_file
 from labrig.errors import DataError
 from labrig.process import process_run
-from labrig.process.decay import measure_decay
 from labrig.record import read_run
-from tests.analyse.recorded import cut_off_and_resumed, record
+from tests.analyse.recorded import cut_off_and_resumed, record, whole
 
 PROTOCOL: dict[str, Any] = {
     "protocol": "blank",
@@ -75,9 +74,9 @@ def test_a_leak_is_found_and_told_and_a_decay_is_warned(tmp_path: Path) -> None:
 
     decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "40 s",
              "first": "1 s", "exposure": "1 s"}  # fmt: skip
-    run = read_run(record(tmp_path / "decay", decay))
-    found = measure_decay(run, read_decay_protocol(run.folder), Choices(), Inputs(blank=blank))
-    assert any("all the time" in said for said in found.run_warnings)
+    run = record(tmp_path / "decay", decay)
+    found = decay_analysis.analyse(whole(run, Inputs(blank=blank)))
+    assert any("all the time" in said for said in found.warnings)
 
 
 def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
@@ -89,17 +88,16 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
     assert any("still gets darker at its end" in said for said in result.warnings)
     decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "20 s",
              "first": "1 s", "exposure": "1 s"}  # fmt: skip
-    decayed = read_run(record(tmp_path / "decay", decay))
-    protocol = read_decay_protocol(decayed.folder)
+    decayed = record(tmp_path / "decay", decay)
     with pytest.raises(DataError, match="never became clean"):
-        measure_decay(decayed, protocol, Choices(), Inputs(blank=blank))
+        decay_analysis.analyse(whole(decayed, Inputs(blank=blank)))
     # One that is clean from the third frame on: the earlier ones are left out, and it is said.
-    third = sorted(frame.t_s for frame in intact_frames(decayed, Choices()).decay)[2]
+    third = sorted(frame.t_s for frame in intact_frames(read_run(decayed), Choices()).decay)[2]
     ends = blank.model_copy(update={"first_clean_s": third, "ambient_dn_per_s": (0.0, 0.0, 0.0)})
-    found = measure_decay(decayed, protocol, Choices(), Inputs(blank=ends))
-    (series,) = found.series.values()
-    assert list(series.usable[:4]) == [False, False, True, True]
-    assert any("2 frames begin before the bench is dark" in said for said in found.run_warnings)
+    found = decay_analysis.analyse(whole(decayed, Inputs(blank=ends)))
+    (patch,) = found.patches.values()
+    assert list(patch.series.usable[:4]) == [False, False, True, True]
+    assert any("2 frames begin before the bench is dark" in said for said in found.warnings)
     rate = np.array(blank.rate_dn_per_s)[:, 1]
     assert rate[1] > rate[-1]
 

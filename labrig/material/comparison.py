@@ -10,13 +10,11 @@ from dataclasses import dataclass
 from itertools import pairwise
 
 import numpy as np
+from numpy.typing import NDArray
 
-from labrig.compare.colorimetry import FloatArray
-from labrig.material import Material, State
-from labrig.report.sections import Table
-from labrig.written_numbers import plus_minus, rounded
+from labrig.material.file import Material, State
 
-UNKNOWN = "–"
+FloatArray = NDArray[np.float64]
 
 
 @dataclass(frozen=True)
@@ -43,7 +41,7 @@ class Pair:
 
 
 @dataclass(frozen=True)
-class Beside:
+class MaterialComparison:
     """All quantities that one of two materials has.
 
     Attributes
@@ -60,37 +58,8 @@ class Beside:
     reradiation_factor: float
     notes: tuple[str, ...]
 
-    def table(self) -> Table:
-        """As the report and the terminal show it."""
-        return Table(
-            head=("", "measured", "reference", "apart / %", "apart / σ"),
-            rows=tuple(
-                (
-                    f"{pair.quantity} / {pair.unit}" if pair.unit else pair.quantity,
-                    _written(pair.measured, pair.sigma),
-                    _written(pair.reference, pair.reference_sigma),
-                    _signed(pair.percent),
-                    _signed(pair.in_sigma),
-                )
-                for pair in self.pairs
-            ),
-            caption=" ".join(
-                [
-                    f"k_e is relative to how bright the lamp was: the measured one is multiplied "
-                    f"by {rounded(self.k_e_factor)}, by least squares over bands and states."
-                    if any(pair.quantity.startswith("k_e") for pair in self.pairs)
-                    else "",
-                    f"Λ is relative: the measured one is multiplied by "
-                    f"{rounded(self.reradiation_factor)}, by least squares over bands and states."
-                    if any(pair.quantity.startswith("Λ") for pair in self.pairs)
-                    else "",
-                    *self.notes,
-                ]
-            ).strip(),
-        )
 
-
-def beside(measured: Material, reference: Material) -> Beside:
+def compare_materials(measured: Material, reference: Material) -> MaterialComparison:
     """`measured` beside `reference`, state by state by falling rate, band by band."""
     notes = []
     ours, theirs = _by_falling_rate(measured), _by_falling_rate(reference)
@@ -120,7 +89,9 @@ def beside(measured: Material, reference: Material) -> Beside:
             bands = measured.bands_nm
             pairs += _pairs(one, other, label, "k_e", "s⁻¹", "k_e_per_s", bands, k_e_factor)
             pairs += _pairs(one, other, label, "Λ", "", "reradiation", bands, factor)
-    return Beside((measured.name, reference.name), tuple(pairs), k_e_factor, factor, tuple(notes))
+    return MaterialComparison(
+        (measured.name, reference.name), tuple(pairs), k_e_factor, factor, tuple(notes)
+    )
 
 
 def _by_falling_rate(material: Material) -> Sequence[State]:
@@ -181,16 +152,3 @@ def _values(state: State | None, name: str) -> tuple[FloatArray | None, FloatArr
 
 def _or_zero(sigma: float) -> float:
     return 0.0 if math.isnan(sigma) else sigma
-
-
-def _written(value: float, sigma: float) -> str:
-    if math.isnan(value):
-        return UNKNOWN
-    return rounded(value) if math.isnan(sigma) else plus_minus(value, sigma)
-
-
-def _signed(number: float) -> str:
-    if not math.isfinite(number):
-        return UNKNOWN
-    text = f"{number:+.1f}"
-    return "0.0" if float(text) == 0 else text.replace("-", "−")

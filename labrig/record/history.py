@@ -1,11 +1,19 @@
-"""What the journal of a decay run says besides its frames: how long the lamp shone, what failed."""
+"""What the journal of a run says besides its frames: how long the lamp shone, what failed."""
 
 from collections.abc import Iterator
+from dataclasses import dataclass
 from datetime import UTC, datetime
 
-from labrig.record import Attempt, RunRecord
-from labrig.report import Interruption
-from labrig.report.sections import Section
+from labrig.record.reading import Attempt, RunRecord
+
+
+@dataclass(frozen=True)
+class Interruption:
+    """An attempt at a unit that did not count: when it began, and why it ended."""
+
+    unit: str
+    began: str
+    reason: str
 
 
 def charges_s(run: RunRecord) -> tuple[float, ...]:
@@ -28,28 +36,6 @@ def interruptions(run: RunRecord) -> tuple[Interruption, ...]:
         for attempt in run.attempts
         if not attempt.completed
     )
-
-
-def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
-    """Whether it was seen that nothing but labrig switched the lamp; nothing without a lamp."""
-    used = [
-        attempt.start.get("lamp_reads_back")
-        for attempt in run.completed().values()
-        if any(action.device == "lamp" for action in attempt.actions)
-    ]
-    if False in used:
-        text = (
-            "The lamp's relay board does not tell whether it is on: that nothing else switched the "
-            "lamp while it charged could not be checked, except by what the photographs show."
-        )
-    elif True in used:
-        text = (
-            "The lamp's relay was read back about once a minute, and each time before it was "
-            "switched: nothing else had switched it."
-        )
-    else:
-        return ()
-    return (Section("Lamp", (text,)),)
 
 
 def written_time(seconds: float) -> str:

@@ -7,9 +7,9 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from labrig import shipped
-from labrig.compare import beside
 from labrig.compare.paper import TABLE_1
-from labrig.material import IrradianceNorm, Material, State, read_material
+from labrig.material import IrradianceNorm, Material, State, compare_materials, read_material
+from labrig.report.material_tables import comparison_table
 
 NAMES = sorted(shipped.names("config/materials"))
 factors = st.floats(1e-3, 1e3)
@@ -41,14 +41,14 @@ def test_a_material_beside_itself_does_not_deviate(
     name: str, of_k_e: float, of_reradiation: float
 ) -> None:
     material = read_material(name)
-    found = beside(rescaled(material, of_k_e, of_reradiation), material)
+    found = compare_materials(rescaled(material, of_k_e, of_reradiation), material)
     assert found.pairs
     for pair in found.pairs:
         assert pair.measured == pytest.approx(pair.reference, rel=1e-9, abs=1e-15)
     assert found.reradiation_factor == pytest.approx(1 / of_reradiation, rel=1e-9)
     if material.irradiance_norm:
         assert found.k_e_factor == pytest.approx(1 / of_k_e, rel=1e-9)
-    assert {row[3] for row in found.table().rows} <= {"0.0", "–"}
+    assert {row[3] for row in comparison_table(found).rows} <= {"0.0", "–"}
 
 
 def measured(**changed: Any) -> Material:
@@ -64,7 +64,7 @@ def measured(**changed: Any) -> Material:
 
 
 def test_deviations_stand_in_percent_and_sigma() -> None:
-    table = beside(measured(), read_material("blue-paint")).table()
+    table = comparison_table(compare_materials(measured(), read_material("blue-paint")))
     rows = {row[0]: row[1:] for row in table.rows}
     assert rows["k_r / s⁻¹"] == ("0.03280 ± 0.00040", "0.032", "+2.5", "+2.0")
     assert rows["Λ 437.5–475 nm"] == ("4.37 ± 0.10", "4.37", "0.0", "0.0")
@@ -78,14 +78,16 @@ def test_what_was_not_measured_is_said() -> None:
     decay_only = Material(
         name="test", kind="phosphor", states=(State(k_r_per_s=0.03), State(k_r_per_s=0.3))
     )
-    found = beside(decay_only, read_material("blue-paint"))
+    found = compare_materials(decay_only, read_material("blue-paint"))
     said = " ".join(found.notes)
     assert "k_e was not measured" in said
     assert "Λ was not measured" in said
     assert "2 states" in said
     assert [pair.quantity for pair in found.pairs] == ["k_r 1", "k_r 2"]
     other_bands = measured().model_copy(update={"bands_nm": tuple(range(400, 490, 10))})
-    assert "bands differ" in " ".join(beside(other_bands, read_material("blue-paint")).notes)
+    assert "bands differ" in " ".join(
+        compare_materials(other_bands, read_material("blue-paint")).notes
+    )
 
 
 def test_the_materials_of_table_1_are_shipped() -> None:

@@ -1,0 +1,153 @@
+"""From the frames of a decay to a fit of every patch."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from importlib.metadata import version
+
+from labrig.analyse.clean import cleaned
+from labrig.analyse.part import Part
+from labrig.analyse.series_fit import fit_series
+from labrig.analyse.this_camera import insist_on_this_camera
+from labrig.analyse.timed_frames import intact_frames, timing_warnings
+from labrig.errors import FitError
+from labrig.fit import DecayFit
+from labrig.material import Material, Provenance, State
+from labrig.record.history import charges_s
+from labrig.record.temperature import glow_temperature_c
+from labrig.reduce import reduce_patches
+from labrig.region import Region
+from labrig.results import Series
+from labrig.results.decay import DecayPatch, DecayResult
+
+
+def analyse(part: Part) -> DecayResult:
+    """Reduce and fit every patch; one that cannot be fitted has the reason in its place.
+
+    Raises
+    ------
+    DataError
+        No decay is complete, a frame is missing or was changed after the run, or the camera file
+        that is known is of another camera, lens or aperture.
+    """
+    run, protocol, choices = part.run, part.protocol, part.choices
+    regions = choices.patches(protocol)
+    background = protocol.background if protocol.dark == "background" else None
+    frames, stray = cleaned(intact_frames(run, choices), part.inputs.blank)
+    insist_on_this_camera(part.inputs.camera, run, run.frames("decay"))
+    series = reduce_patches(frames.decay, regions, frames.dark, background, part.inputs.camera)
+    states = choices.states or (None if protocol.states == "auto" else protocol.states)
+    fits = _fit_all(series, states, choices.fixed_rates_per_s)
+    temperature_c = glow_temperature_c(run)
+    only = protocol.sample.name if len(fits) == 1 else None
+    return DecayResult(
+        patches={
+            name: _patch(regions[name], series[name], fit, only or name, part, temperature_c)
+            for name, fit in fits.items()
+        },
+        background=background,
+        states_asked=states,
+        charges_s=charges_s(run),
+        temperature_c=temperature_c,
+        warnings=(
+            *timing_warnings(run),
+            *frames.warnings,
+            *stray,
+            *_clipping_warnings(series),
+            *_fit_warnings(fits),
+        ),
+    )
+
+
+def _fit_all(
+    series: Mapping[str, Series], states: int | None, fixed_rates_per_s: Sequence[float]
+) -> dict[str, DecayFit | str]:
+    """Fits by patch. Shutter and aperture flicker alike for all patches of a frame, so the patch
+    that tells their flicker best tells it for those that are dim or fade within a few frames.
+    """
+    fits = {name: _fit(one, states, fixed_rates_per_s, None) for name, one in series.items()}
+    measured = [fit for fit in fits.values() if isinstance(fit, DecayFit) and fit.flicker > 0]
+    if len(fits) == 1 or not measured:
+        return fits
+    best = min(measured, key=lambda fit: fit.flicker_sigma / fit.flicker)
+    return {
+        name: (fit if fit is best else _fit(series[name], states, fixed_rates_per_s, best.flicker))
+        for name, fit in fits.items()
+    }
+
+
+def _fit(
+    series: Series,
+    states: int | None,
+    fixed_rates_per_s: Sequence[float],
+    flicker: float | None,
+) -> DecayFit | str:
+    """The fit, or why there is none."""
+    try:
+        return fit_series(series, states, flicker=flicker, fixed_rates_per_s=fixed_rates_per_s)
+    except FitError as error:
+        return str(error)
+
+
+def _patch(
+    region: Region,
+    series: Series,
+    fit: DecayFit | str,
+    name: str,
+    part: Part,
+    temperature_c: float | None,
+) -> DecayPatch:
+    if isinstance(fit, str):
+        return DecayPatch(region=region, series=series, failure=fit)
+    return DecayPatch(
+        region=region,
+        series=series,
+        fit=fit,
+        normalised_residuals=fit.normalised_residuals,
+        material=_material(series, fit, name, part.run.name, temperature_c),
+    )
+
+
+def _material(
+    series: Series, fit: DecayFit, name: str, run: str, temperature_c: float | None
+) -> Material:
+    """What the decay alone says: rates and amplitudes; r0, k_e and Λ stay unknown."""
+    return Material(
+        name=name,
+        kind="phosphor",
+        states=tuple(
+            State(
+                k_r_per_s=state.k_r_per_s,
+                k_r_per_s_sigma=state.k_r_sigma_per_s,
+                amplitude=state.amplitude,
+                amplitude_sigma=state.amplitude_sigma,
+            )
+            for state in fit.states
+        ),
+        provenance=Provenance(
+            source="decay measured with labrig; amplitudes in DN/s of the brightest channel",
+            run=run,
+            frames=series.frame,
+            version=version("labrig"),
+            temperature_c=temperature_c,
+        ),
+    )
+
+
+def _clipping_warnings(series: Mapping[str, Series]) -> Iterator[str]:
+    for name, one in series.items():
+        clipped = sum("clipped" in flag for flag in one.flag)
+        if clipped:
+            yield (
+                f"{_of(name, series)}{clipped} of {len(one.flag)} frames are clipped and left "
+                "out; expose for less or lower the ISO"
+            )
+
+
+def _fit_warnings(fits: Mapping[str, DecayFit | str]) -> Iterator[str]:
+    """What fits warn of, with the names of patches where there are several."""
+    for name, fit in fits.items():
+        said = [f"not fitted: {fit}"] if isinstance(fit, str) else fit.warnings
+        yield from (f"{_of(name, fits)}{text}" for text in said)
+
+
+def _of(name: str, patches: Mapping[str, object]) -> str:
+    return f"{name}: " if len(patches) > 1 else ""

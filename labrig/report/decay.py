@@ -1,0 +1,225 @@
+"""A decay in a report: its numbers, the sample, every patch, timing, and how it was done."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass, field
+
+from labrig.record.frames import FrameRecord
+from labrig.report.colours import Screen, screen_for
+from labrig.report.content import (
+    DECAY_ASSUMPTIONS,
+    DecayReport,
+    GlowPhotograph,
+    PatchReport,
+)
+from labrig.report.decay_figures import linear_decay, logarithmic_decay, values_below_axis
+from labrig.report.methods import REFERENCES, UNKNOWN, methods
+from labrig.report.noise_budget import noise_budget
+from labrig.report.noise_figure import noise_figure
+from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
+from labrig.report.rendering import Rendered, Source
+from labrig.report.residual_figure import residual_figure
+from labrig.report.run_figures import overview_figures, timing_figure
+from labrig.report.sections import Picture, Section
+from labrig.report.stability import Repeat, Steady, repeats, steady
+from labrig.report.swatches import Swatch, swatches
+from labrig.report.timing import FrameTiming, Lateness, frame_timings, lateness
+from labrig.results import FittedDecay, Series
+from labrig.results.decay import DecayPatch, DecayResult
+
+#: With more patches than this, photographs show their numbers and not their names.
+NAMES_ON_PHOTOGRAPH = 3
+#: Photographs of the glow: dense where it changes most.
+GLOW_SHARES = (0.0, 0.03, 0.09, 0.22, 0.5, 1.0)
+
+
+@dataclass(frozen=True)
+class _Patch:
+    """A patch as the templates need it."""
+
+    number: int
+    anchor: str
+    patch: PatchReport
+    fit: FittedDecay | None
+    failure: str
+    n_usable: int
+    swatches: tuple[Swatch, ...]
+    repeats: tuple[Repeat, ...]
+    #: Without a fit, if it shone.
+    steady: Steady | None
+    figures: tuple[Picture, ...] = ()
+    noise_parts: tuple[str, ...] = ()
+    below_axis: int = 0
+
+
+@dataclass(frozen=True)
+class _Content:
+    """What the templates of a decay's sections need, all of them or one patch."""
+
+    report: DecayReport
+    patches: tuple[_Patch, ...]
+    colours_known: bool
+    late: Lateness | None = None
+    item: _Patch | None = None
+    extra: Mapping[str, object] = field(default_factory=dict)
+
+
+def render(result: DecayResult, source: Source) -> Rendered:
+    """Show a decay."""
+    completed = source.run.completed().values()
+    frames = [frame for attempt in completed for frame in attempt.frames]
+    first = next(iter(result.patches.values())).series
+    report = DecayReport(
+        about=source.about,
+        patches=tuple(_reported(name, one) for name, one in result.patches.items()),
+        frames=tuple(frames),
+        daylight=tuple(frame for frame in frames if frame.purpose == "daylight"),
+        glow=_glow(frames, first),
+        camera=source.camera,
+        charges_s=result.charges_s,
+        background=result.background,
+        states=result.states_asked,
+    )
+    lines = tuple(f"{name}\n{fit}" for name, fit in result.fits.items())
+    found, methods = decay_sections(report, source.anchor)
+    return Rendered(found, lines, methods)
+
+
+def decay_sections(
+    report: DecayReport, anchor: str = ""
+) -> tuple[tuple[Section, ...], tuple[Section, ...]]:
+    """What was found, and how; `anchor` begins the names of places that links lead to."""
+    screen = screen_for(report.camera)
+    patches = tuple(
+        _patch(number, patch, screen, anchor) for number, patch in enumerate(report.patches, 1)
+    )
+    timings = frame_timings(report.frames, report.patches)
+    late = lateness(timings)
+    content = _Content(report, patches, screen.known, late)
+    sensor = sensor_of([photograph.frame for photograph in report.glow])
+    found = (
+        _results(content, anchor),
+        _sample(content, screen, anchor),
+        *(
+            Section(
+                one.patch.name,
+                figures=one.figures,
+                anchor=one.anchor,
+                template="patch.html.j2",
+                content=_Content(report, patches, screen.known, late, one),
+            )
+            for one in patches
+        ),
+        *_timing(content, timings, anchor),
+    )
+    how = Section(
+        "Methods",
+        anchor=f"{anchor}methods",
+        template="methods.html.j2",
+        content={
+            "methods": methods(report, sensor, late),
+            "references": REFERENCES,
+            "unknown": UNKNOWN,
+        },
+    )
+    return found, (how, Section("What the numbers rest on", points=DECAY_ASSUMPTIONS))
+
+
+def _reported(name: str, patch: DecayPatch) -> PatchReport:
+    return PatchReport(name, patch.region, patch.series, patch.fit or patch.failure)
+
+
+def _glow(frames: Sequence[FrameRecord], series: Series) -> tuple[GlowPhotograph, ...]:
+    """Some photographs of the first decay."""
+    by_name = {frame.path.name: frame for frame in frames}
+    first = series.by_unit()[0]
+    last = len(first.frame) - 1
+    chosen = sorted({round(share * last) for share in GLOW_SHARES})
+    return tuple(GlowPhotograph(by_name[first.frame[row]], float(first.t_s[row])) for row in chosen)
+
+
+def _results(content: _Content, anchor: str) -> Section:
+    """A table of all patches; of several a small figure each, too."""
+    figures: tuple[Picture, ...] = ()
+    if len(content.patches) > 1:
+        figures = tuple(
+            Picture(f"overview-{one.number}-{one.patch.name}", figure)
+            for one, figure in zip(
+                content.patches, overview_figures(content.report.patches), strict=True
+            )
+        )
+    return Section(
+        "Results",
+        figures=figures,
+        anchor=f"{anchor}results",
+        template="results.html.j2",
+        content=content,
+    )
+
+
+def _sample(content: _Content, screen: Screen, anchor: str) -> Section:
+    report = content.report
+    extra = {
+        "daylight": daylight_picture(report.daylight, report.patches, screen),
+        "glow": glow_pictures(report.glow, screen),
+        "names_on_photograph": len(report.patches) <= NAMES_ON_PHOTOGRAPH,
+        "timing": f"{anchor}timing",
+    }
+    return Section(
+        "Sample",
+        anchor=f"{anchor}sample",
+        template="sample.html.j2",
+        content=_Content(report, content.patches, screen.known, content.late, extra=extra),
+    )
+
+
+def _timing(content: _Content, timings: Sequence[FrameTiming], anchor: str) -> tuple[Section, ...]:
+    repeated = list(dict.fromkeys(one.unit for item in content.patches for one in item.repeats))
+    shining = [item for item in content.patches if item.steady]
+    if not (content.late or repeated or shining):
+        return ()
+    figures = (Picture("timing", timing_figure(timings)),) if timings else ()
+    return (
+        Section(
+            "Timing and stability",
+            figures=figures,
+            anchor=f"{anchor}timing",
+            template="timing.html.j2",
+            content=_Content(
+                content.report,
+                content.patches,
+                content.colours_known,
+                content.late,
+                extra={"repeated": repeated, "steady": shining},
+            ),
+        ),
+    )
+
+
+def _patch(number: int, patch: PatchReport, screen: Screen, anchor: str) -> _Patch:
+    fit = patch.fit if isinstance(patch.fit, FittedDecay) else None
+    series = patch.series
+    figures = [
+        Picture("linear", linear_decay(series, fit)),
+        Picture("logarithmic", logarithmic_decay(series, fit)),
+    ]
+    noise_parts: tuple[str, ...] = ()
+    if fit is not None:
+        figures.append(Picture("residuals", residual_figure(series, fit)))
+        budget = noise_budget(series, fit)
+        if budget is not None:
+            figures.append(Picture("noise", noise_figure(budget)))
+            noise_parts = tuple(budget.visible())
+    return _Patch(
+        number=number,
+        anchor=f"{anchor}patch-{number}",
+        patch=patch,
+        fit=fit,
+        failure=patch.fit if isinstance(patch.fit, str) else "",
+        n_usable=int(series.usable.sum()),
+        swatches=swatches(series, screen),
+        repeats=repeats(series, fit) if fit else (),
+        steady=None if fit else steady(series),
+        figures=tuple(figures),
+        noise_parts=noise_parts,
+        below_axis=values_below_axis(series),
+    )

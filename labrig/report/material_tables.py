@@ -1,0 +1,89 @@
+"""Materials in tables: one as measured, and one beside another."""
+
+import math
+from collections.abc import Iterator, Sequence
+from itertools import pairwise
+
+from labrig.material import Material, MaterialComparison, State
+from labrig.report.sections import Table
+from labrig.written_numbers import plus_minus, rounded
+
+UNKNOWN = "–"
+
+
+def measured_table(material: Material) -> Table:
+    """Every number of a material as it was measured, with its uncertainty; a column a state."""
+    states = sorted(material.states, key=lambda state: -state.k_r_per_s)
+    head = ("",) if len(states) == 1 else ("", *(f"state {n + 1}" for n in range(len(states))))
+    rows = tuple(_rows(states, material.bands_nm or ()))
+    caption = "Value ± standard uncertainty (1 σ)."
+    if material.irradiance_norm is not None:
+        length = material.irradiance_norm.value
+        caption += (
+            " k_e is per unit of the lamp's irradiance, whose values in the bands are scaled so "
+            f"that the root of the sum of their squares is {length:g}; Λ is relative radiance."
+        )
+    return Table(head if len(states) > 1 else ("", "measured"), rows, caption)
+
+
+def comparison_table(comparison: MaterialComparison) -> Table:
+    """One material beside another, as the report and the terminal show it."""
+    return Table(
+        head=("", "measured", "reference", "apart / %", "apart / σ"),
+        rows=tuple(
+            (
+                f"{pair.quantity} / {pair.unit}" if pair.unit else pair.quantity,
+                _written(pair.measured, pair.sigma),
+                _written(pair.reference, pair.reference_sigma),
+                _signed(pair.percent),
+                _signed(pair.in_sigma),
+            )
+            for pair in comparison.pairs
+        ),
+        caption=" ".join(
+            [
+                f"k_e is relative to how bright the lamp was: the measured one is multiplied "
+                f"by {rounded(comparison.k_e_factor)}, by least squares over bands and states."
+                if any(pair.quantity.startswith("k_e") for pair in comparison.pairs)
+                else "",
+                f"Λ is relative: the measured one is multiplied by "
+                f"{rounded(comparison.reradiation_factor)}, by least squares over bands and states."
+                if any(pair.quantity.startswith("Λ") for pair in comparison.pairs)
+                else "",
+                *comparison.notes,
+            ]
+        ).strip(),
+    )
+
+
+def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[str, ...]]:
+    for quantity, name in (("k_r / s⁻¹", "k_r_per_s"), ("r(0)", "r0")):
+        if any(getattr(state, name) is not None for state in states):
+            yield (quantity, *(_of(state, name) for state in states))
+    for symbol, unit, name in (("k_e", " / s⁻¹", "k_e_per_s"), ("Λ", "", "reradiation")):
+        if any(getattr(state, name) is not None for state in states):
+            for band, (low, high) in enumerate(pairwise(bands_nm)):
+                quantity = f"{symbol} {low:g}–{high:g} nm{unit}"
+                yield (quantity, *(_of(state, name, band) for state in states))
+
+
+def _of(state: State, name: str, band: int | None = None) -> str:
+    value, sigma = getattr(state, name), getattr(state, f"{name}_sigma")
+    if value is None:
+        return UNKNOWN
+    if band is not None:
+        value, sigma = value[band], None if sigma is None else sigma[band]
+    return _written(value, math.nan if sigma is None else sigma)
+
+
+def _written(value: float, sigma: float) -> str:
+    if math.isnan(value):
+        return UNKNOWN
+    return rounded(value) if math.isnan(sigma) else plus_minus(value, sigma)
+
+
+def _signed(number: float) -> str:
+    if not math.isfinite(number):
+        return UNKNOWN
+    text = f"{number:+.1f}"
+    return "0.0" if float(text) == 0 else text.replace("-", "−")

@@ -1,0 +1,163 @@
+"""A phosphor in a report: the material as measured, what it looks like, then every part."""
+
+from collections.abc import Iterator, Mapping
+from dataclasses import dataclass, replace
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+
+from labrig import shipped
+from labrig.material import Material, Spectrum, compare_materials, read_material
+from labrig.report.colours import screen_for, spectrum_colour
+from labrig.report.decay_figures import logarithmic_decay
+from labrig.report.figure_style import INK, LEFT_PT, new_figure, place
+from labrig.report.legend import BAND_OPACITY, legend_above, lined, shaded
+from labrig.report.material_tables import comparison_table, measured_table
+from labrig.report.photographs import Daylight, daylight_picture
+from labrig.report.render import render as render_result
+from labrig.report.rendering import Rendered, Source
+from labrig.report.sections import Picture, Section
+from labrig.results.decay import DecayPatch, DecayResult
+from labrig.results.phosphor import PhosphorResult
+
+SPECTRUM_HEIGHT_PT = 256.0
+
+
+@dataclass(frozen=True)
+class _Glance:
+    """What the template needs besides figures and tables.
+
+    Attributes
+    ----------
+    daylight
+        The sample under the lamp; None without a photograph.
+    colours
+        Of the emission as `#rrggbb`, by patch.
+    contents
+        Titles of the parts that follow, by where they begin.
+    failed
+        Why a part is missing, by its name.
+    """
+
+    daylight: Daylight | None
+    colours: Mapping[str, str]
+    contents: Mapping[str, str]
+    failed: Mapping[str, str]
+
+
+def render(result: PhosphorResult, source: Source) -> Rendered:
+    """Show a chain of protocols."""
+    rendered = {
+        name: render_result(result.parts[name], part) for name, part in _parts(result, source)
+    }
+    sections = [_summary(result, source)]
+    for name, one in rendered.items():
+        sections += [replace(section, part=name) for section in one.sections]
+    for patch, material in result.materials.items():
+        sections += _comparison(patch, material)
+    return Rendered(
+        tuple(sections),
+        tuple(f"{name}: {line}" for name, one in rendered.items() for line in one.lines),
+        tuple(section for one in rendered.values() for section in one.methods),
+    )
+
+
+def _parts(result: PhosphorResult, source: Source) -> Iterator[tuple[str, Source]]:
+    """What the result of every part was found in."""
+    for link in source.protocol.chain():
+        if link.name in result.parts:
+            run = source.run.part(link.name)
+            yield (
+                link.name,
+                replace(source, run=run, protocol=link.protocol, anchor=f"{link.name}-"),
+            )
+
+
+def _summary(result: PhosphorResult, source: Source) -> Section:
+    """The material as measured; picture, glow, colour, spectrum; what follows."""
+    figures, colours = [], {}
+    for name, patch in _decays(result).items():
+        figures.append(
+            Picture(
+                f"glow-{name}",
+                logarithmic_decay(patch.series, patch.fit),
+                f"The glow{_of(name, result)} over time, with ± 1 σ; lines are the fit.",
+            )
+        )
+    for name, material in result.materials.items():
+        if material.spectrum is not None:
+            nm, value = np.array(material.spectrum.wavelength_nm), np.array(material.spectrum.value)
+            colours[name or material.name] = spectrum_colour(nm, value)
+            figures.append(
+                Picture(
+                    f"spectrum-{name}",
+                    _spectrum_figure(material.spectrum),
+                    f"Emission spectrum{_of(name, result)}, largest value 1.",
+                )
+            )
+    frames = [frame for attempt in source.run.completed().values() for frame in attempt.frames]
+    daylight = [frame for frame in frames if frame.purpose == "daylight"]
+    return Section(
+        "The material as measured",
+        figures=tuple(figures),
+        tables=tuple(
+            replace(measured_table(material), title=name if len(result.materials) > 1 else "")
+            for name, material in result.materials.items()
+        ),
+        anchor="material",
+        template="phosphor.html.j2",
+        content=_Glance(
+            daylight_picture(daylight, (), screen_for(source.camera)),
+            colours,
+            {f"part-{name}": name for name in result.parts},
+            result.failed,
+        ),
+    )
+
+
+def _decays(result: PhosphorResult) -> dict[str, DecayPatch]:
+    """Of the last decay in the chain, every patch that could be fitted."""
+    decays = [part for part in result.parts.values() if isinstance(part, DecayResult)]
+    patches = decays[-1].patches if decays else {}
+    return {name: patch for name, patch in patches.items() if patch.fit is not None}
+
+
+def _of(patch: str, result: PhosphorResult) -> str:
+    return f" of {patch}" if patch and len(result.materials) > 1 else ""
+
+
+def _spectrum_figure(spectrum: Spectrum) -> Figure:
+    figure = new_figure(SPECTRUM_HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
+    nm, value = np.array(spectrum.wavelength_nm), np.array(spectrum.value)
+    entries: list[Artist] = [lined("emission", INK)]
+    if spectrum.sigma is not None:
+        sigma = np.array(spectrum.sigma)
+        axes.fill_between(
+            nm, value - sigma, value + sigma, color=INK, alpha=BAND_OPACITY, linewidth=0
+        )
+        entries.append(shaded("± 1 σ", INK))
+    axes.plot(nm, value, color=INK, linewidth=1.4)
+    axes.set_xlim(nm[0], nm[-1])
+    axes.set_ylim(bottom=0)
+    axes.set_xlabel("Wavelength / nm")
+    axes.set_ylabel("Emission (largest value 1)")
+    legend_above(figure, entries, columns=4)
+    return figure
+
+
+def _comparison(patch: str, material: Material) -> tuple[Section, ...]:
+    """The material beside the shipped one of its name, such as of Table 1, if there is one."""
+    known = shipped.names("config/materials")
+    if material.name not in known:
+        return ()
+    reference = read_material(known[material.name])
+    source = reference.provenance.source if reference.provenance else "labrig"
+    text = (
+        f"Beside {material.name} of {source}. k_e and Λ are rescaled here, since their scales are "
+        "free in every laboratory; as measured, the numbers stand at the beginning."
+    )
+    table = comparison_table(compare_materials(material, reference))
+    title = f"Compared with a reference: {patch}" if patch else "Compared with a reference"
+    return (Section(title, (text,), tables=(table,), part="comparison"),)

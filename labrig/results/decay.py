@@ -1,0 +1,96 @@
+"""What a decay run found: of every patch its values over time and the fit to them."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from labrig.material import Material, write_material
+from labrig.region import Region
+from labrig.results.arrays import FloatArray
+from labrig.results.fitted_decay import FittedDecay, write_fitted_decay
+from labrig.results.run_result import RunResult
+from labrig.results.series import Series, write_series
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DecayPatch:
+    """One patch of the sample.
+
+    Attributes
+    ----------
+    region
+        Where it lies in the photographs; None if that is not known.
+    series
+        What was measured there, DN/s.
+    fit
+        None where nothing could be fitted.
+    failure
+        Why there is no fit; empty if there is one.
+    normalised_residuals
+        (m, C) value − model of the m usable frames, whitened: independent and of unit variance if
+        the noise is as assumed. None without a fit.
+    material
+        What the decay alone says of it, rates and amplitudes; None without a fit.
+    """
+
+    region: Region | None
+    series: Series
+    fit: FittedDecay | None = None
+    failure: str = ""
+    normalised_residuals: FloatArray | None = None
+    material: Material | None = None
+
+    def write_files(self, folder: Path) -> None:
+        """Write `series.csv` and, where there is a fit, `fit.json` and `material.yaml`."""
+        folder.mkdir(exist_ok=True)
+        write_series(folder / "series.csv", [self.series])
+        if self.fit is not None:
+            write_fitted_decay(folder / "fit.json", self.fit)
+        if self.material is not None:
+            write_material(folder / "material.yaml", self.material)
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class DecayResult(RunResult):
+    """The glow after lamp off.
+
+    Attributes
+    ----------
+    patches
+        By name.
+    background
+        The region whose level was subtracted from each frame; None if dark frames served for that.
+    states_asked
+        The number of states that was asked for; None if the data decided.
+    charges_s
+        How long the lamp shone before each decay, as measured.
+    temperature_c
+        Mean over the photographs of the glow; None where it is not known.
+    """
+
+    kind: ClassVar[str] = "decay"
+
+    patches: Mapping[str, DecayPatch]
+    background: Region | None = None
+    states_asked: int | None = None
+    charges_s: tuple[float, ...] = ()
+    temperature_c: float | None = None
+
+    @property
+    def fits(self) -> dict[str, FittedDecay]:
+        """Of the patches that could be fitted, by name."""
+        return {name: one.fit for name, one in self.patches.items() if one.fit is not None}
+
+    def provides(self) -> dict[str, dict[str, FittedDecay]]:
+        """The fits, by patch."""
+        return {"decays": self.fits}
+
+    def failures(self) -> tuple[str, ...]:
+        """Why no patch at all could be fitted."""
+        return () if self.fits else tuple(one.failure for one in self.patches.values())
+
+    def write_files(self, folder: Path) -> None:
+        """Write what belongs to each patch; of several, each into a folder of its name."""
+        for name, patch in self.patches.items():
+            patch.write_files(folder / name if len(self.patches) > 1 else folder)

@@ -1,0 +1,39 @@
+"""What a chain of protocols found: the results of its parts, and the materials they make."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+from labrig.material import Material, write_material
+from labrig.results.run_result import AnyResult, RunResult
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class PhosphorResult(RunResult):
+    """A phosphor: what every part of the run found, and the materials from all of them.
+
+    Attributes
+    ----------
+    parts
+        By name, in the order of the run; those that could not be analysed are missing.
+    failed
+        Why a part could not be analysed, by its name.
+    materials
+        By patch; under "" the only one.
+    """
+
+    kind: ClassVar[str] = "phosphor"
+
+    parts: Mapping[str, AnyResult]
+    failed: Mapping[str, str]
+    materials: Mapping[str, Material]
+
+    def write_files(self, folder: Path) -> None:
+        """Write the files of every part into a folder of its name, and the material files."""
+        for name, part in self.parts.items():
+            (folder / name).mkdir(exist_ok=True)
+            part.write_files(folder / name)
+        for patch, material in self.materials.items():
+            (folder / patch).mkdir(exist_ok=True)
+            write_material(folder / patch / "material.yaml", material)
