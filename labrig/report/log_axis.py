@@ -5,13 +5,15 @@ import math
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.markers import TICKLEFT
-from matplotlib.ticker import FixedLocator, FuncFormatter, NullLocator
+from matplotlib.ticker import FixedLocator, FuncFormatter, MaxNLocator, NullLocator
 
 from labrig.report.figure_style import MUTED
 from labrig.written_numbers import power_of_ten
 
 #: An axis of fewer decades than this has labels between them, too.
 FEW_DECADES = 2.0
+#: With fewer of them, evenly spaced ticks are labelled instead.
+FEWEST_LABELS = 2
 
 
 def mark_decades(axes: Axes, most: int = 8) -> None:
@@ -21,10 +23,15 @@ def mark_decades(axes: Axes, most: int = 8) -> None:
     low, high = axes.get_ylim()
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     inside = [decade for decade in decades if low <= 10.0**decade <= high]
-    digits = (1, 2, 5) if high < low * 10**FEW_DECADES else (1,)
     step = max(1, math.ceil(len(inside) / most))
-    labelled = [digit * 10.0**decade for decade in decades[::step] for digit in digits]
-    axes.yaxis.set_major_locator(FixedLocator([at for at in labelled if low <= at <= high]))
+    every = decades[::step]
+    labelled = [10.0**decade for decade in every]
+    if high < low * 10**FEW_DECADES:
+        labelled = [digit * 10.0**decade for decade in every for digit in (1, 2, 5)]
+    labelled = [at for at in labelled if low <= at <= high]
+    if len(labelled) < FEWEST_LABELS:
+        labelled = [at for at in MaxNLocator(5).tick_values(low, high) if low <= at <= high]
+    axes.yaxis.set_major_locator(FixedLocator(labelled))
     axes.yaxis.set_major_formatter(FuncFormatter(decade_text))
     # Matplotlib's own minor ticks would be half of the work of drawing the figure.
     axes.yaxis.set_minor_locator(NullLocator())

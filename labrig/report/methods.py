@@ -82,8 +82,8 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
         yield f"Here k_i are the rates and a_i the amplitudes; there are w_c = 1 and {offset}."
     yield "All parameters were fitted together by weighted nonlinear least squares."
     yield f"The weights follow the photon and reading noise found in the frames{_flicker(fits)}."
-    states = sorted({fit.n_states for fit in fits})
-    number = f"n = {' to '.join(str(one) for one in dict.fromkeys((states[0], states[-1])))}"
+    states = [str(one) for one in sorted({fit.n_states for fit in fits})]
+    number = f"n = {states[0]}" if len(states) == 1 else f"n = {' or '.join(states)} by patch"
     if report.states is not None:
         yield f"The number of states was set to {report.states}."
     else:

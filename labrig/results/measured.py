@@ -4,6 +4,10 @@ import math
 from dataclasses import dataclass
 
 
+#: A σ of more digits than this before its point is written with a power of ten.
+MOST_ROUNDED = -2
+
+
 @dataclass(frozen=True)
 class Measured:
     """A value with its standard uncertainty σ, both in `unit`.
@@ -74,6 +78,9 @@ def with_uncertainty(value: float, sigma: float) -> str:
         exponent = math.floor(math.log10(abs(value))) if value else 0
         if exponent < -3:
             return f"{with_uncertainty(value / 10.0**exponent, sigma / 10.0**exponent)}e{exponent}"
+    if decimals < MOST_ROUNDED:
+        exponent = math.floor(math.log10(max(abs(value), sigma)))
+        return f"{with_uncertainty(value / 10.0**exponent, sigma / 10.0**exponent)}e{exponent}"
     if decimals < 0:
         return f"{round(value, decimals):.0f}({digits * 10**-decimals})"
     # σ of 1 and more is written with its decimal point, as in 12.5(1.3).

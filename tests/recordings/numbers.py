@@ -13,8 +13,8 @@ import yaml
 
 #: What changes of labrig that do not say otherwise may move a number by: in σ, or relative to it.
 MOST_SIGMAS, MOST_RELATIVE = 1e-6, 1e-9
-#: Which program made a result is no number of it.
-_LEFT_OUT = "provenance.yaml"
+#: Which program made a result is no number of it; `result.json` repeats what other files say.
+_LEFT_OUT = frozenset({"provenance.yaml", "result.json"})
 
 
 @dataclass(frozen=True)
@@ -90,7 +90,7 @@ def _number_files(folder: Path) -> list[Path]:
     return sorted(
         path.relative_to(folder)
         for path in folder.rglob("*")
-        if path.suffix in _READERS and path.name != _LEFT_OUT
+        if path.suffix in _READERS and path.name not in _LEFT_OUT
     )
 
 
