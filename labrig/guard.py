@@ -12,8 +12,7 @@ import subprocess
 import sys
 import threading
 from collections.abc import Iterator
-from concurrent.futures import ThreadPoolExecutor
-from concurrent.futures import TimeoutError as TooSlow
+from concurrent.futures import ThreadPoolExecutor, TimeoutError as TooSlow
 from contextlib import contextmanager, suppress
 from typing import IO, Any
 

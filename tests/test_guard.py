@@ -11,8 +11,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig import guard as guard_module
-from labrig import guard_process
+from labrig import guard as guard_module, guard_process
 from labrig.acquire import read_rig_file
 from labrig.bench import Bench, open_bench
 from labrig.errors import DeviceError

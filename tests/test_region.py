@@ -1,8 +1,7 @@
 """Regions in pixels and in fractions."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.errors import UsageError
 from labrig.region import parse_region, region_pixels

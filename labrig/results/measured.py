@@ -3,7 +3,6 @@
 import math
 from dataclasses import dataclass
 
-
 #: A σ of more digits than this before its point is written with a power of ten.
 MOST_ROUNDED = -2
 

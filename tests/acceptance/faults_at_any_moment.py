@@ -25,8 +25,7 @@ from typing import Any
 import event_model
 import yaml
 
-from labrig import run as labrig_run
-from labrig import shipped
+from labrig import run as labrig_run, shipped
 from labrig.bench import Bench, open_bench
 from labrig.cli import app as _preloaded  # noqa: F401
 from labrig.cli.ending import guarded

@@ -8,8 +8,7 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from labrig.analyse.choices import Choices
 from labrig.analyse.timed_frames import IntactFrames, intact_frames, timing_warnings

@@ -7,8 +7,8 @@ from typing import Any
 import numpy as np
 import pytest
 import yaml
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
+from labrig.process.result import Result
 
 from labrig.acquire import read_protocol, read_rig_file
 from labrig.analyse import Choices
@@ -22,7 +22,6 @@ from labrig.compare.result import read_patches
 from labrig.errors import DataError, FitError, UsageError
 from labrig.material import read_material
 from labrig.process import process_run
-from labrig.process.result import Result
 from labrig.record import read_run
 from labrig.reduce import RawFrame
 from labrig.region import Region

@@ -3,8 +3,7 @@
 from collections.abc import Callable
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.clock import Interrupted, VirtualClock
 from labrig.drivers.lcus import LcusRelay

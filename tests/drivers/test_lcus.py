@@ -1,8 +1,7 @@
 """The LCUS driver against wire transcripts and against the emulated board."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.acquire import Checkable, Lamp
 from labrig.clock import Interrupted, VirtualClock

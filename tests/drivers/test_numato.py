@@ -1,8 +1,7 @@
 """The Numato driver against wire transcripts and against the emulated board."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.acquire import Lamp
 from labrig.clock import Interrupted, VirtualClock

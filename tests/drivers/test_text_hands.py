@@ -1,8 +1,7 @@
 """Hands that obey lines of text, against transcripts and against the simulated room's."""
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.acquire.roles import Hands
 from labrig.clock import VirtualClock

@@ -6,8 +6,14 @@ import numpy as np
 import pytest
 
 from labrig.errors import FitError
-from labrig.fit.excitation import Charge, ChargingSeries, ExcitationFit, Transient, Uncertain
-from labrig.fit.excitation import fit_excitation as fit
+from labrig.fit.excitation import (
+    Charge,
+    ChargingSeries,
+    ExcitationFit,
+    Transient,
+    Uncertain,
+    fit_excitation as fit,
+)
 from labrig.fit.excitation.levels import levels, levels_at_off
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.material import Material, read_material

@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.optics import Spectrum, Transmittance
 from labrig.optics.piecewise import band_integrals, band_means, edges_about, hats, quadrature

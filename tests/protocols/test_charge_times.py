@@ -2,8 +2,7 @@
 
 import numpy as np
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.protocols.steps.charge_times import CANDIDATES, FloatArray, most_telling_s, still_grows
 

@@ -6,8 +6,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import replace
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.errors import DataError, DeviceError
 from labrig.protocols.steps.darkness import DARK, Darkness, darkness

@@ -3,8 +3,7 @@ from typing import Any
 
 import numpy as np
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from labrig.errors import DataError, DiskError, LabrigError
 from labrig.results import Series, add_flag, parse_series, read_series, write_series

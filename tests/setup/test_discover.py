@@ -12,8 +12,7 @@ import yaml
 from labrig import plugins
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
-from labrig.setup import Process, Surroundings, discover
-from labrig.setup import surroundings as surroundings_module
+from labrig.setup import Process, Surroundings, discover, surroundings as surroundings_module
 from labrig.sim.camera import SimulatedCamera
 
 DRIVERS = ("numato_relay", "ptp_camera")

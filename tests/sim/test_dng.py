@@ -7,8 +7,7 @@ import exifread
 import numpy as np
 import pytest
 import rawpy
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from hypothesis.extra import numpy as hnp
 from numpy.typing import NDArray
 

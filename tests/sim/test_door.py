@@ -10,8 +10,7 @@ import numpy as np
 import pytest
 import rawpy
 import serial
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 from scipy.integrate import quad
 
 from labrig.clock import VirtualClock

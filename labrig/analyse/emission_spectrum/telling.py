@@ -13,8 +13,7 @@ from labrig.analyse.emission_spectrum.figures import (
     spectrum_figure,
 )
 from labrig.analyse.emission_spectrum.picture import Pictures
-from labrig.report.sections import Picture as Plate
-from labrig.report.sections import Section, Table
+from labrig.report.sections import Picture as Plate, Section, Table
 from labrig.written_numbers import plus_minus, rounded
 
 

@@ -8,8 +8,7 @@ from numpy.typing import NDArray
 
 from labrig.analyse.fade.change import Change
 from labrig.analyse.fade.shots import Shots
-from labrig.calibration import Change as ChangeTable
-from labrig.calibration import FadeFile, Warming
+from labrig.calibration import Change as ChangeTable, FadeFile, Warming
 from labrig.report.figure_style import (
     CHANNEL,
     INK,

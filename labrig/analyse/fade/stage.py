@@ -15,8 +15,7 @@ from labrig.analyse.fade.warming import warming
 from labrig.analyse.part import Part, StageResult
 from labrig.analyse.part_frames import part_frames, part_region
 from labrig.analyse.this_camera import insist_on_this_camera
-from labrig.calibration import Change as ChangeTable
-from labrig.calibration import FadeFile, Warming, write_fade_file
+from labrig.calibration import Change as ChangeTable, FadeFile, Warming, write_fade_file
 from labrig.errors import DataError
 from labrig.optics import CameraResponse, Spectrum
 from labrig.record import FrameRecord

@@ -8,8 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Choices
-from labrig.analyse import decay as decay_analysis
+from labrig.analyse import Choices, decay as decay_analysis
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.timed_frames import intact_frames
 from labrig.calibration import read_blank_file

@@ -9,6 +9,8 @@ from pathlib import Path
 from typing import Any
 
 import pytest
+from labrig.process.decay import measure_decay
+from labrig.process.result import Result
 
 from labrig.analyse import Choices
 from labrig.analyse.choices import read_decay_protocol
@@ -16,8 +18,6 @@ from labrig.analyse.inputs import Inputs
 from labrig.calibration import CameraFile, read_camera_file
 from labrig.errors import DataError
 from labrig.process import process_run
-from labrig.process.decay import measure_decay
-from labrig.process.result import Result
 from labrig.record import read_run
 from labrig.sim.optics import vignetting
 from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons

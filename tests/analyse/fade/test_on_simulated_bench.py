@@ -7,6 +7,7 @@ from typing import Any
 
 import numpy as np
 import pytest
+from labrig.process.result import Result
 from numpy.typing import NDArray
 
 from labrig.acquire import Plan, RunObserver
@@ -14,7 +15,6 @@ from labrig.calibration import Change, FadeFile, read_fade_file
 from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.process import process_run
-from labrig.process.result import Result
 from labrig.record import read_run
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.simulation import LampSettings

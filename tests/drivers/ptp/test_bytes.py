@@ -5,8 +5,7 @@ from contextlib import suppress
 from fractions import Fraction
 
 import pytest
-from hypothesis import example, given, settings
-from hypothesis import strategies as st
+from hypothesis import example, given, settings, strategies as st
 
 from labrig.drivers.ptp.containers import Container, Kind, command, decode, encode
 from labrig.drivers.ptp.device_info import parse_device_info

@@ -3,8 +3,7 @@
 import struct
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.drivers.ptp.device_info import parse_device_info
 from labrig.drivers.ptp.standard.object_info import parse_object_info

@@ -3,8 +3,7 @@ import struct
 from time import process_time
 
 import pytest
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from labrig.sim.camera import BodySettings, CameraFaults
 from tests.sim.camera.host import (

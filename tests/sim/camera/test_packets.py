@@ -4,8 +4,7 @@ from itertools import pairwise
 
 import pytest
 import usb.core
-from hypothesis import given, settings
-from hypothesis import strategies as st
+from hypothesis import given, settings, strategies as st
 
 from tests.sim.camera.host import IN, KNOCK, OK, OUT, Bench, Host
 

@@ -5,8 +5,7 @@ from typing import Any
 
 import pytest
 import usb.core
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.sim.camera import BodySettings, CameraFaults, StandardHabits
 from labrig.sim.camera.vocabulary import ObjectFormat

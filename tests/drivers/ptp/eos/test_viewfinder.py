@@ -4,8 +4,7 @@ import struct
 from contextlib import suppress
 
 import pytest
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.acquire.roles import LiveView
 from labrig.clock import VirtualClock

@@ -6,8 +6,7 @@ from typing import Any
 
 import pytest
 import usb.core
-from hypothesis import given
-from hypothesis import strategies as st
+from hypothesis import given, strategies as st
 
 from labrig.clock import VirtualClock
 from labrig.drivers.ptp.containers import Container, Kind
