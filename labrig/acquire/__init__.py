@@ -16,6 +16,7 @@ from labrig.acquire.actions import (
     at,
 )
 from labrig.acquire.by_hand import ByHand, TakenBack
+from labrig.acquire.connections import Connections
 from labrig.acquire.findings import Finding
 from labrig.acquire.part import PartUnit
 from labrig.acquire.planner import MOST_STEPS, Plan, plan
@@ -54,6 +55,7 @@ __all__ = [
     "Camera",
     "CameraOffers",
     "Checkable",
+    "Connections",
     "Device",
     "Door",
     "ExposureSettings",

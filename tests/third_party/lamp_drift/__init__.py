@@ -1,0 +1,1 @@
+"""How steady a lamp is: driver, protocol, analysis and result in a package of one's own."""
