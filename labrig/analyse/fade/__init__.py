@@ -1,5 +1,5 @@
-"""From photographs of a lamp that fades and rises to its fade file."""
+"""From photographs of a lamp that fades and rises to how it does so, band by band."""
 
-from labrig.analyse.fade.stage import process
+from labrig.analyse.fade.analysis import analyse
 
-__all__ = ["process"]
+__all__ = ["analyse"]

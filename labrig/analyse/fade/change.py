@@ -1,16 +1,149 @@
-"""A change of the lamp as it was found: shapes, how likely each is, and what they say of bands."""
+"""How a lamp may go dark or come on: the share of its steady light as a function of a few numbers.
+
+By Wien's law a body at the temperature T(t) has, of its light at T₀, the share
+
+    ln share(λ, t) = −(hc/k) (1/T − 1/T₀) / λ = −u(t) (550 nm / λ)^p,   p = 1.
+
+Parameters θ of all shapes end with p and with the lag of the shutter in s.
+"""
 
 from dataclasses import dataclass
+from typing import Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.analyse.fade.shapes import Shape, share_of
+from labrig.results import FloatArray, Measured
+from labrig.results.fade import FittedShape, LampChange, SwitchedFrames
 
-FloatArray = NDArray[np.float64]
-
+#: Wavelength at which u is minus the logarithm of the share.
+REFERENCE_NM = 550.0
+#: Unit of time of the polynomials.
+SCALE_S = 0.3
+#: Of −ln what counts as nothing.
+DARK = 60.0
+#: hc/(k · 550 nm · T₀) of a lamp of 3000 K, and how much others differ from it (2700 K to 3400 K).
+LN_KAPPA, LN_KAPPA_SIGMA = float(np.log(8.72)), 0.1
+#: Ratio of radiation to conduction, ln r/(1 − r): as good as anything is possible.
+LOGIT_SIGMA = 1.5
 #: Of σ, for derivatives.
 STEP = 0.01
+
+
+class Shape(Protocol):
+    """A change of the lamp."""
+
+    @property
+    def name(self) -> str:
+        """For people."""
+
+    @property
+    def rises(self) -> bool:
+        """Whether it comes on."""
+
+    @property
+    def free(self) -> int:
+        """Parameters besides p and the lag."""
+
+    def start(self, level: float, slope: float) -> FloatArray:
+        """(free,) parameters to begin with: of a rise ln u = level + slope t / `SCALE_S`; of a fade
+        u = −slope t / `SCALE_S`.
+        """
+
+    def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
+        """At (m,) times ≥ 0 after the switch."""
+
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """(free,) what parameters are known to be beforehand, and σ; infinite: anything."""
+
+
+@dataclass(frozen=True)
+class Cooling:
+    """A filament that loses heat by radiation and conduction, dT/dt ∝ −T (r T⁴ + 1 − r), T₀ = 1.
+
+    Its radiation goes with T⁵, as tungsten's emissivity grows with T. An equation of Bernoulli's:
+    1/T = [(e^(q t) − r) / (1 − r)]^(1/4), u = κ (1/T − 1). Parameters: ln κ, ln q, ln r/(1 − r).
+    """
+
+    rises: bool = False
+    free: int = 3
+    name: str = "filament"
+
+    def start(self, level: float, slope: float) -> FloatArray:
+        """Half radiation, half conduction."""
+        per_s = -slope / SCALE_S
+        return np.array([LN_KAPPA, np.log(2 * max(per_s, 0.1) / np.exp(LN_KAPPA)), 0.0])
+
+    def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
+        """See the class."""
+        kappa, rate = np.exp(parameters[:2])
+        conducted = 1 / (1 + np.exp(parameters[2]))
+        grown = np.expm1(np.minimum(rate * t_s, 300.0)) / conducted
+        u: FloatArray = np.minimum(kappa * np.expm1(np.log1p(grown) / 4), DARK)
+        return u
+
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """Of halogen lamps."""
+        return np.array([LN_KAPPA, 0.0, 0.0]), np.array([LN_KAPPA_SIGMA, np.inf, LOGIT_SIGMA])
+
+
+@dataclass(frozen=True)
+class Smooth:
+    """Nothing but smooth: u(t) a polynomial from 0 on, ln u(t) one where the lamp comes on.
+
+    Attributes
+    ----------
+    rises
+        Whether it comes on.
+    degree
+        Of the polynomial.
+    last_s
+        Begin of the last photograph: from there on it goes on straight.
+    """
+
+    rises: bool
+    degree: int
+    last_s: float
+
+    @property
+    def free(self) -> int:
+        """Coefficients."""
+        return self.degree + (1 if self.rises else 0)
+
+    @property
+    def name(self) -> str:
+        """With its degree."""
+        return f"polynomial of degree {self.degree}"
+
+    def start(self, level: float, slope: float) -> FloatArray:
+        """A straight line."""
+        theta = np.zeros(self.free)
+        if self.rises:
+            theta[:2] = level, min(slope, -0.1)
+        else:
+            theta[0] = max(-slope, 0.1)
+        return theta
+
+    def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
+        """See the class."""
+        powers = np.arange(self.free) + (0 if self.rises else 1)
+        end, x = self.last_s / SCALE_S, t_s / SCALE_S
+        inner = np.minimum(x, end)[:, np.newaxis] ** powers @ parameters
+        slope = float((powers * end ** np.maximum(powers - 1.0, 0.0)) @ parameters)
+        value = inner + slope * np.maximum(x - end, 0.0)
+        if self.rises:
+            return np.minimum.accumulate(np.exp(np.clip(value, -DARK, np.log(DARK))))
+        return np.clip(np.maximum.accumulate(value), 0.0, DARK)
+
+    def expected(self) -> tuple[FloatArray, FloatArray]:
+        """Nothing is known."""
+        return np.zeros(self.free), np.full(self.free, np.inf)
+
+
+def share_of(shape: Shape, theta: FloatArray, nm: FloatArray, t_s: FloatArray) -> FloatArray:
+    """Share of the steady lamp's light at (m,) times after the switch, (m, wavelengths)."""
+    u = shape.u(theta[:-2], np.maximum(t_s, 0.0))
+    share: FloatArray = np.exp(-np.outer(u, (REFERENCE_NM / nm) ** theta[-2]))
+    return share
 
 
 @dataclass(frozen=True, eq=False)
@@ -20,7 +153,7 @@ class Fit:
     Attributes
     ----------
     shape, parameters, covariance
-        See `labrig.analyse.fade.shapes`.
+        See `Shape`.
     jitter_s
         Of the photographs' begins.
     chi2, dof, log_determinant
@@ -43,7 +176,7 @@ class Fit:
     def in_bands(
         self, weights: FloatArray, nm: FloatArray, t_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """As `Change.in_bands`, of this shape alone."""
+        """As `FittedChange.in_bands`, of this shape alone."""
         share = share_of(self.shape, self.parameters, nm, t_s) @ weights.T
         slopes = []
         for number, step in enumerate(STEP * np.sqrt(np.diag(self.covariance))):
@@ -56,7 +189,7 @@ class Fit:
 
 
 @dataclass(frozen=True, eq=False)
-class Change:
+class FittedChange:
     """A change of the lamp.
 
     Attributes
@@ -70,19 +203,25 @@ class Change:
     likely: FloatArray
 
     @property
-    def best(self) -> Fit:
-        """The likeliest."""
-        return self.fits[int(np.argmax(self.likely))]
+    def rises(self) -> bool:
+        """Whether the lamp comes on."""
+        return self.fits[0].shape.rises
 
     @property
-    def exponent(self) -> tuple[float, float]:
-        """The power p and its σ."""
-        return self._mean(-2)
+    def lag(self) -> Measured:
+        """By which shutters open later than recorded."""
+        return self._mean(-1, "s")
 
-    @property
-    def lag_s(self) -> tuple[float, float]:
-        """By which shutters open later than recorded, and its σ."""
-        return self._mean(-1)
+    def result(self, frames: SwitchedFrames) -> LampChange:
+        """As it is kept, with the frames that it was found from."""
+        shapes = tuple(
+            FittedShape(
+                fit.shape.name, fit.parameters, fit.covariance, fit.jitter_s, fit.chi2, fit.dof,
+                weight,
+            )
+            for fit, weight in zip(self.fits, self.likely.tolist(), strict=True)
+        )  # fmt: skip
+        return LampChange(frames, shapes, exponent=self._mean(-2), lag=self.lag)
 
     def in_bands(
         self, weights: FloatArray, nm: FloatArray, t_s: FloatArray
@@ -97,11 +236,11 @@ class Change:
         shares, sigmas = zip(*(fit.in_bands(weights, nm, t_s) for fit in self.fits), strict=True)
         return self._averaged(np.array(shares), np.array(sigmas))
 
-    def _mean(self, parameter: int) -> tuple[float, float]:
+    def _mean(self, parameter: int, unit: str = "") -> Measured:
         values = np.array([fit.parameters[parameter] for fit in self.fits])
         sigmas = [np.sqrt(fit.covariance[parameter, parameter]) for fit in self.fits]
         mean, sigma = self._averaged(values, np.array(sigmas))
-        return float(mean), float(sigma)
+        return Measured(float(mean), float(sigma), unit)
 
     def _averaged(self, values: FloatArray, sigmas: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Over the fits, first axis; σ holds what they disagree by."""

@@ -5,22 +5,28 @@ which all its places and colours share, as they share its flicker.
 """
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.analyse.fade.change import Change, Fit
-from labrig.analyse.fade.shapes import REFERENCE_NM, SCALE_S, Cooling, Shape, Smooth, share_of
-from labrig.analyse.fade.shots import Shots
+from labrig.analyse.fade.change import (
+    REFERENCE_NM,
+    SCALE_S,
+    Cooling,
+    Fit,
+    FittedChange,
+    Shape,
+    Smooth,
+    share_of,
+)
 from labrig.errors import FitError
 from labrig.fit.least_squares import least_squares
-
-FloatArray = NDArray[np.float64]
+from labrig.results import FloatArray, Measured
+from labrig.results.fade import SwitchedFrames
 
 #: On which shares are integrated.
 STEP_S = 2e-3
 DEGREES = (2, 3, 4)
 #: What is known of p beforehand, and of the lag if nothing else is; one standard deviation.
 EXPONENT_SIGMA = 0.2
-ANY_LAG_S = (0.0, 6e-3)
+ANY_LAG = Measured(0.0, 6e-3, "s")
 #: Jitters that are tried, the first one first.
 JITTERS_S = np.geomspace(3e-4, 2e-2, 31)
 FIRST_JITTER_S = 3e-3
@@ -31,14 +37,14 @@ CLEARLY = 10.0
 
 
 def fit_change(
-    shots: Shots,
+    frames: SwitchedFrames,
     weights: FloatArray,
     nm: FloatArray,
     flicker: float,
     *,
     rises: bool,
-    lag_s: tuple[float, float] = ANY_LAG_S,
-) -> Change:
+    lag: Measured = ANY_LAG,
+) -> FittedChange:
     """The change that explains the photographs.
 
     Parameters
@@ -49,44 +55,44 @@ def fit_change(
         Of a photograph's light.
     rises
         Whether the lamp comes on.
-    lag_s
-        By which shutters are thought to open late, and its σ.
+    lag
+        By which shutters are thought to open late.
 
     Raises
     ------
     FitError
         The photographs show no such change.
     """
-    last_s = float(shots.start_s.max())
+    last_s = float(frames.start_s.max())
     smooth = [Smooth(rises, degree, last_s) for degree in DEGREES]
     shapes: list[Shape] = [*smooth] if rises else [Cooling(), *smooth]
     fits = [
-        _fit(shots, weights, nm, flicker, shape, lag_s)
+        _fit(frames, weights, nm, flicker, shape, lag)
         for shape in shapes
-        if len(shots.start_s) > shape.free + 3
+        if len(frames.start_s) > shape.free + 3
     ]
     if not fits:
-        raise FitError(f"expected more photographs of the lamp, got {len(shots.start_s)}")
+        raise FitError(f"expected more photographs of the lamp, got {len(frames.start_s)}")
     # What no shape explains (curves that are not quite this bench's) must not decide.
     scatter = max(min(fit.reduced_chi2 for fit in fits), 1.0)
     aic = np.array(
         [fit.log_determinant + fit.chi2 / scatter + 2 * len(fit.parameters) for fit in fits]
     )
     if isinstance(fits[0].shape, Cooling) and aic[0] < aic.min() + CLEARLY:
-        return Change((fits[0],), np.ones(1))
+        return FittedChange((fits[0],), np.ones(1))
     likely = np.exp((aic.min() - aic) / 2)
-    return Change(tuple(fits), likely / likely.sum())
+    return FittedChange(tuple(fits), likely / likely.sum())
 
 
 def _fit(
-    shots: Shots,
+    frames: SwitchedFrames,
     weights: FloatArray,
     nm: FloatArray,
     flicker: float,
     shape: Shape,
-    lag_s: tuple[float, float],
+    lag: Measured,
 ) -> Fit:
-    problem = _Problem(shots, weights, nm, flicker, shape, lag_s)
+    problem = _Problem(frames, weights, nm, flicker, shape, lag)
     theta, jitter_s = problem.start(), FIRST_JITTER_S
     for _ in range(ROUNDS):
         problem.whiten(theta, jitter_s)
@@ -106,36 +112,36 @@ class _Problem:
 
     def __init__(
         self,
-        shots: Shots,
+        frames: SwitchedFrames,
         weights: FloatArray,
         nm: FloatArray,
         flicker: float,
         shape: Shape,
-        lag_s: tuple[float, float],
+        lag: Measured,
     ) -> None:
-        self._shots, self._weights, self._nm = shots, weights, nm
+        self._frames, self._weights, self._nm = frames, weights, nm
         self._flicker, self._shape = flicker, shape
         expected, sigma = shape.expected()
-        self._expected = np.array([*expected, 1.0, lag_s[0]])
-        self._sigma = np.array([*sigma, EXPONENT_SIGMA, lag_s[1]])
-        last_s = float((shots.start_s + shots.exposure_s).max()) + 0.05
+        self._expected = np.array([*expected, 1.0, lag.value])
+        self._sigma = np.array([*sigma, EXPONENT_SIGMA, lag.sigma])
+        last_s = float((frames.start_s + frames.exposure_s).max()) + 0.05
         self._grid_s = np.arange(0.0, last_s + STEP_S, STEP_S)
-        self._used = np.isfinite(shots.value) & np.isfinite(shots.sigma)
+        self._used = np.isfinite(frames.light_s) & np.isfinite(frames.light_sigma_s)
         self.values = int(self._used.sum())
-        known = np.where(self._used, shots.sigma, 1.0)
+        known = np.where(self._used, frames.light_sigma_s, 1.0)
         self._inverse_sigma = np.where(self._used, 1 / known, 0.0)
         self._along, self._common = np.empty((0, 0, 2)), np.empty((0, 2))
         self.log_determinant = 0.0
 
     def start(self) -> FloatArray:
         """A first guess from the photographs' brightest colour."""
-        shots = self._shots
-        column = int(np.argmax(shots.steady))
-        value, start_s = shots.value[:, column], shots.start_s
+        frames = self._frames
+        column = int(np.argmax(frames.steady_dn_per_s))
+        value, start_s = frames.light_s[:, column], frames.start_s
         middle_nm = float(self._weights[column] @ self._nm)
-        used = self._used[:, column] & (value > 5 * shots.sigma[:, column])
+        used = self._used[:, column] & (value > 5 * frames.light_sigma_s[:, column])
         if self._shape.rises:
-            share = np.clip(value / shots.exposure_s, 1e-6, 1 - 1e-6)
+            share = np.clip(value / frames.exposure_s, 1e-6, 1 - 1e-6)
             used &= (share > 0.02) & (share < 0.95)
             target = np.log(-np.log(share[used]) * middle_nm / REFERENCE_NM)
         else:
@@ -157,16 +163,16 @@ class _Problem:
         share = share_of(self._shape, theta, self._nm, self._grid_s) @ self._weights.T
         steps = STEP_S * (share[1:] + share[:-1]) / 2
         integral = np.vstack([np.zeros(share.shape[1]), np.cumsum(steps, axis=0)])
-        begin_s = self._shots.start_s + theta[-1]
+        begin_s = self._frames.start_s + theta[-1]
         first, before = _until(begin_s, integral, share)
-        last, after = _until(begin_s + self._shots.exposure_s, integral, share)
+        last, after = _until(begin_s + self._frames.exposure_s, integral, share)
         return last - first, after - before
 
     def whiten(self, theta: FloatArray, jitter_s: float) -> None:
         """Take covariances from the model there."""
         value, slope = self.model(theta)
         self._along, self._common = self._shared(value, slope, jitter_s)
-        own = np.log(np.square(self._shots.sigma[self._used]))
+        own = np.log(np.square(self._frames.light_sigma_s[self._used]))
         self.log_determinant = float(own.sum() + np.log1p(self._common).sum())
 
     def likeliest_jitter(self, theta: FloatArray) -> float:
@@ -183,7 +189,7 @@ class _Problem:
 
     def _scaled(self, value: FloatArray) -> FloatArray:
         """What a model leaves, in σ; 0 of values that are not used."""
-        return np.where(self._used, (self._shots.value - value) * self._inverse_sigma, 0.0)
+        return np.where(self._used, (self._frames.light_s - value) * self._inverse_sigma, 0.0)
 
     def _shared(
         self, value: FloatArray, slope: FloatArray, jitter_s: float

@@ -7,19 +7,20 @@ from typing import Any
 
 import numpy as np
 import pytest
-from labrig.process.result import Result
 from numpy.typing import NDArray
 
 from labrig.acquire import Plan, RunObserver
 from labrig.calibration import Change, FadeFile, read_fade_file
 from labrig.clock import Clock
 from labrig.errors import UsageError
-from labrig.process import process_run
+from labrig.process import Processed, process_and_report, process_run
 from labrig.record import read_run
+from labrig.results.fade import FadeResult
 from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.simulation import LampSettings
 from tests.acquire.fakes import Watching
 from tests.analyse.recorded import cut_off_and_resumed, record
+from tests.results.round_trip import assert_read_back
 
 FloatArray = NDArray[np.float64]
 
@@ -38,13 +39,18 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def result(run: Path) -> Any:
-    return process_run(run)
+def processed(run: Path) -> Processed:
+    return process_and_report(run)
 
 
 @pytest.fixture(scope="module")
-def fade(result: Result) -> FadeFile:
-    return read_fade_file(result.report.parent / "fade.yaml")
+def result(processed: Processed) -> Any:
+    return processed.result
+
+
+@pytest.fixture(scope="module")
+def fade(result: FadeResult) -> FadeFile:
+    return result.calibration
 
 
 def true_shares(file: FadeFile, change: Change, *, rises: bool) -> FloatArray:
@@ -78,32 +84,50 @@ def test_the_rise_is_the_lamps_in_every_band(fade: FadeFile) -> None:
     assert np.abs(share - true).max() < 0.08
 
 
-def test_it_is_told_as_a_glowing_bodys(result: Result) -> None:
-    assert result.run_warnings == ()
-    assert any(line.startswith("the fade is worth") for line in result.lines)
+def test_it_is_a_glowing_bodys(result: FadeResult) -> None:
+    assert result.warnings == ()
+    assert result.fade.best.name == "filament"
+    assert result.rise is not None
+    assert sum(shape.weight for shape in result.rise.shapes) == pytest.approx(1)
+    for change in (result.fade, result.rise):
+        assert abs(change.exponent.value - 1) < max(0.03, 4 * change.exponent.sigma)
+        assert abs(change.lag.value) < 0.01
+        assert change.best.reduced_chi2 < 2
 
 
-def test_killed_within_a_pass_it_goes_on_there(run: Path, result: Result) -> None:
+def test_a_person_is_told(processed: Processed) -> None:
+    told = ("the fade is worth", "the rise lacks", "a cold lamp lacks")
+    for line, begin in zip(processed.lines, told, strict=True):
+        assert line.startswith(begin)
+
+
+def test_the_result_and_its_file_are_read_back(run: Path, result: FadeResult) -> None:
+    assert read_fade_file(run / "result" / "fade.yaml") == result.calibration
+    assert_read_back(result)
+
+
+def test_killed_within_a_pass_it_goes_on_there(run: Path, result: FadeResult) -> None:
     units = list(read_run(run).completed())
     cut, resumed = cut_off_and_resumed(run, "pass-2")
     assert list(cut.completed()) == units[:-3]
     assert list(resumed.completed()) == units
 
 
-def test_without_the_lamps_spectrum_it_says_what_is_missing(run: Path, result: Result) -> None:
+def test_without_the_lamps_spectrum_it_says_what_is_missing(run: Path, result: FadeResult) -> None:
     path = run / "rig.yaml"
     path.write_text(path.read_text().replace("lamp: halogen_3000k\n", "lamp: null\n"))
     with pytest.raises(UsageError, match="which lamp it has"):
         process_run(run)
 
 
-def test_what_a_cold_lamp_lacks_is_the_rooms(fade: FadeFile, result: Result) -> None:
+def test_what_a_cold_lamp_lacks_is_the_rooms(fade: FadeFile, result: FadeResult) -> None:
     """The room's lamp lacks 3 % and warms in 150 s."""
     assert fade.warming is not None
     assert abs(fade.warming.lacks - 0.03) < 3 * fade.warming.lacks_sigma
     assert fade.warming.lacks_sigma < 0.006
     assert 50 < fade.warming.warms_s < 450
-    assert any("a cold lamp lacks" in line for line in result.lines)
+    assert result.warming is not None
+    assert result.warming.light[-1] == pytest.approx(1, abs=0.03)
 
 
 class Busy(Watching):

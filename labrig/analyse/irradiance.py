@@ -1,19 +1,26 @@
-"""How strongly the lamp lights every place behind the LVF, from card pictures in three colours."""
+"""Irradiance of the lamp on the sample, by itself and through the LVF, from pictures of a card."""
 
-from dataclasses import dataclass, replace
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from itertools import pairwise
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.errors import DataError
+from labrig.analyse.bench_curves import camera_curves, card_reflectance, lamp_spectrum
+from labrig.analyse.lvf_calibration.slices import FLICKER, SliceValues, slice_values
+from labrig.analyse.lvf_calibration.strip_frames import StripFrames
+from labrig.analyse.part import Part
+from labrig.calibration import IrradianceFile, Strip
+from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
 from labrig.optics import CameraResponse, Lvf, Spectrum, Transmittance
-from labrig.optics.piecewise import quadrature
+from labrig.optics.piecewise import band_integrals, quadrature
+from labrig.results import FloatArray
+from labrig.results.irradiance import CardRatio, IrradianceResult, StripScale
 
-FloatArray = NDArray[np.float64]
-
+#: Change of the lamp between rounds that is worth a warning.
+DRIFT = 0.03
 #: Along a strip, what it lets through in all runs as a parabola, in logarithms, but for this,
 UNEVEN = 0.04
 #: over such a distance.
@@ -28,51 +35,135 @@ LEAST = 1e-6
 _STEP = 0.5
 
 
-@dataclass(frozen=True, eq=False)
-class Ratio:
-    """Light of a card through the LVF over that of the lamp by itself.
+def analyse(part: Part) -> IrradianceResult:
+    """Find E of every band, of the lamp by itself and behind every place of the filter.
 
-    Attributes
-    ----------
-    value, sigma
-        (p, channels); NaN where it was not measured. σ without what is common to all.
+    Raises
+    ------
+    UsageError
+        No calibrated LVF is known, or curves are missing in the rig file.
+    DataError
+        Frames are missing or damaged, or some position was not lit.
     """
-
-    value: FloatArray
-    sigma: FloatArray
-
-
-@dataclass(frozen=True, eq=False)
-class Scales:
-    """What the LVF leaves, over what its calibration lets expect.
-
-    Attributes
-    ----------
-    value, covariance
-        (p,) and (p, p) of their logarithms.
-    measured, measured_sigma
-        (p,) each position by itself, before neighbours had their say; σ relative.
-    """
-
-    value: FloatArray
-    covariance: FloatArray
-    measured: FloatArray
-    measured_sigma: FloatArray
+    calibrated = part.inputs.lvf
+    if calibrated is None or calibrated.on_sample is None:
+        raise UsageError(
+            f"{part.run.folder}: no LVF is known that lies on the sample; run lvf_calibration, "
+            "and name its run in the rig file (optics: {lvf: …}) or to labrig process --optics"
+        )
+    frames, lamp, strip = StripFrames(part), lamp_spectrum(part.rig), calibrated.on_sample
+    ratio = _card_ratio(part, frames, strip)
+    position = np.array(strip.positions(*frames.size))
+    lvf = calibrated.lvf.at(np.clip(position, calibrated.position[0], calibrated.position[-1]))
+    camera = camera_curves(part.rig, part.choices, calibrated)
+    scale = strip_scale(ratio, lvf, lamp, card_reflectance(part.rig), camera)
+    return IrradianceResult(
+        calibration=_file(part, strip, lvf, lamp, ratio, scale),
+        centre_nm=lvf.bands.centre_nm,
+        card_ratio=ratio,
+        scale=scale,
+        warnings=tuple(_warnings(ratio)),
+    )
 
 
-def scales(
-    ratio: Ratio,
+def _card_ratio(part: Part, frames: StripFrames, strip: Strip) -> CardRatio:
+    lit = [*frames.of("irradiance-direct"), *frames.of("irradiance-through")]
+    values = slice_values(lit, strip, frames.dark, part.inputs.camera)
+    return mean_ratio(
+        [
+            (values[f"direct-{number}"], values[f"through-{number}"])
+            for number in range(1, part.protocol.rounds + 1)
+            if f"direct-{number}" in values and f"through-{number}" in values
+        ]
+    )
+
+
+def mean_ratio(pairs: Sequence[tuple[SliceValues, SliceValues]]) -> CardRatio:
+    """Of the rounds, each a picture of the card by itself and one through the LVF."""
+    ratios = np.stack([through.value / direct.value for direct, through in pairs])
+    relative = [
+        np.hypot(through.sigma / direct.value, ratio * direct.sigma / direct.value)
+        for (direct, through), ratio in zip(pairs, ratios, strict=True)
+    ]
+    weight = 1 / np.stack(relative) ** 2
+    total = weight.sum(axis=0)
+    mean = (weight * ratios).sum(axis=0) / total
+    clear = mean > 30 / np.sqrt(total)
+    each = [float(np.median((ratio / mean)[clear])) for ratio in ratios]
+    drift = float(np.std(each, ddof=1)) if len(each) > 1 else 0.0
+    common = float(np.hypot(FLICKER * np.sqrt(2), drift) / np.sqrt(len(pairs)))
+    return CardRatio(mean, 1 / np.sqrt(total), common, drift, len(pairs))
+
+
+def _file(
+    part: Part, strip: Strip, lvf: Lvf, lamp: Spectrum, card: CardRatio, scale: StripScale
+) -> IrradianceFile:
+    edges = np.array(part.protocol.bands_nm)
+    direct = band_integrals(lamp.wavelength_nm, lamp.value, edges)
+    norm = part.protocol.vector_length / float(np.linalg.norm(direct))
+    shape, shape_sigma = in_bands(lvf, lamp, edges)
+    factor = scale.value[:, np.newaxis] * norm
+    relative = scale.relative_sigma
+    through = shape * factor
+    sigma = np.hypot(through * relative[:, np.newaxis], shape_sigma * factor)
+    ratio = norm * direct.sum() / through.sum(axis=1)
+    return IrradianceFile(
+        lamp=lamp.name,
+        bands_nm=part.protocol.bands_nm,
+        vector_length=part.protocol.vector_length,
+        direct=tuple((norm * direct).tolist()),
+        direct_sigma=tuple(_direct_sigma(lamp, edges, norm).tolist()),
+        position=tuple(lvf.position.tolist()),
+        through=tuple(tuple(row) for row in through.tolist()),
+        through_sigma=tuple(tuple(row) for row in sigma.tolist()),
+        scale_sigma=card.common_sigma,
+        ratio=tuple(ratio.tolist()),
+        ratio_sigma=tuple((ratio * np.hypot(relative, card.common_sigma)).tolist()),
+        strip=strip,
+        source=f"grey card by itself and through the LVF in {card.rounds} rounds, with labrig",
+        run=part.run.folder.resolve().name,
+    )
+
+
+def _direct_sigma(lamp: Spectrum, edges: FloatArray, norm: float) -> FloatArray:
+    """By what the lamp's file says; errors of neighbouring wavelengths taken to go together."""
+    if lamp.sigma is None:
+        return np.zeros(len(edges) - 1)
+    return norm * band_integrals(lamp.wavelength_nm, lamp.sigma, edges)
+
+
+def _warnings(card: CardRatio) -> Iterator[str]:
+    if card.drift > DRIFT:
+        yield (
+            f"the lamp changed by {card.drift:.1%} from round to round; let it warm up for longer, "
+            "or look for something that was moved"
+        )
+
+
+def strip_scale(
+    ratio: CardRatio,
     lvf: Lvf,
     lamp: Spectrum,
     card: Transmittance,
     camera: CameraResponse,
     curve_error: CurveError = CurveError(),  # noqa: B008 (frozen)
-) -> Scales:
+) -> StripScale:
     """One factor for each position, such that lamp × LVF explains what the card shows.
 
     The camera's curves say how bright a narrow band looks against the whole lamp, and are wrong by
     some per cent, more in the violet. What a strip lets through runs smoothly along it; both are
     weighed by their covariances.
+
+    Parameters
+    ----------
+    ratio
+        What the card shows at p positions; of it only what positions do not share.
+    lvf
+        The filter at these positions.
+    lamp, card
+        The lamp's spectrum and the card's reflectance.
+    camera, curve_error
+        The camera's curves, and by how much they may be wrong.
 
     Raises
     ------
@@ -139,7 +230,7 @@ def _by_figures(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatArray:
     return np.array(changes)
 
 
-def _smoothed(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> Scales:
+def _smoothed(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> StripScale:
     """Weigh logarithms of light through every place against a smooth course of them."""
     centre = lvf.bands.centre_nm
     area = np.log(lvf.bands.peak * lvf.bands.fwhm_nm)
@@ -150,7 +241,7 @@ def _smoothed(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> Scales:
     gain = np.linalg.solve(before + covariance, before).T
     course = gain @ (np.log(value) + area)
     after = before - gain @ before
-    return Scales(
+    return StripScale(
         np.exp(course - area),
         (after + after.T) / 2,
         value,
@@ -161,7 +252,7 @@ def _smoothed(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> Scales:
 def in_bands(lvf: Lvf, lamp: Spectrum, edges_nm: FloatArray) -> tuple[FloatArray, FloatArray]:
     """∫ L T_p dλ over bands, (p, bands), and one σ by what is not known of the filter's bands.
 
-    The height of a band is left out: `scales` measures it.
+    The height of a band is left out: `strip_scale` measures it.
     """
     value = _in_bands(lvf, lamp, edges_nm)
     if lvf.sigma is None:

@@ -1,20 +1,28 @@
 """How strongly the lamp lights what lies behind an LVF, by a camera of doubtful curves."""
 
 from dataclasses import replace
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
 
-from labrig.analyse.irradiance.scales import Ratio, in_bands, scales
-from labrig.analyse.irradiance.stage import mean_ratio
+from labrig.analyse.irradiance import in_bands, mean_ratio, strip_scale
 from labrig.analyse.lvf_calibration.slices import SliceValues
+from labrig.calibration import Strip, read_irradiance_file, write_lvf_file
 from labrig.errors import DataError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
 from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
+from labrig.process import process_run
+from labrig.results.irradiance import CardRatio, IrradianceResult
+from tests.analyse.lvf_calibration.room_truth import simulation_of, true_irradiance
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
+from tests.analyse.recorded import record
+from tests.analyse.spectral_bench import true_lvf_file
+from tests.results.round_trip import assert_read_back
 
 CARD = Transmittance("card", np.array([380.0, 780.0]), np.array([0.17, 0.19]))
 HOUSE = read_camera("canon_eos_5d_mark_ii")
@@ -35,7 +43,7 @@ def bent(seed: int) -> CameraResponse:
     return replace(HOUSE, sensitivity=np.maximum(changed, 0.0))
 
 
-def card_ratio(camera: CameraResponse, seed: int = 0) -> Ratio:
+def card_ratio(camera: CameraResponse, seed: int = 0) -> CardRatio:
     lamp = halogen()
     nodes, weights = quadrature(380.0, 780.0, camera.wavelength_nm, lamp.wavelength_nm)
     light = weights * lamp.at(nodes) * CARD.at(nodes)
@@ -43,18 +51,19 @@ def card_ratio(camera: CameraResponse, seed: int = 0) -> Ratio:
     value = passed @ camera.at(nodes) / (light @ camera.at(nodes))
     sigma = np.full_like(value, 1e-3 * value.max())
     rng = np.random.default_rng(seed)
-    return Ratio(value + sigma * rng.standard_normal(value.shape), sigma)
+    value = value + sigma * rng.standard_normal(value.shape)
+    return CardRatio(value, sigma, common_sigma=0.0, drift=0.0, rounds=1)
 
 
 def test_known_curves_give_the_scale() -> None:
-    found = scales(card_ratio(HOUSE), strip(), halogen(), CARD, HOUSE)
+    found = strip_scale(card_ratio(HOUSE), strip(), halogen(), CARD, HOUSE)
     np.testing.assert_allclose(found.value, TRUE_SCALE, rtol=0.03)
 
 
 def test_wrong_curves_are_in_the_sigma_and_neighbours_help() -> None:
     deviations, single, course = [], [], []
     for seed in range(12):
-        found = scales(card_ratio(bent(seed), seed), strip(), halogen(), CARD, HOUSE)
+        found = strip_scale(card_ratio(bent(seed), seed), strip(), halogen(), CARD, HOUSE)
         off = np.log(found.value / TRUE_SCALE)
         deviations.append(off / np.sqrt(np.diag(found.covariance)))
         single.append(np.log(found.measured / TRUE_SCALE))
@@ -71,7 +80,7 @@ def test_a_position_without_light_is_refused() -> None:
     value = ratio.value.copy()
     value[3] = np.nan
     with pytest.raises(DataError, match="position p03: no light"):
-        scales(replace(ratio, value=value), strip(), halogen(), CARD, HOUSE)
+        strip_scale(replace(ratio, value=value), strip(), halogen(), CARD, HOUSE)
 
 
 def test_shares_of_bands_are_integrals_and_their_sigma_is_of_the_bands() -> None:
@@ -90,7 +99,34 @@ def test_shares_of_bands_are_integrals_and_their_sigma_is_of_the_bands() -> None
 def test_rounds_are_averaged_and_their_scatter_is_told() -> None:
     direct = SliceValues(np.full((4, 3), 100.0), np.full((4, 3), 0.1))
     through = [SliceValues(np.full((4, 3), v), np.full((4, 3), 0.01)) for v in (5.0, 5.2)]
-    lit = mean_ratio([(direct, one) for one in through])
-    np.testing.assert_allclose(lit.ratio.value, 0.051, rtol=1e-3)
-    assert lit.drift == pytest.approx(0.028, rel=0.05)
-    assert lit.sigma == pytest.approx(np.hypot(0.00707, lit.drift) / np.sqrt(2), rel=0.01)
+    card = mean_ratio([(direct, one) for one in through])
+    np.testing.assert_allclose(card.value, 0.051, rtol=1e-3)
+    assert card.drift == pytest.approx(0.028, rel=0.05)
+    assert card.common_sigma == pytest.approx(np.hypot(0.00707, card.drift) / np.sqrt(2), rel=0.01)
+
+
+def test_on_the_simulated_bench_it_is_the_rooms(tmp_path: Path) -> None:
+    """With a filter calibrated without error: what is left is the card's and the camera's."""
+    width, height = 192, 64
+    on_sample = Strip(left=(0.08, 0.5), right=(0.92, 0.5), height=0.25, rising=False)
+    calibrated = true_lvf_file(width, height).model_copy(update={"on_sample": on_sample})
+    write_lvf_file(tmp_path / "lvf.yaml", calibrated)
+
+    def change(rig: dict[str, Any]) -> None:
+        rig["optics"]["lvf"] = str(tmp_path / "lvf.yaml")
+        rig["simulation"]["sensor"] = {"width": width, "height": height}
+
+    protocol = {"protocol": "irradiance", "sample": {"name": "lamp"}, "longest": "4 s",
+                "repeats": 1}  # fmt: skip
+    run = record(tmp_path, protocol, change)
+    result = process_run(run)
+    assert isinstance(result, IrradianceResult)
+    file = result.calibration
+    assert read_irradiance_file(run / "result" / "irradiance.yaml") == file
+    assert_read_back(result)
+    expected = true_irradiance(simulation_of(run), file.strip, file.bands_nm).sum(axis=1)
+    through = np.array(file.through).sum(axis=1)
+    sigma = np.array(file.ratio_sigma) / np.array(file.ratio)
+    assert np.abs(np.log(through / expected) / sigma).max() < 4
+    assert sigma.min() < 0.02
+    assert (result.card_ratio.rounds, result.warnings) == (2, ())

@@ -1,0 +1,169 @@
+"""What photographs of the card hold after a switch of the lamp, and while its housing warms."""
+
+from collections.abc import Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.analyse.timed_frames import switched_time, timed, untimed
+from labrig.calibration import CameraFile, Warming
+from labrig.errors import DataError
+from labrig.record import FrameRecord, RunRecord
+from labrig.reduce import reduce_patches
+from labrig.region import Region
+from labrig.results import FloatArray, Series
+from labrig.results.fade import SwitchedFrames, WarmingLight
+
+#: Of a change, fewer tell nothing.
+FEWEST = 6
+#: Time constants that a housing may have.
+TAU_S: FloatArray = np.geomspace(15.0, 1500.0, 93)
+
+
+def frames_after_switch(
+    run: RunRecord,
+    frames: Sequence[FrameRecord],
+    darks: Sequence[FrameRecord],
+    places: Mapping[str, Region],
+    camera: CameraFile | None,
+    purpose: str,
+) -> SwitchedFrames:
+    """Photographs of a `purpose`, `fade` or `rise`, over those of the steady lamp in their pass.
+
+    Parameters
+    ----------
+    frames
+        Of that purpose, and those called `steady`.
+    places
+        Regions that are seen, by name.
+
+    Raises
+    ------
+    DataError
+        Too few of them are of any use.
+    """
+    state = "on" if purpose == "rise" else "off"
+    attempts = run.completed()
+    taken = [
+        timed(frame, switched_time(attempts[frame.unit], frame, state))
+        for frame in frames
+        if frame.purpose == purpose
+    ]
+    steady = [untimed(frame) for frame in frames if frame.purpose == "steady"]
+    if len(taken) < FEWEST or not steady:
+        raise DataError(
+            f"expected {FEWEST} photographs of the {purpose} or more, and of the steady lamp, got "
+            f"{len(taken)} and {len(steady)}; resume the run"
+        )
+    dark = [untimed(frame) for frame in darks]
+    series = reduce_patches([*taken, *steady], places, dark, camera=camera)
+    parts = [_of_place(one, len(taken)) for one in series.values()]
+    light_s, sigma_s = (np.hstack([part[number] for part in parts]) for number in (0, 1))
+    first = next(iter(series.values()))
+    steady_dn_per_s = np.concatenate([part[2] for part in parts])
+    seen = np.isfinite(light_s).any(axis=1)
+    if np.count_nonzero(seen) < FEWEST:
+        raise DataError(
+            f"expected {FEWEST} photographs of the {purpose} that do not clip, got "
+            f"{np.count_nonzero(seen)}; lower camera.iso"
+        )
+    clips = ~np.all([one.usable[: len(taken)] for one in series.values()], axis=0)
+    return SwitchedFrames(
+        first.t_s[: len(taken)][seen],
+        first.exposure_s[: len(taken)][seen],
+        light_s[seen],
+        sigma_s[seen],
+        steady_dn_per_s,
+        clipped=int(np.count_nonzero(clips)),
+    )
+
+
+def brightest_channels(frames: SwitchedFrames, channels: int) -> NDArray[np.intp]:
+    """Columns of the brightest channel in every place, (S / channels,)."""
+    places = frames.steady_dn_per_s.reshape(-1, channels)
+    columns: NDArray[np.intp] = np.arange(len(places)) * channels + places.argmax(axis=1)
+    return columns
+
+
+def take_columns(frames: SwitchedFrames, columns: NDArray[np.intp]) -> SwitchedFrames:
+    """Some of the places or colours."""
+    return replace(
+        frames,
+        light_s=frames.light_s[:, columns],
+        light_sigma_s=frames.light_sigma_s[:, columns],
+        steady_dn_per_s=frames.steady_dn_per_s[columns],
+    )
+
+
+def _of_place(series: Series, taken: int) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Values and σ of the photographs that were taken, (n, C) each, and the steady signal (C,)."""
+    unit = np.array(series.unit)
+    is_steady = np.arange(len(unit)) >= taken
+    value, sigma = np.full((2, taken, len(series.channels)), np.nan)
+    for one in dict.fromkeys(series.unit):
+        reference = is_steady & (unit == one) & series.usable
+        own = np.flatnonzero(~is_steady & (unit == one) & series.usable)
+        if not reference.any() or not len(own):
+            continue
+        level = series.values[reference].mean(axis=0)
+        exposure_s = series.exposure_s[own][:, np.newaxis]
+        known = level > 0
+        safe = np.where(known, level, 1.0)
+        value[own] = np.where(known, series.values[own] * exposure_s / safe, np.nan)
+        sigma[own] = np.where(known, series.sigma[own] * exposure_s / safe, np.nan)
+    steady = series.values[is_steady & series.usable]
+    if not len(steady):
+        raise DataError("the steady lamp clips in all frames; lower camera.iso")
+    return value, sigma, steady.mean(axis=0)
+
+
+def warming(
+    run: RunRecord,
+    frames: Sequence[FrameRecord],
+    darks: Sequence[FrameRecord],
+    card: Region,
+    camera: CameraFile | None,
+    flicker: float,
+) -> tuple[Warming, WarmingLight]:
+    """What a lamp lacks while its housing is cold, and the light that shows it.
+
+    The light is 1 − d e^(−t/τ) of that of the warm lamp, by the housing's Newtonian warming.
+    """
+    on = switched_time(run.completed()[frames[0].unit], frames[0], "on")
+    series = reduce_patches(
+        [timed(frame, on) for frame in frames],
+        {"card": card},
+        [untimed(frame) for frame in darks],
+        camera=camera,
+    )["card"]
+    used = series.usable
+    values, sigma = series.values[used], np.nan_to_num(series.sigma[used])
+    best = int(np.argmax(np.mean(values, axis=0)))
+    t_s, level = series.t_s[used], values[:, best]
+    unsure = np.hypot(sigma[:, best], flicker * level)
+    found = [_fit_warming(t_s, level / unsure, 1 / unsure, tau) for tau in TAU_S]
+    chi2 = np.array([one[2] for one in found])
+    weight = np.exp(-(chi2 - chi2.min()) / 2)
+    weight /= weight.sum()
+    lacks = np.array([one[0] for one in found])
+    own = np.array([one[1] for one in found])
+    mean = float(weight @ lacks)
+    spread = float(np.sqrt(weight @ (own**2 + (lacks - mean) ** 2)))
+    at = int(np.argmin(chi2))
+    file = Warming(lacks=max(mean, 0.0), lacks_sigma=spread, warms_s=float(TAU_S[at]))
+    return file, WarmingLight(t_s, level / found[at][3])
+
+
+def _fit_warming(
+    t_s: FloatArray, level: FloatArray, one: FloatArray, tau_s: float
+) -> tuple[float, float, float, float]:
+    """What is lacking and its σ, χ², the warm lamp's level; values already over their σ."""
+    rows = np.stack([one, -one * np.exp(-t_s / tau_s)], axis=1)
+    covariance = np.linalg.inv(rows.T @ rows)
+    warm, less = covariance @ (rows.T @ level)
+    lacks = less / warm
+    slope = np.array([-lacks, 1.0]) / warm
+    left = level - rows @ [warm, less]
+    sigma = float(np.sqrt(slope @ covariance @ slope))
+    return float(lacks), sigma, float(left @ left), float(warm)

@@ -1,0 +1,135 @@
+"""A lamp's fade and rise in a report."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from labrig.calibration import Change, FadeFile, Warming
+from labrig.report.figure_style import (
+    CHANNEL,
+    INK,
+    LEFT_PT,
+    OTHER_CHANNELS,
+    new_figure,
+    place,
+    points,
+)
+from labrig.report.legend import legend_above, lined
+from labrig.report.rendering import Rendered, Source
+from labrig.report.sections import Picture, Section, Table
+from labrig.results.fade import FadeResult, LampChange, WarmingLight
+from labrig.written_numbers import plus_minus, rounded
+
+HEIGHT_PT = 250.0
+#: Of the bands that are drawn, from blue to red.
+COLOURS = (CHANNEL["B"], OTHER_CHANNELS[2], CHANNEL["G"], OTHER_CHANNELS[1], CHANNEL["R"])
+
+
+def render(result: FadeResult, source: Source) -> Rendered:
+    """Show the shares over time, how they were fitted, and the light while the housing warms."""
+    file = result.calibration
+    changes = [("fade", file.fade, result.fade)]
+    if file.rise is not None and result.rise is not None:
+        changes.append(("rise", file.rise, result.rise))
+    sections, lines = [_changes(file, changes)], list(_lines(changes))
+    if file.warming is not None and result.warming is not None:
+        sections.append(_warming(file.warming, result.warming))
+        lines.append(_warming_line(file.warming))
+    return Rendered(tuple(sections), tuple(lines))
+
+
+def _changes(file: FadeFile, changes: list[tuple[str, Change, LampChange]]) -> Section:
+    figures = tuple(
+        Picture(
+            name,
+            _shares(file, table),
+            f"The lamp's light over that of the steady lamp during its {name}, in some bands; "
+            "pale: ± 1 σ.",
+        )
+        for name, table, _ in changes
+    )
+    rows = tuple(
+        (
+            name,
+            plus_minus(change.exponent.value, change.exponent.sigma),
+            plus_minus(1e3 * change.lag.value, 1e3 * change.lag.sigma),
+            f"{1e3 * change.best.jitter_s:.1f}",
+            f"{change.best.reduced_chi2:.2f}",
+            f"{len(change.frames.start_s)}",
+        )
+        for name, _, change in changes
+    )
+    head = ("", "exponent", "lag / ms", "jitter / ms", "χ² per dof", "photographs")
+    return Section(
+        "How the lamp goes dark and comes on",
+        (
+            "ln share = −u(t) (550 nm/λ)^p for all wavelengths, u(t) smooth; p is 1 for a glowing "
+            "body. What happens before the first shutter opens follows from the share of 1 (or 0) "
+            "at the switch and from what comes after.",
+        ),
+        figures,
+        (Table(head, rows, "Lag: by how much shutters opened later than recorded."),),
+    )
+
+
+def _shares(file: FadeFile, table: Change) -> Figure:
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+    share, sigma = np.array(table.share), np.array(table.sigma)
+    time_ms = 1e3 * np.array(table.t_s)
+    bands = share.shape[1]
+    shown = sorted(set(np.linspace(0, bands - 1, min(bands, len(COLOURS))).round().astype(int)))
+    entries = []
+    for band, colour in zip(shown, COLOURS, strict=False):
+        low, high = file.bands_nm[band], file.bands_nm[band + 1]
+        axes.fill_between(
+            time_ms, share[:, band] - sigma[:, band], share[:, band] + sigma[:, band],
+            color=colour, alpha=0.3, linewidth=0,
+        )  # fmt: skip
+        axes.plot(time_ms, share[:, band], color=colour, linewidth=1.2)
+        entries.append(lined(f"{low:g}–{high:g} nm", colour))
+    axes.set_xlabel("Time after the switch / ms")
+    axes.set_ylabel("Share of the steady lamp")
+    legend_above(figure, entries, columns=3)
+    return figure
+
+
+def _warming(warm: Warming, seen: WarmingLight) -> Section:
+    figure = new_figure(180)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
+    grid = np.linspace(0, float(seen.t_s.max()), 201)
+    axes.plot(grid, 100 * (1 - warm.lacks * np.exp(-grid / warm.warms_s)), color=INK)
+    points(axes, seen.t_s, 100 * seen.light, "o", INK, INK, size=3.0)
+    axes.set_xlabel("Time after switching on / s")
+    axes.set_ylabel("Light / % of warm")
+    lacks = plus_minus(100 * warm.lacks, 100 * warm.lacks_sigma)
+    text = (
+        f"After ten minutes in the dark the lamp lacks {lacks} % of its light; that comes as its "
+        f"housing warms, with a time constant of {warm.warms_s:.0f} s. Short charges are that much "
+        "weaker."
+    )
+    caption = "Light on the card, by photograph; line: 1 − d e^(−t/τ)."
+    return Section("How the lamp warms", (text,), (Picture("warming", figure, caption),))
+
+
+def _lines(changes: list[tuple[str, Change, LampChange]]) -> Iterator[str]:
+    for name, table, change in changes:
+        missing_s = table.missing_s()
+        if name == "rise":
+            missing_s = table.t_s[-1] - missing_s
+        first, last = 1e3 * missing_s[0], 1e3 * missing_s[-1]
+        verb = "lacks" if name == "rise" else "is worth"
+        yield (
+            f"the {name} {verb} {first:.1f} ms of the steady lamp in the first band, "
+            f"{last:.1f} ms in the last; over after {rounded(table.t_s[-1], 3)} s; exponent of the "
+            f"wavelength {plus_minus(change.exponent.value, change.exponent.sigma)} (1: a glowing "
+            "body)"
+        )
+
+
+def _warming_line(warm: Warming) -> str:
+    return (
+        f"a cold lamp lacks {plus_minus(100 * warm.lacks, 100 * warm.lacks_sigma)} % of its "
+        f"light, which comes with a time constant of {warm.warms_s:.0f} s"
+    )

@@ -1,0 +1,118 @@
+"""A measurement of irradiance in a report."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from labrig.calibration import IrradianceFile
+from labrig.report.figure_style import (
+    INK,
+    LEFT_PT,
+    MUTED,
+    OTHER_CHANNELS,
+    SHADE,
+    error_bars,
+    new_figure,
+    place,
+    points,
+)
+from labrig.report.legend import legend_above, lined
+from labrig.report.rendering import Rendered, Source
+from labrig.report.sections import Picture, Section, Table
+from labrig.results.irradiance import IrradianceResult
+from labrig.written_numbers import plus_minus, rounded
+
+
+def render(result: IrradianceResult, source: Source) -> Rendered:
+    """Show E of every band along the filter, and the scale that the grey card gives it."""
+    return Rendered((_section(result),), tuple(_lines(result.calibration)))
+
+
+def _section(result: IrradianceResult) -> Section:
+    file = result.calibration
+    head = ("Band / nm", *(f"{low:g}" for low in file.bands_nm[:-1]))
+    rows = (
+        ("direct", *(rounded(value, 3) for value in file.direct)),
+        *(
+            (f"p{k:02d}", *(rounded(value, 2) for value in file.through[k]))
+            for k in range(0, len(file.position), 5)
+        ),
+    )
+    return Section(
+        "Irradiance on the sample",
+        (
+            "E of every band is ∫ E dλ over it, scaled so that the lamp by itself has the length "
+            f"{rounded(file.vector_length)}: excitation rates belong to that. Through the LVF, its "
+            "calibration gives the shape and the grey card the scale at every position, both with "
+            f"their σ; common to all positions are {100 * file.scale_sigma:.1f} % more.",
+        ),
+        (
+            Picture(
+                "irradiance",
+                _irradiance_figure(file),
+                "Irradiance of every band along the strip behind the LVF, with 1 σ; where it is "
+                "less than 2 % of its highest, it is not drawn.",
+            ),
+            Picture(
+                "scale",
+                _scale_figure(result),
+                "What the card shows over what the calibration of the LVF lets expect: each "
+                "position by itself (points, 1 σ with the camera's curves), and with its "
+                "neighbours (line and band).",
+            ),
+        ),
+        (Table(head, rows, "Columns begin at the wavelength in their head."),),
+    )
+
+
+def _irradiance_figure(file: IrradianceFile) -> Figure:
+    """E of every band along the strip."""
+    figure = new_figure(240)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+    through, sigma = np.array(file.through), np.array(file.through_sigma)
+    position = np.array(file.position)
+    entries = []
+    for band, (low, high) in enumerate(zip(file.bands_nm[:-1], file.bands_nm[1:], strict=True)):
+        colour = OTHER_CHANNELS[band % len(OTHER_CHANNELS)]
+        seen = through[:, band] > 0.02 * through[:, band].max()
+        error_bars(axes, position[seen], through[seen, band], sigma[seen, band], colour)
+        axes.plot(position[seen], through[seen, band], color=colour, linewidth=1.0)
+        entries.append(lined(f"{low:.0f}–{high:.0f} nm", colour))
+    axes.set_ylim(0, None)
+    axes.set_xlabel("Position from blue end to red end")
+    axes.set_ylabel("Irradiance E")
+    legend_above(figure, entries, columns=4)
+    return figure
+
+
+def _scale_figure(result: IrradianceResult) -> Figure:
+    """Measured over expected, by the wavelength of the position."""
+    scale, centre_nm = result.scale, result.centre_nm
+    figure = new_figure(200)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
+    sigma = scale.relative_sigma
+    low, high = scale.value * np.exp(-sigma), scale.value * np.exp(sigma)
+    axes.fill_between(centre_nm, low, high, color=SHADE, linewidth=0)
+    axes.plot(centre_nm, scale.value, color=MUTED, linewidth=1.2)
+    unsure = scale.measured * scale.measured_sigma
+    error_bars(axes, centre_nm, scale.measured, unsure, INK)
+    points(axes, centre_nm, scale.measured, "o", INK, INK, size=3.0)
+    # Single positions in the violet may be far off: their bars may leave the figure.
+    axes.set_ylim(0, 2 * float(np.median(scale.value)))
+    axes.set_xlabel("Wavelength / nm")
+    axes.set_ylabel("Measured / expected")
+    return figure
+
+
+def _lines(file: IrradianceFile) -> Iterator[str]:
+    direct = ", ".join(rounded(value, 3) for value in file.direct)
+    yield f"the lamp by itself, E per band: {direct} (length {rounded(file.vector_length)})"
+    for k in (0, len(file.position) // 2, len(file.position) - 1):
+        band = int(np.argmax(file.through[k]))
+        low, high = file.bands_nm[band : band + 2]
+        peak = plus_minus(file.through[k][band], file.through_sigma[k][band])
+        yield (
+            f"p{k:02d}: E {peak} in {low:g}-{high:g} nm; direct : through "
+            f"{plus_minus(file.ratio[k], file.ratio_sigma[k])}"
+        )
