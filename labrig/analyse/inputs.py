@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Self, TypeVar
 
 from labrig.acquire import RigFile
-from labrig.analyse.emission_file import EmissionSpectrum
 from labrig.calibration import (
     BlankFile,
     CameraFile,
@@ -22,6 +21,7 @@ from labrig.calibration import (
 from labrig.errors import UsageError
 from labrig.fit import DecayFit
 from labrig.material import Material
+from labrig.results.emission_spectrum import EmissionSpectrum
 
 FileT = TypeVar("FileT")
 
