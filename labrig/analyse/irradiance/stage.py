@@ -8,14 +8,15 @@ import numpy as np
 from labrig.analyse.bench_curves import camera_curves, card_reflectance, lamp_spectrum
 from labrig.analyse.irradiance.figures import irradiance_figure, scale_figure
 from labrig.analyse.irradiance.scales import FloatArray, Ratio, Scales, in_bands, scales
-from labrig.analyse.lvf_calibration.slices import FLICKER, SliceValues, slice_values
-from labrig.analyse.lvf_calibration.strip_frames import StripFrames
 from labrig.analyse.part import Part, StageResult
+from labrig.analyse.strip_frames import StripFrames
 from labrig.calibration import IrradianceFile, LvfFile, write_irradiance_file
 from labrig.errors import UsageError
 from labrig.optics import Lvf, Spectrum
 from labrig.optics.piecewise import band_integrals
+from labrig.reduce.strip import FLICKER, slice_values
 from labrig.report import Picture, Section, Table
+from labrig.results.strip import SliceValues
 from labrig.written_numbers import plus_minus, rounded
 
 #: Change of the lamp between rounds that is worth a warning.

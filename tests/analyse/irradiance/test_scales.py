@@ -7,13 +7,13 @@ import pytest
 
 from labrig.analyse.irradiance.scales import Ratio, in_bands, scales
 from labrig.analyse.irradiance.stage import mean_ratio
-from labrig.analyse.lvf_calibration.slices import SliceValues
 from labrig.errors import DataError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
 from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
+from labrig.results.strip import SliceValues
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
 
 CARD = Transmittance("card", np.array([380.0, 780.0]), np.array([0.17, 0.19]))
