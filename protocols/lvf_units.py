@@ -30,7 +30,7 @@ class StripUnit(SceneUnit):
 
     def _strip(self, session: Session) -> str:
         # Takes a while to load, and plans do without.
-        from labrig.analyse.lvf_calibration.checks import strip_found
+        from .steps.strip_checks import strip_found
 
         return strip_found(self.own(session))
 
@@ -55,7 +55,7 @@ class LinesUnit(SceneUnit):
         session.choose("mercury", lambda: self._lines(session), worst="lines found")
 
     def _lines(self, session: Session) -> str:
-        from labrig.analyse.lvf_calibration.checks import lines_found
+        from .steps.strip_checks import lines_found
 
         return lines_found(self.own(session), frames_of(session, *self.strip), self.rising)
 
@@ -78,7 +78,7 @@ class FilterUnit(SceneUnit):
         return filter_unit(self.before.filter)
 
     def _same(self, session: Session) -> bool:
-        from labrig.analyse.lvf_calibration.checks import look_alike
+        from .steps.strip_checks import look_alike
 
         before = frames_of(session, self.purpose, self._unit_before)
         strip = frames_of(session, self.purpose, filter_unit(None))

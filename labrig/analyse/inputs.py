@@ -6,7 +6,6 @@ from pathlib import Path
 from typing import Self, TypeVar
 
 from labrig.acquire import RigFile
-from labrig.analyse.emission_file import EmissionSpectrum
 from labrig.calibration import (
     BlankFile,
     CameraFile,
@@ -21,7 +20,7 @@ from labrig.calibration import (
 )
 from labrig.errors import UsageError
 from labrig.material import Material
-from labrig.results import FittedDecay
+from labrig.results.emission_spectrum import EmissionSpectrum
 
 FileT = TypeVar("FileT")
 

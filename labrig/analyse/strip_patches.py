@@ -144,6 +144,35 @@ def lean(strip: Strip, slices: Slices, raw: RawFrame) -> FloatArray:
     return np.asarray(below * down / (across**2 + down**2))
 
 
+def for_each_patch(
+    patches: Sequence[StripPatch],
+    analyse: Callable[[StripPatch], tuple[Found, Sequence[str]]],
+) -> tuple[dict[str, Found], tuple[str, ...]]:
+    """What `analyse` finds of every patch by its folder, and its warnings.
+
+    A patch that cannot be analysed is a warning, as long as another one can.
+
+    Raises
+    ------
+    DataError
+        No patch can.
+    """
+    results: dict[str, Found] = {}
+    warnings: list[str] = []
+    failures: list[DataError] = []
+    for patch in patches:
+        prefix = "" if patch.alone else f"{patch.name}: "
+        try:
+            results[patch.folder], own = analyse(patch)
+        except DataError as error:
+            failures.append(type(error)(f"{prefix}{error}"))
+            own = [str(error)]
+        warnings += [f"{prefix}{warning}" for warning in own]
+    if not results:
+        raise failures[0]
+    return results, tuple(warnings)
+
+
 def of_each(
     patches: Sequence[StripPatch],
     known: Inputs,

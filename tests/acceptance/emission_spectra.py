@@ -16,9 +16,9 @@ from pathlib import Path
 import numpy as np
 
 from labrig.analyse import Choices
-from labrig.analyse.emission_spectrum import EmissionSpectrum, process
+from labrig.analyse.emission_spectrum import analyse
 from labrig.record import read_run
-from labrig.report import figure_style
+from labrig.results.emission_spectrum import EmissionSpectrum
 from tests.analyse.spectral_bench import FloatArray, emitted, record, stage_of
 
 MATERIALS = ("blue-paint", "green-paint", "orange-paint", "red-paint", "white-paint")
@@ -29,17 +29,17 @@ BRIGHT = 0.02
 
 def measured(material: str, seed: int) -> list[tuple[EmissionSpectrum, bool]]:
     """With and without the white picture; whether the spectrum was said to change."""
-    with tempfile.TemporaryDirectory() as name, figure_style():
+    with tempfile.TemporaryDirectory() as name:
         folder = Path(name)
         sample = [{"material": material, "region": [0.03, 0.1, 0.94, 0.8]}]
         run = record(folder, PROTOCOL, sample=sample, seed=seed)
-        stage = stage_of(run, folder)
+        part = stage_of(run, folder)
         white = frozenset(frame.path.name for frame in read_run(run).frames("white"))
         found = []
         for excluded in (frozenset[str](), white):
-            result = process(replace(stage, choices=Choices(excluded=excluded)))
-            changes = any("changes with time" in warning for warning in result.warnings)
-            found.append((result.known.spectra[""], changes))
+            result = analyse(replace(part, choices=Choices(excluded=excluded)))
+            patch = result.patches[""]
+            found.append((patch.spectrum, patch.changes_with_time))
         return found
 
 

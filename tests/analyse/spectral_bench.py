@@ -14,7 +14,6 @@ from labrig import shipped
 from labrig.acquire import Plan, RunObserver, read_rig_file
 from labrig.analyse import Choices
 from labrig.analyse.choices import read_run_protocol
-from labrig.analyse.emission_file import WAVELENGTH_NM
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.part import Part
 from labrig.calibration import LvfFile, Strip, write_lvf_file
@@ -25,6 +24,7 @@ from labrig.optics import Bands
 from labrig.optics.piecewise import band_means, edges_about
 from labrig.record import read_run
 from labrig.region import region_pixels
+from labrig.results.emission_spectrum import WAVELENGTH_NM
 from labrig.run import Recording
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import WAVELENGTH_NM as ROOM_NM

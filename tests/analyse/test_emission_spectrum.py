@@ -1,6 +1,7 @@
 """The emission spectrum of a simulated sample against the truth, and what it must not miss."""
 
 import csv
+import json
 import struct
 from dataclasses import replace
 from itertools import pairwise
@@ -13,26 +14,34 @@ import tifffile
 import yaml
 
 from labrig.analyse import Choices
-from labrig.analyse.emission_file import WAVELENGTH_NM
-from labrig.analyse.emission_spectrum import (
-    EmissionSpectrum,
-    process,
-    read_emission_spectrum,
-    write_emission_spectrum,
+from labrig.analyse.emission_spectrum import analyse
+from labrig.analyse.emission_spectrum.comparison import (
+    combined,
+    compared,
+    differ,
+    over_time,
+    visible,
 )
-from labrig.analyse.emission_spectrum.bench import spectral_benches
-from labrig.analyse.emission_spectrum.constancy import compared, differ, over_time
-from labrig.analyse.emission_spectrum.picture import Pictures, combined, visible
-from labrig.analyse.emission_spectrum.reading import read_places
+from labrig.analyse.emission_spectrum.forward_model import forward_models
+from labrig.analyse.emission_spectrum.reduction import reduce_places
 from labrig.analyse.inputs import Inputs
-from labrig.analyse.part import StageResult
 from labrig.errors import DataError, UsageError
-from labrig.fit.spectrum import fit_spectrum, system_through_lvf
+from labrig.fit.spectrum import SpectrumFit, fit_spectrum, system_through_lvf
 from labrig.optics import Spectrum
 from labrig.record import read_run
 from labrig.reduce import SeriesFrame
 from labrig.region import region_pixels
 from labrig.report import figure_style
+from labrig.report.emission_spectrum import render
+from labrig.report.rendering import Source
+from labrig.results.emission_spectrum import (
+    WAVELENGTH_NM,
+    EmissionSpectrum,
+    EmissionSpectrumResult,
+    FilterFrames,
+    read_emission_spectrum,
+    write_emission_spectrum,
+)
 from tests.analyse.spectral_bench import (
     HEIGHT,
     WIDTH,
@@ -48,10 +57,14 @@ QUICK = {"protocol": "emission_spectrum", "charge": "2 min", "times": ["2 s", "1
 ANOTHER_LABORATORY = made.CAMERAS / "ampas_rawtoaces_2017" / "canon_eos_5d_mark_ii_380_780_5.json"
 
 
-def processed(run: Path, folder: Path, excluded: frozenset[str] = frozenset()) -> StageResult:
-    folder.mkdir(parents=True, exist_ok=True)
-    with figure_style():
-        return process(replace(stage_of(run, folder), choices=Choices(excluded=excluded)))
+def analysed(run: Path, excluded: frozenset[str] = frozenset()) -> EmissionSpectrumResult:
+    return analyse(replace(stage_of(run, run), choices=Choices(excluded=excluded)))
+
+
+def on_the_grid(fit: SpectrumFit) -> EmissionSpectrum:
+    return EmissionSpectrum.from_draws(
+        fit.knots_nm, fit.value, fit.samples, sample="light", lamp="halogen", run="run"
+    )
 
 
 def error(spectrum: EmissionSpectrum, material: str) -> tuple[FloatArray, FloatArray]:
@@ -87,40 +100,74 @@ def blue(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def found(blue: Path) -> StageResult:
-    return processed(blue, blue / "result")
+def found(blue: Path) -> EmissionSpectrumResult:
+    return analysed(blue)
 
 
-def test_the_spectrum_is_the_samples(blue: Path, found: StageResult) -> None:
-    spectrum = found.known.spectra[""]
-    difference, in_sigma = error(spectrum, "blue-paint")
-    assert max(spectrum.value) == 1
+def test_the_spectrum_is_the_samples(found: EmissionSpectrumResult) -> None:
+    (patch,) = found.patches.values()
+    difference, in_sigma = error(patch.spectrum, "blue-paint")
+    assert max(patch.spectrum.value) == 1
     assert np.sqrt(np.mean(difference**2)) < 0.025
     assert np.abs(in_sigma).max() < 4
     assert np.mean(np.abs(in_sigma) < 2) > 0.8
     assert found.warnings == ()
-    assert "over time: the same" in found.lines[1]
-    assert "mercury against halogen: the same" in found.lines[2]
-    assert {f.name for s in found.sections for f in s.figures} == {
-        "spectrum", "over-time", "shift", "lamps",
-    }  # fmt: skip
-    assert read_emission_spectrum(blue / "result" / "emission.yaml") == spectrum
-    rows = list(csv.reader((blue / "result" / "spectrum.csv").read_text().splitlines()))
+    assert [charge.lamp for charge in patch.charges] == ["halogen", "mercury"]
+    assert len(patch.times) == len(patch.at_times) == len(patch.charges[0].frames) == 3
+    assert not patch.changes_with_time
+    assert [one.what for one in patch.lamps] == ["mercury against halogen"]
+    assert not patch.depends_on_lamp
+    assert patch.white_reference
+    true_nm = WAVELENGTH_NM @ emitted("blue-paint")
+    assert abs(patch.spectrum.centroid.value - true_nm) < 3 * patch.spectrum.centroid.sigma
+
+
+def test_a_result_and_its_files_are_read_back(
+    found: EmissionSpectrumResult, tmp_path: Path
+) -> None:
+    (before,) = found.patches.values()
+    first = before.charges[0]
+    clipped = np.array(first.frames.sigma_dn_per_s)
+    clipped[0, :2] = np.nan, np.inf
+    frames = replace(first.frames, sigma_dn_per_s=clipped)
+    patch = replace(before, charges=(replace(first, frames=frames), *before.charges[1:]))
+    result = replace(found, patches={"": patch})
+    again = EmissionSpectrumResult.from_dict(json.loads(result.to_json()))
+    assert again.to_json() == result.to_json()
+    (after,) = again.patches.values()
+    assert after.spectrum == before.spectrum
+    assert after.times == before.times
+    np.testing.assert_array_equal(after.charges[0].frames.sigma_dn_per_s, clipped)
+    assert found.provides() == {"spectra": {"": before.spectrum}}
+    found.write_files(tmp_path)
+    assert read_emission_spectrum(tmp_path / "emission.yaml") == before.spectrum
+    rows = list(csv.reader((tmp_path / "spectrum.csv").read_text().splitlines()))
     assert [float(row[0]) for row in rows[1:]] == WAVELENGTH_NM.tolist()
 
 
-def test_without_a_calibrated_lvf_there_is_no_spectrum(blue: Path, tmp_path: Path) -> None:
+def test_a_report_shows_all_comparisons(blue: Path, found: EmissionSpectrumResult) -> None:
+    part = stage_of(blue, blue)
+    with figure_style():
+        shown = render(found, Source(part.run, part.protocol, part.rig))
+    assert {figure.name for section in shown.sections for figure in section.figures} == {
+        "spectrum", "over-time", "shift", "lamps",
+    }  # fmt: skip
+    assert "over time: the same" in shown.lines[1]
+    assert "mercury against halogen: the same" in shown.lines[2]
+
+
+def test_without_a_calibrated_lvf_there_is_no_spectrum(blue: Path) -> None:
     with pytest.raises(UsageError, match=r"lvf_calibration.*optics"):
-        process(replace(stage_of(blue, tmp_path), inputs=Inputs()))
+        analyse(replace(stage_of(blue, blue), inputs=Inputs()))
 
 
-def test_damaged_frames_are_named(blue: Path, tmp_path: Path) -> None:
+def test_damaged_frames_are_named(blue: Path) -> None:
     frame = read_run(blue).frames("spectrum")[1].path
     content = frame.read_bytes()
     frame.write_bytes(content[:-1] + bytes([content[-1] ^ 1]))
     try:
         with pytest.raises(DataError, match=f"{frame.name} was changed after the run"):
-            processed(blue, tmp_path)
+            analysed(blue)
     finally:
         frame.write_bytes(content)
 
@@ -128,15 +175,15 @@ def test_damaged_frames_are_named(blue: Path, tmp_path: Path) -> None:
 def test_states_of_different_colours_are_told(tmp_path: Path) -> None:
     material = two_colours(tmp_path / "two-colours.yaml")
     run = record(tmp_path, QUICK | {"white": False}, sample=str(material))
-    found = processed(run, tmp_path / "result")
+    found = analysed(run)
+    assert found.patches[""].changes_with_time
     assert any("the spectrum changes with time" in warning for warning in found.warnings)
-    assert "over time: changes" in found.lines[1]
 
 
 def test_a_mercury_lamp_that_did_not_light_is_told(tmp_path: Path) -> None:
     keys = QUICK | {"lamps": ["halogen", "mercury"], "white": False, "times": ["2 s", "12 s"]}
     run = record(tmp_path, keys, faults=["mercury_dead"])
-    found = processed(run, tmp_path / "result")
+    found = analysed(run)
     assert any("did not light" in warning for warning in found.warnings)
 
 
@@ -148,8 +195,8 @@ def test_a_white_picture_mends_the_curves_of_another_laboratory(tmp_path: Path) 
                                          "curves": str(ANOTHER_LABORATORY)})  # fmt: skip
     white = frozenset(frame.path.name for frame in read_run(run).frames("white"))
     errors = []
-    for name, excluded in (("with", frozenset[str]()), ("without", white)):
-        spectrum = processed(run, tmp_path / name, excluded=excluded).known.spectra[""]
+    for excluded in (frozenset[str](), white):
+        spectrum = analysed(run, excluded).patches[""].spectrum
         difference, in_sigma = error(spectrum, "blue-paint")
         assert np.abs(in_sigma).max() < 4.5
         errors.append(float(np.sqrt(np.mean(difference**2))))
@@ -162,8 +209,7 @@ def test_what_is_narrower_than_the_band_comes_out_in_its_place() -> None:
     lvf, camera = made.curved_lvf(), made.of_the_house()
     picture = made.photographed(light, lvf, camera, np.random.default_rng(0))
     fit = fit_spectrum(picture.value, picture.sigma, system_through_lvf(lvf, camera, made.KNOTS_NM))
-    spectrum = EmissionSpectrum.of(fit, "line", "halogen", "run")
-    value = np.array(spectrum.value)
+    value = np.array(on_the_grid(fit).value)
     assert WAVELENGTH_NM[np.argmax(value)] == 530
     assert np.count_nonzero(value > 0.5) <= 3
 
@@ -190,33 +236,32 @@ def test_a_monochrome_camera_will_do(blue: Path, tmp_path: Path) -> None:
     curve = tmp_path / "mono.csv"
     sensitivity = np.column_stack([[350, 400, 500, 600, 700, 800], [0.2, 0.5, 1, 0.9, 0.6, 0.3]])
     np.savetxt(curve, sensitivity, delimiter=",", header="wavelength_nm,L", comments="")
-    part = stage_of(blue, tmp_path)
-    part = replace(part, choices=Choices(camera=str(curve)))
+    part = replace(stage_of(blue, blue), choices=Choices(camera=str(curve)))
     light = Spectrum("green", np.arange(380.0, 721.0, 5.0),
                      np.exp(-(((np.arange(380.0, 721.0, 5.0) - 530) / 35) ** 2)))  # fmt: skip
     dark = np.full((HEIGHT, 10 * WIDTH), 4.0)
     darks = [monochrome_dng(tmp_path / f"dark{number}.dng", dark) for number in range(2)]
-    (bench,) = spectral_benches(part, darks[0])[0].values()
-    seen = bench.seen_of(light)
+    (model,) = forward_models(part, darks[0])[0].values()
+    expected = model.expected_of(light)
     scene = dark.copy()
-    for region, value in zip(bench.slices.values(), seen / seen.max(), strict=True):
+    for region, value in zip(model.slices.values(), expected / expected.max(), strict=True):
         x, y, width, height = region_pixels(region, 10 * WIDTH, HEIGHT)
         scene[y : y + height, x : x + width] += 8000 * value
     frames = [
         monochrome_dng(tmp_path / f"glow{'-' * number}.dng", scene / (1 + number))
         for number in range(2)
     ]
-    (read,) = read_places(frames, darks, {"": bench.slices}, None).values()
-    picture = combined(read.pictures("spectrum"))
-    fit = fit_spectrum(picture.value, picture.sigma, bench.system)
-    value = np.array(EmissionSpectrum.of(fit, "green", "halogen", "run").value)
+    (reduction,) = reduce_places(frames, darks, {"": model.slices}, None).values()
+    seen = combined(reduction.of_unit("spectrum"))
+    fit = fit_spectrum(seen.value, seen.sigma, model.system)
+    value = np.array(on_the_grid(fit).value)
     true = light.in_bands(made.EDGES_NM)
-    assert bench.camera.channels == ("L",)
+    assert model.camera.channels == ("L",)
     assert value / value.sum() == pytest.approx(true / true.sum(), abs=0.01)
 
 
-def test_bands_of_a_spectrum_carry_its_covariance(found: StageResult) -> None:
-    spectrum = found.known.spectra[""]
+def test_bands_of_a_spectrum_carry_its_covariance(found: EmissionSpectrumResult) -> None:
+    spectrum = found.patches[""].spectrum
     edges = np.arange(400.0, 701.0, 37.5)
     value, covariance = spectrum.in_bands(edges)
     draws = np.random.default_rng(0).multivariate_normal(
@@ -229,12 +274,14 @@ def test_bands_of_a_spectrum_carry_its_covariance(found: StageResult) -> None:
     assert np.sqrt(covariance[1, 1]) == pytest.approx(np.std(scattered), rel=0.15)
 
 
-def test_bands_that_cut_through_the_grid_are_those_of_the_spectrum(found: StageResult) -> None:
+def test_bands_that_cut_through_the_grid_are_those_of_the_spectrum(
+    found: EmissionSpectrumResult,
+) -> None:
     """Steep flanks, of which straight lines through means over 10 nm make too much."""
     fine = np.arange(395.0, 705.0, 0.1) + 0.05
     steep = np.exp(-(((fine - 460) / 20) ** 2))
     grid = steep.reshape(31, -1).mean(axis=1)
-    spectrum = found.known.spectra[""].model_copy(update={"value": tuple(grid.tolist())})
+    spectrum = found.patches[""].spectrum.model_copy(update={"value": tuple(grid.tolist())})
     edges = np.arange(400.0, 701.0, 37.5)
     value, _ = spectrum.in_bands(edges)
     true = [steep[(fine > a) & (fine < b)].mean() for a, b in pairwise(edges)]
@@ -256,13 +303,13 @@ def test_a_malformed_file_is_refused_in_one_line(tmp_path: Path) -> None:
         read_emission_spectrum(path)
 
 
-def glow(seed: int, brightness: FloatArray, shape: FloatArray, snr: float = 200.0) -> Pictures:
+def glow(seed: int, brightness: FloatArray, shape: FloatArray, snr: float = 200.0) -> FilterFrames:
     """Frames of one shape and several brightnesses with photon noise."""
     rng = np.random.default_rng(seed)
     true = np.outer(brightness, shape)
     sigma = np.sqrt(true * shape.max() + 1e-4) / snr
     value = true + sigma * rng.standard_normal(true.shape)
-    return Pictures(np.arange(1.0, 1 + len(true)), value, sigma, np.zeros_like(true))
+    return FilterFrames(np.arange(1.0, 1 + len(true)), value, sigma, np.zeros_like(true))
 
 
 POSITIONS_NM = np.repeat(np.linspace(395.0, 705.0, 31), 3)
@@ -283,8 +330,8 @@ def test_what_only_gets_darker_is_seldom_said_to_change() -> None:
 def test_a_sensor_that_has_warmed_is_no_change_of_colour() -> None:
     frames = glow(4, np.array([1.0, 0.4, 0.1]), SHAPE)
     offset = np.array([[0.0], [1e-4], [2e-4]])
-    assert offset.max() > 3 * frames.sigma.min()
-    warmed = replace(frames, value=frames.value + offset)
+    assert offset.max() > 3 * frames.sigma_dn_per_s.min()
+    warmed = replace(frames, value_dn_per_s=frames.value_dn_per_s + offset)
     assert not differ(over_time(warmed, POSITIONS_NM))
 
 
@@ -300,18 +347,18 @@ def test_a_shift_by_a_nanometre_is_found_and_measured() -> None:
 
 def test_clipped_places_are_taken_from_the_frames_that_do_not_clip() -> None:
     frames = glow(2, np.array([1.0, 0.2]), SHAPE)
-    frames.value[0, SHAPE > 0.5] = np.nan
-    frames.value[:, 0] = np.nan
-    sigma = np.where(np.isnan(frames.value), np.nan, frames.sigma)
-    picture = combined(replace(frames, sigma=sigma))
-    assert np.isnan(picture.value[0])
-    assert np.isfinite(picture.value[1:]).all()
-    assert picture.value[SHAPE > 0.5] == pytest.approx(SHAPE[SHAPE > 0.5], rel=0.1)
+    frames.value_dn_per_s[0, SHAPE > 0.5] = np.nan
+    frames.value_dn_per_s[:, 0] = np.nan
+    sigma = np.where(np.isnan(frames.value_dn_per_s), np.nan, frames.sigma_dn_per_s)
+    together = combined(replace(frames, sigma_dn_per_s=sigma))
+    assert np.isnan(together.value[0])
+    assert np.isfinite(together.value[1:]).all()
+    assert together.value[SHAPE > 0.5] == pytest.approx(SHAPE[SHAPE > 0.5], rel=0.1)
 
 
 def test_darkness_is_no_spectrum() -> None:
     lit = glow(3, np.array([1.0, 1.0]), SHAPE)
-    noise = lit.sigma * np.random.default_rng(3).standard_normal(lit.value.shape)
+    noise = lit.sigma_dn_per_s * np.random.default_rng(3).standard_normal(lit.value_dn_per_s.shape)
     for value in (noise, noise - 0.1):
         with pytest.raises(DataError, match="none above the noise"):
-            visible(replace(lit, value=value))
+            visible(replace(lit, value_dn_per_s=value))

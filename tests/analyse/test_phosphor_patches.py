@@ -12,11 +12,10 @@ from labrig.process.result import Result
 
 from labrig.acquire import read_protocol, read_rig_file
 from labrig.analyse import Choices
-from labrig.analyse.emission_file import read_emission_spectrum
-from labrig.analyse.emission_spectrum import process as spectra
+from labrig.analyse.emission_spectrum import analyse as analyse_spectra
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.part import Part, StageResult
-from labrig.analyse.strip_patches import StripPatch, cut, lean, of_each
+from labrig.analyse.strip_patches import StripPatch, cut, for_each_patch, lean, of_each
 from labrig.calibration import Strip, write_irradiance_file, write_lvf_file
 from labrig.compare.result import read_patches
 from labrig.errors import DataError, FitError, UsageError
@@ -25,9 +24,9 @@ from labrig.process import process_run
 from labrig.record import read_run
 from labrig.reduce import RawFrame
 from labrig.region import Region
-from labrig.report import figure_style
 from labrig.report.sections import Section
 from labrig.results import read_fitted_decays
+from labrig.results.emission_spectrum import read_emission_spectrum
 from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.analyse.recorded import record
 from tests.analyse.spectral_bench import emitted, true_lvf_file
@@ -155,12 +154,11 @@ def test_a_patch_that_does_not_reach_along_the_filter_is_left_out(
     part, rig = parts_of(run / "protocol.yaml")[0], read_rig_file(run / "rig.yaml")
     short = Choices.parse(["orange-paint=0.03,0.5,0.5,0.4"], [])
     own = read_run(run).part(part.name)
-    with figure_style():
-        found = spectra(Part(own, part.protocol, rig, short, Inputs.of(rig), tmp_path))
+    found = analyse_spectra(Part(own, part.protocol, rig, short, Inputs.of(rig), tmp_path))
     (said,) = (line for line in found.warnings if "expected patch orange-paint below" in line)
     assert "columns 12 to 180" in said
     assert "labrig process RUN --roi orange-paint=x,y,width,height" in said
-    assert list(found.known.spectra) == ["blue-paint"]
+    assert list(found.patches) == ["blue-paint"]
 
 
 STRIP = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.3, rising=True)
@@ -227,6 +225,28 @@ def test_one_patch_that_fails_leaves_the_others(tmp_path: Path) -> None:
     assert found.lines == ("b: k_e 1",)
     with pytest.raises(FitError, match="a: nothing glows"):
         of_each(patches, Inputs(), process("ab"))
+
+
+def test_one_patch_without_a_result_leaves_the_others() -> None:
+    patches = [StripPatch(name, name, (0, 0, 1, 1), alone=False) for name in "ab"]
+
+    def analyse(failing: str) -> Callable[[StripPatch], tuple[str, list[str]]]:
+        def one(patch: StripPatch) -> tuple[str, list[str]]:
+            if patch.name in failing:
+                raise FitError("nothing glows")
+            return patch.material, ["odd"]
+
+        return one
+
+    results, warnings = for_each_patch(patches, analyse("a"))
+    assert results == {"b": "b"}
+    assert warnings == ("a: nothing glows", "b: odd")
+    with pytest.raises(FitError, match="a: nothing glows"):
+        for_each_patch(patches, analyse("ab"))
+    alone = [StripPatch("a", "paint")]
+    assert for_each_patch(alone, analyse("b")) == ({"": "paint"}, ("odd",))
+    with pytest.raises(FitError, match=r"^nothing glows"):
+        for_each_patch(alone, analyse("a"))
 
 
 @pytest.mark.parametrize(

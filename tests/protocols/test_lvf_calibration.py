@@ -16,6 +16,7 @@ from labrig.clock import Clock, Interrupted
 from labrig.errors import UsageError
 from labrig.process import process_run
 from labrig.record import read_run
+from labrig.results import read_result
 from labrig.run import Recording, resume_run
 from tests.acquire.fakes import Watching
 from tests.analyse.lvf_calibration.room_truth import (
@@ -161,7 +162,15 @@ def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
 
     result = process_run(folder)
     assert not result.warnings
-    file = read_lvf_file(folder / "result" / "lvf.yaml")
+    file = result.calibration
+    assert read_lvf_file(folder / "result" / "lvf.yaml") == file
+    assert read_result(folder).to_json() == result.to_json()
+    assert result.filters == tuple(result.through_filters)[1:] == FEW
+    assert not [one for one in result.filter_misfits if one.left_out]
+    assert np.nanmax(np.abs(result.transmittance_residual)) < 0.1
+    assert result.before_camera.lines.wavelength_nm[-1] == pytest.approx(577, abs=0.1)
+    assert result.map_rms_nm < 2
+    assert abs(result.stripes.shift_nm) < 4 * result.stripes.sigma_nm
     room = simulation_of(folder)
     assert file.before_camera is not None
     assert file.on_sample is not None

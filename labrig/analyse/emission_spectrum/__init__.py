@@ -1,10 +1,5 @@
-"""Processing of `emission_spectrum`: Λ* through the LVF, constant in time and for every lamp."""
+"""From frames through the LVF to Λ*, constant in time and for every lamp or not."""
 
-from labrig.analyse.emission_file import (
-    EmissionSpectrum,
-    read_emission_spectrum,
-    write_emission_spectrum,
-)
-from labrig.analyse.emission_spectrum.process import process
+from labrig.analyse.emission_spectrum.analysis import analyse
 
-__all__ = ["EmissionSpectrum", "process", "read_emission_spectrum", "write_emission_spectrum"]
+__all__ = ["analyse"]

@@ -5,10 +5,10 @@ from importlib.metadata import version
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.analyse.emission_file import EmissionSpectrum
 from labrig.calibration.irradiance_file import IrradianceFile
 from labrig.fit.excitation import ExcitationFit, ExcitedState
 from labrig.material import IrradianceNorm, Material, Provenance, State
+from labrig.results.emission_spectrum import EmissionSpectrum
 
 FloatArray = NDArray[np.float64]
 

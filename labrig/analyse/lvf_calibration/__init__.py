@@ -1,5 +1,5 @@
-"""Calibration of a linear variable filter: strip, mercury lines, colour filters."""
+"""From frames of a strip to a calibrated variable filter: place, mercury lines, colour filters."""
 
-from labrig.analyse.lvf_calibration.stage import process
+from labrig.analyse.lvf_calibration.analysis import analyse
 
-__all__ = ["process"]
+__all__ = ["analyse"]

@@ -4,10 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.analyse.lvf_calibration.picture import FloatArray
-from labrig.analyse.lvf_calibration.slices import FLICKER, SliceValues
 from labrig.fit.lvf import LvfCalibration, calibrate_lvf
 from labrig.fit.spectrum import CurveError
 from labrig.optics import (
@@ -19,6 +16,10 @@ from labrig.optics import (
     nominal_lvf,
 )
 from labrig.optics.piecewise import quadrature
+from labrig.reduce.strip import FLICKER
+from labrig.results import FloatArray
+from labrig.results.lvf_calibration import FilterMisfit
+from labrig.results.strip import SliceValues
 
 #: Root mean square by which transmittances along a strip may be off: the map, bands of another
 #: shape, a filter that is not quite as its table.
@@ -102,46 +103,7 @@ class Bench:
         return nodes, weights * self.lamp.at(nodes) * self.card.at(nodes)
 
 
-@dataclass(frozen=True)
-class Misfit:
-    """How far the picture of a filter is from the transmittances, rms along the strip.
-
-    Attributes
-    ----------
-    name
-        Of the filter that should have been in.
-    own, best
-        Of its own transmittance, and of the best one.
-    like
-        Whose that is.
-    """
-
-    name: str
-    own: float
-    best: float
-    like: str
-
-    @property
-    def is_wrong(self) -> bool:
-        """Whether another filter, none or something else was in its place."""
-        another = self.like != self.name and self.own > BETTER * self.best
-        return self.own > FAR_OFF or (self.own > EXPECTED and another)
-
-    def __str__(self) -> str:
-        looks = (
-            f"it looks like {'no filter' if self.like == NO_FILTER.name else self.like} "
-            f"({self.best:.3f})"
-            if self.like != self.name and self.own > BETTER * self.best
-            else "it looks like none of the others"
-        )
-        return (
-            f"colour filter {self.name}: its picture is off its transmittance by {self.own:.3f} "
-            f"(rms along the strip), {looks}; it was not in its place, and is left out (put it in "
-            "and take its unit again, or correct its file)"
-        )
-
-
-def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> list[Misfit]:
+def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> list[FilterMisfit]:
     """Of every filter but the first.
 
     The bands that the maker states will do: what counts is where along the strip a filter bites,
@@ -161,8 +123,24 @@ def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> l
         off = np.sqrt(np.nanmean((expected[:, *at] - ratio) ** 2, axis=1))
         best = int(np.argmin(off))
         name = scenes.filters[number].name
-        found.append(Misfit(name, float(off[number]), float(off[best]), scenes.filters[best].name))
+        like = scenes.filters[best].name
+        another = like != name and off[number] > BETTER * off[best]
+        wrong = off[number] > FAR_OFF or (off[number] > EXPECTED and another)
+        found.append(FilterMisfit(name, float(off[number]), float(off[best]), like, bool(wrong)))
     return found
+
+
+def left_out_text(misfit: FilterMisfit) -> str:
+    """A warning about a filter that was not in its place."""
+    looks = "it looks like none of the others"
+    if misfit.like != misfit.name and misfit.own > BETTER * misfit.best:
+        like = "no filter" if misfit.like == NO_FILTER.name else misfit.like
+        looks = f"it looks like {like} ({misfit.best:.3f})"
+    return (
+        f"colour filter {misfit.name}: its picture is off its transmittance by {misfit.own:.3f} "
+        f"(rms along the strip), {looks}; it was not in its place, and is left out (put it in "
+        "and take its unit again, or correct its file)"
+    )
 
 
 def calibrated(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> LvfCalibration:
@@ -190,7 +168,7 @@ def calibrated(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -
     )
 
 
-def residuals(scenes: FilterScenes, bench: Bench, lvf: Lvf) -> NDArray[np.float64]:
+def residuals(scenes: FilterScenes, bench: Bench, lvf: Lvf) -> FloatArray:
     """(filters, p) transmittance measured minus what the calibrated strip lets expect, mean of the
     channels by their light; NaN where it says nothing.
     """

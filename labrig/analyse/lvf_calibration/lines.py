@@ -1,16 +1,17 @@
 """Mercury lines along a strip, and the strip's place on the sample by them."""
 
-from dataclasses import dataclass, replace
+from dataclasses import replace
 
 import numpy as np
 from scipy.optimize import minimize_scalar, nnls
 
-from labrig.analyse.lvf_calibration.picture import FloatArray, Picture
-from labrig.analyse.lvf_calibration.profile import StripProfile, strip_profile
-from labrig.calibration.lvf_file import Strip
+from labrig.calibration import Strip
 from labrig.errors import DataError, FitError
-from labrig.fit.lvf import LocatedLines, WavelengthFit, fit_wavelengths, locate_lines
+from labrig.fit.lvf import WavelengthFit, fit_wavelengths, locate_lines
 from labrig.optics import Lvf, WavelengthMap
+from labrig.reduce.hdr import HdrFrame
+from labrig.reduce.strip import strip_profile
+from labrig.results.lvf_calibration import PlacedStrip, Stripes, StripLines
 
 #: From blue end to red end.
 WHOLE = (0.0, 1.0)
@@ -22,26 +23,7 @@ MOST_SHIFT = 0.08
 LEAST_EXPLAINED = 0.7
 
 
-@dataclass(frozen=True, eq=False)
-class StripLines:
-    """A strip under the mercury lamp.
-
-    Attributes
-    ----------
-    strip
-        With its wavelengths rising as they were found.
-    profile
-        From its left end to its right end.
-    lines
-        At positions from the blue end, 0, to the red end, 1.
-    """
-
-    strip: Strip
-    profile: StripProfile
-    lines: LocatedLines
-
-
-def strip_lines(picture: Picture, strip: Strip, rising: bool | None) -> StripLines:
+def strip_lines(frame: HdrFrame, strip: Strip, rising: bool | None) -> StripLines:
     """Locate the lines.
 
     Parameters
@@ -56,8 +38,8 @@ def strip_lines(picture: Picture, strip: Strip, rising: bool | None) -> StripLin
     FitError
         There are none, or the strip is the wrong way round.
     """
-    profile = strip_profile(picture, strip)
-    lines = locate_lines(profile.position, profile.value, rising=rising)
+    profile = strip_profile(frame, strip)
+    lines = locate_lines(profile.position, profile.value_dn_per_s, rising=rising)
     position = lines.position if lines.rising else 1 - lines.position
     return StripLines(
         strip.model_copy(update={"rising": lines.rising}),
@@ -71,26 +53,7 @@ def wavelengths_along(found: StripLines) -> WavelengthFit:
     return fit_wavelengths(found.lines, WHOLE)
 
 
-@dataclass(frozen=True, eq=False)
-class Placed:
-    """The strip on the sample.
-
-    Attributes
-    ----------
-    strip
-        Such that the map known from before the camera holds along it.
-    residual_nm
-        (l,) wavelength of the map there minus that of the line.
-    sigma_nm
-        Standard uncertainty of the strip's place, in the middle of the lines.
-    """
-
-    strip: Strip
-    residual_nm: FloatArray
-    sigma_nm: float
-
-
-def place_on_sample(found: StripLines, wavelengths: WavelengthMap) -> Placed:
+def place_on_sample(found: StripLines, wavelengths: WavelengthMap) -> PlacedStrip:
     """Move the ends of a strip until its lines are where the filter has them.
 
     The lamp comes in obliquely and the camera sees the strip from another distance: it is shifted
@@ -111,7 +74,7 @@ def place_on_sample(found: StripLines, wavelengths: WavelengthMap) -> Placed:
     strip = _moved(found.strip, float(shift), float(shift + stretch))
     there = (lines.position - shift) / stretch
     at = np.array([wanted.mean(), 1.0])
-    return Placed(
+    return PlacedStrip(
         strip,
         wavelengths.wavelength_nm(there) - lines.wavelength_nm,
         float(slope * np.sqrt(at @ covariance @ at)),
@@ -134,24 +97,7 @@ def _moved(strip: Strip, blue: float, red: float) -> Strip:
         ) from None
 
 
-@dataclass(frozen=True)
-class Stripes:
-    """How far the glow is from where the card was lit.
-
-    Attributes
-    ----------
-    strip
-        On the sample as the camera sees it.
-    shift_nm, sigma_nm
-        Along the strip, towards the red end.
-    """
-
-    strip: Strip
-    shift_nm: float
-    sigma_nm: float
-
-
-def shifted_by_stripes(picture: Picture, strip: Strip, lvf: Lvf, nm_per_strip: float) -> Stripes:
+def shifted_by_stripes(frame: HdrFrame, strip: Strip, lvf: Lvf, nm_per_strip: float) -> Stripes:
     """Shift the strip until the stripes of glow are where the filter lets mercury lines through.
 
     Heights of the lines are free: how strongly each of them excites is not known yet.
@@ -161,9 +107,9 @@ def shifted_by_stripes(picture: Picture, strip: Strip, lvf: Lvf, nm_per_strip: f
     FitError
         No stripes are seen.
     """
-    profile = strip_profile(picture, strip)
+    profile = strip_profile(frame, strip)
     position = profile.position if strip.rising else 1 - profile.position
-    glow = profile.value.sum(axis=1)
+    glow = profile.value_dn_per_s.sum(axis=1)
     shapes = lvf.transmission(np.array(EXCITING_NM)).T
     varies = float(((glow - glow.mean()) ** 2).sum())
 
@@ -184,9 +130,3 @@ def shifted_by_stripes(picture: Picture, strip: Strip, lvf: Lvf, nm_per_strip: f
     noise = found.fun / max(len(glow) - len(EXCITING_NM) - 2, 1)
     sigma = float(np.sqrt(2 * noise / curvature)) if curvature > 0 else MOST_SHIFT
     return Stripes(_moved(strip, shift, 1 + shift), shift * nm_per_strip, sigma * nm_per_strip)
-
-
-def told(lines: LocatedLines) -> str:
-    """In a few words."""
-    way = "rising" if lines.rising else "falling"
-    return f"{', '.join(f'{nm:.0f}' for nm in lines.wavelength_nm)} nm, {way} to the right"

@@ -1,14 +1,13 @@
 """Calibration of a linear variable filter: mercury lines, and colour filters over a grey card."""
 
 from labrig.fit.lvf.calibration import LvfCalibration, calibrate_lvf
-from labrig.fit.lvf.line_model import MERCURY, Line, LocatedLines
+from labrig.fit.lvf.line_model import MERCURY, Line
 from labrig.fit.lvf.lines import locate_lines
 from labrig.fit.lvf.wavelength_fit import WavelengthFit, fit_wavelengths
 
 __all__ = [
     "MERCURY",
     "Line",
-    "LocatedLines",
     "LvfCalibration",
     "WavelengthFit",
     "calibrate_lvf",

@@ -8,6 +8,7 @@ import numpy as np
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray, least_squares
 from labrig.optics.band import peak_shape
+from labrig.results.strip import LocatedLines
 
 FEWEST_LINES = 3
 #: Share of the profile's variance that lines and background explain, if there are lines.
@@ -58,32 +59,6 @@ MERCURY = (
     Line((546.0750,)),
     Line((576.9610, 579.0670), (0.5, 0.06)),
 )
-
-
-@dataclass(frozen=True, eq=False)
-class LocatedLines:
-    """Lines found along a strip.
-
-    Attributes
-    ----------
-    wavelength_nm
-        (l,) rising; of a blend, of its first line.
-    position, sigma
-        (l,) where they are, and one standard deviation, in the unit of the profile's positions.
-    fwhm
-        Width of a single line in that unit, in the middle of the lines.
-    rising
-        Whether the wavelength grows with the position.
-    explained
-        Share of the profile's variance that the lines and a straight background explain.
-    """
-
-    wavelength_nm: FloatArray
-    position: FloatArray
-    sigma: FloatArray
-    fwhm: float
-    rising: bool
-    explained: float
 
 
 @dataclass(frozen=True)

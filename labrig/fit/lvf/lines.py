@@ -13,9 +13,9 @@ from labrig.fit.lvf.line_model import (
     Assignment,
     Line,
     LineModel,
-    LocatedLines,
 )
 from labrig.optics.lvf import NOMINAL_FWHM_NM
+from labrig.results.strip import LocatedLines
 
 #: Lines of the model agree with what was found to this share of their width.
 TOLERANCE = 0.4

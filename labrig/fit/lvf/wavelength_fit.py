@@ -7,8 +7,8 @@ from scipy.stats import chi2 as chi2_distribution
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.lvf.line_model import LocatedLines
 from labrig.optics.wavelength_map import WavelengthMap
+from labrig.results.strip import LocatedLines
 
 #: A bend is believed if chance gives so good a one this rarely (F-test with known σ).
 RARE = 0.01
@@ -36,11 +36,6 @@ class WavelengthFit:
     map: WavelengthMap
     residual_nm: FloatArray
     order: int
-
-    @property
-    def rms_nm(self) -> float:
-        """Root of the mean squared residual."""
-        return float(np.sqrt(np.mean(self.residual_nm**2)))
 
 
 def fit_wavelengths(lines: LocatedLines, span: tuple[float, float]) -> WavelengthFit:

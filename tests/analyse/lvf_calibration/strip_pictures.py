@@ -1,6 +1,6 @@
 """Frames of a lit strip, made for tests pixel by pixel."""
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -14,6 +14,7 @@ from labrig.optics import (
     seen_through,
 )
 from labrig.reduce import RawFrame
+from labrig.reduce.hdr import HdrFrame, hdr_frame
 
 BLACK, WHITE = 1024, 15600
 #: True wavelengths from the blue end (0) to the red end (1) of the lit part.
@@ -83,3 +84,10 @@ def mercury() -> Spectrum:
     for line, height in lines.items():
         value[nm == line] += height
     return Spectrum("mercury", nm, value)
+
+
+def bracket(scene: Scene, light: Spectrum, exposures: tuple[float, ...] = (0.4, 4.0)) -> HdrFrame:
+    """Several exposures of a scene as one frame."""
+    return hdr_frame(
+        replace(scene, seed=scene.seed + k).frame(light, e) for k, e in enumerate(exposures)
+    )

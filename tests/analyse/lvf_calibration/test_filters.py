@@ -10,13 +10,14 @@ from labrig.analyse.lvf_calibration.filters import (
     Bench,
     FilterScenes,
     calibrated,
+    left_out_text,
     misfits,
     residuals,
 )
-from labrig.analyse.lvf_calibration.slices import SliceValues
 from labrig.fit.least_squares import FloatArray
 from labrig.optics import Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
+from labrig.results.strip import SliceValues
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
 
 CARD = Transmittance("card", np.array([380.0, 780.0]), np.array([0.17, 0.19]))
@@ -63,7 +64,7 @@ def scenes(**in_their_place: Transmittance) -> FilterScenes:
 
 def test_filters_in_their_place_calibrate_the_strip() -> None:
     all_of_them = scenes()
-    assert not [str(one) for one in misfits(all_of_them, BENCH, TRUE_MAP) if one.is_wrong]
+    assert not [one for one in misfits(all_of_them, BENCH, TRUE_MAP) if one.left_out]
     found = calibrated(all_of_them, BENCH, TRUE_MAP)
     truth = strip().bands
     np.testing.assert_allclose(found.lvf.bands.centre_nm, truth.centre_nm, atol=1.0)
@@ -76,8 +77,10 @@ def test_filters_in_their_place_calibrate_the_strip() -> None:
 
 @pytest.mark.parametrize("really", [FILTERS[0], FILTERS[4]], ids=["none", "the one before"])
 def test_a_filter_that_was_skipped_is_named(really: Transmittance) -> None:
-    (wrong,) = (one for one in misfits(scenes(long_570=really), BENCH, TRUE_MAP) if one.is_wrong)
-    said = str(wrong)
+    (wrong,) = (one for one in misfits(scenes(long_570=really), BENCH, TRUE_MAP) if one.left_out)
+    assert (wrong.name, wrong.like) == ("long-570", really.name)
+    assert wrong.own > 3 * wrong.best
+    said = left_out_text(wrong)
     assert said.startswith("colour filter long-570: its picture is off its transmittance by 0.")
     like = "no filter" if really is NO_FILTER else really.name
     assert f"it looks like {like} (" in said
@@ -86,9 +89,9 @@ def test_a_filter_that_was_skipped_is_named(really: Transmittance) -> None:
 
 def test_a_filter_whose_file_is_of_another_one_is_named() -> None:
     unknown = Transmittance("unknown", np.array([380.0, 780.0]), np.array([0.6, 0.3]))
-    (wrong,) = (one for one in misfits(scenes(short_550=unknown), BENCH, TRUE_MAP) if one.is_wrong)
-    assert "short-550" in str(wrong)
-    assert "none of the others" in str(wrong)
+    (wrong,) = (one for one in misfits(scenes(short_550=unknown), BENCH, TRUE_MAP) if one.left_out)
+    assert wrong.name == "short-550"
+    assert "none of the others" in left_out_text(wrong)
 
 
 def test_what_clips_everywhere_is_left_out() -> None:
@@ -96,6 +99,6 @@ def test_what_clips_everywhere_is_left_out() -> None:
     dark = one.values[3]
     holes = replace(dark, value=np.where(dark.value > np.median(dark.value), np.nan, dark.value))
     with_holes = replace(one, values=[*one.values[:3], holes, *one.values[4:]])
-    assert not [m for m in misfits(with_holes, BENCH, TRUE_MAP) if m.is_wrong]
+    assert not [m for m in misfits(with_holes, BENCH, TRUE_MAP) if m.left_out]
     bands = calibrated(with_holes, BENCH, TRUE_MAP).lvf.bands
     np.testing.assert_allclose(bands.centre_nm, strip().bands.centre_nm, atol=1.0)

@@ -1,4 +1,4 @@
-"""Several frames of one scene as one picture with more range than any of them."""
+"""Several exposures of one scene as one frame with more range than any of them."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -10,17 +10,17 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DataError
-from labrig.reduce import PixelMask, RawFrame, read_raw
+from labrig.reduce.planes import PixelMask
+from labrig.reduce.raw import RawFrame, read_raw
 
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.float32]
-
 
 #: Pixels fuller than this are left out: noise carries some of their like beyond the range.
 FULL = 0.95
 
 
-class Photograph(Protocol):
+class Exposure(Protocol):
     """A frame on disk."""
 
     @property
@@ -33,7 +33,7 @@ class Photograph(Protocol):
 
 
 @dataclass(frozen=True, eq=False)
-class Picture:
+class HdrFrame:
     """What a sensor saw, undemosaiced.
 
     Attributes
@@ -57,12 +57,12 @@ class Picture:
         return np.asarray(cv2.medianBlur(smooth, 3), dtype=np.float32)
 
 
-def read_picture(frames: Iterable[Photograph], hot: PixelMask | None = None) -> Picture:
-    """As `picture_of`, from files."""
-    return picture_of(((read_raw(frame.path), frame.exposure_s) for frame in frames), hot)
+def read_hdr_frame(frames: Iterable[Exposure], hot: PixelMask | None = None) -> HdrFrame:
+    """As `hdr_frame`, from files."""
+    return hdr_frame(((read_raw(frame.path), frame.exposure_s) for frame in frames), hot)
 
 
-def picture_of(frames: Iterable[tuple[RawFrame, float]], hot: PixelMask | None = None) -> Picture:
+def hdr_frame(frames: Iterable[tuple[RawFrame, float]], hot: PixelMask | None = None) -> HdrFrame:
     """Frames and their shutter times in seconds, added up where they do not clip.
 
     Raises
@@ -87,7 +87,7 @@ def picture_of(frames: Iterable[tuple[RawFrame, float]], hot: PixelMask | None =
         seconds[hot] = 0.0
     rate = np.full(counts.shape, np.nan, dtype=np.float32)
     np.divide(counts, seconds, out=rate, where=seconds > 0, casting="same_kind")
-    return Picture(rate, first.cfa, first.cfa_side, first.channels)
+    return HdrFrame(rate, first.cfa, first.cfa_side, first.channels)
 
 
 def _black(raw: RawFrame) -> FloatArray:

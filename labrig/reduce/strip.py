@@ -1,15 +1,21 @@
-"""Finds the lit strip of a linear variable filter in a picture."""
+"""The strip of a linear variable filter in frames: where it is lit, and what is read along it."""
 
 import math
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.analyse.lvf_calibration.picture import Image, Picture
+from labrig.calibration import CameraFile
 from labrig.calibration.lvf_file import SLICES, Strip
 from labrig.errors import DataError
+from labrig.reduce.hdr import HdrFrame, Image
+from labrig.reduce.patches import reduce_patches
+from labrig.reduce.shots import SeriesFrame
+from labrig.results import FloatArray
+from labrig.results.strip import SliceValues, StripProfile
 
 #: Lit is what is brighter than so many times the noise of the dark surroundings,
 SEEN_SIGMA = 6.0
@@ -30,6 +36,10 @@ FULL = (0.9, 1.1)
 LONG_MARGIN, END_MARGIN = 0.12, 0.01
 #: A slice is two pixels wide at the least: a cell of the colour filter.
 _LEAST_SLICE = 2
+#: Lamp, shutter and aperture from one scene to the next, relative; all colours and places alike.
+FLICKER = 0.005
+#: Relative errors that no two frames share: the sensor's pattern, dust.
+PATTERN = 0.002
 
 
 @dataclass(frozen=True)
@@ -68,16 +78,20 @@ class FoundStrip:
             rising=rising,
         )
 
+    def __str__(self) -> str:
+        """Its size and tilt."""
+        return f"{self.length:.0f} x {self.height:.0f} pixels, tilted by {self.tilt_degrees:+.1f}°"
 
-def find_strip(picture: Picture) -> FoundStrip:
-    """The brightest elongated rectangle in an otherwise dark picture.
+
+def find_strip(frame: HdrFrame) -> FoundStrip:
+    """The brightest elongated rectangle in an otherwise dark frame.
 
     Raises
     ------
     DataError
         There is none, it is tilted by more than 5°, or too short to be read.
     """
-    light = picture.light()
+    light = frame.light()
     height, width = light.shape
     lit = _lit(light)
     if lit is None:
@@ -116,6 +130,78 @@ def find_strip(picture: Picture) -> FoundStrip:
     return FoundStrip(tuple(corners), float(angle), float(across), float(down), width, height)
 
 
+def strip_profile(frame: HdrFrame, strip: Strip) -> StripProfile:
+    """Means across the strip, one for every cell of the colour filter along it.
+
+    Each channel is read where its own pixels are, and drawn straight in between.
+
+    Parameters
+    ----------
+    frame
+        Whole, from one exposure or several.
+    strip
+        Where it lies; which way its wavelengths rise does not matter.
+
+    Raises
+    ------
+    DataError
+        Some part of the strip clips in all frames.
+    """
+    height, width = frame.rate.shape
+    along, inside = _along(strip, width, height)
+    rows, columns = np.nonzero(inside)
+    at, value = along[inside], frame.rate[inside].astype(np.float64)
+    side = frame.cfa_side
+    colour = np.array(list(frame.cfa)).reshape(side, side)[rows % side, columns % side]
+    cells = (strip.right[0] - strip.left[0]) * width / max(side, 2)
+    edges = np.linspace(0.0, 1.0, int(cells) + 1)
+    position = (edges[1:] + edges[:-1]) / 2
+    seen = np.isfinite(value)
+    columns_of_value = [
+        _read_at(at[own], value[own], edges, position)
+        for own in (seen & (colour == name) for name in frame.channels)
+    ]
+    return StripProfile(position, np.stack(columns_of_value, axis=1))
+
+
+def slice_values(
+    frames: Sequence[SeriesFrame],
+    strip: Strip,
+    darks: Sequence[SeriesFrame],
+    camera: CameraFile | None,
+) -> Mapping[str, SliceValues]:
+    """Light in every slice of a strip, scene by scene.
+
+    Parameters
+    ----------
+    frames
+        Those of one unit show one scene at several exposures.
+    strip
+        Where it lies in all of them.
+    darks
+        Dark frames at their exposures.
+    camera
+        Its calibration, where there is one.
+
+    Returns
+    -------
+    dict
+        Unit → values in DN/s.
+    """
+    series = reduce_patches(frames, strip.slices(), darks, camera=camera)
+    units = dict.fromkeys(frame.unit for frame in frames)
+    found = {}
+    for unit in units:
+        pairs = []
+        for one in series.values():
+            rows = np.array(one.unit) == unit
+            usable = rows & one.usable & np.isfinite(one.sigma).all(axis=1)
+            pairs.append(_weighted_mean(one.values[usable], one.sigma[usable], one.dark_sigma))
+        value, sigma = np.moveaxis(np.array(pairs), 1, 0)
+        found[unit] = SliceValues(value, sigma)
+    return found
+
+
 def _lit(light: Image) -> NDArray[np.uint8] | None:
     """(height, width) 1 in the largest lit patch; None without light."""
     ground = float(np.median(light))
@@ -152,3 +238,42 @@ def _rectangle(lit: NDArray[np.uint8]) -> tuple[tuple[float, float], float, floa
 
 def _point(xy: NDArray[np.float64]) -> tuple[float, float]:
     return float(xy[0]), float(xy[1])
+
+
+def _along(strip: Strip, width: int, height: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Position of every pixel along the strip, and whether it is inside; (height, width)."""
+    x, y = np.arange(width) + 0.5, np.arange(height)[:, np.newaxis] + 0.5
+    left = np.array([strip.left[0] * width, strip.left[1] * height])
+    right = np.array([strip.right[0] * width, strip.right[1] * height])
+    length = float(np.hypot(*(right - left)))
+    (ex, ey) = (right - left) / length
+    along = ((x - left[0]) * ex + (y - left[1]) * ey) / length
+    aside = (y - left[1]) * ex - (x - left[0]) * ey
+    inside = (along >= 0) & (along <= 1) & (np.abs(aside) <= strip.height * height / 2)
+    return along, inside
+
+
+def _read_at(
+    at: FloatArray, value: FloatArray, edges: FloatArray, position: FloatArray
+) -> FloatArray:
+    """Mean value and mean place of the pixels between `edges`, read at `position`."""
+    pixels, _ = np.histogram(at, edges)
+    if (pixels == 0).any():
+        raise DataError(
+            "some of the strip clips in every frame; close the aperture, or lower the ISO"
+        )
+    place = np.histogram(at, edges, weights=at)[0] / pixels
+    mean = np.histogram(at, edges, weights=value)[0] / pixels
+    return np.asarray(np.interp(position, place, mean), dtype=np.float64)
+
+
+def _weighted_mean(
+    value: FloatArray, sigma: FloatArray, dark_sigma: FloatArray
+) -> tuple[FloatArray, FloatArray]:
+    """(channels,) of the frames (n, channels) of one scene, weighted."""
+    if not len(value):
+        return np.full_like(dark_sigma, np.nan), np.full_like(dark_sigma, np.nan)
+    weight = 1 / sigma**2
+    mean = (weight * value).sum(axis=0) / weight.sum(axis=0)
+    dark = np.nan_to_num(dark_sigma)
+    return mean, np.sqrt(1 / weight.sum(axis=0) + dark**2 + (PATTERN * mean) ** 2)

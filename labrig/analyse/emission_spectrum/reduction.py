@@ -1,4 +1,4 @@
-"""Noise of what the filter's places show, told by all of them together.
+"""From frames through the LVF to DN/s at its places: noise, dark and fall-off.
 
 A place on a small sensor is a few pixels wide, too few to tell their noise, and its surroundings
 are brighter or darker. But all pixels of a channel are alike: variance = a + b · level (photon
@@ -6,21 +6,26 @@ transfer; Janesick 2007). Pairs of successive frames, one scaled to the other, t
 stands still cancels.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Hashable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
+from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from labrig.analyse.hot_pixels import hot_pixels_of
-from labrig.reduce import PixelMask, RawFrame, SeriesFrame, read_raw
+from labrig.calibration import CameraFile
+from labrig.errors import DataError
+from labrig.reduce import DarkModel, PixelMask, RawFrame, SeriesFrame, fit_dark, read_raw
 from labrig.reduce.noise import ROUNDING_VARIANCE
 from labrig.reduce.pairs import STRIPS
+from labrig.reduce.patches import TWO_DEGREES
 from labrig.region import Region, region_pixels
+from labrig.results import FloatArray, is_usable
+from labrig.results.emission_spectrum import FilterFrames
 
-FloatArray = NDArray[np.float64]
+Patch = TypeVar("Patch", bound=Hashable)
 
 #: Rounds in which the weights follow the line.
 ROUNDS = 8
@@ -46,7 +51,7 @@ class PixelNoise:
 
 
 @dataclass(frozen=True, eq=False)
-class Seen:
+class MeasuredPlaces:
     """One frame of `width` × `height` pixels in all places.
 
     Attributes
@@ -64,7 +69,7 @@ class Seen:
     pixels: FloatArray
     strips: FloatArray
 
-    def take(self, places: Sequence[int]) -> "Seen":
+    def take(self, places: Sequence[int]) -> "MeasuredPlaces":
         """Some of the places."""
         some = list(places)
         return replace(
@@ -72,15 +77,146 @@ class Seen:
         )
 
 
-def seen(
+@dataclass(frozen=True, eq=False)
+class PatchReduction:
+    """All frames in all places of one patch.
+
+    Attributes
+    ----------
+    frames
+        As measured.
+    slices
+        The places.
+    holder
+        Dark parts of the frame beside the filter, measured after the places.
+    camera
+        Its calibration, where there is one.
+    noise
+        Of its pixels.
+    dark
+        Level of each place in the dark.
+    """
+
+    frames: Sequence[MeasuredPlaces]
+    slices: Mapping[str, Region]
+    holder: Mapping[str, Region]
+    camera: CameraFile | None
+    noise: PixelNoise
+    dark: Sequence[DarkModel]
+
+    def of_unit(self, unit: str) -> FilterFrames:
+        """The frames of a unit, those a person excludes left out."""
+        rows = [one for one in self.frames if one.frame.unit == unit and is_usable(one.frame.flag)]
+        if not rows:
+            raise DataError(f"expected frames of {unit}, got none that are not excluded")
+        columns = [self._reduced(one) for one in rows]
+        value, sigma, dark_sigma = (np.stack(column) for column in zip(*columns, strict=True))
+        middles_s = [one.frame.t_s + one.frame.exposure_s / 2 for one in rows]
+        return FilterFrames(np.array(middles_s), value, sigma, dark_sigma)
+
+    def _reduced(self, one: MeasuredPlaces) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Value, σ and the σ of what all have in common, each (places · channels,) in DN/s."""
+        frame, camera, exposure_s = one.frame, self.camera, one.frame.exposure_s
+        levels = [model.dark_level(exposure_s) for model in self.dark]
+        level, known = (np.array(column) for column in zip(*levels, strict=True))
+        light, sigma = one.level_dn - level, self.noise.sigma_dn(one.level_dn, one.pixels)
+        # A sensor that has warmed since the dark frames is off in all places together.
+        common = TWO_DEGREES * np.abs(np.array([m.current(exposure_s) for m in self.dark]))
+        count = len(self.slices)
+        if self.holder:
+            share = one.pixels[count:] / one.pixels[count:].sum(axis=0)
+            light = light - np.sum(share * light[count:], axis=0)
+            common = np.broadcast_to(
+                np.sqrt(np.sum((share * sigma[count:]) ** 2, axis=0)), light.shape
+            )
+        sigma = np.where(np.isnan(light), np.nan, np.hypot(sigma, known))
+        per_dn = np.full(
+            light.shape, exposure_s if camera is None else camera.exposure_s(exposure_s)[0]
+        )
+        if camera is not None:
+            per_dn[:count] *= [
+                camera.flat(frame.f_number, region, one.width, one.height)
+                for region in self.slices.values()
+            ]
+        columns = (light, sigma, common)
+        value, sigma, common = ((column / per_dn)[:count].ravel() for column in columns)
+        return value, sigma, common
+
+
+def reduce_places(
+    frames: Sequence[SeriesFrame],
+    darks: Sequence[SeriesFrame],
+    patches: Mapping[Patch, Mapping[str, Region]],
+    camera: CameraFile | None,
+    holder: Mapping[str, Region] | None = None,
+) -> dict[Patch, PatchReduction]:
+    """Read every frame once, in every place of each patch, and in the holder, whose light is
+    subtracted.
+
+    Raises
+    ------
+    DataError
+        No dark frames, or some at another ISO.
+    """
+    isos = {frame.iso for frame in (*frames, *darks)}
+    if not darks or len(isos) > 1:
+        raise DataError(
+            f"expected dark frames at the one ISO of all frames, got {len(darks)} and ISO "
+            f"{', '.join(f'{iso:g}' for iso in sorted(filter(None, isos)))}"
+        )
+    beside = dict(holder or {})
+    regions = [region for slices in patches.values() for region in slices.values()]
+    lit, dark = (
+        _measured_frames(some, [*regions, *beside.values()], darks) for some in (frames, darks)
+    )
+    rising = sorted(dark, key=lambda one: one.frame.exposure_s)
+    groups = [[o for o in lit if o.frame.unit == u] for u in {o.frame.unit: None for o in lit}]
+    places, first = {}, 0
+    for patch, slices in patches.items():
+        after = first + len(slices)
+        # The holder's places come last.
+        places[patch] = [*range(first, after), *range(len(regions), len(regions) + len(beside))]
+        first = after
+    # Patches fade differently: the frames of a pair are brought to the same brightness in each.
+    noise = pixel_noise(
+        [[one.take(own) for one in group] for own in places.values() for group in (*groups, rising)]
+    )
+    return {
+        patch: _reduction(
+            [one.take(own) for one in lit], [one.take(own) for one in dark], patches[patch],
+            beside, camera, noise,
+        )
+        for patch, own in places.items()
+    }  # fmt: skip
+
+
+def _reduction(
+    lit: Sequence[MeasuredPlaces],
+    dark: Sequence[MeasuredPlaces],
+    slices: Mapping[str, Region],
+    holder: Mapping[str, Region],
+    camera: CameraFile | None,
+    noise: PixelNoise,
+) -> PatchReduction:
+    exposure_s = np.array([one.frame.exposure_s for one in dark])
+    level = np.stack([np.nan_to_num(one.level_dn) for one in dark])
+    sigma = np.stack([noise.sigma_dn(one.level_dn, one.pixels) for one in dark])
+    models = [
+        fit_dark(exposure_s, level[:, place], np.nan_to_num(sigma[:, place], nan=np.inf))
+        for place in range(level.shape[1])
+    ]
+    return PatchReduction(lit, slices, holder, camera, noise, models)
+
+
+def _measured_frames(
     frames: Sequence[SeriesFrame], places: Sequence[Region], darks: Sequence[SeriesFrame]
-) -> list[Seen]:
+) -> list[MeasuredPlaces]:
     """Every frame in every place, hot pixels left out."""
     hot = hot_pixels_of(darks)
-    return [_seen(frame, read_raw(frame.path), places, hot) for frame in frames]
+    return [_measured(frame, read_raw(frame.path), places, hot) for frame in frames]
 
 
-def pixel_noise(groups: Sequence[Sequence[Seen]]) -> PixelNoise:
+def pixel_noise(groups: Sequence[Sequence[MeasuredPlaces]]) -> PixelNoise:
     """From groups of frames that show the same, brighter or darker, in order of time."""
     levels, scatters = zip(*(pair for group in groups for pair in _pairs(group)), strict=True)
     level, scatter = np.concatenate(levels), np.concatenate(scatters)
@@ -93,9 +229,9 @@ def pixel_noise(groups: Sequence[Sequence[Seen]]) -> PixelNoise:
     return PixelNoise(np.array(at_black), np.array(per_dn))
 
 
-def _seen(
+def _measured(
     frame: SeriesFrame, raw: RawFrame, regions: Sequence[Region], hot: PixelMask | None
-) -> Seen:
+) -> MeasuredPlaces:
     side = raw.cfa_side
     cell = np.array([raw.channels.index(letter) for letter in raw.cfa]).reshape(side, side)
     tiling = (-(-raw.height // side), -(-raw.width // side))
@@ -125,10 +261,10 @@ def _seen(
     for place, one in enumerate(strips):
         deviations[place, :, : one.shape[1]] = one - one.mean(axis=1, keepdims=True)
     counted = np.array(pixels, dtype=np.float64)
-    return Seen(frame, raw.width, raw.height, np.array(level), counted, deviations)
+    return MeasuredPlaces(frame, raw.width, raw.height, np.array(level), counted, deviations)
 
 
-def _pairs(group: Sequence[Seen]) -> Iterator[tuple[FloatArray, FloatArray]]:
+def _pairs(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray, FloatArray]]:
     """Level that a pair's noise belongs to and its variance per pixel, each (p, C)."""
     for one, other in pairwise(group):
         # Brought to the same brightness all over, as nearly as the noisiest place allows.

@@ -3,12 +3,12 @@
 from functools import cached_property
 
 from labrig.analyse.hot_pixels import hot_pixels_of
-from labrig.analyse.lvf_calibration.picture import Picture, read_picture
 from labrig.analyse.part import Part
 from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import steady_frames
 from labrig.errors import DataError
 from labrig.reduce import PixelMask, SeriesFrame, read_raw
+from labrig.reduce.hdr import HdrFrame, read_hdr_frame
 
 
 class StripFrames:
@@ -22,7 +22,7 @@ class StripFrames:
     """
 
     def __init__(self, part: Part) -> None:
-        self._stage = part
+        self._part = part
         self.dark = self.of("dark")
         insist_on_this_camera(part.inputs.camera, part.run, part.run.frames("dark"))
 
@@ -30,19 +30,19 @@ class StripFrames:
         """Of a purpose, and of one unit where that matters."""
         frames = [
             frame
-            for frame in steady_frames(self._stage.run, self._stage.choices, purpose)
+            for frame in steady_frames(self._part.run, self._part.choices, purpose)
             if unit is None or frame.unit == unit
         ]
         if not frames:
             raise DataError(
-                f"{self._stage.run.folder}: the unit {unit or purpose} is not complete; go on "
-                f"with: labrig resume {self._stage.run.folder}"
+                f"{self._part.run.folder}: the unit {unit or purpose} is not complete; go on "
+                f"with: labrig resume {self._part.run.folder}"
             )
         return frames
 
-    def picture(self, purpose: str, unit: str | None = None) -> Picture:
+    def hdr(self, purpose: str, unit: str | None = None) -> HdrFrame:
         """All of them together."""
-        return read_picture(self.of(purpose, unit), self.hot)
+        return read_hdr_frame(self.of(purpose, unit), self.hot)
 
     @cached_property
     def size(self) -> tuple[int, int]:

@@ -1,14 +1,17 @@
-"""What of the bench a spectrum needs: the filter where it is read, camera curves, the white."""
+"""What a spectrum comes to in a frame through the LVF: filter, camera curves, white reference.
+
+A camera's curves from another laboratory are off by some per cent, and so is every spectrum found
+with them. A grey card under a known lamp, seen through the same filter, shows by how much in every
+position and channel: the errors that the model may have are known ones from then on.
+"""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, fields, replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.analyse.bench_curves import camera_curves, card_reflectance, lamp_spectrum
-from labrig.analyse.emission_spectrum.picture import Pictures, combined
-from labrig.analyse.emission_spectrum.white import taught_by
+from labrig.analyse.emission_spectrum.comparison import combined
 from labrig.analyse.part import Part
 from labrig.analyse.strip_patches import Slices, StripPatch, cut, lean, strip_patches
 from labrig.calibration.lvf_file import Strip
@@ -25,19 +28,23 @@ from labrig.optics import (
 )
 from labrig.reduce import RawFrame, SeriesFrame, read_raw
 from labrig.region import Region, region_pixels
-
-FloatArray = NDArray[np.float64]
+from labrig.results import FloatArray
+from labrig.results.emission_spectrum import FilterFrames
 
 #: From where to where the holder is read, in heights of the strip from its middle; the filter's own
 #: blurred edges end at 0.7.
 HOLDER = (0.8, 1.1)
 #: Of the spectrum fitted: finer than the filter's 25 nm, and beyond the grid that is told.
 KNOTS_NM: FloatArray = np.arange(380.0, 721.0, 5.0)
+#: What is not known of a lamp's spectrum whose file says nothing, relative.
+LAMP_SIGMA = 0.01
+#: How bright the picture is may be anything.
+ANY_BRIGHTNESS = 1e3
 
 
 @dataclass(frozen=True, eq=False)
-class SpectralBench:
-    """The bench as the spectrum of one patch sees it.
+class ForwardModel:
+    """From the spectrum of one patch to the values of a frame.
 
     Attributes
     ----------
@@ -49,8 +56,8 @@ class SpectralBench:
         Its curves.
     system
         From a spectrum to the values read, and how that may be wrong.
-    white
-        Whether a white picture has had its say.
+    white_reference
+        Whether a grey card under the known lamp told what the curves are off by.
     """
 
     slices: Mapping[str, Region]
@@ -58,14 +65,14 @@ class SpectralBench:
     lvfs: tuple[Lvf, ...]
     camera: CameraResponse
     system: SpectralSystem
-    white: bool = False
+    white_reference: bool = False
 
     @property
     def centre_nm(self) -> FloatArray:
         """(positions · channels,) of the band in which each value is read."""
         return np.stack([lvf.bands.centre_nm for lvf in self.lvfs], axis=1).ravel()
 
-    def seen_of(self, light: Spectrum) -> FloatArray:
+    def expected_of(self, light: Spectrum) -> FloatArray:
         """(positions · channels,) what a light comes to."""
         columns = [
             seen_through(lvf, one, light)[:, 0]
@@ -74,10 +81,10 @@ class SpectralBench:
         return np.stack(columns, axis=1).ravel()
 
 
-def spectral_benches(
+def forward_models(
     part: Part, frame: SeriesFrame
-) -> tuple[dict[StripPatch, SpectralBench], tuple[str, ...]]:
-    """The bench that a part was measured on, for every patch; and why there is none for one.
+) -> tuple[dict[StripPatch, ForwardModel], tuple[str, ...]]:
+    """The model of every patch of a part; and why a patch has none, a line each.
 
     Parameters
     ----------
@@ -101,19 +108,19 @@ def spectral_benches(
     raw, strip, lvf = read_raw(frame.path), known.before_camera, known.lvf
     camera, holder = _camera(part, raw.channels), _holder(strip)
     patches, refused = cut(strip_patches(part), strip, raw)
-    benches = {}
+    models = {}
     for patch, slices in patches.items():
         # At either end pixels reach a little beyond the places that were calibrated.
         places = np.clip(_positions(raw, strip, slices), lvf.position[0], lvf.position[-1])
         lvfs = tuple(lvf.at(own) for own in places)
-        benches[patch] = SpectralBench(slices, holder, lvfs, camera, _system(lvfs, camera))
-    return benches, refused
+        models[patch] = ForwardModel(slices, holder, lvfs, camera, _system(lvfs, camera))
+    return models, refused
 
 
-def with_white(
-    bench: SpectralBench, part: Part, white: Pictures | None
-) -> tuple[SpectralBench, tuple[str, ...]]:
-    """The bench after its white picture, if there is one; and warnings.
+def with_white_reference(
+    model: ForwardModel, part: Part, white: FilterFrames | None
+) -> tuple[ForwardModel, tuple[str, ...]]:
+    """The model after frames of the grey card, if there are any; and warnings.
 
     Raises
     ------
@@ -121,20 +128,59 @@ def with_white(
         The files of lamp or grey card are no good.
     """
     if white is None:
-        return bench, ()
+        return model, ()
     optics = part.rig.optics
     if optics.lamp is None or optics.grey_card is None:
-        return bench, (
+        return model, (
             "the white picture says nothing, since the spectra of lamp and grey card are not "
             "known: name them in the rig file (optics: {lamp: …, grey_card: …})",
         )
     light = _light(lamp_spectrum(part.rig), card_reflectance(part.rig))
-    picture = combined(white)
-    if not picture.shows_light:
-        return bench, ("the white picture is dark or clips throughout; the spectrum does without",)
-    expected = bench.seen_of(light)
-    system = taught_by(bench.system, picture.value, picture.sigma, light, expected)
-    return replace(bench, system=system, white=True), ()
+    seen = combined(white)
+    if not seen.shows_light:
+        return model, ("the white picture is dark or clips throughout; the spectrum does without",)
+    system = conditioned_on_white(
+        model.system, seen.value, seen.sigma, light, model.expected_of(light)
+    )
+    return replace(model, system=system, white_reference=True), ()
+
+
+def conditioned_on_white(
+    system: SpectralSystem,
+    value: FloatArray,
+    sigma: FloatArray,
+    light: Spectrum,
+    expected: FloatArray,
+) -> SpectralSystem:
+    """The system after a picture of a known light.
+
+    With value = g (expected + Σ_k z_k modes_k · light) + noise, z and g normal, this is the mean
+    and covariance of z given the picture.
+
+    Parameters
+    ----------
+    value, sigma
+        (m,) of the picture, in any unit; NaN where it clips.
+    light
+        What was photographed.
+    expected
+        (m,) what the system's own curves make of it, wavelengths beyond its knots included.
+    """
+    known = np.isfinite(value) & np.isfinite(sigma)
+    gain = float(expected[known] @ value[known] / (expected[known] @ expected[known]))
+    y, s = value[known] / gain, sigma[known] / gain
+    seen = system.modes[:, known] @ light.at(system.knots_nm)
+    levers = np.vstack([seen, ANY_BRIGHTNESS * expected[known]])
+    noise = np.hypot(s, LAMP_SIGMA * expected[known])
+    whitened = levers / noise
+    precision = np.eye(len(levers)) + whitened @ whitened.T
+    mean = np.linalg.solve(precision, whitened @ ((y - expected[known]) / noise))
+    # Rows of the root of the covariance: independent again, each of unit variance.
+    root = np.linalg.inv(np.linalg.cholesky(precision))[:, :-1]
+    design = system.design + np.tensordot(mean[:-1], system.modes, axes=1)
+    return SpectralSystem(
+        system.knots_nm, np.maximum(design, 0.0), np.tensordot(root, system.modes, axes=1)
+    )
 
 
 def _holder(strip: Strip) -> dict[str, Region]:

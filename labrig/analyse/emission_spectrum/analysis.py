@@ -1,0 +1,218 @@
+"""An emission spectrum, from its frames to Λ* of each patch, and whether it is one at all."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+
+import numpy as np
+
+from labrig.analyse.clean import cleaned
+from labrig.analyse.emission_spectrum.comparison import (
+    CombinedFrame,
+    combined,
+    compared,
+    differ,
+    over_time,
+    visible,
+)
+from labrig.analyse.emission_spectrum.forward_model import (
+    ForwardModel,
+    forward_models,
+    with_white_reference,
+)
+from labrig.analyse.emission_spectrum.reduction import PatchReduction, reduce_places
+from labrig.analyse.part import Part
+from labrig.analyse.strip_patches import StripPatch, for_each_patch
+from labrig.analyse.this_camera import insist_on_this_camera
+from labrig.analyse.timed_frames import intact_frames, steady_frames, timing_warnings
+from labrig.errors import DataError
+from labrig.fit.spectrum import fit_spectrum
+from labrig.reduce import SeriesFrame
+from labrig.results import is_usable
+from labrig.results.emission_spectrum import (
+    ChargeSpectrum,
+    EmissionSpectrum,
+    EmissionSpectrumResult,
+    FilterFrames,
+    PatchSpectrum,
+)
+
+#: Draws of the spectrum, and of those that are only shown.
+SAMPLES, FEW_SAMPLES = 400, 60
+#: After another lamp the glow must be so much brighter than what was left of the one before.
+CHARGED_ANEW = 1.05
+
+
+@dataclass(frozen=True, eq=False)
+class _Charge:
+    """The glow after one charge: its frames, and all of them as one."""
+
+    lamp: str
+    frames: FilterFrames
+    combined: CombinedFrame
+
+
+def analyse(part: Part) -> EmissionSpectrumResult:
+    """Find Λ* of every patch, whether it is constant, and whether it depends on the lamp.
+
+    Raises
+    ------
+    UsageError
+        No calibrated LVF, no camera curves.
+    DataError
+        No spectrum is complete, frames are damaged, nothing glows in them, or no patch lies below
+        the filter.
+    FitError
+        Too much clips.
+    """
+    intact = intact_frames(part.run, part.choices, "spectrum")
+    frames, stray = cleaned(intact, part.inputs.blank)
+    insist_on_this_camera(part.inputs.camera, part.run, part.run.frames("spectrum"))
+    models, refused = forward_models(part, frames.decay[0])
+    white = steady_frames(part.run, part.choices, "white")
+    reductions = reduce_places(
+        [*frames.decay, *white],
+        frames.dark,
+        {patch: model.slices for patch, model in models.items()},
+        part.inputs.camera,
+        next(iter(models.values())).holder,
+    )
+    patches, warnings = for_each_patch(
+        list(models),
+        lambda patch: _of_patch(
+            part, patch, models[patch], reductions[patch], frames.decay, white=bool(white)
+        ),
+    )
+    return EmissionSpectrumResult(
+        patches=patches,
+        warnings=(*timing_warnings(part.run, "spectrum"), *stray, *refused, *warnings),
+    )
+
+
+def _of_patch(
+    part: Part,
+    patch: StripPatch,
+    model: ForwardModel,
+    reduction: PatchReduction,
+    frames: Sequence[SeriesFrame],
+    *,
+    white: bool,
+) -> tuple[PatchSpectrum, list[str]]:
+    """The patch's spectrum, and warnings."""
+    model, warnings = with_white_reference(
+        model, part, reduction.of_unit("white") if white else None
+    )
+    charges, dead = _charges(reduction, frames)
+
+    def spectrum_of(frame: CombinedFrame, lamp: str, samples: int) -> EmissionSpectrum:
+        fit = fit_spectrum(frame.value, frame.sigma, model.system, samples=samples)
+        run = part.run.folder.resolve().name
+        return EmissionSpectrum.from_draws(
+            fit.knots_nm, fit.value, fit.samples, sample=patch.material, lamp=lamp, run=run
+        )
+
+    first = charges[0]
+    times = over_time(first.frames, model.centre_nm) if len(first.frames) > 1 else []
+    lamps = [
+        compared(f"{one.lamp} against {first.lamp}", one.frames, first.combined, model.centre_nm)
+        for one in charges[1:]
+    ]
+    found = PatchSpectrum(
+        spectrum=spectrum_of(first.combined, first.lamp, SAMPLES),
+        channels=model.camera.channels,
+        centre_nm=model.centre_nm,
+        white_reference=model.white_reference,
+        charges=tuple(
+            ChargeSpectrum(one.lamp, one.frames, spectrum_of(one.combined, one.lamp, FEW_SAMPLES))
+            for one in charges
+        ),
+        times=tuple(times),
+        at_times=tuple(
+            spectrum_of(combined(first.frames.take([row])), first.lamp, FEW_SAMPLES)
+            for row in range(len(first.frames))
+        ),
+        lamps=tuple(lamps),
+        changes_with_time=differ(times),
+        depends_on_lamp=differ(lamps),
+    )
+    return found, [
+        *warnings,
+        *_clipping(first.frames),
+        *_faint(len(first.frames), frames),
+        *_differences(found),
+        *_not_charged(charges),
+        *dead,
+    ]
+
+
+def _charges(
+    reduction: PatchReduction, frames: Sequence[SeriesFrame]
+) -> tuple[list[_Charge], list[str]]:
+    """Those after which something glows, and a warning for each of the others.
+
+    Raises
+    ------
+    DataError
+        Nothing glows after the first charge.
+    """
+    charges: list[_Charge] = []
+    dead: list[str] = []
+    for unit in dict.fromkeys(frame.unit for frame in frames):
+        lamp = unit.removeprefix("spectrum-")
+        try:
+            seen = visible(reduction.of_unit(unit))
+        except DataError:
+            if not charges:
+                raise
+            dead.append(f"after charging with the {lamp} lamp nothing glows: it did not light")
+            continue
+        charges.append(_Charge(lamp, seen, combined(seen)))
+    return charges, dead
+
+
+def _differences(found: PatchSpectrum) -> Iterator[str]:
+    if found.changes_with_time:
+        worst = max(found.times, key=lambda one: one.beyond_noise)
+        yield (
+            f"the spectrum changes with time: at {worst.what} it differs by "
+            f"{worst.beyond_noise:.1%} (rms, beyond noise) from the other times; states emit in "
+            "different colours, or another light comes in, so that one Λ* does not describe them"
+        )
+    if found.depends_on_lamp:
+        worst = max(found.lamps, key=lambda one: one.beyond_noise)
+        yield (
+            f"the spectrum depends on the lamp: {worst.what} it differs by "
+            f"{worst.beyond_noise:.1%} (rms, beyond noise); is it the same sample, in its place?"
+        )
+
+
+def _not_charged(charges: Sequence[_Charge]) -> Iterator[str]:
+    """Lamps after which the glow went on fading as if they had not been lit."""
+    for before, after in pairwise(charges):
+        seen = np.isfinite(before.combined.value) & np.isfinite(after.combined.value)
+        left = before.combined.value[seen] * before.combined.brightness[-1]
+        anew = after.combined.value[seen]
+        if float(anew @ left) < CHARGED_ANEW * float(left @ left):
+            yield (
+                f"after charging with the {after.lamp} lamp the glow is no brighter than what was "
+                f"left before: the {after.lamp} lamp did not light, or hardly excites this sample"
+            )
+
+
+def _faint(count: int, frames: Sequence[SeriesFrame]) -> Iterator[str]:
+    taken = sum(one.unit == frames[0].unit and is_usable(one.flag) for one in frames)
+    if count != taken:
+        yield (
+            f"{taken - count} of {taken} frames show no light above the noise and are left out; "
+            "photograph earlier (times:), or charge for longer"
+        )
+
+
+def _clipping(frames: FilterFrames) -> Iterator[str]:
+    clipped = np.isnan(frames.value_dn_per_s)
+    if clipped.any():
+        lost = int(clipped.all(axis=0).sum())
+        yield (
+            f"{clipped.mean():.0%} of the values clip and are left out, {lost} of "
+            f"{clipped.shape[1]} in every frame; expose for less or lower the ISO"
+        )

@@ -1,0 +1,143 @@
+"""Frames through the LVF put together, and whether they differ in more than their brightness.
+
+They are compared as they are, position by position: camera curves and filter, which are known to
+some per cent, are the same in both and drop out.
+"""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+import numpy as np
+from scipy.special import chdtrc
+
+from labrig.errors import DataError
+from labrig.results import FloatArray
+from labrig.results.emission_spectrum import FilterFrames, SpectralComparison
+
+#: Rounds in which brightness and mean follow each other; each gains a digit or more.
+COMBINING_ROUNDS = 20
+#: All of the light together is so many σ at least.
+SEEN_SIGMA = 5.0
+#: Chance, over all comparisons of a kind, at which spectra that do not differ are said to.
+LEVEL = 1e-3
+#: Share of the highest value above which a place tells the centroid: elsewhere is noise.
+BRIGHT = 0.02
+#: Rounds in which the noise of the reference follows the brightness.
+COMPARING_ROUNDS = 5
+
+
+@dataclass(frozen=True, eq=False)
+class CombinedFrame:
+    """Several frames as one: (m,) values as bright as the first of them, and σ.
+
+    Attributes
+    ----------
+    brightness
+        (f,) of every frame relative to the first.
+    """
+
+    value: FloatArray
+    sigma: FloatArray
+    brightness: FloatArray
+
+    @property
+    def shows_light(self) -> bool:
+        """Whether all of it together stands out of the noise."""
+        return bool(np.nansum(self.value) > SEEN_SIGMA * np.sqrt(np.nansum(self.sigma**2)))
+
+
+def combined(frames: FilterFrames) -> CombinedFrame:
+    """What is behind some frames, each as bright as it is."""
+    weight = np.nan_to_num(1 / (frames.sigma_dn_per_s**2 + frames.dark_sigma_dn_per_s**2))
+    value = np.nan_to_num(frames.value_dn_per_s)
+    brightness = np.ones(len(frames))
+    for _ in range(COMBINING_ROUNDS):
+        total = (weight * brightness[:, np.newaxis] ** 2).sum(axis=0)
+        with np.errstate(invalid="ignore", divide="ignore"):
+            mean = (weight * value * brightness[:, np.newaxis]).sum(axis=0) / total
+        known = np.nan_to_num(mean)
+        brightness = (weight * value) @ known / (weight @ known**2)
+        brightness = brightness / (brightness[0] or 1.0)
+    with np.errstate(divide="ignore"):
+        sigma = np.where(total > 0, 1 / np.sqrt(total), np.nan)
+    return CombinedFrame(mean, sigma, brightness)
+
+
+def visible(frames: FilterFrames) -> FilterFrames:
+    """Those of the frames in which there is light.
+
+    Raises
+    ------
+    DataError
+        There is none in any of them.
+    """
+    rows = [row for row in range(len(frames)) if combined(frames.take([row])).shows_light]
+    if not rows:
+        raise DataError(
+            "expected light through the LVF, got none above the noise: was the sample charged, is "
+            "the filter where it was calibrated? (raise camera.iso, expose longer)"
+        )
+    return frames.take(rows)
+
+
+def differ(comparisons: Sequence[SpectralComparison]) -> bool:
+    """Whether any of several comparisons is more than chance."""
+    return any(one.p_value < LEVEL / len(comparisons) for one in comparisons)
+
+
+def over_time(frames: FilterFrames, centre_nm: FloatArray) -> list[SpectralComparison]:
+    """Every frame against all others together.
+
+    Parameters
+    ----------
+    centre_nm
+        (m,) of the filter where every value was read.
+    """
+    found = []
+    for row in range(len(frames)):
+        others = combined(frames.take([other for other in range(len(frames)) if other != row]))
+        found.append(compared(f"{frames.t_s[row]:.3g} s", frames.take([row]), others, centre_nm))
+    return found
+
+
+def compared(
+    what: str, frames: FilterFrames, reference: CombinedFrame, centre_nm: FloatArray
+) -> SpectralComparison:
+    """Some frames against others put together."""
+    mean = combined(frames)
+    known = np.isfinite(mean.value) & np.isfinite(reference.value)
+    y, m = mean.value[known], reference.value[known]
+    gain, chi2 = float(y @ m / (m @ m)), 0.0
+    for _ in range(COMPARING_ROUNDS):
+        variance = mean.sigma[known] ** 2 + gain**2 * reference.sigma[known] ** 2
+        inverse = _inverse(variance)
+        gain = float(m @ inverse @ y / (m @ inverse @ m))
+        residual = y - gain * m
+        chi2 = float(residual @ inverse @ residual)
+    dof = len(y) - 2
+    excess = max(chi2 - dof, 0.0) / float(gain**2 * (m @ inverse @ m))
+    shift, sigma = _shift(y, m, gain, variance, centre_nm[known])
+    return SpectralComparison(
+        what, gain, chi2, dof, float(chdtrc(dof, chi2)), float(np.sqrt(excess)), shift, sigma
+    )
+
+
+def _inverse(variance: FloatArray) -> FloatArray:
+    """Of the covariance where all values may be off by one and the same amount: a sensor that has
+    warmed since its dark frames is brighter all over.
+    """
+    weight = 1 / variance
+    inverse: FloatArray = np.diag(weight) - np.outer(weight, weight) / weight.sum()
+    return inverse
+
+
+def _shift(
+    y: FloatArray, m: FloatArray, gain: float, variance: FloatArray, centre_nm: FloatArray
+) -> tuple[float, float]:
+    """Difference of the centroids in nm where m has its light, and its σ."""
+    bright = m > BRIGHT * m.max()
+    y, m, variance, centre_nm = y[bright], m[bright], variance[bright], centre_nm[bright]
+    light = float(m.sum())
+    middle = float(centre_nm @ m) / light
+    lever = (centre_nm - middle) / (gain * light)
+    return float(lever @ (y - gain * m)), float(np.sqrt(lever**2 @ variance))

@@ -1,0 +1,165 @@
+"""The calibration of a variable filter, from its frames to its result."""
+
+from collections.abc import Iterator
+from dataclasses import replace
+
+import numpy as np
+
+from labrig.analyse.bench_curves import (
+    camera_curves,
+    card_reflectance,
+    filter_transmittances,
+    lamp_spectrum,
+)
+from labrig.analyse.lvf_calibration.filters import (
+    NO_FILTER,
+    Bench,
+    FilterScenes,
+    calibrated,
+    left_out_text,
+    misfits,
+    residuals,
+)
+from labrig.analyse.lvf_calibration.lines import (
+    place_on_sample,
+    shifted_by_stripes,
+    strip_lines,
+    wavelengths_along,
+)
+from labrig.analyse.part import Part
+from labrig.analyse.strip_frames import StripFrames
+from labrig.calibration import LvfFile, Strip
+from labrig.calibration.lvf_file import BandColumns, CurveColumns, WavelengthColumns
+from labrig.errors import DataError
+from labrig.fit.lvf import LvfCalibration
+from labrig.optics import WavelengthMap
+from labrig.reduce.hdr import read_hdr_frame
+from labrig.reduce.strip import find_strip, slice_values
+from labrig.results import FloatArray
+from labrig.results.lvf_calibration import (
+    CameraCurves,
+    FilterMisfit,
+    LvfCalibrationResult,
+    Stripes,
+)
+
+#: Misfit of the filters beyond which the curves are worth a look.
+BAD_MISFIT = 3.0
+#: Shift of the sample that is worth a word.
+SHIFTED_NM = 2.0
+
+
+def analyse(part: Part) -> LvfCalibrationResult:
+    """Find the strip and its lines, then fit what the colour filters say.
+
+    Raises
+    ------
+    DataError
+        Frames are missing or damaged, or show no strip, or one that is tilted.
+    FitError
+        No mercury lines, the filter the wrong way round, or too few filters.
+    """
+    protocol, frames = part.protocol, StripFrames(part)
+    strip = find_strip(frames.hdr("lvf-filter", "filter-none")).strip(rising=True)
+    before_camera = strip_lines(frames.hdr("lvf-lines"), strip, protocol.rising)
+    fit = wavelengths_along(before_camera)
+    strip = find_strip(frames.hdr("lvf-strip-on-sample")).strip(rising=True)
+    on_sample = strip_lines(frames.hdr("lvf-lines-on-sample"), strip, protocol.rising_on_sample)
+    placed = place_on_sample(on_sample, fit.map)
+    bench = Bench(
+        lamp_spectrum(part.rig),
+        card_reflectance(part.rig),
+        camera_curves(part.rig, part.choices),
+    )
+    every = _scenes(part, frames, before_camera.strip)
+    of_filters = tuple(misfits(every, bench, fit.map))
+    scenes = every.without({one.name for one in of_filters if one.left_out})
+    found = calibrated(scenes, bench, fit.map)
+    stripes, why_no_stripes = _stripes(part, frames, placed.strip, found, fit.map)
+    filters = tuple(one.name for one in scenes.filters[1:])
+    assert found.lvf.sigma is not None, "a calibration tells its σ"
+    file = LvfFile(
+        position=tuple(found.lvf.position.tolist()),
+        bands=BandColumns.of(found.lvf.bands),
+        sigma=BandColumns.of(found.lvf.sigma),
+        remainder_nm=tuple(found.lvf.remainder_nm.tolist()),
+        remainder=tuple(tuple(row) for row in found.lvf.remainder.tolist()),
+        wavelengths=WavelengthColumns.of(fit.map),
+        before_camera=before_camera.strip,
+        on_sample=stripes.strip if stripes else placed.strip,
+        camera=CurveColumns.of(found.camera),
+        source=f"{len(filters)} colour filters and mercury lines, measured with labrig",
+        run=part.run.folder.resolve().name,
+    )
+    return LvfCalibrationResult(
+        calibration=file,
+        before_camera=before_camera,
+        on_sample=on_sample,
+        map_residual_nm=fit.residual_nm,
+        map_order=fit.order,
+        placed=placed,
+        stripes=stripes,
+        why_no_stripes=why_no_stripes,
+        card=every.card,
+        through_filters={
+            one.name: values for one, values in zip(every.filters, every.values, strict=True)
+        },
+        filter_misfits=of_filters,
+        filters=filters,
+        transmittance_residual=residuals(scenes, replace(bench, camera=found.camera), file.lvf)[1:],
+        band_misfit=found.misfit,
+        camera_before=CameraCurves(bench.camera.wavelength_nm, bench.camera.sensitivity),
+        warnings=tuple(_warnings(of_filters, found.misfit, stripes)),
+    )
+
+
+def _scenes(part: Part, frames: StripFrames, strip: Strip) -> FilterScenes:
+    completed = part.run.completed()
+    names = [name for name in part.protocol.filter_names() if f"filter-{name}" in completed]
+    lit = [*frames.of("lvf-card"), *frames.of("lvf-filter")]
+    values = slice_values(lit, strip, frames.dark, part.inputs.camera)
+    return FilterScenes(
+        np.array(strip.positions(*frames.size)),
+        [NO_FILTER, *filter_transmittances(part.rig, names)],
+        [values[f"filter-{name}"] for name in (NO_FILTER.name, *names)],
+        values["card"],
+    )
+
+
+def _stripes(
+    part: Part,
+    frames: StripFrames,
+    strip: Strip,
+    found: LvfCalibration,
+    wavelengths: WavelengthMap,
+) -> tuple[Stripes | None, str]:
+    """The stripes that glow, or why there are none."""
+    if part.protocol.stripes == "none":
+        return None, "no stripes were asked for"
+    nm = wavelengths.wavelength_nm([0.0, 1.0])
+    why = "no stripes were photographed"
+    # A glow fades while it is photographed: one frame, the fullest that does not clip.
+    for frame in sorted(frames.of("lvf-stripes"), key=lambda frame: -frame.exposure_s):
+        try:
+            hdr = read_hdr_frame([frame], frames.hot)
+            return shifted_by_stripes(hdr, strip, found.lvf, float(abs(nm[1] - nm[0]))), ""
+        except DataError as error:  # it clips, or nothing is seen
+            why = str(error)
+    return None, why
+
+
+def _warnings(
+    of_filters: tuple[FilterMisfit, ...], misfit: FloatArray, stripes: Stripes | None
+) -> Iterator[str]:
+    yield from (left_out_text(one) for one in of_filters if one.left_out)
+    if np.median(misfit) > BAD_MISFIT:
+        yield (
+            f"the filters contradict one another (misfit {np.median(misfit):.1f}, 1 is "
+            "expected): check the curves of lamp, camera and filters; σ was raised by as much"
+        )
+    if stripes and abs(stripes.shift_nm) > SHIFTED_NM:
+        yield (
+            f"the sample is seen {stripes.shift_nm:+.1f} nm along the strip from where the "
+            "card was lit: the card lay higher, or the door does not open to the same place; the "
+            "map on the sample was shifted by that"
+        )

@@ -1,0 +1,249 @@
+"""An emission spectrum in a report: Λ*, whether it is one at all times, and after every lamp."""
+
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import replace
+
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.ticker import NullLocator
+
+from labrig.report.figure_style import (
+    INK,
+    LEFT_PT,
+    MARKERS,
+    MUTED,
+    OTHER_CHANNELS,
+    error_bars,
+    new_figure,
+    place,
+    points,
+)
+from labrig.report.legend import BAND_OPACITY, legend_above, lined, marked, shaded
+from labrig.report.rendering import Rendered, Source
+from labrig.report.sections import Picture, Section, Table
+from labrig.results import FloatArray
+from labrig.results.emission_spectrum import (
+    EmissionSpectrum,
+    EmissionSpectrumResult,
+    PatchSpectrum,
+    SpectralComparison,
+)
+from labrig.written_numbers import plus_minus, rounded
+
+HEIGHT_PT = 256.0
+WAVELENGTH_LABEL = "Wavelength / nm"
+COLUMNS = 4
+
+
+def render(result: EmissionSpectrumResult, source: Source) -> Rendered:
+    """Show the spectrum of every patch, its constancy and its independence of the lamp."""
+    sections: list[Section] = []
+    lines: list[str] = []
+    for name, patch in result.patches.items():
+        of_patch, prefix = (f": {name}", f"{name}: ") if name else ("", "")
+        sections += (replace(one, title=one.title + of_patch) for one in _sections(patch))
+        lines += (prefix + line for line in _lines(patch))
+    return Rendered(tuple(sections), tuple(lines))
+
+
+def _lines(patch: PatchSpectrum) -> Iterator[str]:
+    """Where the spectrum is, one line for the times, one for each further lamp."""
+    spectrum, centroid = patch.spectrum, patch.spectrum.centroid
+    yield (
+        f"emission: highest at {spectrum.peak_nm:.0f} nm, centroid "
+        f"{plus_minus(centroid.value, centroid.sigma)} nm; "
+        f"σ of Λ* {100 * float(np.median(spectrum.sigma)):.1f} % of its peak (median)"
+    )
+    if patch.times:
+        least = min(patch.times, key=lambda one: one.p_value)
+        outcome = "changes" if patch.changes_with_time else "the same"
+        yield (
+            f"over time: {outcome} (least p = {least.p_value:.2g} of {len(patch.times)}, at "
+            f"{least.what}; centroid {_shift(least)} nm off the others)"
+        )
+    outcome = "differs" if patch.depends_on_lamp else "the same"
+    for one in patch.lamps:
+        yield (
+            f"{one.what}: {outcome} (p = {one.p_value:.2g}; centroid {_shift(one)} nm off, "
+            f"{one.brightness:.3g} times as bright)"
+        )
+
+
+def _shift(comparison: SpectralComparison) -> str:
+    return plus_minus(comparison.shift_nm, comparison.shift_sigma_nm)
+
+
+def _sections(patch: PatchSpectrum) -> Iterator[Section]:
+    frames = patch.charges[0].frames
+    white = (
+        "A grey card under the known lamp, through the same filter, has told what the camera's "
+        "curves are off by in every place."
+        if patch.white_reference
+        else "Without a picture of a grey card under the known lamp the camera's curves are taken "
+        "as they are, with the 6 % by which laboratories disagree in every σ."
+    )
+    places = len(patch.centre_nm) // len(patch.channels)
+    yield Section(
+        "Emission spectrum",
+        (
+            f"Λ* from {places} places of the filter in {len(frames)} frames, largest value 1. "
+            f"{white}",
+            "Lines much narrower than the filter's band may come out broader than they are, by "
+            "more than the credible band says.",
+        ),
+        (
+            Picture(
+                "spectrum",
+                _spectrum_figure(patch.spectrum),
+                "Emission spectrum Λ*, means over 10 nm; band: 68 % credible.",
+            ),
+        ),
+    )
+    if patch.times:
+        at_times = {
+            f"{t_s:.3g} s": spectrum
+            for t_s, spectrum in zip(frames.t_s, patch.at_times, strict=True)
+        }
+        yield Section(
+            "Constancy in time",
+            (_constancy_text(patch),),
+            (
+                Picture(
+                    "over-time",
+                    _normalised_figure(at_times),
+                    "Spectra at several times after lamp off, all of one integral; bars: 1 σ, "
+                    "most of it common to all times (camera curves).",
+                ),
+                Picture(
+                    "shift",
+                    _shift_figure(patch.times, frames.t_s),
+                    "Centroid of the light along the filter at each time, less that of all "
+                    "other times; bars: 1 σ of noise.",
+                ),
+            ),
+            (_table("after lamp off", patch.times),),
+        )
+    if patch.lamps:
+        by_lamp = {charge.lamp: charge.spectrum for charge in patch.charges}
+        yield Section(
+            "Independence of the exciting lamp",
+            (_lamp_text(patch),),
+            (
+                Picture(
+                    "lamps",
+                    _normalised_figure(by_lamp),
+                    "Spectra after charging with either lamp, all of one integral; bars: 1 σ, "
+                    "most of it common to both (camera curves).",
+                ),
+            ),
+            (_table("lamp", patch.lamps),),
+        )
+
+
+def _constancy_text(patch: PatchSpectrum) -> str:
+    least = min(patch.times, key=lambda one: one.p_value)
+    if patch.changes_with_time:
+        worst = max(patch.times, key=lambda one: one.beyond_noise)
+        return (
+            "The relative spectrum changes with time: the picture at "
+            f"{worst.what} differs from those at the other times by {worst.beyond_noise:.2%} "
+            f"beyond noise (p = {least.p_value:.2g})."
+        )
+    return (
+        "The relative spectrum is the same at all times within noise (paper, fig. 6): the least "
+        f"p-value of {len(patch.times)} is {least.p_value:.2g}. Pictures are compared place by "
+        "place, so that camera curves and filter drop out."
+    )
+
+
+def _lamp_text(patch: PatchSpectrum) -> str:
+    outcome = "differs" if patch.depends_on_lamp else "is the same within noise"
+    worst = max(patch.lamps, key=lambda one: one.beyond_noise)
+    return (
+        f"The relative spectrum {outcome} whichever lamp charged the sample: "
+        f"p = {worst.p_value:.2g}, {worst.beyond_noise:.2%} rms beyond noise."
+    )
+
+
+def _table(what: str, comparisons: Sequence[SpectralComparison]) -> Table:
+    return Table(
+        (what, "χ²", "degrees of freedom", "p", "rms beyond noise / %", "centroid shift / nm"),
+        tuple(
+            (
+                one.what,
+                rounded(one.chi2),
+                str(one.dof),
+                f"{one.p_value:.2g}",
+                rounded(100 * one.beyond_noise, 2),
+                _shift(one),
+            )
+            for one in comparisons
+        ),
+    )
+
+
+def _spectrum_figure(spectrum: EmissionSpectrum) -> Figure:
+    """Λ* with its credible band."""
+    figure, axes = _axes("Λ* (largest value 1)")
+    nm = np.array(spectrum.wavelength_nm)
+    axes.fill_between(nm, spectrum.low, spectrum.high, color=INK, alpha=BAND_OPACITY, linewidth=0)
+    axes.plot(nm, spectrum.value, color=INK, linewidth=1.4)
+    axes.set_ylim(0, 1.05 * max(spectrum.high))
+    legend_above(figure, [lined("Λ*", INK), shaded("68 % credible", INK)], COLUMNS)
+    return figure
+
+
+def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
+    """Several spectra, each of its own integral, so that only their shapes differ."""
+    figure, axes = _axes("Share of the emission per 10 nm / %")
+    entries = []
+    for number, (name, spectrum) in enumerate(spectra.items()):
+        colour, marker = _colour_and_marker(number)
+        nm = np.array(spectrum.wavelength_nm)
+        value, sigma = (
+            100 * np.array(column) / sum(spectrum.value)
+            for column in (spectrum.value, spectrum.sigma)
+        )
+        # Side by side, so that error bars do not cover each other.
+        beside = nm + 1.2 * (number - (len(spectra) - 1) / 2)
+        axes.plot(nm, value, color=colour, linewidth=0.9)
+        error_bars(axes, beside, value, sigma, colour)
+        points(axes, beside, value, marker, colour, colour, size=3.0)
+        entries.append(marked(name, marker, colour))
+    axes.set_ylim(0, None)
+    legend_above(figure, entries, COLUMNS)
+    return figure
+
+
+def _shift_figure(comparisons: Sequence[SpectralComparison], t_s: FloatArray) -> Figure:
+    """How far the centroid of every frame's light lies off that of the others."""
+    figure = new_figure(180.0)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
+    axes.axhline(0.0, color=MUTED, linewidth=0.9)
+    shift = np.array([one.shift_nm for one in comparisons])
+    sigma = np.array([one.shift_sigma_nm for one in comparisons])
+    error_bars(axes, t_s, shift, sigma, INK)
+    points(axes, t_s, shift, "o", INK, INK)
+    axes.set_xscale("log")
+    axes.set_xticks(t_s, [f"{time_s:.3g}" for time_s in t_s])
+    axes.xaxis.set_minor_locator(NullLocator())
+    axes.set_xlabel("Time after lamp off / s")
+    axes.set_ylabel("Shift of centroid / nm")
+    reach = 1.2 * float(np.max(np.abs(shift) + sigma, initial=0.1))
+    axes.set_ylim(-reach, reach)
+    return figure
+
+
+def _axes(label: str) -> tuple[Figure, Axes]:
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
+    axes.set_xlabel(WAVELENGTH_LABEL)
+    axes.set_ylabel(label)
+    axes.set_xlim(395, 705)
+    return figure, axes
+
+
+def _colour_and_marker(number: int) -> tuple[str, str]:
+    colours = (INK, *OTHER_CHANNELS)
+    return colours[number % len(colours)], MARKERS[number % len(MARKERS)]

@@ -1,0 +1,60 @@
+"""What frames of a filter's strip are held against while the bench is still as it was."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from labrig.calibration import Strip
+from labrig.fit.lvf import locate_lines
+from labrig.reduce.hdr import Exposure, read_hdr_frame
+from labrig.reduce.strip import find_strip, strip_profile
+from labrig.results.strip import StripProfile
+
+#: Scenes are alike if this share of the strip, in per cent, agrees to that; two gels do not.
+NEARLY_ALL, ALIKE = 90, 0.02
+#: Dimmer than this share of the brightest, a place along the strip says nothing of that.
+BRIGHT = 0.05
+
+
+def strip_found(frames: Sequence[Exposure]) -> str:
+    """Where the strip is, in words.
+
+    Raises
+    ------
+    DataError
+        As `find_strip`.
+    """
+    return str(find_strip(read_hdr_frame(frames)))
+
+
+def lines_found(
+    frames: Sequence[Exposure], of_strip: Sequence[Exposure], rising: bool | None
+) -> str:
+    """Which lines are seen, in words.
+
+    Raises
+    ------
+    FitError
+        As `locate_lines`: none are, or the filter is the wrong way round.
+    """
+    profile = _profile(frames, _strip(of_strip))
+    return str(locate_lines(profile.position, profile.value_dn_per_s, rising=rising))
+
+
+def look_alike(
+    frames: Sequence[Exposure], others: Sequence[Exposure], of_strip: Sequence[Exposure]
+) -> bool:
+    """Whether the strip looks the same in two sets of frames, brightness included."""
+    strip = _strip(of_strip)
+    one, other = (_profile(some, strip).value_dn_per_s for some in (frames, others))
+    bright = other > BRIGHT * other.max(axis=0)
+    apart = np.abs(one[bright] / other[bright] - 1)
+    return bool(np.percentile(apart, NEARLY_ALL) < ALIKE)
+
+
+def _strip(frames: Sequence[Exposure]) -> Strip:
+    return find_strip(read_hdr_frame(frames)).strip(rising=True)
+
+
+def _profile(frames: Sequence[Exposure], strip: Strip) -> StripProfile:
+    return strip_profile(read_hdr_frame(frames), strip)
