@@ -1,7 +1,5 @@
 """A time series: what one patch of the sample gave, frame by frame."""
 
-import csv
-import io
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -9,8 +7,9 @@ from pathlib import Path
 import numpy as np
 import numpy.typing as npt
 
-from labrig.errors import DataError, DiskError
+from labrig.errors import DataError
 from labrig.results.arrays import FloatArray
+from labrig.results.csv_file import write_csv
 
 #: Columns of series.csv that are not channels (contracts.md).
 TIME, EXPOSURE, SIGMA_SUFFIX = "t_s", "exposure_s", "_sigma"
@@ -122,16 +121,9 @@ def write_series(path: Path, series: Sequence[Series]) -> None:
     channels = {part.channels for part in series}
     if len(channels) != 1:
         raise DataError(f"expected series of the same channels, got {sorted(channels)}")
-    text = io.StringIO()
-    writer = csv.writer(text, lineterminator="\n")
     columns = [column for name in channels.pop() for column in (name, name + SIGMA_SUFFIX)]
-    writer.writerow([TIME, EXPOSURE, *columns, *RESERVED])
-    for part in series:
-        writer.writerows(_rows(part))
-    try:
-        path.write_text(text.getvalue(), encoding="utf-8", newline="")
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    rows = (row for part in series for row in _rows(part))
+    write_csv(path, (TIME, EXPOSURE, *columns, *RESERVED), rows)
 
 
 def _rows(series: Series) -> Iterator[list[str]]:

@@ -6,50 +6,50 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from labrig.analyse.isotropy import View, process
-from labrig.analyse.part import Part
+from labrig.analyse.isotropy import analyse
 from labrig.errors import DataError
-from labrig.process import process_run
-from labrig.report import figure_style
+from labrig.process import process_and_report
+from labrig.results.isotropy import IsotropyResult
 from tests.analyse.spectral_bench import record, stage_of
+from tests.results.made import assert_read_back
 
 QUICK = {"protocol": "isotropy", "charge": "2 min", "frames": 2, "angles": [40, 80],
          "first": "30 s"}  # fmt: skip
 
 
-def views(part: Part) -> dict[int, View]:
-    rows = (part.folder / "isotropy.csv").read_text().splitlines()[1:]
-    found = [row.split(",") for row in rows]
-    return {int(angle): View(int(angle), float(r), float(s)) for _, angle, r, s in found}
-
-
 @pytest.mark.parametrize("anisotropy", [0.0, 0.15])
 def test_what_the_sample_loses_to_the_side_is_found(tmp_path: Path, anisotropy: float) -> None:
     part = stage_of(record(tmp_path, QUICK, anisotropy=anisotropy), tmp_path)
-    with figure_style():
-        result = process(part)
-    for angle, view in views(part).items():
-        true = 1 - anisotropy * (1 - np.cos(np.radians(angle)))
-        assert abs(view.ratio - true) < 3 * view.sigma
-        assert view.sigma < 0.02
-    told = any("not isotropic" in warning for warning in result.warnings)
-    assert told == (anisotropy > 0)
-    assert ("at 80°" in result.lines[0]) or not told
-    assert len(result.sections[0].figures) == 1
+    result = analyse(part)
+    (glow,) = result.patches.values()
+    true = 1 - anisotropy * (1 - np.cos(np.radians(glow.angle_deg)))
+    assert glow.angle_deg.tolist() == [40, 80]
+    assert (np.abs(glow.ratio - true) < 3 * glow.ratio_sigma).all()
+    assert (glow.ratio_sigma < 0.02).all()
+    warned = any("not isotropic" in warning for warning in result.warnings)
+    assert warned == (anisotropy > 0)
+    assert glow.worst_angle_deg == 80 or not warned
+    assert_read_back(result)
     attempts = [attempt for attempt in part.run.attempts if attempt.unit != "angle-after"]
     with pytest.raises(DataError, match="between two straight ones"):
-        process(replace(part, run=replace(part.run, attempts=attempts)))
+        analyse(replace(part, run=replace(part.run, attempts=attempts)))
 
 
 def test_around_a_whole_sample_the_cosine_is_divided_out(tmp_path: Path) -> None:
-    part = stage_of(record(tmp_path, QUICK | {"patch": "around"}), tmp_path)
-    with figure_style():
-        process(part)
-    for angle, view in views(part).items():
-        assert view.ratio * np.cos(np.radians(angle)) == pytest.approx(1.0, abs=0.03)
+    done = process_and_report(record(tmp_path, QUICK | {"patch": "around"}))
+    assert isinstance(done.result, IsotropyResult)
+    (glow,) = done.result.patches.values()
+    assert glow.ratio * np.cos(np.radians(glow.angle_deg)) == pytest.approx(1.0, abs=0.03)
+    rows = (done.report.parent / "isotropy.csv").read_text().splitlines()
+    assert len(rows) == 1 + 2
+    (line,) = done.lines
+    assert f"(at {glow.worst_angle_deg}°: " in line
+    page = done.report.read_text()
+    assert "here divided by the cosine" in page
+    assert "Glow at an angle relative to the straight view" in page
 
 
 def test_the_report_tells_how_late_shield_and_door_were(tmp_path: Path) -> None:
-    page = process_run(record(tmp_path, QUICK | {"angles": [80]})).report.read_text()
+    page = process_and_report(record(tmp_path, QUICK | {"angles": [80]})).report.read_text()
     assert "shield cover at most" in page
     assert "door open at most 0 ms" in page

@@ -9,13 +9,15 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import read_rig_file
-from labrig.analyse.saturation import process
-from labrig.analyse.saturation.level import charged, level
-from labrig.analyse.saturation.shared_rates import Curve, compare_rates
+from labrig.analyse.saturation import analyse
+from labrig.analyse.saturation.charge_level import charge_level, charged
+from labrig.analyse.saturation.rate_comparison import compare_rates
 from labrig.bench import open_bench
 from labrig.errors import DataError
-from labrig.report import figure_style
+from labrig.process import process_and_report
+from labrig.results.saturation import Curve, SaturationResult
 from tests.analyse.spectral_bench import record, stage_of
+from tests.results.made import assert_read_back
 
 QUICK: dict[str, Any] = {
     "protocol": "saturation", "charges": ["30 s", "10 min", "20 min"], "first": "800 ms",
@@ -38,20 +40,25 @@ def true_level(rig: Path, charge_s: float) -> float:
 
 
 def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
-    part = stage_of(record(tmp_path, QUICK | HALF, seed=2), tmp_path)
-    with figure_style():
-        found = process(part)
-    in_time, of_level, rates = found.lines
+    done = process_and_report(record(tmp_path, QUICK | HALF, seed=2))
+    assert isinstance(done.result, SaturationResult)
+    (patch,) = done.result.patches.values()
+    assert patch.in_time == "saturated in time"
+    (level,) = patch.levels
+    assert abs(level.r - true_level(tmp_path / "rig.yaml", 1200.0)) < 3 * level.sigma
+    assert level.sigma < 0.05
+    assert level.verdict == "no"
+    assert len(patch.curves) == 6
+    assert not patch.rates.differ
+    assert any("r(0) = 1 does not hold" in warning for warning in done.result.warnings)
+    assert_read_back(done.result)
+    rows = (done.report.parent / "saturation.csv").read_text().splitlines()
+    assert len(rows) == 1 + 6
+    in_time, of_level, rates = done.lines
     assert "saturated in time" in in_time
-    r, sigma = (float(text) for text in of_level.split("r(0) = ")[1].split(";")[0].split(" ± "))
-    assert abs(r - true_level(tmp_path / "rig.yaml", 1200.0)) < 3 * sigma
-    assert sigma < 0.05
     assert of_level.endswith("r(0) = 1 may be believed: no")
     assert "rates are the same after all 6 charges" in rates
-    assert any("r(0) = 1 does not hold" in warning for warning in found.warnings)
-    rows = (tmp_path / "saturation.csv").read_text().splitlines()
-    assert len(rows) == 1 + 6
-    assert len(found.sections[0].figures) == 2
+    assert "The weaker light was 50% of the full one (σ 2% of that)" in done.report.read_text()
 
 
 @pytest.mark.campaign
@@ -61,16 +68,16 @@ def test_a_power_laws_rates_depend_on_the_charge(tmp_path: Path) -> None:
                sample="power-law"),
         tmp_path,
     )  # fmt: skip
-    with figure_style():
-        found = process(part)
-    assert "not saturated" in found.lines[0]
-    assert "nothing can be said without a weaker light" in found.lines[1]
-    assert "rates differ with all 2 charges" in found.lines[2]
-    assert any("the rates depend on the charge" in warning for warning in found.warnings)
+    result = analyse(part)
+    (patch,) = result.patches.values()
+    assert patch.in_time == "not saturated"
+    assert patch.levels == ()
+    assert patch.rates.differ
+    assert any("the rates depend on the charge" in warning for warning in result.warnings)
     attempts = [attempt for attempt in part.run.attempts if attempt.unit != "full-2"]
     run = replace(part.run, attempts=attempts)
     with pytest.raises(DataError, match="two or more complete decays"):
-        process(replace(part, run=run))
+        analyse(replace(part, run=run))
 
 
 @given(
@@ -84,7 +91,7 @@ def test_the_level_is_what_was_charged(
 ) -> None:
     kappa = times * k
     full, weak = charged(kappa, k, charge_s), charged(share * kappa, k, charge_s)
-    found = level(weak / full, 1e-4, share, 0.0, k, (charge_s, charge_s))
+    found = charge_level(weak / full, 1e-4, share, 0.0, k, (charge_s, charge_s))
     assert found.r == pytest.approx(full, rel=1e-6)
     assert found.sigma > 0
 
@@ -93,7 +100,7 @@ def test_the_level_is_what_was_charged(
     ("ratio", "r", "verdict"), [(0.5, 0.0, "no"), (0.999, 1.0, "yes"), (0.4, 0.0, "no")]
 )
 def test_ends_of_the_range_are_levels_too(ratio: float, r: float, verdict: str) -> None:
-    found = level(ratio, 0.002, 0.5, 0.01, 0.03, (5400.0, 5400.0))
+    found = charge_level(ratio, 0.002, 0.5, 0.01, 0.03, (5400.0, 5400.0))
     assert found.r == pytest.approx(r, abs=0.01)
     assert found.verdict == verdict
 

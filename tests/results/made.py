@@ -1,11 +1,14 @@
-"""Decay results with given numbers, for tests of what becomes of them."""
+"""Decay results with given numbers, for tests of what becomes of them; results read back."""
 
+import json
 import math
 from collections.abc import Mapping
+from dataclasses import fields, is_dataclass
+from typing import Any
 
 import numpy as np
 
-from labrig.results import DecayState, FittedDecay
+from labrig.results import DecayState, FittedDecay, RunResult
 
 
 def decay_result(
@@ -38,3 +41,30 @@ def decay_result(
         rivals=(),
         better_rival=None,
     )
+
+
+def assert_read_back(result: RunResult) -> None:
+    """What is written as `result.json` gives the same result, field by field, bit by bit."""
+    again = type(result).from_dict(json.loads(result.to_json()))
+    _assert_same(result, again, result.kind)
+
+
+def _assert_same(one: Any, other: Any, place: str) -> None:
+    if isinstance(other, np.ndarray):
+        assert one.dtype == other.dtype, place
+        np.testing.assert_array_equal(one, other, err_msg=place)
+    elif isinstance(other, Mapping):
+        assert list(one) == list(other), place
+        for key in other:
+            _assert_same(one[key], other[key], f"{place}.{key}")
+    elif isinstance(other, tuple):
+        assert len(one) == len(other), place
+        for number, (mine, its) in enumerate(zip(one, other, strict=True)):
+            _assert_same(mine, its, f"{place}[{number}]")
+    elif is_dataclass(other):
+        assert isinstance(one, type(other)), place
+        for field in fields(other):
+            mine, its = getattr(one, field.name), getattr(other, field.name)
+            _assert_same(mine, its, f"{place}.{field.name}")
+    else:
+        np.testing.assert_equal(one, other, err_msg=place)

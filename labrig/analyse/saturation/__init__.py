@@ -1,5 +1,5 @@
-"""Processing of `saturation`: is r(0) = 1, and do rates depend on the charge."""
+"""From decays after several charges: is r(0) = 1, and do rates depend on the charge."""
 
-from labrig.analyse.saturation.process import process
+from labrig.analyse.saturation.analysis import analyse
 
-__all__ = ["process"]
+__all__ = ["analyse"]

@@ -6,104 +6,19 @@ has them, say the same with less noise. Amplitudes are linear, so only the rates
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import least_squares
-from scipy.special import chdtrc, fdtrc
+from scipy.special import fdtrc
 
 from labrig.errors import FitError
-from labrig.fit import DecayFit
 from labrig.fit.least_squares import EPSILON
 from labrig.material.rates import exponential_means
-from labrig.results import Series
-
-FloatArray = NDArray[np.float64]
-
-#: Chance at which rates that are the same are said to differ.
-LEVEL = 1e-3
-#: Chance at which decays that are exponentials are said to be none.
-MISFIT_LEVEL = 5e-4
+from labrig.results import FittedDecay, FloatArray, Series
+from labrig.results.saturation import Curve, RatesTest
 
 
-@dataclass(frozen=True, eq=False)
-class Curve:
-    """One decay: (n,) times, exposures, values and σ; σ of a constant that may be in all."""
-
-    t_s: FloatArray
-    exposure_s: FloatArray
-    value: FloatArray
-    sigma: FloatArray
-    offset_sigma: float
-
-    def design(self, rates_per_s: FloatArray) -> FloatArray:
-        """(n + 1, states + 1) whitened, its last row the offset's prior."""
-        shapes = exponential_means(rates_per_s, self.t_s, self.exposure_s)
-        offset = np.full((len(self.t_s), 1), self.offset_sigma)
-        rows = np.hstack([shapes, offset]) / self.sigma[:, np.newaxis]
-        prior = np.zeros((1, rows.shape[1]))
-        prior[0, -1] = 1.0
-        return np.vstack([rows, prior])
-
-    @property
-    def target(self) -> FloatArray:
-        """(n + 1,) whitened."""
-        return np.append(self.value / self.sigma, 0.0)
-
-    def residuals(self, rates_per_s: FloatArray) -> FloatArray:
-        """(n + 1,) of the best amplitudes."""
-        design = self.design(rates_per_s)
-        solution, *_ = np.linalg.lstsq(design, self.target, rcond=None)
-        return np.asarray(design @ solution - self.target)
-
-
-@dataclass(frozen=True, eq=False)
-class RatesTest:
-    """What sharing the rates costs.
-
-    Attributes
-    ----------
-    shared_per_s
-        (s,) by falling rate.
-    own_per_s, own_sigma_per_s
-        (d, s) of every decay by itself.
-    amplitude, amplitude_sigma
-        (d, s) of every decay at lamp off, the rates shared.
-    chi2_shared, chi2_own, dof_own
-        Sums of all decays.
-    noise_dof
-        Degrees of freedom from which the noise itself was estimated; infinite if it is known.
-    p_value
-        Of an F-test: chance that rates which are the same come out so different.
-    """
-
-    shared_per_s: FloatArray
-    own_per_s: FloatArray
-    own_sigma_per_s: FloatArray
-    amplitude: FloatArray
-    amplitude_sigma: FloatArray
-    chi2_shared: float
-    chi2_own: float
-    dof_own: int
-    noise_dof: float
-    p_value: float
-
-    @property
-    def differ(self) -> bool:
-        """Whether the rates depend on the charge."""
-        return self.p_value < LEVEL
-
-    @property
-    def misfit(self) -> bool:
-        """Whether not even rates of their own describe the decays."""
-        if np.isinf(self.noise_dof):
-            return float(chdtrc(self.dof_own, self.chi2_own)) < MISFIT_LEVEL
-        excess = self.chi2_own / self.dof_own
-        return float(fdtrc(self.dof_own, self.noise_dof, excess)) < MISFIT_LEVEL
-
-
-def curve(series: Series, fit: DecayFit) -> Curve:
+def curve(series: Series, fit: FittedDecay) -> Curve:
     """A series with its channels weighed as in `fit`, flicker in its σ."""
     rows = series.usable
     weights = np.array(fit.channel_weights)
@@ -116,7 +31,7 @@ def curve(series: Series, fit: DecayFit) -> Curve:
     return Curve(series.t_s[rows], series.exposure_s[rows], value, sigma, float(shares @ dark))
 
 
-def flicker_dof(fit: DecayFit) -> float:
+def flicker_dof(fit: FittedDecay) -> float:
     """Degrees of freedom from which a fit estimated its flicker; infinite if it was given."""
     if not fit.flicker_sigma > 0:
         return np.inf
@@ -163,6 +78,7 @@ def compare_rates(
         own_sigma_per_s=np.array([(np.exp(found) * sigma)[falling] for found, _, sigma in alone]),
         amplitude=np.array([value[falling] for value, _ in amplitudes]),
         amplitude_sigma=np.array([sigma[falling] for _, sigma in amplitudes]),
+        residuals=tuple(-_misfit(one, np.exp(shared)[falling])[:-1] for one in curves),
         chi2_shared=shared_chi2,
         chi2_own=own_chi2,
         dof_own=dof,
@@ -175,7 +91,7 @@ def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float,
     """Log rates (s,), χ² and σ of the log rates."""
 
     def residuals(log_rates: FloatArray) -> FloatArray:
-        return np.concatenate([one.residuals(np.exp(log_rates)) for one in curves])
+        return np.concatenate([_misfit(one, np.exp(log_rates)) for one in curves])
 
     found = least_squares(residuals, start, x_scale=0.1, xtol=1e-10, ftol=1e-12)
     jacobian = np.asarray(found.jac, dtype=np.float64)
@@ -183,8 +99,30 @@ def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float,
     return found.x, float(2 * found.cost), np.sqrt(np.diag(covariance))
 
 
+def _misfit(one: Curve, rates_per_s: FloatArray) -> FloatArray:
+    """(n + 1,) model − value of the best amplitudes, whitened."""
+    design, target = _design(one, rates_per_s), _target(one)
+    solution, *_ = np.linalg.lstsq(design, target, rcond=None)
+    return np.asarray(design @ solution - target)
+
+
 def _amplitudes(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    design = one.design(rates_per_s)
+    design = _design(one, rates_per_s)
     covariance = np.linalg.pinv(design.T @ design, rcond=1e3 * EPSILON)
-    solution = covariance @ design.T @ one.target
+    solution = covariance @ design.T @ _target(one)
     return solution[:-1], np.sqrt(np.diag(covariance))[:-1]
+
+
+def _design(one: Curve, rates_per_s: FloatArray) -> FloatArray:
+    """(n + 1, states + 1) whitened, its last row the offset's prior."""
+    shapes = exponential_means(rates_per_s, one.t_s, one.exposure_s)
+    offset = np.full((len(one.t_s), 1), one.offset_sigma)
+    rows = np.hstack([shapes, offset]) / one.sigma[:, np.newaxis]
+    prior = np.zeros((1, rows.shape[1]))
+    prior[0, -1] = 1.0
+    return np.vstack([rows, prior])
+
+
+def _target(one: Curve) -> FloatArray:
+    """(n + 1,) whitened."""
+    return np.append(one.value / one.sigma, 0.0)

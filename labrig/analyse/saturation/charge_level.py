@@ -5,33 +5,15 @@ q κ: where r is small the glow falls by q, where it is near 1 hardly at all. Am
 compared, so that neither Λ nor the camera's scale matter.
 """
 
-from dataclasses import dataclass
-
 import numpy as np
 from scipy.optimize import brentq
+
+from labrig.results.saturation import ChargeLevel
 
 #: Lights searched, in multiples of the rate of re-radiation: r∞ of 1e-4 to 0.9999.
 FAINTEST, STRONGEST = 1e-4, 1e4
 #: Relative step of the derivatives.
 STEP = 1e-3
-#: r(0) = 1 may be believed from here on, and not below.
-NEARLY_ONE = 0.95
-SIGMAS = 2.0
-
-
-@dataclass(frozen=True)
-class Level:
-    """r at lamp off after the long charge under the full light, and its σ."""
-
-    r: float
-    sigma: float
-
-    @property
-    def verdict(self) -> str:
-        """Whether r(0) = 1 may be believed."""
-        if self.r + SIGMAS * self.sigma < NEARLY_ONE:
-            return "no"
-        return "yes" if self.r - SIGMAS * self.sigma > NEARLY_ONE else "not decided"
 
 
 def charged(kappa_per_s: float, k_per_s: float, charge_s: float) -> float:
@@ -40,14 +22,14 @@ def charged(kappa_per_s: float, k_per_s: float, charge_s: float) -> float:
     return float(kappa_per_s / s * -np.expm1(-s * charge_s))
 
 
-def level(
+def charge_level(
     ratio: float,
     ratio_sigma: float,
     share: float,
     share_sigma: float,
     k_per_s: float,
     charges_s: tuple[float, float],
-) -> Level:
+) -> ChargeLevel:
     """The level under the full light.
 
     Parameters
@@ -65,7 +47,7 @@ def level(
     sigma = np.hypot(by_ratio * ratio_sigma / ratio, by_share * share_sigma)
     # At an end of the range, where nothing changes any more, the σ is that just inside.
     least = ratio_sigma / ratio * share / (1 - share)
-    return Level(r, float(max(sigma, least)))
+    return ChargeLevel(r, float(max(sigma, least)))
 
 
 def _level(ratio: float, share: float, k_per_s: float, charges_s: tuple[float, float]) -> float:

@@ -1,0 +1,115 @@
+"""The glow at several angles in a report."""
+
+from collections.abc import Mapping
+
+import numpy as np
+from matplotlib.artist import Artist
+from matplotlib.figure import Figure
+
+from labrig.report.figure_style import (
+    INK,
+    LEFT_PT,
+    MARKERS,
+    MUTED,
+    OTHER_CHANNELS,
+    SHADE,
+    error_bars,
+    new_figure,
+    place,
+    points,
+)
+from labrig.report.legend import legend_above, marked, shaded
+from labrig.report.rendering import Rendered, Source
+from labrig.report.sections import Picture, Section, Table
+from labrig.results.isotropy import PAPER, AngularGlow, IsotropyResult, is_within_paper
+from labrig.written_numbers import plus_minus
+
+#: By how much more than the paper's samples fluctuate the figure reaches at least.
+LEAST_REACH = 1.5
+
+
+def render(result: IsotropyResult, source: Source) -> Rendered:
+    """Show the radiance over the angle, and what the largest deviation is."""
+    several = len(result.patches) > 1
+    lines = (
+        f"{name}: {_line(glow)}" if several else _line(glow)
+        for name, glow in result.patches.items()
+    )
+    return Rendered((_section(result),), tuple(lines))
+
+
+def _line(glow: AngularGlow) -> str:
+    worst = glow.worst
+    return (
+        f"isotropy: within {abs(worst.value - 1):.1%} of the straight view up to "
+        f"{glow.angle_deg.max()}° (at {glow.worst_angle_deg}°: "
+        f"{plus_minus(worst.value, worst.sigma)}; the paper's samples: less than {PAPER:.0%})"
+    )
+
+
+def _section(result: IsotropyResult) -> Section:
+    patches = result.patches
+    what = (
+        "The patches enclose the whole sample: what they show is its intensity, here divided by "
+        "the cosine of the angle."
+        if result.around
+        else "The patches lie inside of the sample: what they show is its radiance, which is the "
+        "same at all angles if the emission is isotropic."
+    )
+    drift = ", ".join(
+        f"{name} {plus_minus(glow.drift.value, glow.drift.sigma)}" for name, glow in patches.items()
+    )
+    caption = (
+        "Glow at an angle relative to the straight view at the same time after lamp off; bars: "
+        f"1 σ; shaded: the {100 * PAPER:g} % that the paper's samples stay within."
+    )
+    first = next(iter(patches.values()))
+    rows = (
+        (
+            f"{angle_deg}°",
+            *(plus_minus(glow.ratio[n], glow.ratio_sigma[n]) for glow in patches.values()),
+        )
+        for n, angle_deg in enumerate(first.angle_deg)
+    )
+    return Section(
+        "Isotropy",
+        (
+            f"Every view follows a charge seen straight. {what}",
+            f"The straight view after all others over the one before: {drift}; that drift is "
+            "divided out.",
+            *(_statement(name, glow) for name, glow in patches.items()),
+        ),
+        (Picture("isotropy", _figure(patches), caption),),
+        (Table(("angle", *patches), tuple(rows)),),
+    )
+
+
+def _statement(name: str, glow: AngularGlow) -> str:
+    worst = glow.worst
+    return (
+        f"{name}: the largest deviation is {worst.value - 1:+.1%} ± {worst.sigma:.1%} at "
+        f"{glow.worst_angle_deg}°, {'no more' if is_within_paper(worst) else 'more'} than the "
+        f"paper's {PAPER:.0%}."
+    )
+
+
+def _figure(patches: Mapping[str, AngularGlow]) -> Figure:
+    figure = new_figure(220.0)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
+    axes.axhspan(1 - PAPER, 1 + PAPER, color=SHADE, zorder=0)
+    axes.axhline(1.0, color=MUTED, linewidth=0.9)
+    entries: list[Artist] = [shaded(f"paper: ± {100 * PAPER:g} %", MUTED)]
+    reach = LEAST_REACH * PAPER
+    for number, (name, glow) in enumerate(patches.items()):
+        colour = (INK, *OTHER_CHANNELS)[number % (1 + len(OTHER_CHANNELS))]
+        marker = MARKERS[number % len(MARKERS)]
+        angle_deg = glow.angle_deg.astype(float)
+        error_bars(axes, angle_deg, glow.ratio, glow.ratio_sigma, colour)
+        points(axes, angle_deg, glow.ratio, marker, colour, colour)
+        entries.append(marked(name, marker, colour))
+        reach = max(reach, 1.2 * float(np.max(np.abs(glow.ratio - 1) + glow.ratio_sigma)))
+    axes.set_ylim(1 - reach, 1 + reach)
+    axes.set_xlabel("Angle / °")
+    axes.set_ylabel("Relative to straight view")
+    legend_above(figure, entries, columns=5)
+    return figure

@@ -1,0 +1,191 @@
+"""Plateaus of the glow, levels of charge and rates after several charges in a report."""
+
+from collections.abc import Iterator
+
+import numpy as np
+from matplotlib.figure import Figure
+
+from labrig.quantity import duration_text
+from labrig.report.figure_style import (
+    DASHED,
+    INK,
+    LEFT_PT,
+    MARKERS,
+    MUTED,
+    OTHER_CHANNELS,
+    PAPER,
+    error_bars,
+    new_figure,
+    place,
+    points,
+)
+from labrig.report.legend import legend_above, lined, marked
+from labrig.report.log_axis import mark_decades
+from labrig.report.rendering import Rendered, Source
+from labrig.report.sections import Picture, Section, Table
+from labrig.results import Measured
+from labrig.results.saturation import FULL, LIGHTS, PatchSaturation, RatesTest, SaturationResult
+from labrig.written_numbers import plus_minus, rounded
+
+
+def render(result: SaturationResult, source: Source) -> Rendered:
+    """Show every patch: how its glow saturates, in time and in level, and its rates."""
+    several = len(result.patches) > 1
+    lines = (
+        f"{name}: {line}" if several else line
+        for name, patch in result.patches.items()
+        for line in _lines(patch)
+    )
+    sections = (_section(name, one, result.weaker_light) for name, one in result.patches.items())
+    return Rendered(tuple(sections), tuple(lines))
+
+
+def _lines(patch: PatchSaturation) -> Iterator[str]:
+    """Saturation in time, in level, and the rates."""
+    begin, end = (
+        f"{_percent(growth.value)} ± {_percent(growth.sigma)}"
+        for growth in (patch.growth_at_begin, patch.growth_at_end)
+    )
+    shorter, longer = (duration_text(float(patch.charge_s[row])) for row in patch.rows(FULL)[-2:])
+    yield (
+        f"from {shorter} to {longer} of charge the glow changes by {begin} at lamp off, {end} at "
+        f"the end of the decay: {patch.in_time}"
+    )
+    of_states = zip(patch.levels, patch.rates.shared_per_s, strict=False)
+    for number, (level, k_per_s) in enumerate(of_states, start=1):
+        yield (
+            f"state {number} (k = {rounded(float(k_per_s), 3)} s⁻¹): r(0) = "
+            f"{plus_minus(level.r, level.sigma)}; r(0) = 1 may be believed: {level.verdict}"
+        )
+    if not patch.levels:
+        yield (
+            "r(0): nothing can be said without a weaker light; saturation in time is none in level"
+        )
+    yield _rates_text(patch)
+
+
+def _rates_text(patch: PatchSaturation) -> str:
+    test = patch.rates
+    if test.misfit and not test.differ:
+        return (
+            f"rates: nothing can be said, {patch.fit.n_states} exponential(s) do not describe the "
+            f"decays (reduced χ² {test.chi2_own / test.dof_own:.3g} with own rates)"
+        )
+    verb = "differ with" if test.differ else "are the same after"
+    return (
+        f"rates {verb} all {len(patch.curves)} charges: shared rates cost χ² "
+        f"{test.chi2_shared - test.chi2_own:.3g} (reduced χ² {test.chi2_own / test.dof_own:.3g} "
+        f"with own rates), p = {test.p_value:.2g}"
+    )
+
+
+def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Section:
+    text = [*_lines(patch)]
+    if weaker is not None:
+        text.append(
+            f"The weaker light was {weaker.value:.0%} of the full one (σ "
+            f"{weaker.sigma / weaker.value:.0%} of that). From the ratio of the amplitudes follows "
+            "κ/k of each state, and r(0), whatever Λ and the camera's scale are."
+        )
+    text.append(
+        "Rates are compared by an F-test of all decays with shared against each with its own "
+        "rates, amplitudes always their own."
+    )
+    return Section(
+        f"Saturation: {name}",
+        tuple(f"{line[0].upper()}{line[1:]}." if line[-1] != "." else line for line in text),
+        (
+            Picture(
+                f"plateaus-{name}",
+                _plateau_figure(patch),
+                "Amplitude of each state at lamp off over the length of the charge; bars: 1 σ.",
+            ),
+            Picture(
+                f"charges-{name}",
+                _decays_figure(patch),
+                "Decays after different charges over their begin, and what shared rates leave of "
+                "them in σ.",
+            ),
+        ),
+        (_rates_table(patch.rates, tuple(patch.curves)),),
+    )
+
+
+def _percent(share: float) -> str:
+    return f"{share:.1%}".replace("-", "−")
+
+
+def _rates_table(test: RatesTest, units: tuple[str, ...]) -> Table:
+    states = range(len(test.shared_per_s))
+    rows = (
+        (
+            unit,
+            *(plus_minus(test.own_per_s[row, n], test.own_sigma_per_s[row, n]) for n in states),
+        )
+        for row, unit in enumerate(units)
+    )
+    shared = ("shared", *(rounded(float(k)) for k in test.shared_per_s))
+    head = ("decay", *(f"k{number + 1} / s⁻¹" for number in states))
+    return Table(head, (*rows, shared))
+
+
+def _plateau_figure(patch: PatchSaturation) -> Figure:
+    """Amplitude of every state after each charge, by light."""
+    figure = new_figure(256.0)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
+    entries = []
+    lights = [light for light in LIGHTS if light in patch.light]
+    for style, light in zip(("-", DASHED), lights, strict=False):
+        rows = patch.rows(light)
+        minutes = patch.charge_s[rows] / 60
+        full = light == FULL
+        entries.append(lined(f"{light} light", MUTED, style))
+        for state in range(patch.rates.amplitude.shape[1]):
+            colour, marker = _look(state)
+            y, sigma = (
+                of_all[rows, state]
+                for of_all in (patch.rates.amplitude, patch.rates.amplitude_sigma)
+            )
+            axes.plot(minutes, y, color=colour, linestyle=style, linewidth=1.0)
+            error_bars(axes, minutes, y, sigma, colour)
+            points(axes, minutes, y, marker, colour, colour if full else PAPER)
+            if full:
+                entries.append(marked(f"state {state + 1}", marker, colour))
+    axes.set_xlim(0, None)
+    axes.set_ylim(0, None)
+    axes.set_xlabel("Charge / min")
+    axes.set_ylabel("Amplitude / (DN/s)")
+    legend_above(figure, entries, columns=5)
+    return figure
+
+
+def _decays_figure(patch: PatchSaturation) -> Figure:
+    """Decays over what shared rates make of their begin, and what is left of each."""
+    figure = new_figure(320.0)
+    top = place(figure, left=LEFT_PT, bottom=150, right=12, top=46)
+    below = place(figure, left=LEFT_PT, bottom=38, right=12, top=190, share_x=top)
+    top.set_yscale("log", nonpositive="clip")
+    entries, lowest = [], np.inf
+    for number, (name, one) in enumerate(patch.curves.items()):
+        colour, marker = _look(number)
+        start = float(patch.rates.amplitude[number].sum())
+        middle_s = one.t_s + one.exposure_s / 2
+        points(top, middle_s, one.value / start, marker, colour, colour, size=3.0)
+        points(below, middle_s, patch.rates.residuals[number], marker, colour, colour, size=3.0)
+        entries.append(marked(name, marker, colour))
+        least = float(np.min(one.value[one.value > 0], initial=np.inf))
+        lowest = min(lowest, least / start)
+    top.set_ylim(max(lowest / 1.5, 1e-5), 1.5)
+    mark_decades(top)
+    below.axhline(0, color=MUTED, linewidth=0.9)
+    top.set_ylabel("Over begin")
+    below.set_ylabel("Residual / σ")
+    below.set_xlabel("Time after lamp off / s")
+    top.tick_params(labelbottom=False)
+    legend_above(figure, entries, columns=3)
+    return figure
+
+
+def _look(number: int) -> tuple[str, str]:
+    colours = (INK, *OTHER_CHANNELS)
+    return colours[number % len(colours)], MARKERS[number % len(MARKERS)]

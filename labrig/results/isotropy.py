@@ -1,0 +1,88 @@
+"""Whether a sample glows alike in all directions."""
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import ClassVar
+
+import numpy as np
+
+from labrig.results.arrays import FloatArray, IntArray
+from labrig.results.csv_file import write_csv
+from labrig.results.measured import Measured
+from labrig.results.run_result import RunResult
+
+#: What the paper found its samples to fluctuate by at most (section 4).
+PAPER = 0.05
+#: A deviation is believed when it is so many σ beyond that.
+SIGMAS = 2.0
+
+
+def is_within_paper(ratio: Measured) -> bool:
+    """Whether a ratio of two views may be as near to 1 as the paper's samples are."""
+    return abs(ratio.value - 1) < PAPER + SIGMAS * ratio.sigma
+
+
+@dataclass(frozen=True, eq=False)
+class AngularGlow:
+    """The glow of a patch at n angles, over the glow seen straight at the same time.
+
+    Attributes
+    ----------
+    angle_deg
+        (n,) against the camera's axis, rising.
+    ratio, ratio_sigma
+        (n,) radiance over that of the straight view, 1 if the emission is isotropic.
+    drift
+        The straight view after all others over the one before; it is divided out of `ratio`.
+    """
+
+    angle_deg: IntArray
+    ratio: FloatArray
+    ratio_sigma: FloatArray
+    drift: Measured
+
+    @property
+    def worst(self) -> Measured:
+        """The ratio that is furthest from 1."""
+        return Measured(float(self.ratio[self._worst]), float(self.ratio_sigma[self._worst]))
+
+    @property
+    def worst_angle_deg(self) -> int:
+        """Where that is."""
+        return int(self.angle_deg[self._worst])
+
+    @property
+    def _worst(self) -> int:
+        return int(np.argmax(np.abs(self.ratio - 1)))
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class IsotropyResult(RunResult):
+    """Radiance over angle.
+
+    Attributes
+    ----------
+    patches
+        By name.
+    around
+        Whether the patches enclose the whole sample, so that its intensity was divided by the
+        cosine of the angle; else they lie inside of it and show its radiance.
+    """
+
+    kind: ClassVar[str] = "isotropy"
+
+    patches: Mapping[str, AngularGlow]
+    around: bool
+
+    def write_files(self, folder: Path) -> None:
+        """Write `isotropy.csv`."""
+        rows = (
+            (name, angle_deg, f"{ratio:.6g}", f"{sigma:.6g}")
+            for name, glow in self.patches.items()
+            for angle_deg, ratio, sigma in zip(
+                glow.angle_deg, glow.ratio, glow.ratio_sigma, strict=True
+            )
+        )
+        head = ("patch", "angle_deg", "ratio", "ratio_sigma")
+        write_csv(folder / "isotropy.csv", head, rows)
