@@ -5,13 +5,16 @@ conduction, and what it still emits follows Planck's law, so the blue goes first
 """
 
 import math
+from collections.abc import Callable
 from dataclasses import dataclass, replace
+from functools import lru_cache
 from itertools import pairwise
 from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.integrate import OdeSolution, solve_ivp
+from scipy.integrate import solve_ivp
+from scipy.interpolate import BSpline, make_interp_spline
 
 from .simulation import LampSettings
 
@@ -43,12 +46,16 @@ CELL_NM = 2.5
 CELL_EDGES_NM: FloatArray = np.linspace(380.0, 780.0, 161)
 WAVELENGTH_NM: FloatArray = CELL_EDGES_NM[:-1] + CELL_NM / 2
 
+#: Temperatures at so many times interpolate a settling filament to a part in 10¹².
+SETTLING_TIMES = 1001
+
 #: Gauss–Legendre panels no longer than this resolve a fading lamp, and a burning one.
+PANEL_NODES = 8
 PANEL_FADING_S = 0.02
 PANEL_SETTLED_S = 300.0
 
 
-def filament_spectrum(temperature_k: float) -> FloatArray:
+def filament_spectrum(temperature_k: float | FloatArray) -> FloatArray:
     """Spectrum of a tungsten filament relative to one at 3000 K and 560 nm.
 
     Planck's law times tungsten's emissivity, which falls linearly over the visible
@@ -56,11 +63,12 @@ def filament_spectrum(temperature_k: float) -> FloatArray:
 
     Returns
     -------
-    ndarray, shape (160,)
-        On `WAVELENGTH_NM`.
+    ndarray, shape (..., 160)
+        Of every temperature, on `WAVELENGTH_NM`.
     """
     emissivity = 0.47 - 2e-4 * (WAVELENGTH_NM - 400.0)
-    exponent = np.minimum(C2_NM_K / (WAVELENGTH_NM * temperature_k), 700.0)
+    each_k = np.asarray(temperature_k)[..., None]
+    exponent = np.minimum(C2_NM_K / (WAVELENGTH_NM * each_k), 700.0)
     reference = (0.47 - 2e-4 * 160.0) / (560.0**5 * math.expm1(C2_NM_K / (560.0 * BURNING_K)))
     planck: FloatArray = emissivity / (WAVELENGTH_NM**5 * np.expm1(exponent)) / reference
     return planck
@@ -81,20 +89,55 @@ def _warming_k_per_s(temperature_k: float, powered: bool) -> float:
     return BURNING_K / FILAMENT_S * (gained - lost) / heat_capacity
 
 
+@lru_cache(maxsize=32)
+def _settling(begin_k: float, powered: bool) -> BSpline:
+    """Temperature of a filament over time after a switch, until it has settled."""
+    temperature_k = solve_ivp(
+        lambda _, t: [_warming_k_per_s(t[0], powered)],
+        (0.0, SETTLED_S),
+        [begin_k],
+        method="DOP853",
+        rtol=1e-11,
+        atol=1e-8,
+        dense_output=True,
+    ).sol
+    assert temperature_k is not None
+    # Closer together at first, when a cold filament warms within milliseconds.
+    times_s = SETTLED_S * np.linspace(0.0, 1.0, SETTLING_TIMES) ** 2
+    return make_interp_spline(times_s, temperature_k(times_s)[0], k=7)
+
+
 @dataclass(frozen=True)
 class _Phase:
     """From one switch to the next, at `start_s`.
 
-    `warmth` is the housing's then, 0 cold to 1 warm; `glowing` what is left behind of the light
-    that the lamp gave, 0 to 1.
+    `begin_k` is the filament's temperature then, `warmth` the housing's, 0 cold to 1 warm;
+    `glowing` what is left behind of the light that the lamp gave, 0 to 1.
     """
 
     start_s: float
     powered: bool
     warmth: float
     glowing: float
-    settled_k: float
-    settling: OdeSolution | None
+    begin_k: float
+
+    @property
+    def settled_k(self) -> float:
+        """Temperature of the filament in the end."""
+        return BURNING_K if self.powered else ROOM_K
+
+    @property
+    def settled_s(self) -> float:
+        """When it has that."""
+        return self.start_s if self.begin_k == self.settled_k else self.start_s + SETTLED_S
+
+    def temperature_k(self, time_s: FloatArray) -> FloatArray:
+        """Of the filament."""
+        if self.begin_k == self.settled_k:
+            return np.full_like(time_s, self.settled_k)
+        after_s = time_s - self.start_s
+        settling_k = _settling(self.begin_k, self.powered)(np.clip(after_s, 0.0, SETTLED_S))
+        return np.where(time_s >= self.settled_s, self.settled_k, settling_k)
 
 
 @dataclass(frozen=True)
@@ -111,8 +154,8 @@ class Lamp:
     @classmethod
     def found(cls, settings: LampSettings, on: bool) -> Self:
         """A lamp that has been on (and is warm), or off (and is cold), for long at time zero."""
-        settled_k = BURNING_K if on else ROOM_K
-        return cls(settings, (_Phase(0.0, on, float(on), float(on), settled_k, None),))
+        begin_k = BURNING_K if on else ROOM_K
+        return cls(settings, (_Phase(0.0, on, float(on), float(on), begin_k),))
 
     @property
     def on(self) -> bool:
@@ -123,17 +166,8 @@ class Lamp:
         """The lamp after one more switch; switching to what it is already does nothing."""
         if on == self.on:
             return self
-        settled_k = BURNING_K if on else ROOM_K
-        settling = solve_ivp(
-            lambda _, t: [_warming_k_per_s(t[0], on)],
-            (at_s, at_s + SETTLED_S),
-            [self.temperature_k(at_s)],
-            method="DOP853",
-            rtol=1e-9,
-            atol=1e-6,
-            dense_output=True,
-        ).sol
-        phase = _Phase(at_s, on, self._warmth(at_s), self._glowing(at_s), settled_k, settling)
+        warmth, glowing = float(self._warmth(at_s)), float(self._glowing(at_s))
+        phase = _Phase(at_s, on, warmth, glowing, float(self.temperature_k(at_s)))
         return replace(self, phases=(*self.phases, phase))
 
     def until(self, time_s: float) -> "Lamp":
@@ -150,71 +184,86 @@ class Lamp:
         times = {t for p in self.phases for t in (p.start_s, p.start_s + SETTLED_S)}
         return sorted(t for t in times if start_s < t < end_s)
 
-    def temperature_k(self, time_s: float) -> float:
-        """Of the filament."""
-        phase = self._phase(time_s)
-        if phase.settling is None or time_s >= phase.start_s + SETTLED_S:
-            return phase.settled_k
-        return float(phase.settling(time_s)[0])
+    def temperature_k(self, time_s: float | FloatArray) -> FloatArray:
+        """Of the filament, at every time."""
+        return self._by_phase(time_s, lambda phase, at_s: phase.temperature_k(at_s))
 
     def dark(self, start_s: float, end_s: float) -> bool:
         """Whether no light at all is to be expected from `start_s` to `end_s`."""
         if self.settings.afterglow and self._glowing(start_s):
             return False
-        cold = self._settled(start_s) and self._phase(start_s).settled_k == ROOM_K
+        cold = self._settled(start_s) and not self._phase(start_s).powered
         return cold and not self.corners(start_s, end_s)
 
-    def irradiance(self, time_s: float) -> FloatArray:
-        """Relative spectral irradiance at the sample, shape (160,), on `WAVELENGTH_NM`."""
+    def irradiance(self, time_s: float | FloatArray) -> FloatArray:
+        """Relative spectral irradiance at the sample, shape (..., 160), on `WAVELENGTH_NM`."""
         temperature_k = self.temperature_k(time_s)
-        afterglow = self.settings.afterglow and self.settings.afterglow * self._glowing(time_s)
-        if temperature_k == ROOM_K:
-            return afterglow * BURNING_SPECTRUM
-        burning = temperature_k == BURNING_K
-        spectrum = BURNING_SPECTRUM if burning else filament_spectrum(temperature_k)
-        light = self._gain(time_s) * spectrum
-        return light + afterglow * BURNING_SPECTRUM if afterglow else light
+        if np.all(temperature_k == BURNING_K):
+            spectrum = BURNING_SPECTRUM
+        else:
+            spectrum = filament_spectrum(temperature_k)
+        gain = np.where(temperature_k == ROOM_K, 0.0, self._gain(time_s))
+        light = gain[..., None] * spectrum
+        if self.settings.afterglow:
+            afterglow = self.settings.afterglow * self._glowing(time_s)
+            light += afterglow[..., None] * BURNING_SPECTRUM
+        return light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
         """∫ irradiance dt over an interval, shape (160,)."""
-        nodes, weights = np.polynomial.legendre.leggauss(8)
         total = np.zeros_like(WAVELENGTH_NM)
         for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
-            if self.dark(left, right):
-                continue
-            settled = self._settled(left)
-            panels = math.ceil((right - left) / (PANEL_SETTLED_S if settled else PANEL_FADING_S))
-            edges = np.linspace(left, right, panels + 1)
-            for low, high in pairwise(edges):
-                for node, weight in zip(nodes, weights, strict=True):
-                    at_s = (low + high + (high - low) * node) / 2
-                    total += weight * (high - low) / 2 * self.irradiance(at_s)
+            if not self.dark(left, right):
+                panel_s = PANEL_SETTLED_S if self._settled(left) else PANEL_FADING_S
+                at_s, part_s = nodes(left, right, panel_s)
+                total += part_s @ self.irradiance(at_s)
         return total
 
     def _phase(self, time_s: float) -> _Phase:
         return next(p for p in reversed(self.phases) if p.start_s <= time_s)
 
     def _settled(self, time_s: float) -> bool:
-        phase = self._phase(time_s)
-        return phase.settling is None or time_s >= phase.start_s + SETTLED_S
+        return time_s >= self._phase(time_s).settled_s
 
-    def _warmth(self, time_s: float) -> float:
+    def _by_phase(
+        self, time_s: float | FloatArray, value: Callable[[_Phase, FloatArray], FloatArray]
+    ) -> FloatArray:
+        """What `value` is at every time, in the phase of that time."""
+        times_s = np.asarray(time_s)
+        starts_s = [phase.start_s for phase in self.phases]
+        of_time = np.searchsorted(starts_s, times_s, side="right") - 1
+        first, last = of_time.min(), of_time.max()
+        found = value(self.phases[first], times_s)
+        for index in range(first + 1, last + 1):
+            found = np.where(of_time < index, found, value(self.phases[index], times_s))
+        return found
+
+    def _warmth(self, time_s: float | FloatArray) -> FloatArray:
         """Newton's law for the housing, 0 cold to 1 warm."""
-        phase = self._phase(time_s)
-        return _approach(phase, phase.warmth, time_s, self.settings.warm_up)
+        constant_s = self.settings.warm_up
+        return self._by_phase(time_s, lambda p, at_s: _approach(p, p.warmth, at_s, constant_s))
 
-    def _glowing(self, time_s: float) -> float:
+    def _glowing(self, time_s: float | FloatArray) -> FloatArray:
         """What glows on behind the filament, 0 to 1."""
-        phase = self._phase(time_s)
-        return _approach(phase, phase.glowing, time_s, self.settings.afterglow_fades)
+        constant_s = self.settings.afterglow_fades
+        return self._by_phase(time_s, lambda p, at_s: _approach(p, p.glowing, at_s, constant_s))
 
-    def _gain(self, time_s: float) -> float:
-        aged = math.exp(math.log1p(-self.settings.drift_per_hour) * time_s / 3600.0)
+    def _gain(self, time_s: float | FloatArray) -> FloatArray:
+        hours = np.asarray(time_s) / 3600.0
+        aged = np.exp(math.log1p(-self.settings.drift_per_hour) * hours)
         return aged * (1 - self.settings.warm_up_deficit * (1 - self._warmth(time_s)))
 
 
-def _approach(phase: _Phase, begin: float, time_s: float, constant_s: float) -> float:
+def _approach(phase: _Phase, begin: float, time_s: FloatArray, constant_s: float) -> FloatArray:
     """From `begin` towards 1 while there is power, towards 0 while there is none."""
     goal = float(phase.powered)
-    elapsed_s = max(time_s - phase.start_s, 0.0)
-    return goal + (begin - goal) * math.exp(-elapsed_s / constant_s)
+    elapsed_s = np.maximum(time_s - phase.start_s, 0.0)
+    return goal + (begin - goal) * np.exp(-elapsed_s / constant_s)
+
+
+def nodes(start_s: float, end_s: float, panel_s: float) -> tuple[FloatArray, FloatArray]:
+    """Times and weights of Gauss and Legendre's quadrature in panels no longer than `panel_s`."""
+    node, weight = np.polynomial.legendre.leggauss(PANEL_NODES)
+    edges = np.linspace(start_s, end_s, math.ceil((end_s - start_s) / panel_s) + 1)
+    half, middle = np.diff(edges)[:, None] / 2, (edges[:-1, None] + edges[1:, None]) / 2
+    return (middle + half * node).ravel(), (half * weight).ravel()

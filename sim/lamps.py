@@ -47,8 +47,8 @@ class FilteredLamps:
         """Whether no light at all is to be expected from `start_s` to `end_s`."""
         return self.halogen.dark(start_s, end_s) and self.mercury.dark(start_s, end_s)
 
-    def irradiance(self, time_s: float) -> FloatArray:
-        """Relative spectral irradiance at the sample, shape (160,)."""
+    def irradiance(self, time_s: float | FloatArray) -> FloatArray:
+        """Relative spectral irradiance at the sample, shape (..., 160)."""
         light = self.halogen.irradiance(time_s)
         if self.mercury.was_on:
             light = light + self.mercury.irradiance(time_s)
@@ -65,5 +65,7 @@ class FilteredLamps:
             total += light * self._passed(left)
         return total
 
-    def _passed(self, time_s: float) -> FloatArray:
-        return next(passed for since_s, passed in reversed(self.filters) if since_s <= time_s)
+    def _passed(self, time_s: float | FloatArray) -> FloatArray:
+        since_s = [since_s for since_s, _ in self.filters]
+        passed: FloatArray = np.array([passed for _, passed in self.filters])
+        return passed[np.searchsorted(since_s, time_s, side="right") - 1]

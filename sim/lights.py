@@ -5,8 +5,7 @@ samples there may be a shield before the lamp and a trap door, which turns the s
 camera.
 """
 
-import math
-from collections.abc import Callable, Iterator, Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -15,7 +14,7 @@ from numpy.typing import NDArray
 
 from .door import Door
 from .faults import When
-from .lamp import BURNING_K, PANEL_FADING_S, WAVELENGTH_NM, Lamp, filament_spectrum
+from .lamp import BURNING_K, PANEL_FADING_S, WAVELENGTH_NM, Lamp, filament_spectrum, nodes
 from .lamps import FilteredLamps
 
 FloatArray = NDArray[np.float64]
@@ -100,14 +99,14 @@ class Lights:
         middles = [(left + right) / 2 for left, right in pairwise(corners)]
         return not any(stray.is_on(at_s) for stray in self._strays for at_s in middles)
 
-    def irradiance(self, time_s: float) -> FloatArray:
-        """Relative spectral irradiance at the sample, shape (160,), on `WAVELENGTH_NM`."""
+    def irradiance(self, time_s: float | FloatArray) -> FloatArray:
+        """Relative spectral irradiance at the sample, shape (..., 160), on `WAVELENGTH_NM`."""
         light = self.lamp.irradiance(time_s)
         if self._doors:
-            light = light * self._unshielded(time_s) * self._facing_lamp(time_s)
+            arriving = _at(time_s, lambda at_s: self._unshielded(at_s) * self._facing_lamp(at_s))
+            light = light * arriving[..., None]
         for stray in self._strays:
-            if stray.is_on(time_s):
-                light = light + stray.spectrum
+            light = light + _at(time_s, stray.is_on)[..., None] * stray.spectrum
         return light
 
     def openness(self, time_s: float) -> float:
@@ -169,9 +168,9 @@ class Lights:
                 parts = [share((left + right) / 2) for share in shares]
                 total += np.outer(parts, self.lamp.exposure(left, right))
                 continue
-            for at_s, part_s in _nodes(left, right):
-                parts = [part_s * share(at_s) for share in shares]
-                total += np.outer(parts, self.lamp.irradiance(at_s))
+            times_s, part_s = nodes(left, right, PANEL_FADING_S)
+            parts_s = part_s * np.array([_at(times_s, share) for share in shares])
+            total += parts_s @ self.lamp.irradiance(times_s)
         return total
 
     def _stray(self, start_s: float, end_s: float, share: Share) -> FloatArray:
@@ -186,7 +185,8 @@ class Lights:
             if self._is_still(left, right):
                 seen_s = share(middle_s) * (right - left)
             else:
-                seen_s = sum(part_s * share(at_s) for at_s, part_s in _nodes(left, right))
+                times_s, part_s = nodes(left, right, PANEL_FADING_S)
+                seen_s = float(part_s @ _at(times_s, share))
             total += light * seen_s
         return total
 
@@ -194,13 +194,10 @@ class Lights:
         return all(door.is_still(start_s, end_s) for door in self._doors)
 
 
-def _nodes(start_s: float, end_s: float) -> Iterator[tuple[float, float]]:
-    """Times and weights of Gauss and Legendre's quadrature while a lamp fades or a door swings."""
-    nodes, weights = np.polynomial.legendre.leggauss(8)
-    edges = np.linspace(start_s, end_s, math.ceil((end_s - start_s) / PANEL_FADING_S) + 1)
-    for low, high in pairwise(edges):
-        for node, weight in zip(nodes, weights, strict=True):
-            yield (low + high + (high - low) * node) / 2, weight * (high - low) / 2
+def _at(time_s: float | FloatArray, share: Share) -> FloatArray:
+    """A share at every time."""
+    times_s = np.asarray(time_s)
+    return np.array([share(at_s) for at_s in times_s.ravel().tolist()]).reshape(times_s.shape)
 
 
 def room_light_spectrum() -> FloatArray:

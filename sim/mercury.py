@@ -89,9 +89,9 @@ class Mercury:
         """Times strictly between at which the light does not go on smoothly."""
         return [at_s for at_s, _ in self.switches if start_s < at_s < end_s]
 
-    def irradiance(self, time_s: float) -> FloatArray:
-        """Relative spectral irradiance at the sample, shape (160,)."""
-        return self._gain(time_s) * line_spectrum()
+    def irradiance(self, time_s: float | FloatArray) -> FloatArray:
+        """Relative spectral irradiance at the sample, shape (..., 160)."""
+        return np.multiply.outer(np.vectorize(self._gain, otypes=[float])(time_s), line_spectrum())
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
         """∫ irradiance dt over an interval, shape (160,)."""

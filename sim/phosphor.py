@@ -1,17 +1,19 @@
 """The samples: rate equations of all states of all patches, integrated along the light.
 
-Eq. 1 of Nalbach et al. is integrated as it stands, by an explicit Runge–Kutta method of order 8
-(DOP853). Nothing here knows a solution of it: that is what labrig's fits are tested against.
+Eq. 1 of Nalbach et al. is integrated as it stands, by collocation at the nodes of Gauss and
+Legendre (an implicit Runge–Kutta method of order 16). Nothing here knows a solution of it: that is
+what labrig's fits are tested against.
 """
 
+import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 from typing import Protocol
 
 import numpy as np
+from numpy.polynomial import legendre
 from numpy.typing import NDArray
-from scipy.integrate import solve_ivp
 
 from labrig.errors import UsageError
 from labrig.material.file import Material, State
@@ -20,12 +22,36 @@ from .lamp import BURNING_K, CELL_EDGES_NM, CELL_NM, filament_spectrum
 
 FloatArray = NDArray[np.float64]
 
-#: Of the integration, relative; and absolute, of concentrations between 0 and 1.
+#: A step may differ by so much from its two halves, relative; and absolute, of concentrations
+#: between 0 and 1. The halves, which are kept, are better by orders of magnitude.
 RTOL = 1e-8
-ATOL = 1e-12
+ATOL = 1e-13
+#: Nodes of a step; its order is twice that.
+STAGES = 8
+#: The next step is not shorter than the last by more than this factor, nor longer.
+SHORTER, LONGER = 0.1, 10.0
+#: An error that is none.
+TINY = 1e-30
 
 #: Level of a fully charged state of which neither excitation rates nor a charge are known.
 UNKNOWN_CHARGE = 0.5
+
+
+def _collocation() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
+    """Nodes and weights between 0 and 1; integrals up to the nodes; and what extrapolates to 1.
+
+    With values f at the nodes, ∫f up to node i is `integrals[i] @ f`, and that up to 1
+    `weights @ f` or, from the integrals themselves, `extrapolation @ (integrals @ f)`.
+    """
+    nodes, weights = legendre.leggauss(STAGES)
+    of_values = np.linalg.inv(legendre.legvander(nodes, STAGES - 1))
+    below = legendre.legval(nodes, legendre.legint(of_values, lbnd=-1)).T
+    integrals = np.asarray(below, dtype=np.float64)
+    extrapolation = weights @ np.linalg.inv(integrals)
+    return (nodes + 1) / 2, weights / 2, integrals / 2, extrapolation
+
+
+NODES, WEIGHTS, INTEGRALS, EXTRAPOLATION = _collocation()
 
 
 class Light(Protocol):
@@ -37,8 +63,8 @@ class Light(Protocol):
     def dark(self, start_s: float, end_s: float) -> bool:
         """Whether there is no light at all from `start_s` to `end_s`."""
 
-    def irradiance(self, time_s: float) -> FloatArray:
-        """Relative spectral irradiance on `WAVELENGTH_NM`."""
+    def irradiance(self, time_s: FloatArray) -> FloatArray:
+        """Relative spectral irradiance at every time on `WAVELENGTH_NM`, shape (times, 160)."""
 
 
 @dataclass(frozen=True)
@@ -89,13 +115,12 @@ class Phosphor:
         exposure_s : ndarray, shape (states,)
             ∫ v q r dt from `start_s` to `end_s`, with q the `quickening`.
         """
-        state = np.concatenate([level, np.zeros_like(level)])
+        state = np.array([level, np.zeros_like(level)])
         corners = [start_s, *light.corners(start_s, end_s), end_s]
         for left, right in pairwise(corners):
             if right > left:
                 state = self._smooth(state, left, right, light, visible)
-        count = len(level)
-        return state[:count], state[count:]
+        return state[0], state[1]
 
     def _smooth(
         self,
@@ -105,27 +130,69 @@ class Phosphor:
         light: Light,
         visible: Callable[[float], float],
     ) -> FloatArray:
-        excitation, count = self.excitation, len(self.k_r_per_s)
+        """Levels and exposures at `right`, shape (2, states); halves of a step confirm it."""
+        shining = None if light.dark(left, right) else light
+        start_s, step_s = left, right - left
+        while math.nextafter(start_s, right) < right:
+            end_s = min(start_s + step_s, right)
+            middle_s = (start_s + end_s) / 2
+            if not start_s < middle_s < end_s:
+                raise ArithmeticError(f"the rate equations cannot be integrated at {start_s} s")
+            spans = np.array([[start_s, end_s], [start_s, middle_s], [middle_s, end_s]])
+            whole, first, second = self._steps(spans, shining, visible)
+            rough, fine = whole(state), second(first(state))
+            error = np.max(np.abs(rough - fine) / (ATOL + RTOL * np.abs(fine)))
+            factor = 0.9 * max(error, TINY) ** (-1 / (2 * STAGES + 1))
+            step_s = (end_s - start_s) * min(max(factor, SHORTER), LONGER)
+            if error <= 1:
+                start_s, state = end_s, fine
+        return state
 
-        def in_the_dark(time_s: float, y: FloatArray) -> FloatArray:
-            faster, r = self.quickening(time_s), y[:count]
-            return np.concatenate([-faster * self.k_r_per_s * r, visible(time_s) * faster * r])
+    def _steps(
+        self, spans: FloatArray, light: Light | None, visible: Callable[[float], float]
+    ) -> list["_Step"]:
+        """The step from beginning to end of each of the `spans`, shape (spans, 2); None: dark."""
+        lasting_s = np.diff(spans)
+        times_s = spans[:, :1] + lasting_s * NODES
+        each_s = times_s.ravel().tolist()
+        faster = np.array([self.quickening(at_s) for at_s in each_s]).reshape(times_s.shape)
+        seen = np.array([visible(at_s) for at_s in each_s]).reshape(times_s.shape) * faster
+        loss = faster[:, None, :] * self.k_r_per_s[:, None]
+        charging = np.zeros_like(loss)
+        if light is not None:
+            kappa = light.irradiance(times_s.ravel()) @ self.excitation.T
+            charging = kappa.reshape(*times_s.shape, -1).transpose(0, 2, 1)
+        # r at the nodes is r at the beginning plus the integrals of dr/dt, which is linear in r.
+        integrals_s = lasting_s[:, :, None, None] * INTEGRALS
+        matrix = np.eye(STAGES) + integrals_s * (loss + charging)[:, :, None, :]
+        charged = (integrals_s @ charging[..., None])[..., 0]
+        levels = np.linalg.solve(matrix, np.stack([np.ones_like(charged), charged], axis=-1))
+        end = EXTRAPOLATION @ levels
+        end[..., 0] += 1 - EXTRAPOLATION.sum()
+        exposure_s = ((lasting_s * WEIGHTS * seen)[:, None, None, :] @ levels)[:, :, 0]
+        return [_Step(*step) for step in np.stack([end, exposure_s], axis=-1).transpose(0, 2, 3, 1)]
 
-        def lit(time_s: float, y: FloatArray) -> FloatArray:
-            faster, r = self.quickening(time_s), y[:count]
-            charging = (1 - r) * (excitation @ light.irradiance(time_s))
-            return np.concatenate(
-                [charging - faster * self.k_r_per_s * r, visible(time_s) * faster * r]
-            )
 
-        rates = in_the_dark if light.dark(left, right) else lit
-        solution = solve_ivp(
-            rates, (left, right), state, method="DOP853", rtol=RTOL, atol=ATOL, t_eval=[right]
-        )
-        if not solution.success:
-            raise ArithmeticError(f"the rate equations cannot be integrated: {solution.message}")
-        end: FloatArray = solution.y[:, -1]
-        return end
+@dataclass(frozen=True)
+class _Step:
+    """What a step makes of levels and exposures, each shape (2, states).
+
+    Attributes
+    ----------
+    factor
+        Level and exposure at its end per level at its beginning.
+    added
+        The same without any level at its beginning.
+    """
+
+    factor: FloatArray
+    added: FloatArray
+
+    def __call__(self, state: FloatArray) -> FloatArray:
+        """Levels and exposures after the step."""
+        after: FloatArray = self.factor * state[0] + self.added
+        after[1] += state[1]
+        return after
 
 
 def phosphor(

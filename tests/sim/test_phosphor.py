@@ -28,8 +28,8 @@ class ExponentialFade:
     def dark(self, start_s: float, end_s: float) -> bool:
         return False
 
-    def irradiance(self, time_s: float) -> FloatArray:
-        return np.full_like(WAVELENGTH_NM, np.exp(-time_s / self.fade_s))
+    def irradiance(self, time_s: FloatArray) -> FloatArray:
+        return np.exp(-time_s / self.fade_s)[:, None] * np.ones_like(WAVELENGTH_NM)
 
 
 def one_state(k_r_per_s: float, kappa_per_s: float) -> Phosphor:
