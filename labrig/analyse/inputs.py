@@ -20,6 +20,7 @@ from labrig.calibration import (
 )
 from labrig.errors import UsageError
 from labrig.material import Material
+from labrig.results import FittedDecay
 from labrig.results.emission_spectrum import EmissionSpectrum
 
 FileT = TypeVar("FileT")

@@ -7,17 +7,18 @@ from itertools import pairwise
 import numpy as np
 
 from labrig.analyse.bench_curves import camera_curves, card_reflectance, lamp_spectrum
-from labrig.analyse.lvf_calibration.slices import FLICKER, SliceValues, slice_values
-from labrig.analyse.lvf_calibration.strip_frames import StripFrames
 from labrig.analyse.part import Part
+from labrig.analyse.strip_frames import StripFrames
 from labrig.calibration import IrradianceFile, Strip
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
 from labrig.optics import CameraResponse, Lvf, Spectrum, Transmittance
 from labrig.optics.piecewise import band_integrals, quadrature
+from labrig.reduce.strip import FLICKER, slice_values
 from labrig.results import FloatArray
 from labrig.results.irradiance import CardRatio, IrradianceResult, StripScale
+from labrig.results.strip import SliceValues
 
 #: Change of the lamp between rounds that is worth a warning.
 DRIFT = 0.03

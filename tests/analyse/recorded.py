@@ -16,7 +16,9 @@ from labrig.analyse import Choices, Inputs, Part
 from labrig.analyse.choices import read_run_protocol
 from labrig.clock import Clock
 from labrig.filling import Watch
+from labrig.process.description import describe_run
 from labrig.record import RunRecord, read_run
+from labrig.report import Source
 from labrig.run import Recording, resume_run
 from tests.acquire.fakes import Watching
 
@@ -84,3 +86,9 @@ def whole(run: Path, inputs: Inputs | None = None, choices: Choices | None = Non
     return Part(
         read_run(run), read_run_protocol(run), choices.bench(run), choices, inputs or Inputs()
     )
+
+
+def source_of(part: Part) -> Source:
+    """What a report needs to show the result of `part`."""
+    about = describe_run(part.run, part.protocol, part.rig)
+    return Source(part.run, part.protocol, part.rig, about)

@@ -33,7 +33,6 @@ from labrig.reduce import SeriesFrame
 from labrig.region import region_pixels
 from labrig.report import figure_style
 from labrig.report.emission_spectrum import render
-from labrig.report.rendering import Source
 from labrig.results.emission_spectrum import (
     WAVELENGTH_NM,
     EmissionSpectrum,
@@ -42,6 +41,7 @@ from labrig.results.emission_spectrum import (
     read_emission_spectrum,
     write_emission_spectrum,
 )
+from tests.analyse.recorded import source_of
 from tests.analyse.spectral_bench import (
     HEIGHT,
     WIDTH,
@@ -148,7 +148,7 @@ def test_a_result_and_its_files_are_read_back(
 def test_a_report_shows_all_comparisons(blue: Path, found: EmissionSpectrumResult) -> None:
     part = stage_of(blue, blue)
     with figure_style():
-        shown = render(found, Source(part.run, part.protocol, part.rig))
+        shown = render(found, source_of(part))
     assert {figure.name for section in shown.sections for figure in section.figures} == {
         "spectrum", "over-time", "shift", "lamps",
     }  # fmt: skip

@@ -6,16 +6,19 @@ from typing import Any
 
 import numpy as np
 import pytest
-from labrig.analyse.irradiance.scales import in_bands
 
-from labrig.analyse.irradiance.stage import mean_ratio
+from labrig.analyse.irradiance import in_bands, mean_ratio, strip_scale
+from labrig.calibration import Strip, read_irradiance_file, write_lvf_file
 from labrig.errors import DataError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
 from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
+from labrig.process import process_run
+from labrig.results.irradiance import CardRatio, IrradianceResult
 from labrig.results.strip import SliceValues
+from tests.analyse.lvf_calibration.room_truth import simulation_of, true_irradiance
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
 from tests.analyse.recorded import record
 from tests.analyse.spectral_bench import true_lvf_file

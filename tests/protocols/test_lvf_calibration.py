@@ -17,6 +17,7 @@ from labrig.errors import UsageError
 from labrig.process import process_run
 from labrig.record import read_run
 from labrig.results import read_result
+from labrig.results.lvf_calibration import LvfCalibrationResult
 from labrig.run import Recording, resume_run
 from tests.acquire.fakes import Watching
 from tests.analyse.lvf_calibration.room_truth import (
@@ -161,6 +162,7 @@ def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
     assert list(record.completed())[-1] == "put-back"
 
     result = process_run(folder)
+    assert isinstance(result, LvfCalibrationResult)
     assert not result.warnings
     file = result.calibration
     assert read_lvf_file(folder / "result" / "lvf.yaml") == file

@@ -5,7 +5,6 @@ from collections.abc import Iterable, Iterator, Mapping
 import numpy as np
 
 from labrig.analyse.clean import cleaned
-from labrig.analyse.history import charges_s
 from labrig.analyse.part import Part
 from labrig.analyse.saturation.charge_level import charge_level
 from labrig.analyse.saturation.rate_comparison import compare_rates, curve, flicker_dof
@@ -15,6 +14,7 @@ from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.errors import DataError
 from labrig.protocols.saturation import WeakerLight
 from labrig.record import RunRecord
+from labrig.record.history import charges_s
 from labrig.reduce import reduce_patches
 from labrig.results import FloatArray, Measured, Series
 from labrig.results.saturation import (
