@@ -5,8 +5,8 @@ from importlib.metadata import version
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.process.provenance import library_versions
 from labrig.record import RunRecord, read_notes
+from labrig.record.description import DeviceLine, RunDescription
 from labrig.record.history import interruptions, written_time
-from labrig.results import DeviceLine, RunDescription
 
 
 def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDescription:

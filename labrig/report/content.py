@@ -3,9 +3,10 @@
 from dataclasses import dataclass
 
 from labrig.optics import CameraResponse
+from labrig.record.description import RunDescription
 from labrig.record.frames import FrameRecord
 from labrig.region import Region
-from labrig.results import FittedDecay, RunDescription, Series
+from labrig.results import FittedDecay, Series
 
 #: What every decay measured with a camera rests on.
 DECAY_ASSUMPTIONS = (

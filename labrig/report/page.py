@@ -8,13 +8,13 @@ from markupsafe import Markup
 
 from labrig.errors import DiskError
 from labrig.optics import CameraResponse
+from labrig.record.description import RunDescription
 from labrig.record.frames import FrameRecord
 from labrig.report.figure_style import figure_style
 from labrig.report.plates import Plates
 from labrig.report.sections import Section
 from labrig.report.shown import draw
 from labrig.report.template import dated_notes, environment, script, style
-from labrig.results import RunDescription
 
 TEMPLATE = "report.html.j2"
 

@@ -6,8 +6,8 @@ from typing import Any, Protocol
 from labrig.acquire import RigFile
 from labrig.optics import CameraResponse
 from labrig.record import RunRecord
+from labrig.record.description import RunDescription
 from labrig.report.sections import Section
-from labrig.results import RunDescription
 
 
 @dataclass(frozen=True)

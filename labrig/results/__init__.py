@@ -1,7 +1,6 @@
 """What was found, as frozen values with uncertainties and units; one reader and writer a file."""
 
 from labrig.results.arrays import BoolArray, FloatArray, IntArray
-from labrig.results.description import DeviceLine, RunDescription
 from labrig.results.fitted_decay import (
     Candidate,
     DecayState,
@@ -23,13 +22,11 @@ __all__ = [
     "BoolArray",
     "Candidate",
     "DecayState",
-    "DeviceLine",
     "FittedDecay",
     "FloatArray",
     "IntArray",
     "Measured",
     "Rival",
-    "RunDescription",
     "RunResult",
     "Series",
     "add_flag",

@@ -172,6 +172,7 @@ def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
     assert np.nanmax(np.abs(result.transmittance_residual)) < 0.1
     assert result.before_camera.lines.wavelength_nm[-1] == pytest.approx(577, abs=0.1)
     assert result.map_rms_nm < 2
+    assert result.stripes is not None
     assert abs(result.stripes.shift_nm) < 4 * result.stripes.sigma_nm
     room = simulation_of(folder)
     assert file.before_camera is not None

@@ -10,12 +10,13 @@ from numpy.typing import NDArray
 from labrig.errors import LabrigError
 from labrig.fit import DecayFit, fit_decay
 from labrig.optics import read_camera
+from labrig.record.description import DeviceLine, RunDescription
 from labrig.record.frames import FrameRecord
 from labrig.report import Report
 from labrig.report.content import DecayReport, GlowPhotograph, PatchReport
 from labrig.report.decay import decay_sections
 from labrig.report.figure_style import figure_style
-from labrig.results import DeviceLine, RunDescription, Series
+from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
 
