@@ -1,7 +1,7 @@
 """What is known of a bench before a part is processed."""
 
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Self, TypeVar
 
@@ -20,7 +20,7 @@ from labrig.calibration import (
 )
 from labrig.errors import UsageError
 from labrig.material import Material
-from labrig.results import FittedDecay
+from labrig.results import FittedDecay, RunResult
 from labrig.results.emission_spectrum import EmissionSpectrum
 
 FileT = TypeVar("FileT")
@@ -68,6 +68,14 @@ class Inputs:
             lvf=_read(optics.lvf, "lvf.yaml", read_lvf_file),
             irradiance=_read(optics.irradiance, "irradiance.yaml", read_irradiance_file),
         )
+
+    def with_those_of(self, result: RunResult) -> Self:
+        """These, and what a result provides; of mappings by patch, the other patches stay."""
+        provided = {
+            name: {**getattr(self, name), **value} if isinstance(value, Mapping) else value
+            for name, value in result.provides().items()
+        }
+        return replace(self, **provided)
 
 
 def _read(named: str | None, name: str, read: Callable[[Path], FileT]) -> FileT | None:

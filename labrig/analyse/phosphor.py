@@ -1,7 +1,5 @@
 """A chain of protocols, from its frames to the results of its parts and the materials they make."""
 
-from dataclasses import replace
-
 from labrig import plugins
 from labrig.analyse.part import Part
 from labrig.errors import DataError, FitError
@@ -37,7 +35,7 @@ def analyse(part: Part) -> PhosphorResult:
             continue
         parts[link.name] = result
         warnings += [f"{link.name}: {warning}" for warning in result.warnings]
-        inputs = replace(inputs, **result.provides())
+        inputs = inputs.with_those_of(result)
     if not parts:
         raise next(iter(failures.values()))
     return PhosphorResult(

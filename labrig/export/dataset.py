@@ -9,10 +9,20 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.record import read_run
-from labrig.results import FittedDecay, Series, read_fitted_decay, read_series
+from labrig.results import (
+    FittedDecay,
+    Measured,
+    RunResult,
+    Series,
+    leaves,
+    read_result,
+    unit_of,
+)
+from labrig.results.decay import DecayResult
+from labrig.results.phosphor import PhosphorResult
 
 if TYPE_CHECKING:
-    from xarray import Dataset
+    from xarray import Dataset, DataTree
 
 #: Attributes of variables: xarray's plots write them at the axes.
 SECONDS, PER_S, DN_PER_S = {"units": "s"}, {"units": "1/s"}, {"units": "DN/s"}
@@ -21,18 +31,22 @@ AFTER_LAMP_OFF = {"long_name": "start of the exposure after lamp off"}
 Column = tuple[Any, ...]
 
 
-def read_dataset(run: Path | str) -> "Dataset":
-    """The latest result of the run in folder `run`, as in its series.csv and fit.json.
+def read_dataset(run: Path | str) -> "Dataset | DataTree":
+    """The latest result of the run in folder `run`.
 
     Returns
     -------
     Dataset
-        Dimensions `patch`, `frame` (file names), `channel` and `state` (from 1, by falling rate).
-        `value` and `sigma` (patch, frame, channel), `flag` (patch, frame); over the frames `t_s`,
-        `exposure_s`, `unit`, `iso`, `f_number`. Of the fits `k_r_per_s`, `amplitude` (patch,
-        state), `channel_weight`, `offset` (patch, channel), each with its σ, and `flicker`,
-        `reduced_chi2`, `fit_warnings` (patch); NaN where there is no fit. Units are attributes
-        of the variables; the Dataset's own say which run, sample and devices.
+        Of a decay: dimensions `patch`, `frame` (file names), `channel` and `state` (from 1, by
+        falling rate). `value` and `sigma` (patch, frame, channel), `flag` (patch, frame); over the
+        frames `t_s`, `exposure_s`, `unit`, `iso`, `f_number`. Of the fits `k_r_per_s`, `amplitude`
+        (patch, state), `channel_weight`, `offset` (patch, channel), each with its σ, and
+        `flicker`, `reduced_chi2`, `fit_warnings` (patch); NaN where there is no fit.
+        Of any other protocol: every field of its result, those of fields in fields with a dot
+        between, with dimensions of their own. Units are attributes of the variables; the Dataset's
+        own say which run, sample and devices.
+    DataTree
+        Of a chain: a node for each part, and the materials at its root.
 
     Raises
     ------
@@ -49,29 +63,63 @@ def read_dataset(run: Path | str) -> "Dataset":
             "python -m pip install xarray"
         ) from None
     folder = Path(run)
-    places = sorted(path.parent for path in (folder / "result").rglob("series.csv"))
-    if not places:
-        raise UsageError(
-            f"{folder}: expected a run with a result; make it with: labrig process {folder}"
-        )
-    patches = [read_series(place / "series.csv") for place in places]
-    fits = [_read_fit(place / "fit.json") for place in places]
-    channels = patches[0][0].channels
+    result = read_result(folder)
+    if not isinstance(result, PhosphorResult):
+        return _dataset(result, _attributes(folder))
+    nodes = {name: _dataset(part, {}) for name, part in result.parts.items()}
+    return xarray.DataTree.from_dict({"/": _dataset(result, _attributes(folder)), **nodes})
+
+
+def _dataset(result: RunResult, attributes: dict[str, str]) -> "Dataset":
+    import xarray
+
+    if not isinstance(result, DecayResult):
+        columns = {".".join(path): _column(path, value) for path, value in leaves(result)}
+        found = {name: column for name, column in columns.items() if column is not None}
+        return xarray.Dataset(found | _sigmas(result), attrs=attributes)
+    patches = [patch.series for patch in result.patches.values()]
+    fits = [patch.fit for patch in result.patches.values()]
+    channels = patches[0].channels
+    first = patches[0]
     return xarray.Dataset(
         _measured(patches) | _fitted(fits, channels),
         {
-            "patch": [decays[0].region for decays in patches],
+            "patch": list(result.patches),
             "channel": list(channels),
             "state": 1 + np.arange(max((fit.n_states for fit in fits if fit), default=0)),
-            "frame": _joined(patches[0], "frame"),
-            "unit": ("frame", _joined(patches[0], "unit")),
-            "t_s": ("frame", _joined(patches[0], "t_s"), SECONDS | AFTER_LAMP_OFF),
-            "exposure_s": ("frame", _joined(patches[0], "exposure_s"), SECONDS),
-            "iso": ("frame", _joined(patches[0], "iso")),
-            "f_number": ("frame", _joined(patches[0], "f_number")),
+            "frame": np.array(first.frame),
+            "unit": ("frame", np.array(first.unit)),
+            "t_s": ("frame", first.t_s, SECONDS | AFTER_LAMP_OFF),
+            "exposure_s": ("frame", first.exposure_s, SECONDS),
+            "iso": ("frame", first.iso),
+            "f_number": ("frame", first.f_number),
         },
-        _attributes(folder),
+        attributes,
     )
+
+
+def _column(path: tuple[str, ...], value: Any) -> Column | None:
+    """A field as a variable; None for what is neither numbers nor texts."""
+    if isinstance(value, Measured):
+        return ((), value.value, {"units": value.unit})
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return None
+    if array.dtype.kind not in "iufbU":
+        return None
+    dimensions = tuple(f"{'.'.join(path)}_{axis}" for axis in range(array.ndim))
+    unit = unit_of(path[-1])
+    return (dimensions, array, {"units": unit} if unit else {})
+
+
+def _sigmas(result: RunResult) -> dict[str, Column]:
+    """The σ of every measured value, beside it."""
+    return {
+        f"{'.'.join(path)}_sigma": ((), value.sigma, {"units": value.unit})
+        for path, value in leaves(result)
+        if isinstance(value, Measured)
+    }
 
 
 def _attributes(folder: Path) -> dict[str, str]:
@@ -84,28 +132,16 @@ def _attributes(folder: Path) -> dict[str, str]:
     return {"run": folder.resolve().name, **known, **start.get("devices", {})}
 
 
-def _read_fit(path: Path) -> FittedDecay | None:
-    """What was fitted; None where nothing was."""
-    return read_fitted_decay(path) if path.is_file() else None
-
-
-def _measured(patches: Sequence[Sequence[Series]]) -> dict[str, Column]:
+def _measured(patches: Sequence[Series]) -> dict[str, Column]:
     """Every patch was measured in the same frames."""
-
-    def stacked(name: str) -> NDArray[Any]:
-        return np.stack([_joined(decays, name) for decays in patches])
-
     dimensions = ("patch", "frame", "channel")
+    values = np.stack([series.values for series in patches])
+    flags = np.stack([np.array(series.flag) for series in patches])
     return {
-        "value": (dimensions, stacked("values"), DN_PER_S | {"long_name": "signal"}),
-        "sigma": (dimensions, stacked("sigma"), DN_PER_S),
-        "flag": (("patch", "frame"), stacked("flag")),
+        "value": (dimensions, values, DN_PER_S | {"long_name": "signal"}),
+        "sigma": (dimensions, np.stack([series.sigma for series in patches]), DN_PER_S),
+        "flag": (("patch", "frame"), flags),
     }
-
-
-def _joined(decays: Sequence[Series], name: str) -> NDArray[Any]:
-    """A column of all decays, one after the other."""
-    return np.concatenate([getattr(decay, name) for decay in decays])
 
 
 def _fitted(fits: Sequence[FittedDecay | None], channels: Sequence[str]) -> dict[str, Column]:

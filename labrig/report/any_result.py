@@ -1,15 +1,12 @@
 """Plain tables of any result, for protocols that register no report of their own."""
 
-from collections.abc import Iterator, Mapping
-from dataclasses import fields, is_dataclass
 from typing import Any
 
 import numpy as np
-from pydantic import BaseModel
 
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Section, Table
-from labrig.results import Measured, RunResult
+from labrig.results import RunResult, leaves
 
 #: Longer arrays are not shown, only how long they are.
 MOST_SHOWN = 12
@@ -17,27 +14,14 @@ MOST_SHOWN = 12
 
 def render(result: RunResult, source: Source) -> Rendered:
     """Every field by its name, those of fields in fields with a dot between."""
-    rows = tuple(_rows("", result))
+    rows = tuple(
+        (".".join(path).replace("_", " "), _written(value))
+        for path, value in leaves(result)
+        if path != ("warnings",)
+    )
     table = Table(("Quantity", "Value"), rows, "Value with its standard uncertainty (1 σ).")
     lines = tuple(f"{name}: {value}" for name, value in rows)
     return Rendered((Section("Results", tables=(table,)),), lines)
-
-
-def _rows(name: str, value: Any) -> Iterator[tuple[str, str]]:
-    parts: Mapping[str, Any] | None = None
-    if isinstance(value, Mapping):
-        parts = value
-    elif isinstance(value, BaseModel):
-        parts = {key: getattr(value, key) for key in type(value).model_fields}
-    elif is_dataclass(value) and not isinstance(value, Measured):
-        parts = {one.name: getattr(value, one.name) for one in fields(value)}
-        if not name:
-            parts.pop("warnings")
-    if parts is None:
-        yield name.replace("_", " "), _written(value)
-        return
-    for key, inner in parts.items():
-        yield from _rows(f"{name}.{key}" if name else str(key), inner)
 
 
 def _written(value: Any) -> str:

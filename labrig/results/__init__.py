@@ -1,6 +1,7 @@
 """What was found, as frozen values with uncertainties and units; one reader and writer a file."""
 
 from labrig.results.arrays import BoolArray, FloatArray, IntArray
+from labrig.results.fields import leaves, unit_of
 from labrig.results.fitted_decay import (
     Candidate,
     DecayState,
@@ -33,11 +34,13 @@ __all__ = [
     "find_fitted_decays",
     "is_usable",
     "joined",
+    "leaves",
     "parse_series",
     "read_fitted_decay",
     "read_fitted_decays",
     "read_result",
     "read_series",
+    "unit_of",
     "with_uncertainty",
     "write_fitted_decay",
     "write_result",
