@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Self, TypeVar
+from typing import Any, Self, TypeVar
 
 from labrig.acquire import RigFile
 from labrig.calibration import (
@@ -71,7 +71,7 @@ class Inputs:
 
     def with_those_of(self, result: RunResult) -> Self:
         """These, and what a result provides; of mappings by patch, the other patches stay."""
-        provided = {
+        provided: dict[str, Any] = {
             name: {**getattr(self, name), **value} if isinstance(value, Mapping) else value
             for name, value in result.provides().items()
         }

@@ -58,7 +58,9 @@ def test_what_cannot_be_read_is_said_in_one_line(
     with pytest.raises(UsageError, match="expected a run with a result"):
         labrig.read_dataset(tmp_path)
     copy = shutil.copytree(finished.folder, tmp_path / "run")
-    (copy / "result" / "result.json").write_text('{"kind": "decay", "schema_version": 1, "patches": [')
+    (copy / "result" / "result.json").write_text(
+        '{"kind": "decay", "schema_version": 1, "patches": ['
+    )
     with pytest.raises(DataError, match=r"result\.json: expected"):
         labrig.read_dataset(copy)
     monkeypatch.setitem(sys.modules, "xarray", None)

@@ -1,5 +1,5 @@
-"""From the frames of a camera calibration to its camera file."""
+"""From the frames of a camera calibration to what body and lens make of light."""
 
-from labrig.analyse.camera_calibration.stage import process
+from labrig.analyse.camera_calibration.analysis import analyse
 
-__all__ = ["process"]
+__all__ = ["analyse"]

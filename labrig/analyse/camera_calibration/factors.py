@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from labrig.calibration import Factor
 from labrig.errors import DataError
+from labrig.results import FloatArray, Measured
 
-FloatArray = NDArray[np.float64]
 Setting = float | None
 
 #: How much of a factor the frames must determine by themselves.
@@ -49,13 +49,13 @@ class CardFrame:
 
 @dataclass(frozen=True)
 class Factors:
-    """By rising setting; `flicker` of all frames, `repeated` of equal ones, each with its σ."""
+    """By rising setting; relative `flicker` of all frames, `repeated` of equal ones."""
 
     shutter: tuple[Factor, ...]
     iso_gain: tuple[Factor, ...]
     aperture: tuple[Factor, ...]
-    flicker: tuple[float, float]
-    repeated: tuple[float, float]
+    flicker: Measured
+    repeated: Measured
 
 
 def fit_factors(frames: Sequence[CardFrame], iso: float, f_number: Setting) -> Factors:
@@ -140,8 +140,8 @@ def _labelled(frame: CardFrame, iso: float, f_number: Setting) -> float:
 
 def _solve(
     design: FloatArray, target: FloatArray, noise: FloatArray
-) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], tuple[float, float]]:
-    """Values, σ, whether they are determined, and the flicker with its σ."""
+) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], Measured]:
+    """Values, σ, whether they are determined, and the flicker."""
     flicker = 0.01
     for _ in range(ROUNDS):
         weight = 1 / np.hypot(noise, flicker)
@@ -156,17 +156,17 @@ def _solve(
         flicker = _common_scatter(squares, noise)
     sigma = np.sqrt(np.square(inverse).sum(axis=1))
     determined = np.square(v[kept]).sum(axis=0) > DETERMINED
-    return values, sigma, determined, (flicker, flicker / np.sqrt(2 * freedom))
+    return values, sigma, determined, Measured(flicker, float(flicker / np.sqrt(2 * freedom)))
 
 
-def _scatter(frames: Sequence[CardFrame]) -> tuple[float, float]:
-    """Flicker of equal frames about a straight line, and its σ."""
+def _scatter(frames: Sequence[CardFrame]) -> Measured:
+    """Flicker of equal frames about a straight line."""
     light, design = np.array([frame.light for frame in frames]), _lamp(frames)
     found, *_ = np.linalg.lstsq(design, light)
     freedom = max(len(light) - design.shape[1], 1)
     squares = np.square(light - design @ found) * len(light) / freedom
     flicker = _common_scatter(squares, np.array([frame.sigma for frame in frames]))
-    return flicker, float(np.sqrt(squares.mean() / (2 * freedom)))
+    return Measured(flicker, float(np.sqrt(squares.mean() / (2 * freedom))))
 
 
 def _common_scatter(squares: FloatArray, noise: FloatArray) -> float:

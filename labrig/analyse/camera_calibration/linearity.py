@@ -16,8 +16,7 @@ from numpy.typing import NDArray
 
 from labrig.calibration import Linearity
 from labrig.optics.piecewise import hats
-
-FloatArray = NDArray[np.float64]
+from labrig.results import FloatArray
 
 #: Knots of D, as shares of the range up to saturation.
 KNOTS = (0.15, 0.35, 0.55, 0.75, 0.95)

@@ -11,23 +11,19 @@ out where they are lost in the noise would make a gain more certain than it is.
 """
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.calibration import Noise
 from labrig.errors import DataError
 from labrig.record import FrameRecord
 from labrig.reduce import RawFrame
 from labrig.region import Region, region_pixels
-
-FloatArray = NDArray[np.float64]
+from labrig.results import FloatArray
+from labrig.results.camera_calibration import PairScatter, PhotonTransfer
 
 #: Pixels that differ by more standard deviations are hot, or were struck by a cosmic ray.
 OUTLIER_SIGMAS = 6.0
-#: Standard deviations from which neighbours evidently share noise.
-EVIDENT_SIGMAS = 4.0
 #: A frame that is brighter than so many standard deviations of its pixels is lit.
 LIT_SIGMAS = 3.0
 #: More pixels across or down take memory and tell nothing more.
@@ -38,62 +34,7 @@ ROUNDING_VARIANCE = 1 / 12
 _NEIGHBOURS = ((0, 1), (1, -1), (1, 0), (1, 1))
 
 
-@dataclass(frozen=True)
-class Scatter:
-    """What two frames of the same light differ by, all channels together.
-
-    Attributes
-    ----------
-    level_dn
-        Mean of the two above dark.
-    variance
-        Of a pixel in one frame, DN², without what its row shares.
-    neighbours
-        Sum of its covariances with the eight next pixels, DN².
-    row_variance
-        Of what a row shares, DN².
-    pixels
-        That were compared.
-    """
-
-    level_dn: float
-    variance: float
-    neighbours: float
-    row_variance: float
-    pixels: int
-
-
-@dataclass(frozen=True)
-class PhotonTransfer:
-    """The noise found, and what it was found from.
-
-    Attributes
-    ----------
-    points
-        Of the lit frames.
-    shared, shared_sigma
-        What neighbours share, over the variance of a pixel.
-    reduced_chi2
-        Of the straight line; more than a few: it is none.
-    """
-
-    noise: Noise
-    points: tuple[Scatter, ...]
-    shared: float
-    shared_sigma: float
-    reduced_chi2: float
-
-    @property
-    def shares(self) -> bool:
-        """Whether neighbours evidently share noise."""
-        return self.shared > EVIDENT_SIGMAS * self.shared_sigma
-
-    def variance(self, point: Scatter) -> float:
-        """Of a pixel's own light, DN²."""
-        return point.variance + point.neighbours
-
-
-def scatter(one: RawFrame, other: RawFrame, region: Region, dark_dn: float) -> Scatter:
+def scatter(one: RawFrame, other: RawFrame, region: Region, dark_dn: float) -> PairScatter:
     """What two frames of one exposure differ by in a region.
 
     Parameters
@@ -136,22 +77,22 @@ def _middle(area: tuple[int, int, int, int]) -> tuple[int, int, int, int]:
     return x + (width - wide) // 2, y + (height - high) // 2, wide, high
 
 
-def _scatter(difference: FloatArray, level_dn: float) -> Scatter:
+def _scatter(difference: FloatArray, level_dn: float) -> PairScatter:
     robust = 1.4826 * float(np.median(np.abs(difference)))
     kept = np.abs(difference) <= OUTLIER_SIGMAS * max(robust, 1.0)
     clean = np.where(kept, difference, 0.0)
     columns = clean.shape[1]
     rows = clean.sum(axis=1) / kept.sum(axis=1)
     own = np.where(kept, clean - rows[:, np.newaxis], 0.0)
-    variance = float(np.square(own).sum()) / kept.sum()
+    variance = float(np.square(own).sum() / kept.sum())
     covariances = [_covariance(own, down, right) for down, right in _NEIGHBOURS]
     # What its mean has taken from each row: pixels that share noise make more of it.
     taken = (variance + 2 * covariances[0]) / columns
-    return Scatter(
+    return PairScatter(
         level_dn,
-        variance=variance + taken,
-        neighbours=2 * (sum(covariances) + taken),
-        row_variance=max(float(np.square(rows).mean()) - taken, 0.0),
+        variance_dn2=variance + taken,
+        neighbours_dn2=2 * (sum(covariances) + taken),
+        row_variance_dn2=max(float(np.square(rows).mean()) - taken, 0.0),
         pixels=int(kept.sum()),
     )
 
@@ -164,7 +105,9 @@ def _covariance(values: FloatArray, down: int, right: int) -> float:
     return float((shifted * unmoved).mean())
 
 
-def photon_transfer(iso: float, lit: Sequence[Scatter], dark: Sequence[Scatter]) -> PhotonTransfer:
+def photon_transfer(
+    iso: float, lit: Sequence[PairScatter], dark: Sequence[PairScatter]
+) -> PhotonTransfer:
     """Gain from the lit pairs, read noise from the dark ones.
 
     Raises
@@ -178,12 +121,12 @@ def photon_transfer(iso: float, lit: Sequence[Scatter], dark: Sequence[Scatter])
             f"{len(lit)} and {len(dark)}; take more"
         )
     level = np.array([point.level_dn for point in lit])
-    variance = np.array([point.variance + point.neighbours for point in lit])
+    variance = np.array([point.light_variance_dn2 for point in lit])
     # Of n pixels the variance V has a variance of 2 V²/n, each of the covariances with the four
     # neighbours, which count twice, V²/n: 9 times as much together.
     freedom = np.array([point.pixels for point in lit]) / 9
-    dark_variance = float(np.mean([point.variance for point in dark]))
-    in_the_dark = float(np.mean([point.variance + point.neighbours for point in dark]))
+    dark_variance = float(np.mean([point.variance_dn2 for point in dark]))
+    in_the_dark = float(np.mean([point.light_variance_dn2 for point in dark]))
     slope, sigma, chi2 = _line(level, variance, in_the_dark, freedom)
     if not slope > 0:
         raise DataError(
@@ -193,7 +136,7 @@ def photon_transfer(iso: float, lit: Sequence[Scatter], dark: Sequence[Scatter])
     gain = 1 / slope
     read = np.sqrt(max(dark_variance - ROUNDING_VARIANCE, 0.0))
     pixels = sum(point.pixels for point in dark)
-    row = np.sqrt(np.mean([point.row_variance for point in dark]))
+    row = np.sqrt(np.mean([point.row_variance_dn2 for point in dark]))
     noise = Noise(
         iso=iso,
         gain_e_per_dn=gain,
@@ -205,10 +148,12 @@ def photon_transfer(iso: float, lit: Sequence[Scatter], dark: Sequence[Scatter])
     return PhotonTransfer(noise, tuple(lit), *_shared(lit), chi2)
 
 
-def _shared(lit: Sequence[Scatter]) -> tuple[float, float]:
+def _shared(lit: Sequence[PairScatter]) -> tuple[float, float]:
     """What neighbours share over all pairs, and its σ if they share nothing."""
     pixels = np.array([point.pixels for point in lit])
-    ratio = np.array([point.neighbours / max(point.variance, ROUNDING_VARIANCE) for point in lit])
+    ratio = np.array(
+        [point.neighbours_dn2 / max(point.variance_dn2, ROUNDING_VARIANCE) for point in lit]
+    )
     sigma = 2 * np.sqrt(len(_NEIGHBOURS) / pixels.sum())
     return float(ratio @ pixels / pixels.sum()), float(sigma)
 

@@ -9,19 +9,18 @@ from pathlib import Path
 from typing import Any
 
 import pytest
-from labrig.process.decay import measure_decay
-from labrig.process.result import Result
 
-from labrig.analyse import Choices
-from labrig.analyse.choices import read_decay_protocol
+from labrig.analyse import decay as decay_analysis
 from labrig.analyse.inputs import Inputs
 from labrig.calibration import CameraFile, read_camera_file
 from labrig.errors import DataError
-from labrig.process import process_run
+from labrig.process import Processed, process_and_report, process_run
 from labrig.record import read_run
+from labrig.results.camera_calibration import CameraCalibrationResult
 from labrig.sim.optics import vignetting
 from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons
-from tests.analyse.recorded import cut_off_and_resumed, record
+from tests.analyse.recorded import cut_off_and_resumed, record, whole
+from tests.results.round_trip import assert_read_back
 
 PROTOCOL = {
     "protocol": "camera_calibration",
@@ -47,13 +46,29 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def result(run: Path) -> Any:
-    return process_run(run)
+def processed(run: Path) -> Processed:
+    return process_and_report(run)
 
 
 @pytest.fixture(scope="module")
-def camera(result: Result) -> CameraFile:
-    return read_camera_file(result.report.parent / "camera.yaml")
+def result(processed: Processed) -> Any:
+    return processed.result
+
+
+@pytest.fixture(scope="module")
+def camera(result: CameraCalibrationResult) -> CameraFile:
+    return result.calibration
+
+
+def test_the_result_and_its_file_are_read_back(run: Path, result: CameraCalibrationResult) -> None:
+    assert read_camera_file(run / "result" / "camera.yaml") == result.calibration
+    assert_read_back(result)
+
+
+def test_a_person_is_told(processed: Processed) -> None:
+    told = ("ISO 100: gain", "ISO 400: gain", "flicker", "shutter", "aperture", "light left in the")
+    for line, begin in zip(processed.lines, told, strict=True):
+        assert line.startswith(begin)
 
 
 def test_gain_and_read_noise_are_the_sensors(camera: CameraFile) -> None:
@@ -66,13 +81,17 @@ def test_gain_and_read_noise_are_the_sensors(camera: CameraFile) -> None:
         assert noise.row_noise_e == pytest.approx(0.5 * read, rel=0.35)
 
 
-def test_shared_charge_is_told(result: Result) -> None:
-    assert any("neighbouring pixels share noise" in warning for warning in result.run_warnings)
+def test_shared_charge_is_seen(result: CameraCalibrationResult) -> None:
+    assert any(one.shares for one in result.photon_transfers)
+    assert any("neighbouring pixels share noise" in warning for warning in result.warnings)
 
 
-def test_flicker_is_the_rooms_and_not_the_lamps_drift(camera: CameraFile) -> None:
+def test_flicker_is_the_rooms_and_not_the_lamps_drift(
+    camera: CameraFile, result: CameraCalibrationResult
+) -> None:
     assert abs(camera.flicker - 0.007) < 3.5 * camera.flicker_sigma
     assert camera.flicker_sigma < 0.001
+    assert abs(result.repeat_flicker.value - 0.007) < 3.5 * result.repeat_flicker.sigma
 
 
 def test_shutter_iso_and_aperture_are_the_bodys(camera: CameraFile) -> None:
@@ -89,7 +108,9 @@ def test_shutter_iso_and_aperture_are_the_bodys(camera: CameraFile) -> None:
     assert times_s[-1] / times_s[0] > 100
 
 
-def test_the_sensor_is_linear_until_pixels_are_full(camera: CameraFile, result: Result) -> None:
+def test_the_sensor_is_linear_until_pixels_are_full(
+    camera: CameraFile, result: CameraCalibrationResult
+) -> None:
     """A full pixel still shares its charge: it stays below the level that says it is full."""
     assert camera.linearity is not None
     curve = zip(
@@ -99,7 +120,7 @@ def test_the_sensor_is_linear_until_pixels_are_full(camera: CameraFile, result: 
     assert len(below) >= 4
     assert all(abs(value) < 4 * sigma for value, sigma in below)
     assert camera.linearity.saturation_dn == pytest.approx(15_600 - 1024)
-    assert any("off a straight line" in warning for warning in result.run_warnings)
+    assert any("off a straight line" in warning for warning in result.warnings)
 
 
 def test_the_flat_field_is_the_lenss(camera: CameraFile) -> None:
@@ -121,7 +142,7 @@ def test_the_body_is_noted_and_known_again(run: Path, camera: CameraFile) -> Non
 
 
 def test_killed_within_a_bracket_it_goes_on_there(
-    run: Path, result: Result, camera: CameraFile, tmp_path: Path
+    run: Path, result: CameraCalibrationResult, camera: CameraFile, tmp_path: Path
 ) -> None:
     again = tmp_path / "again"
     shutil.copytree(run, again)
@@ -134,8 +155,9 @@ def test_killed_within_a_bracket_it_goes_on_there(
     # The card is in its place still: nobody is asked to put it there.
     asked = [a.task for u in after if u not in before for a in after[u].actions if a.is_by_hand]
     assert asked == ["lamp halogen", "sample", "lvf away", "no filter"]
-    process_run(again)
-    other = read_camera_file(again / "result" / "camera.yaml")
+    result = process_run(again)
+    assert isinstance(result, CameraCalibrationResult)
+    other = result.calibration
     for one, as_before in zip(other.aperture, camera.aperture, strict=True):
         assert one.factor == pytest.approx(as_before.factor, abs=5 * 0.007)
 
@@ -146,11 +168,11 @@ def test_a_decay_uses_it_or_refuses_it(camera: CameraFile, tmp_path: Path) -> No
         "first": "1 s", "exposure": "1 s", "patches": {"corner": [0.05, 0.12, 0.1, 0.2]},
         "camera": {"iso": 400, "f_number": 4},
     }  # fmt: skip
-    run = read_run(record(tmp_path, decay))
-    protocol, choices = read_decay_protocol(run.folder), Choices()
+    run = record(tmp_path, decay)
 
     def brightest(known: Inputs) -> float:
-        return float(measure_decay(run, protocol, choices, known).series["corner"].values[0].max())
+        found = decay_analysis.analyse(whole(run, known))
+        return float(found.patches["corner"].series.values[0].max())
 
     left = vignetting(64, 96)[8:20, 5:15].mean()
     assert brightest(Inputs(camera=camera)) == pytest.approx(brightest(Inputs()) / left, rel=0.006)
@@ -169,7 +191,7 @@ def test_frames_of_another_lens_refuse_it(camera: CameraFile, tmp_path: Path) ->
 
     decay = {"protocol": "decay", "charge": "20 s", "for": "20 s", "first": "1 s",
              "exposure": "1 s"}  # fmt: skip
-    run = read_run(record(tmp_path, decay, other_lens))
+    run = record(tmp_path, decay, other_lens)
     with pytest.raises(DataError, match="calibration of another lens: expected EF75mm") as caught:
-        measure_decay(run, read_decay_protocol(run.folder), Choices(), Inputs(camera=camera))
+        decay_analysis.analyse(whole(run, Inputs(camera=camera)))
     assert "EF50mm f/1.4 USM, 50 mm" in str(caught.value)

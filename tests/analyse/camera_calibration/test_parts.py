@@ -86,7 +86,7 @@ def test_factors_and_flicker_are_right_and_as_uncertain_as_they_say() -> None:
         flickers.append(found.flicker)
     assert 0.8 < np.std(pulls) < 1.25
     assert abs(np.mean(pulls)) < 0.35
-    value, sigma = np.array(flickers).T
+    value, sigma = np.array([(one.value, one.sigma) for one in flickers]).T
     assert np.mean(value) == pytest.approx(0.007, rel=0.04)
     assert np.std(value) == pytest.approx(np.mean(sigma), rel=0.35)
 

@@ -1,7 +1,6 @@
 """The flat field of a lens at one aperture, from frames of an evenly lit card."""
 
 from collections.abc import Sequence
-from dataclasses import dataclass
 from itertools import pairwise
 from typing import NamedTuple
 
@@ -12,30 +11,13 @@ from labrig.calibration import Flat, rho_squared
 from labrig.errors import DataError
 from labrig.reduce import RawFrame
 from labrig.region import Region, region_pixels
-
-FloatArray = NDArray[np.float64]
+from labrig.results import FloatArray
+from labrig.results.camera_calibration import FittedFlat
 
 #: Blocks across and down the card whose means are fitted.
 BLOCKS = (16, 12)
 #: ρ⁴ takes part if it is so many σ from nothing.
 EVIDENT_SIGMAS = 4.0
-
-
-@dataclass(frozen=True, eq=False)
-class FittedFlat:
-    """A flat field, and means of blocks of the card: ρ², and light over the fit in the middle.
-
-    Attributes
-    ----------
-    rho2
-        (channels, blocks).
-    light
-        (channels, blocks), the gradient divided out.
-    """
-
-    flat: Flat
-    rho2: FloatArray
-    light: FloatArray
 
 
 def fit_flat(

@@ -1,15 +1,12 @@
-"""What a camera calibration looks like."""
+"""A camera calibration in a report."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
 
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from labrig.analyse.camera_calibration.factors import Factors
-from labrig.analyse.camera_calibration.flat_fit import FittedFlat
-from labrig.analyse.camera_calibration.photon_transfer import PhotonTransfer
 from labrig.calibration import CameraFile, Factor, Linearity
 from labrig.report.figure_style import (
     INK,
@@ -25,23 +22,27 @@ from labrig.report.figure_style import (
     points,
 )
 from labrig.report.legend import legend_above, marked
+from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
+from labrig.results import Measured
+from labrig.results.camera_calibration import (
+    CameraCalibrationResult,
+    FittedFlat,
+    PhotonTransfer,
+)
 from labrig.written_numbers import exposure_text, plus_minus, rounded
 
 HEIGHT_PT = 230.0
 
 
-def sections(
-    file: CameraFile,
-    transfers: Sequence[PhotonTransfer],
-    factors: Factors,
-    flats: Sequence[FittedFlat],
-) -> tuple[Section, ...]:
-    """Noise, linearity, settings, flat field."""
-    found = [_noise(file, transfers)]
+def render(result: CameraCalibrationResult, source: Source) -> Rendered:
+    """Show noise, linearity, settings, flat field."""
+    file = result.calibration
+    sections = [_noise(file, result.photon_transfers)]
     if file.linearity is not None:
-        found.append(_linearity(file.linearity))
-    return (*found, _settings(file, factors), _flat_field(file, flats))
+        sections.append(_linearity(file.linearity))
+    sections += [_settings(file, result.repeat_flicker), _flat_field(file, result.flats)]
+    return Rendered(tuple(sections), tuple(_lines(file)))
 
 
 def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
@@ -79,7 +80,7 @@ def _transfer_figure(transfers: Sequence[PhotonTransfer]) -> Figure:
         colour, marker = OTHER_CHANNELS[number % len(OTHER_CHANNELS)], MARKERS[number % 8]
         level = np.array([point.level_dn for point in one.points])
         read = one.noise.read_noise_e / one.noise.gain_e_per_dn
-        variance = np.array([one.variance(point) for point in one.points]) - read**2
+        variance = np.array([point.light_variance_dn2 for point in one.points]) - read**2
         points(axes, level, variance, marker, colour, PAPER)
         axes.plot(level, level / one.noise.gain_e_per_dn, color=colour, linewidth=1.0)
         entries.append(marked(f"ISO {one.noise.iso:g}", marker, colour, PAPER))
@@ -120,7 +121,7 @@ def _linearity(found: Linearity) -> Section:
     )
 
 
-def _settings(file: CameraFile, factors: Factors) -> Section:
+def _settings(file: CameraFile, repeat_flicker: Measured) -> Section:
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     _logarithmic(axes)
@@ -131,9 +132,8 @@ def _settings(file: CameraFile, factors: Factors) -> Section:
     points(axes, times_s, factor, "o", INK, PAPER)
     axes.set_xlabel("Shutter time as the camera tells / s")
     axes.set_ylabel("True over told")
-    repeated, flicker = (
-        plus_minus(100 * value, 100 * sigma) for value, sigma in (factors.repeated, factors.flicker)
-    )
+    flicker = plus_minus(100 * file.flicker, 100 * file.flicker_sigma)
+    repeated = plus_minus(100 * repeat_flicker.value, 100 * repeat_flicker.sigma)
     tables = (
         _table("ISO", file.iso_gain, "{:g}", "Signal over that of the label."),
         _table("f-number", file.aperture, "f/{:g}", "Light over that of the label."),
@@ -200,3 +200,22 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
         ),
         (Table(head, rows, "Light left in the corners, and the lamp's gradient."),),
     )
+
+
+def _lines(file: CameraFile) -> Iterator[str]:
+    for noise in file.noise:
+        yield (
+            f"ISO {noise.iso:g}: gain {plus_minus(noise.gain_e_per_dn, noise.gain_e_per_dn_sigma)} "
+            f"e/DN, read noise {plus_minus(noise.read_noise_e, noise.read_noise_e_sigma)} e"
+        )
+    yield f"flicker {plus_minus(100 * file.flicker, 100 * file.flicker_sigma)} %"
+    for name, factors in (("shutter", file.shutter), ("aperture", file.aperture)):
+        if len(factors) > 1:
+            most = max(factors, key=lambda one: abs(one.factor - 1))
+            setting = exposure_text(most.setting) if name == "shutter" else f"f/{most.setting:g}"
+            factor = plus_minus(most.factor, most.sigma)
+            yield f"{name}: furthest from its label {setting}, × {factor}"
+    corners = [float(np.min(flat.at(1.0))) for flat in file.flats]
+    stops = ["" if flat.f_number is None else f" at f/{flat.f_number:g}" for flat in file.flats]
+    falling = (f"{100 * left:.1f} %{at}" for left, at in zip(corners, stops, strict=True))
+    yield f"light left in the corners: {', '.join(falling)}"

@@ -1,0 +1,278 @@
+"""A camera calibration, from its frames to its result."""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass, replace
+
+import numpy as np
+
+from labrig.analyse.camera_calibration.factors import CardFrame, Factors, fit_factors
+from labrig.analyse.camera_calibration.flat_field import fit_flat
+from labrig.analyse.camera_calibration.linearity import deviation, fit_linearity
+from labrig.analyse.camera_calibration.photon_transfer import pairs_of, photon_transfer, scatter
+from labrig.analyse.part import Part
+from labrig.analyse.part_frames import part_frames, part_region
+from labrig.analyse.this_camera import camera_identity, lens_of
+from labrig.analyse.timed_frames import timed, untimed
+from labrig.calibration import CameraFile, Linearity
+from labrig.errors import DataError
+from labrig.record import FrameRecord
+from labrig.reduce import measure, read_raw, reduce_patches
+from labrig.region import Region
+from labrig.results import FloatArray, Series
+from labrig.results.camera_calibration import (
+    CameraCalibrationResult,
+    FittedFlat,
+    PairScatter,
+    PhotonTransfer,
+)
+from labrig.written_numbers import exposure_text, plus_minus
+
+LIT = ("photon", "repeat", "bracket", "flat")
+#: Share of a region's pixels that may clip in a photon transfer.
+CLIPPED_SHARE = 1e-3
+#: Where a sensor is further from a straight line, its frames tell nothing of a shutter.
+MOST_BENT = 0.02
+#: χ² per degree of freedom beyond which the photon-transfer line is none.
+STRAIGHT_CHI2 = 6.0
+#: Deviations from linear, shutter times and gradients of light that are worth a warning.
+BENT, OFF, UNEVEN = 0.01, 0.05, 0.2
+#: Numbers of σ from which a difference is one.
+CLEAR_SIGMAS = 4.0
+
+
+def analyse(part: Part) -> CameraCalibrationResult:
+    """Find noise, linearity, factors of settings and flat fields.
+
+    Raises
+    ------
+    DataError
+        Some unit is missing, or its frames are of no use.
+    """
+    protocol, run = part.protocol, part.run
+    region, iso = part_region(part, protocol.card), protocol.camera.iso
+    darks = part_frames(part, "dark")
+    lit = part_frames(part, *LIT)
+    card = card_levels(lit, darks, region)
+    photon = [frame for frame in lit if frame.purpose == "photon"]
+    transfers = tuple(_transfer(one, photon, darks, region) for one in protocol.isos)
+    bracket = [frame for frame in lit if frame.unit == "linearity"]
+    if not bracket:
+        raise DataError("expected the brackets of 'linearity', got none; resume the run")
+    range_dn, full_dn = _saturation(max(bracket, key=lambda frame: frame.exposure_s), region)
+    linearity = card.linearity(iso, range_dn, full_dn)
+    factors = fit_factors(
+        card.card_frames(("repeat", "bracket"), linearity), iso, protocol.camera.f_number
+    )
+    flats = _flats(part, lit, darks)
+    file = CameraFile(
+        camera=camera_identity(run),
+        lens=lens_of(lit),
+        iso=iso,
+        f_number=protocol.camera.f_number,
+        channels=card.series.channels,
+        noise=tuple(one.noise for one in transfers),
+        linearity=linearity,
+        flicker=factors.flicker.value,
+        flicker_sigma=factors.flicker.sigma,
+        shutter=factors.shutter,
+        iso_gain=factors.iso_gain,
+        aperture=factors.aperture,
+        flats=tuple(one.flat for one in flats),
+        source="measured with labrig, camera_calibration",
+        run=run.folder.resolve().name,
+    )
+    return CameraCalibrationResult(
+        calibration=file,
+        card=card.series,
+        photon_transfers=transfers,
+        repeat_flicker=factors.repeated,
+        flats=flats,
+        warnings=tuple(_warnings(file, transfers, factors, card)),
+    )
+
+
+@dataclass(frozen=True, eq=False)
+class CardLevels:
+    """The card in n frames of C channels, row by row the frames of `series`."""
+
+    frames: tuple[FrameRecord, ...]
+    series: Series
+
+    @property
+    def level_dn(self) -> FloatArray:
+        """(n, C) above dark."""
+        return self.series.values * self.series.exposure_s[:, np.newaxis]
+
+    @property
+    def sigma_dn(self) -> FloatArray:
+        """(n, C) of `level_dn`."""
+        return self.series.sigma * self.series.exposure_s[:, np.newaxis]
+
+    @property
+    def clipped(self) -> int:
+        """How many frames clip that are not meant to."""
+        rows = zip(self.frames, self.series.usable, strict=True)
+        return sum(frame.purpose != "bracket" and not usable for frame, usable in rows)
+
+    def linearity(
+        self, iso: float, range_dn: float, saturation_dn: float | None
+    ) -> Linearity | None:
+        """From the frames at one ISO."""
+        rows = self.series.usable & np.array([frame.iso == iso for frame in self.frames])
+        stops = [frame.f_number for frame in self.frames]
+        known = list(dict.fromkeys(stops))
+        group = np.array([known.index(stop) for stop in stops], dtype=np.intp)
+        level = np.where(rows[:, np.newaxis], self.level_dn, np.nan)
+        return fit_linearity(level, self.sigma_dn, group, range_dn, saturation_dn)
+
+    def card_frames(self, purposes: Sequence[str], linearity: Linearity | None) -> list[CardFrame]:
+        """What brackets and repeats show, put right for what is not linear."""
+        bent = deviation(linearity, self.level_dn)
+        straight = self.level_dn * np.exp(-bent)
+        used = self.series.usable & (np.abs(bent).max(axis=1) < MOST_BENT)
+        light, noise = straight.sum(axis=1), np.sqrt(np.square(self.sigma_dn).sum(axis=1))
+        return [
+            CardFrame(
+                frame.unit, frame.purpose, frame.start_time, frame.exposure_s, frame.iso,
+                frame.f_number, float(np.log(light[row])), float(noise[row] / light[row]),
+            )
+            for row, frame in enumerate(self.frames)
+            if frame.purpose in purposes and used[row] and light[row] > 0
+        ]  # fmt: skip
+
+
+def card_levels(
+    lit: Sequence[FrameRecord], darks: Sequence[FrameRecord], card: Region
+) -> CardLevels:
+    """Reduce all lit frames in the card's region.
+
+    Raises
+    ------
+    DataError
+        There are none, or no dark frames at their ISO.
+    """
+    if not lit:
+        raise DataError("expected frames of the lit card, got none; resume the run")
+    frames = [
+        replace(
+            timed(frame, lit[0].start_time),
+            unit=f"{frame.unit} ISO {frame.iso} f/{frame.f_number}",
+        )
+        for frame in lit
+    ]
+    dark = [untimed(frame) for frame in darks]
+    return CardLevels(tuple(lit), reduce_patches(frames, {"card": card}, dark)["card"])
+
+
+def _transfer(
+    iso: float, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord], card: Region
+) -> PhotonTransfer:
+    """Photon transfer at one ISO.
+
+    Raises
+    ------
+    DataError
+        Too few frames.
+    """
+    shortest_s = min((frame.exposure_s for frame in darks if frame.iso == iso), default=0.0)
+    dark = [frame for frame in darks if frame.iso == iso and frame.exposure_s == shortest_s]
+    dark_dn = float(np.mean(_dark_levels(dark, card))) if dark else 0.0
+    own = [frame for frame in lit if frame.iso == iso]
+    return photon_transfer(
+        iso, _scatters(pairs_of(own), card, dark_dn), _scatters(pairs_of(dark), card, dark_dn)
+    )
+
+
+def _dark_levels(darks: Sequence[FrameRecord], card: Region) -> FloatArray:
+    """Mean of each channel above black, (channels,)."""
+    measured = [measure(read_raw(frame.path), card) for frame in darks]
+    levels = [[channel.mean for channel in one.channels.values()] for one in measured]
+    mean: FloatArray = np.mean(levels, axis=0)
+    return mean
+
+
+def _saturation(brightest: FrameRecord, card: Region) -> tuple[float, float | None]:
+    """From black to white, and the level above black at which most of the card clips; or None."""
+    seen = measure(read_raw(brightest.path), card)
+    range_dn = seen.white - max(seen.black)
+    clips = any(channel.saturated > channel.n / 2 for channel in seen.channels.values())
+    return range_dn, range_dn if clips else None
+
+
+def _scatters(
+    pairs: Sequence[tuple[FrameRecord, FrameRecord]], card: Region, dark_dn: float
+) -> list[PairScatter]:
+    found = []
+    for one, other in pairs:
+        first, second = read_raw(one.path), read_raw(other.path)
+        seen = measure(first, card).channels.values()
+        if all(channel.saturated <= CLIPPED_SHARE * channel.n for channel in seen):
+            found.append(scatter(first, second, card, dark_dn))
+    return found
+
+
+def _flats(
+    part: Part, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord]
+) -> tuple[FittedFlat, ...]:
+    card, reference = part_region(part, part.protocol.card), part.protocol.camera.iso
+    dark_dn = _dark_levels([frame for frame in darks if frame.iso == reference], card)
+    of_flats = [frame for frame in lit if frame.purpose == "flat"]
+    return tuple(
+        fit_flat(
+            [read_raw(frame.path) for frame in of_flats if frame.f_number == f_number],
+            card,
+            dark_dn,
+            f_number,
+        )
+        for f_number in dict.fromkeys(frame.f_number for frame in of_flats)
+    )
+
+
+def _warnings(
+    file: CameraFile,
+    transfers: Sequence[PhotonTransfer],
+    factors: Factors,
+    card: CardLevels,
+) -> Iterator[str]:
+    for one in transfers:
+        if one.reduced_chi2 > STRAIGHT_CHI2:
+            yield (
+                f"the noise at ISO {one.noise.iso:g} does not rise evenly with the light (χ² "
+                f"{one.reduced_chi2:.1f} a degree of freedom): does the camera filter its RAW "
+                "frames, or did something move?"
+            )
+    evident = [one for one in transfers if one.shares]
+    if evident:
+        most = max(evident, key=lambda one: one.shared)
+        yield (
+            f"neighbouring pixels share noise ({100 * most.shared:.0f} % of a pixel's variance): "
+            "the gain takes it into account"
+        )
+    flicker, repeated = factors.flicker.value, factors.repeated.value
+    if flicker - repeated > CLEAR_SIGMAS * factors.repeated.sigma:
+        yield (
+            f"brackets scatter by {100 * flicker:.2f} %, equal frames by {100 * repeated:.2f} %: "
+            "the lamp wandered, or a setting does not repeat well; factors are no better than that"
+        )
+    if file.linearity is not None:
+        curve = zip(
+            file.linearity.level_dn, file.linearity.deviation, file.linearity.sigma, strict=True
+        )
+        bent = [level for level, d, s in curve if abs(d) > max(BENT, CLEAR_SIGMAS * s)]
+        if bent:
+            yield (
+                f"the sensor is off a straight line by more than 1 % at {bent[0]:.0f} DN above "
+                "dark: keep the brightest level of a measurement well below"
+            )
+        if file.linearity.saturation_dn is None:
+            yield "no frame saturated; the level at which the sensor is full is not known"
+    off = [o for o in file.shutter if abs(o.factor - 1) > max(OFF, CLEAR_SIGMAS * o.sigma)][:3]
+    if off:
+        named = ", ".join(
+            f"{exposure_text(one.setting)}, × {plus_minus(one.factor, one.sigma)}" for one in off
+        )
+        yield f"shutter times are off by more than 5 % ({named}): longer ones are more exact"
+    if any(max(map(abs, row)) > UNEVEN for flat in file.flats for row in flat.gradient):
+        yield "the card is lit unevenly, by more than 20 %: move the lamp further away"
+    if clipped := card.clipped:
+        yield f"{clipped} frames of the card clip and are left out; lower camera.iso"
