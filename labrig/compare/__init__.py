@@ -1,7 +1,6 @@
 """Held against photographs, against other materials and against the paper."""
 
 from labrig.compare.beside import Beside, Pair, beside
-from labrig.compare.closure import Closure, closure
 from labrig.compare.numbers import numbers
 from labrig.compare.run import RunComparison, compare_run
 from labrig.compare.sections import sections
@@ -9,12 +8,10 @@ from labrig.compare.three_channels import ThreeChannels, three_channels
 
 __all__ = [
     "Beside",
-    "Closure",
     "Pair",
     "RunComparison",
     "ThreeChannels",
     "beside",
-    "closure",
     "compare_run",
     "numbers",
     "sections",

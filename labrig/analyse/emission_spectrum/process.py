@@ -1,6 +1,6 @@
 """From the frames of an emission_spectrum run to Λ* of each patch, and whether it is one at all."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 
@@ -21,10 +21,10 @@ from labrig.analyse.emission_spectrum.telling import (
 )
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.part import Part, StageResult
-from labrig.analyse.strip_patches import StripPatch, of_each
+from labrig.analyse.strip_patches import StripPatch
 from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import intact_frames, steady_frames, timing_warnings
-from labrig.errors import DataError
+from labrig.errors import DataError, FitError
 from labrig.fit.spectrum import fit_spectrum
 from labrig.reduce import SeriesFrame
 from labrig.results import is_usable
@@ -71,7 +71,7 @@ def process(part: Part) -> StageResult:
         part.inputs.camera,
         next(iter(benches.values())).holder,
     )
-    found = of_each(
+    found = _of_each(
         list(benches),
         part.inputs,
         lambda patch, known: _of_patch(
@@ -84,6 +84,43 @@ def process(part: Part) -> StageResult:
         *refused,
     )
     return replace(found, warnings=(*told, *found.warnings))
+
+
+def _of_each(
+    patches: Sequence[StripPatch],
+    known: Inputs,
+    process: Callable[[StripPatch, Inputs], StageResult],
+) -> StageResult:
+    """What `process` finds of every patch, what is known growing from one to the next.
+
+    A patch that cannot be processed is a warning, as long as another one can.
+
+    Raises
+    ------
+    DataError, FitError
+        No patch can.
+    """
+    if len(patches) == 1 and patches[0].alone:
+        return process(patches[0], known)
+    found, failures = StageResult(known), []
+    for patch in patches:
+        name = patch.name
+        try:
+            one = process(patch, found.known)
+        except (DataError, FitError) as error:
+            failures.append(type(error)(f"{name}: {error}"))
+            found = replace(found, warnings=(*found.warnings, str(failures[-1])))
+            continue
+        titled = (replace(section, title=f"{section.title}: {name}") for section in one.sections)
+        found = StageResult(
+            known=one.known,
+            sections=(*found.sections, *titled),
+            lines=(*found.lines, *(f"{name}: {line}" for line in one.lines)),
+            warnings=(*found.warnings, *(f"{name}: {warning}" for warning in one.warnings)),
+        )
+    if len(failures) == len(patches):
+        raise failures[0]
+    return found
 
 
 def _of_patch(
