@@ -5,16 +5,15 @@ of the same place along the strip.
 """
 
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.analyse.inputs import Inputs
-from labrig.analyse.part import Part, StageResult
+from labrig.analyse.part import Part
 from labrig.calibration.lvf_file import SLICES, Strip
-from labrig.errors import DataError, FitError
+from labrig.errors import DataError
 from labrig.reduce import RawFrame
 from labrig.region import Region, region_pixels
 
@@ -171,40 +170,3 @@ def for_each_patch(
     if not results:
         raise failures[0]
     return results, tuple(warnings)
-
-
-def of_each(
-    patches: Sequence[StripPatch],
-    known: Inputs,
-    process: Callable[[StripPatch, Inputs], StageResult],
-) -> StageResult:
-    """What `process` finds of every patch, what is known growing from one to the next.
-
-    A patch that cannot be processed is a warning, as long as another one can.
-
-    Raises
-    ------
-    DataError, FitError
-        No patch can.
-    """
-    if len(patches) == 1 and patches[0].alone:
-        return process(patches[0], known)
-    found, failures = StageResult(known), []
-    for patch in patches:
-        name = patch.name
-        try:
-            one = process(patch, found.known)
-        except (DataError, FitError) as error:
-            failures.append(type(error)(f"{name}: {error}"))
-            found = replace(found, warnings=(*found.warnings, str(failures[-1])))
-            continue
-        titled = (replace(section, title=f"{section.title}: {name}") for section in one.sections)
-        found = StageResult(
-            known=one.known,
-            sections=(*found.sections, *titled),
-            lines=(*found.lines, *(f"{name}: {line}" for line in one.lines)),
-            warnings=(*found.warnings, *(f"{name}: {warning}" for warning in one.warnings)),
-        )
-    if len(failures) == len(patches):
-        raise failures[0]
-    return found

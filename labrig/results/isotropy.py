@@ -8,9 +8,9 @@ from typing import ClassVar
 import numpy as np
 
 from labrig.results.arrays import FloatArray, IntArray
-from labrig.results.csv_file import write_csv
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
+from labrig.results.text_files import write_csv
 
 #: What the paper found its samples to fluctuate by at most (section 4).
 PAPER = 0.05

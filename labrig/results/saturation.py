@@ -9,10 +9,10 @@ import numpy as np
 from scipy.special import chdtrc, fdtrc
 
 from labrig.results.arrays import FloatArray
-from labrig.results.csv_file import write_csv
 from labrig.results.fitted_decay import FittedDecay
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
+from labrig.results.text_files import write_csv
 
 #: Lights of a saturation run, as its units are called.
 LIGHTS = FULL, WEAKER = "full", "weaker"

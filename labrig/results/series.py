@@ -9,7 +9,7 @@ import numpy.typing as npt
 
 from labrig.errors import DataError
 from labrig.results.arrays import FloatArray
-from labrig.results.csv_file import write_csv
+from labrig.results.text_files import write_csv
 
 #: Columns of series.csv that are not channels (contracts.md).
 TIME, EXPOSURE, SIGMA_SUFFIX = "t_s", "exposure_s", "_sigma"

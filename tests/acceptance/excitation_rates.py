@@ -14,8 +14,9 @@ import argparse
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.excitation import ExcitationFit, Uncertain, fit_excitation
+from labrig.fit.excitation import Uncertain, fit_excitation
 from labrig.material import Material, read_material
+from labrig.results import FittedExcitation
 from tests.fit.charged_samples import Bench, lvf_windows, two_states
 
 FloatArray = NDArray[np.float64]
@@ -27,7 +28,7 @@ STRONG_PER_S = 0.002
 LAMP = 0.005
 
 
-def run(material: Material, seed: int) -> tuple[ExcitationFit, Bench]:
+def run(material: Material, seed: int) -> tuple[FittedExcitation, Bench]:
     """One bench, measured and fitted."""
     bench = Bench(material, seed=seed)
     bare = bench.series("bare lamp", np.ones((1, 160)), [5400.0], shots=30, every_s=6.0)
@@ -37,7 +38,7 @@ def run(material: Material, seed: int) -> tuple[ExcitationFit, Bench]:
     return fit_excitation([bare, lvf], 1.1 * rates, bench.amplitudes(), uncertain), bench
 
 
-def deviations(found: ExcitationFit, bench: Bench) -> FloatArray:
+def deviations(found: FittedExcitation, bench: Bench) -> FloatArray:
     """In σ: k_r, amplitude and k_e of every state in turn."""
     rows = []
     for state, truth, full in zip(

@@ -14,8 +14,8 @@ from labrig.acquire import read_protocol, read_rig_file
 from labrig.analyse import Choices
 from labrig.analyse.emission_spectrum import analyse as analyse_spectra
 from labrig.analyse.inputs import Inputs
-from labrig.analyse.part import Part, StageResult
-from labrig.analyse.strip_patches import StripPatch, cut, for_each_patch, lean, of_each
+from labrig.analyse.part import Part
+from labrig.analyse.strip_patches import StripPatch, cut, for_each_patch, lean
 from labrig.calibration import Strip, write_irradiance_file, write_lvf_file
 from labrig.compare.result import read_patches
 from labrig.errors import DataError, FitError, UsageError
@@ -24,7 +24,6 @@ from labrig.process import process_run
 from labrig.record import read_run
 from labrig.reduce import RawFrame
 from labrig.region import Region
-from labrig.report.sections import Section
 from labrig.results import read_fitted_decays
 from labrig.results.emission_spectrum import read_emission_spectrum
 from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
@@ -208,23 +207,26 @@ def test_rows_of_a_tilted_strip_lie_further_along(down: float, below: float) -> 
         assert (middle[0] - left[0]) / (right - left)[0] + further == pytest.approx(along)
 
 
-def test_one_patch_that_fails_leaves_the_others(tmp_path: Path) -> None:
+def test_one_patch_without_a_result_leaves_the_others() -> None:
     patches = [StripPatch(name, name, (0, 0, 1, 1), alone=False) for name in "ab"]
 
-    def process(failing: str) -> Callable[[StripPatch, Inputs], StageResult]:
-        def one(patch: StripPatch, known: Inputs) -> StageResult:
+    def analyse(failing: str) -> Callable[[StripPatch], tuple[str, list[str]]]:
+        def one(patch: StripPatch) -> tuple[str, list[str]]:
             if patch.name in failing:
                 raise FitError("nothing glows")
-            return StageResult(known, (Section("Excitation"),), ("k_e 1",), ("odd",))
+            return patch.material, ["odd"]
 
         return one
 
-    found = of_each(patches, Inputs(), process("a"))
-    assert found.warnings == ("a: nothing glows", "b: odd")
-    assert [section.title for section in found.sections] == ["Excitation: b"]
-    assert found.lines == ("b: k_e 1",)
+    results, warnings = for_each_patch(patches, analyse("a"))
+    assert results == {"b": "b"}
+    assert warnings == ("a: nothing glows", "b: odd")
     with pytest.raises(FitError, match="a: nothing glows"):
-        of_each(patches, Inputs(), process("ab"))
+        for_each_patch(patches, analyse("ab"))
+    alone = [StripPatch("a", "paint")]
+    assert for_each_patch(alone, analyse("b")) == ({"": "paint"}, ("odd",))
+    with pytest.raises(FitError, match=r"^nothing glows"):
+        for_each_patch(alone, analyse("a"))
 
 
 def test_one_patch_without_a_result_leaves_the_others() -> None:

@@ -52,6 +52,8 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
     assert not patch.rates.differ
     assert any("r(0) = 1 does not hold" in warning for warning in done.result.warnings)
     assert_read_back(done.result)
+    given_noise = replace(patch, rates=replace(patch.rates, noise_dof=np.inf))
+    assert_read_back(replace(done.result, patches={"sample": given_noise}))
     rows = (done.report.parent / "saturation.csv").read_text().splitlines()
     assert len(rows) == 1 + 6
     in_time, of_level, rates = done.lines

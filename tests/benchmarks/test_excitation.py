@@ -6,9 +6,10 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from labrig.fit.excitation import ChargingSeries, Uncertain, fit_excitation
+from labrig.fit.excitation import Uncertain, fit_excitation
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
+from labrig.results import ChargingSeries
 from tests.fit.charged_samples import Bench, lvf_windows, two_states
 
 Floats = npt.NDArray[np.float64]

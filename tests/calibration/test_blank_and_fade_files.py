@@ -16,7 +16,7 @@ from labrig.calibration import (
     write_fade_file,
 )
 from labrig.errors import DataError, UsageError
-from labrig.fit.excitation import Transient
+from labrig.results import Transient
 
 BLANK = BlankFile(
     iso=400,

@@ -10,8 +10,8 @@ from dataclasses import dataclass, field
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.excitation import Charge, ChargingSeries, Transient
 from labrig.material import Material, read_material
+from labrig.results import Charge, ChargingSeries, Transient
 from labrig.sim.lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
 from labrig.sim.phosphor import Phosphor, band_cells, phosphor
 from labrig.sim.simulation import LampSettings

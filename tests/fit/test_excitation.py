@@ -6,17 +6,11 @@ import numpy as np
 import pytest
 
 from labrig.errors import FitError
-from labrig.fit.excitation import (
-    Charge,
-    ChargingSeries,
-    ExcitationFit,
-    Transient,
-    Uncertain,
-    fit_excitation as fit,
-)
-from labrig.fit.excitation.levels import levels, levels_at_off
+from labrig.fit.excitation import Uncertain, fit_excitation as fit, levels_at_off
+from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.material import Material, read_material
+from labrig.results import Charge, ChargingSeries, FittedExcitation, Transient
 from tests.fit.charged_samples import DOOR_S, Bench, lvf_windows, two_states
 
 LVF = lvf_windows(np.linspace(405, 695, 12))
@@ -31,7 +25,7 @@ def measured(bench: Bench) -> list[ChargingSeries]:
     return [bare, bench.series("through LVF", LVF, CHARGES_S)]
 
 
-def fitted(bench: Bench, series: list[ChargingSeries]) -> ExcitationFit:
+def fitted(bench: Bench, series: list[ChargingSeries]) -> FittedExcitation:
     rates = 1.1 * np.array([state.k_r_per_s for state in bench.material.states])
     return fit(series, rates, bench.amplitudes(), Uncertain(bench.flicker, LAMP))
 

@@ -1,5 +1,5 @@
-"""Excitation rates, from a run to a material."""
+"""Excitation rates, from the frames of a run to a material of each patch."""
 
-from labrig.analyse.excitation.processing import process
+from labrig.analyse.excitation.analysis import analyse
 
-__all__ = ["process"]
+__all__ = ["analyse"]

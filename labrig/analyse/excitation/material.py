@@ -3,14 +3,10 @@
 from importlib.metadata import version
 
 import numpy as np
-from numpy.typing import NDArray
 
 from labrig.calibration.irradiance_file import IrradianceFile
-from labrig.fit.excitation import ExcitationFit, ExcitedState
 from labrig.material import IrradianceNorm, Material, Provenance, State
-from labrig.results.emission_spectrum import EmissionSpectrum
-
-FloatArray = NDArray[np.float64]
+from labrig.results import ExcitedState, FittedExcitation, FloatArray
 
 SOURCE = (
     "decay and excitation measured with labrig; amplitudes in DN/s of the brightest channel, Λ = "
@@ -20,7 +16,7 @@ SOURCE = (
 
 
 def excited_material(
-    fit: ExcitationFit,
+    fit: FittedExcitation,
     irradiance: IrradianceFile,
     spectrum: EmissionSpectrum | None,
     name: str,
@@ -55,7 +51,7 @@ def excited_material(
 
 
 def _reradiation(
-    fit: ExcitationFit,
+    fit: FittedExcitation,
     number: int,
     state: ExcitedState,
     spectrum: EmissionSpectrum | None,

@@ -12,12 +12,11 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import FitError
 from labrig.fit.excitation.levels import levels_at_off
-from labrig.fit.excitation.parameters import Rates, Uncertain
+from labrig.fit.excitation.parameters import Rates, Uncertain, bands_of
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.fit.excitation.result import ExcitationFit, ExcitedState, LevelAtOff
-from labrig.fit.excitation.series import ChargingSeries, bands_of
 from labrig.fit.excitation.start import starts
 from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
+from labrig.results import ChargingSeries, ExcitedState, FittedExcitation, LevelAtOff
 
 #: The flicker's covariance is taken from the fit so often; the second changes nothing visible.
 WHITENINGS = 2
@@ -35,8 +34,8 @@ def fit_excitation(
     k_r_per_s: ArrayLike,
     shares: ArrayLike,
     uncertain: Uncertain | None = None,
-    near: ExcitationFit | None = None,
-) -> ExcitationFit:
+    near: FittedExcitation | None = None,
+) -> FittedExcitation:
     """Fit all series together.
 
     Parameters
@@ -85,7 +84,7 @@ def _brightest(series: Sequence[ChargingSeries]) -> int:
     return int(np.argmax(total))
 
 
-def _as_fitted(problem: ExcitationProblem, fit: ExcitationFit, reference: int) -> FloatArray:
+def _as_fitted(problem: ExcitationProblem, fit: FittedExcitation, reference: int) -> FloatArray:
     k_r, amplitude = np.array([(s.k_r_per_s, s.amplitude) for s in fit.states]).T
     weights = fit.channel_weights
     at_reference = weights[reference]
@@ -110,7 +109,7 @@ def _chi2(fit: LeastSquaresFit) -> float:
 
 def _result(
     problem: ExcitationProblem, found: LeastSquaresFit, reference: int, uncertain: Uncertain
-) -> ExcitationFit:
+) -> FittedExcitation:
     n, bands = problem.parameters.states, problem.parameters.bands
     rates, theta = problem.parameters.unpack(found.parameters), found.parameters
     own = 2 * n + n * bands
@@ -145,7 +144,7 @@ def _result(
         [order, n + order, *(2 * n + i * bands + np.arange(bands) for i in order)]
     )
     at_off = _at_off(problem, rates, covariance[:own, :own], order)
-    return ExcitationFit(
+    return FittedExcitation(
         states=states,
         channel_weights=rates.weights,
         channel_weights_sigma=weights_sigma,

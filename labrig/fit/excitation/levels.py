@@ -10,9 +10,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.excitation.series import ChargingSeries
-from labrig.fit.least_squares import FloatArray
 from labrig.material.rates import phi1, phi2, relaxation_with_slopes
+from labrig.results import ChargingSeries, FloatArray
 
 
 class Levels(NamedTuple):

@@ -7,8 +7,8 @@ from typing import NamedTuple
 
 import numpy as np
 
-from labrig.fit.excitation.series import ChargingSeries, bands_of
-from labrig.fit.least_squares import FloatArray
+from labrig.errors import FitError
+from labrig.results import ChargingSeries, FloatArray
 
 
 class Rates(NamedTuple):
@@ -197,6 +197,23 @@ class Parameters:
             theta[columns.off],
             theta[columns.offset],
         )
+
+
+def bands_of(series: Sequence[ChargingSeries]) -> int:
+    """Number of bands, the same in all.
+
+    Raises
+    ------
+    FitError
+        There is no series, or they differ in bands or channels.
+    """
+    shapes = {(one.irradiance.shape[1], one.values.shape[2]) for one in series}
+    if len(shapes) != 1:
+        raise FitError(
+            f"expected series with the same bands and channels, got {sorted(shapes) or 'none'}"
+        )
+    bands, _ = shapes.pop()
+    return int(bands)
 
 
 def _begins(counts: Sequence[int]) -> list[int]:

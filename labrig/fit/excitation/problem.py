@@ -12,8 +12,7 @@ import numpy as np
 
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.parameters import Parameters, Rates, Uncertain, is_fitted
-from labrig.fit.excitation.series import ChargingSeries
-from labrig.fit.least_squares import FloatArray
+from labrig.results import ChargingSeries, FloatArray
 
 
 class ExcitationProblem:

@@ -6,9 +6,8 @@ import numpy as np
 
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.fit.excitation.series import ChargingSeries
-from labrig.fit.least_squares import FloatArray
 from labrig.fit.nonnegative import nonnegative_least_squares
+from labrig.results import ChargingSeries, FloatArray
 
 #: Level of the brightest site: how far charging has gone is what the fit knows least at first.
 GUESSED_LEVELS = (0.05, 0.2, 0.5, 0.9)

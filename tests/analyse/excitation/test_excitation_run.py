@@ -12,9 +12,9 @@ import yaml
 
 from labrig.acquire import read_rig_file
 from labrig.analyse.choices import Choices, read_run_protocol
-from labrig.analyse.excitation.charges import charged
-from labrig.analyse.excitation.lit import glowing
-from labrig.analyse.excitation.processing import USUAL
+from labrig.analyse.excitation.analysis import USUAL
+from labrig.analyse.excitation.charge_intervals import charge_frames
+from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.part import Part
 from labrig.calibration import BlankFile
@@ -22,15 +22,17 @@ from labrig.calibration.irradiance_file import IrradianceFile, write_irradiance_
 from labrig.calibration.lvf_file import SLICES, Strip
 from labrig.errors import DataError
 from labrig.material import read_material
-from labrig.process import process_run
+from labrig.process import process_and_report, process_run
 from labrig.record import read_run
 from labrig.reduce import measure, read_raw
+from labrig.results.excitation import ExcitationResult
 from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import BURNING_K, filament_spectrum
 from labrig.sim.lvf import Lvf
 from labrig.sim.phosphor import band_cells
 from tests.analyse.recorded import cut_off_and_resumed, record
 from tests.calibration.test_camera_file import camera
+from tests.results.made import assert_read_back
 
 #: Wide, so that a slice of the strip is ten pixels; low, so that it is fast.
 WIDTH, HEIGHT = 384, 48
@@ -98,31 +100,34 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 @pytest.mark.campaign
 def test_rates_and_levels_are_the_true_ones(run: Path) -> None:
-    result = process_run(run)
-    found, true = read_material(run / "result" / "material.yaml"), read_material("blue-paint")
-    (state,), (truth,) = found.states, true.states
-    assert state.k_e_per_s is not None
-    assert state.k_e_per_s_sigma is not None
+    done = process_and_report(run)
+    assert isinstance(done.result, ExcitationResult)
+    (patch,) = done.result.patches.values()
+    (state,), (truth,) = patch.fit.states, read_material("blue-paint").states
     assert truth.k_e_per_s is not None
-    assert state.k_r_per_s_sigma is not None
-    assert state.r0 is not None
-    assert state.r0_sigma is not None
-    assert abs(state.k_r_per_s - truth.k_r_per_s) < 4 * state.k_r_per_s_sigma
+    assert abs(state.k_r_per_s - truth.k_r_per_s) < 4 * state.k_r_sigma_per_s
     # The room's lamp is four times as bright as the irradiance to which Table 1's rates belong.
-    rates, sigma = np.array(state.k_e_per_s) / 4, np.array(state.k_e_per_s_sigma) / 4
+    rates, sigma = state.k_e_per_s / 4, state.k_e_sigma_per_s / 4
     off = rates - np.array(truth.k_e_per_s)
     assert (np.abs(off) < np.maximum(4 * sigma, 1e-5)).all()
     assert rates[:3] == pytest.approx(truth.k_e_per_s[:3], rel=0.1)
+    assert state.k_e_upper_per_s[5] < 1e-3
+    level = patch.fit.at_off[-1]
     kappa = 4 * float(np.array(truth.k_e_per_s) @ true_irradiance().direct)
-    assert state.r0 == pytest.approx(
-        kappa / (kappa + truth.k_r_per_s), abs=4 * state.r0_sigma + 0.01
-    )
-    closure = next(line for line in result.lines if line.startswith("closure"))
-    assert float(closure.split("within ")[1].split(" %")[0]) < 5
-    assert float(closure.split("(")[1].split(" σ")[0]) < 3
-    assert (run / "result" / "figures").is_dir()
-    fit = json.loads((run / "result" / "excitation.json").read_text())
-    assert fit["states"][0]["k_e_upper_per_s"][5] < 1e-3
+    true_r0 = kappa / (kappa + truth.k_r_per_s)
+    assert level.r0[0] == pytest.approx(true_r0, abs=4 * level.r0_sigma[0] + 0.01)
+    assert patch.closure is not None
+    assert patch.closure.rms_percent < 5
+    assert patch.closure.rms_sigma < 3
+    assert_read_back(done.result)
+
+    folder = done.report.parent
+    assert patch.material == read_material(folder / "material.yaml")
+    fit = json.loads((folder / "excitation.json").read_text())
+    assert fit["states"][0]["k_e_per_s"] == state.k_e_per_s.tolist()
+    assert (folder / "figures").is_dir()
+    assert done.lines[0].startswith("state 1: k_r ")
+    assert done.lines[-1].startswith("closure: charging by the lamp itself is predicted within ")
 
 
 def test_charges_double_until_the_glow_stops_growing(run: Path) -> None:
@@ -191,15 +196,17 @@ def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: P
         sigma_dn_per_s=((1.0,),), constant_dn_per_s=(0.0,), constant_sigma_dn_per_s=(1.0,),
         ambient_dn_per_s=(0.0,), ambient_sigma_dn_per_s=(1.0,), first_clean_s=10.0,
     )  # fmt: skip
-    whole = glowing(read_run(run), Choices(), 150.0)
-    clean = glowing(read_run(run), Choices(), 150.0, blank)
-    early = [frame for frame, one in whole.charge.items() if frame.start_time < one.off_s + 9.98]
+    whole = charge_frames(read_run(run), Choices(), 150.0)
+    clean = charge_frames(read_run(run), Choices(), 150.0, blank)
+    early = [frame for frame, one in whole.charge_of.items() if frame.start_time < one.off_s + 9.98]
     assert early
-    assert set(clean.charge) == set(whole.charge) - set(early)
+    assert set(clean.charge_of) == set(whole.charge_of) - set(early)
     (said,) = clean.left_out
     assert said.startswith(f"{len(early)} frames begin before the bench is dark and are left out")
     with pytest.raises(DataError, match="all frames begin before"):
-        glowing(read_run(run), Choices(), 150.0, blank.model_copy(update={"first_clean_s": 1e4}))
+        charge_frames(
+            read_run(run), Choices(), 150.0, blank.model_copy(update={"first_clean_s": 1e4})
+        )
 
 
 def stage_of(run: Path, **known: Any) -> Part:
@@ -218,9 +225,11 @@ def test_charges_are_missing(run: Path) -> None:
     part = stage_of(run)
     some = [one for one in part.run.attempts if not one.unit.startswith("bare")]
     with pytest.raises(DataError, match="through the filter and without it"):
-        charged(replace(part, run=replace(part.run, attempts=some)), true_irradiance(), USUAL)
+        patch_chargings(
+            replace(part, run=replace(part.run, attempts=some)), true_irradiance(), USUAL
+        )
 
 
 def test_a_calibration_of_another_camera_is_refused(run: Path) -> None:
     with pytest.raises(DataError, match="calibration of another camera"):
-        charged(stage_of(run, camera=camera()), true_irradiance(), USUAL)
+        patch_chargings(stage_of(run, camera=camera()), true_irradiance(), USUAL)

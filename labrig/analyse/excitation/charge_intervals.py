@@ -13,15 +13,19 @@ from labrig.record import Attempt, FrameRecord, RunRecord
 #: Frames that show the glow after a charge; those of a metering are exposed too long or too short.
 GLOWING = ("strip", "bare", "rest")
 #: Units that charged by the lamp itself; all others charged through the filter.
-BARE = "bare-"
+DIRECT = "bare-"
 
 
 @dataclass(frozen=True)
-class Lit:
-    """A unit that charged.
+class ChargeInterval:
+    """When a unit charged, in seconds since 1970.
 
     Attributes
     ----------
+    unit
+        Its name.
+    on_s, off_s
+        When the lamp was switched.
     cold
         Part of what a cold lamp lacks that it lacked in this charge on average, 0 to 1.
     """
@@ -32,40 +36,42 @@ class Lit:
     cold: float = 0.0
 
     @property
-    def is_bare(self) -> bool:
+    def is_direct(self) -> bool:
         """Whether it charged by the lamp itself."""
-        return self.unit.startswith(BARE)
+        return self.unit.startswith(DIRECT)
 
 
 @dataclass(frozen=True)
-class Glowing:
+class ChargeFrames:
     """The charges, by time, and the photographs after them.
 
     Attributes
     ----------
-    charge
+    intervals
+        The charges.
+    charge_of
         Photographs by time, each with the charge that it belongs to.
     left_out
         What to say of photographs that begin before the bench is dark.
     """
 
-    lit: Sequence[Lit]
-    charge: Mapping[FrameRecord, Lit]
+    intervals: Sequence[ChargeInterval]
+    charge_of: Mapping[FrameRecord, ChargeInterval]
     left_out: tuple[str, ...] = ()
 
     @property
     def zero_s(self) -> float:
         """When the first charge began; from there times count."""
-        return self.lit[0].on_s
+        return self.intervals[0].on_s
 
-    def after(self, one: Lit) -> list[FrameRecord]:
+    def after(self, one: ChargeInterval) -> list[FrameRecord]:
         """The photographs of one charge."""
-        return [frame for frame, charge in self.charge.items() if charge is one]
+        return [frame for frame, charge in self.charge_of.items() if charge is one]
 
 
-def glowing(
+def charge_frames(
     run: RunRecord, choices: Choices, warms_s: float, blank: BlankFile | None = None
-) -> Glowing:
+) -> ChargeFrames:
     """What a run says; photographs that begin before the bench is dark, by its blank, left out.
 
     Parameters
@@ -79,40 +85,39 @@ def glowing(
         There are no charges through the filter, or none without it, or no photographs; or the
         blank never became clean.
     """
-    lit = with_warmth(
-        sorted(
-            (one for attempt in run.completed().values() for one in _lit(attempt)),
-            key=lambda one: one.on_s,
-        ),
-        warms_s,
-    )
+    units = (_interval(attempt) for attempt in run.completed().values())
+    lit = sorted((one for one in units if one is not None), key=lambda one: one.on_s)
+    intervals = with_warmth(lit, warms_s)
     frames = [
         frame for purpose in GLOWING for frame in run.frames(purpose) if not choices.excludes(frame)
     ]
     frames.sort(key=lambda frame: frame.start_time)
-    charge = {frame: one for frame in frames if (one := _charge_before(lit, frame)) is not None}
-    charge, left_out = (charge, ()) if blank is None or not charge else _cleaned(charge, blank)
-    if not charge or not any(one.is_bare for one in lit) or all(one.is_bare for one in lit):
+    of_frames = {frame: _interval_before(intervals, frame) for frame in frames}
+    charge_of = {frame: one for frame, one in of_frames.items() if one is not None}
+    left_out: tuple[str, ...] = ()
+    if blank is not None and charge_of:
+        charge_of, left_out = _cleaned(charge_of, blank)
+    if not charge_of or len({one.is_direct for one in intervals}) < 2:
         raise DataError(
             f"{run.folder}: expected complete charges through the filter and without it; go on "
             f"with: labrig resume {run.folder}"
         )
-    return Glowing(lit, charge, left_out)
+    return ChargeFrames(intervals, charge_of, left_out)
 
 
 def _cleaned(
-    charge: Mapping[FrameRecord, Lit], blank: BlankFile
-) -> tuple[dict[FrameRecord, Lit], tuple[str, ...]]:
+    charge: Mapping[FrameRecord, ChargeInterval], blank: BlankFile
+) -> tuple[dict[FrameRecord, ChargeInterval], tuple[str, ...]]:
     after_s = {frame: frame.start_time - one.off_s for frame, one in charge.items()}
     left_out = left_out_lines(list(after_s.values()), blank)
     return {frame: charge[frame] for frame, t in after_s.items() if blank.is_clean(t)}, left_out
 
 
-def with_warmth(lit: Sequence[Lit], warms_s: float) -> list[Lit]:
+def with_warmth(intervals: Sequence[ChargeInterval], warms_s: float) -> list[ChargeInterval]:
     """By Newton's law: cold before the first charge, warmer in each one, cooler after it."""
-    found: list[Lit] = []
+    found: list[ChargeInterval] = []
     lacking, since_s = 1.0, 0.0
-    for one in lit:
+    for one in intervals:
         if found:
             lacking = 1 - (1 - lacking) * math.exp(-(one.on_s - since_s) / warms_s)
         charge_s = one.off_s - one.on_s
@@ -122,16 +127,20 @@ def with_warmth(lit: Sequence[Lit], warms_s: float) -> list[Lit]:
     return found
 
 
-def _lit(attempt: Attempt) -> Sequence[Lit]:
+def _interval(attempt: Attempt) -> ChargeInterval | None:
     times = {
         action.action: action.middle_time for action in attempt.actions if action.device == "lamp"
     }
-    return [Lit(attempt.unit, times["on"], times["off"])] if {"on", "off"} <= set(times) else []
+    if not {"on", "off"} <= set(times):
+        return None
+    return ChargeInterval(attempt.unit, times["on"], times["off"])
 
 
-def _charge_before(lit: Sequence[Lit], frame: FrameRecord) -> Lit | None:
+def _interval_before(
+    intervals: Sequence[ChargeInterval], frame: FrameRecord
+) -> ChargeInterval | None:
     """The last one; None if there was none in the same arrangement of filter and lamp."""
-    before = [one for one in lit if one.off_s < frame.start_time]
-    if not before or before[-1].is_bare is not frame.unit.startswith(BARE):
+    before = [one for one in intervals if one.off_s < frame.start_time]
+    if not before or before[-1].is_direct is not frame.unit.startswith(DIRECT):
         return None
     return before[-1]

@@ -2,8 +2,7 @@
 
 import numpy as np
 
-from labrig.analyse.excitation.first_photographs import first_photographs
-from labrig.fit.excitation import Charge, ChargingSeries, Transient
+from labrig.results import Charge, ChargingSeries, Transient
 
 EMPTY = np.empty((0, 1, 1))
 
@@ -19,14 +18,14 @@ def series(*begins_s: tuple[float, ...]) -> ChargingSeries:
 
 
 def test_the_first_usable_one_of_each_charge() -> None:
-    found = first_photographs(series((1, 5), (1, 5)), np.array([False, True, True, True]))
+    found = series((1, 5), (1, 5)).first_frames(np.array([False, True, True, True]))
     assert found == {0: 1, 1: 2}
 
 
 def test_a_charge_that_was_looked_at_much_later_is_left_out() -> None:
     every = np.ones(5, dtype=bool)
-    assert first_photographs(series((87,), (1, 5), (1.2, 5)), every) == {1: 1, 2: 3}
+    assert series((87,), (1, 5), (1.2, 5)).first_frames(every) == {1: 1, 2: 3}
 
 
 def test_nothing_usable() -> None:
-    assert first_photographs(series((1, 5)), np.zeros(2, dtype=bool)) == {}
+    assert series((1, 5)).first_frames(np.zeros(2, dtype=bool)) == {}

@@ -3,8 +3,8 @@
 import numpy as np
 import pytest
 
-from labrig.analyse.excitation.light import across_sites, band_sigma, site_modes
-from labrig.analyse.excitation.lit import Lit, with_warmth
+from labrig.analyse.excitation.charge_intervals import ChargeInterval, with_warmth
+from labrig.analyse.excitation.lamp_light import across_sites, band_sigma, site_modes
 from tests.analyse.excitation.test_excitation_run import true_irradiance
 
 
@@ -33,9 +33,9 @@ def test_what_is_told_of_a_place_is_what_its_modes_add_up_to() -> None:
 
 
 def test_a_lamp_is_warm_after_a_long_charge_and_cools_in_the_dark() -> None:
-    first = Lit("a", 0.0, 10.0)
-    after_long = Lit("b", 20.0, 2000.0), Lit("c", 2010.0, 2020.0), Lit("d", 4000.0, 4010.0)
-    cold = [one.cold for one in with_warmth([first, *after_long], 150.0)]
+    times_s = {"a": (0.0, 10.0), "b": (20.0, 2000.0), "c": (2010.0, 2020.0), "d": (4000.0, 4010.0)}
+    intervals = [ChargeInterval(unit, *both) for unit, both in times_s.items()]
+    cold = [one.cold for one in with_warmth(intervals, 150.0)]
     assert cold[0] == pytest.approx(1 - 10 / 150 / 2, abs=0.002)
     assert cold[2] < 0.1
     assert cold[3] > 0.95

@@ -1,4 +1,4 @@
-"""Tables of numbers as CSV files."""
+"""Results as text files."""
 
 import csv
 import io
@@ -7,6 +7,20 @@ from pathlib import Path
 from typing import Any
 
 from labrig.errors import DiskError
+
+
+def write_text(path: Path, text: str) -> None:
+    """Write a text, its lines ended alike on every computer.
+
+    Raises
+    ------
+    DiskError
+        The file cannot be written.
+    """
+    try:
+        path.write_text(text, encoding="utf-8", newline="")
+    except OSError as error:
+        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
 
 
 def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) -> None:
@@ -21,7 +35,4 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) ->
     table = csv.writer(text, lineterminator="\n")
     table.writerow(head)
     table.writerows(rows)
-    try:
-        path.write_text(text.getvalue(), encoding="utf-8", newline="")
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    write_text(path, text.getvalue())

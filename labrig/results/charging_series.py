@@ -4,7 +4,6 @@ One photograph shows many sites at once: places under the linear variable filter
 by different wavelengths, or samples under the bare lamp.
 """
 
-from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
 from typing import Self
@@ -13,10 +12,14 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.fit.least_squares import FloatArray
+from labrig.results.arrays import BoolArray, FloatArray
+
+#: Charges that are first looked at so many times later than most (those of a metering, by the next
+#: look at what is left) do not go with the others.
+LATER = 3.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Transient:
     """How the lamp comes on or goes dark, band by band.
 
@@ -60,7 +63,7 @@ class Transient:
         return float(self.duration_s.sum())
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class Charge:
     """One charge and the photographs after it, before the next one; times on one clock.
 
@@ -90,7 +93,7 @@ class Charge:
     saturated: bool = False
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ChargingSeries:
     """Charges in one geometry, and n photographs of P sites in C channels.
 
@@ -131,6 +134,26 @@ class ChargingSeries:
             return self
         irradiance = (self.across * self.irradiance).reshape(-1, self.irradiance.shape[1])
         return replace(self, irradiance=irradiance, across=None)
+
+    def first_frames(self, usable: BoolArray) -> dict[int, int]:
+        """Row of its first usable photograph, for each charge photographed as soon as most.
+
+        Parameters
+        ----------
+        usable
+            (n,) photographs that may be taken.
+        """
+        ends = np.cumsum([0, *(len(charge.start_s) for charge in self.charges)])
+        first = {
+            number: low + int(np.argmax(usable[low:high]))
+            for number, (low, high) in enumerate(pairwise(ends))
+            if usable[low:high].any()
+        }
+        begins_s = np.concatenate([charge.start_s - charge.off_s for charge in self.charges])
+        if not first:
+            return {}
+        usual_s = float(np.median([begins_s[row] for row in first.values()]))
+        return {number: row for number, row in first.items() if begins_s[row] <= LATER * usual_s}
 
     def checked(self) -> Self:
         """Itself, if nothing is wrong with it.
@@ -188,20 +211,3 @@ class ChargingSeries:
                 f"{self.name}: expected photographs after the lamp has faded, {dark_s:.3f} s, got "
                 f"one at {charge.start_s.min():.3f} s; leave it out"
             )
-
-
-def bands_of(series: Sequence[ChargingSeries]) -> int:
-    """Number of bands, the same in all.
-
-    Raises
-    ------
-    FitError
-        There is no series, or they differ in bands or channels.
-    """
-    shapes = {(one.irradiance.shape[1], one.values.shape[2]) for one in series}
-    if len(shapes) != 1:
-        raise FitError(
-            f"expected series with the same bands and channels, got {sorted(shapes) or 'none'}"
-        )
-    bands, _ = shapes.pop()
-    return int(bands)

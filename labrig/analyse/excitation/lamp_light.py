@@ -1,12 +1,14 @@
-"""The light on every place behind the filter: how it may be off, and how it runs across a place."""
+"""The lamp's light on the sample: how it may be off, how it runs across a place, how it changes.
+
+Every place behind the filter has a light of its own. The lamp comes on and goes dark in every band
+as it was measured, or as halogen lamps usually do.
+"""
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.interpolate import PchipInterpolator
 
-from labrig.calibration.irradiance_file import IrradianceFile
-
-FloatArray = NDArray[np.float64]
+from labrig.calibration import Change, FadeFile, IrradianceFile
+from labrig.results import FloatArray, Transient
 
 #: Of the light on a place alone, whatever its file says: bands are calibrated place by place, and
 #: their flanks are rough by so much. Smooth errors alone would have to bend for it.
@@ -19,6 +21,12 @@ SMOOTH_MODES = 9
 WORST = 1.0
 #: Less light than this share of the most has no logarithm worth the name.
 LEAST_LIGHT = 1e-6
+#: A halogen lamp falls to 1/e in so long at these wavelengths (physics.md: measured by others),
+#: and is dark after `DARK_S` (Nalbach et al., section 4.4).
+USUAL_NM = (419.0, 650.0)
+USUAL_1_E_S = (0.031, 0.051)
+DARK_S = 0.32
+STEPS = 64
 
 
 def site_modes(irradiance: IrradianceFile) -> FloatArray:
@@ -29,19 +37,19 @@ def site_modes(irradiance: IrradianceFile) -> FloatArray:
     others change it at a band's edges and far from it.
     """
     through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
-    told = _told(irradiance)[:, None]
+    light_sigma = _relative_sigma(irradiance)[:, None]
     position = np.array(irradiance.position)
     knots = np.linspace(position[0], position[-1], SMOOTH_MODES)
     share = np.clip(1 - np.abs(position - knots[:, None]) / (knots[1] - knots[0]), 0.0, None)
     smooth = np.sin(np.pi / 2 * share)[..., None]
     nm = np.ptp(irradiance.bands_nm) * (position - position[0]) / np.ptp(position)
     by_nm = np.gradient(np.log(_some(through)), nm, axis=0)
-    beyond = np.sqrt(np.clip((sigma / _some(through)) ** 2 - told**2, 0.0, WORST**2))
+    beyond = np.sqrt(np.clip((sigma / _some(through)) ** 2 - light_sigma**2, 0.0, WORST**2))
     bands = np.ones(through.shape[1])
     alone = LEAST_SITE_SIGMA * np.eye(len(position))[..., None]
     return np.concatenate(
         [
-            smooth * told * bands,
+            smooth * light_sigma * bands,
             smooth * WAVELENGTH_SIGMA_NM * by_nm,
             smooth * beyond,
             alone * bands,
@@ -79,16 +87,53 @@ def scale_sigma(irradiance: IrradianceFile) -> float:
     What is not known even of the place that is known best, all places have in common: how bright
     the camera sees a narrow band against the lamp's whole light.
     """
-    return float(np.hypot(irradiance.scale_sigma, _told(irradiance).min()))
+    return float(np.hypot(irradiance.scale_sigma, _relative_sigma(irradiance).min()))
 
 
-def _told(irradiance: IrradianceFile) -> FloatArray:
+def lamp_transients(fade: FadeFile | None, bands_nm: FloatArray) -> tuple[Transient, Transient]:
+    """Rise and fade; without a file, what halogen lamps usually do.
+
+    A rise that was not measured is taken for the fade upside down: a filament heats about as fast
+    as it cools.
+    """
+    if fade is None:
+        dark = _usual(bands_nm)
+        return _upside_down(dark), dark
+    found = _transient(fade, fade.fade, bands_nm, end=0.0)
+    if fade.rise is None:
+        return _upside_down(found), found
+    return _transient(fade, fade.rise, bands_nm, end=1.0), found
+
+
+def _relative_sigma(irradiance: IrradianceFile) -> FloatArray:
     """(P,) relative σ of all light on each place."""
     through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
-    told: FloatArray = np.sqrt((sigma**2).sum(axis=1)) / np.maximum(through.sum(axis=1), 1e-300)
-    return told
+    relative: FloatArray = np.sqrt((sigma**2).sum(axis=1)) / np.maximum(through.sum(axis=1), 1e-300)
+    return relative
 
 
 def _some(light: FloatArray) -> FloatArray:
     some: FloatArray = np.maximum(light, LEAST_LIGHT * light.max())
     return some
+
+
+def _transient(file: FadeFile, change: Change, bands_nm: FloatArray, end: float) -> Transient:
+    """In steps short enough, until the lamp has arrived."""
+    times_s, share = file.in_bands(change, bands_nm)
+    fine_s = np.linspace(0.0, times_s[-1], STEPS + 1)
+    fine = np.column_stack([np.interp(fine_s, times_s, column) for column in share.T])
+    fine[-1] = end
+    return Transient.sampled(fine_s, fine)
+
+
+def _usual(bands_nm: FloatArray) -> Transient:
+    middles_nm = (bands_nm[1:] + bands_nm[:-1]) / 2
+    tau_s = np.interp(middles_nm, USUAL_NM, USUAL_1_E_S)
+    times_s = np.linspace(0.0, DARK_S, STEPS + 1)
+    share = np.exp(-times_s[:, None] / tau_s)
+    share[-1] = 0.0
+    return Transient.sampled(times_s, share)
+
+
+def _upside_down(fade: Transient) -> Transient:
+    return Transient(fade.duration_s, 1 - fade.share)

@@ -1,11 +1,10 @@
-"""What an excitation fit found."""
+"""Excitation rates of all states and bands, and how well they are known."""
 
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.fit.least_squares import FloatArray
+from labrig.results.arrays import BoolArray, FloatArray
 
 #: One-sided 95 %.
 UPPER_SIGMAS = 1.645
@@ -13,7 +12,7 @@ UPPER_SIGMAS = 1.645
 SEEN_SIGMAS = 2.0
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class ExcitedState:
     """One state; σ are standard uncertainties.
 
@@ -35,7 +34,7 @@ class ExcitedState:
     k_e_sigma_per_s: FloatArray
 
     @property
-    def seen(self) -> NDArray[np.bool_]:
+    def seen(self) -> BoolArray:
         """(B,) bool: the band excites; where not, only `k_e_upper_per_s` is known."""
         return self.k_e_per_s > SEEN_SIGMAS * self.k_e_sigma_per_s
 
@@ -45,7 +44,7 @@ class ExcitedState:
         return self.k_e_per_s + UPPER_SIGMAS * self.k_e_sigma_per_s
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class LevelAtOff:
     """How charged the states were at a lamp-off, traced back in the dark.
 
@@ -68,8 +67,8 @@ class LevelAtOff:
     amplitude_sigma: FloatArray
 
 
-@dataclass(frozen=True)
-class ExcitationFit:
+@dataclass(frozen=True, eq=False)
+class FittedExcitation:
     """Rates of all states and bands, from all series together.
 
     Attributes

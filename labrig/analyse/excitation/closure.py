@@ -4,64 +4,59 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.analyse.excitation.charges import Charged
-from labrig.analyse.excitation.first_photographs import first_photographs
-from labrig.calibration.irradiance_file import IrradianceFile
-from labrig.compare.closure import Charging, Closure, closure
-from labrig.fit.excitation import ChargingSeries, ExcitationFit, Uncertain
-from labrig.fit.excitation.levels import levels_at_off
-
-FloatArray = NDArray[np.float64]
+from labrig.calibration import IrradianceFile
+from labrig.fit.excitation import Charging, Uncertain, closure, levels_at_off
+from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray
+from labrig.results.excitation import PatchCharging
 
 #: Of σ, for derivatives.
 STEP = 0.01
 
 
 def predicted_charging(
-    measured: Charged,
+    charging: PatchCharging,
     irradiance: IrradianceFile,
     uncertain: Uncertain,
-    fit_of: Callable[[Charged], ExcitationFit],
+    fit_of: Callable[[PatchCharging], FittedExcitation],
 ) -> Closure | None:
     """Charging by the lamp itself as predicted from charges through the filter.
 
-    The longest bare charge stays in the fit, since it tells how far the sample is charged; the
-    shorter ones are predicted. With fewer than two of those there is no test.
+    The longest charge by the lamp itself stays in the fit, since it tells how far the sample is
+    charged; the shorter ones are predicted. With fewer than two of those there is no test.
 
     Parameters
     ----------
     fit_of
         Fits what is left without the charges that are predicted.
     """
-    bare = measured.bare
-    lengths = np.array([charge.off_s - charge.on_s for charge in bare.charges])
+    direct = charging.direct
+    lengths = np.array([charge.off_s - charge.on_s for charge in direct.charges])
     longest = int(np.argmax(lengths))
-    of_charge = np.repeat(np.arange(len(lengths)), [len(one.start_s) for one in bare.charges])
+    of_charge = np.repeat(np.arange(len(lengths)), [len(one.start_s) for one in direct.charges])
     kept = of_charge == longest
     alone = replace(
-        measured,
-        bare=replace(bare, values=np.where(kept[:, None, None], bare.values, np.nan)),
+        charging,
+        direct=replace(direct, values=np.where(kept[:, None, None], direct.values, np.nan)),
     )
-    channel = int(np.argmax(np.nanmean(bare.values, axis=(0, 1))))
-    usable = np.asarray(np.isfinite(bare.values[..., channel]).all(axis=1))
-    first = first_photographs(bare, usable)
+    channel = int(np.argmax(np.nanmean(direct.values, axis=(0, 1))))
+    usable = np.asarray(np.isfinite(direct.values[..., channel]).all(axis=1))
+    first = direct.first_frames(usable)
     if len(first) < 3:
         return None
     fit = fit_of(alone)
     rows = np.array(list(first.values()))
-    charges = [bare.charges[number] for number in first]
-    values, sigma = bare.values[rows, :, channel], bare.sigma[rows, :, channel]
+    charges = [direct.charges[number] for number in first]
+    values, sigma = direct.values[rows, :, channel], direct.sigma[rows, :, channel]
     level = values.mean(axis=1)
     noise = np.hypot(np.sqrt((sigma**2).sum(axis=1)) / sigma.shape[1], uncertain.flicker * level)
-    charge_s = _at_full_light(bare, fit, np.array(irradiance.direct))[list(first)]
+    charge_s = _at_full_light(direct, fit, np.array(irradiance.direct))[list(first)]
     starts, exposures = (
-        np.concatenate([getattr(one, name) for one in bare.charges])[rows]
+        np.concatenate([getattr(one, name) for one in direct.charges])[rows]
         for name in ("start_s", "exposure_s")
     )
     dark_s = starts - np.array([charge.off_s for charge in charges])
-    left = _left(bare, fit)[list(first)]
+    left = _left(direct, fit)[list(first)]
 
     def predicted(theta: FloatArray) -> FloatArray:
         """By k_r, amplitudes, k_e and ln of the light."""
@@ -99,26 +94,26 @@ def predicted_charging(
     )
 
 
-def _at_full_light(bare: ChargingSeries, fit: ExcitationFit, direct: FloatArray) -> FloatArray:
+def _at_full_light(direct: ChargingSeries, fit: FittedExcitation, steady: FloatArray) -> FloatArray:
     """(K,) s: how long the charges would have lasted by the steady lamp, for what they charge."""
-    weight = fit.k_e().sum(axis=0) * direct
+    weight = fit.k_e().sum(axis=0) * steady
     weight /= weight.sum()
-    lost_s = bare.rise.duration_s @ (1 - bare.rise.share @ weight)
-    gained_s = bare.fade.duration_s @ (bare.fade.share @ weight)
+    lost_s = direct.rise.duration_s @ (1 - direct.rise.share @ weight)
+    gained_s = direct.fade.duration_s @ (direct.fade.share @ weight)
     return np.array(
-        [one.brightness * (one.off_s - one.on_s - lost_s + gained_s) for one in bare.charges]
+        [one.brightness * (one.off_s - one.on_s - lost_s + gained_s) for one in direct.charges]
     )
 
 
-def _left(bare: ChargingSeries, fit: ExcitationFit) -> FloatArray:
+def _left(direct: ChargingSeries, fit: FittedExcitation) -> FloatArray:
     """(K, N) concentrations that each charge finds, of the one before it."""
     k_r = np.array([state.k_r_per_s for state in fit.states])
-    ended = levels_at_off(bare, k_r, fit.k_e()).value.mean(axis=1)
+    ended = levels_at_off(direct, k_r, fit.k_e()).value.mean(axis=1)
     on_s, off_s = (
-        np.array([getattr(one, name) for one in bare.charges]) for name in ("on_s", "off_s")
+        np.array([getattr(one, name) for one in direct.charges]) for name in ("on_s", "off_s")
     )
     waited_s = on_s[1:] - off_s[:-1]
-    fresh = np.array([one.fresh for one in bare.charges[1:]])
+    fresh = np.array([one.fresh for one in direct.charges[1:]])
     left = np.where(fresh[:, None], 0.0, ended[:-1] * np.exp(-np.outer(waited_s, k_r)))
     return np.vstack([np.zeros_like(k_r), left])
 

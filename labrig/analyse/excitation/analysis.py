@@ -1,0 +1,128 @@
+"""An excitation run, from its frames to rates and a material of every patch."""
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from labrig.analyse.excitation.charge_intervals import GLOWING
+from labrig.analyse.excitation.charging_series import patch_chargings
+from labrig.analyse.excitation.closure import predicted_charging
+from labrig.analyse.excitation.lamp_light import band_sigma, scale_sigma
+from labrig.analyse.excitation.material import excited_material
+from labrig.analyse.intact import insist_on_intact
+from labrig.analyse.part import Part
+from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
+from labrig.analyse.strip_patches import StripPatch, for_each_patch
+from labrig.analyse.temperature import at_temperature
+from labrig.calibration import IrradianceFile, Warming
+from labrig.errors import DataError
+from labrig.fit.excitation import Uncertain, fit_excitation
+from labrig.results import FittedDecay, FittedExcitation
+from labrig.results.excitation import ExcitationResult, PatchCharging, PatchExcitation
+
+#: Of a lamp's brightness from charge to charge.
+LAMP = 0.01
+#: What a lamp lacks that was just switched on, where nobody has measured it.
+USUAL = Warming(lacks=0.02, lacks_sigma=0.02, warms_s=150.0)
+#: No dark level is known better, in DN/s.
+LEAST_DARK = 1e-3
+
+
+def analyse(part: Part) -> ExcitationResult:
+    """Reduce all charges, and fit those of every patch together.
+
+    Raises
+    ------
+    DataError
+        Nothing is known of the light on the sample, or charges are missing.
+    FitError
+        Nothing glows, or what glows cannot be fitted.
+    """
+    irradiance, fade, blank = part.inputs.irradiance, part.inputs.fade, part.inputs.blank
+    if irradiance is None:
+        raise DataError(
+            "expected the light on every place of the sample, got none; run irradiance and name "
+            "its run in the rig file ('optics: {irradiance: …}') or to labrig process --optics"
+        )
+    insist_on_intact(part.run, (*GLOWING, "dark"), part.choices)
+    warming = USUAL if fade is None or fade.warming is None else fade.warming
+    chargings, left_out = patch_chargings(part, irradiance, warming)
+    patches, warnings = for_each_patch(
+        list(chargings),
+        lambda patch: _of_patch(part, patch, chargings[patch], irradiance, warming),
+    )
+    unmeasured = () if fade else ("the lamp's fade was not measured: a usual one was taken",)
+    leaks = blank.leaks() if blank else ()
+    return ExcitationResult(
+        irradiance=irradiance,
+        patches=patches,
+        warnings=(*unmeasured, *leaks, *left_out, *warnings),
+    )
+
+
+def _of_patch(
+    part: Part,
+    patch: StripPatch,
+    charging: PatchCharging,
+    irradiance: IrradianceFile,
+    warming: Warming,
+) -> tuple[PatchExcitation, Sequence[str]]:
+    """The patch's excitation, and warnings."""
+    decay = fit_series(charging.whole, _states(part, patch))
+    dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), LEAST_DARK).tolist())
+    uncertain = Uncertain(
+        flicker=_flicker(part, decay),
+        lamp=LAMP,
+        cold=warming.lacks_sigma,
+        offset=dark,
+        # The sensor warms and cools over hours of long exposures, more than dark frames tell.
+        wander=dark,
+        scale=scale_sigma(irradiance),
+        irradiance=band_sigma(irradiance),
+    )
+    fit = _fit(charging, decay, uncertain)
+    closure = predicted_charging(
+        charging, irradiance, uncertain, lambda without: _fit(without, decay, uncertain, fit)
+    )
+    run, spectra = part.run, part.inputs.spectra
+    spectrum = patch.own(spectra)
+    frames = tuple(frame.path.name for purpose in GLOWING for frame in run.frames(purpose))
+    material = excited_material(
+        fit, irradiance, spectrum, patch.material, run.folder.resolve().name, frames
+    )
+    no_spectrum = (
+        ("no emission spectrum was found of this patch, so that its material has no Λ",)
+        if spectra and spectrum is None
+        else ()
+    )
+    return (
+        PatchExcitation(charging, decay, fit, at_temperature(material, run), closure),
+        (*decay.warnings, *fit.warnings, *no_spectrum),
+    )
+
+
+def _states(part: Part, patch: StripPatch) -> int | None:
+    """As many as are asked for, or as a decay of this patch had; None chooses."""
+    asked = part.protocol.states
+    states = part.choices.states or (None if asked == "auto" else asked)
+    if states is None and (known := patch.own(part.inputs.decays)) is not None:
+        return known.n_states
+    return states
+
+
+def _fit(
+    charging: PatchCharging,
+    decay: FittedDecay,
+    uncertain: Uncertain,
+    near: FittedExcitation | None = None,
+) -> FittedExcitation:
+    rates = [state.k_r_per_s for state in decay.states]
+    amplitudes = np.array([state.amplitude for state in decay.states])
+    shares = np.maximum(amplitudes / amplitudes.sum(), 1e-3)
+    return fit_excitation([charging.through, charging.direct], rates, shares, uncertain, near)
+
+
+def _flicker(part: Part, decay: FittedDecay) -> float:
+    if part.inputs.camera is not None:
+        return part.inputs.camera.flicker
+    return decay.flicker if decay.flicker > 0 else TYPICAL_FLICKER

@@ -1,0 +1,214 @@
+"""From a run's frames to charging series: every charge with the photographs after it."""
+
+from dataclasses import replace
+
+import numpy as np
+
+from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
+from labrig.analyse.excitation.lamp_light import across_sites, lamp_transients, site_modes
+from labrig.analyse.part import Part
+from labrig.analyse.strip_patches import Slices, StripPatch, cut, lean, strip_patches
+from labrig.analyse.this_camera import insist_on_this_camera
+from labrig.analyse.timed_frames import timed, untimed
+from labrig.calibration import IrradianceFile, Strip, Warming
+from labrig.errors import DataError
+from labrig.reduce import RawFrame, read_raw, reduce_patches
+from labrig.region import Region, region_pixels
+from labrig.results import BoolArray, Charge, ChargingSeries, FloatArray, Series
+from labrig.results.excitation import PatchCharging
+
+#: All of the strip, from which the rates to start with are taken.
+WHOLE = "whole strip"
+#: Of a series whose values are still to come.
+NOTHING: FloatArray = np.empty((0, 0, 0))
+
+
+def patch_chargings(
+    part: Part, irradiance: IrradianceFile, warming: Warming
+) -> tuple[dict[StripPatch, PatchCharging], tuple[str, ...]]:
+    """Read and reduce all frames of the run: what each patch shows, and what to say of the rest.
+
+    Parameters
+    ----------
+    irradiance
+        On the sample.
+    warming
+        What the lamp lacks while its housing is cold.
+
+    Raises
+    ------
+    DataError
+        Charges or frames are missing, no patch lies below the filter, or the camera was not this
+        one.
+    """
+    known, choices, protocol = part.inputs, part.choices, part.protocol
+    frames = charge_frames(part.run, choices, warming.warms_s, known.blank)
+    insist_on_this_camera(known.camera, part.run, list(frames.charge_of))
+    raw = read_raw(next(iter(frames.charge_of)).path)
+    sites, refused = cut(strip_patches(part), irradiance.strip, raw, len(irradiance.position))
+    series = reduce_patches(
+        [
+            replace(timed(frame, frames.zero_s), unit=one.unit)
+            for frame, one in frames.charge_of.items()
+        ],
+        {
+            _key(patch, name): region
+            for patch, slices in sites.items()
+            for name, region in {**slices, WHOLE: _around(slices)}.items()
+        },
+        [untimed(frame) for frame in part.run.frames("dark") if not choices.excludes(frame)],
+        camera=known.camera,
+    )
+    rise, fade = lamp_transients(known.fade, np.array(irradiance.bands_nm))
+    longest = max(
+        (one for one in frames.intervals if one.is_direct), key=lambda one: one.off_s - one.on_s
+    )
+
+    def charges(direct: bool) -> tuple[Charge, ...]:
+        return tuple(
+            _charge(
+                one,
+                frames,
+                warming.lacks,
+                fresh=protocol.samples > 1,
+                saturated=protocol.saturated and one is longest,
+            )
+            for one in frames.intervals
+            if one.is_direct is direct
+        )
+
+    through = ChargingSeries(
+        "through the filter", charges(False), rise, fade, np.array(irradiance.through),
+        NOTHING, NOTHING, site_modes(irradiance), across_sites(irradiance),
+    )  # fmt: skip
+    everywhere = np.tile(irradiance.direct, (len(irradiance.position), 1))
+    direct = ChargingSeries(
+        "by the lamp itself", charges(True), rise, fade, everywhere, NOTHING, NOTHING
+    )  # fmt: skip
+    found = {}
+    for patch, slices in sites.items():
+        own = [series[_key(patch, name)] for name in slices]
+        values = np.stack([_blanked(one, one.values) for one in own], axis=1)
+        sigma = np.stack([_blanked(one, one.sigma) for one in own], axis=1)
+        values = _centred(values, slices, np.array(irradiance.position), irradiance.strip, raw)
+        whole = series[_key(patch, WHOLE)]
+        found[patch] = _evened(values, sigma, through, direct, whole, frames)
+    return found, (*frames.left_out, *refused)
+
+
+def _centred(
+    values: FloatArray,
+    slices: Slices,
+    position: FloatArray,
+    strip: Strip,
+    raw: RawFrame,
+) -> FloatArray:
+    """Values (n, P, C) at the positions (P,) along the strip, by the slope to the neighbours.
+
+    A slice consists of whole pixels, and of a Bayer cell's colours some lie left of others: what a
+    channel shows of a slice belongs to a place up to a pixel away from the slice's middle. Along
+    the filter the glow is steep, so that a pixel matters where slices are a few pixels wide.
+
+    Parameters
+    ----------
+    slices
+        Where the values were measured.
+    raw
+        Any frame: its size and colours.
+    """
+    along = position if strip.rising else 1 - position
+    left, right = strip.left[0] * raw.width, strip.right[0] * raw.width
+    wanted = left + (along - lean(strip, slices, raw)) * (right - left)
+    moved = values.copy()
+    for number, channel in enumerate(raw.channels):
+        x = np.array([_middle(region, raw, channel) for region in slices.values()])
+        slope = np.nan_to_num(np.gradient(values[..., number], x, axis=1))
+        moved[..., number] += slope * (wanted - x)
+    return moved
+
+
+def _middle(region: Region, raw: RawFrame, channel: str) -> float:
+    """Mean place in x of the pixels of that channel in a region, their middles at .5."""
+    x, y, width, height = region_pixels(region, raw.width, raw.height)
+    side = raw.cfa_side
+    colours = np.array(list(raw.cfa)).reshape(side, side)
+    rows, columns = np.arange(y, y + height) % side, np.arange(x, x + width)
+    own = colours[np.ix_(rows, columns % side)] == channel
+    found = own.sum(axis=0)
+    return float((found * (columns + 0.5)).sum() / found.sum())
+
+
+def _evened(
+    values: FloatArray,
+    sigma: FloatArray,
+    through: ChargingSeries,
+    direct: ChargingSeries,
+    whole: Series,
+    frames: ChargeFrames,
+) -> PatchCharging:
+    """One patch: (n, P, C) of all photographs, brought into the two series."""
+    is_direct = np.array([one.is_direct for one in frames.charge_of.values()])
+    evenness = _evenness(values[is_direct], sigma[is_direct])
+    values, sigma = values / evenness[:, None], sigma / evenness[:, None]
+    last = np.array([one is frames.intervals[-1] for one in frames.charge_of.values()])
+    return PatchCharging(
+        replace(through, values=values[~is_direct], sigma=sigma[~is_direct]),
+        replace(direct, values=values[is_direct], sigma=sigma[is_direct]),
+        evenness,
+        _after_off(whole, last, frames),
+    )
+
+
+def _charge(
+    one: ChargeInterval, frames: ChargeFrames, lacks: float, *, fresh: bool, saturated: bool
+) -> Charge:
+    after = frames.after(one)
+    return Charge(
+        on_s=one.on_s - frames.zero_s,
+        off_s=one.off_s - frames.zero_s,
+        start_s=np.array([frame.start_time - frames.zero_s for frame in after]),
+        exposure_s=np.array([frame.exposure_s for frame in after]),
+        brightness=1 - lacks * one.cold,
+        cold=one.cold,
+        fresh=fresh,
+        saturated=saturated,
+    )
+
+
+def _key(patch: StripPatch, name: str) -> str:
+    """Of a place among those of all patches."""
+    return f"{patch.folder} {name}".strip()
+
+
+def _blanked(series: Series, numbers: FloatArray) -> FloatArray:
+    """NaN where a row must not be used."""
+    return np.where(series.usable[:, None], numbers, np.nan)
+
+
+def _around(sites: Slices) -> Region:
+    """The upright rectangle around all sites."""
+    left, top = (min(region[k] for region in sites.values()) for k in (0, 1))
+    right = max(region[0] + region[2] for region in sites.values())
+    bottom = max(region[1] + region[3] for region in sites.values())
+    return left, top, right - left, bottom - top
+
+
+def _evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:
+    """(P,) how bright every place is after the same light, 1 on average; all frames together."""
+    weight = np.where(np.isfinite(values) & (sigma > 0), 1 / np.square(sigma), 0.0)
+    known = weight.min(axis=1, keepdims=True) > 0
+    frame = np.where(known, np.nanmean(np.where(known, values, 0.0), axis=1, keepdims=True), 0.0)
+    weight = np.where(known, weight, 0.0)
+    total = (weight * frame**2).sum(axis=(0, 2))
+    if not (total > 0).all():
+        raise DataError(
+            "expected a glow all along the filter's place after charges by the lamp itself, got "
+            "none somewhere, or it is clipped; check where the sample and the filter lie"
+        )
+    found = (weight * frame * np.nan_to_num(values)).sum(axis=(0, 2)) / total
+    return np.asarray(found / found.mean())
+
+
+def _after_off(whole: Series, rows: BoolArray, frames: ChargeFrames) -> Series:
+    part = whole.take(np.flatnonzero(rows))
+    return replace(part, t_s=part.t_s - (frames.intervals[-1].off_s - frames.zero_s))

@@ -1,0 +1,113 @@
+"""Charging from rates, band by band; does it predict what was measured under the whole lamp?"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from labrig.errors import DataError
+from labrig.material.rates import concentration, phi1
+from labrig.results import Closure, FloatArray
+from labrig.results.closure import spans_decades
+
+#: Of the curve.
+POINTS = 200
+
+
+@dataclass(frozen=True, eq=False)
+class Charging:
+    """A sample under the lamp: (m, b) and (m,) rates, (m,) levels at r = 1, (b,) irradiance."""
+
+    k_e_per_s: FloatArray
+    k_r_per_s: FloatArray
+    full_level: FloatArray
+    irradiance: FloatArray
+
+    def __post_init__(self) -> None:
+        m, b = len(self.k_r_per_s), len(self.irradiance)
+        if self.k_e_per_s.shape != (m, b) or self.full_level.shape != (m,):
+            raise DataError(
+                f"closure: expected k_e of shape {(m, b)} and {m} full levels, got "
+                f"{self.k_e_per_s.shape} and {self.full_level.shape}"
+            )
+
+    def level(
+        self, charge_s: FloatArray, r0: FloatArray, dark_s: FloatArray, exposure_s: FloatArray
+    ) -> FloatArray:
+        """After charges from `r0`, (n, m); all else (n,)."""
+        kappa, k_r = self.k_e_per_s @ self.irradiance, self.k_r_per_s
+        charged = concentration(r0, kappa, k_r, charge_s[:, np.newaxis])
+        faded = np.exp(-np.multiply.outer(dark_s, k_r)) * phi1(np.multiply.outer(exposure_s, k_r))
+        return np.asarray((charged * faded) @ self.full_level)
+
+
+def closure(
+    charge_s: ArrayLike,
+    level: ArrayLike,
+    sigma: ArrayLike,
+    *,
+    irradiance: ArrayLike,
+    k_e_per_s: ArrayLike,
+    k_r_per_s: ArrayLike,
+    full_level: ArrayLike,
+    r0: ArrayLike = 0.0,
+    dark_s: ArrayLike = 0.0,
+    exposure_s: ArrayLike = 0.0,
+) -> Closure:
+    """Levels after charges of different lengths, each from the same concentrations.
+
+    With m states, b bands and n charges: κ_i = Σ_j k_e,ij E_j, r_i after the charge by the rate
+    equation, and level = Σ_i full_level_i r_i e^(−k_r,i d) over the mean of an exposure.
+
+    Parameters
+    ----------
+    charge_s, level, sigma
+        Shape (n,): how long the lamp shone (its fade counts as so much longer at full light), what
+        was then photographed, and by how much it and the prediction may differ.
+    irradiance
+        Shape (b,): of that lamp, in the norm to which `k_e_per_s` belongs.
+    k_e_per_s, k_r_per_s
+        Shapes (m, b) and (m,).
+    full_level
+        Shape (m,): level of each state at r = 1, as measured by Λ_i k_r,i.
+    r0
+        Concentrations before each charge, one number, (m,) or (n, m).
+    dark_s, exposure_s
+        From lamp off to the begin of the exposure, and its length; one number or (n,).
+
+    Raises
+    ------
+    DataError
+        Shapes that do not agree, numbers that are not finite, or a σ that is not above 0.
+    """
+    sample = Charging(*map(_floats, (k_e_per_s, k_r_per_s, full_level, irradiance)))
+    charge, measured, noise = map(_floats, (charge_s, level, sigma))
+    if not (charge.ndim == 1 and charge.shape == measured.shape == noise.shape and charge.size):
+        raise DataError("closure: expected as many levels and σ as charges, at least one")
+    n, m = len(charge), len(sample.k_r_per_s)
+    start = np.broadcast_to(_floats(r0), (n, m))
+    dark, exposure = (np.broadcast_to(_floats(one), n) for one in (dark_s, exposure_s))
+    if not all(np.isfinite(one).all() for one in (charge, measured, noise, start, dark, exposure)):
+        raise DataError("closure: expected finite numbers, got NaN or infinity")
+    if not (noise > 0).all():
+        raise DataError("closure: expected σ above 0")
+    predicted = sample.level(charge, start, dark, exposure)
+    order, line_s = np.argsort(charge, kind="stable"), _line(charge)
+
+    def along(column: FloatArray) -> FloatArray:
+        return np.interp(line_s, charge[order], column[order])
+
+    starts = np.stack([along(column) for column in start.T], axis=1)
+    line = sample.level(line_s, starts, along(dark), along(exposure))
+    return Closure(charge, measured, noise, predicted, line_s, line)
+
+
+def _floats(values: ArrayLike) -> FloatArray:
+    return np.asarray(values, dtype=np.float64)
+
+
+def _line(charge_s: FloatArray) -> FloatArray:
+    low, high = float(charge_s.min()), float(charge_s.max())
+    if spans_decades(charge_s):
+        return np.geomspace(low, high, POINTS)
+    return np.linspace(min(low, 0.0), high, POINTS)

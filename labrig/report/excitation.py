@@ -1,0 +1,267 @@
+"""Excitation in a report: rates by band, how places charge, what the fit leaves, and closure."""
+
+from collections.abc import Iterator
+from itertools import pairwise
+
+import numpy as np
+from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
+
+from labrig.report.figure_style import (
+    INK,
+    LEFT_PT,
+    MARKERS,
+    MUTED,
+    OTHER_CHANNELS,
+    RULE,
+    error_bars,
+    new_figure,
+    place,
+    points,
+)
+from labrig.report.legend import legend_above, lined, marked
+from labrig.report.rendering import Rendered, Source
+from labrig.report.sections import Picture, Section, Table
+from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray
+from labrig.results.closure import spans_decades
+from labrig.results.excitation import ExcitationResult, PatchExcitation
+from labrig.written_numbers import plus_minus, rounded
+
+HEIGHT_PT = 270.0
+#: Places along the strip whose charging is shown.
+SHOWN = 5
+MEASURED = (
+    "r(0) and a = Λ* k_r r(0) after the brightest charge by the lamp itself. Nothing is assumed of "
+    "r(0): how the charging curves bend tells it."
+)
+ASSUMED = "r(0) = 1 is assumed after the longest charge, as Nalbach et al. do."
+
+
+def render(result: ExcitationResult, source: Source) -> Rendered:
+    """Show every patch: its rates, how its places charge, and whether the rates predict that."""
+    sections, lines = [], []
+    for name, patch in result.patches.items():
+        sections.append(_section(f"Excitation: {name}" if name else "Excitation", result, patch))
+        lines += [f"{name}: {line}" if name else line for line in _lines(result, patch)]
+    return Rendered(tuple(sections), tuple(lines))
+
+
+def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
+    fit, off = patch.fit, patch.fit.at_off[-1]
+    for number, state in enumerate(fit.states):
+        yield (
+            f"state {number + 1}: k_r {plus_minus(state.k_r_per_s, state.k_r_sigma_per_s)} /s, "
+            f"r(0) {plus_minus(float(off.r0[number]), float(off.r0_sigma[number]))}"
+        )
+        bands = zip(pairwise(result.irradiance.bands_nm), _rates(fit, number), strict=True)
+        for (low, high), text in bands:
+            yield f"  {low:.0f}-{high:.0f} nm: k_e {text} /s"
+    yield f"reduced χ² {rounded(fit.reduced_chi2, 3)} ({fit.dof} dof)"
+    yield f"closure: {_closure_line(patch.closure)}"
+
+
+def _closure_line(closure: Closure | None) -> str:
+    if closure is None:
+        return "not tested; give three charges or more in 'bare'"
+    return (
+        f"charging by the lamp itself is predicted within {rounded(closure.rms_percent, 2)} % "
+        f"({rounded(closure.rms_sigma, 2)} σ) rms"
+    )
+
+
+def _rates(fit: FittedExcitation, number: int) -> list[str]:
+    state = fit.states[number]
+    return [
+        plus_minus(float(value), float(sigma)) if seen else f"< {rounded(float(upper), 2)}"
+        for value, sigma, seen, upper in zip(
+            state.k_e_per_s, state.k_e_sigma_per_s, state.seen, state.k_e_upper_per_s, strict=True
+        )
+    ]
+
+
+def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Section:
+    fit, through, direct = patch.fit, patch.charging.through, patch.charging.direct
+    position_nm, irradiance = result.position_nm, result.irradiance
+    figures = [
+        _rates_picture(fit, irradiance.bands_nm),
+        _charging_picture(through, through.values - fit.residuals[0] * through.sigma, position_nm),
+        _residual_picture(fit.residuals[0], position_nm),
+    ]
+    if patch.closure is not None:
+        figures.append(closure_picture(patch.closure))
+    assumed = any(charge.saturated for charge in direct.charges)
+    return Section(
+        title,
+        (
+            f"{len(through.charges)} charges through the variable filter and "
+            f"{len(direct.charges)} by the lamp itself, fitted together by the rate "
+            "equation in exact steps. k_e belongs to an irradiance of vector length "
+            f"{rounded(irradiance.vector_length)}.",
+            f"Closure: {_closure_line(patch.closure)}.",
+        ),
+        tuple(figures),
+        (
+            _levels_table(fit, ASSUMED if assumed else MEASURED),
+            _rates_table(fit, irradiance.bands_nm),
+        ),
+    )
+
+
+def _levels_table(fit: FittedExcitation, caption: str) -> Table:
+    off = fit.at_off[-1]
+    return Table(
+        ("State", "k_r / s⁻¹", "Amplitude at r = 1 / (DN/s)", "r(0)", "Amplitude a / (DN/s)"),
+        tuple(
+            (
+                str(number + 1),
+                plus_minus(state.k_r_per_s, state.k_r_sigma_per_s),
+                plus_minus(state.amplitude, state.amplitude_sigma),
+                plus_minus(float(off.r0[number]), float(off.r0_sigma[number])),
+                plus_minus(float(off.amplitude[number]), float(off.amplitude_sigma[number])),
+            )
+            for number, state in enumerate(fit.states)
+        ),
+        caption,
+    )
+
+
+def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
+    states = range(len(fit.states))
+    columns = [_rates(fit, number) for number in states]
+    return Table(
+        ("Band / nm", *(f"k_e of state {number + 1} / s⁻¹" for number in states)),
+        tuple(
+            (f"{low:.0f}–{high:.0f}", *(column[band] for column in columns))
+            for band, (low, high) in enumerate(pairwise(bands_nm))
+        ),
+        "Value ± 1 σ, or what it is below with 95 % probability.",
+    )
+
+
+def _rates_picture(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Picture:
+    """k_e of every band and state, limits as arrows."""
+    edges = np.array(bands_nm)
+    middles, widths = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=34)
+    axes.set_xlim(edges[0], edges[-1])
+    entries = []
+    for number, state in enumerate(fit.states):
+        colour = INK if number == 0 else OTHER_CHANNELS[number - 1]
+        shift = (number - (len(fit.states) - 1) / 2) * 0.16 * widths
+        marker, seen = MARKERS[number], state.seen
+        x, y = middles + shift, 1e3 * state.k_e_per_s
+        error_bars(axes, x[seen], y[seen], 1e3 * state.k_e_sigma_per_s[seen], colour)
+        points(axes, x[seen], y[seen], marker, colour, colour, 5.0)
+        limits = 1e3 * state.k_e_upper_per_s[~seen]
+        axes.plot(x[~seen], limits, linestyle="none", marker=7, markersize=6, color=colour)
+        for at_nm, limit in zip(x[~seen], limits, strict=True):
+            axes.plot([at_nm, at_nm], [0, limit], color=colour, linewidth=0.9, alpha=0.5)
+        entries.append(marked(f"state {number + 1}, k_r {state.k_r_per_s:.3g} s⁻¹", marker, colour))
+    axes.set_ylim(0, None)
+    axes.set_xlabel("Wavelength of the exciting light / nm")
+    axes.set_ylabel("k_e / 10⁻³ s⁻¹")
+    legend_above(figure, entries, columns=3)
+    return Picture(
+        "excitation-rates",
+        figure,
+        "Excitation rate of each band, per unit of the stated irradiance; bars are ± 1 σ. A caret "
+        "is a limit: the rate lies below it with 95 % probability.",
+    )
+
+
+def _charging_picture(
+    series: ChargingSeries, fitted: FloatArray, position_nm: FloatArray
+) -> Picture:
+    """Glow in the first usable photograph after every charge, over the charge, at some places.
+
+    Parameters
+    ----------
+    fitted
+        (n, P, C) what the fit says.
+    position_nm
+        (P,) wavelength that charges each place.
+    """
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=48)
+    axes.set_xscale("log")
+    axes.set_yscale("log", nonpositive="clip")
+    charge_s = np.array([charge.off_s - charge.on_s for charge in series.charges])
+    channel = int(np.argmax(np.nanmean(series.values, axis=(0, 1))))
+    total = np.nansum(fitted[..., channel], axis=0)
+    reach = np.flatnonzero(total > 0.01 * total.max())
+    shown = reach[np.linspace(0, len(reach) - 1, min(SHOWN, len(reach))).round().astype(int)]
+    entries = []
+    for number, site in enumerate(dict.fromkeys(shown.tolist())):
+        colour = OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
+        first = series.first_frames(np.isfinite(series.values[:, site, channel]))
+        order = sorted(first, key=lambda number: charge_s[number])
+        picked = [first[number] for number in order]
+        x, y = charge_s[order], series.values[picked, site, channel]
+        error_bars(axes, x, y, series.sigma[picked, site, channel], colour)
+        points(axes, x, y, MARKERS[number], colour, colour, 4.2)
+        axes.plot(x, fitted[picked, site, channel], color=colour, linewidth=1.0)
+        entries.append(marked(f"{position_nm[site]:.0f} nm", MARKERS[number], colour))
+    axes.set_xlabel("Charged for / s")
+    axes.set_ylabel("First photograph / (DN/s)")
+    legend_above(figure, [*entries, lined("fit", MUTED)], columns=6)
+    return Picture(
+        "charging",
+        figure,
+        "Glow in the first photograph after each charge through the filter, brightest channel, at "
+        "some places along it; lines join what the fit says for these very photographs, whose "
+        "times and exposures differ.",
+    )
+
+
+def _residual_picture(residuals: FloatArray, position_nm: FloatArray) -> Picture:
+    """(n, P, C) in σ, rms over channels and photographs, along the filter and over time."""
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
+    of_site = np.sqrt(np.nanmean(residuals**2, axis=(0, 2)))
+    axes.axhline(1.0, color=RULE, linewidth=1.2)
+    points(axes, position_nm, of_site, "o", INK, INK, 4.2)
+    axes.set_ylim(0, max(1.5, 1.15 * float(np.nanmax(of_site))))
+    axes.set_xlabel("Wavelength that charges the place / nm")
+    axes.set_ylabel("Residuals, rms / σ")
+    return Picture(
+        "residuals",
+        figure,
+        "What the fit leaves at every place along the filter, in standard uncertainties of single "
+        "values, flicker not taken out.",
+    )
+
+
+def closure_picture(closure: Closure) -> Picture:
+    """Levels over the charge, measured and predicted, and by how much they deviate."""
+    charge_s, measured, predicted = closure.charge_s, closure.measured, closure.predicted
+    figure = new_figure(300.0)
+    upper = place(figure, left=LEFT_PT, bottom=128, right=12, top=30)
+    upper.plot(closure.curve_charge_s, closure.curve, color=MUTED, linewidth=1.2)
+    error_bars(upper, charge_s, measured, closure.sigma, INK)
+    points(upper, charge_s, measured, "o", INK, INK)
+    upper.set_ylim(0, 1.1 * float(max(measured.max(), closure.curve.max())))
+    upper.set_ylabel("Level / (DN/s)")
+    upper.tick_params(labelbottom=False)
+    lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=188, share_x=upper)
+    if spans_decades(charge_s):
+        upper.set_xscale("log")
+        upper.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
+        upper.xaxis.set_minor_locator(NullLocator())
+    upper.xaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
+    full = float(np.sqrt(np.mean(predicted**2))) or 1.0
+    share, share_sigma = 100 * (measured - predicted) / full, 100 * closure.sigma / full
+    lower.axhline(0, color=MUTED, linewidth=1.2)
+    error_bars(lower, charge_s, share, share_sigma, INK)
+    points(lower, charge_s, share, "o", INK, INK, size=3.0)
+    reach = 1.15 * float(np.max(np.abs(share) + share_sigma))
+    lower.set_ylim(-reach, reach)
+    lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
+    lower.set_ylabel("Deviation / %")
+    lower.set_xlabel("Charge / s")
+    legend_above(figure, [marked("measured", "o", INK), lined("predicted", MUTED)], columns=2)
+    caption = (
+        "Charging under the whole lamp: the curve is predicted from the rates measured band by "
+        "band, nothing is fitted; points are measured, with ± 1 σ of both. RMS deviation "
+        f"{closure.rms_percent:.2g} % of the RMS level, {closure.rms_sigma:.2g} σ."
+    )
+    return Picture("closure", figure, caption)

@@ -1,0 +1,134 @@
+"""How fast light of each band charges a sample, and the material that follows."""
+
+import json
+from collections.abc import Mapping
+from dataclasses import dataclass
+from pathlib import Path
+from typing import Any, ClassVar
+
+import numpy as np
+
+from labrig.calibration import IrradianceFile
+from labrig.material import Material, write_material
+from labrig.results.arrays import FloatArray
+from labrig.results.charging_series import ChargingSeries
+from labrig.results.closure import Closure
+from labrig.results.fitted_decay import FittedDecay
+from labrig.results.fitted_excitation import FittedExcitation
+from labrig.results.run_result import RunResult
+from labrig.results.series import Series
+from labrig.results.text_files import write_text
+
+
+@dataclass(frozen=True, eq=False)
+class PatchCharging:
+    """What was measured of a patch at P places along the filter.
+
+    Attributes
+    ----------
+    through, direct
+        Charges through the filter and by the lamp itself, at the same places; values are even:
+        what lens and sample do from place to place is divided out.
+    evenness
+        (P,) by which they were divided, 1 on average.
+    whole
+        The whole strip after the last charge by the lamp itself.
+    """
+
+    through: ChargingSeries
+    direct: ChargingSeries
+    evenness: FloatArray
+    whole: Series
+
+
+@dataclass(frozen=True, eq=False)
+class PatchExcitation:
+    """What was found of a patch.
+
+    Attributes
+    ----------
+    charging
+        Light, charges, and photographs after each.
+    decay
+        Of the whole strip after the last charge; where the fit of the charges started.
+    fit
+        Of all charges together; its residuals are those of `charging.through`, then of
+        `charging.direct`.
+    material
+        As these rates say; with re-radiance where the emission spectrum is known.
+    closure
+        Charging by the lamp itself, as predicted from charges through the filter; None if there
+        were too few charges to test it.
+    """
+
+    charging: PatchCharging
+    decay: FittedDecay
+    fit: FittedExcitation
+    material: Material
+    closure: Closure | None
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class ExcitationResult(RunResult):
+    """Excitation rates by band.
+
+    Attributes
+    ----------
+    irradiance
+        The lamp's light on the sample, as it was known.
+    patches
+        By name; under "" the only one.
+    """
+
+    kind: ClassVar[str] = "excitation"
+
+    irradiance: IrradianceFile
+    patches: Mapping[str, PatchExcitation]
+
+    @property
+    def position_nm(self) -> FloatArray:
+        """(P,) mean wavelength of the light at every place behind the filter."""
+        edges, through = np.array(self.irradiance.bands_nm), np.array(self.irradiance.through)
+        middles = (edges[1:] + edges[:-1]) / 2
+        # Squared, so that what leaks all over does not pull.
+        found: FloatArray = through**2 @ middles / np.maximum((through**2).sum(axis=1), 1e-300)
+        return found
+
+    def provides(self) -> Mapping[str, Any]:
+        """The materials."""
+        return {"materials": {name: patch.material for name, patch in self.patches.items()}}
+
+    def write_files(self, folder: Path) -> None:
+        """Write `material.yaml` and `excitation.json` of each patch, in a folder of its name."""
+        for name, patch in self.patches.items():
+            place = folder / name
+            place.mkdir(exist_ok=True)
+            write_material(place / "material.yaml", patch.material)
+            write_text(place / "excitation.json", self._fit_json(patch.fit))
+
+    def _fit_json(self, fit: FittedExcitation) -> str:
+        off = fit.at_off[-1]
+        content = {
+            "bands_nm": self.irradiance.bands_nm,
+            "irradiance_vector_length": self.irradiance.vector_length,
+            "states": [
+                {
+                    "k_r_per_s": state.k_r_per_s,
+                    "k_r_sigma_per_s": state.k_r_sigma_per_s,
+                    "amplitude_at_full_charge": state.amplitude,
+                    "amplitude_at_full_charge_sigma": state.amplitude_sigma,
+                    "k_e_per_s": state.k_e_per_s.tolist(),
+                    "k_e_sigma_per_s": state.k_e_sigma_per_s.tolist(),
+                    "k_e_upper_per_s": state.k_e_upper_per_s.tolist(),
+                    "r0": float(off.r0[number]),
+                    "r0_sigma": float(off.r0_sigma[number]),
+                }
+                for number, state in enumerate(fit.states)
+            ],
+            "channel_weights": fit.channel_weights.tolist(),
+            "reduced_chi2": fit.reduced_chi2,
+            "dof": fit.dof,
+            "covariance": fit.covariance.tolist(),
+            "warnings": list(fit.warnings),
+        }
+        return json.dumps(content, ensure_ascii=False, indent=1) + "\n"

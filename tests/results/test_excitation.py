@@ -1,0 +1,80 @@
+"""An excitation's result: read back whatever is in it, and written patch by patch."""
+
+import json
+import math
+from dataclasses import replace
+from pathlib import Path
+
+import numpy as np
+import pytest
+
+from labrig.errors import DiskError
+from labrig.fit.excitation import Uncertain, closure, fit_excitation
+from labrig.material import read_material
+from labrig.results import Series
+from labrig.results.excitation import ExcitationResult, PatchCharging, PatchExcitation
+from tests.analyse.excitation.test_excitation_run import true_irradiance
+from tests.fit.charged_samples import Bench, lvf_windows
+from tests.results.made import assert_read_back, decay_result
+
+
+@pytest.fixture(scope="module")
+def result() -> ExcitationResult:
+    material = read_material("blue-paint")
+    bench = Bench(material)
+    windows = lvf_windows(np.array([430.0, 480.0, 650.0]))
+    through = bench.series("through the filter", windows, (8.0, 64.0), shots=3)
+    direct = bench.series("by the lamp itself", np.ones_like(windows), (256.0,), shots=3)
+    through.values[0, 0, 0] = math.nan
+    (state,) = material.states
+    fit = fit_excitation([through, direct], [state.k_r_per_s], [1.0], Uncertain(bench.flicker))
+    unknown = replace(fit.states[0], k_r_sigma_per_s=math.inf)
+    fit = replace(fit, states=(unknown,))
+    whole = Series(
+        t_s=np.array([1.0, 5.0]), exposure_s=np.ones(2), values=np.ones((2, 1)),
+        sigma=np.full((2, 1), math.nan), dark_sigma=np.zeros(1), channels=("G",),
+        iso=np.full(2, 400.0), f_number=np.full(2, 4.0), frame=("a", "b"), unit=("u", "u"),
+        flag=("", "late"),
+    )  # fmt: skip
+    closed = closure(
+        [8.0, 64.0, 256.0], [1.0, 2.0, 3.0], [0.1, 0.1, 0.1], irradiance=[1.0],
+        k_e_per_s=[[0.01]], k_r_per_s=[0.03], full_level=[10.0],
+    )  # fmt: skip
+    charging = PatchCharging(through, direct, np.ones(3), whole)
+    decay = decay_result((0.03, 10.0))
+    patch = PatchExcitation(charging, decay, fit, material, closed)
+    untested = PatchExcitation(charging, decay, fit, material, None)
+    return ExcitationResult(
+        irradiance=true_irradiance(), patches={"left": patch, "right": untested}, warnings=("odd",)
+    )
+
+
+def test_it_is_read_back(result: ExcitationResult) -> None:
+    assert_read_back(result)
+
+
+def test_files_lie_in_folders_of_the_patches(result: ExcitationResult, tmp_path: Path) -> None:
+    result.write_files(tmp_path)
+    for name, patch in result.patches.items():
+        assert read_material(tmp_path / name / "material.yaml") == patch.material
+        fit = json.loads((tmp_path / name / "excitation.json").read_text())
+        assert fit["covariance"] == patch.fit.covariance.tolist()
+    assert result.provides() == {
+        "materials": {name: patch.material for name, patch in result.patches.items()}
+    }
+
+
+def test_one_patch_alone_has_no_folder(result: ExcitationResult, tmp_path: Path) -> None:
+    alone = replace(result, patches={"": result.patches["left"]})
+    alone.write_files(tmp_path)
+    assert (tmp_path / "excitation.json").is_file()
+    (tmp_path / "excitation.json").unlink()
+    (tmp_path / "excitation.json").mkdir()
+    with pytest.raises(DiskError, match="cannot be written"):
+        alone.write_files(tmp_path)
+
+
+def test_places_go_along_the_filter(result: ExcitationResult) -> None:
+    position_nm = result.position_nm
+    assert len(position_nm) == len(result.irradiance.position)
+    assert position_nm[0] < 460 < 600 < position_nm[-1]
