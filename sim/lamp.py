@@ -49,28 +49,33 @@ WAVELENGTH_NM: FloatArray = CELL_EDGES_NM[:-1] + CELL_NM / 2
 #: Temperatures at so many times interpolate a settling filament to a part in 10¹².
 SETTLING_TIMES = 1001
 
-#: Gauss–Legendre panels no longer than this resolve a fading lamp, and a burning one.
-PANEL_NODES = 8
+#: Gauss and Legendre's nodes and weights for a panel, and how long a panel resolves a fading lamp,
+#: and a burning one.
+PANEL = np.polynomial.legendre.leggauss(8)
 PANEL_FADING_S = 0.02
 PANEL_SETTLED_S = 300.0
+
+
+#: Tungsten's, which falls linearly over the visible: 0.47 at 400 nm to 0.41 at 700 nm, about what
+#: de Vos measured in 1954.
+_EMISSIVITY: FloatArray = 0.47 - 2e-4 * (WAVELENGTH_NM - 400.0)
+_FIFTH_POWER: FloatArray = WAVELENGTH_NM**5
+_AT_560_NM = (0.47 - 2e-4 * 160.0) / (560.0**5 * math.expm1(C2_NM_K / (560.0 * BURNING_K)))
 
 
 def filament_spectrum(temperature_k: float | FloatArray) -> FloatArray:
     """Spectrum of a tungsten filament relative to one at 3000 K and 560 nm.
 
-    Planck's law times tungsten's emissivity, which falls linearly over the visible
-    (0.47 at 400 nm to 0.41 at 700 nm, about what de Vos measured in 1954).
+    Planck's law times tungsten's emissivity.
 
     Returns
     -------
     ndarray, shape (..., 160)
         Of every temperature, on `WAVELENGTH_NM`.
     """
-    emissivity = 0.47 - 2e-4 * (WAVELENGTH_NM - 400.0)
     each_k = np.asarray(temperature_k)[..., None]
     exponent = np.minimum(C2_NM_K / (WAVELENGTH_NM * each_k), 700.0)
-    reference = (0.47 - 2e-4 * 160.0) / (560.0**5 * math.expm1(C2_NM_K / (560.0 * BURNING_K)))
-    planck: FloatArray = emissivity / (WAVELENGTH_NM**5 * np.expm1(exponent)) / reference
+    planck: FloatArray = _EMISSIVITY / (_FIFTH_POWER * np.expm1(exponent)) / _AT_560_NM
     return planck
 
 
@@ -230,6 +235,8 @@ class Lamp:
     ) -> FloatArray:
         """What `value` is at every time, in the phase of that time."""
         times_s = np.asarray(time_s)
+        if np.all(times_s >= self.phases[-1].start_s):
+            return value(self.phases[-1], times_s)
         starts_s = [phase.start_s for phase in self.phases]
         of_time = np.searchsorted(starts_s, times_s, side="right") - 1
         first, last = of_time.min(), of_time.max()
@@ -263,7 +270,7 @@ def _approach(phase: _Phase, begin: float, time_s: FloatArray, constant_s: float
 
 def nodes(start_s: float, end_s: float, panel_s: float) -> tuple[FloatArray, FloatArray]:
     """Times and weights of Gauss and Legendre's quadrature in panels no longer than `panel_s`."""
-    node, weight = np.polynomial.legendre.leggauss(PANEL_NODES)
+    node, weight = PANEL
     edges = np.linspace(start_s, end_s, math.ceil((end_s - start_s) / panel_s) + 1)
     half, middle = np.diff(edges)[:, None] / 2, (edges[:-1, None] + edges[1:, None]) / 2
     return (middle + half * node).ravel(), (half * weight).ravel()

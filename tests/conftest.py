@@ -98,6 +98,12 @@ def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> 
         monkeypatch.setattr("matplotlib.figure.Figure.savefig", _leave_blank)
 
 
+@pytest.fixture(autouse=True)
+def unsynced(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Files are not synced: nobody pulls the plug. `tests/record` has the tests that ask for it."""
+    monkeypatch.setattr("os.fsync", lambda handle: None)
+
+
 def _leave_blank(figure: object, file: object, format: str = "", **_: object) -> None:
     if format == "svg":
         assert isinstance(file, BytesIO)

@@ -2,7 +2,7 @@
 
 import hashlib
 from collections.abc import Callable, Mapping
-from concurrent.futures import ThreadPoolExecutor
+from concurrent.futures import Executor
 from pathlib import Path
 from typing import Any
 
@@ -56,6 +56,8 @@ class AttemptWriter:
         Plan, devices, versions: what the RunStart says.
     disk
         Keeps the frames.
+    beside
+        Does what can be done while the disk is busy.
     """
 
     def __init__(
@@ -68,6 +70,7 @@ class AttemptWriter:
         new_uid: Callable[[], str],
         metadata: Mapping[str, Any],
         disk: Disk,
+        beside: Executor,
     ) -> None:
         self.unit = unit
         self._journal = journal
@@ -76,6 +79,7 @@ class AttemptWriter:
         self._wall = wall
         self._new_uid = new_uid
         self._disk = disk
+        self._beside = beside
         self._bundle = event_model.compose_run(
             uid=new_uid(), time=wall(), metadata={**metadata, "unit": unit}
         )
@@ -115,9 +119,8 @@ class AttemptWriter:
         path = self._frames_folder / f"{self._next_number():06d}{suffix}"
         began = self._wall()
         # Hashed while the disk is busy: of a 25 MB frame that is a quarter of the time.
-        with ThreadPoolExecutor(1) as beside:
-            checksum = beside.submit(hashlib.sha256, data)
-            write_durably(path, data, self._disk)
+        checksum = self._beside.submit(hashlib.sha256, data)
+        write_durably(path, data, self._disk)
         record = FrameRecord(
             path=path,
             sha256=checksum.result().hexdigest(),

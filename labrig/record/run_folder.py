@@ -4,6 +4,7 @@ import re
 import shutil
 import uuid
 from collections.abc import Callable, Mapping
+from concurrent.futures import ThreadPoolExecutor
 from contextlib import suppress
 from datetime import UTC, datetime
 from pathlib import Path
@@ -49,6 +50,7 @@ class RunFolder:
             raise DiskError(f"{path}: the run cannot be written to ({error.strerror})") from None
         self._frame_number = _highest_frame(path / "frames")
         self._journal = Journal(path / JOURNAL, disk)
+        self._beside = ThreadPoolExecutor(1)
 
     @classmethod
     def create(
@@ -120,6 +122,7 @@ class RunFolder:
             self._new_uid,
             metadata,
             self._disk,
+            self._beside,
         )
 
     def close_open_attempts(
@@ -158,6 +161,7 @@ class RunFolder:
 
     def close(self) -> None:
         """Release the folder."""
+        self._beside.shutdown()
         self._journal.close()
         with suppress(OSError):  # the system lets go of it when labrig ends
             self._lock.release()
