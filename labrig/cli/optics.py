@@ -19,7 +19,7 @@ def show(
     ] = None,
 ) -> None:
     """What is in a file of measured curves, and how they look."""
-    from labrig.optics.sketch import describe, draw, shown
+    from labrig.report.curve_sketch import describe, draw, shown
 
     found = shown(file, curve)
     typer.echo(describe(found))

@@ -1,17 +1,13 @@
 """Held against photographs, against other materials and against the paper."""
 
-from labrig.compare.beside import Beside, Pair, beside
 from labrig.compare.numbers import numbers
 from labrig.compare.run import RunComparison, compare_run
 from labrig.compare.sections import sections
 from labrig.compare.three_channels import ThreeChannels, three_channels
 
 __all__ = [
-    "Beside",
-    "Pair",
     "RunComparison",
     "ThreeChannels",
-    "beside",
     "compare_run",
     "numbers",
     "sections",

@@ -191,7 +191,7 @@ def _patch_series(
         dark_sigma=dark_sigma,
         channels=tuple(views[0].measured.channels),
         iso=np.array([shot.iso for shot in shots], dtype=np.float64),
-        f_number=np.array([shot.f_number for shot in shots]),
+        f_number=np.array([shot.f_number for shot in shots], dtype=np.float64),
         frame=tuple(shot.frame.path.name for shot in shots),
         unit=unit,
         flag=flags,

@@ -3,6 +3,7 @@
 from labrig.results.arrays import BoolArray, FloatArray, IntArray
 from labrig.results.charging_series import Charge, ChargingSeries, Transient
 from labrig.results.closure import Closure
+from labrig.results.fields import leaves, unit_of
 from labrig.results.fitted_decay import (
     Candidate,
     DecayState,

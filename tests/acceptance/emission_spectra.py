@@ -19,7 +19,7 @@ from labrig.analyse import Choices
 from labrig.analyse.emission_spectrum import analyse
 from labrig.record import read_run
 from labrig.results.emission_spectrum import EmissionSpectrum
-from tests.analyse.spectral_bench import FloatArray, emitted, record, stage_of
+from tests.analyse.spectral_bench import FloatArray, emitted, part_of, record
 
 MATERIALS = ("blue-paint", "green-paint", "orange-paint", "red-paint", "white-paint")
 PROTOCOL = {"protocol": "emission_spectrum", "charge": "5 min", "times": ["2 s", "12 s", "30 s"],
@@ -33,7 +33,7 @@ def measured(material: str, seed: int) -> list[tuple[EmissionSpectrum, bool]]:
         folder = Path(name)
         sample = [{"material": material, "region": [0.03, 0.1, 0.94, 0.8]}]
         run = record(folder, PROTOCOL, sample=sample, seed=seed)
-        part = stage_of(run, folder)
+        part = part_of(run)
         white = frozenset(frame.path.name for frame in read_run(run).frames("white"))
         found = []
         for excluded in (frozenset[str](), white):

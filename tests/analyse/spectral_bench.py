@@ -110,11 +110,11 @@ def record(folder: Path, protocol: dict[str, Any], **simulation: Any) -> Path:
     return Recording.prepare(path, rig, folder / "runs").record(_quietly)
 
 
-def stage_of(run: Path, folder: Path) -> Part:
+def part_of(run: Path) -> Part:
     """What its processing is given."""
     rig = read_rig_file(run / "rig.yaml")
     protocol = read_run_protocol(run)
-    return Part(read_run(run), protocol, rig, Choices(), Inputs.of(rig), folder)
+    return Part(read_run(run), protocol, rig, Choices(), Inputs.of(rig))
 
 
 def emitted(material: str) -> FloatArray:

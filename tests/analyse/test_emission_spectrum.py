@@ -47,8 +47,8 @@ from tests.analyse.spectral_bench import (
     WIDTH,
     FloatArray,
     emitted,
+    part_of,
     record,
-    stage_of,
 )
 from tests.fit import lvf_pictures as made
 
@@ -58,7 +58,7 @@ ANOTHER_LABORATORY = made.CAMERAS / "ampas_rawtoaces_2017" / "canon_eos_5d_mark_
 
 
 def analysed(run: Path, excluded: frozenset[str] = frozenset()) -> EmissionSpectrumResult:
-    return analyse(replace(stage_of(run, run), choices=Choices(excluded=excluded)))
+    return analyse(replace(part_of(run), choices=Choices(excluded=excluded)))
 
 
 def on_the_grid(fit: SpectrumFit) -> EmissionSpectrum:
@@ -146,7 +146,7 @@ def test_a_result_and_its_files_are_read_back(
 
 
 def test_a_report_shows_all_comparisons(blue: Path, found: EmissionSpectrumResult) -> None:
-    part = stage_of(blue, blue)
+    part = part_of(blue)
     with figure_style():
         shown = render(found, source_of(part))
     assert {figure.name for section in shown.sections for figure in section.figures} == {
@@ -158,7 +158,7 @@ def test_a_report_shows_all_comparisons(blue: Path, found: EmissionSpectrumResul
 
 def test_without_a_calibrated_lvf_there_is_no_spectrum(blue: Path) -> None:
     with pytest.raises(UsageError, match=r"lvf_calibration.*optics"):
-        analyse(replace(stage_of(blue, blue), inputs=Inputs()))
+        analyse(replace(part_of(blue), inputs=Inputs()))
 
 
 def test_damaged_frames_are_named(blue: Path) -> None:
@@ -236,7 +236,7 @@ def test_a_monochrome_camera_will_do(blue: Path, tmp_path: Path) -> None:
     curve = tmp_path / "mono.csv"
     sensitivity = np.column_stack([[350, 400, 500, 600, 700, 800], [0.2, 0.5, 1, 0.9, 0.6, 0.3]])
     np.savetxt(curve, sensitivity, delimiter=",", header="wavelength_nm,L", comments="")
-    part = replace(stage_of(blue, blue), choices=Choices(camera=str(curve)))
+    part = replace(part_of(blue), choices=Choices(camera=str(curve)))
     light = Spectrum("green", np.arange(380.0, 721.0, 5.0),
                      np.exp(-(((np.arange(380.0, 721.0, 5.0) - 530) / 35) ** 2)))  # fmt: skip
     dark = np.full((HEIGHT, 10 * WIDTH), 4.0)

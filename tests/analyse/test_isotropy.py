@@ -10,7 +10,7 @@ from labrig.analyse.isotropy import analyse
 from labrig.errors import DataError
 from labrig.process import process_and_report
 from labrig.results.isotropy import IsotropyResult
-from tests.analyse.spectral_bench import record, stage_of
+from tests.analyse.spectral_bench import part_of, record
 from tests.results.made import assert_read_back
 
 QUICK = {"protocol": "isotropy", "charge": "2 min", "frames": 2, "angles": [40, 80],
@@ -19,7 +19,7 @@ QUICK = {"protocol": "isotropy", "charge": "2 min", "frames": 2, "angles": [40, 
 
 @pytest.mark.parametrize("anisotropy", [0.0, 0.15])
 def test_what_the_sample_loses_to_the_side_is_found(tmp_path: Path, anisotropy: float) -> None:
-    part = stage_of(record(tmp_path, QUICK, anisotropy=anisotropy), tmp_path)
+    part = part_of(record(tmp_path, QUICK, anisotropy=anisotropy))
     result = analyse(part)
     (glow,) = result.patches.values()
     true = 1 - anisotropy * (1 - np.cos(np.radians(glow.angle_deg)))

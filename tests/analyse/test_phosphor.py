@@ -10,10 +10,13 @@ from labrig.acquire import read_protocol
 from labrig.calibration import write_irradiance_file
 from labrig.errors import UsageError
 from labrig.material import read_material
-from labrig.process import process_run
+from labrig.process import process_and_report
 from labrig.record import read_run
+from labrig.results.phosphor import PhosphorResult
+from labrig.written_numbers import plus_minus
 from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.analyse.recorded import cut_off_and_resumed, record
+from tests.results.round_trip import assert_read_back
 
 WIDTH, HEIGHT = 192, 48
 DECAY = {
@@ -43,20 +46,29 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 def test_a_chain_that_was_killed_and_resumed_ends_in_one_material(run: Path) -> None:
-    result = process_run(run)
+    processed = process_and_report(run)
+    result = processed.result
+    assert isinstance(result, PhosphorResult)
+    assert list(result.parts) == ["decay", "excitation"]
     material = read_material(run / "result" / "material.yaml")
     (state,) = material.states
     assert material.provenance is not None
     assert material.provenance.temperature_c == pytest.approx(21, abs=1)
     assert state.k_r_per_s == pytest.approx(0.032, rel=0.02)
     assert state.k_e_per_s is not None
+    assert state.k_e_per_s_sigma is not None
     assert state.k_e_per_s[1] / 4 == pytest.approx(0.05, rel=0.2)
     assert (run / "result" / "decay" / "series.csv").is_file()
     fit = json.loads((run / "result" / "decay" / "fit.json").read_text())
     assert fit["states"][0]["k_r_per_s"] == pytest.approx(0.032, rel=0.02)
     page = (run / "result" / "report.html").read_text()
-    assert "Beside blue-paint" in page or "beside blue-paint of Nalbach" in page
-    assert any(line.startswith("excitation: closure") for line in result.lines)
+    # As measured on top, rescaled to the paper in a section of its own.
+    before, _, after = page.partition("Compared with a reference")
+    k_e, k_e_sigma = state.k_e_per_s[1], state.k_e_per_s_sigma[1]
+    assert plus_minus(k_e, k_e_sigma) in before
+    assert "beside blue-paint of Nalbach" in after.replace("Beside", "beside")
+    assert any(line.startswith("excitation: closure") for line in processed.lines)
+    assert_read_back(result)
 
 
 def test_parts_see_their_own_frames_only(run: Path) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 import yaml
 from hypothesis import given, strategies as st
-from labrig.process.result import Result
 
 from labrig.acquire import read_protocol, read_rig_file
 from labrig.analyse import Choices
@@ -20,7 +19,7 @@ from labrig.calibration import Strip, write_irradiance_file, write_lvf_file
 from labrig.compare.result import read_patches
 from labrig.errors import DataError, FitError, UsageError
 from labrig.material import read_material
-from labrig.process import process_run
+from labrig.process import Processed, process_and_report
 from labrig.record import read_run
 from labrig.reduce import RawFrame
 from labrig.region import Region
@@ -75,8 +74,8 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
 
 
 @pytest.fixture(scope="module")
-def result(run: Path) -> Any:
-    return process_run(run)
+def processed(run: Path) -> Processed:
+    return process_and_report(run)
 
 
 def parts_of(path: Path) -> Any:
@@ -95,7 +94,7 @@ def states(run: Path, paint: str) -> tuple[Any, Any]:
 @pytest.mark.campaign
 @pytest.mark.parametrize(("paint", "other"), [tuple(PAINTS), tuple(PAINTS)[::-1]])
 def test_every_paint_has_its_own_material(
-    run: Path, result: Result, paint: str, other: str
+    run: Path, processed: Processed, paint: str, other: str
 ) -> None:
     found, true = states(run, paint)
     _, of_other = states(run, other)
@@ -112,7 +111,7 @@ def test_every_paint_has_its_own_material(
 
 
 @pytest.mark.campaign
-def test_every_paint_has_its_own_spectrum(run: Path, result: Result) -> None:
+def test_every_paint_has_its_own_spectrum(run: Path, processed: Processed) -> None:
     for paint in PAINTS:
         place = run / "result" / "emission_spectrum" / paint
         spectrum = read_emission_spectrum(place / "emission.yaml")
@@ -122,7 +121,7 @@ def test_every_paint_has_its_own_spectrum(run: Path, result: Result) -> None:
 
 
 @pytest.mark.campaign
-def test_results_lie_in_folders_of_the_patches(run: Path, result: Result) -> None:
+def test_results_lie_in_folders_of_the_patches(run: Path, processed: Processed) -> None:
     made = run / "result"
     for paint in PAINTS:
         material = read_material(made / paint / "material.yaml")
@@ -132,14 +131,14 @@ def test_results_lie_in_folders_of_the_patches(run: Path, result: Result) -> Non
         assert (made / "decay" / paint / "series.csv").is_file()
     assert not (made / "material.yaml").exists()
     page = (made / "report.html").read_text()
-    for part in ("Material", "Emission spectrum", "Excitation"):
+    for part in ("Emission spectrum", "Excitation"):
         assert all(f"<h2>{part}: {paint}</h2>" in page for paint in PAINTS)
-    assert any(line.startswith("excitation: orange-paint: state 1") for line in result.lines)
+    assert any(line.startswith("excitation: orange-paint: state 1") for line in processed.lines)
     assert list(read_fitted_decays(run / "result")) == list(PAINTS)
 
 
 @pytest.mark.campaign
-def test_a_comparison_takes_the_whole_material_of_each(run: Path, result: Result) -> None:
+def test_a_comparison_takes_the_whole_material_of_each(run: Path, processed: Processed) -> None:
     compared = read_patches(run)
     assert list(compared) == list(PAINTS)
     for paint, patch in compared.items():
@@ -153,7 +152,7 @@ def test_a_patch_that_does_not_reach_along_the_filter_is_left_out(
     part, rig = parts_of(run / "protocol.yaml")[0], read_rig_file(run / "rig.yaml")
     short = Choices.parse(["orange-paint=0.03,0.5,0.5,0.4"], [])
     own = read_run(run).part(part.name)
-    found = analyse_spectra(Part(own, part.protocol, rig, short, Inputs.of(rig), tmp_path))
+    found = analyse_spectra(Part(own, part.protocol, rig, short, Inputs.of(rig)))
     (said,) = (line for line in found.warnings if "expected patch orange-paint below" in line)
     assert "columns 12 to 180" in said
     assert "labrig process RUN --roi orange-paint=x,y,width,height" in said
@@ -205,28 +204,6 @@ def test_rows_of_a_tilted_strip_lie_further_along(down: float, below: float) -> 
         middle = np.array([(x + width / 2) * WIDTH, (y + height / 2) * HEIGHT])
         along = (middle - left) @ (right - left) / np.sum((right - left) ** 2)
         assert (middle[0] - left[0]) / (right - left)[0] + further == pytest.approx(along)
-
-
-def test_one_patch_without_a_result_leaves_the_others() -> None:
-    patches = [StripPatch(name, name, (0, 0, 1, 1), alone=False) for name in "ab"]
-
-    def analyse(failing: str) -> Callable[[StripPatch], tuple[str, list[str]]]:
-        def one(patch: StripPatch) -> tuple[str, list[str]]:
-            if patch.name in failing:
-                raise FitError("nothing glows")
-            return patch.material, ["odd"]
-
-        return one
-
-    results, warnings = for_each_patch(patches, analyse("a"))
-    assert results == {"b": "b"}
-    assert warnings == ("a: nothing glows", "b: odd")
-    with pytest.raises(FitError, match="a: nothing glows"):
-        for_each_patch(patches, analyse("ab"))
-    alone = [StripPatch("a", "paint")]
-    assert for_each_patch(alone, analyse("b")) == ({"": "paint"}, ("odd",))
-    with pytest.raises(FitError, match=r"^nothing glows"):
-        for_each_patch(alone, analyse("a"))
 
 
 def test_one_patch_without_a_result_leaves_the_others() -> None:

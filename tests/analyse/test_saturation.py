@@ -16,7 +16,7 @@ from labrig.bench import open_bench
 from labrig.errors import DataError
 from labrig.process import process_and_report
 from labrig.results.saturation import Curve, SaturationResult
-from tests.analyse.spectral_bench import record, stage_of
+from tests.analyse.spectral_bench import part_of, record
 from tests.results.made import assert_read_back
 
 QUICK: dict[str, Any] = {
@@ -65,10 +65,9 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
 
 @pytest.mark.campaign
 def test_a_power_laws_rates_depend_on_the_charge(tmp_path: Path) -> None:
-    part = stage_of(
+    part = part_of(
         record(tmp_path, QUICK | {"charges": ["20 s", "60 min"], "for": "150 s"},
-               sample="power-law"),
-        tmp_path,
+               sample="power-law")
     )  # fmt: skip
     result = analyse(part)
     (patch,) = result.patches.values()

@@ -155,9 +155,9 @@ def test_killed_within_a_bracket_it_goes_on_there(
     # The card is in its place still: nobody is asked to put it there.
     asked = [a.task for u in after if u not in before for a in after[u].actions if a.is_by_hand]
     assert asked == ["lamp halogen", "sample", "lvf away", "no filter"]
-    result = process_run(again)
-    assert isinstance(result, CameraCalibrationResult)
-    other = result.calibration
+    processed = process_run(again)
+    assert isinstance(processed, CameraCalibrationResult)
+    other = processed.calibration
     for one, as_before in zip(other.aperture, camera.aperture, strict=True):
         assert one.factor == pytest.approx(as_before.factor, abs=5 * 0.007)
 

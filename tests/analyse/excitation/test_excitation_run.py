@@ -209,7 +209,7 @@ def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: P
         )
 
 
-def stage_of(run: Path, **known: Any) -> Part:
+def part_of(run: Path, **known: Any) -> Part:
     rig = read_rig_file(run / "rig.yaml")
     return Part(
         read_run(run),
@@ -217,12 +217,11 @@ def stage_of(run: Path, **known: Any) -> Part:
         rig,
         Choices(),
         replace(Inputs.of(rig), **known),
-        run / "result",
     )
 
 
 def test_charges_are_missing(run: Path) -> None:
-    part = stage_of(run)
+    part = part_of(run)
     some = [one for one in part.run.attempts if not one.unit.startswith("bare")]
     with pytest.raises(DataError, match="through the filter and without it"):
         patch_chargings(
@@ -232,4 +231,4 @@ def test_charges_are_missing(run: Path) -> None:
 
 def test_a_calibration_of_another_camera_is_refused(run: Path) -> None:
     with pytest.raises(DataError, match="calibration of another camera"):
-        patch_chargings(stage_of(run, camera=camera()), true_irradiance(), USUAL)
+        patch_chargings(part_of(run, camera=camera()), true_irradiance(), USUAL)
