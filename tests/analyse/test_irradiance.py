@@ -22,7 +22,7 @@ from tests.analyse.lvf_calibration.room_truth import simulation_of, true_irradia
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
 from tests.analyse.recorded import record
 from tests.analyse.spectral_bench import true_lvf_file
-from tests.results.round_trip import assert_read_back
+from tests.results.made import assert_read_back
 
 CARD = Transmittance("card", np.array([380.0, 780.0]), np.array([0.17, 0.19]))
 HOUSE = read_camera("canon_eos_5d_mark_ii")

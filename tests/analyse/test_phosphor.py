@@ -16,7 +16,7 @@ from labrig.results.phosphor import PhosphorResult
 from labrig.written_numbers import plus_minus
 from tests.analyse.excitation.test_excitation_run import QUICK, true_irradiance
 from tests.analyse.recorded import cut_off_and_resumed, record
-from tests.results.round_trip import assert_read_back
+from tests.results.made import assert_read_back
 
 WIDTH, HEIGHT = 192, 48
 DECAY = {

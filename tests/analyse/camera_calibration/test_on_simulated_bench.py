@@ -20,7 +20,7 @@ from labrig.results.camera_calibration import CameraCalibrationResult
 from labrig.sim.optics import vignetting
 from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons
 from tests.analyse.recorded import cut_off_and_resumed, record, whole
-from tests.results.round_trip import assert_read_back
+from tests.results.made import assert_read_back
 
 PROTOCOL = {
     "protocol": "camera_calibration",

@@ -20,7 +20,7 @@ from labrig.sim.lamp import WAVELENGTH_NM, Lamp
 from labrig.sim.simulation import LampSettings
 from tests.acquire.fakes import Watching
 from tests.analyse.recorded import cut_off_and_resumed, record
-from tests.results.round_trip import assert_read_back
+from tests.results.made import assert_read_back
 
 FloatArray = NDArray[np.float64]
 
