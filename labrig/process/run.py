@@ -100,7 +100,10 @@ def process_and_report(folder: Path | str, choices: Choices | None = None) -> Pr
     write_nexus(made / "run.nxs", run, about, result)
     with figure_style():
         rendered = render(result, Source(run, protocol, rig, about, camera))
-        sections = (*rendered.sections, *lamp_sections(run), *temperature_sections(run))
+        # After the parts of a chain, what is about all of them.
+        part = "the_run" if any(section.part for section in rendered.sections) else ""
+        about_run = (*lamp_sections(run), *temperature_sections(run))
+        sections = (*rendered.sections, *(replace(one, part=part) for one in about_run))
         report = Report(about, warnings, sections, rendered.methods, frames, camera)
         write_report(made / "report.html", report)
     changes = put_in_place(made)

@@ -101,7 +101,7 @@ def decay_sections(
         _sample(content, screen, anchor),
         *(
             Section(
-                one.patch.name,
+                f"Patch {one.patch.name}",
                 figures=one.figures,
                 anchor=one.anchor,
                 template="patch.html.j2",

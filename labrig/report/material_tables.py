@@ -29,7 +29,7 @@ def measured_table(material: Material) -> Table:
 def comparison_table(comparison: MaterialComparison) -> Table:
     """One material beside another, as the report and the terminal show it."""
     return Table(
-        head=("", "measured", "reference", "apart / %", "apart / σ"),
+        head=("", _measured_head(comparison), "reference", "apart / %", "apart / σ"),
         rows=tuple(
             (
                 f"{pair.quantity} / {pair.unit}" if pair.unit else pair.quantity,
@@ -54,6 +54,11 @@ def comparison_table(comparison: MaterialComparison) -> Table:
             ]
         ).strip(),
     )
+
+
+def _measured_head(comparison: MaterialComparison) -> str:
+    factors = (comparison.k_e_factor, comparison.reradiation_factor)
+    return "measured" if factors == (1.0, 1.0) else "measured, rescaled"
 
 
 def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[str, ...]]:

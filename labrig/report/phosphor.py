@@ -1,6 +1,6 @@
 """A phosphor in a report: the material as measured, what it looks like, then every part."""
 
-from collections.abc import Iterator, Mapping
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
 
 import numpy as np
@@ -9,12 +9,14 @@ from matplotlib.figure import Figure
 
 from labrig import shipped
 from labrig.material import Material, Spectrum, compare_materials, read_material
-from labrig.report.colours import screen_for, spectrum_colour
+from labrig.record import FrameRecord
+from labrig.report.colours import Screen, screen_for, spectrum_colour
+from labrig.report.content import GlowPhotograph
 from labrig.report.decay_figures import logarithmic_decay
 from labrig.report.figure_style import INK, LEFT_PT, new_figure, place
 from labrig.report.legend import BAND_OPACITY, legend_above, lined, shaded
 from labrig.report.material_tables import comparison_table, measured_table
-from labrig.report.photographs import Daylight, daylight_picture
+from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
 from labrig.report.render import render as render_result
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section
@@ -32,6 +34,8 @@ class _Glance:
     ----------
     daylight
         The sample under the lamp; None without a photograph.
+    glow
+        The sample glowing, where there is no photograph under the lamp.
     colours
         Of the emission as `#rrggbb`, by patch.
     contents
@@ -41,6 +45,7 @@ class _Glance:
     """
 
     daylight: Daylight | None
+    glow: GlowPicture | None
     colours: Mapping[str, str]
     contents: Mapping[str, str]
     failed: Mapping[str, str]
@@ -97,7 +102,8 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
                 )
             )
     frames = [frame for attempt in source.run.completed().values() for frame in attempt.frames]
-    daylight = [frame for frame in frames if frame.purpose == "daylight"]
+    screen = screen_for(source.camera)
+    daylight = daylight_picture([one for one in frames if one.purpose == "daylight"], (), screen)
     return Section(
         "The material as measured",
         figures=tuple(figures),
@@ -108,12 +114,28 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
         anchor="material",
         template="phosphor.html.j2",
         content=_Glance(
-            daylight_picture(daylight, (), screen_for(source.camera)),
+            daylight,
+            None if daylight else _first_glow(frames, result, screen),
             colours,
             {f"part-{name}": name for name in result.parts},
             result.failed,
         ),
     )
+
+
+def _first_glow(
+    frames: Sequence[FrameRecord], result: PhosphorResult, screen: Screen
+) -> GlowPicture | None:
+    """The first photograph of the decay."""
+    for patch in _decays(result).values():
+        first = int(np.argmin(patch.series.t_s))
+        glowing = [
+            GlowPhotograph(frame, float(patch.series.t_s[first]))
+            for frame in frames
+            if frame.path.name == patch.series.frame[first]
+        ]
+        return next(iter(glow_pictures(glowing, screen)), None)
+    return None
 
 
 def _decays(result: PhosphorResult) -> dict[str, DecayPatch]:
@@ -160,4 +182,4 @@ def _comparison(patch: str, material: Material) -> tuple[Section, ...]:
     )
     table = comparison_table(compare_materials(material, reference))
     title = f"Compared with a reference: {patch}" if patch else "Compared with a reference"
-    return (Section(title, (text,), tables=(table,), part="comparison"),)
+    return (Section(title, (text,), tables=(table,), part="compared_with_a_reference"),)
