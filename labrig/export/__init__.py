@@ -1,7 +1,7 @@
 """Runs and results for other programs: NeXus, xarray, Tiled."""
 
-from labrig.export.dataset import read_dataset
+from labrig.export.dataset import read_dataset, tree_of
 from labrig.export.nexus import write_nexus
 from labrig.export.tiled import to_tiled
 
-__all__ = ["read_dataset", "to_tiled", "write_nexus"]
+__all__ = ["read_dataset", "to_tiled", "tree_of", "write_nexus"]

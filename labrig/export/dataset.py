@@ -1,6 +1,6 @@
-"""The result of a run as an xarray Dataset, for notebooks."""
+"""The result of a run for xarray, for notebooks."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -42,11 +42,10 @@ def read_dataset(run: Path | str) -> "Dataset | DataTree":
         frames `t_s`, `exposure_s`, `unit`, `iso`, `f_number`. Of the fits `k_r_per_s`, `amplitude`
         (patch, state), `channel_weight`, `offset` (patch, channel), each with its σ, and
         `flicker`, `reduced_chi2`, `fit_warnings` (patch); NaN where there is no fit.
-        Of any other protocol: every field of its result, those of fields in fields with a dot
-        between, with dimensions of their own. Units are attributes of the variables; the Dataset's
-        own say which run, sample and devices.
+        Units are attributes of the variables; the Dataset's own say which run, sample and devices.
     DataTree
-        Of a chain: a node for each part, and the materials at its root.
+        Of any other protocol: every field of its result, fields in fields as nodes; of a chain a
+        node for each part.
 
     Raises
     ------
@@ -56,7 +55,7 @@ def read_dataset(run: Path | str) -> "Dataset | DataTree":
         A file in it was changed.
     """
     try:
-        import xarray
+        import xarray  # noqa: F401
     except ImportError:
         raise UsageError(
             "a Dataset needs xarray, which is not installed; install it with: "
@@ -64,19 +63,53 @@ def read_dataset(run: Path | str) -> "Dataset | DataTree":
         ) from None
     folder = Path(run)
     result = read_result(folder)
-    if not isinstance(result, PhosphorResult):
-        return _dataset(result, _attributes(folder))
-    nodes = {name: _dataset(part, {}) for name, part in result.parts.items()}
-    return xarray.DataTree.from_dict({"/": _dataset(result, _attributes(folder)), **nodes})
+    attributes = _attributes(folder)
+    if isinstance(result, DecayResult):
+        return _decay(result, attributes)
+    return tree_of(result, attributes)
 
 
-def _dataset(result: RunResult, attributes: dict[str, str]) -> "Dataset":
+def tree_of(result: RunResult, attributes: Mapping[str, str] | None = None) -> "DataTree":
+    """A result of any protocol as an xarray DataTree, as `read_dataset` gives it."""
     import xarray
 
-    if not isinstance(result, DecayResult):
-        columns = {".".join(path): _column(path, value) for path, value in leaves(result)}
-        found = {name: column for name, column in columns.items() if column is not None}
-        return xarray.Dataset(found | _sigmas(result), attrs=attributes)
+    nodes: dict[str, Dataset] = {}
+    if isinstance(result, PhosphorResult):
+        for name, part in result.parts.items():
+            own = _decay(part, {}) if isinstance(part, DecayResult) else None
+            below = tree_of(part).to_dict() if own is None else {"/": own}
+            nodes |= {f"/{name}{path}".rstrip("/"): node for path, node in below.items()}
+    variables: dict[str, dict[str, Column]] = {}
+    for path, value in leaves(result):
+        *inner, name = (key.replace("/", "_") for key in path)
+        if path != ("warnings",):
+            place = "/" + "/".join(inner)
+            variables.setdefault(place, {}).update(_columns(".".join((*inner, name)), name, value))
+    nodes |= {place: xarray.Dataset(columns) for place, columns in variables.items()}
+    tree = xarray.DataTree.from_dict(nodes)
+    tree.attrs = dict(attributes or {}) | {"warnings": "\n".join(result.warnings)}
+    return tree
+
+
+def _columns(dimension: str, name: str, value: Any) -> dict[str, Column]:
+    """A field as a variable, with its σ if it has one; nothing where it is empty or no number."""
+    if isinstance(value, Measured):
+        unit = {"units": value.unit}
+        return {name: ((), value.value, unit), f"{name}_sigma": ((), value.sigma, unit)}
+    try:
+        array = np.asarray(value)
+    except ValueError:
+        return {}
+    if array.dtype.kind not in "iufbU" or not array.size:
+        return {}
+    dimensions = tuple(f"{dimension}_{axis}" for axis in range(array.ndim))
+    units = unit_of(name)
+    return {name: (dimensions, array, {"units": units} if units else {})}
+
+
+def _decay(result: DecayResult, attributes: Mapping[str, str]) -> "Dataset":
+    import xarray
+
     patches = [patch.series for patch in result.patches.values()]
     fits = [patch.fit for patch in result.patches.values()]
     channels = patches[0].channels
@@ -96,30 +129,6 @@ def _dataset(result: RunResult, attributes: dict[str, str]) -> "Dataset":
         },
         attributes,
     )
-
-
-def _column(path: tuple[str, ...], value: Any) -> Column | None:
-    """A field as a variable; None for what is neither numbers nor texts."""
-    if isinstance(value, Measured):
-        return ((), value.value, {"units": value.unit})
-    try:
-        array = np.asarray(value)
-    except ValueError:
-        return None
-    if array.dtype.kind not in "iufbU":
-        return None
-    dimensions = tuple(f"{'.'.join(path)}_{axis}" for axis in range(array.ndim))
-    unit = unit_of(path[-1])
-    return (dimensions, array, {"units": unit} if unit else {})
-
-
-def _sigmas(result: RunResult) -> dict[str, Column]:
-    """The σ of every measured value, beside it."""
-    return {
-        f"{'.'.join(path)}_sigma": ((), value.sigma, {"units": value.unit})
-        for path, value in leaves(result)
-        if isinstance(value, Measured)
-    }
 
 
 def _attributes(folder: Path) -> dict[str, str]:

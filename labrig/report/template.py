@@ -39,6 +39,7 @@ def environment() -> Environment:
     )
     made.filters["quoted"] = shlex.quote
     made.filters["indexed"] = _indexed
+    made.filters["titled"] = _titled
     return made
 
 
@@ -68,3 +69,9 @@ def _utc(frame: FrameRecord) -> str:
     """When the frame began."""
     start = datetime.fromtimestamp(frame.start_time, UTC)
     return start.strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
+
+
+def _titled(name: str) -> str:
+    """`Camera calibration` of `camera_calibration`."""
+    words = name.replace("_", " ").capitalize()
+    return words.replace("Lvf", "LVF")

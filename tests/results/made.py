@@ -8,6 +8,7 @@ from typing import Any
 
 import numpy as np
 
+from labrig.export import tree_of
 from labrig.results import DecayState, FittedDecay, RunResult
 
 
@@ -45,8 +46,13 @@ def decay_result(
 
 def assert_read_back(result: RunResult) -> None:
     """What is written as `result.json` gives the same result, field by field, bit by bit."""
-    again = type(result).from_dict(json.loads(result.to_json()))
+    again = type(result).from_dict(json.loads(result.to_json(), parse_constant=_no_number))
     _assert_same(result, again, result.kind)
+    assert tree_of(again).to_dict()
+
+
+def _no_number(text: str) -> float:
+    raise AssertionError(f"{text} is no JSON")
 
 
 def _assert_same(one: Any, other: Any, place: str) -> None:
