@@ -77,3 +77,11 @@ def test_rivals(
         - mean(tau_s, exponent - step, T_S, EXPOSURE_S)[0]
     ) / (2 * step)
     np.testing.assert_allclose(slopes, np.stack([by_log_tau, by_exponent], 1), atol=1e-9)
+
+
+@pytest.mark.parametrize("exposure_s", [1e30, 1e100, 1e300])
+def test_an_absurdly_long_exposure_sees_nothing_and_warns_of_nothing(exposure_s: float) -> None:
+    means, slopes = exponential_means_and_slopes(
+        np.array([1e3]), np.zeros(1), np.array([exposure_s])
+    )
+    np.testing.assert_allclose([means, slopes], 0.0, atol=1e-30)

@@ -24,6 +24,7 @@ def exponential_means_and_slopes(
 
 def _mean_slope(x: FloatArray, mean: FloatArray) -> FloatArray:
     """Give x φ₁′(x) = e^(−x) − φ₁(x)."""
-    # Σ_j j (−x)^j / (j + 1)!, j = 1 … 6.
-    series = -x * (1 / 2 - x * (1 / 3 - x * (1 / 8 - x * (1 / 30 - x * (1 / 144 - x / 840)))))
+    # Σ_j j (−x)^j / (j + 1)!, j = 1 … 6; cut off, since powers of what is not small overflow.
+    y = np.minimum(x, SERIES_BELOW)
+    series = -y * (1 / 2 - y * (1 / 3 - y * (1 / 8 - y * (1 / 30 - y * (1 / 144 - y / 840)))))
     return np.where(x < SERIES_BELOW, series, np.exp(-x) - mean)
