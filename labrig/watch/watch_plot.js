@@ -44,6 +44,7 @@ export function ticks(low, high, about) {
 }
 
 function decades(low, high) {
+  if (high / low < 8) return ticks(low, high, 4);
   const made = [];
   for (let n = Math.floor(Math.log10(low)); 10 ** n <= high; n += 1) {
     for (const factor of high / low < 200 ? [1, 2, 5] : [1]) {
@@ -55,7 +56,10 @@ function decades(low, high) {
 }
 
 function written(value) {
-  if (value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e6)) return value.toExponential(0);
+  // longer ones would run into the axis' title
+  if (value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e5)) {
+    return String(Number(value.toPrecision(3)).toExponential()).replace("e+", "e");
+  }
   return String(Number(value.toPrecision(6)));
 }
 

@@ -1,10 +1,14 @@
 """A run watched from outside the dark room, while its folder grows."""
 
 import http.client
+import json
 import os
+import re
 import shutil
 import time
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
+from dataclasses import dataclass
 from pathlib import Path
 from urllib.parse import urlsplit
 
@@ -15,18 +19,23 @@ from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
 from labrig import shipped
+from labrig.acquire import read_protocol
 from labrig.cli.ending import guarded
 from labrig.cli.progress import thumbnail
 from labrig.errors import UsageError
-from labrig.record import read_run
-from labrig.report.pictures import jpeg
-from labrig.watch.following import Following
+from labrig.record import TAKEN_BACK, ActionRecord, RunFolder, read_run
+from labrig.run import resume_run
+from labrig.watch.following import Following, State
 from labrig.watch.glances import Glances
 from labrig.watch.server import News, WatchServer
 from labrig.yaml_file import read_yaml, yaml_text
+from tests.analyse.recorded import quietly
+from tests.recordings import runs as recordings
 
 SCREENSHOTS = os.environ.get("LABRIG_SCREENSHOTS")
 PATIENCE_S = 20
+#: A chain of three parts.
+CHAIN_RUN = recordings.HERE / "chain" / recordings.RUN
 
 
 @pytest.fixture(scope="module")
@@ -74,7 +83,8 @@ class Growing:
 
     def finish(self) -> None:
         self.grow(len(self._lines))
-        shutil.copytree(self._finished / "result", self.path / "result")
+        if (self._finished / "result").is_dir():
+            shutil.copytree(self._finished / "result", self.path / "result")
 
 
 @pytest.fixture
@@ -82,36 +92,56 @@ def growing(finished: Path, tmp_path: Path) -> Growing:
     return Growing(finished, tmp_path / "growing")
 
 
+def settled(following: Following) -> State:
+    """What there is to tell once all frames were looked at."""
+    while following.look():
+        pass
+    return following.state()
+
+
+def unit_states(state: State) -> list[str]:
+    return [unit["state"] for unit in state["units"].values()]
+
+
 def test_what_is_done_and_what_comes(growing: Growing) -> None:
     following = Following(growing.path)
-    assert following.look()
-    assert following.state()["state"] == "unfinished"
+    assert settled(following)["run"]["state"] == "unfinished"
     growing.grow_until(b'"unit": "decay-1"')
     growing.grow_until(b'"purpose": "decay"')
     with FileLock(growing.path / ".lock"):
         assert following.look()
+        state = settled(following)
         assert not following.look()
-        state = following.state()
-    assert state["state"] == "running"
-    assert [unit["state"] for unit in state["units"]] == ["done", "now"]
-    assert {step["what"] for step in state["steps"]} >= {"lamp on", "lamp off"}
-    assert [point["patch"] for point in state["points"]] == ["left", "right"]
+    assert state["run"]["state"] == "running"
+    assert unit_states(state) == ["done", "now"]
+    now = state["run"]["now"]
+    assert [step["what"].split(",")[0] for step in now["done"]] == ["lamp off", "decay frame"]
+    assert {step["what"].split(",")[0] for step in now["next"]} == {"decay frame"}
+    # the plan begins before the lamp was on, the frames come after it was off
+    assert 900 < now["at_s"] < now["next"][0]["at_s"] <= now["until_s"] < 1000
+    assert [point["patch"] for (points) in state["points"].values() for point in points] == [
+        "left",
+        "right",
+    ]
     assert state["frame"]["purpose"] == "decay"
-    assert state["results"] == []
+    assert state["results"] == {}
 
 
 def test_the_points_are_the_decay(growing: Growing) -> None:
     growing.finish()
-    following = Following(growing.path)
-    following.look()
-    state = following.state()
-    assert state["state"] == "processed"
-    assert [result["patch"] for result in state["results"]] == ["left", "right"]
+    state = settled(Following(growing.path))
+    assert state["run"]["state"] == "processed"
+    assert sorted(state["results"]) == ["left", "right"]
     frames = read_run(growing.path).frames("decay")
-    points = [point for point in state["points"] if point["patch"] == "left"]
-    assert len(points) == len(frames)
-    assert points[0]["t_s"] == pytest.approx(0.56, abs=0.05)
-    greens = [point["dn_per_s"]["G"] for point in points]
+    left = [
+        point
+        for frame in frames
+        for point in state["points"][frame.path.name]
+        if point["patch"] == "left"
+    ]
+    assert len(left) == len(frames) == len(state["points"])
+    assert left[0]["t_s"] == pytest.approx(0.56, abs=0.05)
+    greens = [point["dn_per_s"]["G"] for point in left]
     assert greens == sorted(greens, reverse=True)
     # before dark frames are subtracted, and so within a few per cent of the result
     series = (growing.path / "result" / "left" / "series.csv").read_text().splitlines()
@@ -121,11 +151,90 @@ def test_the_points_are_the_decay(growing: Growing) -> None:
 
 def test_a_frame_that_cannot_be_read_is_passed_over(growing: Growing) -> None:
     growing.finish()
-    (last,) = sorted((growing.path / "frames").iterdir())[-1:]
+    *_, before, last = sorted((growing.path / "frames").iterdir())
     last.write_bytes(b"no frame")
-    following = Following(growing.path)
-    following.look()
-    assert following.state()["frame"]["name"] != last.name
+    assert settled(Following(growing.path))["frame"]["name"] == before.name
+
+
+def test_a_chain_is_told_by_its_parts(tmp_path: Path) -> None:
+    growing = Growing(CHAIN_RUN, tmp_path)
+    growing.finish()
+    state = settled(Following(growing.path))
+    names = [unit["name"] for unit in state["units"].values()]
+    assert names[:2] == ["emission_spectrum/dark", "emission_spectrum/meter-halogen"]
+    assert set(unit_states(state)) == {"done"}
+    # the patches are those of the part
+    frames = read_run(growing.path).frames("decay")
+    told = [(point["unit"], point["patch"]) for p in state["points"].values() for point in p]
+    assert told == [("decay/decay-1", "sample")] * len(frames)
+
+
+def test_what_takes_longer_than_planned_is_still_to_come(tmp_path: Path) -> None:
+    growing = Growing(CHAIN_RUN, tmp_path)
+    growing.grow_until(b'"unit": "emission_spectrum/dark"')
+    with FileLock(growing.path / ".lock"):
+        now = settled(Following(growing.path))["run"]["now"]
+        # nobody knows how long a person takes: the plan waits there
+        assert now["next"][0]["what"].startswith("by hand: put the variable filter")
+        assert now["until_s"] == now["next"][0]["at_s"]
+        assert now["done"] == []
+        growing.grow_until(b'"device": "person"')
+        now = settled(Following(growing.path))["run"]["now"]
+    assert [step["what"] for step in now["done"]] == [
+        "by hand: put the variable filter before the camera"
+    ]
+    assert not any("by hand" in step["what"] for step in now["next"])
+
+
+def test_what_was_cut_off_counts_no_more_until_it_is_done_again(
+    finished: Path, tmp_path: Path
+) -> None:
+    run = Path(shutil.copytree(finished, tmp_path / finished.name))
+    shutil.rmtree(run / "result")
+    lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
+    cut_at = 3 + next(n for n, line in enumerate(lines) if b'"purpose": "decay"' in line)
+    (run / "journal.jsonl").write_bytes(b"".join(lines[:cut_at]))
+    of_frames = [line for line in lines[:cut_at] if b'"purpose"' in line]
+    for path in sorted((run / "frames").iterdir())[len(of_frames) :]:
+        path.unlink()
+    following = Following(run)
+    with FileLock(run / ".lock"):
+        assert len(settled(following)["points"]) == 3
+    state = settled(following)
+    assert (state["run"]["state"], state["run"]["now"]) == ("unfinished", None)
+    assert unit_states(state) == ["done", "again"]
+    assert state["points"] == {}
+    assert state["run"]["discarded_frames"] == 3
+    (trouble,) = state["troubles"].values()
+    assert trouble == {"unit": "decay-1", "reason": "labrig was cut off", "mended": False}
+    resume_run(run, quietly)
+    state = settled(following)
+    assert (state["run"]["state"], unit_states(state)) == ("recorded", ["done", "done"])
+    assert state["units"]["1"]["tries"] == 2
+    assert [trouble["mended"] for trouble in state["troubles"].values()] == [True]
+    assert state["run"]["discarded_frames"] == 3
+    assert len(state["points"]) == len(read_run(run).frames("decay"))
+
+
+def test_what_is_taken_back_is_to_be_done_again(tmp_path: Path) -> None:
+    growing = Growing(CHAIN_RUN, tmp_path)
+    growing.grow_until(b'"unit": "emission_spectrum/spectrum-halogen"')
+    growing.grow_until(b'"name": "stop"')
+    wrong = "emission_spectrum/meter-halogen"
+    with RunFolder(growing.path) as folder:
+        following = Following(growing.path)
+        before = settled(following)
+        last_time = before["run"]["last_time"]
+        assert unit_states(before)[:3] == ["done"] * 3
+        unit = "emission_spectrum/put-back"
+        writer = folder.attempt(unit, lambda: last_time, {})
+        writer.action(ActionRecord(unit, TAKEN_BACK, wrong, last_time, last_time, 0.0))
+        writer.stop("abort", f"taken back: 'put it there'; {wrong} is done again")
+        state = settled(following)
+    assert unit_states(state)[:5] == ["done", "again", "done", "again", "to do"]
+    assert [trouble["unit"] for trouble in state["troubles"].values()] == [unit]
+    assert state["run"]["frames"] + state["run"]["discarded_frames"] == before["run"]["frames"]
+    assert state["run"]["discarded_frames"] > 0
 
 
 def test_another_process_looks_at_frames_and_runs_nothing_that_lies_about(
@@ -135,8 +244,8 @@ def test_another_process_looks_at_frames_and_runs_nothing_that_lies_about(
     monkeypatch.chdir(tmp_path)
     glances = Glances(finished, 48)
     try:
-        glances.ask("nothing.dng")
-        glances.ask("000005.dng")
+        glances.ask("nothing.dng", "dark")
+        glances.ask("000005.dng", "dark")
         deadline = time.monotonic() + PATIENCE_S
         while glances.latest is None and time.monotonic() < deadline:
             time.sleep(0.05)
@@ -163,23 +272,26 @@ class Watching:
     """What `labrig watch` does, look by look."""
 
     def __init__(self, run: Path) -> None:
-        self.following, self.news = Following(run), News()
+        self.following = Following(run)
+        self.news = News(settled(self.following), self.following.picture)
         self.server = WatchServer(self.news)
 
     def look(self) -> None:
-        if self.following.look():
-            latest = self.following.latest
-            picture = None if latest is None else jpeg(latest.picture)
-            self.news.tell(self.following.state(), picture)
+        self.news.tell(settled(self.following), self.following.picture)
+
+
+@contextmanager
+def watched(run: Path) -> Iterator[Watching]:
+    made = Watching(run)
+    with made.server, made.server.running():
+        yield made
+        made.news.end()
 
 
 @pytest.fixture
 def watching(growing: Growing) -> Iterator[Watching]:
-    made = Watching(growing.path)
-    with made.server, made.server.running():
-        made.look()
+    with watched(growing.path) as made:
         yield made
-        made.news.end()
 
 
 def test_nobody_else_gets_to_see_it(watching: Watching) -> None:
@@ -190,6 +302,151 @@ def test_nobody_else_gets_to_see_it(watching: Watching) -> None:
         connection.request("GET", path, headers={"Host": host})
         assert connection.getresponse().status == 403
         connection.close()
+
+
+@dataclass(frozen=True)
+class Message:
+    size_bytes: int
+    number: int
+    things: State
+
+
+@contextmanager
+def connected(url: str, headers: dict[str, str] | None = None) -> Iterator[Callable[[], Message]]:
+    """The stream of news; gives the next message and its size in bytes."""
+    place = urlsplit(url)
+    connection = http.client.HTTPConnection("127.0.0.1", place.port or 0, timeout=PATIENCE_S)
+    connection.request("GET", f"{place.path}events", headers=headers or {})
+    stream = connection.getresponse()
+
+    def message() -> Message:
+        lines = b""
+        while not lines.endswith(b"\n\n") or b"data: " not in lines:
+            line = stream.readline()
+            assert line, "the stream has ended"
+            lines += line
+        data = lines.partition(b"data: ")[2]
+        return Message(len(lines), **json.loads(data))
+
+    yield message
+    stream.close()
+    connection.close()
+
+
+def first_news(url: str) -> State:
+    """What stands in the page itself."""
+    place = urlsplit(url)
+    connection = http.client.HTTPConnection("127.0.0.1", place.port or 0, timeout=PATIENCE_S)
+    connection.request("GET", place.path)
+    page = connection.getresponse().read().decode()
+    connection.close()
+    (news,) = re.findall(r'<script id="first" type="application/json">(.*?)</script>', page)
+    things: State = json.loads(news)["things"]
+    return things
+
+
+class Written:
+    """A chain of many decays, written frame by frame; all are the same picture."""
+
+    FRAMES_EACH = 50
+
+    def __init__(self, place: Path, finished: Path, name: str) -> None:
+        self.path = place / "run"
+        (self.path / "frames").mkdir(parents=True)
+        self._frame = next((finished / "frames").iterdir())
+        shutil.copy(finished / "rig.yaml", self.path)
+        part = {
+            "protocol": "decay", "charge": "10 s", "exposure": "1 s", "for": "300 s",
+            "dark": "background", "background": [0.0, 0.0, 0.1, 0.1],
+        }  # fmt: skip
+        patches = {"left": [0.1, 0.2, 0.3, 0.6], "right": [0.6, 0.2, 0.3, 0.6]}
+        parts = [part | {"part": f"decay-{n}", "patches": patches} for n in range(25)]
+        protocol = {"protocol": "phosphor", "sample": {"name": name}, "parts": parts}
+        (self.path / "protocol.yaml").write_text(yaml_text(protocol))
+        self._names = [unit.name for unit in read_protocol(self.path / "protocol.yaml").units()]
+        self._units = iter(self._names)
+        self._time = 1.8e9
+        self.frames = 0
+        self._in_unit = self.FRAMES_EACH
+        self._unit = ""
+
+    def _append(self, kind: str, /, **doc: object) -> None:
+        self._time += 1.0
+        with (self.path / "journal.jsonl").open("a") as journal:
+            journal.write(json.dumps({"name": kind, "doc": {"time": self._time} | doc}) + "\n")
+
+    def _event(self, stream: str, **data: object) -> None:
+        self._append("event", descriptor=f"{self._unit} {stream}", data=data)
+
+    def _happens(self) -> dict[str, float]:
+        return {"start_time": self._time, "end_time": self._time, "late_s": 0.0}
+
+    def _next_unit(self) -> None:
+        if self._unit:
+            self._append("stop", run_start=self._unit, exit_status="success")
+        self._unit, self._in_unit = next(self._units), 0
+        self._append("start", uid=self._unit, unit=self._unit)
+        for stream in ("actions", "frames"):
+            self._append(
+                "descriptor", uid=f"{self._unit} {stream}", run_start=self._unit, name=stream
+            )
+        self._event("actions", device="lamp", action="off", **self._happens())
+
+    def shoot(self) -> None:
+        """One frame more."""
+        if self._in_unit == self.FRAMES_EACH:
+            self._next_unit()
+        self.frames, self._in_unit = self.frames + 1, self._in_unit + 1
+        name = f"frames/{self.frames:06d}.dng"
+        (self.path / name).hardlink_to(self._frame)
+        settings = {"exposure_s": 1.0, "iso": 100, "f_number": 4.0, "purpose": "decay"}
+        kept = {"frame": name, "sha256": "", "size_bytes": 1}
+        self._event("frames", **kept, **settings, **self._happens())
+
+
+def test_what_is_sent_for_a_frame_does_not_grow_with_the_run(
+    finished: Path, tmp_path: Path
+) -> None:
+    written = Written(tmp_path, finished, "<b>paint</b> </script>")
+    sizes = {}
+    with FileLock(written.path / ".lock"):
+        for _ in range(9):
+            written.shoot()
+        with watched(written.path) as watching:
+            assert first_news(watching.server.url)["run"]["sample"] == "<b>paint</b> </script>"
+            with connected(watching.server.url) as message:
+                assert len(message().things["points"]) == 9
+                for count in (10, 11, 1010, 1011):
+                    while written.frames < count - 1:
+                        written.shoot()
+                    if count == 1010:
+                        watching.look()
+                        message()
+                    written.shoot()
+                    watching.look()
+                    told = message()
+                    assert list(told.things["points"]) == [f"{count:06d}.dng"]
+                    assert told.things["run"]["frames"] == count
+                    assert "units" not in told.things
+                    sizes[count] = told.size_bytes
+            # who comes late is told all of it, once; who comes back, what was missed
+            with connected(watching.server.url) as message:
+                everything = message()
+                assert len(everything.things["points"]) == written.frames
+                assert len(everything.things["units"]) == 25
+                written.shoot()
+                watching.look()
+                assert len(message().things["points"]) == 1
+            known = {"Last-Event-ID": str(everything.number)}
+            with connected(watching.server.url, known) as message:
+                assert list(message().things["points"]) == ["001012.dng"]
+            assert first_news(watching.server.url)["run"]["frames"] == written.frames
+    assert sizes[10] < 2000
+    # a digit more here and there, and no more
+    print(sizes, everything.size_bytes)
+    assert sizes[1010] < sizes[10] + 20
+    assert sizes[1011] < sizes[11] + 20
+    assert everything.size_bytes > 50 * sizes[10]
 
 
 def dots(chromium: Chrome) -> int:
@@ -222,9 +479,10 @@ def test_the_page_follows_the_run_and_finds_back(
         # every stream breaks, as when the PC was asleep; the page asks again by itself
         watching.news.end()
         wait.until(lambda _: "lost" in text(chromium, "state"))
-        watching.news = watching.server.news = News()
         growing.grow_until(b'"purpose": "decay"')
-        watching.look()
+        watching.news = watching.server.news = News(
+            settled(watching.following), watching.following.picture
+        )
         wait.until(lambda _: dots(chromium) == 8)
         assert text(chromium, "state") == "running"
     growing.finish()
