@@ -345,6 +345,10 @@ def first_news(url: str) -> State:
     return things
 
 
+#: As names may be.
+LONG = "strontium_aluminate_powder_in_clear_varnish_thick"
+
+
 class Written:
     """A chain of many decays, written frame by frame; all are the same picture."""
 
@@ -356,17 +360,17 @@ class Written:
         self._frame = next((finished / "frames").iterdir())
         shutil.copy(finished / "rig.yaml", self.path)
         part = {
-            "protocol": "decay", "charge": "10 s", "exposure": "1 s", "for": "300 s",
+            "protocol": "decay", "charge": "10 s", "exposure": "1 s", "for": "300 s", "repeats": 12,
             "dark": "background", "background": [0.0, 0.0, 0.1, 0.1],
+            "patches": {LONG: [0.1, 0.2, 0.3, 0.6], f"{LONG}2": [0.6, 0.2, 0.3, 0.6]},
         }  # fmt: skip
-        patches = {"left": [0.1, 0.2, 0.3, 0.6], "right": [0.6, 0.2, 0.3, 0.6]}
-        parts = [part | {"part": f"decay-{n}", "patches": patches} for n in range(25)]
+        parts = [part | {"part": f"decay of {LONG} {n}"} for n in range(5)]
         protocol = {"protocol": "phosphor", "sample": {"name": name}, "parts": parts}
         (self.path / "protocol.yaml").write_text(yaml_text(protocol))
         self._names = [unit.name for unit in read_protocol(self.path / "protocol.yaml").units()]
         self._units = iter(self._names)
         self._time = 1.8e9
-        self.frames = 0
+        self.frames = self.of_decays = 0
         self._in_unit = self.FRAMES_EACH
         self._unit = ""
 
@@ -392,14 +396,15 @@ class Written:
             )
         self._event("actions", device="lamp", action="off", **self._happens())
 
-    def shoot(self) -> None:
+    def shoot(self, purpose: str = "decay") -> None:
         """One frame more."""
         if self._in_unit == self.FRAMES_EACH:
             self._next_unit()
         self.frames, self._in_unit = self.frames + 1, self._in_unit + 1
+        self.of_decays += purpose == "decay"
         name = f"frames/{self.frames:06d}.dng"
         (self.path / name).hardlink_to(self._frame)
-        settings = {"exposure_s": 1.0, "iso": 100, "f_number": 4.0, "purpose": "decay"}
+        settings = {"exposure_s": 1.0, "iso": 100, "f_number": 4.0, "purpose": purpose}
         kept = {"frame": name, "sha256": "", "size_bytes": 1}
         self._event("frames", **kept, **settings, **self._happens())
 
@@ -417,8 +422,8 @@ def test_what_is_sent_for_a_frame_does_not_grow_with_the_run(
             with connected(watching.server.url) as message:
                 assert len(message().things["points"]) == 9
                 for count in (10, 11, 1010, 1011):
-                    while written.frames < count - 1:
-                        written.shoot()
+                    while written.frames < count - 1:  # one of a decay takes 20 ms to look at
+                        written.shoot("decay" if written.frames % 5 == 0 else "dark")
                     if count == 1010:
                         watching.look()
                         message()
@@ -432,8 +437,8 @@ def test_what_is_sent_for_a_frame_does_not_grow_with_the_run(
             # who comes late is told all of it, once; who comes back, what was missed
             with connected(watching.server.url) as message:
                 everything = message()
-                assert len(everything.things["points"]) == written.frames
-                assert len(everything.things["units"]) == 25
+                assert len(everything.things["points"]) == written.of_decays > 200
+                assert len(everything.things["units"]) == 60
                 written.shoot()
                 watching.look()
                 assert len(message().things["points"]) == 1
@@ -441,12 +446,34 @@ def test_what_is_sent_for_a_frame_does_not_grow_with_the_run(
             with connected(watching.server.url, known) as message:
                 assert list(message().things["points"]) == ["001012.dng"]
             assert first_news(watching.server.url)["run"]["frames"] == written.frames
+    print(sizes, everything.size_bytes)
     assert sizes[10] < 2000
     # a digit more here and there, and no more
-    print(sizes, everything.size_bytes)
     assert sizes[1010] < sizes[10] + 20
     assert sizes[1011] < sizes[11] + 20
     assert everything.size_bytes > 50 * sizes[10]
+
+
+#: Pairs of texts of which one lies over the other, and texts that stick out of the window.
+COVERED = """
+const list = document.getElementById("units");
+list.style.maxHeight = "none";
+for (const part of list.querySelectorAll("details")) part.open = true;
+const texts = [];
+const walker = document.createTreeWalker(document.getElementById("page"), NodeFilter.SHOW_TEXT);
+while (walker.nextNode()) {
+  const node = walker.currentNode, range = document.createRange();
+  range.selectNodeContents(node);
+  if (!node.data.trim() || !node.parentElement.checkVisibility()) continue;
+  for (const { left, right, top, bottom } of range.getClientRects())
+    texts.push({ text: node.data.trim(), node, left, right, top: top + 2, bottom: bottom - 2 });
+}
+const found = texts.filter((a) => a.left < 0 || a.right > innerWidth).map((a) => a.text);
+for (const a of texts) for (const b of texts)
+  if (a.node !== b.node && a.left < b.right - 1 && b.left < a.right - 1 && a.top < b.bottom
+      && b.top < a.bottom) found.push(`${a.text} | ${b.text}`);
+return found;
+"""
 
 
 def dots(chromium: Chrome) -> int:
@@ -500,6 +527,59 @@ def test_the_page_follows_the_run_and_finds_back(
         )
         assert too_wide <= 0
         keep(chromium, f"watch-{width}", tmp_path)
+
+
+@pytest.fixture
+def long_chain(finished: Path, tmp_path: Path) -> Iterator[Watching]:
+    """A chain under way in its second part, of units and patches with long names."""
+    written = Written(tmp_path, finished, " ".join([LONG] * 3))
+    with FileLock(written.path / ".lock"):
+        for _ in range(Written.FRAMES_EACH * 20):
+            written.shoot("dark")
+        written.shoot()
+        with watched(written.path) as watching:
+            yield watching
+
+
+def test_the_page_shows_a_chain_by_its_parts(long_chain: Watching, chromium: Chrome) -> None:
+    # nothing comes but the page itself: the run stands in it
+    chromium.execute_cdp_cmd("Network.enable", {})
+    chromium.execute_cdp_cmd("Network.setBlockedURLs", {"urls": ["*events*"]})
+    chromium.set_window_size(420, 800)
+    chromium.get(long_chain.server.url)
+    parts = chromium.find_elements(By.CSS_SELECTOR, "#units details")
+    assert [part.get_property("open") for part in parts] == [False, True, False, False, False]
+    heads = [part.find_element(By.TAG_NAME, "summary").text for part in parts]
+    assert [said.split("\n")[1].split(",")[0] for said in heads] == [
+        "12 done", "8 of 12 done", "0 of 12 done", "0 of 12 done", "0 of 12 done",
+    ]  # fmt: skip
+    assert text(chromium, "unit") == f"decay of {LONG} 1/decay-9"
+    assert "1001 of at most" in text(chromium, "frames")
+    within = chromium.execute_script("""
+        const list = document.getElementById("units").getBoundingClientRect();
+        const now = document.querySelector("#units li.now").getBoundingClientRect();
+        const head = document.querySelector("details[open] summary").getBoundingClientRect();
+        return [list.top <= head.top, head.bottom <= now.top, now.bottom <= list.bottom];
+    """)
+    assert within == [True, True, True]
+    # what a person unfolds stays unfolded
+    parts[0].find_element(By.TAG_NAME, "summary").click()
+    time.sleep(1.2)
+    assert parts[0].get_property("open")
+
+
+@pytest.mark.parametrize("width", [320, 400, 800, 1280])
+def test_no_label_covers_another(
+    long_chain: Watching, chromium: Chrome, width: int, tmp_path: Path
+) -> None:
+    chromium.set_window_size(width, 900)
+    # the window itself cannot be so narrow
+    metrics = {"width": width, "height": 900, "deviceScaleFactor": 1, "mobile": False}
+    chromium.execute_cdp_cmd("Emulation.setDeviceMetricsOverride", metrics)
+    chromium.get(long_chain.server.url)
+    WebDriverWait(chromium, PATIENCE_S).until(lambda _: dots(chromium) == 2)
+    keep(chromium, f"watch-long-{width}", tmp_path)
+    assert chromium.execute_script(COVERED) == []
 
 
 def keep(chromium: Chrome, name: str, tmp_path: Path) -> None:
