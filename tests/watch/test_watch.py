@@ -5,6 +5,7 @@ import json
 import os
 import re
 import shutil
+import signal
 import time
 from collections.abc import Callable, Iterator
 from contextlib import contextmanager
@@ -22,12 +23,14 @@ from labrig import shipped
 from labrig.acquire import read_protocol
 from labrig.cli.ending import guarded
 from labrig.cli.progress import thumbnail
+from labrig.clock import Interrupted, SystemClock
 from labrig.errors import UsageError
 from labrig.record import TAKEN_BACK, ActionRecord, RunFolder, read_run
 from labrig.run import resume_run
 from labrig.watch.following import Following, State
 from labrig.watch.glances import Glances
 from labrig.watch.server import News, WatchServer
+from labrig.watch.watching import watch_run
 from labrig.yaml_file import read_yaml, yaml_text
 from tests.analyse.recorded import quietly
 from tests.recordings import runs as recordings
@@ -292,6 +295,20 @@ def watched(run: Path) -> Iterator[Watching]:
 def watching(growing: Growing) -> Iterator[Watching]:
     with watched(growing.path) as made:
         yield made
+
+
+def test_the_run_is_there_as_soon_as_the_address_is_told(growing: Growing) -> None:
+    growing.finish()
+    clock, seen = SystemClock(), []
+
+    def tell(url: str) -> None:
+        seen.append(first_news(url))
+        clock.interrupt(signal.SIGINT)
+
+    with pytest.raises(Interrupted):
+        watch_run(growing.path, 0, clock, tell)
+    assert unit_states(seen[0]) == ["done", "done"]
+    assert seen[0]["frame"]["name"] == "000016.dng"
 
 
 def test_nobody_else_gets_to_see_it(watching: Watching) -> None:
