@@ -3,6 +3,10 @@
 Bound to 127.0.0.1; other programs' pages are kept out by a secret in the path, by the Host header
 (a foreign name that resolves to 127.0.0.1 would otherwise do) and by asking for JSON, which a
 foreign page cannot send without being allowed to.
+
+Written on `http.server`: a library would save some fifty lines of this, and bring a server that is
+for development only (Werkzeug, Bottle) or an event loop beside the threads that hold the camera and
+the run (Starlette). The checks would stay ours.
 """
 
 import json

@@ -3,13 +3,15 @@
 After Nalbach et al., sections 4.2 to 4.7.
 """
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from typing import Any, Literal, Self
 
 from pydantic import Field, model_validator
 
 from labrig import plugins
 from labrig.acquire import PartUnit, ProtocolModel, RigFile, Unit
+from labrig.record import unit_within
+from labrig.region import Region
 from labrig.yaml_file import validate
 
 from .steps.patch_names import FilterPatches
@@ -44,6 +46,13 @@ class Phosphor(ProtocolModel):
     def chain(self) -> tuple["Part", ...]:
         """The protocols in order, each with the sample and the patches of the chain."""
         return tuple(Part.read(content, self) for content in self.parts)
+
+    def patches_of(self, unit: str) -> Mapping[str, Region]:
+        """Those of the part that the unit is of."""
+        for part in self.chain():
+            if (own := unit_within(part.name, unit)) is not None:
+                return part.protocol.patches_of(own)
+        return self.patches
 
     def suited_to(self, rig: RigFile) -> Self:
         """With what its parts leave to the rig file filled in."""

@@ -19,7 +19,7 @@ from labrig.acquire.by_hand import ByHand, TakenBack
 from labrig.acquire.connections import Connections
 from labrig.acquire.findings import Finding
 from labrig.acquire.part import PartUnit
-from labrig.acquire.planner import MOST_STEPS, Plan, plan
+from labrig.acquire.planner import MOST_STEPS, Plan, Step, plan
 from labrig.acquire.protocol import ProtocolModel, Sample, Unit
 from labrig.acquire.registered import load_driver, read_protocol
 from labrig.acquire.rig import Rig
@@ -80,6 +80,7 @@ __all__ = [
     "Shield",
     "Shoot",
     "Spectrometer",
+    "Step",
     "Switch",
     "TakenBack",
     "Thermometer",

@@ -8,6 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
+from labrig.region import Region
 
 
 class Unit(Protocol):
@@ -47,6 +48,11 @@ class ProtocolModel(BaseModel):
     @abstractmethod
     def units(self) -> Sequence[Unit]:
         """All units in order, known before anything moves."""
+
+    def patches_of(self, unit: str) -> Mapping[str, Region]:
+        """The regions of interest in the frames of one of its units, by name; most have none."""
+        patches: Mapping[str, Region] = getattr(self, "patches", {})
+        return patches
 
     def suited_to(self, rig: RigFile) -> Self:
         """The protocol with what it leaves to the rig file filled in; most leave nothing to it.

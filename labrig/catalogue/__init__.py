@@ -2,11 +2,12 @@
 
 from labrig.catalogue.compare import Comparison, Difference, PatchComparison, compare_runs
 from labrig.catalogue.listing import (
+    RunState,
     RunSummary,
     Wanted,
     find_run,
-    is_being_written,
     list_runs,
+    state_of,
     summarise,
 )
 
@@ -14,11 +15,12 @@ __all__ = [
     "Comparison",
     "Difference",
     "PatchComparison",
+    "RunState",
     "RunSummary",
     "Wanted",
     "compare_runs",
     "find_run",
-    "is_being_written",
     "list_runs",
+    "state_of",
     "summarise",
 ]

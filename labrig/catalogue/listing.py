@@ -16,9 +16,9 @@ from labrig.results import FittedDecay, read_fitted_decays
 from labrig.yaml_file import did_you_mean, read_yaml
 
 #: `running`: a labrig is writing to it now; `unfinished`: units are left to do; `recorded`: all
-#: units are there, nothing was fitted; `damaged`: its journal cannot be read.
-State = Literal["running", "unfinished", "recorded", "processed", "damaged"]
-STATES: tuple[State, ...] = get_args(State)
+#: units are there, nothing was made of them; `damaged`: its journal cannot be read.
+RunState = Literal["running", "unfinished", "recorded", "processed", "damaged"]
+STATES: tuple[RunState, ...] = get_args(RunState)
 
 
 @dataclass(frozen=True)
@@ -41,7 +41,7 @@ class RunSummary:
     sample: str
     protocol: str
     began: datetime | None
-    state: State
+    state: RunState
     done: int
     units: int | None
     frames: int
@@ -120,7 +120,7 @@ def summarise(folder: Path) -> RunSummary:
         record, results = read_run(folder), read_fitted_decays(folder / "result")
     except (DataError, DiskError):
         has_journal = (folder / "journal.jsonl").exists()
-        state: State = "damaged" if has_journal else "unfinished"
+        state: RunState = "damaged" if has_journal else "unfinished"
         return RunSummary(folder, sample, protocol, None, state, 0, units, 0, {})
     done = record.completed()
     return RunSummary(
@@ -132,7 +132,7 @@ def summarise(folder: Path) -> RunSummary:
             if record.attempts
             else None
         ),
-        state=_state(folder, units is not None and len(done) == units, bool(results)),
+        state=state_of(folder, units is not None and len(done) == units),
         done=len(done),
         units=units,
         frames=sum(len(attempt.frames) for attempt in done.values()),
@@ -159,15 +159,16 @@ def _asked(folder: Path) -> tuple[str, str, int | None]:
     return str(name), str(content.get("protocol", "?")), units
 
 
-def _state(folder: Path, is_complete: bool, has_results: bool) -> State:
-    if is_being_written(folder):
+def state_of(folder: Path, is_complete: bool) -> RunState:
+    """How far the run in `folder` has come, given whether all its units are complete."""
+    if _is_being_written(folder):
         return "running"
     if not is_complete:
         return "unfinished"
-    return "processed" if has_results else "recorded"
+    return "processed" if (folder / "result").is_dir() else "recorded"
 
 
-def is_being_written(folder: Path) -> bool:
+def _is_being_written(folder: Path) -> bool:
     """Whether a labrig has the run open now."""
     lock = folder / ".lock"
     if not lock.exists():

@@ -204,7 +204,7 @@ class LiveProgress:
         if self._glances is None:
             self._run = record.path.parents[1]
             self._glances = Glances(self._run, THUMBNAIL_WIDTH)
-        self._glances.ask(record.path.name)
+        self._glances.ask(record.path.name, record.unit)
 
     def close(self) -> None:
         """No more frames come."""

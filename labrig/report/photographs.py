@@ -11,10 +11,10 @@ from numpy.typing import NDArray
 from labrig.errors import LabrigError, UsageError
 from labrig.record.frames import FrameRecord
 from labrig.reduce import RawFrame, read_raw
+from labrig.reduce.pictures import Picture, binned, is_grey, jpeg, saturated_cells, small
 from labrig.region import region_pixels
 from labrig.report.colours import Screen, encoded, into_gamut
 from labrig.report.content import GlowPhotograph, PatchReport
-from labrig.report.pictures import Picture, binned, is_grey, jpeg, saturated_cells, small
 from labrig.written_numbers import exposure_text, rounded
 
 DAYLIGHT_WIDTH = 1000

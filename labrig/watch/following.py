@@ -2,36 +2,32 @@
 
 import math
 import shutil
-from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from collections import Counter
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from labrig.acquire import Plan, ProtocolModel, plan, read_protocol, read_rig_file
-from labrig.catalogue import is_being_written, summarise
+from labrig.acquire import ProtocolModel, plan, read_protocol, read_rig_file
+from labrig.catalogue import RunState, state_of
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.record import Attempt, FrameRecord, RunRecord, read_run
+from labrig.reduce.pictures import jpeg
 from labrig.region import Region
 from labrig.results import read_fitted_decays
 from labrig.watch.glance import Glance, glance
+from labrig.watch.standing import PlannedUnit, planned_units
 from labrig.written_numbers import plus_minus
 
 PICTURE_WIDTH = 720
+#: Purpose of the frames that are drawn as a decay.
+DECAY = "decay"
+#: Of the decay's frames that were there before somebody watched, so many are taken in at a look:
+#: the page does not wait for thousands of them.
+MOST_EARLIER = 4
 
-
-@dataclass(frozen=True)
-class Point:
-    """One frame of a decay in one patch: mean above black per second, by channel; not the result.
-
-    `t_s` counts from lamp off.
-    """
-
-    patch: str
-    unit: str
-    t_s: float
-    exposure_s: float
-    dn_per_s: dict[str, float]
-    clipped: bool
+#: Section → key → plain value. Whatever grows with a run has a key of its own, so that only what
+#: is new needs to be told.
+State = dict[str, dict[str, Any]]
 
 
 class Following:
@@ -46,167 +42,228 @@ class Following:
     ------
     UsageError
         Not a run folder.
+
+    Attributes
+    ----------
+    picture
+        The newest frame that could be read, as a JPEG.
     """
 
     def __init__(self, run: Path) -> None:
         if not (run / "protocol.yaml").is_file():
             raise UsageError(f"{run}: expected a run folder with protocol.yaml in it; see --runs")
         self.run = run
-        self.protocol: ProtocolModel = read_protocol(run / "protocol.yaml")
+        self.picture: bytes | None = None
+        self._protocol: ProtocolModel = read_protocol(run / "protocol.yaml")
         rig = read_rig_file(run / "rig.yaml")
-        self.is_simulated = rig.simulation is not None
-        self.plan: Plan = plan(self.protocol, rig, str(run / "rig.yaml"))
-        self.patches: dict[str, Region] = dict(getattr(self.protocol, "patches", {}))
+        self._is_simulated = rig.simulation is not None
+        laid_out = plan(self._protocol, rig, str(run / "rig.yaml"))
+        self._planned_frames = laid_out.frames
+        self._units: tuple[PlannedUnit, ...] = planned_units(laid_out)
+        self._patches: dict[str, Mapping[str, Region]] = {
+            unit: self._protocol.patches_of(unit) for unit in laid_out.units
+        }
         self._seen: tuple[object, ...] = ()
-        self._record: RunRecord | None = None
-        self._points: dict[str, tuple[Point, ...]] = {}
-        self.latest: Glance | None = None
-        self._latest_frame: FrameRecord | None = None
+        self._record = RunRecord(run, [], False, 0.0)
+        self._state: RunState = "unfinished"
+        self._points: dict[str, list[dict[str, Any]]] = {}
+        self._newest: dict[str, Any] = {}
+        self._unreadable: set[str] = set()
 
     def look(self) -> bool:
         """Take in what is new; whether there is anything.
+
+        Of the frames of a decay some are taken in at every look, until all are.
 
         Raises
         ------
         DataError
             The journal is damaged.
         """
-        seen = (
-            _size(self.run / "journal.jsonl"),
-            _size(self.run / "result" / "report.html"),
-            is_being_written(self.run),
-        )
-        if seen == self._seen:
-            return False
-        self._seen = seen
-        if seen[0]:
+        written = _size(self.run / "journal.jsonl"), _size(self.run / "result" / "report.html")
+        if written[0] and written != self._seen[:2]:
             self._record = read_run(self.run)
-            for attempt in self._record.attempts:
-                self._take_in(attempt)
-        return True
+        is_complete = len(self._record.completed()) == len(self._units)
+        self._state = state_of(self.run, is_complete)
+        is_new = (*written, self._state) != self._seen
+        self._seen = (*written, self._state)
+        return self._look_at_frames() or is_new
 
-    def state(self) -> dict[str, Any]:
+    def state(self) -> State:
         """All of it, for a page: plain values, times in seconds since 1970."""
-        record = self._record
-        attempts = [] if record is None else record.attempts
-        open_one = next((a for a in reversed(attempts) if a.exit_status is None), None)
+        counting = self._counting()
+        done = self._record.completed()
+        all_frames = sum(len(attempt.frames) for attempt in self._record.attempts)
+        frames = [frame for attempt in counting for frame in attempt.frames]
+        current = self._current()
         return {
-            "run": self.run.name,
-            "sample": self.protocol.sample.name,
-            "protocol": self.protocol.protocol,
-            "state": summarise(self.run).state,
-            "simulated": self.is_simulated,
-            "began_time": attempts[0].start["time"] if attempts else None,
-            "last_time": None if record is None else record.last_time,
-            "units": self._units(attempts),
-            "steps": [] if open_one is None else self._steps(open_one.unit),
-            "unit_began_time": None if open_one is None else open_one.start["time"],
-            "frames": sum(len(attempt.frames) for attempt in attempts),
-            "planned_frames": self.plan.frames,
-            "points": [asdict(p) for points in self._points.values() for p in points],
-            "frame": self._frame(),
-            "trouble": [
-                f"{attempt.unit}: {attempt.reason}"
-                for attempt in attempts
-                if attempt.exit_status not in (None, "success")
-            ],
-            "disk_free_bytes": shutil.disk_usage(self.run).free,
+            "run": {
+                "name": self.run.name,
+                "sample": self._protocol.sample.name,
+                "state": self._state,
+                "simulated": self._is_simulated,
+                "last_time": self._record.last_time,
+                "frames": len(frames),
+                "discarded_frames": all_frames - len(frames),
+                "planned_frames": self._planned_frames,
+                "disk_free_bytes": shutil.disk_usage(self.run).free,
+                "now": None if current is None else self._standing(current),
+            },
+            "units": self._unit_states(done, current),
+            "points": {
+                frame.path.name: self._points[frame.path.name]
+                for frame in frames
+                if self._points.get(frame.path.name)
+            },
+            "frame": self._newest,
+            "troubles": self._troubles(done, current),
             "results": self._results(),
         }
 
-    def _take_in(self, attempt: Attempt) -> None:
-        """Look at the frames that were not there before."""
+    def _current(self) -> Attempt | None:
+        """The attempt that is under way; one that a crash left open is not."""
+        last = self._record.attempts[-1:] if self._state == "running" else []
+        return next((attempt for attempt in last if attempt.exit_status is None), None)
+
+    def _counting(self) -> list[Attempt]:
+        """The attempts that count, and the one that is under way."""
+        current = self._current()
+        return [*self._record.completed().values(), *([] if current is None else [current])]
+
+    def _standing(self, attempt: Attempt) -> dict[str, Any] | None:
+        for number, unit in enumerate(self._units):
+            if unit.name == attempt.unit:
+                return {"unit": number, **unit.standing(attempt)}
+        return None
+
+    def _unit_states(
+        self, done: Mapping[str, Attempt], current: Attempt | None
+    ) -> dict[str, dict[str, Any]]:
+        """Of every unit, by its number."""
+        tries = Counter(attempt.unit for attempt in self._record.attempts)
+        told = {}
+        for number, unit in enumerate(self._units):
+            if current is not None and unit.name == current.unit:
+                state = "now"
+            elif unit.name in done:
+                state = "done"
+            else:
+                state = "again" if tries[unit.name] else "to do"
+            told[str(number)] = {
+                "name": unit.name,
+                "state": state,
+                "planned_s": unit.duration_s,
+                "tries": tries[unit.name],
+            }
+        return told
+
+    def _troubles(
+        self, done: Mapping[str, Attempt], current: Attempt | None
+    ) -> dict[str, dict[str, Any]]:
+        """Attempts that do not count, by number: why, and whether the unit was done since."""
+        return {
+            str(number): {
+                "unit": attempt.unit,
+                "reason": attempt.reason or "labrig was cut off",
+                "mended": attempt.unit in done,
+            }
+            for number, attempt in enumerate(self._record.attempts)
+            if not attempt.completed and attempt is not current
+        }
+
+    def _look_at_frames(self) -> bool:
+        """Look at the newest frame, and at some of a decay; whether there was any to look at."""
+        newest = next(
+            (
+                (attempt, frame)
+                for attempt in reversed(self._record.attempts)
+                for frame in reversed(attempt.frames)
+                if frame.path.name not in self._unreadable
+            ),
+            None,
+        )
+        is_new = newest is not None and newest[1].path.name != self._newest.get("name")
+        if newest is not None and is_new and (seen := self._look_at(*newest)) is not None:
+            self._newest = _shown(newest[1], seen)
+            self.picture = jpeg(seen.picture)
+        earlier = [
+            (attempt, frame)
+            for attempt in self._counting()
+            for frame in attempt.frames
+            if frame.purpose == DECAY and frame.path.name not in self._points
+        ]
+        for attempt, frame in earlier[:MOST_EARLIER]:
+            self._look_at(attempt, frame)
+        return is_new or bool(earlier)
+
+    def _look_at(self, attempt: Attempt, frame: FrameRecord) -> Glance | None:
+        """Look at a frame and keep its points; None if it cannot be read, which processing says."""
+        name = frame.path.name
+        self._points[name] = []
+        try:
+            seen = glance(frame.path, self._patches.get(frame.unit, {}), PICTURE_WIDTH)
+        except LabrigError:
+            self._unreadable.add(name)
+            return None
         off_times = [
             action.middle_time
             for action in attempt.actions
             if (action.device, action.action) == ("lamp", "off")
+            and action.middle_time <= frame.start_time
         ]
-        for frame in attempt.frames:
-            if frame.path.name in self._points:
-                continue
-            try:
-                seen = glance(frame.path, self.patches, PICTURE_WIDTH)
-            except LabrigError:  # processing says so; watching goes on
-                self._points[frame.path.name] = ()
-                continue
-            self.latest, self._latest_frame = seen, frame
-            before = [time for time in off_times if time <= frame.start_time]
-            is_decay = frame.purpose == "decay" and bool(before)
-            self._points[frame.path.name] = _points(frame, seen, before[-1]) if is_decay else ()
+        if frame.purpose == DECAY and off_times:
+            self._points[name] = _points(frame, seen, off_times[-1])
+        return seen
 
-    def _units(self, attempts: Sequence[Attempt]) -> list[dict[str, Any]]:
-        done = {attempt.unit for attempt in attempts if attempt.completed}
-        under_way = {attempt.unit for attempt in attempts if attempt.exit_status is None}
-        begins_s, units = 0.0, []
-        for name, ends_s in zip(self.plan.units, self.plan.unit_ends_s, strict=True):
-            state = "done" if name in done else "now" if name in under_way else "to do"
-            tries = sum(attempt.unit == name for attempt in attempts)
-            units.append(
-                {"name": name, "state": state, "planned_s": ends_s - begins_s, "tries": tries}
-            )
-            begins_s = ends_s
-        return units
-
-    def _steps(self, unit: str) -> list[dict[str, Any]]:
-        """What the plan has for a unit, in seconds after its start."""
-        number = self.plan.units.index(unit)
-        begins_s = self.plan.unit_ends_s[number - 1] if number else 0.0
-        return [
-            {"at_s": step.at_s - begins_s, "what": f"{step.device} {step.action}".lstrip("- ")}
-            for step in self.plan.steps
-            if step.unit == unit
-        ]
-
-    def _frame(self) -> dict[str, Any] | None:
-        frame, seen = self._latest_frame, self.latest
-        if frame is None or seen is None:
-            return None
-        return {
-            "name": frame.path.name,
-            "purpose": frame.purpose,
-            "exposure_s": frame.exposure_s,
-            "iso": frame.iso,
-            "f_number": frame.f_number,
-            "start_time": frame.start_time,
-            "late_s": frame.late_s,
-            "brightened": seen.brightened,
-            "values": seen.values,
-            "clipped": seen.clipped,
-            "width": seen.picture.shape[1],
-            "height": seen.picture.shape[0],
-        }
-
-    def _results(self) -> list[dict[str, str]]:
+    def _results(self) -> dict[str, str]:
+        """The rates that were fitted to each patch, as text."""
         try:
             results = read_fitted_decays(self.run / "result")
         except DataError:
-            return []
-        order = {name: number for number, name in enumerate(self.patches)}
-        return [
-            {
-                "patch": name or next(iter(self.patches), ""),
-                "rates": ", ".join(plus_minus(rate.value, rate.sigma) for rate in fit.rates),
-            }
-            for name, fit in sorted(results.items(), key=lambda one: order.get(one[0], 0))
-        ]
+            return {}
+        only = next(iter(self._protocol.patches_of("")), "")
+        return {
+            name or only: ", ".join(plus_minus(rate.value, rate.sigma) for rate in fit.rates)
+            for name, fit in results.items()
+        }
 
 
-def _points(frame: FrameRecord, seen: Glance, lamp_off_time: float) -> tuple[Point, ...]:
-    return tuple(
-        Point(
-            patch,
-            frame.unit,
-            frame.start_time - lamp_off_time,
-            frame.exposure_s,
-            {
+def _points(frame: FrameRecord, seen: Glance, lamp_off_time: float) -> list[dict[str, Any]]:
+    """A frame of a decay in every patch: means above black per second; not the result."""
+    return [
+        {
+            "unit": frame.unit,
+            "patch": patch,
+            "t_s": frame.start_time - lamp_off_time,
+            "dn_per_s": {
                 channel: mean / frame.exposure_s
                 for channel, mean in values.items()
                 if math.isfinite(mean)
             },
-            patch in seen.clipped,
-        )
+        }
         for patch, values in seen.values.items()
-    )
+    ]
+
+
+def _shown(frame: FrameRecord, seen: Glance) -> dict[str, Any]:
+    return {
+        "name": frame.path.name,
+        "unit": frame.unit,
+        "purpose": frame.purpose,
+        "exposure_s": frame.exposure_s,
+        "iso": frame.iso,
+        "late_s": frame.late_s,
+        "brightened": seen.brightened,
+        "values": {
+            patch: {
+                channel: mean if math.isfinite(mean) else None for channel, mean in values.items()
+            }
+            for patch, values in seen.values.items()
+        },
+        "clipped": seen.clipped,
+        "width": seen.picture.shape[1],
+        "height": seen.picture.shape[0],
+    }
 
 
 def _size(path: Path) -> int:

@@ -8,8 +8,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.reduce import measure, read_raw
+from labrig.reduce.pictures import binned, small
 from labrig.region import Region
-from labrig.report.pictures import binned, small
 
 #: Brought to full brightness: this quantile of the pixels, so that hot ones do not decide.
 BRIGHT_QUANTILE = 0.995

@@ -57,10 +57,10 @@ class Glances:
         self._listening = threading.Thread(target=self._listen, daemon=True)
         self._listening.start()
 
-    def ask(self, name: str) -> None:
-        """Have the frame of that name looked at."""
+    def ask(self, name: str, unit: str) -> None:
+        """Have the frame of that name, which a unit has taken, looked at."""
         try:
-            self._questions.write(f"{name}\n")
+            self._questions.write(f"{json.dumps([name, unit])}\n")
             self._questions.flush()
         except OSError:  # it has died: a run goes on without pictures
             return
@@ -88,20 +88,21 @@ class Glances:
             )
 
 
-def answer(run: Path, width: int, names: Iterable[str], out: TextIO) -> None:
-    """Look at the frames that are named, one JSON line each; what cannot be read is left out."""
+def answer(run: Path, width: int, questions: Iterable[str], out: TextIO) -> None:
+    """Look at the frames asked for, one JSON line each; what cannot be read is left out."""
     # only in the process that looks: the one that runs the rig starts without what this loads
     from labrig.acquire import read_protocol
     from labrig.watch.glance import glance
 
-    patches = getattr(read_protocol(run / "protocol.yaml"), "patches", {})
-    for name in names:
+    protocol = read_protocol(run / "protocol.yaml")
+    for question in questions:
+        name, unit = json.loads(question)
         try:
-            seen = glance(run / "frames" / name.strip(), patches, width)
+            seen = glance(run / "frames" / name, protocol.patches_of(unit), width)
         except LabrigError:
             continue
         said = {
-            "name": name.strip(),
+            "name": name,
             "values": seen.values,
             "clipped": seen.clipped,
             "shape": seen.picture.shape,

@@ -1,4 +1,4 @@
-"""The page of `labrig watch`: the state of a run, pushed whenever it changes."""
+"""The page of `labrig watch`: what there is to tell of a run, pushed whenever it changes."""
 
 import json
 import threading
@@ -7,29 +7,53 @@ from http import HTTPStatus
 from pathlib import Path
 from typing import Any, ClassVar
 
-from labrig.local_server import LocalConversation, LocalServer
+from labrig.local_server import KINDS, LocalConversation, LocalServer
 
 #: A browser that hears nothing for longer takes the connection for dead.
 HEARTBEAT_S = 5.0
 #: How soon a browser comes back when the connection broke, in ms.
 COME_BACK_MS = 500
 _HERE = Path(__file__).parent
+_PAGE = _HERE / "watch_page.html"
+#: Where in the page the first news stand.
+_FIRST = "FIRST_NEWS"
 
 PAGES: Mapping[str, Path] = {
-    name: _HERE / (name or "watch_page.html")
-    for name in ("", "watch_page.css", "watch_page.js", "watch_plot.js")
+    name: _HERE / name
+    for name in (
+        "watch_page.css",
+        "watch_page.js",
+        "watch_units.js",
+        "watch_words.js",
+        "watch_plot.js",
+    )
 }
+
+#: Section → key → value; a value of None: there is no such thing any more.
+Things = Mapping[str, Mapping[str, Any]]
 
 
 class News:
-    """The latest state and picture, handed from the thread that follows a run to the browsers."""
+    """What there is to tell of a run, handed from the thread that follows it to the browsers.
 
-    def __init__(self) -> None:
+    Everything is kept with the number of the telling that changed it last. So a browser that names
+    the last number it knows is told what it lacks, whether that is one frame or the whole run.
+
+    Parameters
+    ----------
+    state
+        Section → key → value of everything.
+    picture
+        The last frame as a JPEG.
+    """
+
+    def __init__(self, state: Things, picture: bytes | None) -> None:
         self._number = 0
-        self._state: Mapping[str, Any] = {}
+        self._told: dict[tuple[str, str], tuple[int, Any]] = {}
         self._picture: bytes | None = None
         self._is_over = False
         self._changed = threading.Condition()
+        self.tell(state, picture)
 
     @property
     def picture(self) -> bytes | None:
@@ -37,11 +61,20 @@ class News:
         with self._changed:
             return self._picture
 
-    def tell(self, state: Mapping[str, Any], picture: bytes | None) -> None:
-        """Hand on what is new."""
+    def tell(self, state: Things, picture: bytes | None) -> None:
+        """Hand on the state as it is now."""
+        now = {
+            (section, key): value
+            for section, things in state.items()
+            for key, value in things.items()
+        }
         with self._changed:
             self._number += 1
-            self._state, self._picture = state, picture
+            for place in [*now, *self._told]:
+                value = now.get(place)
+                if place not in self._told or self._told[place][1] != value:
+                    self._told[place] = (self._number, value)
+            self._picture = picture
             self._changed.notify_all()
 
     def end(self) -> None:
@@ -50,8 +83,8 @@ class News:
             self._is_over = True
             self._changed.notify_all()
 
-    def after(self, number: int, at_most_s: float) -> tuple[int, Mapping[str, Any]] | None:
-        """Number and state later than `number`, waited for; None if nothing came in time.
+    def after(self, number: int, at_most_s: float) -> tuple[int, Things] | None:
+        """What was told later than `number`, and the last number; None if nothing comes in time.
 
         Raises
         ------
@@ -59,10 +92,18 @@ class News:
             There will be no more.
         """
         with self._changed:
+            if number > self._number:  # of another watch: nothing is known
+                number = 0
             self._changed.wait_for(lambda: self._number > number or self._is_over, at_most_s)
             if self._is_over:
                 raise EOFError
-            return (self._number, self._state) if self._number > number else None
+            if self._number <= number:
+                return None
+            things: dict[str, dict[str, Any]] = {}
+            for (section, key), (told, value) in self._told.items():
+                if told > number:
+                    things.setdefault(section, {})[key] = value
+            return self._number, things
 
 
 class WatchServer(LocalServer):
@@ -86,8 +127,10 @@ class _Conversation(LocalConversation):
     pages: ClassVar[Mapping[str, Path]] = PAGES
 
     def answer(self, path: str) -> None:
-        """The stream of states, or the last frame."""
-        if path == "events":
+        """The page, the stream of news, or the last frame."""
+        if path == "":
+            self._send_page()
+        elif path == "events":
             self._stream()
         elif path == "frame.jpg":
             picture = self.server.news.picture
@@ -98,16 +141,28 @@ class _Conversation(LocalConversation):
         else:
             super().answer(path)
 
+    def _send_page(self) -> None:
+        """The page with the run as it is now in it, so that it is never seen empty."""
+        try:
+            first = _message(self.server.news.after(0, 0.0))
+        except EOFError:
+            self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "labrig watch is ending")
+            return
+        # a name in it must not end the element that it stands in
+        page = _PAGE.read_text(encoding="utf-8").replace(_FIRST, first.replace("<", "\\u003c"))
+        self.send(HTTPStatus.OK, KINDS[".html"], page.encode())
+
     def _stream(self) -> None:
-        """Server-sent events: a browser that loses them comes back for more by itself."""
+        """Server-sent events: a browser that loses them comes back for what it lacks by itself."""
         self.close_connection = True
         self.send_response(HTTPStatus.OK)
         self.send_header("Content-Type", "text/event-stream")
         self.send_header("Cache-Control", "no-store")
         self.send_header("Connection", "close")
         self.end_headers()
-        number = 0
         self.wfile.write(f"retry: {COME_BACK_MS}\n\n".encode())
+        known = self.headers.get("Last-Event-ID") or self.query("after") or "0"
+        number = int(known) if known.isdecimal() and len(known) < 12 else 0
         while True:
             try:
                 news = self.server.news.after(number, HEARTBEAT_S)
@@ -116,5 +171,10 @@ class _Conversation(LocalConversation):
             if news is None:
                 self.wfile.write(b": still here\n\n")
             else:
-                number, state = news
-                self.wfile.write(f"data: {json.dumps(state)}\n\n".encode())
+                number = news[0]
+                self.wfile.write(f"id: {number}\ndata: {_message(news)}\n\n".encode())
+
+
+def _message(news: tuple[int, Things] | None) -> str:
+    number, things = news or (0, {})
+    return json.dumps({"number": number, "things": things})

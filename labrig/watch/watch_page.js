@@ -1,34 +1,44 @@
-// Shows what the server tells; asks again by itself when the connection breaks.
+// Shows what the server tells: first all of it, which stands in the page, then what is new; asks
+// again by itself, for what it lacks, when the connection breaks.
 
 import { draw, sample } from "./watch_plot.js";
+import { leftS, showUnits } from "./watch_units.js";
+import { duration, exposure, grouped, tag } from "./watch_words.js";
 
 const $ = (id) => document.getElementById(id);
 const NOTHING_NEXT = {
+  running: "Between two attempts.",
   unfinished: "Nobody is at it. Go on with: labrig resume",
-  recorded: "Everything is recorded; the fit follows, or else: labrig process",
+  recorded: "Everything is recorded; the analysis follows, or else: labrig process",
   processed: "Done; the report is in the run's folder: result/report.html",
-  damaged: "The journal cannot be read.",
 };
-let state = null;
-let isConnected = false;
+const MOST_TROUBLES = 5;
+const state = { run: {}, units: {}, points: {}, frame: {}, troubles: {}, results: {} };
+let number = 0;
+let isConnected = true;
 
-function duration(s) {
-  const whole = Math.max(0, Math.round(s));
-  if (whole >= 3600) return `${Math.floor(whole / 3600)} h ${Math.floor((whole % 3600) / 60)} min`;
-  if (whole >= 60) return `${Math.floor(whole / 60)} min ${whole % 60} s`;
-  return `${whole} s`;
-}
-
-function tag(name, text, kind) {
-  const made = document.createElement(name);
-  if (text !== undefined) made.textContent = text;
-  if (kind) made.className = kind;
-  return made;
+function take(news) {
+  number = news.number;
+  for (const [section, things] of Object.entries(news.things)) {
+    for (const [key, value] of Object.entries(things)) {
+      if (value === null) delete state[section][key];
+      else state[section][key] = value;
+    }
+  }
 }
 
 /** Time in the room, in seconds since 1970: a simulated one only moves with its journal. */
 function now() {
-  return state.simulated || state.state !== "running" ? state.last_time : Date.now() / 1000;
+  const { simulated, last_time } = state.run;
+  return simulated || state.run.state !== "running" ? last_time : Date.now() / 1000;
+}
+
+/** Where the unit under way is in its plan; no further than what the journal has to tell next. */
+function position() {
+  const standing = state.run.now;
+  if (!standing) return 0;
+  const waited = Math.max(0, now() - standing.time);
+  return Math.max(standing.at_s, Math.min(standing.at_s + waited, standing.until_s));
 }
 
 function brightest(points) {
@@ -42,23 +52,32 @@ function brightest(points) {
 }
 
 function showDecay() {
+  const all = Object.values(state.points).flat();
+  $("decay").hidden = !all.length;
+  // where nothing decays, or not yet, the last frame has the room
+  const place = $(all.length ? "right" : "left");
+  if ($("frame").parentElement !== place) place.append($("frame"));
+  if (!all.length) return;
+  const parts = grouped(all, (point) => point.unit.split("/").slice(0, -1).join("/"));
   const series = new Map();
-  for (const patch of new Set(state.points.map((point) => point.patch))) {
-    const points = state.points.filter((point) => point.patch === patch);
-    const channel = brightest(points);
-    series.set(`${patch}, ${channel}`, points.map((p) => [p.t_s, p.dn_per_s[channel]]));
+  for (const [part, points] of parts) {
+    for (const [patch, own] of grouped(points, (point) => point.patch)) {
+      const channel = brightest(own);
+      const name = `${part ? `${part}: ` : ""}${patch}, ${channel}`;
+      series.set(name, own.map((point) => [point.t_s, point.dn_per_s[channel]]));
+    }
   }
-  $("legend").replaceChildren(...[...series.keys()].map((name, number) => {
+  $("legend").replaceChildren(...[...series.keys()].map((name, order) => {
     const entry = tag("span");
-    entry.append(sample(number), name);
+    entry.append(sample(order), name);
     return entry;
   }));
   draw($("plot"), [...series.values()], $("log").checked);
 }
 
 function showFrame() {
-  const frame = state.frame;
-  if (!frame) return;
+  const { frame } = state;
+  if (!frame.name) return;
   const picture = $("picture");
   if (picture.dataset.name !== frame.name) {
     picture.src = `frame.jpg?name=${encodeURIComponent(frame.name)}`;
@@ -67,10 +86,10 @@ function showFrame() {
     picture.hidden = false;
   }
   $("frame-name").textContent = frame.name;
-  const exposure = frame.exposure_s < 0.3 ? `1/${Math.round(1 / frame.exposure_s)} s` : `${Number(frame.exposure_s.toPrecision(3))} s`;
   const late = frame.late_s > 0.02 ? `, ${(1000 * frame.late_s).toFixed(0)} ms late` : "";
   $("frame-said").textContent =
-    `${frame.purpose}, ${exposure}, ISO ${frame.iso}${late}; brightened ${frame.brightened} ×`;
+    `${frame.unit}: ${frame.purpose}, ${exposure(frame.exposure_s)}, ISO ${frame.iso}${late}; `
+    + `brightened ${frame.brightened} ×`;
   const channels = Object.keys(Object.values(frame.values)[0] ?? {});
   const head = tag("tr");
   head.append(tag("th", "DN above black"), ...channels.map((channel) => tag("th", channel)));
@@ -79,74 +98,98 @@ function showFrame() {
     const row = tag("tr");
     row.append(
       tag("td", clipped ? `${patch} (clipped)` : patch, clipped ? "clipped" : ""),
-      ...channels.map((channel) => tag("td", values[channel].toFixed(1))),
+      ...channels.map((channel) => tag("td", values[channel]?.toFixed(1) ?? "–")),
     );
     return row;
   });
-  $("values").replaceChildren(head, ...rows);
+  $("values").replaceChildren(...(rows.length ? [head, ...rows] : []));
+}
+
+function step(when, what, kind) {
+  const entry = tag("li", undefined, kind);
+  entry.append(tag("b", when), tag("span", what));
+  return entry;
 }
 
 function showSteps() {
-  const at = state.unit_began_time === null ? 0 : now() - state.unit_began_time;
-  const next = state.steps.findIndex((step) => step.at_s > at);
-  const until = next < 0 ? state.steps.length : next;
-  const shown = state.steps.slice(Math.max(0, until - 2), until + 4);
-  $("steps").replaceChildren(...shown.map((step) => {
-    const isPast = step.at_s <= at;
-    const entry = tag("li", undefined, isPast ? "past" : step === state.steps[next] ? "now" : "");
-    const when = isPast ? `${duration(at - step.at_s)} ago` : `in ${duration(step.at_s - at)}`;
-    entry.append(tag("b", when), tag("span", step.what));
-    return entry;
-  }));
-  if (!shown.length) $("steps").replaceChildren(tag("li", NOTHING_NEXT[state.state] ?? "–", "alone"));
-  const left = state.units.reduce((sum, unit) => {
-    if (unit.state === "done") return sum;
-    return sum + Math.max(0, unit.planned_s - (unit.state === "now" ? at : 0));
-  }, 0);
-  $("left").textContent = left > 0 && state.state === "running" ? `${duration(left)} left at most` : "";
+  const standing = state.run.now;
+  $("unit").textContent = standing ? state.units[standing.unit].name : "";
+  if (!standing) {
+    $("steps").replaceChildren(tag("li", NOTHING_NEXT[state.run.state], "alone"));
+    return;
+  }
+  const at = position();
+  const past = standing.done.map(({ time, what }) => step(`${duration(now() - time)} ago`, what, "past"));
+  // of what has begun, only the last is under way
+  const begun = standing.next.findLastIndex(({ at_s }) => at_s <= at);
+  const next = standing.next.slice(Math.max(0, begun)).map(({ at_s, what }, order) => {
+    const isNow = begun >= 0 && order === 0;
+    return step(isNow ? "now" : `in ${duration(at_s - at)}`, what, isNow ? "now" : "");
+  });
+  $("steps").replaceChildren(...past, ...next);
 }
 
-function showUnits() {
-  const at = state.unit_began_time === null ? 0 : now() - state.unit_began_time;
-  $("units").replaceChildren(...state.units.map((unit) => {
-    const entry = tag("li", undefined, unit.state === "now" ? "now" : "");
-    const done = { done: 1, now: Math.min(1, at / unit.planned_s), "to do": 0 }[unit.state];
-    const bar = tag("i");
-    bar.style.setProperty("--done", done);
-    const tries = unit.tries > 1 ? ` (try ${unit.tries})` : "";
-    entry.append(tag("b", unit.name + tries), bar, tag("span", duration(unit.planned_s)));
-    return entry;
-  }));
-  $("frames").textContent = `${state.frames} of ${state.planned_frames} frames`;
-  $("disk").textContent = `${(state.disk_free_bytes / 1e9).toFixed(1)} GB free on the disk`;
-  $("results").replaceChildren(...state.results.map((result) => {
+function showProgress() {
+  const { run } = state;
+  const units = Object.values(state.units);
+  const at = position();
+  showSteps();
+  showUnits($("units"), units, at);
+  const left = units.reduce((sum, unit) => sum + leftS(unit, at), 0);
+  $("left-s").textContent = left > 0 && run.state === "running" ? `${duration(left)} left, as planned` : "";
+  const not = run.discarded_frames ? `; ${run.discarded_frames} more do not count` : "";
+  $("frames").textContent = `${run.frames} of at most ${run.planned_frames} frames${not}`;
+  $("disk").textContent = `${(run.disk_free_bytes / 1e9).toFixed(1)} GB free on the disk`;
+}
+
+function showResults() {
+  $("results").replaceChildren(...Object.entries(state.results).map(([patch, rates]) => {
     const row = tag("tr");
-    row.append(tag("td", result.patch), tag("td", `${result.rates} /s`));
+    row.append(tag("td", patch), tag("td", `${rates} /s`));
     return row;
   }));
-  $("results-head").hidden = !state.results.length;
+  $("results-section").hidden = !Object.keys(state.results).length;
+}
+
+function showTroubles() {
+  const all = Object.values(state.troubles);
+  const line = ({ unit, reason }) => tag("li", `${unit}: ${reason}`);
+  const open = all.filter((trouble) => !trouble.mended);
+  const mended = all.filter((trouble) => trouble.mended);
+  $("open-troubles").replaceChildren(...open.slice(-MOST_TROUBLES).map(line));
+  if (open.length > MOST_TROUBLES) {
+    $("open-troubles").prepend(tag("li", `and ${open.length - MOST_TROUBLES} before`));
+  }
+  const [summary, list] = $("mended").children;
+  summary.textContent = mended.length === 1
+    ? "1 attempt did not count; its unit was done again"
+    : `${mended.length} attempts did not count; their units were done again`;
+  list.replaceChildren(...mended.map(line));
+  $("mended").hidden = !mended.length;
+  $("troubles").hidden = !all.length;
+  $("troubles").classList.toggle("open", open.length > 0);
 }
 
 function show() {
-  if (!state) return;
-  document.title = `${state.sample} – labrig`;
-  $("sample").textContent = state.sample;
-  $("run").textContent = `${state.run}${state.simulated ? " (simulated)" : ""}`;
-  $("state").textContent = isConnected ? state.state : "connection lost, trying again";
-  $("state").className = `state ${isConnected ? state.state : "lost"}`;
-  $("trouble").hidden = !state.trouble.length;
-  $("trouble").replaceChildren(...state.trouble.map((text) => tag("li", text)));
-  showDecay();
+  const { run } = state;
+  document.title = `${run.sample} – labrig`;
+  $("sample").textContent = run.sample;
+  $("run").textContent = `${run.name}${run.simulated ? " (simulated)" : ""}`;
+  $("state").textContent = isConnected ? run.state : "connection lost, trying again";
+  $("state").className = `state ${isConnected ? run.state : "lost"}`;
+  $("page").hidden = false;
+  showTroubles();
+  showProgress();
+  showResults();
   showFrame();
-  showSteps();
-  showUnits();
+  showDecay();
 }
 
 function listen() {
-  const source = new EventSource("events");
+  const source = new EventSource(`events?after=${number}`);
   source.onmessage = (event) => {
     isConnected = true;
-    state = JSON.parse(event.data);
+    take(JSON.parse(event.data));
     show();
   };
   source.onopen = () => { isConnected = true; show(); };
@@ -160,5 +203,7 @@ function listen() {
 
 $("log").addEventListener("change", show);
 addEventListener("resize", show);
-setInterval(() => { if (state && isConnected) { showSteps(); showUnits(); } }, 1000);
+setInterval(() => { if (isConnected) showProgress(); }, 1000);
+take(JSON.parse($("first").textContent));
+show();
 listen();

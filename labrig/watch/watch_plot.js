@@ -23,7 +23,9 @@ function element(name, attributes, text) {
 function marker(number, x, y) {
   const shape = SHAPES[Math.floor(number / COLOURS.length) % SHAPES.length];
   const fill = COLOURS[number % COLOURS.length];
-  return element("path", { class: "marker", d: shape, fill, transform: `translate(${x} ${y})` });
+  // where series lie upon one another, each is seen behind the next
+  const scale = Math.max(0.6, 1.25 - 0.2 * number);
+  return element("path", { class: "marker", d: shape, fill, transform: `translate(${x} ${y}) scale(${scale})` });
 }
 
 /** The marker alone, for a legend. */
@@ -44,6 +46,7 @@ export function ticks(low, high, about) {
 }
 
 function decades(low, high) {
+  if (high / low < 8) return ticks(low, high, 4);
   const made = [];
   for (let n = Math.floor(Math.log10(low)); 10 ** n <= high; n += 1) {
     for (const factor of high / low < 200 ? [1, 2, 5] : [1]) {
@@ -55,7 +58,10 @@ function decades(low, high) {
 }
 
 function written(value) {
-  if (value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e6)) return value.toExponential(0);
+  // longer ones would run into the axis' title
+  if (value !== 0 && (Math.abs(value) < 1e-3 || Math.abs(value) >= 1e5)) {
+    return String(Number(value.toPrecision(3)).toExponential()).replace("e+", "e");
+  }
   return String(Number(value.toPrecision(6)));
 }
 

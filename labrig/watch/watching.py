@@ -5,7 +5,6 @@ from pathlib import Path
 from typing import Never
 
 from labrig.clock import Clock
-from labrig.report.pictures import jpeg
 from labrig.watch.following import Following
 from labrig.watch.server import News, WatchServer
 
@@ -31,15 +30,18 @@ def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -
         How it ends.
     UsageError
         Not a run folder, or a port that is taken.
+    DataError
+        The run's journal is damaged.
     """
-    following, news = Following(run), News()
+    following = Following(run)
+    following.look()
+    news = News(following.state(), following.picture)
     with WatchServer(news, port) as server, server.running():
         try:
             tell(server.url)
             while True:
                 if following.look():
-                    latest = following.latest
-                    news.tell(following.state(), None if latest is None else jpeg(latest.picture))
+                    news.tell(following.state(), following.picture)
                 clock.sleep(LOOK_PERIOD_S)
         finally:
             news.end()

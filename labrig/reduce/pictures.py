@@ -3,7 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.reduce import RawFrame
+from labrig.reduce.raw import RawFrame
 
 Picture = NDArray[np.float32]
 
