@@ -1,6 +1,7 @@
 """What a result was made with: labrig, the libraries its numbers pass through, what was asked."""
 
 from collections.abc import Mapping, Sequence
+from functools import cache
 from importlib.metadata import version
 
 from pydantic import BaseModel, ConfigDict
@@ -75,6 +76,7 @@ def provenance(
     )
 
 
+@cache
 def library_versions() -> dict[str, str]:
     """Versions of what decodes, reduces, fits and draws."""
     import cv2
