@@ -88,7 +88,7 @@ class Serial(serial.SerialBase):
         """Up to `size` bytes that have arrived."""
         if self._is_gone:
             raise serial.SerialException(f"read failed: {_input_output_error()}")
-        count = min(size, self.in_waiting)
+        count = min(size, bisect_right(self._due_s, self._clock.now()))
         taken = self._take(count)
         self._clock.spend(BYTE_S * count)
         return taken
@@ -118,7 +118,7 @@ class Serial(serial.SerialBase):
 
     @property
     def _is_gone(self) -> bool:
-        return not self._cable.is_plugged or self._plugging != self._cable.plugging
+        return not self._cable.has_held(self._plugging)
 
 
 def _input_output_error() -> OSError:
