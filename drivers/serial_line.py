@@ -3,6 +3,8 @@
 pyserial's own time-outs count on the system's clock, so ports are opened non-blocking.
 """
 
+from collections.abc import Callable
+
 import serial
 
 from labrig.acquire.connections import SerialPort
@@ -63,20 +65,7 @@ class SerialLine:
         UnclearAnswerError
             `end` did not come in time; shows what came.
         """
-        deadline_s = self._clock.now() + timeout_s
-        came = b""
-        while not came.endswith(end):
-            came += self._read_one()
-            if came.endswith(end):
-                break
-            if self._clock.now() >= deadline_s:
-                raise UnclearAnswerError(
-                    f"{self._name} did not answer within {timeout_s:g} s: expected {end!r} at the "
-                    f"end, got {came!r}; check its power, cable and address"
-                )
-            if not self._waiting():
-                self._clock.sleep(POLL_S)
-        return came
+        return self._read(lambda came: came.endswith(end), f"{end!r} at the end", timeout_s)
 
     def read_exactly(self, count: int, timeout_s: float) -> bytes:
         """The next `count` bytes.
@@ -86,20 +75,7 @@ class SerialLine:
         UnclearAnswerError
             They did not come in time; shows what came.
         """
-        deadline_s = self._clock.now() + timeout_s
-        came = b""
-        while len(came) < count:
-            came += self._read_one()
-            if len(came) == count:
-                break
-            if self._clock.now() >= deadline_s:
-                raise UnclearAnswerError(
-                    f"{self._name} did not answer within {timeout_s:g} s: expected {count} bytes, "
-                    f"got {came!r}; check its power, cable and address"
-                )
-            if not self._waiting():
-                self._clock.sleep(POLL_S)
-        return came
+        return self._read(lambda came: len(came) == count, f"{count} bytes", timeout_s)
 
     def drain(self, quiet_s: float = LATEST_ANSWER_S, timeout_s: float = DRAIN_S) -> bytes:
         """What comes until the line is quiet for `quiet_s`."""
@@ -120,6 +96,22 @@ class SerialLine:
         while not self._waiting() and self._clock.now() < deadline_s:
             self._clock.sleep(POLL_S)
         return self.drain(quiet_s) if self._waiting() else b""
+
+    def _read(self, is_all: Callable[[bytes], bool], expected: str, timeout_s: float) -> bytes:
+        """Bytes one by one, so that none is taken that comes after."""
+        deadline_s = self._clock.now() + timeout_s
+        came = b""
+        while not is_all(came):
+            byte = self._read_one()
+            came += byte
+            if self._clock.now() >= deadline_s and not is_all(came):
+                raise UnclearAnswerError(
+                    f"{self._name} did not answer within {timeout_s:g} s: expected {expected}, "
+                    f"got {came!r}; check its power, cable and address"
+                )
+            if not byte:
+                self._clock.sleep(POLL_S)
+        return came
 
     def _read_one(self) -> bytes:
         try:

@@ -6,6 +6,7 @@ nothing but the URL.
 
 import errno
 import os
+from bisect import bisect_right
 from typing import Protocol
 from urllib.parse import urlsplit
 
@@ -65,7 +66,8 @@ class Serial(serial.SerialBase):
         self._clock = room.clock
         self._cable = cable
         self._plugging = cable.plugging
-        self._incoming: list[tuple[float, int]] = []
+        self._incoming = b""
+        self._due_s: list[float] = []
         self.is_open = True
 
     def close(self) -> None:
@@ -80,37 +82,43 @@ class Serial(serial.SerialBase):
         """Bytes that have arrived by now."""
         if self._is_gone:
             raise _input_output_error()
-        now_s = self._clock.now()
-        return sum(1 for due_s, _ in self._incoming if due_s <= now_s)
+        return bisect_right(self._due_s, self._clock.now())
 
     def read(self, size: int = 1, /) -> bytes:
         """Up to `size` bytes that have arrived."""
         if self._is_gone:
             raise serial.SerialException(f"read failed: {_input_output_error()}")
-        count = min(size, self.in_waiting)
-        taken, self._incoming = self._incoming[:count], self._incoming[count:]
+        count = min(size, bisect_right(self._due_s, self._clock.now()))
+        taken = self._take(count)
         self._clock.spend(BYTE_S * count)
-        return bytes(byte for _, byte in taken)
+        return taken
 
     def write(self, data: bytes, /) -> int:  # type: ignore[override]
         """Send `data`; the answer arrives byte by byte, a little later."""
         self._clock.spend(BYTE_S * len(data))
         if self._is_gone:
             raise serial.SerialException(f"write failed: {_input_output_error()}")
-        last_s = self._incoming[-1][0] if self._incoming else 0.0
+        last_s = self._due_s[-1] if self._due_s else 0.0
         due_s = max(last_s, self._clock.now() + ANSWER_S)
-        for byte in self._cable.carry(bytes(data)):
+        answer = self._cable.carry(bytes(data))
+        self._incoming += answer
+        for _ in answer:
             due_s += BYTE_S
-            self._incoming.append((due_s, byte))
+            self._due_s.append(due_s)
         return len(data)
 
     def reset_input_buffer(self) -> None:
         """Forget what has arrived."""
-        self._incoming = self._incoming[self.in_waiting :]
+        self._take(self.in_waiting)
+
+    def _take(self, count: int) -> bytes:
+        taken, self._incoming = self._incoming[:count], self._incoming[count:]
+        del self._due_s[:count]
+        return taken
 
     @property
     def _is_gone(self) -> bool:
-        return not self._cable.is_plugged or self._plugging != self._cable.plugging
+        return not self._cable.has_held(self._plugging)
 
 
 def _input_output_error() -> OSError:

@@ -8,6 +8,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 # What one process has compiled, the many that tests start need not compile again.
 os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 
+import gc
 import signal
 import sys
 from collections.abc import Callable, Iterator
@@ -29,12 +30,15 @@ if TYPE_CHECKING:
     from selenium.webdriver import Chrome
 
 sys.dont_write_bytecode = False
+# As Python sets it, the collector takes a tenth of the time of all tests.
+gc.set_threshold(20_000, 10, 10)
 SHARED = Path(__file__).parents[2] / "shared" / "data"
 HANDLERS = {signum: signal.getsignal(signum) for signum in STOP_SIGNALS}
 
-# In CI the same examples every time, so that a red run is about the change; new ones elsewhere.
+# In CI the same examples every time, so that a red run is about the change; elsewhere new ones,
+# fewer at a time.
 settings.register_profile("ci", derandomize=True, deadline=None)
-settings.register_profile("default", deadline=None)
+settings.register_profile("default", max_examples=40, deadline=None)
 settings.load_profile("ci" if os.environ.get("CI") else "default")
 
 

@@ -99,14 +99,25 @@ def without_faults(run: Path) -> None:
     (run / "rig.yaml").write_text(yaml.safe_dump(content))
 
 
+@pytest.fixture(scope="module")
+def undisturbed() -> dict[str, RunRecord]:
+    """Runs of protocols on a bench without faults, by the protocol's text."""
+    return {}
+
+
 @pytest.fixture
-def moment(labrig: Labrig, rig: Make, tmp_path: Path) -> Callable[..., float]:
+def moment(
+    labrig: Labrig, rig: Make, tmp_path: Path, undisturbed: dict[str, RunRecord]
+) -> Callable[..., float]:
     """When a lamp is switched in an undisturbed run of a protocol, seconds after the epoch."""
 
     def find(protocol: Path, unit: str, action: str) -> float:
-        runs = tmp_path / "undisturbed"
-        assert labrig("run", protocol, "--rig", rig(), "--runs", runs, "--no-process").code == 0
-        actions = recorded(runs).completed()[unit].actions
+        text = protocol.read_text()
+        if text not in undisturbed:
+            runs = tmp_path / "undisturbed"
+            assert labrig("run", protocol, "--rig", rig(), "--runs", runs, "--no-process").code == 0
+            undisturbed[text] = recorded(runs)
+        actions = undisturbed[text].completed()[unit].actions
         epoch = datetime(2026, 1, 1, tzinfo=UTC).timestamp()
         return next(each.start_time - epoch for each in actions if each.action == action)
 

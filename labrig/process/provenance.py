@@ -1,6 +1,7 @@
 """What a result was made with: labrig, the libraries its numbers pass through, what was asked."""
 
 from collections import Counter
+from functools import cache
 from importlib.metadata import version
 from typing import Any
 
@@ -64,6 +65,7 @@ def provenance(run: RunRecord, protocol: Any, choices: Choices, camera: str | No
     )
 
 
+@cache
 def library_versions() -> dict[str, str]:
     """Versions of what decodes, reduces, fits and draws."""
     import cv2

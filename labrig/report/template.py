@@ -3,6 +3,7 @@
 import re
 import shlex
 from datetime import UTC, datetime
+from functools import cache
 from pathlib import Path
 
 from jinja2 import Environment, FileSystemLoader, StrictUndefined
@@ -17,6 +18,7 @@ _FOLDER = Path(__file__).parent
 _SYMBOL = re.compile(r"\b([a-z])_([a-z])\b")
 
 
+@cache
 def environment() -> Environment:
     """Templates of this folder, with the functions that all of them use."""
     made = Environment(

@@ -58,6 +58,10 @@ class SerialCable:
         now_s = self._clock.now()
         return sum(out.at <= now_s for out in self._unplugged)
 
+    def has_held(self, plugging: int) -> bool:
+        """Whether the cable is in, and has been since it had been pulled so often."""
+        return not self._unplugged or (self.is_plugged and self.plugging == plugging)
+
     def carry(self, data: bytes) -> bytes:
         """Bytes to the board; what comes back for them."""
         if self._now(self._silent):
