@@ -10,7 +10,7 @@ from typing import Annotated, ClassVar, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import LAMP_OFF, Session, Shoot, Unit, at
+from labrig.acquire import CAMERA, LAMP_OFF, Session, Shoot, Unit, at
 from labrig.quantity import DurationS, duration_text
 from labrig.region import Region
 
@@ -132,7 +132,7 @@ class WhiteUnit:
         """Lamp on, a ladder of exposures, lamp off."""
         session.wait_until_warm("camera")
         light_card(session)
-        offers = session.rig.camera.offers()
+        offers = session.rig[CAMERA].offers()
         for wanted_s in WHITE_EXPOSURES_S:
             shoot = Shoot("white", self.protocol.settings(offers.exposure_at_most(wanted_s)))
             for _ in range(WHITES_PER_EXPOSURE):

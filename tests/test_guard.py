@@ -12,7 +12,7 @@ from pathlib import Path
 import pytest
 
 from labrig import guard as guard_module, guard_process
-from labrig.acquire import read_rig_file
+from labrig.acquire import LAMP, read_rig_file
 from labrig.bench import Bench, open_bench
 from labrig.errors import DeviceError
 from labrig.guard import ALL_OFF, MAY_BE_ON, Guard, guarding
@@ -189,7 +189,7 @@ def test_it_may_go_only_when_all_lights_are_known_to_be_off(
     monkeypatch.setattr(Guard, "_tell", noted)
     with open_bench(read_rig_file(path), str(path)) as bench:
         with bench.devices() as devices:
-            devices.lamp.on()
+            devices[LAMP].on()
         assert told == [MAY_BE_ON, ALL_OFF]
         with pytest.raises(DeviceError, match="its guard goes on trying for 5 min"):
             _lose_the_board(bench, board)
@@ -202,5 +202,5 @@ def test_it_may_go_only_when_all_lights_are_known_to_be_off(
 
 def _lose_the_board(bench: Bench, board: BoardProcess) -> None:
     with bench.devices() as devices:
-        devices.lamp.on()
+        devices[LAMP].on()
         board.plug_in_again()
