@@ -10,6 +10,7 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import serial
 
 from labrig import guard as guard_module, guard_process
 from labrig.acquire import LAMP, read_rig_file
@@ -160,6 +161,24 @@ def test_a_guard_that_somebody_killed_is_replaced(
         guard.stand_down()
     assert len(stand_ins) == 2
     assert stand_ins[1].wait() == 0
+
+
+def test_lamp_and_leds_of_one_board_are_all_switched_off(
+    rig: Callable[[str], Path], board: BoardProcess
+) -> None:
+    """Each is opened by itself; they wait for one another's port."""
+    path = rig(board.address)
+    bank = f"{{driver: numato_led_bank, address: '{board.address}', relays: {{a: {RELAY}, b: 6}}}}"
+    path.write_text(path.read_text().replace(f"relay: {RELAY}", "relay: 5") + f"  leds: {bank}\n")
+    with serial.Serial(board.address) as port:
+        port.write(f"relay on {RELAY}\r".encode())
+        assert board.wait_for(True, OFF_WITHIN_S)
+    file = read_rig_file(path)
+    with guarding(file, str(path)) as guard:
+        assert guard is not None
+        assert guard.lights == {"lamp", "leds"}
+    guard_process.Lights(file, str(path)).switch_off()
+    assert board.wait_for(False, OFF_WITHIN_S)
 
 
 def test_a_rig_without_lights_has_no_guard(tmp_path: Path) -> None:

@@ -129,8 +129,8 @@ def test_the_lamp_is_off_before_the_door_closes_whatever_the_rig_file_says() -> 
     bench = Bench()
     bench.rig.make_safe()
     assert bench.notes == ["lamp off", "shield uncovered", "door closed", "camera safe"]
-    assert in_safe_order(["viewfinder", "camera", "door", "lamp"]) == [
-        "lamp", "door", "viewfinder", "camera",
+    assert in_safe_order(["viewfinder", "camera", "door", "leds"]) == [
+        "leds", "door", "viewfinder", "camera",
     ]  # fmt: skip
 
 

@@ -10,6 +10,7 @@ from typing import Any
 from labrig.acquire.roles.camera import CAMERA, Camera, Shoot
 from labrig.acquire.roles.hands import HANDS, Hands
 from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
+from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedSwitch
 from labrig.acquire.roles.role import (
     DARK,
     Checkable,
@@ -48,6 +49,7 @@ ROLES: dict[str, Role[Any]] = {
     role.key: role
     for role in (
         LAMP,
+        LEDS,
         SHIELD,
         DOOR,
         HANDS,
@@ -71,6 +73,8 @@ __all__ = [
     "LAMP",
     "LAMP_OFF",
     "LAMP_ON",
+    "LEDS",
+    "LEDS_OFF",
     "LIGHTS",
     "ROLES",
     "SHIELD",
@@ -91,6 +95,8 @@ __all__ = [
     "KeptAwake",
     "Lamp",
     "LampShield",
+    "LedBank",
+    "LedSwitch",
     "Light",
     "LiveView",
     "Measured",
