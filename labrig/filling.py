@@ -7,8 +7,18 @@ from dataclasses import dataclass, field
 from importlib.metadata import version
 from typing import Any, Protocol, TypeVar
 
-from labrig.acquire import Checkable, Plan, ProtocolModel, Rig, RunObserver, Unit, run_units
-from labrig.acquire.roles import LIGHTS
+from labrig.acquire import (
+    HANDS,
+    LIGHTS,
+    Checkable,
+    Plan,
+    ProtocolModel,
+    Rig,
+    RunObserver,
+    Unit,
+    lights_that_read_back,
+    run_units,
+)
 from labrig.bench import Bench
 from labrig.clock import Clock, Interrupted, Slept
 from labrig.errors import (
@@ -88,9 +98,9 @@ def fill(
             devices = rig.identities()
             _arrange_again(left, rig, observer)
             _tell_what_was_exchanged(folder, devices, observer)
-            told: dict[str, Any] = {"rig": rig.name, "devices": devices}
-            if "lamp" in rig.devices:
-                told["lamp_reads_back"] = rig.lamp.reads_back()
+            told = {"rig": rig.name, "devices": devices} | {
+                f"{key}_reads_back": tells for key, tells in lights_that_read_back(rig).items()
+            }
             run_units(units, rig, folder, observer, {**metadata, **told})
 
         try:
@@ -214,9 +224,9 @@ def _arrange_again(left: Sequence[ActionRecord], rig: Rig, observer: RunObserver
 
     Hands that are a device do it all once more; a person is told what was last.
     """
-    if left and "hands" in rig.devices:
+    if left and HANDS in rig:
         for action in left:
-            rig.hands.do(action.task)
+            rig[HANDS].do(action.task)
     elif left:
         observer.warn(
             f"the bench has to be as it was left; last done by hand: {left[-1].action} "

@@ -16,8 +16,7 @@ from concurrent.futures import ThreadPoolExecutor, TimeoutError as TooSlow
 from contextlib import contextmanager, suppress
 from typing import IO, Any
 
-from labrig.acquire import RigFile
-from labrig.acquire.roles import LIGHTS
+from labrig.acquire import LIGHTS, RigFile
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 

@@ -12,9 +12,8 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from labrig import plugins
-from labrig.acquire import RigFile
+from labrig.acquire import ROLES, RigFile
 from labrig.acquire.rig_file import DeviceEntry
-from labrig.acquire.roles import ROLES
 from labrig.errors import UsageError
 from labrig.material import Material
 from labrig.yaml_file import did_you_mean
@@ -50,11 +49,13 @@ def _rig() -> Any:
     drivers = {name: plugins.load(plugins.DRIVERS, name, "schema") for name in names}
     entries = {name: _entry(name, driver.Settings) for name, driver in drivers.items()}
     roles: dict[str, Any] = {}
-    for role, kind in ROLES.items():
-        fitting = [entries[name] for name, driver in drivers.items() if issubclass(driver, kind)]
+    for key, role in ROLES.items():
+        fitting = [
+            entries[name] for name, driver in drivers.items() if issubclass(driver, role.does)
+        ]
         if fitting:
-            summary = inspect.cleandoc(kind.__doc__ or "").splitlines()[0]
-            roles[role] = (_one_of("driver", fitting), Field(None, description=summary))
+            summary = inspect.cleandoc(role.does.__doc__ or "").splitlines()[0]
+            roles[key] = (_one_of("driver", fitting), Field(None, description=summary))
     devices = create_model("Devices", __config__={"extra": "forbid"}, **roles)
     from labrig.sim.simulation import Simulation
 

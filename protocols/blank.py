@@ -11,6 +11,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import (
+    CAMERA,
     ByHand,
     CameraOffers,
     ExposureSettings,
@@ -106,7 +107,7 @@ class BlankDarkUnit:
         session.ask(BLANK)
         session.wait_until_warm("camera")
         face_camera(session)
-        offers = session.rig.camera.offers()
+        offers = session.rig[CAMERA].offers()
         times_s = [offers.exposures_s[0], *self.protocol.exposures_s(offers)]
         for exposure_s in dict.fromkeys(times_s):
             for _ in range(DARKS_PER_EXPOSURE):
@@ -131,7 +132,7 @@ class SequenceUnit:
         """Later by a little in each sequence."""
         protocol = self.protocol
         session.wait_until_warm("camera")
-        first_s, others_s = protocol.exposures_s(session.rig.camera.offers())
+        first_s, others_s = protocol.exposures_s(session.rig[CAMERA].offers())
         earliest_s = seen_s(session) or EARLIEST_S
         if protocol.first != "auto" and protocol.first < seen_s(session):
             raise ProtocolError(

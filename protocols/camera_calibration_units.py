@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 
 import numpy as np
 
-from labrig.acquire import CameraOffers, ExposureSettings, Session, Shoot
+from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, Session, Shoot
 from labrig.region import Region
 
 from .steps.lit_card import GREY_CARD, CardLight, card_light, light_card
@@ -48,7 +48,7 @@ class CardDarkUnit:
         if self.asks:
             session.ask(GREY_CARD)
         session.wait_until_warm("camera")
-        offers = session.rig.camera.offers()
+        offers = session.rig[CAMERA].offers()
         longest_s = offers.exposure_at_most(self.longest_s)
         for exposure_s in (offers.exposures_s[0], longest_s):
             shot = ExposureSettings(exposure_s, self.iso, self.reference.f_number)
@@ -75,7 +75,7 @@ class PhotonUnit:
     def run(self, session: Session) -> None:
         """Two frames at each level."""
         light_card(session)
-        light, offers = card_light(session, self.reference, self.card), session.rig.camera.offers()
+        light, offers = card_light(session, self.reference, self.card), session.rig[CAMERA].offers()
         settings = replace(self.reference, iso=self.iso)
         shares = np.linspace(*PHOTON_SHARES, self.levels)
         wanted = [light.exposed(float(share), settings, offers) for share in shares]
@@ -97,7 +97,7 @@ class RepeatUnit:
         """At the reference exposure."""
         light_card(session)
         light = card_light(session, self.reference, self.card)
-        shot = light.exposed(HALF, self.reference, session.rig.camera.offers())
+        shot = light.exposed(HALF, self.reference, session.rig[CAMERA].offers())
         for _ in range(self.repeats):
             session.perform(Shoot("repeat", shot))
 
@@ -120,7 +120,7 @@ class FlatUnit:
         light_card(session)
         light = card_light(session, self.reference, self.card)
         settings = replace(self.reference, f_number=self.f_number)
-        shot = light.exposed(HALF, settings, session.rig.camera.offers())
+        shot = light.exposed(HALF, settings, session.rig[CAMERA].offers())
         for _ in range(FLATS):
             session.perform(Shoot("flat", shot))
 
@@ -139,7 +139,7 @@ class BracketUnit:
         """Forwards in one cycle, backwards in the next: a lamp's drift then is no factor."""
         light_card(session)
         light = card_light(session, self.reference, self.card)
-        first, *others = self.bracket(light, session.rig.camera.offers(), self.reference)
+        first, *others = self.bracket(light, session.rig[CAMERA].offers(), self.reference)
         for cycle in range(self.cycles):
             order = others if cycle % 2 == 0 else others[::-1]
             for shot in _interleaved(order, first):

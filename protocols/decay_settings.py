@@ -5,7 +5,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel, Session
+from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, ProtocolModel, Session
 from labrig.quantity import Count, DurationS, Fraction, WordOrDuration, duration_text
 from labrig.reduce import FrameMeasurement
 from labrig.region import CENTRE, Region
@@ -135,7 +135,7 @@ class DecaySettings(ProtocolModel):
 
     def short_settings(self, session: Session) -> list[ExposureSettings]:
         """For a closer look at what clips."""
-        ladder = self.meter_ladder(session.rig.camera.offers())[:3]
+        ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
         return [self.settings(exposure_s) for _, exposure_s in ladder]
 
     def watcher(self, session: Session, unit: str, metering: str = "meter") -> Watcher:

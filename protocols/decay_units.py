@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from labrig.acquire import LAMP_ON, Session, Shoot, at
+from labrig.acquire import CAMERA, LAMP_ON, Session, Shoot, at
 from labrig.quantity import duration_text
 
 from .decay_settings import DecaySettings
@@ -42,7 +42,7 @@ class DecayUnit:
         watcher.insist_on_decay(self.protocol.short_settings(session))
 
     def _schedule(self, session: Session) -> Schedule:
-        protocol, offers = self.protocol, session.rig.camera.offers()
+        protocol, offers = self.protocol, session.rig[CAMERA].offers()
         regions = list(protocol.patches.values())
 
         def decide() -> Schedule:
@@ -103,7 +103,7 @@ class DaylightUnit:
         if has_door(session):
             session.warn("no daylight photograph: behind a door the lamp lights the sample unseen")
             return
-        offers = session.rig.camera.offers()
+        offers = session.rig[CAMERA].offers()
         session.perform(LAMP_ON)
         session.wait(LAMP_SETTLES_S, "lamp settles")
         under_lamp = [

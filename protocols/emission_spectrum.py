@@ -3,14 +3,15 @@
 After Nalbach et al., sec. 4.3: it is to be the same at all times, and whatever lamp charged it.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import LAMP_OFF, Session, Shoot, Unit, at
+from labrig.acquire import CAMERA, LAMP_OFF, Session, Shoot, Unit, at
+from labrig.calibration import LVF_KIND
 from labrig.quantity import DurationS, duration_text
 from labrig.region import Region
 
@@ -38,7 +39,7 @@ WHITE = "it tells what the camera's curves are off by"
 class EmissionSpectrum(GlowSettings):
     """The protocol; see `emission_spectrum.yaml` for what each key means."""
 
-    rests_on: ClassVar[Mapping[str, str]] = {"lvf_calibration": "lvf"}
+    rests_on = (LVF_KIND,)
 
     protocol: Literal["emission_spectrum"] = "emission_spectrum"
     camera: CameraSettings = CameraSettings(iso=1600)
@@ -132,7 +133,7 @@ class WhiteUnit:
         """Lamp on, a ladder of exposures, lamp off."""
         session.wait_until_warm("camera")
         light_card(session)
-        offers = session.rig.camera.offers()
+        offers = session.rig[CAMERA].offers()
         for wanted_s in WHITE_EXPOSURES_S:
             shoot = Shoot("white", self.protocol.settings(offers.exposure_at_most(wanted_s)))
             for _ in range(WHITES_PER_EXPOSURE):

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.acquire import ByHand, Session, Shoot, at
+from labrig.acquire import CAMERA, ByHand, Session, Shoot, at
 from labrig.record import FrameRecord
 
 from .excitation_settings import PLACES, ExcitationSettings
@@ -62,7 +62,7 @@ class ExcitationUnit:
         session.wait(rule.at_least, "resting in the dark")
         rested_s = rule.at_least
         exposure_s = max(
-            self.protocol.longest_exposures_s(session.rig.camera.offers(), self.protocol.duration)
+            self.protocol.longest_exposures_s(session.rig[CAMERA].offers(), self.protocol.duration)
         )
         look_now = Shoot("rest", self.protocol.settings(exposure_s))
         while True:
@@ -96,7 +96,7 @@ class DarkUnit(ExcitationUnit):
     def run(self, session: Session) -> None:
         """Warm the camera up, then photograph darkness."""
         session.wait_until_warm("camera")
-        offers, regions = session.rig.camera.offers(), self.protocol.regions()
+        offers, regions = session.rig[CAMERA].offers(), self.protocol.regions()
         exposures_s = self.protocol.dark_exposures_s(offers)
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
         dark_frames(session, self.name, regions, exposures)
@@ -111,7 +111,7 @@ class _Meter(ExcitationUnit):
     def _meter(self, session: Session, unit: str, hand: ByHand, charge_s: float) -> None:
         session.wait_until_warm("camera")
         session.ask(hand)
-        ladder = self.protocol.ladder(session.rig.camera.offers())
+        ladder = self.protocol.ladder(session.rig[CAMERA].offers())
         check_seen(session, ladder[0][0])
         charge(session, charge_s)
         session.run_sequence(

@@ -1,12 +1,12 @@
 """The keys of an excitation protocol, and the times and exposures that follow."""
 
-from collections.abc import Mapping
 from itertools import pairwise
-from typing import ClassVar, Literal, Self
+from typing import Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel
+from labrig.calibration import IRRADIANCE_KIND
 from labrig.quantity import Count, DurationS, Fraction, duration_text
 from labrig.region import Region
 
@@ -39,7 +39,7 @@ class Rest(BaseModel):
 class ExcitationSettings(ProtocolModel):
     """The keys; see `excitation.yaml` for what each means."""
 
-    rests_on: ClassVar[Mapping[str, str]] = {"irradiance": "irradiance"}
+    rests_on = (IRRADIANCE_KIND,)
 
     protocol: Literal["excitation"] = "excitation"
     first_charge: DurationS = Field(8.0, gt=0)

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.acquire import Session, Shoot, at
+from labrig.acquire import CAMERA, Session, Shoot, at
 from labrig.record import FrameRecord
 
 from .excitation_metering import ExcitationUnit
@@ -25,7 +25,7 @@ class _Charged(ExcitationUnit):
 
     def _charge(self, session: Session, purpose: str, charge_s: float, lasting_s: float) -> None:
         self.rest(session)
-        offers = session.rig.camera.offers()
+        offers = session.rig[CAMERA].offers()
         schedule = self._schedule(session, purpose, charge_s, lasting_s)
         longest_s = self.protocol.longest_exposures_s(offers, lasting_s)
         check_seen(session, self.protocol.first)
@@ -46,7 +46,7 @@ class _Charged(ExcitationUnit):
         self, session: Session, purpose: str, charge_s: float, lasting_s: float
     ) -> Schedule:
         """Exposures by what was seen after the longest charge like this one, else by the meter."""
-        protocol, offers = self.protocol, session.rig.camera.offers()
+        protocol, offers = self.protocol, session.rig[CAMERA].offers()
         times_s = protocol.frame_times_s(lasting_s)
         longest_s = max(protocol.longest_exposures_s(offers, lasting_s))
 

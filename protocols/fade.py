@@ -13,6 +13,7 @@ from typing import Literal, Self
 from pydantic import Field, model_validator
 
 from labrig.acquire import (
+    CAMERA,
     LAMP_OFF,
     LAMP_ON,
     ByHand,
@@ -137,7 +138,7 @@ class PassUnit:
 
     def run(self, session: Session) -> None:
         """Steady, off and fading, on and rising, and again."""
-        protocol, offers = self.protocol, session.rig.camera.offers()
+        protocol, offers = self.protocol, session.rig[CAMERA].offers()
         session.wait_until_warm("camera")
         light_card(session)
         light = card_light(session, protocol.settings(), protocol.card)
@@ -179,7 +180,7 @@ class WarmingUnit:
         session.wait_until_warm("camera")
         light_card(session)
         light = card_light(session, protocol.settings(), protocol.card)
-        steady = light.exposed(HALF, protocol.settings(), session.rig.camera.offers())
+        steady = light.exposed(HALF, protocol.settings(), session.rig[CAMERA].offers())
         session.perform(LAMP_OFF)
         session.wait(COOLS_S, "lamp's housing cools")
         shots = [

@@ -4,13 +4,14 @@ The map lamp × LVF at the sample's plane enters excitation rates one to one (Na
 Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.6): it is measured.
 """
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from itertools import pairwise
-from typing import Annotated, ClassVar, Literal, Self
+from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
 from labrig.acquire import ProtocolModel, Unit
+from labrig.calibration import LVF_KIND
 from labrig.quantity import Count, DurationS
 
 from .lvf_units import StripUnit
@@ -31,7 +32,7 @@ _THROUGH = Arrangement("grey card", "on sample")
 class Irradiance(ProtocolModel):
     """The irradiance protocol; see `irradiance.yaml` for what each key means."""
 
-    rests_on: ClassVar[Mapping[str, str]] = {"lvf_calibration": "lvf"}
+    rests_on = (LVF_KIND,)
 
     protocol: Literal["irradiance"] = "irradiance"
     bands_nm: tuple[Nanometres, ...] = BANDS_NM

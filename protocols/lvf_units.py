@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from labrig.acquire import Session, Shoot, Timed, at
+from labrig.acquire import CAMERA, Session, Shoot, Timed, at
 
 from .steps.arrangement import light
 from .steps.camera_settings import MARGIN_S
@@ -104,7 +104,7 @@ class StripesUnit(SceneUnit):
         self.arrange(session)
         light(session, self.warm_up_s(session))
         charge(session, self.charge_s)
-        offers, scene = session.rig.camera.offers(), self.still_life
+        offers, scene = session.rig[CAMERA].offers(), self.still_life
         at_s, steps = seen_s(session) + MARGIN_S, list[Timed]()
         for share in STRIPES_LADDER:
             exposure_s = offers.exposure_at_most(scene.longest_s * share)

@@ -51,6 +51,25 @@ class DoorSettings(Part):
         return self
 
 
+class LedSettings(Part):
+    """An LED behind a relay of the Numato board, beside the lamp; no filter is before it.
+
+    Attributes
+    ----------
+    relay
+        Of the board; its relay 0 is the lamp's.
+    centre, fwhm
+        Of its band, in nanometres.
+    level
+        Its light, of the warm lamp's over all wavelengths.
+    """
+
+    relay: Annotated[int, Field(ge=1, le=7)]
+    centre: Nanometres
+    fwhm: Annotated[float, Field(ge=5, le=200)] = 25.0
+    level: Annotated[Fraction, Field(gt=0)] = 0.1
+
+
 class ServoBoardSettings(Part):
     """The Maestro at `sim://room/servo`; its channels' homes are: door closed, shield open.
 

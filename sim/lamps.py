@@ -1,12 +1,13 @@
-"""The lamps that the relay may feed, behind the colour filter that hands have put before them."""
+"""The lamps that the relay may feed, behind the colour filter before them, and LEDs beside it."""
 
-from dataclasses import dataclass, replace
+from dataclasses import dataclass, field, replace
 from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
 
 from .lamp import Lamp
+from .leds import Leds
 from .mercury import Mercury
 
 FloatArray = NDArray[np.float64]
@@ -22,37 +23,49 @@ class FilteredLamps:
         Only one of them is fed at a time, but a filament fades after it was switched off.
     filters
         From when on, and what the filter then lets through, shape (160,); the first from 0 on.
+    leds
+        Their light does not pass it.
     """
 
     halogen: Lamp
     mercury: Mercury
     filters: tuple[tuple[float, FloatArray], ...]
+    leds: Leds = field(default_factory=Leds)
 
     def until(self, time_s: float) -> "FilteredLamps":
         """As if nobody had touched the lamps after `time_s`."""
-        return replace(self, halogen=self.halogen.until(time_s), mercury=self.mercury.until(time_s))
+        return replace(
+            self,
+            halogen=self.halogen.until(time_s),
+            mercury=self.mercury.until(time_s),
+            leds=self.leds.until(time_s),
+        )
 
     def last_switch_off(self, time_s: float) -> float | None:
         """When one was last switched off, up to and including `time_s`."""
-        off = [lamp.last_switch_off(time_s) for lamp in (self.halogen, self.mercury)]
+        lights = (self.halogen, self.mercury, self.leds)
+        off = [light.last_switch_off(time_s) for light in lights]
         return max((off_s for off_s in off if off_s is not None), default=None)
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
         """Times strictly between at which the light does not go on smoothly."""
         changes = {since_s for since_s, _ in self.filters if start_s < since_s < end_s}
         changes.update(self.halogen.corners(start_s, end_s), self.mercury.corners(start_s, end_s))
+        changes.update(self.leds.corners(start_s, end_s))
         return sorted(changes)
 
     def dark(self, start_s: float, end_s: float) -> bool:
         """Whether no light at all is to be expected from `start_s` to `end_s`."""
-        return self.halogen.dark(start_s, end_s) and self.mercury.dark(start_s, end_s)
+        lights = (self.halogen, self.mercury, self.leds)
+        return all(light.dark(start_s, end_s) for light in lights)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
         """Relative spectral irradiance at the sample, shape (..., 160)."""
         light = self.halogen.irradiance(time_s)
         if self.mercury.was_on:
             light = light + self.mercury.irradiance(time_s)
-        return light * self._passed(time_s)
+        light = light * self._passed(time_s)
+        return light + self.leds.irradiance(time_s) if self.leds.were_lit else light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
         """∫ irradiance dt over an interval, shape (160,)."""
@@ -63,7 +76,7 @@ class FilteredLamps:
             if self.mercury.was_on:
                 light = light + self.mercury.exposure(left, right)
             total += light * self._passed(left)
-        return total
+        return total + self.leds.exposure(start_s, end_s) if self.leds.were_lit else total
 
     def _passed(self, time_s: float | FloatArray) -> FloatArray:
         since_s = [since_s for since_s, _ in self.filters]

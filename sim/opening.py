@@ -95,6 +95,8 @@ class OpenRoom:
     def _relay_moved(self, board: str, relay: int, on: bool) -> None:
         if (board, relay) == (self._lamp_board, LAMP_RELAY):
             self.room.switch_lamp(on)
+        elif board == "relays":
+            self.room.switch_led(relay, on)
 
 
 @contextmanager

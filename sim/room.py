@@ -25,6 +25,7 @@ from .hands import Hands
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .lamps import FilteredLamps
 from .layout import Layout
+from .leds import Leds
 from .lights import Lights, Seen, leak, room_light_spectrum
 from .optics import FOCAL_MM, bent_curves, measured_curves, vignetting
 from .samples import Samples
@@ -70,6 +71,7 @@ class Room:
         self._view = View(simulation, self._layout)
         faults = simulation.faults
         self._circuit = LampCircuit(simulation.lamp, simulation.initial.lamp == "on", faults, clock)
+        self._leds = Leds(simulation.leds)
         self._left_on = given(fault.light_left_on for fault in faults)
         leaks = [leak(one.level, [one]) for one in given(fault.ambient_light for fault in faults)]
         always = [leak(simulation.ambient, [When()])] if simulation.ambient else []
@@ -100,6 +102,11 @@ class Room:
         return self._circuit.closed
 
     @property
+    def leds(self) -> Leds:
+        """The bank of LEDs with its history up to now."""
+        return self._leds
+
+    @property
     def door(self) -> Door | None:
         """The trap door with its history up to now; None where there is none."""
         return self._doors.trap_door
@@ -117,6 +124,10 @@ class Room:
     def switch_lamp(self, on: bool) -> None:
         """Ask the lamp's relay to switch now."""
         self._circuit.ask(on)
+
+    def switch_led(self, relay: int, on: bool) -> None:
+        """The contact of a relay moves now; an LED may hang on it."""
+        self._leds = self._leds.switched(relay, on, self._clock.now())
 
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
         """The DNG of an exposure that is over.
@@ -230,6 +241,7 @@ class Room:
             self._circuit.lamp,
             self._circuit.mercury,
             self._filters.history(self._hands.arrangements),
+            self._leds,
         )
 
     def _lights(self) -> Lights:

@@ -17,6 +17,7 @@ from labrig.region import Region
 
 from .bench_settings import (
     DoorSettings,
+    LedSettings,
     LensSettings,
     LvfSettings,
     Part,
@@ -157,6 +158,8 @@ class Simulation(Part):
         Of everything random: camera curves, hot pixels, noise.
     faults
         What goes wrong, and when, see `sim.faults`.
+    leds
+        The bank of LEDs.
     door
         The trap door: closed, the sample faces the lamp, open, the camera. Null: none, and the
         sample always faces both.
@@ -204,6 +207,7 @@ class Simulation(Part):
     initial: InitialState = InitialState()
     faults: tuple[Fault, ...] = ()
     lamp: LampSettings = LampSettings()
+    leds: tuple[LedSettings, ...] = ()
     door: DoorSettings | None = None
     shield: DoorSettings | None = None
     servo: ServoBoardSettings = ServoBoardSettings()
@@ -231,6 +235,8 @@ class Simulation(Part):
             raise ValueError("a fault of the door needs a 'door:'")
         if self.door and self.shield and self.door.channel == self.shield.channel:
             raise ValueError("expected 'door' and 'shield' on two channels of the servo board")
+        if len({led.relay for led in self.leds}) < len(self.leds):
+            raise ValueError("expected a relay of its own for each of 'leds'")
         if self.lvf is None and any(fault.lvf_turned for fault in self.faults):
             raise ValueError("a fault of the LVF needs an 'lvf:'")
         return self

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import serial
 
-from labrig.acquire import read_rig_file
+from labrig.acquire import LAMP, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import SystemClock
 from labrig.errors import DeviceError, UsageError
@@ -59,9 +59,9 @@ def test_the_real_driver_on_a_real_port_with_the_systems_clock(
         assert isinstance(bench.clock, SystemClock)
         with bench.devices() as devices:
             assert not board.states[3], "off at connect"
-            devices.lamp.on()
+            devices[LAMP].on()
             assert board.states == [False, False, False, True, False, False, False, False]
-            assert devices.lamp.is_on()
+            assert devices[LAMP].is_on()
             assert "Numato" in devices.identities()["lamp"]
         assert not board.states[3], "off at the end"
 
@@ -77,7 +77,7 @@ def test_a_rig_in_use_is_refused_by_every_name_and_not_touched(
     address, board = wired
     path = rig(address)
     with open_bench(read_rig_file(path), str(path)) as first, first.devices() as devices:
-        devices.lamp.on()
+        devices[LAMP].on()
         before = board.heard_bytes
         match spelling:
             case "link":
@@ -95,7 +95,7 @@ def test_a_rig_in_use_is_refused_by_every_name_and_not_touched(
         ):
             pass
         assert board.heard_bytes == before
-        assert devices.lamp.is_on()
+        assert devices[LAMP].is_on()
 
 
 def test_a_program_that_knows_no_labrig_is_refused_too(

@@ -14,7 +14,7 @@ import pytest
 import serial
 import yaml
 
-from labrig.acquire import read_rig_file
+from labrig.acquire import LAMP, read_rig_file
 from labrig.bench import Bench, open_bench
 from labrig.cli.progress import PlainProgress
 from labrig.clock import SystemClock
@@ -375,7 +375,7 @@ def test_a_clock_that_was_stepped_between_run_and_resume_harms_nothing(
 def test_a_board_that_is_silent_for_a_moment_is_asked_again(rig: Make) -> None:
     bench = rig({"relays_silent": {"at": "10 s", "for": "4 s"}})
     with open_bench(read_rig_file(bench), str(bench)) as stand, stand.devices() as devices:
-        devices.lamp.on()
+        devices[LAMP].on()
         stand.clock.sleep_until(10.5)
         devices.make_safe()
         assert not lamp_is_on(stand)

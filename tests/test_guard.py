@@ -10,9 +10,10 @@ from collections.abc import Callable, Iterator
 from pathlib import Path
 
 import pytest
+import serial
 
 from labrig import guard as guard_module, guard_process
-from labrig.acquire import read_rig_file
+from labrig.acquire import LAMP, read_rig_file
 from labrig.bench import Bench, open_bench
 from labrig.errors import DeviceError
 from labrig.guard import ALL_OFF, MAY_BE_ON, Guard, guarding
@@ -162,6 +163,24 @@ def test_a_guard_that_somebody_killed_is_replaced(
     assert stand_ins[1].wait() == 0
 
 
+def test_lamp_and_leds_of_one_board_are_all_switched_off(
+    rig: Callable[[str], Path], board: BoardProcess
+) -> None:
+    """Each is opened by itself; they wait for one another's port."""
+    path = rig(board.address)
+    bank = f"{{driver: numato_led_bank, address: '{board.address}', relays: {{a: {RELAY}, b: 6}}}}"
+    path.write_text(path.read_text().replace(f"relay: {RELAY}", "relay: 5") + f"  leds: {bank}\n")
+    with serial.Serial(board.address) as port:
+        port.write(f"relay on {RELAY}\r".encode())
+        assert board.wait_for(True, OFF_WITHIN_S)
+    file = read_rig_file(path)
+    with guarding(file, str(path)) as guard:
+        assert guard is not None
+        assert guard.lights == {"lamp", "leds"}
+    guard_process.Lights(file, str(path)).switch_off()
+    assert board.wait_for(False, OFF_WITHIN_S)
+
+
 def test_a_rig_without_lights_has_no_guard(tmp_path: Path) -> None:
     path = tmp_path / "rig.yaml"
     path.write_text(
@@ -189,7 +208,7 @@ def test_it_may_go_only_when_all_lights_are_known_to_be_off(
     monkeypatch.setattr(Guard, "_tell", noted)
     with open_bench(read_rig_file(path), str(path)) as bench:
         with bench.devices() as devices:
-            devices.lamp.on()
+            devices[LAMP].on()
         assert told == [MAY_BE_ON, ALL_OFF]
         with pytest.raises(DeviceError, match="its guard goes on trying for 5 min"):
             _lose_the_board(bench, board)
@@ -202,5 +221,5 @@ def test_it_may_go_only_when_all_lights_are_known_to_be_off(
 
 def _lose_the_board(bench: Bench, board: BoardProcess) -> None:
     with bench.devices() as devices:
-        devices.lamp.on()
+        devices[LAMP].on()
         board.plug_in_again()

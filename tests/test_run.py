@@ -14,7 +14,7 @@ from pathlib import Path
 import event_model
 import pytest
 
-from labrig.acquire import Plan, RunObserver, plan, read_protocol, read_rig_file
+from labrig.acquire import LAMP, Plan, RunObserver, plan, read_protocol, read_rig_file
 from labrig.bench import Bench, open_bench
 from labrig.clock import Clock, Interrupted, VirtualClock
 from labrig.errors import DeviceError
@@ -133,7 +133,7 @@ def test_the_lamp_that_a_crash_left_on_is_switched_off_at_connect(
         assert lamp_is_on(stand)
         with stand.devices() as devices:
             assert not lamp_is_on(stand)
-            devices.lamp.on()
+            devices[LAMP].on()
             assert lamp_is_on(stand)
         assert not lamp_is_on(stand)
 

@@ -58,6 +58,37 @@ class Board:
             )
         return " ".join(line for line in lines[1:] if line)
 
+    def switch(self, relay: int, *, on: bool) -> None:
+        """Switch a relay, and read it back.
+
+        Raises
+        ------
+        UnclearAnswerError
+            The board refuses, or the relay does not read as it was switched.
+        """
+        state, channel = "on" if on else "off", CHANNELS[relay]
+        said = self.ask(f"relay {state} {channel}")
+        if said:
+            raise UnclearAnswerError(
+                f"{self.name} refused 'relay {state} {channel}': expected a bare prompt, got "
+                f"'{said}'; is relay {relay} on this board?"
+            )
+        if self.is_on(relay) != on:
+            read = "off" if on else "on"
+            raise UnclearAnswerError(
+                f"relay {relay} of {self.name} was switched {state} but reads {read}; switch off "
+                "by hand and check the board"
+            )
+
+    def is_on(self, relay: int) -> bool:
+        """What the board reads a relay as."""
+        state = self.ask(f"relay read {CHANNELS[relay]}")
+        if state not in ("on", "off"):
+            raise UnclearAnswerError(
+                f"{self.name} was asked for relay {relay}: expected 'on' or 'off', got '{state}'"
+            )
+        return state == "on"
+
     def resynchronise(self) -> None:
         """A bare return ends a half-typed command; whatever comes is of no interest."""
         self._line.write(b"\r")

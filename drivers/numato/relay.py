@@ -1,9 +1,8 @@
-"""A relay of a Numato board; it is read back after every write."""
+"""A relay of a Numato board that switches a lamp."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire.connections import Connections
-from labrig.errors import UnclearAnswerError
 
 from .board import CHANNELS, Board
 
@@ -29,7 +28,6 @@ class NumatoRelay:
         relay: int = Field(ge=0, lt=len(CHANNELS))
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
-        self._channel = CHANNELS[settings.relay]
         self._relay = settings.relay
         self._board = Board(address, connections)
 
@@ -43,15 +41,15 @@ class NumatoRelay:
 
     def on(self) -> None:
         """Switch on, read back."""
-        self._switch("on")
+        self._board.switch(self._relay, on=True)
 
     def off(self) -> None:
         """Switch off, read back."""
-        self._switch("off")
+        self._board.switch(self._relay, on=False)
 
     def is_on(self) -> bool:
         """State as the board reads it."""
-        return self._read() == "on"
+        return self._board.is_on(self._relay)
 
     def make_safe(self) -> None:
         """Bring the line back into step, then off."""
@@ -60,26 +58,3 @@ class NumatoRelay:
 
     def disconnect(self) -> None:
         """The port belongs to the connections, which close it."""
-
-    def _switch(self, state: str) -> None:
-        said = self._board.ask(f"relay {state} {self._channel}")
-        if said:
-            raise UnclearAnswerError(
-                f"{self._board.name} refused 'relay {state} {self._channel}': expected a bare "
-                f"prompt, got '{said}'; is relay {self._relay} on this board?"
-            )
-        read = self._read()
-        if read != state:
-            raise UnclearAnswerError(
-                f"relay {self._relay} of {self._board.name} was switched {state} but reads {read}; "
-                "switch off by hand and check the board"
-            )
-
-    def _read(self) -> str:
-        state = self._board.ask(f"relay read {self._channel}")
-        if state not in ("on", "off"):
-            raise UnclearAnswerError(
-                f"{self._board.name} was asked for relay {self._relay}: expected 'on' or 'off', "
-                f"got '{state}'"
-            )
-        return state

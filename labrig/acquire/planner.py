@@ -10,9 +10,9 @@ from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.registered import load_driver
 from labrig.acquire.rig import Rig
 from labrig.acquire.rig_file import RigFile
-from labrig.acquire.roles import Device
+from labrig.acquire.roles import CAMERA, ROLES, Device
 from labrig.acquire.session import TOLERANCE_S, Session
-from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.acquire.values import CameraOffers, Frame
 from labrig.clock import VirtualClock
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
@@ -97,17 +97,11 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
     clock = VirtualClock()
     recorder = _PlanRecorder(clock)
     devices: dict[str, Device] = {}
-    offers = CameraOffers((), ())
     for key, entry in rig.devices.items():
         driver = load_driver(key, entry.driver, source)
         settings = validate(entry.settings(), driver.Settings, f"{source}, devices.{key}")
-        if key == "camera":
-            offers = driver.declared_offers(settings)
-            devices[key] = _PlannedCamera(clock, offers)
-        elif key == "lamp":
-            devices[key] = _PlannedLamp()
-        elif key in ("door", "shield"):
-            devices[key] = _PlannedDoor(driver.declared_travel_s(settings))
+        if stand_in := ROLES[key].planned:
+            devices[key] = stand_in(driver, settings, clock)
     warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
     planned = Rig(rig.name, clock, devices, warm_up_s)
     units, ends = protocol.units(), []
@@ -120,83 +114,8 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
         tuple(unit.name for unit in units),
         tuple(ends),
         recorder.frame_count,
-        offers,
+        planned[CAMERA].offers() if CAMERA in planned else CameraOffers((), ()),
     )
-
-
-class _PlannedDevice:
-    def identity(self) -> str:
-        return "planned"
-
-    def make_safe(self) -> None:
-        pass
-
-    def disconnect(self) -> None:
-        pass
-
-
-class _PlannedLamp(_PlannedDevice):
-    def __init__(self) -> None:
-        self._on = False
-
-    def reads_back(self) -> bool:
-        return False
-
-    def on(self) -> None:
-        self._on = True
-
-    def off(self) -> None:
-        self._on = False
-
-    def is_on(self) -> bool:
-        return self._on
-
-
-class _PlannedDoor(_PlannedDevice):
-    """A trap door or a shield; moving it takes no time, its travel is the protocol's to wait."""
-
-    def __init__(self, travel_s: float) -> None:
-        self._travel_s = travel_s
-
-    def travel_s(self) -> float:
-        return self._travel_s
-
-    def open(self) -> None:
-        pass
-
-    def close(self) -> None:
-        pass
-
-    def cover(self) -> None:
-        pass
-
-    def uncover(self) -> None:
-        pass
-
-
-class _PlannedCamera(_PlannedDevice):
-    def __init__(self, clock: VirtualClock, offers: CameraOffers) -> None:
-        self._clock = clock
-        self._offers = offers
-        self._settings: ExposureSettings | None = None
-
-    def offers(self) -> CameraOffers:
-        return self._offers
-
-    def configure(self, settings: ExposureSettings) -> ExposureSettings:
-        self._offers.check(settings)
-        self._settings = settings
-        return settings
-
-    def arm(self) -> None:
-        pass
-
-    def shoot(self) -> Frame:
-        assert self._settings is not None, "a session configures before it shoots"
-        start_s = self._clock.now()
-        end_s = start_s + self._settings.exposure_s
-        self._clock.spend(self._settings.exposure_s + self._offers.overhead_s)
-        return Frame(b"", "", start_s, end_s, self._settings)
 
 
 @dataclass
@@ -221,7 +140,7 @@ class _PlanRecorder:
 
     def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
         self.frame_count += 1
-        self._note(frame.start_s, "camera", f"{purpose} frame, {frame.settings}", late_s)
+        self._note(frame.start_s, CAMERA.key, f"{purpose} frame, {frame.settings}", late_s)
 
     def temperature(self, celsius: float, at_s: float) -> None:
         pass

@@ -2,12 +2,13 @@
 
 from abc import abstractmethod
 from collections.abc import Mapping, Sequence
-from typing import ClassVar, Protocol, Self
+from typing import Any, ClassVar, Protocol, Self
 
 from pydantic import BaseModel, ConfigDict, Field
 
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
+from labrig.calibration import CalibrationKind
 from labrig.region import Region
 
 
@@ -39,8 +40,8 @@ class ProtocolModel(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    #: Protocols on whose results this one's rest, and the key of 'optics' that names such a run.
-    rests_on: ClassVar[Mapping[str, str]] = {}
+    #: Calibrations on which this one's results rest.
+    rests_on: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
 
     protocol: str
     sample: Sample = Sample()
@@ -66,4 +67,4 @@ class ProtocolModel(BaseModel):
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Protocols on whose results this one's rest, of which the rig file names no run."""
-        return [name for name, key in self.rests_on.items() if getattr(rig.optics, key) is None]
+        return [kind.protocol for kind in self.rests_on if rig.optics.named(kind) is None]

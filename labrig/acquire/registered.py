@@ -18,10 +18,11 @@ def load_driver(key: str, name: str, source: str) -> Any:
     UsageError
         As of `load`; or it is the driver of a device of another kind.
     """
-    driver = load(DRIVERS, name, source)
-    if not issubclass(driver, ROLES[key]):
+    driver, role = load(DRIVERS, name, source), ROLES[key]
+    if not issubclass(driver, role.does):
         raise UsageError(
-            f"{source}: the driver '{name}' is no {key}; choose another driver for 'devices.{key}'"
+            f"{source}: the driver '{name}' is no {role.name}; choose another driver for "
+            f"'devices.{key}'"
         )
     return driver
 

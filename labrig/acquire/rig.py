@@ -1,18 +1,11 @@
 """The devices of one bench, open, with the clock they share."""
 
-from collections.abc import Callable, Iterable, Mapping
-from typing import cast
+from collections.abc import Callable, Iterable, Iterator, Mapping
+from contextlib import contextmanager
+from typing import Any, cast
 
-from labrig.acquire.roles import (
-    SAFE_ORDER,
-    Camera,
-    Device,
-    Hands,
-    Lamp,
-    LampShield,
-    Thermometer,
-    TrapDoor,
-)
+from labrig.acquire.roles import ROLES, Device, Role
+from labrig.acquire.roles.role import DeviceT
 from labrig.clock import Clock
 from labrig.errors import (
     DeviceError,
@@ -56,35 +49,27 @@ class Rig:
         self._warm_up_s = dict(warm_up_s)
         self.connected_s = clock.now()
 
-    @property
-    def lamp(self) -> Lamp:
-        """The lamp; `ProtocolError` where the rig has none."""
-        return cast(Lamp, self._device("lamp"))
+    def __getitem__(self, role: Role[DeviceT]) -> DeviceT:
+        """The device that fills the role.
 
-    @property
-    def camera(self) -> Camera:
-        """The camera; `ProtocolError` where the rig has none."""
-        return cast(Camera, self._device("camera"))
+        Raises
+        ------
+        ProtocolError
+            The rig has none.
+        """
+        return cast(DeviceT, self.device(role.key))
 
-    @property
-    def door(self) -> TrapDoor:
-        """The trap door; `ProtocolError` where the rig has none."""
-        return cast(TrapDoor, self._device("door"))
+    def __contains__(self, role: Role[Any]) -> bool:
+        return role.key in self.devices
 
-    @property
-    def shield(self) -> LampShield:
-        """The lamp's shield; `ProtocolError` where the rig has none."""
-        return cast(LampShield, self._device("shield"))
-
-    @property
-    def hands(self) -> Hands:
-        """What works in a person's place; `ProtocolError` where the rig has none."""
-        return cast(Hands, self._device("hands"))
-
-    @property
-    def thermometer(self) -> Thermometer:
-        """The thermometer; `ProtocolError` where the rig has none."""
-        return cast(Thermometer, self._device("thermometer"))
+    def device(self, key: str) -> Device:
+        """As by its role."""
+        if key not in self.devices:
+            raise ProtocolError(
+                f"the protocol needs a {ROLES[key].name}, the rig '{self.name}' has none "
+                f"(only {', '.join(sorted(self.devices)) or 'nothing'}); add it under 'devices:'"
+            )
+        return self.devices[key]
 
     def warm_up_s(self, key: str) -> float:
         """Seconds that device needs to become steady; 0 where the rig file says nothing."""
@@ -113,12 +98,11 @@ class Rig:
             self.clock, {key: step}, unless=lambda error: not isinstance(error, UnclearAnswerError)
         )
         if key in failures:
-            if isinstance(failures[key], LabrigError):
+            with device_errors(key):
                 raise failures[key]
-            raise DeviceError(f"{key}: its driver failed ({failures[key]!r})") from failures[key]
 
     def make_safe(self) -> None:
-        """Lamp off, LEDs off, door closed: every device is tried, whatever the others answered.
+        """Lights off, door closed: every device is tried, whatever the others answered.
 
         Lights first: a door that closes turns its sample to the lamp. A device that does not
         confirm is told again, for up to `PATIENCE_S`; one that is gone is not, since only
@@ -155,13 +139,16 @@ class Rig:
             for device in self.devices.values():
                 device.disconnect()
 
-    def _device(self, key: str) -> Device:
-        if key not in self.devices:
-            raise ProtocolError(
-                f"the protocol needs a {key}, the rig '{self.name}' has none "
-                f"(only {', '.join(sorted(self.devices)) or 'nothing'}); add it under 'devices:'"
-            )
-        return self.devices[key]
+
+@contextmanager
+def device_errors(key: str) -> Iterator[None]:
+    """Whatever a driver raises, its own faults included, names the device and ends the run."""
+    try:
+        yield
+    except LabrigError:
+        raise
+    except Exception as error:
+        raise DeviceError(f"{key}: its driver failed ({error!r})") from error
 
 
 def insist(
@@ -206,4 +193,5 @@ def _is_gone(error: Exception) -> bool:
 
 def in_safe_order(keys: Iterable[str]) -> list[str]:
     """Keys of devices, those first that have to be safe before the others move."""
-    return sorted(keys, key=lambda key: SAFE_ORDER.get(key, len(SAFE_ORDER)))
+    order = [key for key, role in ROLES.items() if role.safe_first]
+    return sorted(keys, key=lambda key: order.index(key) if key in order else len(order))

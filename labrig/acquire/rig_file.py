@@ -2,15 +2,18 @@
 
 import os
 from pathlib import Path
-from typing import Any, Literal
+from typing import Any, Literal, TypeVar
 
-from pydantic import BaseModel, ConfigDict, Field
+from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from labrig import shipped
 from labrig.acquire.roles import ROLES
+from labrig.calibration import KINDS, CalibrationKind
 from labrig.errors import UsageError
 from labrig.quantity import DurationS
 from labrig.yaml_file import did_you_mean, read_yaml, validate
+
+ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
 class DeviceEntry(BaseModel):
@@ -27,8 +30,21 @@ class DeviceEntry(BaseModel):
         return dict(self.__pydantic_extra__ or {})
 
 
+def _with_calibrations(model: type[ModelT]) -> type[ModelT]:
+    """The model with a key for each kind of calibration."""
+    keys: dict[str, Any] = {
+        kind.optics_key: (
+            str | None,
+            Field(None, description=f"What {kind.protocol} found: a file, or the folder of a run."),
+        )
+        for kind in KINDS
+    }
+    return create_model(model.__name__, __base__=model, __doc__=model.__doc__, **keys)
+
+
+@_with_calibrations
 class Optics(BaseModel):
-    """What is known of this bench.
+    """What is known of this bench; beside its curves its calibrations, see `CalibrationKind`.
 
     Attributes
     ----------
@@ -36,8 +52,6 @@ class Optics(BaseModel):
         Measured curves: names of shipped files or paths.
     filters
         Folder of the colour filters' transmittances, a file each.
-    camera_file, lvf, irradiance, fade, blank
-        What the protocols of that purpose found: a file, or the folder of their run.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -46,11 +60,6 @@ class Optics(BaseModel):
     lamp: str | None = None
     grey_card: str | None = None
     filters: str | None = None
-    camera_file: str | None = None
-    lvf: str | None = None
-    irradiance: str | None = None
-    fade: str | None = None
-    blank: str | None = None
 
     def filter_files(self) -> dict[str, Path]:
         """Name → transmittance of every colour filter: in the rig's own folder, else the shipped.
@@ -69,6 +78,11 @@ class Optics(BaseModel):
                 f"{shipped_ones} for what one looks like, and 'filters' under 'optics:'"
             )
         return found
+
+    def named(self, kind: CalibrationKind[Any]) -> str | None:
+        """What is named as a calibration of that kind: its file, or the folder of its run."""
+        named: str | None = getattr(self, kind.optics_key)
+        return named
 
 
 class RigFile(BaseModel):

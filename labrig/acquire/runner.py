@@ -4,8 +4,8 @@ from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
 from labrig.acquire.by_hand import TakenBack
-from labrig.acquire.lamp_readback import LampReadback
 from labrig.acquire.protocol import Unit
+from labrig.acquire.readback import LightReadback
 from labrig.acquire.rig import Rig
 from labrig.acquire.session import Observer, Session
 from labrig.acquire.temperature import TemperatureLog
@@ -45,7 +45,7 @@ def run_units(
     A unit that ends by an exception leaves its attempt open: the caller first reaches the safe
     state, then closes the attempt with `RunFolder.close_open_attempts`. Where a person takes back
     what was done by hand last, its unit counts no longer and is done again. The temperature is
-    read at both ends of a unit, and while it waits; the lamp is read back while it waits.
+    read at both ends of a unit, and while it waits; lights are read back while it waits.
 
     Raises
     ------
@@ -74,14 +74,14 @@ def _run_what_is_left(
     done = record.completed()
     frames = [frame for attempt in done.values() for frame in attempt.frames]
     actions = [action for attempt in done.values() for action in attempt.actions]
-    lamp = LampReadback(rig)
+    lights = LightReadback(rig)
     for number, unit in enumerate(units, start=1):
         if unit.name in done:
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
         recorder = _Recorder(rig.clock, writer, frames, actions, observer)
-        session = Session(rig, recorder, observer, temperature, lamp)
+        session = Session(rig, recorder, observer, temperature, lights)
         try:
             with rig.clock.noticing_sleep():
                 session.read_temperature()

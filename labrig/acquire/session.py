@@ -3,21 +3,19 @@
 The same code runs on a bench and in the planner: only devices, clock and recorder differ.
 """
 
-from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager
+from collections.abc import Callable, Sequence
 from dataclasses import replace
 from functools import cached_property
 from typing import Protocol, TypeVar
 
-from labrig.acquire.actions import Action, Missed, Shoot, Switch, Timed
+from labrig.acquire.actions import Action, Missed, Timed
 from labrig.acquire.by_hand import ByHand, TakenBack
-from labrig.acquire.lamp_readback import LampReadback
-from labrig.acquire.rig import Rig
-from labrig.acquire.roles import Guarded, KeptAwake
+from labrig.acquire.readback import LightReadback
+from labrig.acquire.rig import Rig, device_errors
+from labrig.acquire.roles import CAMERA, HANDS, Guarded, KeptAwake, Shoot
 from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import ExposureSettings, Frame
 from labrig.clock import Clock
-from labrig.errors import DeviceError, LabrigError
 from labrig.quantity import duration_text
 from labrig.record import PERSON, ActionRecord, FrameRecord, unit_within
 
@@ -100,8 +98,8 @@ class Session:
     ----------
     temperature
         Reads the thermometer, for all units of a run; None: one of this unit's own.
-    lamp
-        Reads the lamp back, for all units of a run; None: one of this unit's own.
+    lights
+        Reads the lights back, for all units of a run; None: one of this unit's own.
     """
 
     def __init__(
@@ -110,13 +108,13 @@ class Session:
         recorder: Recorder,
         observer: Observer,
         temperature: TemperatureLog | None = None,
-        lamp: LampReadback | None = None,
+        lights: LightReadback | None = None,
     ) -> None:
         self.rig = rig
         self._recorder = recorder
         self._observer = observer
         self._temperature = temperature or TemperatureLog(rig, observer.warn)
-        self._lamp = lamp or LampReadback(rig)
+        self._lights = lights or LightReadback(rig)
         self._in_force: ExposureSettings | None = None
         self._beaten_s = rig.clock.now()
 
@@ -140,7 +138,7 @@ class Session:
     def perform(self, action: Action) -> None:
         """Do one thing now."""
         self._beat_if_due()
-        self._read_lamp_before(action)
+        self._read_lights_before([action])
         self._prepare(action)
         self._execute(action, late_s=0.0)
 
@@ -150,9 +148,9 @@ class Session:
         """Do things at their times after now, against absolute deadlines.
 
         The camera is set and half-pressed for its next photograph as soon as the previous one is
-        over, for the first one before the sequence begins. Before it, the lamp is read back if the
-        sequence switches it. An action whose time has passed is done at once and recorded as late;
-        of lamp, door and shield that is said, too.
+        over, for the first one before the sequence begins. Before it, the lights are read back
+        that the sequence switches. An action whose time has passed is done at once and recorded as
+        late; of all but photographs that is said, too.
 
         Returns
         -------
@@ -160,7 +158,7 @@ class Session:
             What began more than `tolerance_s` after its time, for protocols that then repeat it.
         """
         missed = []
-        self._read_lamp_before(*(timed.action for timed in sequence))
+        self._read_lights_before([timed.action for timed in sequence])
         photographs = [timed.action for timed in sequence if isinstance(timed.action, Shoot)]
         if photographs:
             self._prepare(photographs.pop(0))
@@ -194,9 +192,9 @@ class Session:
         remark = self._observer.ask(step, self._recorder.last_by_hand(), self._meanwhile())
         if remark is None:
             raise TakenBack
-        if "hands" in self.rig.devices:
-            with _device_errors("hands"):
-                self.rig.hands.do(step.task)
+        if HANDS in self.rig:
+            with device_errors(HANDS.key):
+                self.rig[HANDS].do(step.task)
         said = f"{step.what} ({remark})" if remark else step.what
         self._recorder.acted(PERSON, said, start_s, self.clock.now(), 0.0, step.task)
         return remark
@@ -212,7 +210,7 @@ class Session:
     def within(self, part: str) -> "Session":
         """The session of a unit of one part of a chain: it sees frames of its part only."""
         recorder = _PartRecorder(self._recorder, part)
-        return Session(self.rig, recorder, self._observer, self._temperature, self._lamp)
+        return Session(self.rig, recorder, self._observer, self._temperature, self._lights)
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         """A choice that rests on frames already taken; the plan assumes `worst`.
@@ -235,13 +233,13 @@ class Session:
     def _sleep_until(self, deadline_s: float) -> None:
         """Wait; keep from falling asleep what would, and from striking what guards."""
         looked_after = (
-            self._sleepy or self._guarded or self._temperature.is_kept or self._lamp.is_told
+            self._sleepy or self._guarded or self._temperature.is_kept or self._lights.is_told
         )
         while looked_after and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
             self.clock.sleep(AWAKE_PERIOD_S)
             self._look_after()
         if deadline_s - self.clock.now() > QUIET_BEFORE_S:
-            self._read_lamp_if_due()
+            self._lights.read_if_due()
             self._temperature.read_if_due(self._recorder.temperature)
         if deadline_s - self.clock.now() > BEAT_S:
             self._beat_if_due()
@@ -262,21 +260,14 @@ class Session:
 
     def _look_after(self) -> None:
         for key, device in self._sleepy.items():
-            with _device_errors(key):
+            with device_errors(key):
                 device.keep_awake()
         self._beat()
-        self._read_lamp_if_due()
+        self._lights.read_if_due()
         self._temperature.read_if_due(self._recorder.temperature)
 
-    def _read_lamp_if_due(self) -> None:
-        with _device_errors("lamp"):
-            self._lamp.read_if_due()
-
-    def _read_lamp_before(self, *actions: Action) -> None:
-        """A charge that ends now was one only if nobody else has ended it already."""
-        if any(isinstance(action, Switch) for action in actions):
-            with _device_errors("lamp"):
-                self._lamp.read()
+    def _read_lights_before(self, actions: Sequence[Action]) -> None:
+        self._lights.read_before([one for one in actions if not isinstance(one, Shoot)])
 
     def _beat_if_due(self) -> None:
         if self.clock.now() - self._beaten_s >= AWAKE_PERIOD_S:
@@ -284,7 +275,7 @@ class Session:
 
     def _beat(self) -> None:
         for key, device in self._guarded.items():
-            with _device_errors(key):
+            with device_errors(key):
                 device.heartbeat()
         self._beaten_s = self.clock.now()
 
@@ -299,8 +290,8 @@ class Session:
     def _prepare(self, action: Action) -> None:
         if not isinstance(action, Shoot):
             return
-        camera = self.rig.camera
-        with _device_errors("camera"):
+        camera = self.rig[CAMERA]
+        with device_errors(CAMERA.key):
             if action.settings != self._in_force:
                 self._in_force = None
                 camera.configure(action.settings)
@@ -310,16 +301,15 @@ class Session:
     def _execute(self, action: Action, late_s: float) -> None:
         if isinstance(action, Shoot):
             self._observer.doing(str(action))
-            with _device_errors("camera"):
-                frame = self.rig.camera.shoot()
+            with device_errors(CAMERA.key):
+                frame = self.rig[CAMERA].shoot()
             self._recorder.photographed(action.purpose, frame, late_s)
             return
         self._observer.doing(f"{action.device} {action}")
         start_s = self.clock.now()
-        with _device_errors(action.device):
-            action.begin(self.rig)
-        if isinstance(action, Switch):
-            self._lamp.asked(action.on)
+        with device_errors(action.device):
+            action.begin(self.rig.device(action.device))
+        self._lights.asked(action)
         self._recorder.acted(action.device, str(action), start_s, self.clock.now(), late_s)
 
 
@@ -347,14 +337,3 @@ class _PartRecorder:
             for record in records
             if (unit := unit_within(self._part, record.unit)) is not None
         ]
-
-
-@contextmanager
-def _device_errors(key: str) -> Iterator[None]:
-    """Whatever a driver raises, its own faults included, names the device and ends the run."""
-    try:
-        yield
-    except LabrigError:
-        raise
-    except Exception as error:
-        raise DeviceError(f"{key}: its driver failed ({error!r})") from error

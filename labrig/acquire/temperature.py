@@ -3,8 +3,9 @@
 import math
 from collections.abc import Callable
 
-from labrig.acquire.rig import Rig
-from labrig.errors import DeviceError, LabrigError
+from labrig.acquire.rig import Rig, device_errors
+from labrig.acquire.roles import THERMOMETER
+from labrig.errors import DeviceError
 
 #: How often while something is waited for; rooms change in ten minutes.
 READ_PERIOD_S = 60.0
@@ -25,7 +26,7 @@ class TemperatureLog:
     """
 
     def __init__(self, rig: Rig, warn: Callable[[str], None]) -> None:
-        self.is_kept = "thermometer" in rig.devices
+        self.is_kept = THERMOMETER in rig
         self._rig = rig
         self._warn = warn
         self._has_warned = False
@@ -37,7 +38,8 @@ class TemperatureLog:
             return
         self._read_s = start_s = self._rig.clock.now()
         try:
-            celsius = _celsius(self._rig)
+            with device_errors(THERMOMETER.key):
+                celsius = self._rig[THERMOMETER].celsius()
         except DeviceError as error:
             if not self._has_warned:
                 self._warn(f"the run goes on without temperatures: {error}")
@@ -49,13 +51,3 @@ class TemperatureLog:
         """Read if the last reading is long ago."""
         if self._rig.clock.now() - self._read_s >= READ_PERIOD_S:
             self.read(keep)
-
-
-def _celsius(rig: Rig) -> float:
-    """As `Thermometer.celsius`; a fault of the driver is the thermometer's, too."""
-    try:
-        return rig.thermometer.celsius()
-    except LabrigError:
-        raise
-    except Exception as error:
-        raise DeviceError(f"thermometer: its driver failed ({error!r})") from error

@@ -1,29 +1,22 @@
 """What is known of a bench before a part is processed."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 from labrig.acquire import RigFile
 from labrig.calibration import (
+    KINDS,
     BlankFile,
     CameraFile,
     FadeFile,
     IrradianceFile,
     LvfFile,
-    read_blank_file,
-    read_camera_file,
-    read_fade_file,
-    read_irradiance_file,
-    read_lvf_file,
 )
-from labrig.errors import UsageError
 from labrig.material import Material
 from labrig.results import FittedDecay, RunResult
 from labrig.results.emission_spectrum import EmissionSpectrum
-
-FileT = TypeVar("FileT")
 
 
 @dataclass(frozen=True)
@@ -33,7 +26,8 @@ class Inputs:
     Attributes
     ----------
     camera, blank, fade, lvf, irradiance
-        From a rig file's `optics:`, or measured earlier in the same run.
+        Calibrations, by the names of their kinds: from a rig file's `optics:`, or measured earlier
+        in the same run.
     spectra
         By patch; under "" of the only one.
     decays
@@ -60,13 +54,12 @@ class Inputs:
         UsageError
             One is missing or malformed.
         """
-        optics = rig.optics
         return cls(
-            camera=_read(optics.camera_file, "camera.yaml", read_camera_file),
-            blank=_read(optics.blank, "blank.yaml", read_blank_file),
-            fade=_read(optics.fade, "fade.yaml", read_fade_file),
-            lvf=_read(optics.lvf, "lvf.yaml", read_lvf_file),
-            irradiance=_read(optics.irradiance, "irradiance.yaml", read_irradiance_file),
+            **{
+                kind.name: kind.read_named(Path(named))
+                for kind in KINDS
+                if (named := rig.optics.named(kind)) is not None
+            }
         )
 
     def with_those_of(self, result: RunResult) -> Self:
@@ -76,19 +69,3 @@ class Inputs:
             for name, value in result.provides().items()
         }
         return replace(self, **provided)
-
-
-def _read(named: str | None, name: str, read: Callable[[Path], FileT]) -> FileT | None:
-    """The file itself, or the one in a run folder's result, be it one part of a chain."""
-    if named is None:
-        return None
-    path = Path(named)
-    if not path.is_dir():
-        return read(path)
-    found = [*path.glob(f"result/{name}"), *path.glob(f"result/*/{name}")]
-    if len(found) != 1:
-        raise UsageError(
-            f"{path}: expected a run with one {name} in its result, got {len(found)}; process it "
-            "first, or name the file itself"
-        )
-    return read(found[0])

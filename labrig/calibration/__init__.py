@@ -1,7 +1,15 @@
-"""Calibrations of a bench as files: what its own protocols measure and later ones use."""
+"""Calibrations of a bench as files: what its own protocols measure and later ones use.
 
-from labrig.calibration.blank_file import BlankFile, read_blank_file, write_blank_file
+To add a kind, write its file's module with its `CalibrationKind` and list that in `KINDS`: rig
+files then have its key. Analyses find it in the field of `labrig.analyse.inputs.Inputs` that has
+its name.
+"""
+
+from typing import Any
+
+from labrig.calibration.blank_file import BLANK_KIND, BlankFile, read_blank_file, write_blank_file
 from labrig.calibration.camera_file import (
+    CAMERA_KIND,
     CameraFile,
     Factor,
     Linearity,
@@ -10,6 +18,7 @@ from labrig.calibration.camera_file import (
     write_camera_file,
 )
 from labrig.calibration.fade_file import (
+    FADE_KIND,
     Change,
     FadeFile,
     Warming,
@@ -18,14 +27,32 @@ from labrig.calibration.fade_file import (
 )
 from labrig.calibration.flat_field import Flat, rho_squared
 from labrig.calibration.irradiance_file import (
+    IRRADIANCE_KIND,
     IrradianceFile,
     read_irradiance_file,
     write_irradiance_file,
 )
-from labrig.calibration.lvf_file import LvfFile, Strip, read_lvf_file, write_lvf_file
+from labrig.calibration.kind import CalibrationKind
+from labrig.calibration.lvf_file import LVF_KIND, LvfFile, Strip, read_lvf_file, write_lvf_file
+
+#: Every kind, in the order of their keys in a rig file.
+KINDS: tuple[CalibrationKind[Any], ...] = (
+    CAMERA_KIND,
+    LVF_KIND,
+    IRRADIANCE_KIND,
+    FADE_KIND,
+    BLANK_KIND,
+)
 
 __all__ = [
+    "BLANK_KIND",
+    "CAMERA_KIND",
+    "FADE_KIND",
+    "IRRADIANCE_KIND",
+    "KINDS",
+    "LVF_KIND",
     "BlankFile",
+    "CalibrationKind",
     "CameraFile",
     "Change",
     "Factor",

@@ -7,6 +7,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from labrig.calibration.kind import CalibrationKind
 from labrig.errors import DataError
 from labrig.yaml_file import read_model, write_yaml
 
@@ -121,3 +122,13 @@ def read_blank_file(path: Path) -> BlankFile:
 def write_blank_file(path: Path, file: BlankFile) -> None:
     """Write `file` so that `read_blank_file` gives it back."""
     write_yaml(path, file)
+
+
+BLANK_KIND = CalibrationKind(
+    name="blank",
+    protocol="blank",
+    optics_key="blank",
+    file_name="blank.yaml",
+    read=read_blank_file,
+    write=write_blank_file,
+)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.calibration.flat_field import Flat
+from labrig.calibration.kind import CalibrationKind
 from labrig.errors import DataError
 from labrig.region import Region
 from labrig.yaml_file import read_model, write_yaml
@@ -222,6 +223,16 @@ def read_camera_file(path: Path) -> CameraFile:
 def write_camera_file(path: Path, file: CameraFile) -> None:
     """Write `file` so that `read_camera_file` gives it back."""
     write_yaml(path, file)
+
+
+CAMERA_KIND = CalibrationKind(
+    name="camera",
+    protocol="camera_calibration",
+    optics_key="camera_file",
+    file_name="camera.yaml",
+    read=read_camera_file,
+    write=write_camera_file,
+)
 
 
 def _body(identity: str) -> str:

@@ -8,6 +8,7 @@ import numpy as np
 from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from labrig.calibration.kind import CalibrationKind
 from labrig.yaml_file import read_model, write_yaml
 
 FloatArray = NDArray[np.float64]
@@ -121,3 +122,13 @@ def read_fade_file(path: Path) -> FadeFile:
 def write_fade_file(path: Path, file: FadeFile) -> None:
     """Write `file` so that `read_fade_file` gives it back."""
     write_yaml(path, file)
+
+
+FADE_KIND = CalibrationKind(
+    name="fade",
+    protocol="fade",
+    optics_key="fade",
+    file_name="fade.yaml",
+    read=read_fade_file,
+    write=write_fade_file,
+)

@@ -6,6 +6,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from labrig.calibration.kind import CalibrationKind
 from labrig.calibration.lvf_file import Strip
 from labrig.yaml_file import read_model, write_yaml
 
@@ -89,6 +90,16 @@ def read_irradiance_file(path: Path) -> IrradianceFile:
 def write_irradiance_file(path: Path, file: IrradianceFile) -> None:
     """Write `file` so that `read_irradiance_file` gives it back."""
     write_yaml(path, file)
+
+
+IRRADIANCE_KIND = CalibrationKind(
+    name="irradiance",
+    protocol="irradiance",
+    optics_key="irradiance",
+    file_name="irradiance.yaml",
+    read=read_irradiance_file,
+    write=write_irradiance_file,
+)
 
 
 def _rising(values: tuple[float, ...], name: str) -> None:

@@ -8,6 +8,7 @@ from typing import Annotated, Literal, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from labrig.calibration.kind import CalibrationKind
 from labrig.optics import Bands, CameraResponse, Lvf, WavelengthMap
 from labrig.region import Region, region_pixels
 from labrig.yaml_file import read_model, write_yaml
@@ -246,3 +247,13 @@ def read_lvf_file(path: Path) -> LvfFile:
 def write_lvf_file(path: Path, file: LvfFile) -> None:
     """Write `file` so that `read_lvf_file` gives it back."""
     write_yaml(path, file)
+
+
+LVF_KIND = CalibrationKind(
+    name="lvf",
+    protocol="lvf_calibration",
+    optics_key="lvf",
+    file_name="lvf.yaml",
+    read=read_lvf_file,
+    write=write_lvf_file,
+)

@@ -35,8 +35,8 @@ def process(
         list[str] | None,
         typer.Option(
             "--optics",
-            help="KEY=PATH: a calibration instead of the rig file's 'optics:', a file or a run: "
-            "irradiance, lvf, fade, blank, camera_file, …. Repeatable.",
+            help="KEY=PATH: what a key of the rig file's 'optics:' is to name instead, a file or a "
+            "run, such as lvf=PATH. Repeatable.",
         ),
     ] = None,
     runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),

@@ -49,7 +49,7 @@ def check(
 ) -> None:
     """Connect, identify, look for settings that spoil photometry, exercise gently, leave safe.
 
-    The lamp is lit three times, well under a second each; door and shield go there and back once;
+    Lights are lit some times, well under a second each; door and shield go there and back once;
     the camera takes three short frames and a dark one of 2 s. Do it in the dark. Exit code 0:
     fine, 2: a setting has to be changed first, 3: a device failed.
     """

@@ -11,6 +11,7 @@ from pathlib import Path
 import h5py
 import numpy as np
 
+from labrig.acquire import CAMERA, DARK, LIGHTS
 from labrig.errors import DiskError
 from labrig.export.hdf5 import add_group, add_note, add_number, add_text
 from labrig.export.nexus_decay import add_decays, add_fit, valid_names
@@ -23,7 +24,7 @@ from labrig.results.phosphor import PhosphorResult
 
 YAML = "application/yaml"
 #: NeXus classes of the devices that have one.
-DEVICE_CLASSES = {"camera": "NXdetector", "lamp": "NXsource", "leds": "NXsource"}
+DEVICE_CLASSES = {CAMERA.key: "NXdetector", **dict.fromkeys(LIGHTS, "NXsource")}
 
 
 def write_nexus(path: Path, run: RunRecord, about: RunDescription, result: RunResult) -> None:
@@ -118,10 +119,10 @@ def _add_device(
     group = add_group(instrument, device.role, DEVICE_CLASSES.get(device.role, "NXcollection"))
     add_text(group, "name", device.role)
     add_text(group, "description", device.identity)
-    if device.role == "camera":
+    if device.role == CAMERA.key:
         _add_frames(group, run, start_time)
-    if device.role == "lamp":
-        _add_switching(group, run, start_time)
+    if device.role in LIGHTS:
+        _add_switching(group, device.role, run, start_time)
 
 
 def _add_frames(camera: h5py.Group, run: RunRecord, start_time: float) -> None:
@@ -146,18 +147,18 @@ def _add_frames(camera: h5py.Group, run: RunRecord, start_time: float) -> None:
     add_number(kept, "late", [frame.late_s for frame in frames], "s")
 
 
-def _add_switching(lamp: h5py.Group, run: RunRecord, start_time: float) -> None:
-    """When the lamp went on and off: the history of the sample's charge."""
+def _add_switching(light: h5py.Group, key: str, run: RunRecord, start_time: float) -> None:
+    """When the light went on and off: the history of the sample's charge."""
     switched = [
         action
         for attempt in run.completed().values()
         for action in attempt.actions
-        if action.device == "lamp" and action.action in ("on", "off")
+        if action.device == key
     ]
-    log = add_group(lamp, "switched", "NXlog")
+    log = add_group(light, "switched", "NXlog")
     middles = [action.middle_time - start_time for action in switched]
     add_number(log, "time", middles, "s").attrs["start"] = _iso(start_time)
-    add_number(log, "value", np.array([action.action == "on" for action in switched], np.int8))
+    add_number(log, "value", np.array([action.action != DARK for action in switched], np.int8))
     add_text(log, "description", "1: on, 0: off")
 
 

@@ -5,7 +5,7 @@ from collections.abc import Iterator
 import numpy as np
 from matplotlib.figure import Figure
 
-from labrig.calibration import LvfFile
+from labrig.calibration import LVF_KIND, LvfFile
 from labrig.optics import CameraResponse, WavelengthMap
 from labrig.report.figure_style import (
     DASHED,
@@ -158,7 +158,7 @@ def _table(file: LvfFile) -> Table:
         for k in chosen
     ]
     head = ("Position", "Centre / nm", "Width / nm", "Peak / %", "Leakage / %")
-    return Table(head, tuple(rows), "Some of the positions; all are in lvf.yaml.")
+    return Table(head, tuple(rows), f"Some of the positions; all are in {LVF_KIND.file_name}.")
 
 
 def _profile_figure(found: StripLines, wavelengths: WavelengthMap) -> Figure:

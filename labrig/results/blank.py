@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from labrig.calibration import BlankFile, write_blank_file
+from labrig.calibration import BLANK_KIND, BlankFile
 from labrig.results.arrays import BoolArray, FloatArray
 from labrig.results.run_result import RunResult
 
@@ -60,8 +60,8 @@ class BlankResult(RunResult):
 
     def provides(self) -> Mapping[str, Any]:
         """The blank."""
-        return {"blank": self.calibration}
+        return {BLANK_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:
         """Write `blank.yaml`."""
-        write_blank_file(folder / "blank.yaml", self.calibration)
+        BLANK_KIND.write_into(folder, self.calibration)

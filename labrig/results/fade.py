@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from labrig.calibration import FadeFile, write_fade_file
+from labrig.calibration import FADE_KIND, FadeFile
 from labrig.results.arrays import FloatArray
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
@@ -131,8 +131,8 @@ class FadeResult(RunResult):
 
     def provides(self) -> Mapping[str, Any]:
         """The fade."""
-        return {"fade": self.calibration}
+        return {FADE_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:
         """Write `fade.yaml`."""
-        write_fade_file(folder / "fade.yaml", self.calibration)
+        FADE_KIND.write_into(folder, self.calibration)

@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from labrig.calibration import IrradianceFile, write_irradiance_file
+from labrig.calibration import IRRADIANCE_KIND, IrradianceFile
 from labrig.results.arrays import FloatArray
 from labrig.results.run_result import RunResult
 
@@ -88,8 +88,8 @@ class IrradianceResult(RunResult):
 
     def provides(self) -> Mapping[str, Any]:
         """The irradiance."""
-        return {"irradiance": self.calibration}
+        return {IRRADIANCE_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:
         """Write `irradiance.yaml`."""
-        write_irradiance_file(folder / "irradiance.yaml", self.calibration)
+        IRRADIANCE_KIND.write_into(folder, self.calibration)

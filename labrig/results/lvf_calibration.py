@@ -7,7 +7,7 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from labrig.calibration import LvfFile, Strip, write_lvf_file
+from labrig.calibration import LVF_KIND, LvfFile, Strip
 from labrig.optics import CameraResponse
 from labrig.results.arrays import FloatArray
 from labrig.results.run_result import RunResult
@@ -166,8 +166,8 @@ class LvfCalibrationResult(RunResult):
 
     def provides(self) -> Mapping[str, Any]:
         """The calibrated filter."""
-        return {"lvf": self.calibration}
+        return {LVF_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:
         """Write `lvf.yaml`."""
-        write_lvf_file(folder / "lvf.yaml", self.calibration)
+        LVF_KIND.write_into(folder, self.calibration)

@@ -2,17 +2,15 @@
 
 from labrig.setup.check import check_rig
 from labrig.setup.discover import Discovery, Found, discover
-from labrig.setup.report import DeviceReport, Measured, RigReport, Suggestion
+from labrig.setup.report import DeviceReport, RigReport
 from labrig.setup.surroundings import Process, Surroundings
 
 __all__ = [
     "DeviceReport",
     "Discovery",
     "Found",
-    "Measured",
     "Process",
     "RigReport",
-    "Suggestion",
     "Surroundings",
     "check_rig",
     "discover",

@@ -1,102 +1,33 @@
-"""The camera's part of a rig check: three short frames for their timing, a longer one for noise."""
+"""What the photographs of a rig check tell: the noise of a dark frame, whether it is turned."""
 
 import io
 import logging
-import math
-from dataclasses import replace
 from typing import Any
 
-from labrig.acquire import Camera, CameraOffers, ExposureSettings, Finding, Frame
-from labrig.clock import Clock
-from labrig.errors import DeviceError
-from labrig.quantity import duration_text
+from labrig.acquire import Exercised, Finding, Frame, Measured
 from labrig.reduce import FrameMeasurement, measure, read_raw
-from labrig.setup.report import DeviceReport, Measured, Suggestion, spread_ms
+from labrig.setup.picture_stats import decode
 
-SHORT_FRAMES = 3
-SHORT_S, LONG_S = 1 / 60, 2.0
-#: From a half press until the camera is certainly ready: in a run it has that time, too.
-SETTLING_S = 0.5
-#: A sensitivity at which read noise and dark current both show.
-ISO = 400
 #: Mean above black, as a part of the range, from which on a frame is not dark.
 LIGHT = 0.005
-#: Suggested times are rounded up to this, so that the plan is kept.
-STEP_S = 0.1
 #: EXIF orientation of a picture that was not turned.
 UPRIGHT = 1
 
 
-def exercise_camera(report: DeviceReport, camera: Camera, clock: Clock) -> DeviceReport:
-    """`report` with what photographing taught.
+class Photographs:
+    """The eyes of a rig check: reads RAW frames and live pictures."""
 
-    Raises
-    ------
-    LabrigError
-        The camera failed, or its frame cannot be reduced.
-    """
-    offers = camera.offers()
-    measured, suggestions = _timing(camera, offers, clock)
-    frame = _shoot(camera, _settings(offers, LONG_S), clock)[0]
-    reduced = measure(read_raw(frame.data, "the dark frame"))
-    return replace(
-        report,
-        findings=(*report.findings, _darkness(reduced), _orientation(frame.data)),
-        measured=(*report.measured, _offered(offers), *measured, *_noise(reduced, frame)),
-        suggestions=(*report.suggestions, *suggestions),
-    )
+    def dark_frame(self, frame: Frame) -> Exercised:
+        """Its noise, whether it is dark, whether it is turned."""
+        reduced = measure(read_raw(frame.data, "the dark frame"))
+        return Exercised(
+            tuple(_noise(reduced, frame)), (_darkness(reduced), _orientation(frame.data))
+        )
 
-
-def _timing(
-    camera: Camera, offers: CameraOffers, clock: Clock
-) -> tuple[list[Measured], list[Suggestion]]:
-    settings = _settings(offers, SHORT_S)
-    lags_s, cycles_s = [], []
-    for _ in range(SHORT_FRAMES):
-        frame, asked_s = _shoot(camera, settings, clock)
-        camera.arm()  # only now can the next exposure begin
-        lags_s.append(frame.start_s - asked_s)
-        cycles_s.append(clock.now() - frame.end_s)
-    frame_time_s = math.ceil(max(cycles_s) / STEP_S) * STEP_S
-    return [
-        Measured(
-            "release asked to exposure begun, with the rig file's shutter_lag", spread_ms(lags_s)
-        ),
-        Measured("exposure over to ready for the next", spread_ms(cycles_s)),
-    ], [Suggestion("frame_time", duration_text(frame_time_s))]
-
-
-def _shoot(camera: Camera, settings: ExposureSettings, clock: Clock) -> tuple[Frame, float]:
-    """The frame, and when it was asked for."""
-    camera.configure(settings)
-    camera.arm()
-    clock.sleep(SETTLING_S)
-    asked_s = clock.now()
-    frame = camera.shoot()
-    if not frame.data:
-        raise DeviceError("the camera delivered an empty frame; try again")
-    return frame, asked_s
-
-
-def _settings(offers: CameraOffers, exposure_s: float) -> ExposureSettings:
-    return ExposureSettings(
-        offers.exposure_at_most(exposure_s),
-        min(offers.isos, key=lambda iso: abs(iso - ISO)),
-        max(offers.f_numbers, default=None),
-    )
-
-
-def _offered(offers: CameraOffers) -> Measured:
-    return Measured(
-        "it offers",
-        f"{duration_text(offers.exposures_s[0])} to {duration_text(offers.exposures_s[-1])}, "
-        f"ISO {', '.join(map(str, offers.isos))}, "
-        + (
-            f"f/{offers.f_numbers[0]:g} to f/{offers.f_numbers[-1]:g}"
-            if offers.f_numbers
-            else "no aperture"
-        ),
-    )
+    def live_picture(self, jpeg: bytes) -> Measured:
+        """Its size."""
+        height, width, _ = decode(jpeg).shape
+        return Measured("live picture", f"{width} x {height} pixels, {len(jpeg) / 1e3:.1f} kB")
 
 
 def _noise(reduced: FrameMeasurement, frame: Frame) -> list[Measured]:

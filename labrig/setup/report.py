@@ -1,26 +1,10 @@
 """What a rig check found out."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterator
 from dataclasses import asdict, dataclass
 from typing import Any
 
-from labrig.acquire import Finding
-
-
-@dataclass(frozen=True)
-class Measured:
-    """One thing that was measured, with its unit in the text of `value`."""
-
-    what: str
-    value: str
-
-
-@dataclass(frozen=True)
-class Suggestion:
-    """A key of the rig file and the measured value it could have."""
-
-    key: str
-    value: str
+from labrig.acquire import Finding, Measured, Suggestion
 
 
 @dataclass(frozen=True)
@@ -96,9 +80,3 @@ class RigReport:
     def to_json(self) -> dict[str, Any]:
         """What `labrig rig check --json` prints."""
         return asdict(self) | {"failures": list(self.failures), "refusals": list(self.refusals)}
-
-
-def spread_ms(durations_s: Sequence[float]) -> str:
-    """Shortest to longest, in milliseconds."""
-    shortest, longest = min(durations_s) * 1e3, max(durations_s) * 1e3
-    return f"{shortest:.1f} to {longest:.1f} ms ({len(durations_s)} times)"

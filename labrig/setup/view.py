@@ -5,7 +5,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Never
 
-from labrig.acquire import LiveView, Rig, read_rig_file
+from labrig.acquire import CAMERA, VIEWFINDER, LiveView, Rig, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import Clock
 from labrig.errors import UsageError
@@ -18,7 +18,7 @@ PICTURE_PERIOD_S = 0.1
 #: Ctrl-C is answered at least so often, in real time.
 LOOK_UP_S = 0.1
 #: Devices that may have a live view, the one made for it first.
-_EYES = ("viewfinder", "camera")
+_EYES = (VIEWFINDER.key, CAMERA.key)
 
 
 def view_rig(

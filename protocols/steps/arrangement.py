@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 from typing import Literal
 
-from labrig.acquire import LAMP_OFF, LAMP_ON, ByHand, Session
+from labrig.acquire import LAMP, LAMP_OFF, LAMP_ON, ByHand, Session
 
 from .posing import face_lamp
 from .still_life import LOOK
@@ -77,7 +77,7 @@ class Arrangement:
 
 def light(session: Session, warm_up_s: float) -> None:
     """Lamp on, and steady; one that has been on since the unit before is."""
-    if not session.rig.lamp.is_on():
+    if not session.rig[LAMP].is_on():
         face_lamp(session)
         session.perform(LAMP_ON)
         session.wait(warm_up_s, "the lamp warms up")

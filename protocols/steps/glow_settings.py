@@ -6,7 +6,7 @@ from itertools import pairwise
 
 from pydantic import Field
 
-from labrig.acquire import CameraOffers, ExposureSettings, ProtocolModel, Session
+from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, ProtocolModel, Session
 from labrig.quantity import DurationS
 from labrig.region import Region
 
@@ -87,7 +87,7 @@ class GlowSettings(ProtocolModel):
 
     def short_settings(self, session: Session) -> list[ExposureSettings]:
         """For a closer look at what clips."""
-        ladder = self.meter_ladder(session.rig.camera.offers())[:3]
+        ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
         return [self.settings(exposure_s) for _, exposure_s in ladder]
 
     def watcher(self, session: Session, unit: str, metering: str = "meter") -> Watcher:
@@ -101,7 +101,7 @@ class GlowSettings(ProtocolModel):
 
 def metered_schedule(session: Session, protocol: GlowSettings, metering: str) -> Schedule:
     """Shutter times of the glow, from what the unit `metering` saw of it."""
-    offers = session.rig.camera.offers()
+    offers = session.rig[CAMERA].offers()
 
     def decide() -> Schedule:
         frames = [frame for frame in session.frames("meter") if frame.unit == metering]

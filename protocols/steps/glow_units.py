@@ -4,7 +4,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from labrig.acquire import CameraOffers, ExposureSettings, Session, Shoot, at
+from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, Session, Shoot, at
 
 from .posing import check_seen, lights_out
 from .resting import dark_frames
@@ -46,7 +46,7 @@ class DarkUnit:
     def run(self, session: Session) -> None:
         """Warm the camera up, then photograph darkness."""
         session.wait_until_warm("camera")
-        exposures_s = self.protocol.dark_exposures_s(session.rig.camera.offers())
+        exposures_s = self.protocol.dark_exposures_s(session.rig[CAMERA].offers())
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
         watcher = self.protocol.watcher(session, self.name)
         dark_frames(session, self.name, watcher.patches, exposures)
@@ -65,7 +65,7 @@ class MeterUnit:
         """Charge, lamp off, a ladder of exposures; for `grow`, then on along the decay."""
         session.wait_until_warm("camera")
         self.protocol.charge_sample(session, min(self.charge_s, METER_CHARGE_S))
-        ladder = self.protocol.meter_ladder(session.rig.camera.offers())
+        ladder = self.protocol.meter_ladder(session.rig[CAMERA].offers())
         check_seen(session, ladder[0][0])
         session.run_sequence(
             [

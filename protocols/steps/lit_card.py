@@ -4,6 +4,8 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 
 from labrig.acquire import (
+    CAMERA,
+    LAMP,
     LAMP_ON,
     ByHand,
     CameraOffers,
@@ -79,7 +81,7 @@ class CardMeterUnit:
         """Light the card, photograph it, refuse one that is not lit."""
         session.wait_until_warm("camera")
         light_card(session)
-        offers = session.rig.camera.offers()
+        offers = session.rig[CAMERA].offers()
         for wanted_s in METERED_S:
             exposure_s = offers.exposure_at_most(wanted_s)
             shot = ExposureSettings(exposure_s, self.settings.iso, self.settings.f_number)
@@ -90,7 +92,7 @@ class CardMeterUnit:
 def light_card(session: Session) -> None:
     """Lamp on and warm, the sample turned to it; nothing is done where it burns already."""
     face_lamp(session)
-    if not session.rig.lamp.is_on():
+    if not session.rig[LAMP].is_on():
         session.perform(LAMP_ON)
         session.wait(max(session.rig.warm_up_s("lamp"), SETTLES_S), "lamp warms up")
 

@@ -6,10 +6,12 @@ Without a door the sample faces lamp and camera at once, and nothing has to be m
 from collections.abc import Sequence
 
 from labrig.acquire import (
+    DOOR,
     DOOR_CLOSE,
     DOOR_OPEN,
     LAMP_OFF,
     LAMP_ON,
+    SHIELD,
     SHIELD_COVER,
     SHIELD_UNCOVER,
     Session,
@@ -27,25 +29,25 @@ SETTLES_S = 0.1
 
 def has_door(session: Session) -> bool:
     """Whether the sample turns from lamp to camera."""
-    return "door" in session.rig.devices
+    return DOOR in session.rig
 
 
 def face_camera(session: Session) -> None:
     """The camera sees the sample, the lamp does not reach it; waits until the door has stopped."""
     if has_door(session):
         session.perform(DOOR_OPEN)
-        session.wait(session.rig.door.travel_s() + SETTLES_S, "door opens")
+        session.wait(session.rig[DOOR].travel_s() + SETTLES_S, "door opens")
 
 
 def face_lamp(session: Session) -> None:
     """The sample faces the lamp, uncovered; waits until the doors have stopped."""
     travels_s = []
-    if "shield" in session.rig.devices:
+    if SHIELD in session.rig:
         session.perform(SHIELD_UNCOVER)
-        travels_s.append(session.rig.shield.travel_s())
+        travels_s.append(session.rig[SHIELD].travel_s())
     if has_door(session):
         session.perform(DOOR_CLOSE)
-        travels_s.append(session.rig.door.travel_s())
+        travels_s.append(session.rig[DOOR].travel_s())
     if travels_s:
         session.wait(max(travels_s) + SETTLES_S, "door and shield move")
 
@@ -61,9 +63,9 @@ def lights_out(session: Session) -> Sequence[Timed]:
     """The begin of a timed sequence: lamp off, shield before it, then the door opens."""
     steps = [at(0.0, LAMP_OFF)]
     dark_s = LAMP_DARK_S
-    if "shield" in session.rig.devices:
+    if SHIELD in session.rig:
         steps.append(at(0.0, SHIELD_COVER))
-        dark_s = min(dark_s, session.rig.shield.travel_s() + SETTLES_S)
+        dark_s = min(dark_s, session.rig[SHIELD].travel_s() + SETTLES_S)
     if has_door(session):
         steps.append(at(dark_s, DOOR_OPEN))
     return steps
@@ -73,7 +75,7 @@ def seen_s(session: Session) -> float:
     """From `lights_out` until the camera sees the whole sample."""
     if not has_door(session):
         return 0.0
-    return lights_out(session)[-1].at_s + session.rig.door.travel_s() + SETTLES_S
+    return lights_out(session)[-1].at_s + session.rig[DOOR].travel_s() + SETTLES_S
 
 
 def check_seen(session: Session, first_s: float) -> None:

@@ -2,7 +2,7 @@
 
 from dataclasses import dataclass
 
-from labrig.acquire import Session, Shoot
+from labrig.acquire import CAMERA, Session, Shoot
 from labrig.record import FrameRecord
 from labrig.region import CENTRE
 
@@ -22,7 +22,7 @@ class StillDarkUnit:
         """Warm the camera up, then photograph darkness."""
         session.wait_until_warm("camera")
         scene = self.still_life
-        exposures_s = scene.dark_exposures_s(session.rig.camera.offers())
+        exposures_s = scene.dark_exposures_s(session.rig[CAMERA].offers())
         for exposure_s in exposures_s:
             session.perform(Shoot("dark", scene.settings(exposure_s)))
         Watcher(session, self.name, [CENTRE], None).insist_on_darkness(

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.acquire import CameraOffers, ExposureSettings, Session, Shoot
+from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, Session, Shoot
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
@@ -67,7 +67,7 @@ class StillLife:
         DeviceError
             It is dark.
         """
-        offers = session.rig.camera.offers()
+        offers = session.rig[CAMERA].offers()
         for exposure_s in self._ladder(offers):
             session.perform(Shoot(LOOK, self.settings(exposure_s)))
             if session.choose("bright enough", lambda: self._enough(session, unit), worst=False):
@@ -90,7 +90,7 @@ class StillLife:
 
     def _exposure_s(self, session: Session, unit: str, lamp: str) -> float:
         """Shutter time at which the brightest fills as much of the range as it should."""
-        offers, looks = session.rig.camera.offers(), _looks(session, unit)
+        offers, looks = session.rig[CAMERA].offers(), _looks(session, unit)
         seen = [_seen(frame) for frame in looks]
         visible = [one for one in seen if one.visible]
         if not visible:

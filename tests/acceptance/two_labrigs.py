@@ -17,7 +17,7 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from labrig.setup.check import SWITCHINGS
+from labrig.acquire.roles.lamp import SWITCHINGS
 from tests.acceptance.board_on_a_terminal import RIG, WatchedBoard
 from tests.terminal import on_a_terminal
 

@@ -4,7 +4,7 @@ from collections.abc import Callable
 
 import pytest
 
-from labrig.acquire import Device, Rig
+from labrig.acquire import CAMERA, LAMP, Device, Rig
 from labrig.acquire.rig import PATIENCE_S
 from labrig.clock import VirtualClock
 from labrig.errors import DeviceError, DeviceLostError, UnclearAnswerError, UsageError
@@ -55,8 +55,8 @@ def rig(clock: VirtualClock, notes: list[str]) -> Rig:
 def test_a_lamp_that_obeys_late_is_off_and_the_door_did_not_wait_for_it(
     rig: Rig, clock: VirtualClock, notes: list[str], error: Exception
 ) -> None:
-    stubborn = Stubborn(clock, rig.lamp.off, 0.8 * PATIENCE_S, error)
-    rig.lamp.make_safe = stubborn  # type: ignore[method-assign]
+    stubborn = Stubborn(clock, rig[LAMP].off, 0.8 * PATIENCE_S, error)
+    rig[LAMP].make_safe = stubborn  # type: ignore[method-assign]
     rig.make_safe()
     assert notes == ["door closed", "camera safe", "lamp off"]
     assert stubborn.tries > 5
@@ -64,8 +64,8 @@ def test_a_lamp_that_obeys_late_is_off_and_the_door_did_not_wait_for_it(
 
 
 def test_patience_ends(rig: Rig, clock: VirtualClock) -> None:
-    stubborn = Stubborn(clock, rig.lamp.off, 1e9, UnclearAnswerError("says ?"))
-    rig.lamp.make_safe = stubborn  # type: ignore[method-assign]
+    stubborn = Stubborn(clock, rig[LAMP].off, 1e9, UnclearAnswerError("says ?"))
+    rig[LAMP].make_safe = stubborn  # type: ignore[method-assign]
     with pytest.raises(DeviceLostError, match="switch off by hand: lamp: says \\?") as caught:
         rig.make_safe()
     assert caught.value.unsafe == ("lamp",)
@@ -73,10 +73,10 @@ def test_patience_ends(rig: Rig, clock: VirtualClock) -> None:
 
 
 def test_what_is_gone_is_not_asked_again_and_the_others_are(rig: Rig, clock: VirtualClock) -> None:
-    gone = Stubborn(clock, rig.camera.arm, 1e9, DeviceLostError("gone"))
-    stubborn = Stubborn(clock, rig.lamp.off, 5.0, UnclearAnswerError("?"))
-    rig.camera.make_safe = gone  # type: ignore[method-assign]
-    rig.lamp.make_safe = stubborn  # type: ignore[method-assign]
+    gone = Stubborn(clock, rig[CAMERA].arm, 1e9, DeviceLostError("gone"))
+    stubborn = Stubborn(clock, rig[LAMP].off, 5.0, UnclearAnswerError("?"))
+    rig[CAMERA].make_safe = gone  # type: ignore[method-assign]
+    rig[LAMP].make_safe = stubborn  # type: ignore[method-assign]
     with pytest.raises(DeviceLostError, match="by hand: camera: gone"):
         rig.make_safe()
     assert gone.tries == 1

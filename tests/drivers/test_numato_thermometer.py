@@ -5,7 +5,7 @@ from contextlib import suppress
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.acquire.roles import Thermometer
+from labrig.acquire import Thermometer
 from labrig.clock import Interrupted, VirtualClock
 from labrig.drivers.numato import NumatoRelay, NumatoThermometer
 from labrig.drivers.numato.thermometer import CONVERSIONS, PLAUSIBLE_C

@@ -6,7 +6,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig.acquire import read_rig_file
+from labrig.acquire import DOOR, LAMP, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import VirtualClock
 from labrig.sim.boards import LcusBoard, MaestroBoard
@@ -38,9 +38,9 @@ def test_lamp_and_door(open_ports: Callable[[Board], str], tmp_path: Path) -> No
     with open_bench(read_rig_file(path), str(path)) as bench:
         with bench.devices() as rig:
             assert not lcus.states[1]
-            rig.lamp.on()
-            assert rig.lamp.is_on()
-            rig.door.open()
+            rig[LAMP].on()
+            assert rig[LAMP].is_on()
+            rig[DOOR].open()
             assert "pulse 1877.50 µs" in rig.identities()["door"]
         assert not lcus.states[1]
     assert [pulse.width_s * 1e6 for pulse in maestro.pulses(3)] == pytest.approx(

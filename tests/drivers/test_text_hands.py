@@ -3,7 +3,7 @@
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire.roles import Hands
+from labrig.acquire import Hands
 from labrig.clock import VirtualClock
 from labrig.drivers.text_hands import TextHands
 from labrig.errors import DeviceError, DeviceLostError

@@ -7,8 +7,8 @@ import cv2
 import numpy as np
 import pytest
 
+from labrig.acquire import ROLES, LiveView
 from labrig.acquire.connections import Connections
-from labrig.acquire.roles import ROLES, LiveView
 from labrig.drivers.uvc_preview import UvcPreview
 from labrig.errors import DeviceError
 
@@ -37,7 +37,7 @@ def brightness(jpeg: bytes) -> float:
 def test_shows_one_picture_after_the_other(film: str) -> None:
     camera = eye(film)
     assert isinstance(camera, LiveView)
-    assert ROLES["viewfinder"] is LiveView
+    assert ROLES["viewfinder"].does is LiveView
     assert brightness(camera.preview()) == pytest.approx(40, abs=1)
     assert brightness(camera.preview()) == pytest.approx(200, abs=1)
     camera.make_safe()

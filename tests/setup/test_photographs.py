@@ -6,12 +6,12 @@ import cv2
 import numpy as np
 import pytest
 
-from labrig.acquire import CameraOffers, ExposureSettings, Frame
+from labrig.acquire import CameraOffers, Exercised, ExposureSettings, Frame, Trial
+from labrig.acquire.roles.camera import exercise_camera
 from labrig.clock import VirtualClock
 from labrig.errors import FrameError
-from labrig.setup.photographs import exercise_camera
+from labrig.setup.photographs import Photographs
 from labrig.setup.picture_stats import decode, picture_stats
-from labrig.setup.report import DeviceReport
 from tests.reduce.conftest import _dng as write_dng
 
 X_TRANS = "GGRGGBGGBGGRBRGRBGGGBGGRGGRGGBRBGBRG"
@@ -62,9 +62,9 @@ class StillCamera:
         pass
 
 
-def exercised(data: bytes) -> DeviceReport:
+def exercised(data: bytes) -> Exercised:
     clock = VirtualClock()
-    return exercise_camera(DeviceReport("camera", "still camera"), StillCamera(clock, data), clock)
+    return exercise_camera(StillCamera(clock, data), Trial(clock, Photographs()))
 
 
 @every_sensor

@@ -13,7 +13,7 @@ from selenium.webdriver.common.keys import Keys
 from selenium.webdriver.remote.webelement import WebElement
 from selenium.webdriver.support.wait import WebDriverWait
 
-from labrig.acquire import LiveView, read_protocol, read_rig_file
+from labrig.acquire import CAMERA, LiveView, read_protocol, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import Interrupted
 from labrig.setup.aimed_protocol import AimedProtocol
@@ -38,7 +38,7 @@ def page(make_rig: Callable[..., Path], make_protocol: Callable[..., Path]) -> I
         ViewServer(pictures, protocol, rig.name) as server,
         server.running(),
     ):
-        camera = rig.camera
+        camera = rig[CAMERA]
         assert isinstance(camera, LiveView)
 
         def look() -> None:

@@ -3,8 +3,7 @@
 import pytest
 
 from labrig import shipped
-from labrig.acquire import read_rig_file
-from labrig.acquire.roles import Hands
+from labrig.acquire import Hands, read_rig_file
 from labrig.bench import open_bench
 from labrig.errors import DeviceError, UsageError
 from labrig.sim import open_room

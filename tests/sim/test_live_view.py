@@ -7,7 +7,7 @@ import cv2
 import numpy as np
 import pytest
 
-from labrig.acquire import LiveView, read_rig_file
+from labrig.acquire import CAMERA, LAMP, LiveView, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import VirtualClock
 from labrig.sim.room import Room
@@ -20,11 +20,12 @@ SENSOR = {"width": 192, "height": 128}
 
 def look(path: Path, lamp: bool = False) -> np.ndarray[tuple[int, ...], np.dtype[np.float64]]:
     with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as rig:
-        assert isinstance(rig.camera, LiveView)
+        camera = rig[CAMERA]
+        assert isinstance(camera, LiveView)
         if lamp:
-            rig.lamp.on()
+            rig[LAMP].on()
             rig.clock.sleep(1.0)
-        picture = cv2.imdecode(np.frombuffer(rig.camera.preview(), np.uint8), cv2.IMREAD_COLOR)
+        picture = cv2.imdecode(np.frombuffer(camera.preview(), np.uint8), cv2.IMREAD_COLOR)
     assert picture is not None
     return picture.astype(np.float64)
 

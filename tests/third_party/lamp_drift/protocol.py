@@ -7,6 +7,7 @@ from typing import Literal
 from pydantic import Field
 
 from labrig.acquire import (
+    CAMERA,
     LAMP_OFF,
     LAMP_ON,
     ExposureSettings,
@@ -44,7 +45,7 @@ class WatchUnit:
         """Do it."""
         protocol = self.protocol
         session.wait_until_warm("camera")
-        offers = session.rig.camera.offers()
+        offers = session.rig[CAMERA].offers()
         settings = ExposureSettings(offers.exposure_at_most(protocol.exposure), 100, 4.0)
         session.perform(LAMP_ON)
         for _ in range(protocol.frames):

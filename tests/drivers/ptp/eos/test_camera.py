@@ -7,7 +7,7 @@ from typing import Any
 import pytest
 import usb.core
 
-from labrig.acquire.roles import Camera
+from labrig.acquire import Camera
 from labrig.acquire.values import CameraOffers, ExposureSettings
 from labrig.drivers.ptp import PtpCamera
 from labrig.errors import DeviceError

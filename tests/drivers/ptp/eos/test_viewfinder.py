@@ -6,7 +6,7 @@ from contextlib import suppress
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire.roles import LiveView
+from labrig.acquire import LiveView
 from labrig.clock import VirtualClock
 from labrig.drivers.ptp import PtpCamera
 from labrig.drivers.ptp.eos.viewfinder import READY_TIMEOUT_S, jpeg_in

@@ -9,7 +9,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import ExposureSettings, read_rig_file
+from labrig.acquire import CAMERA, ExposureSettings, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import SystemClock
 from labrig.drivers.ptp.codes import Standard
@@ -200,7 +200,7 @@ def test_pictures_over_the_loopback_network(rig: Callable[[str], Path]) -> None:
     with served(film) as server:
         path = rig(server.address)
         with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
-            camera = devices.camera
+            camera = devices[CAMERA]
             assert "5D Mark II" in camera.identity()
             for _ in range(2):
                 assert camera.configure(settings) == settings
@@ -219,15 +219,15 @@ def test_a_broken_connection_is_mended_on_the_way_to_the_safe_state(
     with served(film) as server:
         path = rig(server.address)
         with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
-            devices.camera.configure(settings)
+            devices[CAMERA].configure(settings)
             assert server._host is not None
             server._host.command._socket.shutdown(socket.SHUT_RDWR)
             with pytest.raises(DeviceError, match="it is gone") as caught:
-                devices.camera.configure(ExposureSettings(1 / 8, 400, 4.0))
+                devices[CAMERA].configure(ExposureSettings(1 / 8, 400, 4.0))
             assert "\n" not in str(caught.value)
             devices.make_safe()
-            devices.camera.configure(settings)
-            assert devices.camera.shoot().data == film.delivered[-1]
+            devices[CAMERA].configure(settings)
+            assert devices[CAMERA].shoot().data == film.delivered[-1]
 
 
 def test_a_camera_that_knows_the_standard_only_photographs(rig: Callable[[str], Path]) -> None:
@@ -237,8 +237,8 @@ def test_a_camera_that_knows_the_standard_only_photographs(rig: Callable[[str], 
         path = rig(server.address)
         with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
             for _ in range(2):
-                assert devices.camera.configure(settings) == settings
-                frame = devices.camera.shoot()
+                assert devices[CAMERA].configure(settings) == settings
+                frame = devices[CAMERA].shoot()
                 assert frame.data == film.delivered[-1]
                 assert frame.settings == settings
     assert film.taken == [Taken(0.25, 400, 4.0)] * 2
@@ -252,7 +252,7 @@ def test_a_camera_that_is_switched_off_is_one_line(rig: Callable[[str], Path]) -
             path = rig(power.enter_context(served(Film())).address)
             with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
                 power.close()
-                devices.camera.configure(settings)
+                devices[CAMERA].configure(settings)
 
     with pytest.raises(DeviceLostError) as caught:
         session()

@@ -9,7 +9,7 @@ import pytest
 import usb.core
 import usb.util
 
-from labrig.acquire import ExposureSettings, read_rig_file
+from labrig.acquire import CAMERA, ExposureSettings, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import SystemClock, VirtualClock
 from labrig.drivers.ptp import PtpCamera
@@ -90,8 +90,8 @@ def rig(tmp_path: Path) -> Callable[..., Path]:
 
 def photograph(path: Path) -> bytes:
     with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as devices:
-        devices.camera.configure(SETTINGS)
-        return devices.camera.shoot().data
+        devices[CAMERA].configure(SETTINGS)
+        return devices[CAMERA].shoot().data
 
 
 @pytest.mark.parametrize("ending", ["0222", "222"])
@@ -109,8 +109,8 @@ def test_the_one_that_is_meant_photographs(
         other, _ = twins.find(find_all=True)
         usb.util.claim_interface(other, 0)  # the other one is free
         usb.util.dispose_resources(other)
-        devices.camera.configure(SETTINGS)
-        data = devices.camera.shoot().data
+        devices[CAMERA].configure(SETTINGS)
+        data = devices[CAMERA].shoot().data
     assert twins.films["0222"].delivered == [data]
     assert twins.films["0111"].taken == []
 
@@ -146,8 +146,8 @@ def test_one_that_another_labrig_has_is_not_even_asked(
         with pytest.raises(UsageError, match="held by another labrig"):
             photograph(rig(f"usb://{EOS_IDS}{serial}"))
         assert photograph(rig(f"usb://{EOS_IDS}/0222")) == twins.films["0222"].delivered[0]
-        devices.camera.configure(SETTINGS)
-        assert devices.camera.shoot().data == twins.films["0111"].delivered[0]
+        devices[CAMERA].configure(SETTINGS)
+        assert devices[CAMERA].shoot().data == twins.films["0111"].delivered[0]
 
 
 def test_one_whose_program_died_is_asked_and_then_taken_over(

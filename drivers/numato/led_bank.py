@@ -1,0 +1,119 @@
+"""LEDs behind relays of a Numato board, one lit at a time; every relay is read back."""
+
+from contextlib import suppress
+from typing import Annotated, Self
+
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.acquire.connections import Connections
+from labrig.errors import DeviceError
+
+from .board import CHANNELS, Board
+
+Name = Annotated[str, Field(min_length=1)]
+Relay = Annotated[int, Field(ge=0, lt=len(CHANNELS))]
+
+
+class NumatoLedBank:
+    """Several relays of one Numato board, each switching an LED.
+
+    Two are never lit together: all that may be lit are switched off and read back before another
+    one is switched on.
+
+    Parameters
+    ----------
+    address
+        Serial port of the board; its other relays may be used by other devices.
+    settings
+        The rig file's keys for this device.
+    connections
+        Opens the port.
+    """
+
+    class Settings(BaseModel):
+        """Keys of the rig file.
+
+        Attributes
+        ----------
+        relays
+            Name of each LED, and the relay that it hangs on.
+        """
+
+        model_config = ConfigDict(frozen=True, extra="forbid")
+
+        relays: dict[Name, Relay] = Field(min_length=1)
+
+        @model_validator(mode="after")
+        def _a_relay_each(self) -> Self:
+            if len(set(self.relays.values())) < len(self.relays):
+                raise ValueError("expected a relay of its own for each LED in 'relays'")
+            return self
+
+    def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
+        self._relays = settings.relays
+        self._board = Board(address, connections)
+        #: Those not read back as off since they were last lit: of one just connected, all.
+        self._may_be_lit = set(self._relays)
+
+    @classmethod
+    def declared_channels(cls, settings: Settings) -> tuple[str, ...]:
+        """Names of the LEDs, for plans."""
+        return tuple(settings.relays)
+
+    def channels(self) -> tuple[str, ...]:
+        """Names of the LEDs, in the rig file's order."""
+        return tuple(self._relays)
+
+    def reads_back(self) -> bool:
+        """Every Numato board tells the states of its relays."""
+        return True
+
+    def identity(self) -> str:
+        """Maker, firmware version and id, as the board says; LEDs do not tell what they are."""
+        leds = ", ".join(f"{name} on relay {relay}" for name, relay in self._relays.items())
+        return f"Numato relay board, {self._board.identity()}, LEDs {leds}"
+
+    def light(self, channel: str) -> None:
+        """Switch off what may be lit, then switch on one; all read back."""
+        self.dark()
+        self._may_be_lit.add(channel)
+        self._board.switch(self._relays[channel], on=True)
+
+    def dark(self) -> None:
+        """Switch off all that may be lit, each whatever became of the others; read back."""
+        failure: DeviceError | None = None
+        for channel in [name for name in self._relays if name in self._may_be_lit]:
+            try:
+                self._board.switch(self._relays[channel], on=False)
+                self._may_be_lit.remove(channel)
+            except DeviceError as error:
+                failure = failure or error
+                with suppress(DeviceError):  # so that the next one is understood
+                    self._board.resynchronise()
+        if failure:
+            raise failure
+
+    def lit(self) -> str | None:
+        """The one that the board reads as on.
+
+        Raises
+        ------
+        DeviceError
+            There are several.
+        """
+        lit = [name for name, relay in self._relays.items() if self._board.is_on(relay)]
+        if len(lit) > 1:
+            raise DeviceError(
+                f"{self._board.name}: {' and '.join(lit)} are lit at once; something else has "
+                "switched them: leave the board to labrig while it measures"
+            )
+        return lit[0] if lit else None
+
+    def make_safe(self) -> None:
+        """Bring the line back into step, then all off, whatever they were before."""
+        self._board.resynchronise()
+        self._may_be_lit = set(self._relays)
+        self.dark()
+
+    def disconnect(self) -> None:
+        """The port belongs to the connections, which close it."""

@@ -1,0 +1,97 @@
+"""Lights read back while they are relied upon: somebody else may have switched them."""
+
+from collections.abc import Iterable, Iterator
+from typing import cast
+
+from labrig.acquire.rig import Rig, device_errors
+from labrig.acquire.roles import DARK, LIGHTS, ROLES, DeviceAction, Light
+from labrig.errors import DeviceError
+from labrig.quantity import duration_text
+
+#: How often while something is waited for: with looks every 30 s about once a minute.
+READ_PERIOD_S = 50.0
+
+
+def lights_that_read_back(rig: Rig) -> dict[str, bool]:
+    """Key of every light → whether its board tells how it is."""
+    return {key: light.reads_back() for key, light in _lights(rig)}
+
+
+class LightReadback:
+    """Compares the lights with what a run has asked of them, where their boards tell.
+
+    Parameters
+    ----------
+    rig
+        Whose lights were made safe, and are switched by nobody else from now on.
+    """
+
+    def __init__(self, rig: Rig) -> None:
+        self._read_back = {
+            key: _OneLight(rig, key) for key, tells in lights_that_read_back(rig).items() if tells
+        }
+
+    @property
+    def is_told(self) -> bool:
+        """Whether there is a light whose board tells."""
+        return bool(self._read_back)
+
+    def asked(self, action: DeviceAction) -> None:
+        """It was begun just now."""
+        if action.device in self._read_back:
+            self._read_back[action.device].asked(str(action))
+
+    def read_if_due(self) -> None:
+        """Read each whose last reading is long ago; as `read_before`."""
+        for light in self._read_back.values():
+            light.read_if_due()
+
+    def read_before(self, actions: Iterable[DeviceAction]) -> None:
+        """Read each that they will switch.
+
+        A charge that ends now was one only if nobody else has ended it already.
+
+        Raises
+        ------
+        DeviceError
+            One is not as it was switched.
+        """
+        for key in {action.device: None for action in actions}:
+            if key in self._read_back:
+                self._read_back[key].read()
+
+
+class _OneLight:
+    def __init__(self, rig: Rig, key: str) -> None:
+        self._rig = rig
+        self._role = ROLES[key]
+        self._asked = DARK
+        self._asked_s = self._read_s = rig.clock.now()
+
+    def asked(self, state: str) -> None:
+        self._asked = state
+        self._asked_s = self._read_s = self._rig.clock.now()
+
+    def read_if_due(self) -> None:
+        if self._rig.clock.now() - self._read_s >= READ_PERIOD_S:
+            self.read()
+
+    def read(self) -> None:
+        assert self._role.state is not None, "it is a light"
+        self._read_s = self._rig.clock.now()
+        with device_errors(self._role.key):
+            found = self._role.state(self._rig[self._role])
+        if found == self._asked:
+            return
+        raise DeviceError(
+            f"the {self._role.name} was switched {self._asked} "
+            f"{duration_text(self._read_s - self._asked_s)} ago and reads {found}: something else "
+            "has switched it (another program on its port, or a hand); leave its board to labrig "
+            "while it measures"
+        )
+
+
+def _lights(rig: Rig) -> Iterator[tuple[str, Light]]:
+    for key, device in rig.devices.items():
+        if key in LIGHTS:
+            yield key, cast(Light, device)

@@ -1,0 +1,177 @@
+"""The camera: delivers RAW frames."""
+
+import math
+from dataclasses import dataclass
+from typing import Protocol, runtime_checkable
+
+from labrig.acquire.roles.role import (
+    Device,
+    Exercised,
+    Measured,
+    PlannedDevice,
+    Role,
+    Suggestion,
+    Trial,
+    spread_ms,
+)
+from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.clock import VirtualClock
+from labrig.errors import DeviceError
+from labrig.quantity import duration_text
+
+#: Of the exercise: frames for their timing, a longer one for its noise.
+SHORT_FRAMES = 3
+SHORT_S, LONG_S = 1 / 60, 2.0
+#: From a half press until the camera is certainly ready: in a run it has that time, too.
+SETTLING_S = 0.5
+#: A sensitivity at which read noise and dark current both show.
+ISO = 400
+#: Suggested times are rounded up to this, so that the plan is kept.
+STEP_S = 0.1
+
+
+@runtime_checkable
+class Camera(Device, Protocol):
+    """A camera that delivers RAW frames. Safe: shutter released, nothing pending."""
+
+    def offers(self) -> CameraOffers:
+        """What it can be set to, as it is now."""
+
+    def configure(self, settings: ExposureSettings) -> ExposureSettings:
+        """Set and read back; returns the settings in force, with the true shutter time.
+
+        Raises
+        ------
+        DeviceError
+            The camera does not offer them or did not take them.
+        """
+
+    def arm(self) -> None:
+        """Do all that can be done beforehand, so that `shoot` starts without delay."""
+
+    def shoot(self) -> Frame:
+        """Release now, wait for the exposure, transfer the frame."""
+
+
+class PlannedCamera(PlannedDevice):
+    """A camera of a plan: it takes the time that its driver declares, and delivers nothing."""
+
+    def __init__(self, clock: VirtualClock, offers: CameraOffers) -> None:
+        self._clock = clock
+        self._offers = offers
+        self._settings: ExposureSettings | None = None
+
+    def offers(self) -> CameraOffers:
+        """As its driver declares."""
+        return self._offers
+
+    def configure(self, settings: ExposureSettings) -> ExposureSettings:
+        """Take what is offered."""
+        self._offers.check(settings)
+        self._settings = settings
+        return settings
+
+    def arm(self) -> None:
+        """It is."""
+
+    def shoot(self) -> Frame:
+        """Expose, and take the time of a frame."""
+        assert self._settings is not None, "a session configures before it shoots"
+        start_s = self._clock.now()
+        end_s = start_s + self._settings.exposure_s
+        self._clock.spend(self._settings.exposure_s + self._offers.overhead_s)
+        return Frame(b"", "", start_s, end_s, self._settings)
+
+
+@dataclass(frozen=True)
+class Shoot:
+    """One photograph, for a purpose: `dark`, `meter`, `decay`, `daylight`.
+
+    The session takes it: it sets the camera beforehand, and keeps the frame.
+    """
+
+    purpose: str
+    settings: ExposureSettings
+
+    def __str__(self) -> str:
+        return f"{self.purpose} frame, {self.settings}"
+
+
+def exercise_camera(camera: Camera, trial: Trial) -> Exercised:
+    """Three short frames for their timing, a longer one for noise.
+
+    Raises
+    ------
+    LabrigError
+        The camera failed, or its frame cannot be reduced.
+    """
+    offers = camera.offers()
+    measured, suggestion = _timing(camera, offers, trial)
+    frame, _ = _shoot(camera, _settings(offers, LONG_S), trial)
+    seen = trial.eyes.dark_frame(frame)
+    return Exercised(
+        (_offered(offers), *measured, *seen.measured),
+        seen.findings,
+        (suggestion, *seen.suggestions),
+    )
+
+
+def _timing(
+    camera: Camera, offers: CameraOffers, trial: Trial
+) -> tuple[list[Measured], Suggestion]:
+    settings = _settings(offers, SHORT_S)
+    lags_s, cycles_s = [], []
+    for _ in range(SHORT_FRAMES):
+        frame, asked_s = _shoot(camera, settings, trial)
+        camera.arm()  # only now can the next exposure begin
+        lags_s.append(frame.start_s - asked_s)
+        cycles_s.append(trial.clock.now() - frame.end_s)
+    frame_time_s = math.ceil(max(cycles_s) / STEP_S) * STEP_S
+    return [
+        Measured(
+            "release asked to exposure begun, with the rig file's shutter_lag", spread_ms(lags_s)
+        ),
+        Measured("exposure over to ready for the next", spread_ms(cycles_s)),
+    ], Suggestion("frame_time", duration_text(frame_time_s))
+
+
+def _shoot(camera: Camera, settings: ExposureSettings, trial: Trial) -> tuple[Frame, float]:
+    """The frame, and when it was asked for."""
+    camera.configure(settings)
+    camera.arm()
+    trial.clock.sleep(SETTLING_S)
+    asked_s = trial.clock.now()
+    frame = camera.shoot()
+    if not frame.data:
+        raise DeviceError("the camera delivered an empty frame; try again")
+    return frame, asked_s
+
+
+def _settings(offers: CameraOffers, exposure_s: float) -> ExposureSettings:
+    return ExposureSettings(
+        offers.exposure_at_most(exposure_s),
+        min(offers.isos, key=lambda iso: abs(iso - ISO)),
+        max(offers.f_numbers, default=None),
+    )
+
+
+def _offered(offers: CameraOffers) -> Measured:
+    return Measured(
+        "it offers",
+        f"{duration_text(offers.exposures_s[0])} to {duration_text(offers.exposures_s[-1])}, "
+        f"ISO {', '.join(map(str, offers.isos))}, "
+        + (
+            f"f/{offers.f_numbers[0]:g} to f/{offers.f_numbers[-1]:g}"
+            if offers.f_numbers
+            else "no aperture"
+        ),
+    )
+
+
+CAMERA: Role[Camera] = Role(
+    key="camera",
+    does=Camera,
+    name="camera",
+    planned=lambda driver, settings, clock: PlannedCamera(clock, driver.declared_offers(settings)),
+    exercise=exercise_camera,
+)

@@ -1,0 +1,179 @@
+"""The role `leds`: lit by a protocol on a simulated bench, planned, read back, checked, guarded."""
+
+import json
+from collections.abc import Callable, Sequence
+from pathlib import Path
+from typing import Any
+
+import pytest
+import yaml
+
+from labrig.acquire import (
+    LAMP_OFF,
+    LAMP_ON,
+    LEDS,
+    LEDS_OFF,
+    LIGHTS,
+    LedSwitch,
+    ProtocolModel,
+    Rig,
+    Session,
+    Unit,
+    at,
+    lights_that_read_back,
+    plan,
+    read_rig_file,
+    run_units,
+)
+from labrig.acquire.roles.leds import PlannedLedBank
+from labrig.bench import open_bench
+from labrig.clock import VirtualClock
+from labrig.errors import DeviceError, ProtocolError, UsageError
+from labrig.guard import guarding
+from labrig.record import RunFolder
+from tests.conftest import Ended
+
+from .fakes import Watching
+
+Make = Callable[..., Path]
+BANK = {"450 nm": 1, "525 nm": 2}
+
+
+@pytest.fixture
+def rig(make_rig: Make) -> Path:
+    """The simulated rig with two LEDs on the lamp's board."""
+    path = make_rig(
+        leds=[{"relay": 1, "centre": 450}, {"relay": 2, "centre": 525}],
+    )
+    content = yaml.safe_load(path.read_text())
+    content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
+    content["devices"]["leds"] = {
+        "driver": "numato_led_bank", "address": "sim://room/relays", "relays": BANK,
+    }  # fmt: skip
+    path.write_text(yaml.safe_dump(content))
+    return path
+
+
+class Colours(ProtocolModel):
+    """One LED after the other."""
+
+    channels: tuple[str, ...] = tuple(BANK)
+
+    def units(self) -> Sequence[Unit]:
+        return [ColoursUnit(self.channels)]
+
+
+class ColoursUnit:
+    name = "colours"
+
+    def __init__(self, channels: tuple[str, ...]) -> None:
+        self.channels = channels
+
+    def run(self, session: Session) -> None:
+        session.perform(LAMP_ON)
+        session.perform(LAMP_OFF)
+        for channel in self.channels:
+            session.perform(LedSwitch(channel))
+            session.wait(100.0, "charging")
+        session.run_sequence([at(0.0, LEDS_OFF)])
+
+
+def test_what_protocols_do_with_them_is_lit_recorded_and_read_back(
+    rig: Path, tmp_path: Path
+) -> None:
+    folder = RunFolder.create(tmp_path / "runs", "colours", 0.0, {}, seed=1)
+    with folder, open_bench(read_rig_file(rig), str(rig)) as bench, bench.devices() as devices:
+        assert lights_that_read_back(devices) == {"lamp": True, "leds": True}
+        run_units(Colours(protocol="colours").units(), devices, folder, Watching(), {})
+        assert bench.room is not None
+        states = bench.room.room.leds.states
+        (attempt,) = folder.read().completed().values()
+    assert [lit for _, lit in states] == [set(), {1}, set(), {2}, set()]
+    assert [(one.device, one.action) for one in attempt.actions] == [
+        ("lamp", "on"), ("lamp", "off"),
+        ("leds", "450 nm on"), ("leds", "525 nm on"), ("leds", "off"),
+    ]  # fmt: skip
+    on, _, off = attempt.actions[2:]
+    assert on.end_time - on.start_time < 0.02, "nothing is switched off that is known to be off"
+    assert off.end_time - off.start_time < 0.02
+
+
+def test_they_are_planned(rig: Path) -> None:
+    lines = plan(Colours(protocol="colours"), read_rig_file(rig), str(rig)).lines()
+    assert [line.split("s)  ")[1].split() for line in lines if " leds " in line] == [
+        ["leds", "450", "nm", "on"], ["leds", "525", "nm", "on"], ["leds", "off"],
+    ]  # fmt: skip
+    with pytest.raises(ProtocolError, match="an LED '540 nm', which the rig has not") as caught:
+        plan(Colours(protocol="colours", channels=("540 nm",)), read_rig_file(rig), str(rig))
+    assert "did you mean '450 nm'?" in str(caught.value)
+
+
+def test_a_rig_without_them_is_told_so(make_rig: Make) -> None:
+    path = make_rig()
+    with pytest.raises(ProtocolError, match=r"needs a bank of LEDs, .* has none"):
+        plan(Colours(protocol="colours"), read_rig_file(path), str(path))
+
+
+def test_another_driver_does_not_do(rig: Path) -> None:
+    text = rig.read_text().replace("numato_led_bank", "numato_relay")
+    rig.write_text(text)
+    with pytest.raises(UsageError, match="'numato_relay' is no bank of LEDs"):
+        plan(Colours(protocol="colours"), read_rig_file(rig), str(rig))
+
+
+class Shared(PlannedLedBank):
+    """Somebody else switches it off after 30 s."""
+
+    def __init__(self, clock: VirtualClock) -> None:
+        super().__init__(tuple(BANK))
+        self._clock = clock
+
+    def reads_back(self) -> bool:
+        return True
+
+    def lit(self) -> str | None:
+        return None if self._clock.now() > 30.0 else super().lit()
+
+
+class Unlit:
+    name = "unlit"
+
+    def run(self, session: Session) -> None:
+        session.perform(LedSwitch("450 nm"))
+        session.wait(600.0, "charging")
+
+
+def test_what_somebody_else_switched_ends_the_unit(tmp_path: Path) -> None:
+    clock = VirtualClock()
+    folder = RunFolder.create(tmp_path, "unlit", 0.0, {}, seed=1)
+    bench = Rig("bench", clock, {"leds": Shared(clock)}, {})
+    with folder, pytest.raises(DeviceError, match="something else has switched it") as caught:
+        run_units([Unlit()], bench, folder, Watching(), {})
+    assert "the bank of LEDs was switched 450 nm on 1 min ago and reads off" in str(caught.value)
+    assert clock.now() == pytest.approx(60.0, abs=1.0)
+    assert bench[LEDS].lit() is None
+
+
+def test_the_rig_check_lights_each(rig: Path, labrig: Callable[..., Ended]) -> None:
+    ended = labrig("rig", "check", rig, "--json")
+    report: dict[str, Any] = json.loads(ended.out)
+    assert (ended.code, report["failures"], report["unsafe"]) == (0, [], None)
+    (leds,) = [device for device in report["devices"] if device["key"] == "leds"]
+    assert [one["what"] for one in leds["measured"]] == [
+        "450 nm on, read back", "525 nm on, read back", "off, read back",
+    ]  # fmt: skip
+    assert "LEDs 450 nm on relay 1" in leds["identity"]
+
+
+def test_the_guard_watches_them() -> None:
+    assert {"lamp", "leds"} == LIGHTS
+
+
+def test_a_rig_with_leds_only_is_guarded(rig: Path) -> None:
+    content = yaml.safe_load(rig.read_text())
+    del content["devices"]["lamp"]
+    content |= {"simulation": None}
+    rig.write_text(yaml.safe_dump(content))
+    with guarding(read_rig_file(rig), str(rig)) as guard:
+        assert guard is not None
+        assert guard.lights == {"leds"}

@@ -1,0 +1,49 @@
+"""Every kind of calibration is known to rig files, to analyses, and under its protocol's name."""
+
+from dataclasses import fields
+from pathlib import Path
+from typing import Any
+
+import pytest
+
+from labrig import plugins
+from labrig.acquire import read_rig_file
+from labrig.analyse.inputs import Inputs
+from labrig.calibration import KINDS, CalibrationKind
+from labrig.errors import UsageError
+
+RIG = """name: x
+devices: {{camera: {{driver: ptp_camera, address: "usb://04a9:3199"}}}}
+optics: {{{key}: {named}}}
+"""
+every_kind = pytest.mark.parametrize("kind", KINDS, ids=lambda kind: kind.name)
+
+
+@every_kind
+def test_a_rig_file_names_its_file_and_analyses_have_it(
+    kind: CalibrationKind[Any], tmp_path: Path
+) -> None:
+    path = tmp_path / "rig.yaml"
+    path.write_text(RIG.format(key=kind.optics_key, named="mine"))
+    optics = read_rig_file(path).optics
+    assert [optics.named(one) for one in KINDS if optics.named(one)] == ["mine"]
+    assert optics.named(kind) == "mine"
+    assert kind.name in {field.name for field in fields(Inputs)}
+    assert kind.protocol in plugins.names(plugins.ANALYSES)
+
+
+@pytest.mark.parametrize("found", [[], ["one"], ["one", "two"]], ids=len)
+def test_the_file_itself_or_the_one_in_a_runs_result(found: list[str], tmp_path: Path) -> None:
+    kind = CalibrationKind(
+        "text", "blank", "text", "text.yaml",
+        read=lambda path: path.read_text(), write=lambda path, file: None,
+    )  # fmt: skip
+    for part in found:
+        (tmp_path / "result" / part).mkdir(parents=True)
+        (tmp_path / "result" / part / "text.yaml").write_text(part)
+    if found == ["one"]:
+        assert kind.read_named(tmp_path) == "one"
+        assert kind.read_named(tmp_path / "result" / "one" / "text.yaml") == "one"
+    else:
+        with pytest.raises(UsageError, match=f"one text.yaml in its result, got {len(found)}"):
+            kind.read_named(tmp_path)
