@@ -18,13 +18,13 @@ from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
-import yaml
 from hypothesis import settings
 
 from labrig import shipped
 from labrig.cli.ending import guarded
 from labrig.signals import STOP_SIGNALS
 from tests.analyse import recorded
+from tests.quick_yaml import read_quickly, write_quickly
 
 if TYPE_CHECKING:
     from selenium.webdriver import Chrome
@@ -119,13 +119,13 @@ def make_rig(tmp_path: Path) -> Callable[..., Path]:
     """Writes the shipped simulated rig with a small sensor, changed as told."""
 
     def write(name: str = "rig.yaml", base: str = "sim", **simulation: object) -> Path:
-        content = yaml.safe_load((shipped.folder("config") / f"{base}.yaml").read_text())
+        content = read_quickly((shipped.folder("config") / f"{base}.yaml").read_text())
         content["simulation"] |= {"sensor": {"width": 96, "height": 64}}
         # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
         content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
         content["simulation"] |= simulation
         path = tmp_path / name
-        path.write_text(yaml.safe_dump(content))
+        path.write_text(write_quickly(content))
         return path
 
     return write
@@ -144,7 +144,7 @@ def make_protocol(tmp_path: Path) -> Callable[..., Path]:
             "exposure": "1 s",
         } | keys
         path = tmp_path / name
-        path.write_text(yaml.safe_dump(content))
+        path.write_text(write_quickly(content))
         return path
 
     return write

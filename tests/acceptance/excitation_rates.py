@@ -2,7 +2,7 @@
 
     python -m tests.acceptance.excitation_rates [--seeds 40] [--material two-states]
 
-Samples are charged by the simulated lamp and phosphor (DOP853, a cooling filament) under the bare
+Samples are charged by the simulated lamp and phosphor (a cooling filament) under the bare
 lamp and through 12 windows of a linear variable filter; photographs flicker. First one fit of each
 full material of Table 1: worst deviation in σ, worst of the bands that excite with 0.002 /s or
 more in %. Then one material over many seeds: rms of deviation over σ (1 if σ is right), parameter

@@ -7,7 +7,6 @@ from hashlib import sha256
 from pathlib import Path
 from typing import Any
 
-import yaml
 from filelock import FileLock
 
 from labrig import shipped
@@ -21,6 +20,7 @@ from labrig.record import RunRecord, read_run
 from labrig.report import Source
 from labrig.run import Recording, resume_run
 from tests.acquire.fakes import Watching
+from tests.quick_yaml import read_quickly, write_quickly
 
 #: Where the workers of one run of the tests keep what they recorded; set by `tests.conftest`.
 SHARED: Path | None = None
@@ -42,15 +42,15 @@ def record(
     In one run of the tests what is the same is recorded once, and copied.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    rig = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    rig = read_quickly((shipped.folder("config") / "sim-phosphor.yaml").read_text())
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
     rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     rig["simulation"]["sensor"] = {"width": 96, "height": 64}
     rig["devices"]["lamp"]["warm_up"] = "10 min"
     rig["devices"]["camera"]["warm_up"] = "1 min"
     change(rig)
-    (folder / "rig.yaml").write_text(yaml.safe_dump(rig))
-    (folder / "protocol.yaml").write_text(yaml.safe_dump(protocol))
+    (folder / "rig.yaml").write_text(write_quickly(rig))
+    (folder / "protocol.yaml").write_text(write_quickly(protocol))
     runs = folder / "runs"
     recording = Recording.prepare(folder / "protocol.yaml", folder / "rig.yaml", runs)
     if watch is not quietly or SHARED is None:

@@ -1,4 +1,4 @@
-"""Charged samples as the simulated lamp and phosphor make them: DOP853, a cooling filament.
+"""Charged samples as the simulated lamp, a cooling filament, and phosphor make them.
 
 The fit knows none of it: it is told when the lamp was switched, what irradiance each band has, and
 how the lamp fades, band by band; not that the blue of a band fades before its red.

@@ -10,6 +10,7 @@ Sources: APEX (ISO 2720 annex A); code ↔ label pairs as published with libgpho
 import math
 from collections.abc import Iterable
 from fractions import Fraction
+from functools import cache
 from types import MappingProxyType
 
 _STEP = {0: Fraction(0), 3: Fraction(1, 3), 4: Fraction(1, 2), 5: Fraction(2, 3)}
@@ -57,6 +58,7 @@ ISOS = MappingProxyType(
 )  # fmt: skip
 
 
+@cache
 def shutter_time_s(code: int) -> float | None:
     """True shutter time of a Tv code, in seconds; None for bulb and unknown codes."""
     whole, eighths = divmod(code - _TV_ZERO, 8)
