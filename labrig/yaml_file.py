@@ -132,6 +132,18 @@ _Loader.add_constructor("tag:yaml.org,2002:float", _construct_float)
 _Loader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(str(node.value)))
 
 
+class _Dumper(yaml.SafeDumper):
+    """Quotes what PyYAML's own reader or this one would take for anything but text."""
+
+    yaml_implicit_resolvers = {  # noqa: RUF012
+        first: [
+            *yaml.SafeDumper.yaml_implicit_resolvers.get(first, []),
+            *_Loader.yaml_implicit_resolvers.get(first, []),
+        ]
+        for first in {*yaml.SafeDumper.yaml_implicit_resolvers, *_Loader.yaml_implicit_resolvers}
+    }
+
+
 def read_yaml(path: Path) -> dict[str, Any]:
     """The mapping in the file at `path`.
 
@@ -170,7 +182,7 @@ def write_yaml(path: Path, model: BaseModel) -> None:
 
 def yaml_text(content: Mapping[str, Any]) -> str:
     """YAML text of plain values, keys in the given order."""
-    return yaml.safe_dump(dict(content), sort_keys=False, allow_unicode=True, width=100)
+    return yaml.dump(dict(content), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
 
 
 def read_model(path: Path, model: type[ModelT]) -> ModelT:

@@ -168,3 +168,10 @@ def test_any_text_is_a_mapping_or_one_line(text: str) -> None:
 @given(st.floats(allow_nan=False, allow_infinity=False), st.integers(-(10**15), 10**15))
 def test_numbers_survive_writing(real: float, whole: int) -> None:
     assert parse_yaml(yaml_text({"a": real, "b": whole}), "test") == {"a": real, "b": whole}
+
+
+@pytest.mark.parametrize(
+    "text", ["0E0", "1e-3", "1e5", "no", "~", "0x10", "1:30", "0100", "", " a"]
+)
+def test_text_that_looks_like_something_else_comes_back_as_text(text: str) -> None:
+    assert parse_yaml(yaml_text({"name": text}), "file") == {"name": text}

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from labrig.calibration import CameraFile, Flat, Noise, write_camera_file
+from labrig.calibration import CAMERA_KIND, CameraFile, Flat, Noise
 from labrig.results.arrays import FloatArray
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
@@ -121,8 +121,8 @@ class CameraCalibrationResult(RunResult):
 
     def provides(self) -> Mapping[str, Any]:
         """The camera."""
-        return {"camera": self.calibration}
+        return {CAMERA_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:
         """Write `camera.yaml`."""
-        write_camera_file(folder / "camera.yaml", self.calibration)
+        CAMERA_KIND.write_into(folder, self.calibration)
