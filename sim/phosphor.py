@@ -8,6 +8,7 @@ what labrig's fits are tested against.
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from itertools import pairwise
 from typing import Protocol
 
@@ -157,7 +158,9 @@ class Phosphor:
         each_s = times_s.ravel().tolist()
         faster = np.array([self.quickening(at_s) for at_s in each_s]).reshape(times_s.shape)
         seen = np.array([visible(at_s) for at_s in each_s]).reshape(times_s.shape) * faster
-        loss = faster[:, None, :] * self.k_r_per_s[:, None]
+        # In the dark states of one rate are alike, of which there may be hundreds.
+        k_r_per_s, alike = self._rates if light is None else (self.k_r_per_s, np.s_[:])
+        loss = faster[:, None, :] * k_r_per_s[:, None]
         charging = np.zeros_like(loss)
         if light is not None:
             kappa = light.irradiance(times_s.ravel()) @ self.excitation.T
@@ -170,7 +173,13 @@ class Phosphor:
         end = EXTRAPOLATION @ levels
         end[..., 0] += 1 - EXTRAPOLATION.sum()
         exposure_s = ((lasting_s * WEIGHTS * seen)[:, None, None, :] @ levels)[:, :, 0]
-        return [_Step(*step) for step in np.stack([end, exposure_s], axis=-1).transpose(0, 2, 3, 1)]
+        both = np.stack([end, exposure_s], axis=-1).transpose(0, 2, 3, 1)[..., alike]
+        return [_Step(*step) for step in both]
+
+    @cached_property
+    def _rates(self) -> tuple[FloatArray, NDArray[np.intp]]:
+        """All different `k_r_per_s`, and which of them each state has."""
+        return np.unique(self.k_r_per_s, return_inverse=True)
 
 
 @dataclass(frozen=True)

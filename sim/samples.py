@@ -132,10 +132,11 @@ class Samples:
             Of the bench until `end_s`.
         """
         _, seen_s = self.evolve(level, start_s, end_s, arrangement, lights, lights.openness)
-        glow = np.zeros((self.cells.patch[-1] + 1, self.radiance_at_one.shape[1]))
         radiance_s = self.of_cells(seen_s)[:, None] * self.radiance_at_one
-        np.add.at(glow, self.cells.patch, radiance_s)
-        return glow
+        # States are in the order of their cells, and every cell but the cloth has some.
+        begin = np.searchsorted(self.cells.patch, np.arange(1, self.cells.patch[-1] + 1))
+        of_cloth = np.zeros((1, radiance_s.shape[1]))
+        return np.concatenate([of_cloth, np.add.reduceat(radiance_s, begin)])
 
     def _below(self, *, turned: bool) -> Phosphor:
         """The cells' states with what excites them below the LVF."""

@@ -30,6 +30,10 @@ _ISO_OVERFLOW = 65535
 _DNG_VERSION = ("Image Tag 0xC612", "Image DNGVersion")
 
 
+# exifread warns through logging of every odd tag; what matters shows as None.
+logging.getLogger("exifread").setLevel(logging.CRITICAL)
+
+
 def read_exif(content: bytes) -> Exif:
     """EXIF in the bytes of a RAW file.
 
@@ -37,8 +41,6 @@ def read_exif(content: bytes) -> Exif:
     """
     import exifread  # with its maker-note tables, only when a RAW file is read
 
-    # It warns through logging of every odd tag; what matters shows as None.
-    logging.getLogger("exifread").setLevel(logging.CRITICAL)
     try:
         tags: dict[str, Any] = exifread.process_file(io.BytesIO(content), details=False)
     except Exception:  # a damaged file can fail anywhere in exifread, with any exception

@@ -161,6 +161,7 @@ def _brightness(plane: Mosaic) -> float:
     return float(plane[::down, ::right].mean())
 
 
+@cache
 def _tile_pixels(side: int) -> npt.NDArray[np.intp]:
     """Indices of the pixels of each tile along a side, shape (tiles, pixels)."""
     pixels = min(TILE, side)
