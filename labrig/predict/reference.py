@@ -8,7 +8,7 @@ import numpy as np
 
 from labrig.acquire import read_protocol
 from labrig.errors import DataError, UsageError
-from labrig.fit.nonnegative import nonnegative_least_squares
+from labrig.nonnegative import nonnegative_least_squares
 from labrig.predict.camera import (
     TYPICAL_DARK_ELECTRONS_PER_S,
     TYPICAL_ELECTRONS_PER_DN,

@@ -14,11 +14,12 @@ strays into the neighbour of another colour. The same differences tell that corr
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
+from labrig.nonnegative import nonnegative_least_squares
 from labrig.reduce.dark import same_exposure
 from labrig.reduce.noise import Floats
 from labrig.reduce.planes import PixelMask
@@ -238,21 +239,8 @@ def _photon_transfer(
     least = LEAST_SHARE**2 * variance
     for _ in range(REWEIGHTINGS):
         expected = variance[other] + np.square(scale) * variance[one]
-        coefficients = _nonnegative(design / expected[:, np.newaxis], scatter / expected)
+        coefficients = nonnegative_least_squares(
+            design / expected[:, np.newaxis], scatter / expected
+        )
         variance = np.maximum(terms @ coefficients, least)
     return np.sqrt(variance)
-
-
-def _nonnegative(design: Floats, target: Floats) -> Floats:
-    """Least squares with coefficients ≥ 0 for a few columns: the best of all sets of them."""
-    lengths = np.linalg.norm(design, axis=0)
-    columns = design / np.where(lengths > 0, lengths, 1.0)
-    best, least = np.zeros(len(lengths)), np.inf
-    for size in range(1, len(lengths) + 1):
-        for chosen in map(list, combinations(range(len(lengths)), size)):
-            found, *_ = np.linalg.lstsq(columns[:, chosen], target)
-            left = float(np.square(target - columns[:, chosen] @ found).sum())
-            if left < least and found.min() >= 0:
-                best, least = np.zeros(len(lengths)), left
-                best[chosen] = found / np.where(lengths[chosen] > 0, lengths[chosen], 1.0)
-    return best

@@ -12,11 +12,11 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
-from scipy.optimize import nnls
 
 from labrig.analyse.hot_pixels import hot_pixels_of
 from labrig.calibration import CameraFile
 from labrig.errors import DataError
+from labrig.nonnegative import nonnegative_least_squares
 from labrig.reduce import DarkModel, PixelMask, RawFrame, SeriesFrame, fit_dark, read_raw
 from labrig.reduce.noise import ROUNDING_VARIANCE
 from labrig.reduce.pairs import STRIPS
@@ -296,5 +296,5 @@ def _line(level: FloatArray, scatter: FloatArray) -> FloatArray:
         expected = np.maximum(design @ line, ROUNDING_VARIANCE)
         kept = scatter < OUTLIER * expected
         weighted = design[kept] / expected[kept, np.newaxis]
-        line, _ = nnls(weighted, scatter[kept] / expected[kept])
+        line = nonnegative_least_squares(weighted, scatter[kept] / expected[kept])
     return np.asarray(line, dtype=np.float64)

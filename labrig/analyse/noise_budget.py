@@ -1,69 +1,19 @@
 """Where the uncertainty of a value comes from, over the course of a decay."""
 
-from dataclasses import dataclass
-
 import numpy as np
-from numpy.typing import NDArray
 
-from labrig.fit import nonnegative_least_squares
-from labrig.results import FittedDecay, Series
-
-FloatArray = NDArray[np.float64]
+from labrig.nonnegative import nonnegative_least_squares
+from labrig.results import FittedDecay, FloatArray, Series
+from labrig.results.decay import NoiseBudget
 
 #: Terms of the photon-transfer line: constant, ∝ light, ∝ light².
 _TERMS = 3
-#: Parts below this share of the whole are not worth their line.
-LEAST_SHARE = 0.03
 #: Signal over σ below which a frame has nothing to relate σ to.
 LEAST_SIGNAL = 1e-3
 
 
-@dataclass(frozen=True, eq=False)
-class NoiseBudget:
-    """Standard uncertainties of the brightest channel, relative to its fitted signal.
-
-    Parameters
-    ----------
-    t_s
-        Shape (n,): middle of the exposures, rising.
-    photons, reading, uneven
-        Shape (n,): what grows as the root of the light, what is there without light, and what is
-        proportional to it but differs over the patch. Their sum in quadrature is the series' σ.
-    flicker
-        Shape (n,): common to the channels of a frame, as fitted.
-    dark_level
-        Shape (n,): of the level that was subtracted, common to all frames; 0 if not known.
-    """
-
-    t_s: FloatArray
-    photons: FloatArray
-    reading: FloatArray
-    uneven: FloatArray
-    flicker: FloatArray
-    dark_level: FloatArray
-
-    @property
-    def together(self) -> FloatArray:
-        """Of one value, shape (n,)."""
-        return np.asarray(np.sqrt(np.square(list(self._parts().values())).sum(axis=0)))
-
-    def visible(self) -> dict[str, FloatArray]:
-        """The parts that somewhere are worth a line, by their names."""
-        worth = LEAST_SHARE * self.together
-        return {name: part for name, part in self._parts().items() if np.any(part > worth)}
-
-    def _parts(self) -> dict[str, FloatArray]:
-        return {
-            "photons": self.photons,
-            "reading": self.reading,
-            "uneven light": self.uneven,
-            "flicker": self.flicker,
-            "dark level": self.dark_level,
-        }
-
-
 def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
-    """Of the frames of the first decay that were fitted; None if they are too few, or σ unknown."""
+    """The budget of the first decay's fitted frames; None if they are too few, or σ is unknown."""
     brightest = fit.brightest
     signal = fit.predict(series.t_s, series.exposure_s)[:, brightest] - fit.offset
     # Comparisons with an unknown σ are false.
