@@ -1,11 +1,11 @@
 """What is known of a bench before a part is processed."""
 
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
-from typing import Any, Self, TypeVar
+from typing import Any, Self
 
 from labrig.acquire import RigFile
+from labrig.bench_optics import read_calibration
 from labrig.calibration import (
     BlankFile,
     CameraFile,
@@ -18,12 +18,9 @@ from labrig.calibration import (
     read_irradiance_file,
     read_lvf_file,
 )
-from labrig.errors import UsageError
 from labrig.material import Material
 from labrig.results import FittedDecay, RunResult
 from labrig.results.emission_spectrum import EmissionSpectrum
-
-FileT = TypeVar("FileT")
 
 
 @dataclass(frozen=True)
@@ -62,11 +59,11 @@ class Inputs:
         """
         optics = rig.optics
         return cls(
-            camera=_read(optics.camera_file, "camera.yaml", read_camera_file),
-            blank=_read(optics.blank, "blank.yaml", read_blank_file),
-            fade=_read(optics.fade, "fade.yaml", read_fade_file),
-            lvf=_read(optics.lvf, "lvf.yaml", read_lvf_file),
-            irradiance=_read(optics.irradiance, "irradiance.yaml", read_irradiance_file),
+            camera=read_calibration(optics.camera_file, "camera.yaml", read_camera_file),
+            blank=read_calibration(optics.blank, "blank.yaml", read_blank_file),
+            fade=read_calibration(optics.fade, "fade.yaml", read_fade_file),
+            lvf=read_calibration(optics.lvf, "lvf.yaml", read_lvf_file),
+            irradiance=read_calibration(optics.irradiance, "irradiance.yaml", read_irradiance_file),
         )
 
     def with_those_of(self, result: RunResult) -> Self:
@@ -76,19 +73,3 @@ class Inputs:
             for name, value in result.provides().items()
         }
         return replace(self, **provided)
-
-
-def _read(named: str | None, name: str, read: Callable[[Path], FileT]) -> FileT | None:
-    """The file itself, or the one in a run folder's result, be it one part of a chain."""
-    if named is None:
-        return None
-    path = Path(named)
-    if not path.is_dir():
-        return read(path)
-    found = [*path.glob(f"result/{name}"), *path.glob(f"result/*/{name}")]
-    if len(found) != 1:
-        raise UsageError(
-            f"{path}: expected a run with one {name} in its result, got {len(found)}; process it "
-            "first, or name the file itself"
-        )
-    return read(found[0])

@@ -122,7 +122,7 @@ def _region(folder: Path, patch: str) -> Region:
     """Where the patch was when it was processed, or else where the protocol has it."""
     protocol = predictable(read_protocol(folder / "protocol.yaml"))
     processed = folder / "result" / "provenance.yaml"
-    patches = read_yaml(processed)["patches"] if processed.is_file() else protocol.patches
+    patches = read_yaml(processed)["regions"] if processed.is_file() else protocol.patches
     region: Region = patches.get(patch) or next(iter(patches.values()))
     return region
 
