@@ -108,7 +108,7 @@ def read_reference(place: Path) -> Reference:
             dark_electrons_per_s=(
                 TYPICAL_DARK_ELECTRONS_PER_S if dark_dn_per_s is None else dark_dn_per_s * gain
             ),
-            range_dn=seen.white - max(seen.black),
+            range_dn=seen.range_dn,
             unevenness=float(max((brightest.peak - noise_dn) / brightest.mean, 1.0)),
             channel_shares={name: stats.n / pixels for name, stats in seen.channels.items()},
         ),

@@ -79,4 +79,4 @@ def test_names_of_any_script_and_numbers_are_folders_of_the_result(
     result = ended.run_folder / "result"
     assert (result / "1" / "fit.json").is_file()
     assert (result / "Früh Grün, 2 %" / "fit.json").is_file()
-    assert list(read_yaml(result / "provenance.yaml")["patches"]) == ["1", "Früh Grün, 2 %"]
+    assert list(read_yaml(result / "provenance.yaml")["regions"]) == ["1", "Früh Grün, 2 %"]

@@ -21,6 +21,7 @@ from labrig.reduce import DarkModel, PixelMask, RawFrame, SeriesFrame, fit_dark,
 from labrig.reduce.noise import ROUNDING_VARIANCE
 from labrig.reduce.pairs import STRIPS
 from labrig.reduce.patches import TWO_DEGREES
+from labrig.reduce.saturation import is_clipped
 from labrig.region import Region, region_pixels
 from labrig.results import FloatArray, is_usable
 from labrig.results.emission_spectrum import FilterFrames
@@ -33,8 +34,6 @@ ROUNDS = 8
 OUTLIER = 10.0
 #: Strips from which a place tells its noise.
 FEWEST_STRIPS = 2
-#: A place in which so many of its pixels clip is no measurement.
-CLIPPED = 0.001
 
 
 @dataclass(frozen=True, eq=False)
@@ -251,7 +250,7 @@ def _measured(
             count = np.add.reduceat(own.sum(axis=1), starts)
             total = np.add.reduceat(np.sum(light, axis=1, where=own), starts)
             means.append(total / np.maximum(count, 1))
-            clipped = np.count_nonzero(clips & own) > CLIPPED * count.sum()
+            clipped = is_clipped(np.count_nonzero(clips & own), count.sum())
             totals.append(np.nan if clipped else total.sum())
             counts.append(max(count.sum(), 1))
         level.append(np.array(totals) / counts)
