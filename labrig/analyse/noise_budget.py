@@ -2,7 +2,7 @@
 
 import numpy as np
 
-from labrig.nonnegative import nonnegative_least_squares
+from labrig.reduce.photon_transfer import NoiseModel, variance_terms
 from labrig.results import FittedDecay, FloatArray, Series
 from labrig.results.decay import NoiseBudget
 
@@ -38,19 +38,13 @@ def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
 def noise_parts(series: Series, channel: int, signal: FloatArray) -> FloatArray:
     """The variances of one channel's values in three parts, shape (n, 3), in the values' unit².
 
-    The noise of a frame's mean is a photon-transfer line, σ² = A + B·light + C·light² in DN²: of
-    reading, of photons, and of light that flickers unevenly (Janesick 2007). The line through all
-    frames says in which proportions each frame's σ² is shared out, by its `signal`, shape (n,).
+    The photon-transfer model through all frames says in which proportions each frame's σ² is shared
+    out to reading, photons and uneven light, by its `signal`, shape (n,).
     """
     exposure_s = np.where(series.exposure_s > 0, series.exposure_s, 1.0)
     variance = np.square(series.sigma[:, channel] * exposure_s)
-    terms = _terms(series.values[:, channel] * exposure_s)
-    line = nonnegative_least_squares(terms / variance[:, np.newaxis], np.ones_like(variance))
-    shares = _terms(signal * exposure_s) * line
+    terms = variance_terms(series.values[:, channel] * exposure_s)
+    line = NoiseModel.fit(terms, variance, sigma_dn2=variance)
+    shares = line.parts_dn2(signal * exposure_s)
     shares /= shares.sum(axis=1, keepdims=True)
     return np.asarray(shares * np.square(series.sigma[:, channel, np.newaxis]))
-
-
-def _terms(light: FloatArray) -> FloatArray:
-    light = np.maximum(light, 0.0)
-    return np.stack([np.ones_like(light), light, light**2], axis=1)

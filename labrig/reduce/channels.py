@@ -7,7 +7,7 @@ from typing import Any
 import numpy as np
 
 from labrig.errors import DataError, FrameError
-from labrig.reduce.noise import ROUNDING_VARIANCE
+from labrig.reduce.photon_transfer import ROUNDING_VARIANCE
 from labrig.reduce.planes import PixelMask, PlaneCount, count_planes
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.saturation import is_clipped
