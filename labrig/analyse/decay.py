@@ -4,6 +4,7 @@ from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
 
 from labrig.analyse.clean import cleaned
+from labrig.analyse.noise_budget import noise_budget
 from labrig.analyse.part import Part
 from labrig.analyse.series_fit import fit_series
 from labrig.analyse.this_camera import insist_on_this_camera
@@ -102,6 +103,7 @@ def _patch(
         series=series,
         fit=fit,
         normalised_residuals=fit.normalised_residuals,
+        noise=noise_budget(series, fit),
         material=_material(series, fit, name, part.run.name, temperature_c),
     )
 

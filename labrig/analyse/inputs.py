@@ -2,10 +2,10 @@
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
-from pathlib import Path
 from typing import Any, Self
 
 from labrig.acquire import RigFile
+from labrig.bench_optics import calibration
 from labrig.calibration import (
     KINDS,
     BlankFile,
@@ -54,13 +54,7 @@ class Inputs:
         UsageError
             One is missing or malformed.
         """
-        return cls(
-            **{
-                kind.name: kind.read_named(Path(named))
-                for kind in KINDS
-                if (named := rig.optics.named(kind)) is not None
-            }
-        )
+        return cls(**{kind.name: calibration(rig, kind) for kind in KINDS})
 
     def with_those_of(self, result: RunResult) -> Self:
         """These, and what a result provides; of mappings by patch, the other patches stay."""

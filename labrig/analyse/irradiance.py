@@ -6,9 +6,9 @@ from itertools import pairwise
 
 import numpy as np
 
-from labrig.analyse.bench_curves import camera_curves, card_reflectance, lamp_spectrum
 from labrig.analyse.part import Part
 from labrig.analyse.strip_frames import StripFrames
+from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import IrradianceFile, Strip
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError
@@ -56,7 +56,7 @@ def analyse(part: Part) -> IrradianceResult:
     ratio = _card_ratio(part, frames, strip)
     position = np.array(strip.positions(*frames.size))
     lvf = calibrated.lvf.at(np.clip(position, calibrated.position[0], calibrated.position[-1]))
-    camera = camera_curves(part.rig, part.choices, calibrated)
+    camera = camera_curves(part.rig, part.choices.camera, calibrated)
     scale = strip_scale(ratio, lvf, lamp, card_reflectance(part.rig), camera)
     return IrradianceResult(
         calibration=_file(part, strip, lvf, lamp, ratio, scale),

@@ -50,11 +50,13 @@ def predict_and_tell(
     json: bool,
 ) -> None:
     """Predict for a protocol that fits its rig, and print that."""
-    from labrig.optics import read_camera
+    from labrig.bench_optics import calibration, camera_curves
+    from labrig.calibration import LVF_KIND
     from labrig.predict import Sources, predict
 
-    camera = recording.rig.optics.camera
-    response = None if camera is None else read_camera(camera)
+    optics = recording.rig.optics
+    lvf = calibration(recording.rig, LVF_KIND)
+    response = None if optics.camera is None else camera_curves(recording.rig, lvf=lvf)
     sources = Sources.parse(materials, like, metered, response)
     prediction = predict(
         recording.protocol, recording.plan, recording.rig, str(recording.rig_source), sources

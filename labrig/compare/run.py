@@ -5,6 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from labrig.acquire import read_rig_file
+from labrig.bench_optics import calibration, camera_curves
+from labrig.calibration import LVF_KIND
 from labrig.compare.colorimetry import DEFAULT_WHITE, FloatArray, viewing
 from labrig.compare.emission import emission, emission_grid
 from labrig.compare.glow import GlowComparison, compare_glow, predicted_by
@@ -23,7 +25,8 @@ from labrig.compare.three_channels import ThreeChannels, three_channels
 from labrig.errors import DataError, UsageError
 from labrig.fit import DecayFit
 from labrig.material import Material, MaterialComparison, compare_materials, read_material
-from labrig.optics import CameraResponse, read_camera
+from labrig.optics import CameraResponse
+from labrig.results import read_result
 from labrig.yaml_file import did_you_mean
 
 #: Numbers of states of which the glow is predicted, as in the paper's fig. 8.
@@ -78,7 +81,7 @@ def compare_run(
     white, normalisation
         See `viewing`.
     camera
-        Other curves than the rig file names.
+        Other curves than the run was processed with.
 
     Raises
     ------
@@ -135,16 +138,15 @@ def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Mat
 
 
 def _camera(folder: Path, instead: str | None) -> tuple[CameraResponse | None, list[str]]:
-    """The curves asked for or the rig's, and why there are none."""
-    named = instead or read_rig_file(folder / "rig.yaml").optics.camera
-    if named is None:
-        return None, ["no camera curves: the rig file names none; give them with --camera"]
+    """The curves asked for, else those the run was processed with, and why there are none."""
+    rig = read_rig_file(folder / "rig.yaml")
     try:
-        return read_camera(named), []
+        lvf = read_result(folder).provides().get("lvf") or calibration(rig, LVF_KIND)
+        return camera_curves(rig, instead, lvf), []
     except UsageError as error:
         if instead is not None:
             raise
-        return None, [f"no camera curves: {error}"]
+        return None, [f"no camera curves: {error}; give them with --camera"]
 
 
 def _expected(

@@ -2,12 +2,10 @@
 
 from labrig.fit.decay import DecayFit, fit_decay
 from labrig.fit.least_squares import LeastSquaresFit, least_squares
-from labrig.fit.nonnegative import nonnegative_least_squares
 
 __all__ = [
     "DecayFit",
     "LeastSquaresFit",
     "fit_decay",
     "least_squares",
-    "nonnegative_least_squares",
 ]

@@ -14,7 +14,7 @@ from labrig.predict.glow import Glow
 from labrig.predict.information import Information, information
 from labrig.predict.series import ExpectedSeries, expected_series, repeated
 from labrig.reduce import FrameMeasurement
-from labrig.reduce.patches import CLIPPED_SHARE
+from labrig.reduce.saturation import is_clipped
 from labrig.region import Region
 
 
@@ -195,7 +195,7 @@ def _series(
         darks_s = np.array(protocol.dark_exposures_s(offers))
         darks = dark_frames(camera, region, frames.channels, darks_s)
     one = expected_series(glow, t_s, frames, darks, background, bench.flicker)
-    kept = np.asarray((frames.saturated <= CLIPPED_SHARE).all(axis=1))
+    kept = np.asarray(~is_clipped(frames.saturated, 1.0).any(axis=1))
     clipped = int(np.count_nonzero(~kept))
     if len(kept) - clipped < 2 * len(glow.k_r_per_s):
         raise ProtocolError(

@@ -10,7 +10,7 @@ from labrig.material.rates import exponential_means
 from labrig.predict.camera import CameraFigures
 from labrig.predict.glow import Glow
 from labrig.reduce import ChannelStats, FrameMeasurement
-from labrig.reduce.noise import ROUNDING_VARIANCE
+from labrig.reduce.photon_transfer import ROUNDING_VARIANCE
 from labrig.region import Region
 
 #: Standard deviations above the mean at which a normal variate has its 99.5 % quantile.

@@ -8,7 +8,6 @@ import numpy as np
 
 from labrig.acquire import read_protocol
 from labrig.errors import DataError, UsageError
-from labrig.fit.nonnegative import nonnegative_least_squares
 from labrig.predict.camera import (
     TYPICAL_DARK_ELECTRONS_PER_S,
     TYPICAL_ELECTRONS_PER_DN,
@@ -18,6 +17,7 @@ from labrig.predict.expectation import predictable
 from labrig.predict.frames import PEAK_SIGMAS
 from labrig.record import FrameRecord, RunRecord, read_run
 from labrig.reduce import FrameMeasurement, fit_dark, measure, read_raw
+from labrig.reduce.photon_transfer import NoiseModel, variance_terms
 from labrig.region import Region
 from labrig.results import Series, find_fitted_decays, read_fitted_decay, read_series
 from labrig.yaml_file import read_yaml
@@ -108,7 +108,7 @@ def read_reference(place: Path) -> Reference:
             dark_electrons_per_s=(
                 TYPICAL_DARK_ELECTRONS_PER_S if dark_dn_per_s is None else dark_dn_per_s * gain
             ),
-            range_dn=seen.white - max(seen.black),
+            range_dn=seen.range_dn,
             unevenness=float(max((brightest.peak - noise_dn) / brightest.mean, 1.0)),
             channel_shares={name: stats.n / pixels for name, stats in seen.channels.items()},
         ),
@@ -148,7 +148,7 @@ def _darks(run: RunRecord, region: Region) -> list[FrameMeasurement]:
 def _photon_transfer(
     series: Series, seen: FrameMeasurement, darks: Sequence[FrameMeasurement]
 ) -> tuple[float, float]:
-    """Electrons a DN and read noise in DN, from the line of variance over mean (Janesick 2007).
+    """Electrons a DN and read noise in DN, by photon transfer.
 
     0 electrons a DN where the frames are all too dark to tell.
     """
@@ -162,9 +162,8 @@ def _photon_transfer(
         (pixels * np.square(series.sigma * exposure_s))[series.usable],
         [channel.n * channel.sigma**2 for channel in in_dark],
     )
-    design = np.stack([mean, np.ones_like(mean)], axis=1) / variance[:, np.newaxis]
-    slope, at_zero = nonnegative_least_squares(design, np.ones_like(mean))
-    return float(1 / slope) if slope > 0 else 0.0, float(np.sqrt(at_zero))
+    line = NoiseModel.fit(variance_terms(mean)[:, :2], variance, sigma_dn2=variance)
+    return 1 / line.photon_dn if line.photon_dn > 0 else 0.0, float(np.sqrt(line.read_dn2))
 
 
 def _dark_current(darks: Sequence[FrameMeasurement]) -> float | None:

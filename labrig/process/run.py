@@ -8,9 +8,11 @@ from labrig.acquire import RigFile
 from labrig.analyse import Choices, Inputs, Part
 from labrig.analyse.choices import read_run_protocol
 from labrig.analyse.temperature import temperature_warnings
+from labrig.bench_optics import camera_curves
+from labrig.calibration import LvfFile
 from labrig.errors import FitError, UsageError
 from labrig.export import write_nexus
-from labrig.optics import CameraResponse, read_camera
+from labrig.optics import CameraResponse
 from labrig.process.description import describe_run
 from labrig.process.provenance import provenance
 from labrig.process.result_folder import new_result, put_in_place, write_provenance
@@ -87,9 +89,10 @@ def process_and_report(folder: Path | str, choices: Choices | None = None) -> Pr
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     choices.check(frames)
     analyse = plugins.load(plugins.ANALYSES, protocol.protocol, str(folder))
-    camera, unknown_camera = _camera_response(rig, choices.camera)
-
-    result: RunResult = analyse(Part(run, protocol, rig, choices, Inputs.of(rig)))
+    inputs = Inputs.of(rig)
+    result: RunResult = analyse(Part(run, protocol, rig, choices, inputs))
+    lvf = inputs.with_those_of(result).lvf
+    camera, unknown_camera = _camera_response(rig, choices.camera, lvf)
     warnings = (*result.warnings, *unknown_camera, *temperature_warnings(run))
     result = replace(result, warnings=warnings)
 
@@ -115,17 +118,13 @@ def process_and_report(folder: Path | str, choices: Choices | None = None) -> Pr
 
 
 def _camera_response(
-    rig: RigFile, instead: str | None
+    rig: RigFile, instead: str | None, lvf: LvfFile | None
 ) -> tuple[CameraResponse | None, tuple[str, ...]]:
-    """The curves asked for `instead`, or the rig's with a warning if they are not here.
-
-    They colour the report's pictures; no number rests on them.
-    """
-    if instead is not None:
-        return read_camera(instead), ()
-    if rig.optics.camera is None:
-        return None, ()
+    """The curves that colour the report's pictures, with a warning if the rig's are not here."""
     try:
-        return read_camera(rig.optics.camera), ()
+        return camera_curves(rig, instead, lvf), ()
     except UsageError as error:
-        return None, (f"colours in the report are the camera's own: {error}",)
+        if instead is not None:
+            raise
+        known = rig.optics.camera is not None
+        return None, (f"colours in the report are the camera's own: {error}",) if known else ()

@@ -7,9 +7,10 @@ from typing import Any
 import numpy as np
 
 from labrig.errors import DataError, FrameError
-from labrig.reduce.noise import ROUNDING_VARIANCE
+from labrig.reduce.photon_transfer import ROUNDING_VARIANCE
 from labrig.reduce.planes import PixelMask, PlaneCount, count_planes
 from labrig.reduce.raw import RawFrame
+from labrig.reduce.saturation import is_clipped
 from labrig.region import Region, region_pixels
 
 #: The quantile that says how close to clipping a channel is: a few hot pixels do not reach it.
@@ -47,6 +48,11 @@ class ChannelStats:
     saturated: int
     hot: int
 
+    @property
+    def clipped(self) -> bool:
+        """Whether so many pixels are saturated that the mean is too small."""
+        return bool(is_clipped(self.saturated, self.n))
+
 
 @dataclass(frozen=True)
 class FrameMeasurement:
@@ -63,6 +69,16 @@ class FrameMeasurement:
     f_number: float | None
     make: str | None
     model: str | None
+
+    @property
+    def clipped(self) -> bool:
+        """Whether any channel is."""
+        return any(stats.clipped for stats in self.channels.values())
+
+    @property
+    def range_dn(self) -> float:
+        """From black to white."""
+        return self.white - max(self.black)
 
     def to_json(self) -> dict[str, Any]:
         """What `labrig frame --json` prints (contracts.md)."""

@@ -16,7 +16,8 @@ from labrig.reduce.raw import RawFrame, read_raw
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.float32]
 
-#: Pixels fuller than this are left out: noise carries some of their like beyond the range.
+#: Single pixels fuller than this are left out: noise carries some of their like beyond the range,
+#: which `is_clipped` allows a mean over many.
 FULL = 0.95
 
 

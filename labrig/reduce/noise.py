@@ -26,6 +26,8 @@ from typing import TypeAlias, TypeVar
 import numpy as np
 import numpy.typing as npt
 
+from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel
+
 Floats: TypeAlias = npt.NDArray[np.float64]
 Mosaic: TypeAlias = npt.NDArray[np.uint16]
 NumberArray = TypeVar("NumberArray", npt.NDArray[np.float64], npt.NDArray[np.intp])
@@ -36,9 +38,6 @@ TILE = 12
 TILES_ACROSS = 16
 #: Pixels per direction from which the brightness of a plane is told.
 _SAMPLES_ACROSS = 256
-#: Variance of rounding to whole numbers (uniform distribution), the least an integer can have.
-ROUNDING_VARIANCE = 1 / 12
-
 #: Lags of one half-plane (row, column): where noise may be shared …
 _NEAR = tuple((y, x) for y in range(3) for x in range(-2, 3) if (y, x) >= (0, 0))
 #: … and where only structure reaches.
@@ -64,9 +63,8 @@ class PlaneNoise:
 
     Parameters
     ----------
-    darkest_level, darkest_variance, variance_per_level
-        Temporal variance of a pixel (DN²) along brightness (DN, black included): read noise and
-        photon noise make it a straight line (the photon-transfer line; Janesick 2007).
+    darkest_level, above_darkest
+        Temporal variance of a pixel by its level (DN) above that of the darkest tile.
     mean_variance
         n · Var(mean over n pixels), DN²: the pixels' variance times their correlation.
     correlation
@@ -74,15 +72,15 @@ class PlaneNoise:
     """
 
     darkest_level: float
-    darkest_variance: float
-    variance_per_level: float
+    above_darkest: NoiseModel
     mean_variance: float
     correlation: float
 
     def variance_at(self, level: Floats) -> Floats:
         """Temporal variance in DN² of pixels at `level`, never below that of rounding."""
-        rise = self.variance_per_level * (level - self.darkest_level)
-        return np.maximum(self.darkest_variance + rise, ROUNDING_VARIANCE)
+        line = self.above_darkest
+        rise = line.photon_dn * (level - self.darkest_level)
+        return np.maximum(line.read_dn2 + rise, ROUNDING_VARIANCE)
 
 
 def plane_noise(planes: Sequence[Mosaic]) -> list[PlaneNoise]:
@@ -128,24 +126,24 @@ def _noise_of_plane(
     """
     darkest = float(level.min())
     above = level - darkest
-    at_darkest, slope = _photon_line(above, variance)
+    line = _photon_line(above, variance)
     correlation = 1.0
     if sharing is not None:
         # Only tiles on the line say whether noise is shared: in the others it is the sample.
-        line = at_darkest + slope * above
-        plain = variance <= _ROUGH * line
+        by_line = line.variance_dn2(above)
+        plain = variance <= _ROUGH * by_line
         autocovariance, clean = sharing
-        correlation = _correlation(autocovariance[plain & clean], line[plain & clean])
+        correlation = _correlation(autocovariance[plain & clean], by_line[plain & clean])
         if correlation > 1:
             # Differences of pixels that share noise are too small: take C(0) itself.
             variance = np.where(plain, autocovariance[:, 0], np.inf)
-            at_darkest, slope = _photon_line(above[plain], variance[plain])
-    expected = at_darkest + slope * above
+            line = _photon_line(above[plain], variance[plain])
+    expected = line.variance_dn2(above)
     smooth = np.where(variance <= _ROUGH * expected, variance, expected)
     # Few tiles may miss how much of the plane is bright, thousands of single pixels do not.
-    missed = slope * (brightness - float(level.mean()))
+    missed = line.photon_dn * (brightness - float(level.mean()))
     mean_variance = max(float(smooth.mean()) + missed, 0.0) * correlation
-    return PlaneNoise(darkest, at_darkest, slope, mean_variance, correlation)
+    return PlaneNoise(darkest, line, mean_variance, correlation)
 
 
 def _tiles(plane: Mosaic) -> Floats:
@@ -196,17 +194,17 @@ def _median(values: Floats) -> Floats:
     return np.asarray((parted[..., low] + parted[..., high]) / 2)
 
 
-def _photon_line(level: Floats, variance: Floats) -> tuple[float, float]:
-    """Intercept and slope ≥ 0 of the line that most tiles lie on.
+def _photon_line(level: Floats, variance: Floats) -> NoiseModel:
+    """The photon-transfer line that most tiles lie on.
 
-    Of the lines through the medians of two groups of like brightness (or flat through one), the
-    one with the least capped misfit, in logarithms: tiles with structure, however many at one
-    brightness and however rough, pull no more than the cap.
+    No least squares: of the lines through the medians of two groups of like brightness (or flat
+    through one), the one with the least capped misfit, in logarithms: tiles with structure, however
+    many at one brightness and however rough, pull no more than the cap.
     """
     groups = max(1, min(16, len(level) // 6))
     x, y = _medians_of_groups(level, variance, groups)
     if groups == 1:
-        return float(y[0]), 0.0
+        return NoiseModel(float(y[0]), 0.0)
     one, other = np.triu_indices(len(x), k=1)
     rising = (x[other] > x[one]) & (y[other] > y[one])
     one, other = one[rising], other[rising]
@@ -216,7 +214,7 @@ def _photon_line(level: Floats, variance: Floats) -> tuple[float, float]:
     line = intercept[:, np.newaxis] + slope[:, np.newaxis] * level
     misfit = np.log((variance + ROUNDING_VARIANCE) / (line + ROUNDING_VARIANCE))
     best = int(np.argmin(np.minimum(np.abs(misfit), _MISFIT_CAP).sum(axis=1)))
-    return float(intercept[best]), float(slope[best])
+    return NoiseModel(float(intercept[best]), float(slope[best]))
 
 
 def _medians_of_groups(level: Floats, variance: Floats, groups: int) -> tuple[Floats, Floats]:

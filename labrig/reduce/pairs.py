@@ -14,13 +14,14 @@ strays into the neighbour of another colour. The same differences tell that corr
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from itertools import combinations, pairwise
+from itertools import pairwise
 
 import numpy as np
 import numpy.typing as npt
 
 from labrig.reduce.dark import same_exposure
 from labrig.reduce.noise import Floats
+from labrig.reduce.photon_transfer import NoiseModel, variance_terms
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame
 from labrig.region import Region, region_pixels
@@ -175,7 +176,7 @@ def paired_noise(
             part = part.and_then(darks[one])
         first, second = np.array(pairs).T
         for channel in range(channels):
-            found[rows, channel] = _photon_transfer(part, channel, first, second)[: len(rows)]
+            found[rows, channel] = _sigma_of_means(part, channel, first, second)[: len(rows)]
         light = second < len(rows)
         products += _cross_products(frames.take(rows), found[rows], first[light], second[light])
     length = np.sqrt(np.diag(products))
@@ -192,7 +193,7 @@ def paired_dark_sigma(darks: PatchFrames) -> Floats:
         return darks.sigma
     first, second = np.array(pairs).T
     channels = range(darks.sigma.shape[1])
-    return np.stack([_photon_transfer(darks, c, first, second) for c in channels], axis=1)
+    return np.stack([_sigma_of_means(darks, c, first, second) for c in channels], axis=1)
 
 
 def _cross_products(
@@ -219,40 +220,24 @@ def _differences(
     return scales, frames.deviations[other] - scales[..., np.newaxis] * frames.deviations[one]
 
 
-def _photon_transfer(
+def _sigma_of_means(
     frames: PatchFrames, channel: int, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
 ) -> Floats:
     """σ of the means of one channel, shape (n,), from pairs of `one` frame and an `other`.
 
-    The variance is A + B·light + C·light², all ≥ 0: reading, photons, and what is proportional to
-    the light but not common to the patch.
+    Uneven is what is proportional to the light but not common to the patch.
     """
     scales, differences = _differences(frames, frames.sigma, one, other)
     scale, difference, sigma = scales[:, channel], differences[:, channel], frames.sigma[:, channel]
     strips = difference.shape[1]
-    light = np.maximum(frames.light[:, channel], 0)
+    light = frames.light[:, channel]
     scatter = np.square(difference).sum(axis=1) / (strips - 1) / strips
-    terms = np.stack([np.ones_like(light), light, np.square(light)], axis=1)
-    design = terms[other] + np.square(scale)[:, np.newaxis] * terms[one]
+    terms = variance_terms(light)
+    of_pair = terms[other] + np.square(scale)[:, np.newaxis] * terms[one]
     variance = np.square(sigma)
     least = LEAST_SHARE**2 * variance
     for _ in range(REWEIGHTINGS):
         expected = variance[other] + np.square(scale) * variance[one]
-        coefficients = _nonnegative(design / expected[:, np.newaxis], scatter / expected)
-        variance = np.maximum(terms @ coefficients, least)
+        noise = NoiseModel.fit(of_pair, scatter, sigma_dn2=expected)
+        variance = np.maximum(noise.variance_dn2(light), least)
     return np.sqrt(variance)
-
-
-def _nonnegative(design: Floats, target: Floats) -> Floats:
-    """Least squares with coefficients ≥ 0 for a few columns: the best of all sets of them."""
-    lengths = np.linalg.norm(design, axis=0)
-    columns = design / np.where(lengths > 0, lengths, 1.0)
-    best, least = np.zeros(len(lengths)), np.inf
-    for size in range(1, len(lengths) + 1):
-        for chosen in map(list, combinations(range(len(lengths)), size)):
-            found, *_ = np.linalg.lstsq(columns[:, chosen], target)
-            left = float(np.square(target - columns[:, chosen] @ found).sum())
-            if left < least and found.min() >= 0:
-                best, least = np.zeros(len(lengths)), left
-                best[chosen] = found / np.where(lengths[chosen] > 0, lengths[chosen], 1.0)
-    return best

@@ -19,8 +19,6 @@ from labrig.reduce.shots import SeriesFrame, Shot, View, levels, read_shots, str
 from labrig.region import Region
 from labrig.results import Series, add_flag, is_usable
 
-#: Share of a patch's pixels that may be saturated before its mean is too small.
-CLIPPED_SHARE = 0.001
 #: Share by which the dark current changes when the sensor is two degrees warmer than in the dark
 #: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before
 #: the decay, and 20 min of warming up leave a camera a degree or two to go.
@@ -74,9 +72,9 @@ def reduce_patches(
     camera
         Calibration by which true shutter times, fall-off and settings are put right.
 
-    Frames with more than 0.1 % of a patch saturated are flagged `clipped`, not dropped. Sigma comes
-    from pairs of successive frames of a unit, and of dark frames of one exposure, if there are
-    enough of a unit, else from each frame alone.
+    Frames in which a patch is clipped (`is_clipped`) are flagged so, not dropped. Sigma comes from
+    pairs of successive frames of a unit, and of dark frames of one exposure, if there are enough of
+    a unit, else from each frame alone.
 
     Raises
     ------
@@ -224,11 +222,7 @@ def _views(name: str, shots: Sequence[Shot]) -> list[View]:
 
 def _flag(shot: Shot, name: str) -> str:
     views = [shot.patches[name], *([shot.background] if shot.background else [])]
-    clipped = any(
-        stats.saturated > CLIPPED_SHARE * stats.n
-        for view in views
-        for stats in view.measured.channels.values()
-    )
+    clipped = any(view.measured.clipped for view in views)
     return add_flag(shot.frame.flag, "clipped") if clipped else shot.frame.flag
 
 

@@ -1,14 +1,19 @@
-"""The level from which pixels are saturated, where the file's white level is not reached.
+"""The level from which pixels are saturated, and how many of them clip a region.
 
+The level is told from the frame where the file's white level is not reached.
 Some sensors, and most at their lowest ISO, are full below the white level of their file. Then all
 pixels that would be brighter pile up at one level, the brightest of the frame. Pixels that are not
 saturated do not: photon noise alone spreads them over tens of levels up there.
 """
 
 import numpy as np
+import numpy.typing as npt
 
 from labrig.reduce.histogram import histogram
 from labrig.reduce.noise import Mosaic
+
+#: Share of a region's pixels, of one colour, that may be saturated; see `is_clipped`.
+CLIPPED_SHARE = 0.001
 
 #: Share of the range above black below which no sensor is full, whatever piles up there.
 _LEAST_FULL = 0.5
@@ -20,6 +25,23 @@ _STANDS_OUT = 10
 #: counted over so many levels that occur (compressed files leave levels out). A frame with fewer
 #: of them has no noise and is no photograph: nothing can be told.
 _LEVELS_BELOW = 16
+
+
+def is_clipped(saturated: npt.ArrayLike, pixels: npt.ArrayLike) -> npt.NDArray[np.bool_]:
+    """Whether the mean of a region is too small because pixels of it are full.
+
+    It is if more than 0.1 % of them are. Fewer say nothing about the light: a sensor's hot pixels
+    are up to that many, and in a long exposure they are full whatever is seen. And fewer do no
+    harm: noise whose tail beyond white holds 0.1 % of the pixels lacks 3e-4 of a pixel's standard
+    deviation in the mean, and highlights twice as bright as white lack 0.1 % of white, a seventh
+    of what a shutter flickers by.
+
+    Parameters
+    ----------
+    saturated, pixels
+        How many pixels of one colour are at white or above, of how many.
+    """
+    return np.asarray(np.asarray(saturated) > CLIPPED_SHARE * np.asarray(pixels))
 
 
 def clip_level(mosaic: Mosaic, black: float, white: float) -> float:

@@ -7,6 +7,7 @@ from labrig.record.description import RunDescription
 from labrig.record.frames import FrameRecord
 from labrig.region import Region
 from labrig.results import FittedDecay, Series
+from labrig.results.decay import NoiseBudget
 
 #: What every decay measured with a camera rests on.
 DECAY_ASSUMPTIONS = (
@@ -54,12 +55,15 @@ class PatchReport:
         What was measured there, DN/s.
     fit
         The fit, or the reason why there is none.
+    noise
+        Where σ comes from; None where that is not told.
     """
 
     name: str
     region: Region | None
     series: Series
     fit: FittedDecay | str
+    noise: NoiseBudget | None = None
 
 
 @dataclass(frozen=True)

@@ -13,8 +13,7 @@ from labrig.report.content import (
 )
 from labrig.report.decay_figures import linear_decay, logarithmic_decay, values_below_axis
 from labrig.report.methods import REFERENCES, UNKNOWN, methods
-from labrig.report.noise_budget import noise_budget
-from labrig.report.noise_figure import noise_figure
+from labrig.report.noise_figure import noise_figure, visible_parts
 from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
 from labrig.report.rendering import Rendered, Source
 from labrig.report.residual_figure import residual_figure
@@ -125,7 +124,7 @@ def decay_sections(
 
 
 def _reported(name: str, patch: DecayPatch) -> PatchReport:
-    return PatchReport(name, patch.region, patch.series, patch.fit or patch.failure)
+    return PatchReport(name, patch.region, patch.series, patch.fit or patch.failure, patch.noise)
 
 
 def _glow(frames: Sequence[FrameRecord], series: Series) -> tuple[GlowPhotograph, ...]:
@@ -205,10 +204,9 @@ def _patch(number: int, patch: PatchReport, screen: Screen, anchor: str) -> _Pat
     noise_parts: tuple[str, ...] = ()
     if fit is not None:
         figures.append(Picture("residuals", residual_figure(series, fit)))
-        budget = noise_budget(series, fit)
-        if budget is not None:
-            figures.append(Picture("noise", noise_figure(budget)))
-            noise_parts = tuple(budget.visible())
+    if patch.noise is not None:
+        figures.append(Picture("noise", noise_figure(patch.noise)))
+        noise_parts = tuple(visible_parts(patch.noise))
     return _Patch(
         number=number,
         anchor=f"{anchor}patch-{number}",

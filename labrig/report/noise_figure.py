@@ -19,9 +19,12 @@ from labrig.report.figure_style import (
 )
 from labrig.report.legend import BAND_OPACITY, legend_above, lined
 from labrig.report.log_axis import mark_decades
-from labrig.report.noise_budget import LEAST_SHARE, NoiseBudget
+from labrig.results import FloatArray
+from labrig.results.decay import NoiseBudget
 
 HEIGHT_PT = 268.0
+#: Parts below this share of the whole are not worth their line.
+LEAST_SHARE = 0.03
 _LINES: dict[str, tuple[str, LineStyle]] = {
     "photons": (OTHER_CHANNELS[1], "-"),
     "reading": (OTHER_CHANNELS[2], DASHED),
@@ -31,6 +34,19 @@ _LINES: dict[str, tuple[str, LineStyle]] = {
 }
 #: Where nothing is seen any more, how little need not be shown.
 MOST_PERCENT = 300.0
+
+
+def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
+    """The parts that somewhere are worth a line, by their names."""
+    parts = {
+        "photons": budget.photons,
+        "reading": budget.reading,
+        "uneven light": budget.uneven,
+        "flicker": budget.flicker,
+        "dark level": budget.dark_level,
+    }
+    worth = LEAST_SHARE * budget.together
+    return {name: part for name, part in parts.items() if (part > worth).any()}
 
 
 def noise_figure(budget: NoiseBudget) -> Figure:
@@ -43,7 +59,7 @@ def noise_figure(budget: NoiseBudget) -> Figure:
     entries: list[Artist] = [lined("together", INK, width=4.5, opacity=BAND_OPACITY)]
     shown = [together]
     axes.plot(budget.t_s, together, color=INK, linewidth=4.5, alpha=BAND_OPACITY)
-    for name, part in budget.visible().items():
+    for name, part in visible_parts(budget).items():
         percent, (colour, style) = 100 * part, _LINES[name]
         axes.plot(budget.t_s, percent, color=colour, linewidth=1.2, linestyle=style)
         entries.append(lined(name, colour, style))

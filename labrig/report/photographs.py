@@ -19,9 +19,10 @@ from labrig.written_numbers import exposure_text, rounded
 
 DAYLIGHT_WIDTH = 1000
 GLOW_WIDTH = 420
-#: Share of pixels that may be saturated in a daylight photograph that counts as well exposed.
+#: Share of all pixels that may be saturated in a daylight photograph that counts as well exposed;
+#: for display only.
 BLOWN_SHARE = 0.002
-#: Share of saturated pixels from which a spot is shown as saturated.
+#: Share of saturated pixels from which a spot is shown as saturated; for display only.
 BLOWN_LOOKS = 0.5
 #: What is shown at full brightness: this quantile of the pixels, so that hot ones do not decide.
 BRIGHT_QUANTILE = 0.995

@@ -5,12 +5,45 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import ClassVar
 
+import numpy as np
+
 from labrig.material import Material, write_material
 from labrig.region import Region
 from labrig.results.arrays import FloatArray
 from labrig.results.fitted_decay import FittedDecay, write_fitted_decay
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series, write_series
+
+
+@dataclass(frozen=True, eq=False)
+class NoiseBudget:
+    """Standard uncertainties of the brightest channel, relative to its fitted signal.
+
+    Attributes
+    ----------
+    t_s
+        (n,) middle of the exposures of the first decay, rising.
+    photons, reading, uneven
+        (n,) what grows as the root of the light, what is there without light, and what is
+        proportional to it but differs over the patch. Their sum in quadrature is the series' σ.
+    flicker
+        (n,) common to the channels of a frame, as fitted.
+    dark_level
+        (n,) of the level that was subtracted, common to all frames; 0 if not known.
+    """
+
+    t_s: FloatArray
+    photons: FloatArray
+    reading: FloatArray
+    uneven: FloatArray
+    flicker: FloatArray
+    dark_level: FloatArray
+
+    @property
+    def together(self) -> FloatArray:
+        """Of one value, (n,)."""
+        parts = (self.photons, self.reading, self.uneven, self.flicker, self.dark_level)
+        return np.asarray(np.sqrt(np.square(parts).sum(axis=0)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -30,6 +63,8 @@ class DecayPatch:
     normalised_residuals
         (m, C) value − model of the m usable frames, whitened: independent and of unit variance if
         the noise is as assumed. None without a fit.
+    noise
+        Where σ comes from; None where the fitted frames do not tell.
     material
         What the decay alone says of it, rates and amplitudes; None without a fit.
     """
@@ -39,6 +74,7 @@ class DecayPatch:
     fit: FittedDecay | None = None
     failure: str = ""
     normalised_residuals: FloatArray | None = None
+    noise: NoiseBudget | None = None
     material: Material | None = None
 
     def write_files(self, folder: Path) -> None:

@@ -3,7 +3,7 @@
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import ClassVar
+from typing import Any, ClassVar
 
 from labrig.material import Material, write_material
 from labrig.results.run_result import AnyResult, RunResult
@@ -28,6 +28,15 @@ class PhosphorResult(RunResult):
     parts: Mapping[str, AnyResult]
     failed: Mapping[str, str]
     materials: Mapping[str, Material]
+
+    def provides(self) -> dict[str, Any]:
+        """What all parts provide; where two provide the same, what the later one does."""
+        provided: dict[str, Any] = {}
+        for part in self.parts.values():
+            for name, value in part.provides().items():
+                by_patch = isinstance(value, Mapping)
+                provided[name] = {**provided.get(name, {}), **value} if by_patch else value
+        return provided
 
     def write_files(self, folder: Path) -> None:
         """Write the files of every part into a folder of its name, and the material files."""

@@ -14,7 +14,8 @@ from numpy.typing import NDArray
 from labrig.errors import DeviceError
 from labrig.region import Region, region_pixels
 
-#: A JPEG's 255 rings a little below itself beside an edge.
+#: A JPEG's 255 rings a little below itself beside an edge. For display only: what a measurement
+#: calls clipped is `labrig.reduce.saturation.is_clipped`.
 CLIPPED_FROM = 250
 #: Bars of the histogram, each two values wide.
 BINS = 128

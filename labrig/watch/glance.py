@@ -27,7 +27,7 @@ class Glance:
     values
         Patch → channel → mean in DN above the file's black; nothing else is subtracted.
     clipped
-        Patches in which a pixel is saturated.
+        Patches that are.
     picture
         (height, width, 3), brightened by `brightened`; in the camera's own colours.
     """
@@ -59,11 +59,7 @@ def glance(path: Path, patches: Mapping[str, Region], width: int) -> Glance:
             name: {channel: stats.mean for channel, stats in one.channels.items()}
             for name, one in measured.items()
         },
-        clipped=tuple(
-            name
-            for name, one in measured.items()
-            if any(stats.saturated for stats in one.channels.values())
-        ),
+        clipped=tuple(name for name, one in measured.items() if one.clipped),
         picture=shown.round().astype(np.uint8),
         brightened=float(f"{brightened:.2g}"),
     )

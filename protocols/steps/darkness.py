@@ -8,6 +8,7 @@ import numpy.typing as npt
 
 from labrig.errors import DataError, DeviceError
 from labrig.quantity import duration_text
+from labrig.reduce.saturation import is_clipped
 
 from .metering import Look
 
@@ -22,8 +23,6 @@ DARK_CURRENT_PER_S = 2e-4
 BRIGHT = 0.25
 #: A glow is known by fading by so much along the dark frames; shutters flicker by a third of it.
 FADED = 0.03
-#: A frame in which so many pixels clip is no longer a measurement; hot pixels are fewer.
-CLIPPED = 0.01
 
 
 @dataclass(frozen=True)
@@ -134,9 +133,13 @@ def levels(look: Look) -> FloatArray:
 
 
 def clips(look: Look) -> bool:
-    """Whether some channel of some patch is too bright for its shutter time."""
+    """Whether some channel of some patch is too bright for its shutter time.
+
+    Pixels that stand out alone are hot: of a small patch one is more than may clip, and it is full
+    in a long exposure however dark it is.
+    """
     return any(
-        channel.saturated > CLIPPED * channel.n
+        is_clipped(max(channel.saturated - channel.hot, 0), channel.n)
         for patch in look.patches
         for channel in patch.channels.values()
     )
@@ -144,5 +147,4 @@ def clips(look: Look) -> bool:
 
 def range_dn(look: Look) -> float:
     """From black to white."""
-    one = look.patches[0]
-    return one.white - max(one.black)
+    return look.patches[0].range_dn

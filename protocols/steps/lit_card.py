@@ -17,7 +17,7 @@ from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 from labrig.region import Region
 
-from .darkness import CLIPPED, range_dn
+from .darkness import range_dn
 from .metering import SEEN_SIGMA, Look, look
 from .posing import face_lamp
 
@@ -117,9 +117,9 @@ def _per_s(looks: Sequence[Look]) -> float:
     """From the fullest look that does not clip."""
     fitting = []
     for seen in looks:
-        channels = seen.patches[0].channels.values()
-        if not any(channel.saturated > CLIPPED * channel.n for channel in channels):
-            fitting.append((max(channels, key=lambda channel: channel.mean), seen))
+        card = seen.patches[0]
+        if not card.clipped:
+            fitting.append((max(card.channels.values(), key=lambda channel: channel.mean), seen))
     if not fitting:
         raise DeviceError(
             "the lit card is too bright for the shortest shutter time: lower camera.iso or close "

@@ -23,8 +23,6 @@ TARGET = 0.4
 #: A glow is seen when its mean is this many standard uncertainties and at least this many counts.
 SEEN_SIGMA = 5.0
 SEEN_DN = 2.0
-#: Share of the pixels that are hot at most, and clip in a long exposure whatever is seen.
-HOT = 0.001
 #: Below this share of the range the longest exposure still leaves a picture that is all noise.
 DIM = 0.002
 
@@ -95,13 +93,12 @@ class DecayMeter:
         self._readings: list[_Reading] = []
         self._shortest_clipped = False
         for seen in looks:
-            one = seen.patches[0]
-            self._range_dn = min(self._range_dn, one.white - max(one.black))
+            self._range_dn = min(self._range_dn, seen.patches[0].range_dn)
             channels = [channel for patch in seen.patches for channel in patch.channels.values()]
             self._take(seen.start_s - looks[0].start_s, seen.exposure_s, channels)
 
     def _take(self, time_s: float, exposure_s: float, channels: list[ChannelStats]) -> None:
-        if any(channel.saturated > HOT * channel.n for channel in channels):
+        if any(channel.clipped for channel in channels):
             self._shortest_clipped |= not self._readings
             return
         brightest = max(channels, key=lambda channel: channel.mean)

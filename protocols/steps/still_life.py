@@ -9,7 +9,7 @@ from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, Session, Shoo
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
-from labrig.reduce import FrameMeasurement, measure, read_raw
+from labrig.reduce import measure, read_raw
 
 from .camera_settings import DARKS_PER_EXPOSURE, CameraSettings
 from .metering import SEEN_DN, SEEN_SIGMA, TARGET
@@ -127,15 +127,11 @@ def _seen(frame: FrameRecord) -> _Seen:
     noise_dn = SEEN_SIGMA * brightest.sigma * np.sqrt(brightest.n)
     return _Seen(
         exposure_s=frame.exposure_s,
-        share=brightest.peak / _range_dn(measured),
+        share=brightest.peak / measured.range_dn,
         visible=brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN)
         or brightest.peak > max(noise_dn, SEEN_DN),
-        clips=brightest.peak >= 0.98 * _range_dn(measured),
+        clips=measured.clipped,
     )
-
-
-def _range_dn(measured: FrameMeasurement) -> float:
-    return measured.white - max(measured.black)
 
 
 def _looks(session: Session, unit: str) -> list[FrameRecord]:

@@ -5,17 +5,35 @@ import io
 import json
 import shutil
 from collections.abc import Callable
+from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Any, ClassVar
 
 import pytest
 import yaml
 
 from labrig import shipped
+from labrig.calibration import LvfFile, write_lvf_file
+from labrig.calibration.lvf_file import CurveColumns
 from labrig.cli.ending import guarded
+from labrig.optics import read_camera
+from labrig.results import RunResult
+from labrig.results.phosphor import PhosphorResult
+from tests.analyse.spectral_bench import true_lvf_file
 from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
+
+
+@dataclass(frozen=True, eq=False, kw_only=True)
+class Calibrated(RunResult):
+    """A calibration of a filter of which nothing but its file matters."""
+
+    kind: ClassVar[str] = "calibrated"
+    file: LvfFile
+
+    def provides(self) -> dict[str, LvfFile]:
+        return {"lvf": self.file}
 
 
 @pytest.fixture(scope="module")
@@ -125,6 +143,33 @@ def test_a_run_without_a_sound_result_is_one_clear_line(
     bare = labrig("compare", copy)
     assert (bare.code, len(bare.err.splitlines())) == (4, 1)
     assert "labrig process" in bare.err
+
+
+@pytest.mark.parametrize("found_by", ["an earlier run", "a part of the chain"])
+def test_curves_that_a_calibration_found_go_before_the_rigs(
+    labrig: Labrig, run: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch, found_by: str
+) -> None:
+    known = read_camera("canon_eos_5d_mark_ii")
+    found = replace(known, wavelength_nm=known.wavelength_nm + 4.0)
+    lvf = true_lvf_file().model_copy(update={"camera": CurveColumns.of(found)})
+    copy = Path(shutil.copytree(run, tmp_path / "copy"))
+    of_rig = compared(labrig, copy)
+    if found_by == "an earlier run":
+        write_lvf_file(tmp_path / "lvf.yaml", lvf)
+        rig = yaml.safe_load((copy / "rig.yaml").read_text())
+        rig["optics"]["lvf"] = str(tmp_path / "lvf.yaml")
+        (copy / "rig.yaml").write_text(yaml.safe_dump(rig))
+    else:
+        calibration = Calibrated(file=lvf)
+        chain = PhosphorResult(parts={"lvf_calibration": calibration}, failed={}, materials={})
+        monkeypatch.setattr("labrig.compare.run.read_result", lambda folder: chain)
+    said = compared(labrig, copy)
+    assert "as the filter's calibration found them" in said["words"]
+    table = [[nm, *row] for nm, row in zip(found.wavelength_nm, found.sensitivity, strict=True)]
+    lines = ["wavelength_nm,R,G,B", *(",".join(map(repr, map(float, row))) for row in table)]
+    (tmp_path / "found.csv").write_text("\n".join(lines))
+    asked = compared(labrig, copy, "--camera", tmp_path / "found.csv")
+    assert said["glow"] == asked["glow"] != of_rig["glow"]
 
 
 def test_without_camera_curves_it_says_so_and_does_the_rest(

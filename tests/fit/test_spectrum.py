@@ -9,9 +9,9 @@ from numpy.typing import NDArray
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.nonnegative import nonnegative_least_squares
 from labrig.fit.spectrum import CurveError, SpectralSystem, fit_spectrum, system_through_lvf
 from labrig.fit.spectrum.nonnegative_quadratic import nonnegative_minimum
+from labrig.nonnegative import nonnegative_least_squares
 from labrig.optics import CameraResponse, Spectrum
 from tests.fit import lvf_pictures as made
 

@@ -7,7 +7,7 @@ import numpy.typing as npt
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.reduce.saturation import clip_level
+from labrig.reduce.saturation import clip_level, is_clipped
 
 Levels = npt.NDArray[np.float64]
 BLACK, WHITE = 1000.0, 15000.0
@@ -116,3 +116,13 @@ def test_a_real_photograph_is_clipped_where_it_is(shared_data: Path) -> None:
     pixels = np.fromfile(path, "<u2").reshape(512, 768)
     assert clip_level(pixels, 600, 20000) == 16383
     assert clip_level(pixels[pixels < 16383].reshape(1, -1), 600, 20000) == 20000
+
+
+def test_a_region_is_clipped_if_its_mean_suffers() -> None:
+    """Noise beyond white that does not count as clipping takes nothing worth a σ from the mean."""
+    light = np.random.default_rng(1).normal(100.0, 10.0, 100_000)
+    for white, clipped in ((100 + 10 * 3.3, False), (100 + 10 * 2.8, True)):
+        assert is_clipped(np.count_nonzero(light >= white), light.size) == clipped
+        if not clipped:
+            assert light.mean() - np.minimum(light, white).mean() < 3e-4 * 10.0
+    assert is_clipped([0, 1, 2], [1000, 1000, 1000]).tolist() == [False, False, True]

@@ -7,6 +7,7 @@ import numpy as np
 import tifffile
 from numpy.typing import NDArray
 
+from labrig.analyse.noise_budget import noise_budget
 from labrig.errors import LabrigError
 from labrig.fit import DecayFit, fit_decay
 from labrig.optics import read_camera
@@ -72,7 +73,9 @@ def fitted(series: Series) -> DecayFit | str:
 
 
 def patch(series: Series) -> PatchReport:
-    return PatchReport(series.region, (0.25, 0.25, 0.5, 0.5), series, fitted(series))
+    fit = fitted(series)
+    noise = noise_budget(series, fit) if isinstance(fit, DecayFit) else None
+    return PatchReport(series.region, (0.25, 0.25, 0.5, 0.5), series, fit, noise)
 
 
 def write_dng(path: Path, signal_dn: FloatArray, size: tuple[int, int] = (48, 64)) -> Path:

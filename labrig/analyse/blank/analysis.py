@@ -35,7 +35,7 @@ def analyse(part: Part) -> BlankResult:
         replace(measure(read_raw(frame.path), region, hot), exposure_s=frame.exposure_s)
         for frame in frames.dark
     ]
-    least_dn = protocol.clean.share * (darks[0].white - max(darks[0].black))
+    least_dn = protocol.clean.share * darks[0].range_dn
     found = stray_light(series, protocol.clean.sigmas, least_dn)
     leak, leak_sigma = ambient(darks)
     rows = _rows_worth_keeping(found)

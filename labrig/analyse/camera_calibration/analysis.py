@@ -28,8 +28,6 @@ from labrig.results.camera_calibration import (
 from labrig.written_numbers import exposure_text, plus_minus
 
 LIT = ("photon", "repeat", "bracket", "flat")
-#: Share of a region's pixels that may clip in a photon transfer.
-CLIPPED_SHARE = 1e-3
 #: Where a sensor is further from a straight line, its frames tell nothing of a shutter.
 MOST_BENT = 0.02
 #: χ² per degree of freedom beyond which the photon-transfer line is none.
@@ -194,9 +192,8 @@ def _dark_levels(darks: Sequence[FrameRecord], card: Region) -> FloatArray:
 def _saturation(brightest: FrameRecord, card: Region) -> tuple[float, float | None]:
     """From black to white, and the level above black at which most of the card clips; or None."""
     seen = measure(read_raw(brightest.path), card)
-    range_dn = seen.white - max(seen.black)
     clips = any(channel.saturated > channel.n / 2 for channel in seen.channels.values())
-    return range_dn, range_dn if clips else None
+    return seen.range_dn, seen.range_dn if clips else None
 
 
 def _scatters(
@@ -205,8 +202,7 @@ def _scatters(
     found = []
     for one, other in pairs:
         first, second = read_raw(one.path), read_raw(other.path)
-        seen = measure(first, card).channels.values()
-        if all(channel.saturated <= CLIPPED_SHARE * channel.n for channel in seen):
+        if not measure(first, card).clipped:
             found.append(scatter(first, second, card, dark_dn))
     return found
 

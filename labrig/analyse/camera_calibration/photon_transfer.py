@@ -1,8 +1,7 @@
 """Gain and read noise of a sensor from pairs of frames of the same light.
 
-Photons arrive as Poisson has it: the variance of electrons is their number, so that of numbers is
-level / gain (Janesick, *Photon Transfer*, 2007; EMVA Standard 1288). The difference of two frames
-holds no pattern of pixels, card or lens.
+The model is that of `labrig.reduce.photon_transfer`; the gain is one over its photons' part. The
+difference of two frames holds no pattern of pixels, card or lens.
 
 Where pixels share charge with their neighbours each one scatters less than its photons do. The
 covariances with the eight next ones make up for it: what one pixel loses its neighbours have (A. C.
@@ -18,6 +17,7 @@ from labrig.calibration import Noise
 from labrig.errors import DataError
 from labrig.record import FrameRecord
 from labrig.reduce import RawFrame
+from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel, variance_terms
 from labrig.region import Region, region_pixels
 from labrig.results import FloatArray
 from labrig.results.camera_calibration import PairScatter, PhotonTransfer
@@ -28,8 +28,6 @@ OUTLIER_SIGMAS = 6.0
 LIT_SIGMAS = 3.0
 #: More pixels across or down take memory and tell nothing more.
 MOST_PIXELS = 1024
-#: Of rounding to whole numbers.
-ROUNDING_VARIANCE = 1 / 12
 #: Half of the eight neighbours; the others see the same.
 _NEIGHBOURS = ((0, 1), (1, -1), (1, 0), (1, 1))
 
@@ -162,14 +160,15 @@ def _line(
     level: FloatArray, variance: FloatArray, dark_variance: float, freedom: FloatArray
 ) -> tuple[float, float, float]:
     """Slope, its σ and reduced χ² of variance = dark + slope · level."""
-    rise, expected = variance - dark_variance, variance
+    expected = variance
     for _ in range(3):
-        weight = freedom / (2 * np.square(np.maximum(expected, ROUNDING_VARIANCE)))
-        slope = float((weight * level) @ rise / ((weight * level) @ level))
-        expected = np.maximum(dark_variance + slope * level, 1e-3 * variance)
-    misfit = float(weight @ np.square(rise - slope * level)) / max(len(level) - 1, 1)
-    sigma = float(1 / np.sqrt((weight * level) @ level)) * np.sqrt(max(misfit, 1.0))
-    return slope, float(sigma), misfit
+        unsure = np.maximum(expected, ROUNDING_VARIANCE) * np.sqrt(2 / freedom)
+        line = NoiseModel.fit(variance_terms(level)[:, :2], variance, unsure, dark_variance)
+        expected = np.maximum(line.variance_dn2(level), 1e-3 * variance)
+    left = (variance - line.variance_dn2(level)) / unsure
+    misfit = float(left @ left) / max(len(level) - 1, 1)
+    sigma = np.sqrt(max(misfit, 1.0) / np.square(level / unsure).sum())
+    return line.photon_dn, float(sigma), misfit
 
 
 def pairs_of(frames: Sequence[FrameRecord]) -> list[tuple[FrameRecord, FrameRecord]]:

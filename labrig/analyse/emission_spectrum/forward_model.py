@@ -10,10 +10,10 @@ from dataclasses import dataclass, fields, replace
 
 import numpy as np
 
-from labrig.analyse.bench_curves import camera_curves, card_reflectance, lamp_spectrum
 from labrig.analyse.emission_spectrum.comparison import combined
 from labrig.analyse.part import Part
 from labrig.analyse.strip_patches import Slices, StripPatch, cut, lean, strip_patches
+from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration.lvf_file import Strip
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError, SpectralSystem, system_through_lvf
@@ -267,7 +267,7 @@ def _camera(part: Part, channels: tuple[str, ...]) -> CameraResponse:
         name = part.choices.camera or part.rig.optics.camera
         if name is not None:
             return read_monochrome_camera(name)
-    camera = camera_curves(part.rig, part.choices, part.inputs.lvf)
+    camera = camera_curves(part.rig, part.choices.camera, part.inputs.lvf)
     if camera.channels != channels:
         raise DataError(
             f"expected frames with the channels {', '.join(camera.channels)} or one alone, got "

@@ -1,9 +1,8 @@
 """From frames through the LVF to DN/s at its places: noise, dark and fall-off.
 
 A place on a small sensor is a few pixels wide, too few to tell their noise, and its surroundings
-are brighter or darker. But all pixels of a channel are alike: variance = a + b · level (photon
-transfer; Janesick 2007). Pairs of successive frames, one scaled to the other, tell a and b: what
-stands still cancels.
+are brighter or darker. But all pixels of a channel are alike, so one photon transfer holds for all.
+Pairs of successive frames, one scaled to the other, tell it: what stands still cancels.
 """
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -12,15 +11,15 @@ from itertools import pairwise
 from typing import TypeVar
 
 import numpy as np
-from scipy.optimize import nnls
 
 from labrig.analyse.hot_pixels import hot_pixels_of
 from labrig.calibration import CameraFile
 from labrig.errors import DataError
 from labrig.reduce import DarkModel, PixelMask, RawFrame, SeriesFrame, fit_dark, read_raw
-from labrig.reduce.noise import ROUNDING_VARIANCE
 from labrig.reduce.pairs import STRIPS
 from labrig.reduce.patches import TWO_DEGREES
+from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel, variance_terms
+from labrig.reduce.saturation import is_clipped
 from labrig.region import Region, region_pixels
 from labrig.results import FloatArray, is_usable
 from labrig.results.emission_spectrum import FilterFrames
@@ -33,21 +32,13 @@ ROUNDS = 8
 OUTLIER = 10.0
 #: Strips from which a place tells its noise.
 FEWEST_STRIPS = 2
-#: A place in which so many of its pixels clip is no measurement.
-CLIPPED = 0.001
 
 
-@dataclass(frozen=True, eq=False)
-class PixelNoise:
-    """Photon-transfer line of a pixel of each channel: (C,) DN² at level 0 and DN² per DN."""
-
-    at_black: FloatArray
-    per_dn: FloatArray
-
-    def sigma_dn(self, level_dn: FloatArray, pixels: FloatArray) -> FloatArray:
-        """Of means (…, C) over so many pixels (…, C), their level in DN above black."""
-        variance = self.at_black + self.per_dn * np.maximum(level_dn, 0.0)
-        return np.asarray(np.sqrt(np.maximum(variance, ROUNDING_VARIANCE) / pixels))
+def sigma_dn(noise: Sequence[NoiseModel], level_dn: FloatArray, pixels: FloatArray) -> FloatArray:
+    """σ of means (…, C) over so many pixels (…, C) by the noise of each channel's pixels."""
+    variance = [one.variance_dn2(level_dn[..., number]) for number, one in enumerate(noise)]
+    least = np.maximum(np.stack(variance, axis=-1), ROUNDING_VARIANCE)
+    return np.asarray(np.sqrt(least / pixels))
 
 
 @dataclass(frozen=True, eq=False)
@@ -101,7 +92,7 @@ class PatchReduction:
     slices: Mapping[str, Region]
     holder: Mapping[str, Region]
     camera: CameraFile | None
-    noise: PixelNoise
+    noise: Sequence[NoiseModel]
     dark: Sequence[DarkModel]
 
     def of_unit(self, unit: str) -> FilterFrames:
@@ -119,7 +110,7 @@ class PatchReduction:
         frame, camera, exposure_s = one.frame, self.camera, one.frame.exposure_s
         levels = [model.dark_level(exposure_s) for model in self.dark]
         level, known = (np.array(column) for column in zip(*levels, strict=True))
-        light, sigma = one.level_dn - level, self.noise.sigma_dn(one.level_dn, one.pixels)
+        light, sigma = one.level_dn - level, sigma_dn(self.noise, one.level_dn, one.pixels)
         # A sensor that has warmed since the dark frames is off in all places together.
         common = TWO_DEGREES * np.abs(np.array([m.current(exposure_s) for m in self.dark]))
         count = len(self.slices)
@@ -196,11 +187,11 @@ def _reduction(
     slices: Mapping[str, Region],
     holder: Mapping[str, Region],
     camera: CameraFile | None,
-    noise: PixelNoise,
+    noise: Sequence[NoiseModel],
 ) -> PatchReduction:
     exposure_s = np.array([one.frame.exposure_s for one in dark])
     level = np.stack([np.nan_to_num(one.level_dn) for one in dark])
-    sigma = np.stack([noise.sigma_dn(one.level_dn, one.pixels) for one in dark])
+    sigma = np.stack([sigma_dn(noise, one.level_dn, one.pixels) for one in dark])
     models = [
         fit_dark(exposure_s, level[:, place], np.nan_to_num(sigma[:, place], nan=np.inf))
         for place in range(level.shape[1])
@@ -216,17 +207,12 @@ def _measured_frames(
     return [_measured(frame, read_raw(frame.path), places, hot) for frame in frames]
 
 
-def pixel_noise(groups: Sequence[Sequence[MeasuredPlaces]]) -> PixelNoise:
-    """From groups of frames that show the same, brighter or darker, in order of time."""
+def pixel_noise(groups: Sequence[Sequence[MeasuredPlaces]]) -> list[NoiseModel]:
+    """Each channel's, from groups of frames that show the same, brighter or darker, by time."""
     levels, scatters = zip(*(pair for group in groups for pair in _pairs(group)), strict=True)
     level, scatter = np.concatenate(levels), np.concatenate(scatters)
-    at_black, per_dn = [], []
-    for channel in range(level.shape[1]):
-        known = np.isfinite(scatter[:, channel])
-        line = _line(level[known, channel], scatter[known, channel])
-        at_black.append(line[0])
-        per_dn.append(line[1])
-    return PixelNoise(np.array(at_black), np.array(per_dn))
+    known = np.isfinite(scatter)
+    return [_line(level[known[:, c], c], scatter[known[:, c], c]) for c in range(level.shape[1])]
 
 
 def _measured(
@@ -251,7 +237,7 @@ def _measured(
             count = np.add.reduceat(own.sum(axis=1), starts)
             total = np.add.reduceat(np.sum(light, axis=1, where=own), starts)
             means.append(total / np.maximum(count, 1))
-            clipped = np.count_nonzero(clips & own) > CLIPPED * count.sum()
+            clipped = is_clipped(np.count_nonzero(clips & own), count.sum())
             totals.append(np.nan if clipped else total.sum())
             counts.append(max(count.sum(), 1))
         level.append(np.array(totals) / counts)
@@ -283,18 +269,17 @@ def _pairs(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray, FloatA
         yield np.where(both, level, np.nan), np.where(both, scatter / share, np.nan)
 
 
-def _line(level: FloatArray, scatter: FloatArray) -> FloatArray:
-    """The a and b ≥ 0 of scatter = a + b · level, every scatter as uncertain as it is large."""
+def _line(level: FloatArray, scatter: FloatArray) -> NoiseModel:
+    """Reading and photons through scatters, each as uncertain as it is large."""
     level = np.maximum(level, 0.0)
-    design = np.stack([np.ones_like(level), level], axis=1)
+    terms = variance_terms(level)[:, :2]
     # Medians begin, so that a hot pixel or a cosmic ray cannot.
     dark = level <= np.median(level)
     at_black = float(np.median(scatter[dark]))
     rise = (scatter[~dark] - at_black) / np.maximum(level[~dark], 1.0)
-    line = np.array([at_black, max(float(np.median(rise)) if rise.size else 0.0, 0.0)])
+    noise = NoiseModel(at_black, max(float(np.median(rise)) if rise.size else 0.0, 0.0))
     for _ in range(ROUNDS):
-        expected = np.maximum(design @ line, ROUNDING_VARIANCE)
+        expected = np.maximum(noise.variance_dn2(level), ROUNDING_VARIANCE)
         kept = scatter < OUTLIER * expected
-        weighted = design[kept] / expected[kept, np.newaxis]
-        line, _ = nnls(weighted, scatter[kept] / expected[kept])
-    return np.asarray(line, dtype=np.float64)
+        noise = NoiseModel.fit(terms[kept], scatter[kept], sigma_dn2=expected[kept])
+    return noise

@@ -5,7 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from labrig.analyse.bench_curves import camera_curves, lamp_spectrum
 from labrig.analyse.fade.change import FittedChange
 from labrig.analyse.fade.fit import ANY_LAG, fit_change
 from labrig.analyse.fade.frames import (
@@ -17,6 +16,7 @@ from labrig.analyse.fade.frames import (
 from labrig.analyse.part import Part
 from labrig.analyse.part_frames import part_frames, part_region
 from labrig.analyse.this_camera import insist_on_this_camera
+from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import Change, FadeFile, Warming
 from labrig.errors import DataError
 from labrig.optics import CameraResponse, Spectrum
@@ -52,7 +52,7 @@ def analyse(part: Part) -> FadeResult:
         The rig file does not name the curves of lamp and camera.
     """
     protocol, camera = part.protocol, part.inputs.camera
-    curves = camera_curves(part.rig, part.choices, part.inputs.lvf)
+    curves = camera_curves(part.rig, part.choices.camera, part.inputs.lvf)
     lamp = lamp_spectrum(part.rig)
     frames = part_frames(part, "fade", "rise", "steady")
     insist_on_this_camera(camera, part.run, frames)

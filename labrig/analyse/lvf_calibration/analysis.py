@@ -5,12 +5,6 @@ from dataclasses import replace
 
 import numpy as np
 
-from labrig.analyse.bench_curves import (
-    camera_curves,
-    card_reflectance,
-    filter_transmittances,
-    lamp_spectrum,
-)
 from labrig.analyse.lvf_calibration.filters import (
     NO_FILTER,
     Bench,
@@ -28,6 +22,12 @@ from labrig.analyse.lvf_calibration.lines import (
 )
 from labrig.analyse.part import Part
 from labrig.analyse.strip_frames import StripFrames
+from labrig.bench_optics import (
+    camera_curves,
+    card_reflectance,
+    filter_transmittances,
+    lamp_spectrum,
+)
 from labrig.calibration import LvfFile, Strip
 from labrig.calibration.lvf_file import BandColumns, CurveColumns, WavelengthColumns
 from labrig.errors import DataError
@@ -69,7 +69,7 @@ def analyse(part: Part) -> LvfCalibrationResult:
     bench = Bench(
         lamp_spectrum(part.rig),
         card_reflectance(part.rig),
-        camera_curves(part.rig, part.choices),
+        camera_curves(part.rig, part.choices.camera),
     )
     every = _scenes(part, frames, before_camera.strip)
     of_filters = tuple(misfits(every, bench, fit.map))

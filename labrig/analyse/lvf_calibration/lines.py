@@ -3,11 +3,12 @@
 from dataclasses import replace
 
 import numpy as np
-from scipy.optimize import minimize_scalar, nnls
+from scipy.optimize import minimize_scalar
 
 from labrig.calibration import Strip
 from labrig.errors import DataError, FitError
 from labrig.fit.lvf import WavelengthFit, fit_wavelengths, locate_lines
+from labrig.nonnegative import nonnegative_least_squares
 from labrig.optics import Lvf, WavelengthMap
 from labrig.reduce.hdr import HdrFrame
 from labrig.reduce.strip import strip_profile
@@ -117,7 +118,8 @@ def shifted_by_stripes(frame: HdrFrame, strip: Strip, lvf: Lvf, nm_per_strip: fl
         at = np.clip(position - shift, lvf.position[0], lvf.position[-1])
         columns = [np.interp(at, lvf.position, shape) for shape in shapes]
         design = np.column_stack([*columns, np.ones_like(at)])
-        return float(nnls(design, glow)[1] ** 2)
+        rest = glow - design @ nonnegative_least_squares(design, glow)
+        return float(rest @ rest)
 
     coarse = np.linspace(-MOST_SHIFT, MOST_SHIFT, 33)
     best = coarse[np.argmin([left(shift) for shift in coarse])]

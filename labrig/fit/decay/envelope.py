@@ -16,8 +16,8 @@ from labrig.fit.decay.search import projection
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.nonnegative import nonnegative_least_squares
 from labrig.material.rates import exponential_means
+from labrig.nonnegative import nonnegative_least_squares
 
 COARSE_RATES = 48
 #: Each round puts this many rates between two former neighbours.

@@ -76,7 +76,11 @@ def projection(data: WhitenedSeries, weights: FloatArray) -> Projection:
 
 
 def nonnegative(gram: FloatArray, moments: FloatArray) -> FloatArray:
-    """Minimise ½ aᵀGa − mᵀa over a ≥ 0 for a handful of columns, all sets of them tried."""
+    """Minimise ½ aᵀGa − mᵀa over a ≥ 0 for a handful of columns, all sets of them tried.
+
+    The search asks thousands of times for what need not be exact: `nonnegative_least_squares`,
+    which is, would make a whole decay fit take half as long again.
+    """
     n = len(moments)
     best, best_cost = np.zeros(n), 0.0
     for n_kept in range(n, 0, -1):

@@ -6,7 +6,7 @@ import numpy as np
 
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
-from labrig.fit.nonnegative import nonnegative_least_squares
+from labrig.nonnegative import nonnegative_least_squares
 from labrig.results import ChargingSeries, FloatArray
 
 #: Level of the brightest site: how far charging has gone is what the fit knows least at first.

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.linalg import LinAlgError, cholesky, lapack, solve_triangular
 
 from labrig.fit.least_squares import EPSILON, FloatArray
-from labrig.fit.nonnegative import nonnegative_least_squares
+from labrig.nonnegative import nonnegative_least_squares
 
 #: Exchanges after which it goes round in circles.
 MOST_EXCHANGES = 25

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.optimize import nnls
 
-from labrig.fit.least_squares import EPSILON, FloatArray
+FloatArray = NDArray[np.float64]
 
 
 def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatArray:
@@ -34,7 +34,8 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
     lengths = np.where(norms > 0, norms, 1.0)
     columns = design / lengths
     # Dot products of m terms carry this much rounding.
-    least_gain = 10 * max(len(target), 1) * EPSILON * float(np.linalg.norm(target))
+    rounding = max(len(target), 1) * float(np.finfo(np.float64).eps)
+    least_gain = 10 * rounding * float(np.linalg.norm(target))
     solution = _quickly(columns, target, least_gain)
     if solution is None:
         solution = _by_active_sets(columns, target, least_gain)

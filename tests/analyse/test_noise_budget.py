@@ -5,13 +5,12 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
+from labrig.analyse.noise_budget import noise_budget, noise_parts
 from labrig.fit import DecayFit
 from labrig.report.figure_style import figure_style
-from labrig.report.noise_budget import noise_budget, noise_parts
-from labrig.report.noise_figure import noise_figure
+from labrig.report.noise_figure import noise_figure, visible_parts
 from labrig.results import Series
-
-from .made import decay_series, fitted
+from tests.report.made import decay_series, fitted
 
 READING_DN, PHOTON_GAIN, UNEVEN = 0.8, 0.02, 1e-3
 
@@ -99,4 +98,4 @@ def test_the_figure_has_a_line_for_each_part_that_matters() -> None:
     assert names == ["together", "photons", "reading", "uneven light", "flicker", "dark level"]
     quiet = noise_budget(replace(SERIES, dark_sigma=np.zeros(3)), FIT)
     assert quiet is not None
-    assert "dark level" not in quiet.visible()
+    assert "dark level" not in visible_parts(quiet)

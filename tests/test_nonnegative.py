@@ -4,9 +4,8 @@ import numpy as np
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from labrig.fit import nonnegative
-from labrig.fit.least_squares import FloatArray
-from labrig.fit.nonnegative import nonnegative_least_squares
+from labrig import nonnegative
+from labrig.nonnegative import FloatArray, nonnegative_least_squares
 
 
 @pytest.fixture(params=["SciPy as it is", "SciPy stops short", "SciPy gives up"], autouse=True)

@@ -1,12 +1,13 @@
-"""The measured curves that a rig file's `optics:` names, where a calibration cannot do without."""
+"""What a rig file's `optics:` names: measured curves, and calibrations of the bench."""
 
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
+from typing import TypeVar
 
 from labrig import shipped
 from labrig.acquire import RigFile
-from labrig.analyse.choices import Choices
-from labrig.calibration import LvfFile
+from labrig.calibration import CalibrationKind, LvfFile
 from labrig.errors import UsageError
 from labrig.optics import (
     CameraResponse,
@@ -18,27 +19,50 @@ from labrig.optics import (
 )
 from labrig.yaml_file import did_you_mean
 
+FileT = TypeVar("FileT")
+
 _SUFFIX = ".csv"
 
 
-def camera_curves(rig: RigFile, choices: Choices, lvf: LvfFile | None = None) -> CameraResponse:
-    """Those a person wants, else as the calibration of a filter found them, else the rig's.
+def camera_curves(
+    rig: RigFile, instead: str | None = None, lvf: LvfFile | None = None
+) -> CameraResponse:
+    """The camera's curves: those a person wants `instead`, else as the calibration of a filter
+    found them, else the rig's.
 
     Of a filter and a camera it is their product that a calibration knows best: whoever reads light
-    through the filter takes both from it.
+    through the filter takes both from it. And it has measured this body, not another of its model.
+
+    Raises
+    ------
+    UsageError
+        Nobody names any, or there are none of that name.
     """
-    if choices.camera is None and lvf is not None and lvf.camera is not None:
-        return lvf.camera.response()
-    return read_camera(choices.camera or _named(rig.optics.camera, "camera"))
+    if instead is None and lvf is not None and lvf.camera is not None:
+        found = lvf.camera.response()
+        return replace(found, name=f"{found.name}, as the filter's calibration found them")
+    return read_camera(instead or _named(rig.optics.camera, "camera"))
+
+
+def calibration(rig: RigFile, kind: CalibrationKind[FileT]) -> FileT | None:
+    """What the rig file names as a calibration of that kind; None if it names none.
+
+    Raises
+    ------
+    UsageError
+        It is missing or malformed.
+    """
+    named = rig.optics.named(kind)
+    return None if named is None else kind.read_named(Path(named))
 
 
 def lamp_spectrum(rig: RigFile) -> Spectrum:
-    """Of the usual lamp, relative."""
+    """The usual lamp's spectrum, relative."""
     return read_spectrum(_path(_named(rig.optics.lamp, "lamp")))
 
 
 def card_reflectance(rig: RigFile) -> Transmittance:
-    """Of the grey card."""
+    """The grey card's reflectance."""
     return read_transmittance(_path(_named(rig.optics.grey_card, "grey_card")))
 
 

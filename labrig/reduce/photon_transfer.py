@@ -1,0 +1,79 @@
+"""The photon-transfer model: how much a pixel scatters at which level, and its fit.
+
+Reading adds the same variance at all levels, photons one in proportion to the level, and light that
+is uneven or flickers unevenly one in proportion to its square (J. R. Janesick, *Photon Transfer*,
+2007; EMVA Standard 1288).
+"""
+
+from dataclasses import dataclass
+
+import numpy as np
+from numpy.typing import NDArray
+
+from labrig.nonnegative import nonnegative_least_squares
+
+FloatArray = NDArray[np.float64]
+
+#: Variance of rounding to whole numbers (uniform distribution), the least an integer can have.
+ROUNDING_VARIANCE = 1 / 12
+
+
+@dataclass(frozen=True)
+class NoiseModel:
+    """Variance in DN² of a pixel, or of a mean over pixels, by its level in DN above black.
+
+    Attributes
+    ----------
+    read_dn2
+        At no light.
+    photon_dn
+        Per DN of light: one over the gain in electrons per DN. A fit leaves it 0 where the levels
+        do not tell.
+    uneven
+        Per DN² of light.
+    """
+
+    read_dn2: float
+    photon_dn: float
+    uneven: float = 0.0
+
+    @classmethod
+    def fit(
+        cls,
+        terms: FloatArray,
+        variance_dn2: FloatArray,
+        sigma_dn2: FloatArray,
+        read_dn2: float | None = None,
+    ) -> "NoiseModel":
+        """The model, all parts ≥ 0, through measured variances by weighted least squares.
+
+        Parameters
+        ----------
+        terms
+            (n, 2) or (n, 3): what `variance_terms` says of the levels; of a difference of frames,
+            the sum of what it says of both. With two, there is no uneven part.
+        variance_dn2, sigma_dn2
+            (n,) measured, and their standard uncertainties, known up to a common factor. Whoever
+            has nothing better takes what is expected of a variance for its uncertainty.
+        read_dn2
+            What is measured without light, then held; None: it is fitted.
+        """
+        held = 0.0 if read_dn2 is None else read_dn2
+        free = terms if read_dn2 is None else terms[:, 1:]
+        target = variance_dn2 - held * terms[:, 0]
+        found = nonnegative_least_squares(free / sigma_dn2[:, np.newaxis], target / sigma_dn2)
+        return cls(*([] if read_dn2 is None else [read_dn2]), *found.tolist())
+
+    def parts_dn2(self, level_dn: FloatArray) -> FloatArray:
+        """The parts of the variance at levels (…,), shape (…, 3): reading, photons, uneven."""
+        return variance_terms(level_dn) * [self.read_dn2, self.photon_dn, self.uneven]
+
+    def variance_dn2(self, level_dn: FloatArray) -> FloatArray:
+        """The variance at levels (…,); below black as at black."""
+        return np.asarray(self.parts_dn2(level_dn).sum(axis=-1))
+
+
+def variance_terms(level_dn: FloatArray) -> FloatArray:
+    """(…, 3) 1, L and L² of levels (…,) in DN above black, none below 0."""
+    level = np.maximum(level_dn, 0.0)
+    return np.stack([np.ones_like(level), level, level**2], axis=-1)
