@@ -54,7 +54,8 @@ class Inputs:
         UsageError
             One is missing or malformed.
         """
-        return cls(**{kind.name: calibration(rig, kind) for kind in KINDS})
+        named: dict[str, Any] = {kind.name: calibration(rig, kind) for kind in KINDS}
+        return cls(**named)
 
     def with_those_of(self, result: RunResult) -> Self:
         """These, and what a result provides; of mappings by patch, the other patches stay."""
