@@ -1,6 +1,7 @@
 """A simulated board at the other end of a real terminal device."""
 
 import os
+import select
 import threading
 from collections.abc import Iterator
 from contextlib import contextmanager
@@ -16,17 +17,23 @@ pty = pytest.importorskip("pty", reason="Windows has no pseudo terminals")
 def on_a_terminal(board: Board) -> Iterator[str]:
     """The terminal device at whose other end `board` is."""
     ours, theirs = pty.openpty()
+    ends, end = os.pipe()
 
     def serve() -> None:
-        while True:
+        while ends not in select.select([ours, ends], [], [])[0]:
             try:
                 os.write(ours, board.receive(os.read(ours, 100)))
             except OSError:
                 return
 
-    threading.Thread(target=serve, daemon=True).start()
+    server = threading.Thread(target=serve, daemon=True)
+    server.start()
     try:
         yield os.ttyname(theirs)
     finally:
-        os.close(theirs)
-        os.close(ours)
+        # Before anything is closed: the number of a file that is closed may soon be another one's,
+        # and this board would answer for the next.
+        os.close(end)
+        server.join()
+        for descriptor in (ends, theirs, ours):
+            os.close(descriptor)
