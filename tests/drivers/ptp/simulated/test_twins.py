@@ -1,5 +1,6 @@
 """Two cameras of one model on one bus, told apart by what they say of themselves in PTP."""
 
+import os
 from collections.abc import Callable, Iterable, Iterator
 from itertools import chain
 from pathlib import Path
@@ -19,6 +20,7 @@ from tests.counterparts.served import EOS, STANDARD, Film
 from tests.drivers.ptp.simulated.wired import Wired
 
 SETTINGS = ExposureSettings(0.125, 400, 4.0)
+BUSES = 2
 EOS_IDS, STANDARD_IDS = "04a9:3199", "1209:0001"
 
 
@@ -58,7 +60,8 @@ class Twins:
 
 def _on_bus(number: int, devices: Iterable[Any]) -> Iterator[Any]:
     for device in devices:
-        device.bus = number
+        # A bus of this process's own: the lock of a camera is by its place, for the whole PC.
+        device.bus = BUSES * os.getpid() + number
         yield device
 
 
