@@ -258,18 +258,26 @@ def lit_bench(
         bench.environment[PORTS_FILE] = str(bench.list_port())
         yield bench
     finally:
-        # A guard whose board is taken away while it reads back goes on trying, by a name that the
-        # system gives to the next terminal.
-        deadline = time.monotonic() + PATIENCE_S
-        while _has_guard(folder) and time.monotonic() < deadline:
-            time.sleep(0.02)
+        wait_for_guards(folder)
         board.end()
 
 
+def wait_for_guards(folder: Path) -> None:
+    """Wait until the guards have ended whose labrigs have `folder` in their environment.
+
+    A guard whose board is taken away while it reads back goes on trying, by a name that the system
+    gives to the next terminal.
+    """
+    deadline = time.monotonic() + PATIENCE_S
+    while _has_guard(folder) and time.monotonic() < deadline:
+        time.sleep(0.02)
+
+
 def _has_guard(folder: Path) -> bool:
-    """Whether a guard runs that a labrig of this bench has started; it has its environment."""
+    """Whether such a guard runs; it has the environment of its labrig."""
     for process in Path("/proc").glob("[0-9]*"):
         with suppress(OSError):
-            if b"labrig.guard_process" in (process / "cmdline").read_bytes():
-                return bytes(folder) in (process / "environ").read_bytes()
+            is_guard = b"labrig.guard_process" in (process / "cmdline").read_bytes()
+            if is_guard and bytes(folder) in (process / "environ").read_bytes():
+                return True
     return False

@@ -19,6 +19,7 @@ from pathlib import Path
 
 from labrig.acquire.roles.lamp import SWITCHINGS
 from tests.acceptance.board_on_a_terminal import RIG, WatchedBoard
+from tests.lit_bench import wait_for_guards
 from tests.terminal import on_a_terminal
 
 SPELLINGS = ("path", "link", "relative path", "two slashes", "other TMPDIR")
@@ -35,7 +36,7 @@ def start(spelling: str, address: str, folder: Path) -> subprocess.Popen[str]:
         "two slashes": f"/{address}",
     }.get(spelling, address)
     (folder / "rig.yaml").write_text(RIG.format(address=called))
-    environment = os.environ | {"PYTHONPATH": str(Path.cwd())}
+    environment = os.environ | {"PYTHONPATH": str(Path.cwd()), "TRIAL": str(folder)}
     if spelling == "other TMPDIR":
         environment["TMPDIR"] = str(folder)
     return subprocess.Popen(
@@ -63,6 +64,7 @@ def held(rng: random.Random, folder: Path, spelling: str) -> str:
         after = board.heard_bytes, board.lamp_on
         first.kill()
         first.communicate()
+        wait_for_guards(folder)
         if code == 2 and before == after and "held by another labrig" in complaint:
             return ""
         return f"{spelling}: code {code}; {before} → {after}; {complaint!r}"
@@ -74,6 +76,7 @@ def at_once(rng: random.Random, folder: Path) -> str:
     with on_a_terminal(board) as address:
         both = [start(rng.choice(SPELLINGS), address, folder / str(number)) for number in range(2)]
         endings = sorted(_ended(one) for one in both)
+        wait_for_guards(folder)
     codes = [code for code, _ in endings]
     lit = sum(on for _, on in board.switched)
     refused = codes == [0, 2] and "held by another labrig" in endings[1][1]
