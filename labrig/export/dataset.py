@@ -73,22 +73,29 @@ def tree_of(result: RunResult, attributes: Mapping[str, str] | None = None) -> "
     """A result of any protocol as an xarray DataTree, as `read_dataset` gives it."""
     import xarray
 
-    nodes: dict[str, Dataset] = {}
-    if isinstance(result, PhosphorResult):
-        for name, part in result.parts.items():
-            own = _decay(part, {}) if isinstance(part, DecayResult) else None
-            below = tree_of(part).to_dict() if own is None else {"/": own}
-            nodes |= {f"/{name}{path}".rstrip("/"): node for path, node in below.items()}
-    variables: dict[str, dict[str, Column]] = {}
+    tree = xarray.DataTree.from_dict(_nodes(result))
+    tree.attrs.update(attributes or {})
+    return tree
+
+
+def _nodes(result: RunResult) -> "dict[str, Dataset]":
+    """The nodes of a tree by their paths."""
+    import xarray
+
+    if isinstance(result, DecayResult):
+        return {"/": _decay(result, {})}
+    variables: dict[str, dict[str, Column]] = {"/": {}}
     for path, value in leaves(result):
         *inner, name = (key.replace("/", "_") for key in path)
         if path != ("warnings",):
             place = "/" + "/".join(inner)
             variables.setdefault(place, {}).update(_columns(".".join((*inner, name)), name, value))
-    nodes |= {place: xarray.Dataset(columns) for place, columns in variables.items()}
-    tree = xarray.DataTree.from_dict(nodes)
-    tree.attrs = dict(attributes or {}) | {"warnings": "\n".join(result.warnings)}
-    return tree
+    nodes = {place: xarray.Dataset(columns) for place, columns in variables.items()}
+    nodes["/"].attrs["warnings"] = "\n".join(result.warnings)
+    if isinstance(result, PhosphorResult):
+        for name, part in result.parts.items():
+            nodes |= {f"/{name}{path}".rstrip("/"): node for path, node in _nodes(part).items()}
+    return nodes
 
 
 def _columns(dimension: str, name: str, value: Any) -> dict[str, Column]:

@@ -14,8 +14,6 @@ from labrig.reduce import fit_dark
 from labrig.reduce.patches import TWO_DEGREES
 
 PHOTONS, READING, FLICKER, DARK = "photons", "reading", "flicker", "dark"
-#: Where noise comes from, in the order in which it is told.
-SOURCES = (PHOTONS, READING, FLICKER, DARK)
 
 
 @dataclass(frozen=True, eq=False)

@@ -14,6 +14,7 @@ from labrig.errors import DataError, FitError
 from labrig.material.rates import exponential_means
 from labrig.results.arrays import FloatArray
 from labrig.results.measured import Measured, with_uncertainty
+from labrig.results.text_files import write_text
 
 FILE = "fit.json"
 #: Of that file: another number says that keys were renamed or mean something else.
@@ -300,10 +301,10 @@ def write_fitted_decay(path: Path, result: FittedDecay) -> None:
 
     Raises
     ------
-    OSError
+    DiskError
         It cannot be written.
     """
-    path.write_text(result.to_json(), encoding="utf-8", newline="\n")
+    write_text(path, result.to_json())
 
 
 def read_fitted_decay(path: Path) -> FittedDecay:

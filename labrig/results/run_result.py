@@ -9,8 +9,9 @@ from typing import Annotated, Any, ClassVar, Self
 
 from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, ValidationError
 
-from labrig.errors import DataError, DiskError, UsageError
+from labrig.errors import DataError, UsageError
 from labrig.plugins import RESULTS, load
+from labrig.results.text_files import write_text
 
 FILE = "result.json"
 
@@ -118,11 +119,7 @@ def write_result(folder: Path, result: RunResult) -> None:
     DiskError
         One cannot be written.
     """
-    path = folder / FILE
-    try:
-        path.write_text(result.to_json(), encoding="utf-8", newline="\n")
-    except OSError as error:
-        raise DiskError(f"{path}: cannot be written ({error.strerror})") from None
+    write_text(folder / FILE, result.to_json())
     result.write_files(folder)
 
 

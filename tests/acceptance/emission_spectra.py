@@ -19,7 +19,8 @@ from labrig.analyse import Choices
 from labrig.analyse.emission_spectrum import analyse
 from labrig.record import read_run
 from labrig.results.emission_spectrum import EmissionSpectrum
-from tests.analyse.spectral_bench import FloatArray, emitted, part_of, record
+from tests.analyse.recorded import part_of
+from tests.analyse.spectral_bench import FloatArray, emitted, record
 
 MATERIALS = ("blue-paint", "green-paint", "orange-paint", "red-paint", "white-paint")
 PROTOCOL = {"protocol": "emission_spectrum", "charge": "5 min", "times": ["2 s", "12 s", "30 s"],

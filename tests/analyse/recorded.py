@@ -80,12 +80,12 @@ def cut_off_and_resumed(run: Path, unit: str) -> tuple[RunRecord, RunRecord]:
     return cut, read_run(run)
 
 
-def whole(run: Path, inputs: Inputs | None = None, choices: Choices | None = None) -> Part:
-    """A run as what an analysis is given: no part of a chain, and as told beside it."""
-    choices = choices or Choices()
-    return Part(
-        read_run(run), read_run_protocol(run), choices.bench(run), choices, inputs or Inputs()
-    )
+def part_of(run: Path, inputs: Inputs | None = None) -> Part:
+    """A whole run as what an analysis is given; with the calibrations of its rig unless told."""
+    choices = Choices()
+    rig = choices.bench(run)
+    inputs = Inputs.of(rig) if inputs is None else inputs
+    return Part(read_run(run), read_run_protocol(run), rig, choices, inputs)
 
 
 def source_of(part: Part) -> Source:

@@ -11,18 +11,13 @@ import yaml
 from numpy.typing import NDArray
 
 from labrig import shipped
-from labrig.acquire import Plan, RunObserver, read_rig_file
-from labrig.analyse import Choices
-from labrig.analyse.choices import read_run_protocol
-from labrig.analyse.inputs import Inputs
-from labrig.analyse.part import Part
+from labrig.acquire import Plan, RunObserver
 from labrig.calibration import LvfFile, Strip, write_lvf_file
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
 from labrig.clock import Clock
 from labrig.material import read_material
 from labrig.optics import Bands
 from labrig.optics.piecewise import band_means, edges_about
-from labrig.record import read_run
 from labrig.region import region_pixels
 from labrig.results.emission_spectrum import WAVELENGTH_NM
 from labrig.run import Recording
@@ -108,13 +103,6 @@ def record(folder: Path, protocol: dict[str, Any], **simulation: Any) -> Path:
     path.write_text(yaml.safe_dump({"sample": {"name": "test"}} | protocol))
     rig = write_bench(folder, **simulation)
     return Recording.prepare(path, rig, folder / "runs").record(_quietly)
-
-
-def part_of(run: Path) -> Part:
-    """What its processing is given."""
-    rig = read_rig_file(run / "rig.yaml")
-    protocol = read_run_protocol(run)
-    return Part(read_run(run), protocol, rig, Choices(), Inputs.of(rig))
 
 
 def emitted(material: str) -> FloatArray:

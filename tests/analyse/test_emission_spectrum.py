@@ -41,13 +41,12 @@ from labrig.results.emission_spectrum import (
     read_emission_spectrum,
     write_emission_spectrum,
 )
-from tests.analyse.recorded import source_of
+from tests.analyse.recorded import part_of, source_of
 from tests.analyse.spectral_bench import (
     HEIGHT,
     WIDTH,
     FloatArray,
     emitted,
-    part_of,
     record,
 )
 from tests.fit import lvf_pictures as made

@@ -10,7 +10,8 @@ from labrig.analyse.isotropy import analyse
 from labrig.errors import DataError
 from labrig.process import process_and_report
 from labrig.results.isotropy import IsotropyResult
-from tests.analyse.spectral_bench import part_of, record
+from tests.analyse.recorded import part_of
+from tests.analyse.spectral_bench import record
 from tests.results.made import assert_read_back
 
 QUICK = {"protocol": "isotropy", "charge": "2 min", "frames": 2, "angles": [40, 80],

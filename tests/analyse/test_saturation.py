@@ -16,7 +16,8 @@ from labrig.bench import open_bench
 from labrig.errors import DataError
 from labrig.process import process_and_report
 from labrig.results.saturation import Curve, SaturationResult
-from tests.analyse.spectral_bench import part_of, record
+from tests.analyse.recorded import part_of
+from tests.analyse.spectral_bench import record
 from tests.results.made import assert_read_back
 
 QUICK: dict[str, Any] = {

@@ -1,8 +1,10 @@
 """Serial lines for drivers under test: a scripted one, one with an emulated board at its end."""
 
+from collections.abc import Iterator
+from contextlib import contextmanager, suppress
 from typing import NoReturn, Protocol
 
-from labrig.clock import VirtualClock
+from labrig.clock import Interrupted, VirtualClock
 
 #: What must be written, and what comes back for it.
 Script = list[tuple[bytes, bytes]]
@@ -83,3 +85,11 @@ class InterruptingClock(VirtualClock):
         if self.waits_left == 0:
             self.interrupt(2)
         super()._pause_until(deadline_s)
+
+    @contextmanager
+    def interrupted_after(self, waits: int) -> Iterator[None]:
+        """Interrupt what is done within after so many waits; undisturbed afterwards."""
+        self.waits_left = waits
+        with suppress(Interrupted):
+            yield
+        self.waits_left = 10**9

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.clock import Interrupted, VirtualClock
+from labrig.clock import VirtualClock
 from labrig.drivers.lcus import LcusRelay
 from labrig.drivers.maestro import MaestroDoor
 from labrig.drivers.numato import NumatoRelay
@@ -63,15 +63,11 @@ def test_interrupted_while_answers_are_on_their_way_it_is_made_safe(
 ) -> None:
     clock = InterruptingClock()
     driver, board = make(clock, LATE_S)
-    clock.waits_left = waits
-    try:
+    with clock.interrupted_after(waits):
         driver.on()
         driver.is_on()
         driver.off()
         driver.on()
-    except Interrupted:
-        pass
-    clock.waits_left = 10**9
     driver.make_safe()
     assert not board.states[0]
     assert not driver.is_on()

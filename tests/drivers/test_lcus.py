@@ -4,12 +4,18 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Checkable, Lamp
-from labrig.clock import Interrupted, VirtualClock
+from labrig.clock import VirtualClock
 from labrig.drivers.lcus import LcusRelay, command, relay_states
 from labrig.errors import DeviceError, DeviceLostError
 from labrig.sim.boards import LcusBoard
 from labrig.sim.boards.lcus import Answers
-from tests.drivers.serial_wire import BoardPort, InterruptingClock, Script, ScriptedPort, Wired
+from tests.drivers.serial_wire import (
+    BoardPort,
+    InterruptingClock,
+    Script,
+    ScriptedPort,
+    Wired,
+)
 
 ON_1, OFF_1 = bytes.fromhex("A00101A2"), bytes.fromhex("A00100A1")
 ON_2, OFF_2 = bytes.fromhex("A00201A3"), bytes.fromhex("A00200A2")
@@ -139,15 +145,11 @@ def test_an_interruption_at_any_wait_can_be_made_safe(waits: int, answers: Answe
     clock = InterruptingClock()
     board = LcusBoard(2, lambda relay, on: None, answers)
     driver = LcusRelay("COM5", LcusRelay.Settings(relay=1), Wired(clock, BoardPort(clock, board)))
-    clock.waits_left = waits
-    try:
+    with clock.interrupted_after(waits):
         driver.on()
         driver.is_on()
         driver.off()
         driver.on()
-    except Interrupted:
-        pass
-    clock.waits_left = 10**9
     driver.make_safe()
     assert not board.states[0]
     assert not driver.is_on()

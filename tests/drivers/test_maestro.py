@@ -6,7 +6,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Guarded, LampShield, TrapDoor
-from labrig.clock import Interrupted, VirtualClock
+from labrig.clock import VirtualClock
 from labrig.drivers.maestro import MaestroDoor, MaestroShield
 from labrig.drivers.maestro.errors import ERRORS, told
 from labrig.drivers.maestro.servo import Wire, quarters, seven_bits
@@ -236,14 +236,10 @@ def test_another_programs_half_command_does_not_keep_the_door_open() -> None:
 def test_an_interruption_at_any_wait_can_be_made_safe(waits: int, keys: dict[str, Any]) -> None:
     clock = InterruptingClock()
     bench = Bench(clock, **keys)
-    clock.waits_left = waits
-    try:
+    with clock.interrupted_after(waits):
         bench.door.open()
         bench.door.close()
         bench.door.open()
-    except Interrupted:
-        pass
-    clock.waits_left = 10**9
     bench.door.make_safe()
     assert bench.widths_us(2)[-1] == 1000
 

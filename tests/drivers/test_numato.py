@@ -4,7 +4,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import Lamp
-from labrig.clock import Interrupted, VirtualClock
+from labrig.clock import VirtualClock
 from labrig.drivers.numato import NumatoRelay
 from labrig.drivers.serial_line import SerialLine
 from labrig.errors import DeviceError
@@ -72,14 +72,10 @@ def test_an_interruption_at_any_wait_can_be_made_safe(waits: int) -> None:
     driver = NumatoRelay(
         "COM3", NumatoRelay.Settings(relay=0), Wired(clock, BoardPort(clock, board))
     )
-    clock.waits_left = waits
-    try:
+    with clock.interrupted_after(waits):
         driver.on()
         driver.off()
         driver.on()
-    except Interrupted:
-        pass
-    clock.waits_left = 10**9
     driver.make_safe()
     assert not board.states[0]
     assert not driver.is_on()

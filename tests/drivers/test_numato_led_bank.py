@@ -5,7 +5,7 @@ from hypothesis import given, settings, strategies as st
 from pydantic import ValidationError
 
 from labrig.acquire import LedBank
-from labrig.clock import Interrupted, VirtualClock
+from labrig.clock import VirtualClock
 from labrig.drivers.numato import NumatoLedBank, NumatoRelay
 from labrig.errors import DeviceError
 from labrig.sim.boards import NumatoBoard
@@ -122,17 +122,13 @@ def test_two_are_never_lit_and_after_any_interruption_it_can_be_made_safe(
     board = NumatoBoard(8, lambda relay, on: lit_at_once.append(sum(board.states[1:4])))
     board.states[2] = left_on
     driver = on_a_board(clock, board)
-    clock.waits_left = waits
-    try:
+    with clock.interrupted_after(waits):
         for channel in sequence:
             if channel is None:
                 driver.dark()
             else:
                 driver.light(channel)
             assert driver.lit() == channel
-    except Interrupted:
-        pass
-    clock.waits_left = 10**9
     assert max(lit_at_once, default=0) <= 1
     driver.make_safe()
     assert not any(board.states)

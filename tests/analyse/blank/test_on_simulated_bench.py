@@ -15,7 +15,7 @@ from labrig.calibration import read_blank_file
 from labrig.errors import DataError
 from labrig.process import process_run
 from labrig.record import read_run
-from tests.analyse.recorded import cut_off_and_resumed, record, whole
+from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 
 PROTOCOL: dict[str, Any] = {
     "protocol": "blank",
@@ -74,7 +74,7 @@ def test_a_leak_is_found_and_told_and_a_decay_is_warned(tmp_path: Path) -> None:
     decay = {"protocol": "decay", "sample": {"name": "test"}, "charge": "60 s", "for": "40 s",
              "first": "1 s", "exposure": "1 s"}  # fmt: skip
     run = record(tmp_path / "decay", decay)
-    found = decay_analysis.analyse(whole(run, Inputs(blank=blank)))
+    found = decay_analysis.analyse(part_of(run, Inputs(blank=blank)))
     assert any("all the time" in said for said in found.warnings)
 
 
@@ -89,11 +89,11 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
              "first": "1 s", "exposure": "1 s"}  # fmt: skip
     decayed = record(tmp_path / "decay", decay)
     with pytest.raises(DataError, match="never became clean"):
-        decay_analysis.analyse(whole(decayed, Inputs(blank=blank)))
+        decay_analysis.analyse(part_of(decayed, Inputs(blank=blank)))
     # One that is clean from the third frame on: the earlier ones are left out, and it is said.
     third = sorted(frame.t_s for frame in intact_frames(read_run(decayed), Choices()).decay)[2]
     ends = blank.model_copy(update={"first_clean_s": third, "ambient_dn_per_s": (0.0, 0.0, 0.0)})
-    found = decay_analysis.analyse(whole(decayed, Inputs(blank=ends)))
+    found = decay_analysis.analyse(part_of(decayed, Inputs(blank=ends)))
     (patch,) = found.patches.values()
     assert list(patch.series.usable[:4]) == [False, False, True, True]
     assert any("2 frames begin before the bench is dark" in said for said in found.warnings)

@@ -19,7 +19,7 @@ from labrig.record import read_run
 from labrig.results.camera_calibration import CameraCalibrationResult
 from labrig.sim.optics import vignetting
 from labrig.sim.sensor import gain_electrons_per_dn, read_noise_electrons
-from tests.analyse.recorded import cut_off_and_resumed, record, whole
+from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 from tests.results.made import assert_read_back
 
 PROTOCOL = {
@@ -171,7 +171,7 @@ def test_a_decay_uses_it_or_refuses_it(camera: CameraFile, tmp_path: Path) -> No
     run = record(tmp_path, decay)
 
     def brightest(known: Inputs) -> float:
-        found = decay_analysis.analyse(whole(run, known))
+        found = decay_analysis.analyse(part_of(run, known))
         return float(found.patches["corner"].series.values[0].max())
 
     left = vignetting(64, 96)[8:20, 5:15].mean()
@@ -193,5 +193,5 @@ def test_frames_of_another_lens_refuse_it(camera: CameraFile, tmp_path: Path) ->
              "exposure": "1 s"}  # fmt: skip
     run = record(tmp_path, decay, other_lens)
     with pytest.raises(DataError, match="calibration of another lens: expected EF75mm") as caught:
-        decay_analysis.analyse(whole(run, Inputs(camera=camera)))
+        decay_analysis.analyse(part_of(run, Inputs(camera=camera)))
     assert "EF50mm f/1.4 USM, 50 mm" in str(caught.value)

@@ -10,13 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from labrig.acquire import read_rig_file
-from labrig.analyse.choices import Choices, read_run_protocol
+from labrig.analyse.choices import Choices
 from labrig.analyse.excitation.analysis import USUAL
 from labrig.analyse.excitation.charge_intervals import charge_frames
 from labrig.analyse.excitation.charging_series import patch_chargings
-from labrig.analyse.inputs import Inputs
-from labrig.analyse.part import Part
 from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IrradianceFile, write_irradiance_file
 from labrig.calibration.lvf_file import SLICES, Strip
@@ -30,7 +27,7 @@ from labrig.sim.bench_settings import LvfSettings
 from labrig.sim.lamp import BURNING_K, filament_spectrum
 from labrig.sim.lvf import Lvf
 from labrig.sim.phosphor import band_cells
-from tests.analyse.recorded import cut_off_and_resumed, record
+from tests.analyse.recorded import cut_off_and_resumed, part_of, record
 from tests.calibration.test_camera_file import camera
 from tests.results.made import assert_read_back
 
@@ -209,17 +206,6 @@ def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: P
         )
 
 
-def part_of(run: Path, **known: Any) -> Part:
-    rig = read_rig_file(run / "rig.yaml")
-    return Part(
-        read_run(run),
-        read_run_protocol(run),
-        rig,
-        Choices(),
-        replace(Inputs.of(rig), **known),
-    )
-
-
 def test_charges_are_missing(run: Path) -> None:
     part = part_of(run)
     some = [one for one in part.run.attempts if not one.unit.startswith("bare")]
@@ -230,5 +216,7 @@ def test_charges_are_missing(run: Path) -> None:
 
 
 def test_a_calibration_of_another_camera_is_refused(run: Path) -> None:
+    part = part_of(run)
+    other = replace(part, inputs=replace(part.inputs, camera=camera()))
     with pytest.raises(DataError, match="calibration of another camera"):
-        patch_chargings(part_of(run, camera=camera()), true_irradiance(), USUAL)
+        patch_chargings(other, true_irradiance(), USUAL)
