@@ -10,10 +10,11 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from pathlib import Path
-from typing import Any, TypeVar, get_args
+from typing import TYPE_CHECKING, Any, TypeVar, get_args
 
 import yaml
 from pydantic import BaseModel, ValidationError
+from yaml.composer import Composer
 
 from labrig.errors import UsageError
 from labrig.input_file import read_text
@@ -37,17 +38,26 @@ _FLOAT = re.compile(
 )
 
 
-class _Loader(yaml.SafeLoader):
+if TYPE_CHECKING:
+    from yaml import SafeLoader
+else:
+    # libyaml is ten times faster; a PyYAML built without it lacks its loader.
+    SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
+
+
+class _Loader(SafeLoader, Composer):
     """SafeLoader with the scalars of YAML 1.2's core schema."""
 
     yaml_implicit_resolvers: dict[str, list[tuple[str, re.Pattern[str]]]] = {}  # noqa: RUF012
 
     def __init__(self, text: str) -> None:
         super().__init__(text)
+        Composer.__init__(self)
         self._depth = 0
 
     def get_single_node(self) -> yaml.Node | None:
-        node = super().get_single_node()
+        # Not libyaml's own composer, which would pass `compose_node` by.
+        node = Composer.get_single_node(self)
         if node is not None:
             known: dict[yaml.Node, tuple[int, int]] = {}
             nodes, depth = _extent(node, known)
@@ -163,7 +173,8 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
         content = yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
         mark = error.problem_mark
-        place = "" if mark is None else f", line {mark.line + 1}"
+        # libyaml counts the end of the text as a line of its own.
+        place = "" if mark is None else f", line {min(mark.line, text.count(chr(10))) + 1}"
         problem = " ".join(str(error.problem or error.context).split())
         raise UsageError(f"{source}{place}: {problem}") from None
     except (yaml.YAMLError, ValueError) as error:

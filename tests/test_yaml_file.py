@@ -94,7 +94,7 @@ BOMB = "a: &a [x, x, x, x, x, x, x, x, x]\n" + "".join(
         ("a: .nan", "finite"),
         ("a: 1e400", "finite"),
         ("a: " + "9" * 5000, "digits"),
-        ('a: "\\ud800"', "text"),
+        ('a: "\\ud800"', "character"),
         ('a: "b\\0c"', "text"),
         ("? [a]\n: b", "key"),
     ],

@@ -14,6 +14,7 @@ pytestmark = [
 ]
 
 
+@pytest.mark.campaign
 def test_bands_of_real_dyes_cover_them() -> None:
     lvf, ours = made.curved_lvf(), made.of_the_house()
     dyes = made.fluorophores(3)
@@ -39,6 +40,7 @@ def test_the_colour_checker_through_the_filter() -> None:
     assert other["the lamp as measured"].mean() < 0.7
 
 
+@pytest.mark.campaign
 def test_peaks_told_by_a_real_sensor_of_18_channels() -> None:
     # One third of the wavelengths; python -m tests.acceptance.lightlogger holds out each in turn.
     errors = np.abs([one.error_nm for one in lightlogger.told(lightlogger.every(3)[1], (30,))])
