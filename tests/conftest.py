@@ -11,17 +11,21 @@ os.environ.pop("PYTHONDONTWRITEBYTECODE", None)
 import gc
 import signal
 import sys
-from collections.abc import Callable, Iterator
-from dataclasses import dataclass
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
 from io import BytesIO
 from pathlib import Path
 from typing import TYPE_CHECKING
 
 import pytest
 from hypothesis import settings
+from matplotlib.figure import Figure
 
 from labrig import shipped
 from labrig.cli.ending import guarded
+from labrig.report.plates import Plates
+from labrig.report.sections import Picture, Section
+from labrig.report.shown import Shown, draw
 from labrig.signals import STOP_SIGNALS
 from tests.analyse import recorded
 from tests.quick_yaml import read_quickly, write_quickly
@@ -102,9 +106,15 @@ def answered_signals() -> Iterator[None]:
 
 @pytest.fixture(autouse=True)
 def undrawn(request: pytest.FixtureRequest, monkeypatch: pytest.MonkeyPatch) -> None:
-    """Figures are made and not drawn, which takes longer than all else, but in `drawn` tests."""
-    if request.node.get_closest_marker("drawn") is None:
-        monkeypatch.setattr("matplotlib.figure.Figure.savefig", _leave_blank)
+    """Figures take longer than all else: only tests marked `drawn` draw them.
+
+    Those of `tests/analyse` and `tests/recordings`, where every protocol has one, make them.
+    """
+    if request.node.get_closest_marker("drawn") is not None:
+        return
+    monkeypatch.setattr("matplotlib.figure.Figure.savefig", _leave_blank)
+    if not {"analyse", "recordings"} & set(request.node.path.parts):
+        monkeypatch.setattr("labrig.report.page.draw", _draw_blank)
 
 
 @pytest.fixture(autouse=True)
@@ -117,6 +127,15 @@ def _leave_blank(figure: object, file: object, format: str = "", **_: object) ->
     if format == "svg":
         assert isinstance(file, BytesIO)
         file.write(b'<svg viewBox="0 0 1 1"></svg>')
+
+
+def _draw_blank(sections: Sequence[Section], plates: Plates) -> list[Shown]:
+    blank = [replace(one, figures=tuple(map(_blank, one.figures))) for one in sections]
+    return draw(blank, plates)
+
+
+def _blank(picture: Picture) -> Picture:
+    return replace(picture, draw=Figure)
 
 
 @pytest.fixture

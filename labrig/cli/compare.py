@@ -88,12 +88,16 @@ def _tell(section: "Section") -> None:
 
 def _draw(section: "Section", folder: Path) -> None:
     """As PNG to look at and as PDF to print."""
+    from labrig.report.figure_style import figure_style
+
     if section.figures:
         folder.mkdir(parents=True, exist_ok=True)
     for picture in section.figures:
-        picture.figure.patch.set(visible=True, facecolor="white")
-        for suffix in ("png", "pdf"):
-            picture.figure.savefig(folder / f"{picture.name}.{suffix}", dpi=200)
+        with figure_style():
+            figure = picture.draw()
+            figure.patch.set(visible=True, facecolor="white")
+            for suffix in ("png", "pdf"):
+                figure.savefig(folder / f"{picture.name}.{suffix}", dpi=200)
         typer.echo(f"figure: {folder / picture.name}.png")
 
 

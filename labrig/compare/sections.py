@@ -1,6 +1,7 @@
 """A comparison as parts of a page: text, figures, tables."""
 
 from collections.abc import Iterator
+from functools import partial
 
 from labrig.compare.glow import glow_table
 from labrig.compare.glow_figure import glow_figure
@@ -8,15 +9,13 @@ from labrig.compare.residuals import residuals_table
 from labrig.compare.run import RunComparison
 from labrig.compare.spectra_figure import spectra_figure
 from labrig.compare.three_channels import three_channels_table
-from labrig.report.figure_style import figure_style
 from labrig.report.material_tables import comparison_table
 from labrig.report.sections import Picture, Section
 
 
 def sections(comparison: RunComparison) -> tuple[Section, ...]:
     """In the order of the paper's figures."""
-    with figure_style():
-        return tuple(_sections(comparison))
+    return tuple(_sections(comparison))
 
 
 def _sections(comparison: RunComparison) -> Iterator[Section]:
@@ -24,7 +23,7 @@ def _sections(comparison: RunComparison) -> Iterator[Section]:
         table = glow_table(comparison.glows)
         shown = Picture(
             "glow",
-            glow_figure(comparison.glows),
+            partial(glow_figure, comparison.glows),
             "Photographed and predicted glow; the brightest photograph just fills the screen. "
             "Numbers are CIEDE2000 to the photograph above; a dash: too dim to have a colour.",
         )
@@ -40,7 +39,7 @@ def _sections(comparison: RunComparison) -> Iterator[Section]:
         table = three_channels_table(comparison.spectra, comparison.camera, comparison.white)
         shown = Picture(
             "spectra",
-            spectra_figure([one for one, _ in comparison.spectra]),
+            partial(spectra_figure, [one for one, _ in comparison.spectra]),
             "Spectra relative to their maximum, and the best weighted sum of the three CIE 2015 "
             "colour-matching functions. In the corner the colour of the spectrum and, right of "
             "it, that from the camera's R, G, B, as far as a screen shows them; ΔE is CIEDE2000.",

@@ -20,7 +20,6 @@ from labrig.record import read_run
 from labrig.report import (
     Report,
     Source,
-    figure_style,
     lamp_sections,
     render,
     temperature_sections,
@@ -101,14 +100,13 @@ def process_and_report(folder: Path | str, choices: Choices | None = None) -> Pr
     write_provenance(made, provenance(run, protocol, choices, camera.name if camera else None))
     write_result(made, result)
     write_nexus(made / "run.nxs", run, about, result)
-    with figure_style():
-        rendered = render(result, Source(run, protocol, rig, about, camera))
-        # After the parts of a chain, what is about all of them.
-        part = "the_run" if any(section.part for section in rendered.sections) else ""
-        about_run = (*lamp_sections(run), *temperature_sections(run))
-        sections = (*rendered.sections, *(replace(one, part=part) for one in about_run))
-        report = Report(about, warnings, sections, rendered.methods, frames, camera)
-        write_report(made / "report.html", report)
+    rendered = render(result, Source(run, protocol, rig, about, camera))
+    # After the parts of a chain, what is about all of them.
+    part = "the_run" if any(section.part for section in rendered.sections) else ""
+    about_run = (*lamp_sections(run), *temperature_sections(run))
+    sections = (*rendered.sections, *(replace(one, part=part) for one in about_run))
+    report = Report(about, warnings, sections, rendered.methods, frames, camera)
+    write_report(made / "report.html", report)
     changes = put_in_place(made)
 
     page = folder / "result" / "report.html"

@@ -1,8 +1,10 @@
 """A blank in a report."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from labrig.calibration import BlankFile
 from labrig.report.figure_style import (
@@ -32,25 +34,7 @@ def render(result: BlankResult, source: Source) -> Rendered:
 
 
 def _section(result: BlankResult) -> Section:
-    file, found, channels = result.calibration, result.stray_light, result.calibration.channels
-    figure = new_figure(HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
-    axes.set_xscale("log")
-    least = 4 * float(np.median(found.sigma))
-    axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(least)))
-    axes.axhline(0, color=MUTED, linewidth=0.8)
-    entries = []
-    for number, name in enumerate(channels):
-        colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
-        error_bars(axes, found.start_s, found.rate[:, number], found.sigma[:, number], colour)
-        points(axes, found.start_s, found.rate[:, number], marker, colour, PAPER)
-        entries.append(marked(name, marker, colour, PAPER))
-    if file.first_clean_s is not None:
-        axes.axvline(file.first_clean_s, color=MUTED, linewidth=1.0, linestyle=DASHED)
-        entries.append(lined("first clean frame", MUTED, DASHED))
-    axes.set_xlabel("Begin of the exposure after lamp off / s")
-    axes.set_ylabel("Above what stays / DN/s")
-    legend_above(figure, entries, columns=4)
+    file, channels = result.calibration, result.calibration.channels
     rows = tuple(
         (
             name,
@@ -74,9 +58,38 @@ def _section(result: BlankResult) -> Section:
             "both, so that dark frames take care of it as long as it stays the same; it is told "
             "from dark current by its colour, and may be more.",
         ),
-        (Picture("blank", figure, "Light of the blank over time; bars are ± 1 σ."),),
+        (
+            Picture(
+                "blank",
+                partial(_figure, result),
+                "Light of the blank over time; bars are ± 1 σ.",
+            ),
+        ),
         (Table(("channel", "stays / DN/s", "leaks in / DN/s"), rows),),
     )
+
+
+def _figure(result: BlankResult) -> Figure:
+    file, found, channels = result.calibration, result.stray_light, result.calibration.channels
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+    axes.set_xscale("log")
+    least = 4 * float(np.median(found.sigma))
+    axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(least)))
+    axes.axhline(0, color=MUTED, linewidth=0.8)
+    entries = []
+    for number, name in enumerate(channels):
+        colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
+        error_bars(axes, found.start_s, found.rate[:, number], found.sigma[:, number], colour)
+        points(axes, found.start_s, found.rate[:, number], marker, colour, PAPER)
+        entries.append(marked(name, marker, colour, PAPER))
+    if file.first_clean_s is not None:
+        axes.axvline(file.first_clean_s, color=MUTED, linewidth=1.0, linestyle=DASHED)
+        entries.append(lined("first clean frame", MUTED, DASHED))
+    axes.set_xlabel("Begin of the exposure after lamp off / s")
+    axes.set_ylabel("Above what stays / DN/s")
+    legend_above(figure, entries, columns=4)
+    return figure
 
 
 def _lines(file: BlankFile) -> Iterator[str]:

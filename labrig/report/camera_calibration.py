@@ -1,6 +1,7 @@
 """A camera calibration in a report."""
 
 from collections.abc import Iterator, Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -61,7 +62,7 @@ def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
         (
             Picture(
                 "photon-transfer",
-                _transfer_figure(transfers),
+                partial(_transfer_figure, transfers),
                 "Variance of a pixel from frame to frame, dark subtracted, in DN². Lines: photons "
                 "of the gain found.",
             ),
@@ -99,6 +100,24 @@ def _logarithmic(axes: Axes) -> None:
 
 
 def _linearity(found: Linearity) -> Section:
+    full = "is not known" if found.saturation_dn is None else f"is {found.saturation_dn:.0f} DN"
+    return Section(
+        "Linearity",
+        (
+            "From the channels' ratios along a bracket of shutter times: what shutter and lamp do "
+            f"in a frame is common to the channels. The level at which the sensor is full {full}.",
+        ),
+        (
+            Picture(
+                "linearity",
+                partial(_linearity_figure, found),
+                "Deviation from a linear sensor; bars are ± 1 σ.",
+            ),
+        ),
+    )
+
+
+def _linearity_figure(found: Linearity) -> Figure:
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     axes.axhline(0, color=MUTED, linewidth=0.8)
@@ -110,28 +129,10 @@ def _linearity(found: Linearity) -> Section:
     points(axes, level, percent, "o", INK, PAPER)
     axes.set_xlabel("Level above dark / DN")
     axes.set_ylabel("Off a straight line / %")
-    full = "is not known" if found.saturation_dn is None else f"is {found.saturation_dn:.0f} DN"
-    return Section(
-        "Linearity",
-        (
-            "From the channels' ratios along a bracket of shutter times: what shutter and lamp do "
-            f"in a frame is common to the channels. The level at which the sensor is full {full}.",
-        ),
-        (Picture("linearity", figure, "Deviation from a linear sensor; bars are ± 1 σ."),),
-    )
+    return figure
 
 
 def _settings(file: CameraFile, repeat_flicker: Measured) -> Section:
-    figure = new_figure(HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
-    _logarithmic(axes)
-    axes.axhline(1, color=MUTED, linewidth=0.8)
-    times_s = np.array([one.setting for one in file.shutter])
-    factor = np.array([one.factor for one in file.shutter])
-    error_bars(axes, times_s, factor, np.array([one.sigma for one in file.shutter]), INK)
-    points(axes, times_s, factor, "o", INK, PAPER)
-    axes.set_xlabel("Shutter time as the camera tells / s")
-    axes.set_ylabel("True over told")
     flicker = plus_minus(100 * file.flicker, 100 * file.flicker_sigma)
     repeated = plus_minus(100 * repeat_flicker.value, 100 * repeat_flicker.sigma)
     tables = (
@@ -145,9 +146,23 @@ def _settings(file: CameraFile, repeat_flicker: Measured) -> Section:
             "frames of the same exposure. The longest shutter time measured counts as exact: "
             f"{exposure_text(file.shutter[-1].setting)}.",
         ),
-        (Picture("shutter", figure, "Shutter times; bars are ± 1 σ."),),
+        (Picture("shutter", partial(_shutter_figure, file), "Shutter times; bars are ± 1 σ."),),
         tuple(table for table in tables if table.rows),
     )
+
+
+def _shutter_figure(file: CameraFile) -> Figure:
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
+    _logarithmic(axes)
+    axes.axhline(1, color=MUTED, linewidth=0.8)
+    times_s = np.array([one.setting for one in file.shutter])
+    factor = np.array([one.factor for one in file.shutter])
+    error_bars(axes, times_s, factor, np.array([one.sigma for one in file.shutter]), INK)
+    points(axes, times_s, factor, "o", INK, PAPER)
+    axes.set_xlabel("Shutter time as the camera tells / s")
+    axes.set_ylabel("True over told")
+    return figure
 
 
 def _table(name: str, factors: Sequence[Factor], form: str, caption: str) -> Table:
@@ -160,19 +175,6 @@ def _table(name: str, factors: Sequence[Factor], form: str, caption: str) -> Tab
 
 def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
     shown = flats[0]
-    figure = new_figure(HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
-    rho = np.linspace(0, 1, 101)
-    entries = []
-    for number, name in enumerate(file.channels):
-        colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
-        distance = np.sqrt(shown.rho2[number])
-        points(axes, distance, shown.light[number], marker, colour, PAPER, size=2.6)
-        axes.plot(rho, shown.flat.at(rho**2)[:, number], color=colour, linewidth=1.2)
-        entries.append(marked(name, marker, colour, PAPER))
-    axes.set_xlabel("Distance from the middle / half the diagonal")
-    axes.set_ylabel("Light over that in the middle")
-    legend_above(figure, entries, columns=4)
     rows = tuple(
         (
             "–" if flat.f_number is None else f"f/{flat.f_number:g}",
@@ -192,7 +194,7 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
         (
             Picture(
                 "flat-field",
-                figure,
+                partial(_flat_figure, shown, file.channels),
                 "Blocks of the card"
                 + ("" if stop is None else f" at f/{stop:g}")
                 + ", the gradient divided out, and the fall-off fitted.",
@@ -200,6 +202,23 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
         ),
         (Table(head, rows, "Light left in the corners, and the lamp's gradient."),),
     )
+
+
+def _flat_figure(shown: FittedFlat, channels: Sequence[str]) -> Figure:
+    figure = new_figure(HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+    rho = np.linspace(0, 1, 101)
+    entries = []
+    for number, name in enumerate(channels):
+        colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
+        distance = np.sqrt(shown.rho2[number])
+        points(axes, distance, shown.light[number], marker, colour, PAPER, size=2.6)
+        axes.plot(rho, shown.flat.at(rho**2)[:, number], color=colour, linewidth=1.2)
+        entries.append(marked(name, marker, colour, PAPER))
+    axes.set_xlabel("Distance from the middle / half the diagonal")
+    axes.set_ylabel("Light over that in the middle")
+    legend_above(figure, entries, columns=4)
+    return figure
 
 
 def _lines(file: CameraFile) -> Iterator[str]:

@@ -2,6 +2,7 @@
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
+from functools import partial
 
 from labrig.record.frames import FrameRecord
 from labrig.report.colours import Screen, screen_for
@@ -141,8 +142,8 @@ def _results(content: _Content, anchor: str) -> Section:
     figures: tuple[Picture, ...] = ()
     if len(content.patches) > 1:
         figures = tuple(
-            Picture(f"overview-{one.number}-{one.patch.name}", figure)
-            for one, figure in zip(
+            Picture(f"overview-{one.number}-{one.patch.name}", draw)
+            for one, draw in zip(
                 content.patches, overview_figures(content.report.patches), strict=True
             )
         )
@@ -176,7 +177,7 @@ def _timing(content: _Content, timings: Sequence[FrameTiming], anchor: str) -> t
     shining = [item for item in content.patches if item.steady]
     if not (content.late or repeated or shining):
         return ()
-    figures = (Picture("timing", timing_figure(timings)),) if timings else ()
+    figures = (Picture("timing", partial(timing_figure, timings)),) if timings else ()
     return (
         Section(
             "Timing and stability",
@@ -198,14 +199,14 @@ def _patch(number: int, patch: PatchReport, screen: Screen, anchor: str) -> _Pat
     fit = patch.fit if isinstance(patch.fit, FittedDecay) else None
     series = patch.series
     figures = [
-        Picture("linear", linear_decay(series, fit)),
-        Picture("logarithmic", logarithmic_decay(series, fit)),
+        Picture("linear", partial(linear_decay, series, fit)),
+        Picture("logarithmic", partial(logarithmic_decay, series, fit)),
     ]
     noise_parts: tuple[str, ...] = ()
     if fit is not None:
-        figures.append(Picture("residuals", residual_figure(series, fit)))
+        figures.append(Picture("residuals", partial(residual_figure, series, fit)))
     if patch.noise is not None:
-        figures.append(Picture("noise", noise_figure(patch.noise)))
+        figures.append(Picture("noise", partial(noise_figure, patch.noise)))
         noise_parts = tuple(visible_parts(patch.noise))
     return _Patch(
         number=number,

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -95,7 +96,7 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
         (
             Picture(
                 "spectrum",
-                _spectrum_figure(patch.spectrum),
+                partial(_spectrum_figure, patch.spectrum),
                 "Emission spectrum Λ*, means over 10 nm; band: 68 % credible.",
             ),
         ),
@@ -111,13 +112,13 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
             (
                 Picture(
                     "over-time",
-                    _normalised_figure(at_times),
+                    partial(_normalised_figure, at_times),
                     "Spectra at several times after lamp off, all of one integral; bars: 1 σ, "
                     "most of it common to all times (camera curves).",
                 ),
                 Picture(
                     "shift",
-                    _shift_figure(patch.times, frames.t_s),
+                    partial(_shift_figure, patch.times, frames.t_s),
                     "Centroid of the light along the filter at each time, less that of all "
                     "other times; bars: 1 σ of noise.",
                 ),
@@ -132,7 +133,7 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
             (
                 Picture(
                     "lamps",
-                    _normalised_figure(by_lamp),
+                    partial(_normalised_figure, by_lamp),
                     "Spectra after charging with either lamp, all of one integral; bars: 1 σ, "
                     "most of it common to both (camera curves).",
                 ),

@@ -1,9 +1,11 @@
 """Excitation in a report: rates by band, how places charge, what the fit leaves, and closure."""
 
 from collections.abc import Iterator
+from functools import partial
 from itertools import pairwise
 
 import numpy as np
+from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
 from labrig.report.figure_style import (
@@ -81,10 +83,27 @@ def _rates(fit: FittedExcitation, number: int) -> list[str]:
 def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Section:
     fit, through, direct = patch.fit, patch.charging.through, patch.charging.direct
     position_nm, irradiance = result.position_nm, result.irradiance
+    fitted = through.values - fit.residuals[0] * through.sigma
     figures = [
-        _rates_picture(fit, irradiance.bands_nm),
-        _charging_picture(through, through.values - fit.residuals[0] * through.sigma, position_nm),
-        _residual_picture(fit.residuals[0], position_nm),
+        Picture(
+            "excitation-rates",
+            partial(_rates_figure, fit, irradiance.bands_nm),
+            "Excitation rate of each band, per unit of the stated irradiance; bars are ± 1 σ. A "
+            "caret is a limit: the rate lies below it with 95 % probability.",
+        ),
+        Picture(
+            "charging",
+            partial(_charging_figure, through, fitted, position_nm),
+            "Glow in the first photograph after each charge through the filter, brightest channel, "
+            "at some places along it; lines join what the fit says for these very photographs, "
+            "whose times and exposures differ.",
+        ),
+        Picture(
+            "residuals",
+            partial(_residual_figure, fit.residuals[0], position_nm),
+            "What the fit leaves at every place along the filter, in standard uncertainties of "
+            "single values, flicker not taken out.",
+        ),
     ]
     if patch.closure is not None:
         figures.append(closure_picture(patch.closure))
@@ -137,7 +156,7 @@ def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
     )
 
 
-def _rates_picture(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Picture:
+def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
     """k_e of every band and state, limits as arrows."""
     edges = np.array(bands_nm)
     middles, widths = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
@@ -161,17 +180,10 @@ def _rates_picture(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Pictur
     axes.set_xlabel("Wavelength of the exciting light / nm")
     axes.set_ylabel("k_e / 10⁻³ s⁻¹")
     legend_above(figure, entries, columns=3)
-    return Picture(
-        "excitation-rates",
-        figure,
-        "Excitation rate of each band, per unit of the stated irradiance; bars are ± 1 σ. A caret "
-        "is a limit: the rate lies below it with 95 % probability.",
-    )
+    return figure
 
 
-def _charging_picture(
-    series: ChargingSeries, fitted: FloatArray, position_nm: FloatArray
-) -> Picture:
+def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: FloatArray) -> Figure:
     """Glow in the first usable photograph after every charge, over the charge, at some places.
 
     Parameters
@@ -207,16 +219,10 @@ def _charging_picture(
     axes.set_xlabel("Charged for / s")
     axes.set_ylabel("First photograph / (DN/s)")
     legend_above(figure, [*entries, lined("fit", MUTED)], columns=6)
-    return Picture(
-        "charging",
-        figure,
-        "Glow in the first photograph after each charge through the filter, brightest channel, at "
-        "some places along it; lines join what the fit says for these very photographs, whose "
-        "times and exposures differ.",
-    )
+    return figure
 
 
-def _residual_picture(residuals: FloatArray, position_nm: FloatArray) -> Picture:
+def _residual_figure(residuals: FloatArray, position_nm: FloatArray) -> Figure:
     """(n, P, C) in σ, rms over channels and photographs, along the filter and over time."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
@@ -226,15 +232,20 @@ def _residual_picture(residuals: FloatArray, position_nm: FloatArray) -> Picture
     axes.set_ylim(0, max(1.5, 1.15 * float(np.nanmax(of_site))))
     axes.set_xlabel("Wavelength that charges the place / nm")
     axes.set_ylabel("Residuals, rms / σ")
-    return Picture(
-        "residuals",
-        figure,
-        "What the fit leaves at every place along the filter, in standard uncertainties of single "
-        "values, flicker not taken out.",
-    )
+    return figure
 
 
 def closure_picture(closure: Closure) -> Picture:
+    """The figure with what it says about the prediction."""
+    caption = (
+        "Charging under the whole lamp: the curve is predicted from the rates measured band by "
+        "band, nothing is fitted; points are measured, with ± 1 σ of both. RMS deviation "
+        f"{closure.rms_percent:.2g} % of the RMS level, {closure.rms_sigma:.2g} σ."
+    )
+    return Picture("closure", partial(closure_figure, closure), caption)
+
+
+def closure_figure(closure: Closure) -> Figure:
     """Levels over the charge, measured and predicted, and by how much they deviate."""
     charge_s, measured, predicted = closure.charge_s, closure.measured, closure.predicted
     figure = new_figure(300.0)
@@ -262,9 +273,4 @@ def closure_picture(closure: Closure) -> Picture:
     lower.set_ylabel("Deviation / %")
     lower.set_xlabel("Charge / s")
     legend_above(figure, [marked("measured", "o", INK), lined("predicted", MUTED)], columns=2)
-    caption = (
-        "Charging under the whole lamp: the curve is predicted from the rates measured band by "
-        "band, nothing is fitted; points are measured, with ± 1 σ of both. RMS deviation "
-        f"{closure.rms_percent:.2g} % of the RMS level, {closure.rms_sigma:.2g} σ."
-    )
-    return Picture("closure", figure, caption)
+    return figure

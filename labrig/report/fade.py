@@ -1,6 +1,7 @@
 """A lamp's fade and rise in a report."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -43,7 +44,7 @@ def _changes(file: FadeFile, changes: list[tuple[str, Change, LampChange]]) -> S
     figures = tuple(
         Picture(
             name,
-            _shares(file, table),
+            partial(_shares, file, table),
             f"The lamp's light over that of the steady lamp during its {name}, in some bands; "
             "pale: ± 1 σ.",
         )
@@ -96,13 +97,6 @@ def _shares(file: FadeFile, table: Change) -> Figure:
 
 
 def _warming(warm: Warming, seen: WarmingLight) -> Section:
-    figure = new_figure(180)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
-    grid = np.linspace(0, float(seen.t_s.max()), 201)
-    axes.plot(grid, 100 * (1 - warm.lacks * np.exp(-grid / warm.warms_s)), color=INK)
-    points(axes, seen.t_s, 100 * seen.light, "o", INK, INK, size=3.0)
-    axes.set_xlabel("Time after switching on / s")
-    axes.set_ylabel("Light / % of warm")
     lacks = plus_minus(100 * warm.lacks, 100 * warm.lacks_sigma)
     text = (
         f"After ten minutes in the dark the lamp lacks {lacks} % of its light; that comes as its "
@@ -110,7 +104,22 @@ def _warming(warm: Warming, seen: WarmingLight) -> Section:
         "weaker."
     )
     caption = "Light on the card, by photograph; line: 1 − d e^(−t/τ)."
-    return Section("How the lamp warms", (text,), (Picture("warming", figure, caption),))
+    return Section(
+        "How the lamp warms",
+        (text,),
+        (Picture("warming", partial(_warming_figure, warm, seen), caption),),
+    )
+
+
+def _warming_figure(warm: Warming, seen: WarmingLight) -> Figure:
+    figure = new_figure(180)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
+    grid = np.linspace(0, float(seen.t_s.max()), 201)
+    axes.plot(grid, 100 * (1 - warm.lacks * np.exp(-grid / warm.warms_s)), color=INK)
+    points(axes, seen.t_s, 100 * seen.light, "o", INK, INK, size=3.0)
+    axes.set_xlabel("Time after switching on / s")
+    axes.set_ylabel("Light / % of warm")
+    return figure
 
 
 def _lines(changes: list[tuple[str, Change, LampChange]]) -> Iterator[str]:

@@ -1,6 +1,7 @@
 """A measurement of irradiance in a report."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -50,13 +51,13 @@ def _section(result: IrradianceResult) -> Section:
         (
             Picture(
                 "irradiance",
-                _irradiance_figure(file),
+                partial(_irradiance_figure, file),
                 "Irradiance of every band along the strip behind the LVF, with 1 σ; where it is "
                 "less than 2 % of its highest, it is not drawn.",
             ),
             Picture(
                 "scale",
-                _scale_figure(result),
+                partial(_scale_figure, result),
                 "What the card shows over what the calibration of the LVF lets expect: each "
                 "position by itself (points, 1 σ with the camera's curves), and with its "
                 "neighbours (line and band).",

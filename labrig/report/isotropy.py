@@ -1,6 +1,7 @@
 """The glow at several angles in a report."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -79,7 +80,7 @@ def _section(result: IsotropyResult) -> Section:
             "divided out.",
             *(_statement(name, glow) for name, glow in patches.items()),
         ),
-        (Picture("isotropy", _figure(patches), caption),),
+        (Picture("isotropy", partial(_figure, patches), caption),),
         (Table(("angle", *patches), tuple(rows)),),
     )
 

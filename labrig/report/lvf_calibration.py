@@ -1,6 +1,7 @@
 """The calibration of a linear variable filter in a report."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -81,18 +82,18 @@ def _map_section(result: LvfCalibrationResult) -> Section:
         (
             Picture(
                 "lines",
-                _profile_figure(before, wavelengths),
+                partial(_profile_figure, before, wavelengths),
                 "The strip under the mercury lamp, looked through; dashed: the lines as located. "
                 "Of a blend, its first line.",
             ),
             Picture(
                 "lines-on-sample",
-                _profile_figure(on, wavelengths),
+                partial(_profile_figure, on, wavelengths),
                 "The strip on the sample under the mercury lamp, seen on the grey card.",
             ),
             Picture(
                 "line-residuals",
-                _line_residual_figure(residuals),
+                partial(_line_residual_figure, residuals),
                 "Wavelength of the map minus that of each line, with 1 σ of its place.",
             ),
         ),
@@ -116,24 +117,27 @@ def _band_section(result: LvfCalibrationResult) -> Section:
         (
             Picture(
                 "transmission",
-                _transmission_figure(file),
+                partial(_transmission_figure, file),
                 "Transmission at every position along the strip.",
             ),
             Picture(
                 "along",
-                _along_figure(file),
+                partial(_along_figure, file),
                 "Centre minus a straight line (grey: the map by the lines alone) and full width at "
                 "half maximum of the bands, with 1 σ.",
             ),
             Picture(
                 "camera-curves",
-                _camera_figure(result.camera_before, result.camera_curves),
+                partial(_camera_figure, result.camera_before, result.camera_curves),
                 "The camera's curves as the filters tell them; dashed: as their file has them.",
             ),
             Picture(
                 "filter-residuals",
-                _filter_residual_figure(
-                    result.transmittance_residual, result.filters, file.lvf.bands.centre_nm
+                partial(
+                    _filter_residual_figure,
+                    result.transmittance_residual,
+                    result.filters,
+                    file.lvf.bands.centre_nm,
                 ),
                 "Transmittance of every colour filter along the strip, measured minus expected, "
                 "in per cent.",

@@ -2,6 +2,7 @@
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
+from functools import partial
 
 import numpy as np
 from matplotlib.artist import Artist
@@ -86,7 +87,7 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
         figures.append(
             Picture(
                 f"glow-{name}",
-                logarithmic_decay(patch.series, patch.fit),
+                partial(logarithmic_decay, patch.series, patch.fit),
                 f"The glow{_of(name, result)} over time, with ± 1 σ; lines are the fit.",
             )
         )
@@ -97,7 +98,7 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
             figures.append(
                 Picture(
                     f"spectrum-{name}",
-                    _spectrum_figure(material.spectrum),
+                    partial(_spectrum_figure, material.spectrum),
                     f"Emission spectrum{_of(name, result)}, largest value 1.",
                 )
             )

@@ -7,10 +7,7 @@ from labrig.results import RunResult
 
 
 def render(result: RunResult, source: Source) -> Rendered:
-    """As the protocol's registered renderer shows it; plain tables without one.
-
-    Made inside of `figure_style()`.
-    """
+    """As the protocol's registered renderer shows it; plain tables without one."""
     show: Renderer = any_result.render
     if result.kind in names(REPORTS):
         show = load(REPORTS, result.kind, str(source.run.folder))

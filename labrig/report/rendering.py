@@ -58,10 +58,7 @@ class Rendered:
 
 
 class Renderer(Protocol):
-    """A protocol's part of a report, registered in `labrig.reports` under the protocol's name.
-
-    It is called inside of `figure_style()`.
-    """
+    """A protocol's part of a report, registered in `labrig.reports` under the protocol's name."""
 
     def __call__(self, result: Any, source: Source, /) -> Rendered:
         """Show a result of the protocol's own type."""

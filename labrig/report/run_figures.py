@@ -1,6 +1,7 @@
 """Figures about the run as a whole: all patches side by side, and whether frames came on time."""
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -33,12 +34,12 @@ SMALL_FONT_PT = 9.5
 TIMING_HEIGHT_PT = 200.0
 
 
-def overview_figures(patches: Sequence[PatchReport]) -> list[Figure]:
-    """A small logarithmic decay for each patch, all with the same axes."""
+def overview_figures(patches: Sequence[PatchReport]) -> list[Callable[[], Figure]]:
+    """What draws a small logarithmic decay for each patch, all with the same axes."""
     ends = [log_axis_ends(patch.series) for patch in patches]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
     last_s = max(float(middles_s(patch.series).max()) for patch in patches) or 1.0
-    return [_small_decay(patch, low, high, last_s) for patch in patches]
+    return [partial(_small_decay, patch, low, high, last_s) for patch in patches]
 
 
 def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> Figure:

@@ -1,5 +1,6 @@
 """What a report says of a run whatever it measured: lamp, shield and door; the temperature."""
 
+from functools import partial
 from itertools import groupby
 
 import numpy as np
@@ -14,8 +15,8 @@ from labrig.record.temperature import (
     glowing,
     relative_rate_change,
 )
-from labrig.report.sections import Section
-from labrig.report.temperature import temperature_picture
+from labrig.report.sections import Picture, Section
+from labrig.report.temperature import temperature_figure
 from labrig.report.timing import moves_text
 
 
@@ -44,18 +45,19 @@ def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
 
 
 def temperature_sections(run: RunRecord) -> tuple[Section, ...]:
-    """Picture and words; nothing without a thermometer. Made inside of `figure_style()`."""
+    """Picture and words; nothing without a thermometer."""
     if not run.temperatures():
         return ()
     course, photographs = Course(run), glowing(run)
     units = [list(group) for _, group in groupby(photographs, key=lambda frame: frame.unit)]
     began = run.attempts[0].start["time"]
     spans = [(one[0].start_time, one[-1].end_time) for one in units]
-    picture = temperature_picture(
-        course.time - began,
-        course.celsius,
-        course.smooth,
-        np.array(spans).reshape(-1, 2) - began,
+    glow_s = np.array(spans).reshape(-1, 2) - began
+    shaded = " Shaded: the glow from which rates are fitted." if len(glow_s) else ""
+    picture = Picture(
+        "temperature",
+        partial(temperature_figure, course.time - began, course.celsius, course.smooth, glow_s),
+        f"Readings, and their means over five minutes (line).{shaded}",
     )
     text = (
         f"{degrees_text(course.smooth)} over the run ({len(course.time)} readings, smoothed over "

@@ -1,6 +1,7 @@
 """Plateaus of the glow, levels of charge and rates after several charges in a report."""
 
 from collections.abc import Iterator
+from functools import partial
 
 import numpy as np
 from matplotlib.figure import Figure
@@ -97,12 +98,12 @@ def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Sect
         (
             Picture(
                 f"plateaus-{name}",
-                _plateau_figure(patch),
+                partial(_plateau_figure, patch),
                 "Amplitude of each state at lamp off over the length of the charge; bars: 1 σ.",
             ),
             Picture(
                 f"charges-{name}",
-                _decays_figure(patch),
+                partial(_decays_figure, patch),
                 "Decays after different charges over their begin, and what shared rates leave of "
                 "them in σ.",
             ),

@@ -1,5 +1,6 @@
 """Parts of a report that any protocol can have: text, figures, tables."""
 
+from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,14 +15,14 @@ class Picture:
     ----------
     name
         Of its file: lower case, unique in its section.
-    figure
-        Made inside of `figure_style()`.
+    draw
+        Makes the figure, when it is wanted and within the page's style.
     caption
         What is to be seen, with units; what error bars are.
     """
 
     name: str
-    figure: Figure
+    draw: Callable[[], Figure]
     caption: str = ""
 
 

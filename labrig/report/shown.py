@@ -31,7 +31,7 @@ def draw(sections: Sequence[Section], plates: Plates) -> list[Shown]:
 
 def _drawn(number: int, section: Section, plates: Plates) -> Shown:
     plate = {
-        one.name: plates.add(one.figure, f"{number}-{one.name}", f"{section.title}: {one.name}")
+        one.name: plates.add(one.draw(), f"{number}-{one.name}", f"{section.title}: {one.name}")
         for one in section.figures
     }
     return Shown(section, tuple((plate[one.name], one.caption) for one in section.figures), plate)

@@ -1,10 +1,10 @@
-"""The course of the temperature over a run, as a picture."""
+"""The course of the temperature over a run, as a figure."""
 
 import numpy as np
+from matplotlib.figure import Figure
 from numpy.typing import NDArray
 
 from labrig.report.figure_style import INK, LEFT_PT, MUTED, SHADE, new_figure, place, points
-from labrig.report.sections import Picture
 
 FloatArray = NDArray[np.float64]
 
@@ -15,9 +15,9 @@ LONGEST_IN_MINUTES_S = 3 * 3600.0
 LEAST_SPAN_C = 2.0
 
 
-def temperature_picture(
+def temperature_figure(
     time_s: FloatArray, celsius: FloatArray, smooth: FloatArray, glow_s: FloatArray
-) -> Picture:
+) -> Figure:
     """Readings and their smoothed course; where the glow was photographed is shaded.
 
     Parameters
@@ -39,9 +39,4 @@ def temperature_picture(
     axes.set_ylim(middle - reach, middle + reach)
     axes.set_xlabel(f"Time since the run began / {unit}")
     axes.set_ylabel("Temperature / °C")
-    shaded = " Shaded: the glow from which rates are fitted." if len(glow_s) else ""
-    return Picture(
-        "temperature",
-        figure,
-        f"Readings, and their means over five minutes (line).{shaded}",
-    )
+    return figure

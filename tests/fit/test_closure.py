@@ -61,10 +61,10 @@ def test_deviations_are_told_in_percent_and_sigma() -> None:
 @pytest.mark.parametrize("charges", [CHARGES_S, CHARGES_S + 60.0, CHARGES_S[:1]])
 def test_its_picture_is_labelled_and_inside(charges: NDArray[np.float64]) -> None:
     closed = closure(charges, LEVELS[: len(charges)], np.ones(len(charges)), **LAMP)
-    with figure_style():
-        picture = closure_picture(closed)
+    picture = closure_picture(closed)
     assert f"{closed.rms_percent:.2g} %" in picture.caption
-    figure = picture.figure
+    with figure_style():
+        figure = picture.draw()
     figure.canvas.draw()
     width, height = figure.get_size_inches() * figure.dpi
     for axes in figure.axes:

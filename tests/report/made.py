@@ -16,7 +16,6 @@ from labrig.record.frames import FrameRecord
 from labrig.report import Report
 from labrig.report.content import DecayReport, GlowPhotograph, PatchReport
 from labrig.report.decay import decay_sections
-from labrig.report.figure_style import figure_style
 from labrig.results import Series
 
 FloatArray = NDArray[np.float64]
@@ -156,6 +155,5 @@ def decay_report(folder: Path, patches: Sequence[PatchReport] | None = None) -> 
 
 def page_of(report: DecayReport, warnings: Sequence[str] = ()) -> Report:
     """The page of a decay."""
-    with figure_style():
-        found, methods = decay_sections(report)
+    found, methods = decay_sections(report)
     return Report(report.about, tuple(warnings), found, methods, report.frames, report.camera)

@@ -46,7 +46,7 @@ TIMINGS = [FrameTiming(f"{n}", f"decay-{n % 2}", 5.0 * n, 0.001 * n) for n in ra
         lambda: linear_decay(SERIES, FIT),
         lambda: logarithmic_decay(SERIES, FIT),
         lambda: residual_figure(SERIES, FIT),
-        lambda: overview_figures([patch(SERIES)])[0],
+        lambda: overview_figures([patch(SERIES)])[0](),
         lambda: timing_figure(TIMINGS),
     ],
     ids=["linear", "log", "residuals", "overview", "timing"],
@@ -132,7 +132,8 @@ def test_each_channel_s_own_offset_is_no_signal() -> None:
 def test_overviews_share_their_axes() -> None:
     dim = replace(SERIES, values=SERIES.values / 50, sigma=SERIES.sigma / 50)
     with figure_style():
-        first, second = overview_figures([patch(SERIES), replace(patch(dim), fit="too dim")])
+        small = overview_figures([patch(SERIES), replace(patch(dim), fit="too dim")])
+        first, second = (draw() for draw in small)
     assert first.axes[0].get_ylim() == second.axes[0].get_ylim()
 
 
