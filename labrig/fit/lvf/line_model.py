@@ -1,6 +1,5 @@
 """The profile of a strip under a mercury lamp, as a sum of lines on a background."""
 
-from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
@@ -132,7 +131,7 @@ class LineModel:
         for _ in range(2):
 
             def residuals(x: FloatArray, noise: float = noise) -> tuple[FloatArray, FloatArray]:
-                return _with_derivatives(lambda at: self._residuals(at, noise, prior), x, start)
+                return self._with_derivatives(x, start, noise, prior)
 
             fit = least_squares(residuals, start, lower=low, upper=high, tolerance=1e-6)
             start_left = self.values - self._fit_values(fit.parameters)
@@ -150,42 +149,58 @@ class LineModel:
         variance: FloatArray = np.where(apart < fwhm, (apart * unsure) ** 2, 0.0)
         return variance
 
+    def _with_derivatives(
+        self, x: FloatArray, scale: FloatArray, noise: float, prior: FloatArray
+    ) -> tuple[FloatArray, FloatArray]:
+        """Residuals and their Jacobian by central differences."""
+        steps = np.diag(_STEP * np.maximum(np.abs(scale), 1.0))
+        here, up, down = np.split(
+            self._residuals(np.concatenate([x[np.newaxis], x + steps, x - steps]), noise, prior),
+            [1, 1 + len(x)],
+        )
+        return here[0], ((up - down) / (2 * np.diag(steps)[:, np.newaxis])).T
+
     def _residuals(self, x: FloatArray, noise: float, prior: FloatArray) -> FloatArray:
+        """(..., residuals) of parameters of shape (..., parameters)."""
         left = (self.values - self._fit_values(x)) / noise
         shares = [line.second_share[0] for line in self.lines if len(line.wavelength_nm) == 2]
-        pulled = (x[len(self.lines) + 3 :] - shares) / prior
-        return np.concatenate([left.ravel(), pulled])
+        pulled = (x[..., len(self.lines) + 3 :] - shares) / prior
+        return np.concatenate([left.reshape(*x.shape[:-1], -1), pulled], axis=-1)
 
     def _shapes(self, x: FloatArray) -> FloatArray:
-        """(n, lines + 2): every line at height 1, and the background."""
+        """(..., n, lines + 2): every line at height 1, and the background."""
         n = len(self.lines)
-        positions, log_width, change, skew, shares = (
-            x[:n],
-            x[n],
-            x[n + 1],
-            x[n + 2],
-            list(x[n + 3 :]),
-        )
-        per_nm = self._per_nm(positions)
-        columns = []
-        for line, at in zip(self.lines, positions, strict=True):
-            width = np.exp(log_width + change * (at - self.middle) / self.reach)
-            column = peak_shape(self.u - at, width, skew)
-            if len(line.wavelength_nm) == 2:
-                share, apart = shares.pop(0), line.wavelength_nm[1] - line.wavelength_nm[0]
-                second = peak_shape(self.u - at - apart * per_nm, width, skew)
-                column = (1 - share) * column + share * second
-            columns.append(column)
-        slope = (self.u - self.middle) / self.reach
-        return np.column_stack([*columns, np.ones_like(slope), slope])
+        positions, of_all = x[..., :n], x[..., n : n + 3, np.newaxis]
+        log_width, change, skew = of_all[..., 0, :], of_all[..., 1, :], of_all[..., 2:, :]
+        width = np.exp(log_width + change * (positions - self.middle) / self.reach)
 
-    def _per_nm(self, positions: FloatArray) -> float:
+        def peaks(at: FloatArray, width: FloatArray) -> FloatArray:
+            distance = self.u[:, np.newaxis] - at[..., np.newaxis, :]
+            return peak_shape(distance, width[..., np.newaxis, :], skew)
+
+        lines = peaks(positions, width)
+        blends = [k for k, line in enumerate(self.lines) if len(line.wavelength_nm) == 2]
+        if blends:
+            share = x[..., np.newaxis, n + 3 :]
+            apart_nm = np.array([np.ptp(self.lines[k].wavelength_nm) for k in blends])
+            second_at = positions[..., blends] + apart_nm * self._per_nm(positions)[..., np.newaxis]
+            second = peaks(second_at, width[..., blends])
+            lines[..., blends] = (1 - share) * lines[..., blends] + share * second
+        slope = (self.u - self.middle) / self.reach
+        background = np.stack([np.ones_like(slope), slope], axis=-1)
+        return np.concatenate([lines, np.broadcast_to(background, (*lines.shape[:-1], 2))], axis=-1)
+
+    def _per_nm(self, positions: FloatArray) -> FloatArray:
+        """(...,) slope of the positions (..., lines) over the wavelengths."""
         nm = np.array([line.wavelength_nm[0] for line in self.lines])
-        return float(np.polyfit(nm, positions, 1)[0])
+        nm -= nm.mean()
+        slope: FloatArray = positions @ nm / (nm @ nm)
+        return slope
 
     def _fit_values(self, x: FloatArray) -> FloatArray:
-        shapes = self._shapes(x)
-        fitted: FloatArray = shapes @ np.linalg.lstsq(shapes, self.values)[0]
+        """(..., n, channels): what is nearest to the values."""
+        basis, _ = np.linalg.qr(self._shapes(x))
+        fitted: FloatArray = basis @ (np.swapaxes(basis, -1, -2) @ self.values)
         return fitted
 
     def _heights(self, x: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
@@ -195,16 +210,3 @@ class LineModel:
         variance = np.diag(np.linalg.pinv(shapes.T @ shapes))[:n]
         sigma: FloatArray = noise * np.sqrt(variance)[:, np.newaxis]
         return heights, sigma
-
-
-def _with_derivatives(
-    function: Callable[[FloatArray], FloatArray], x: FloatArray, scale: FloatArray
-) -> tuple[FloatArray, FloatArray]:
-    """Residuals and their Jacobian by central differences."""
-    steps = _STEP * np.maximum(np.abs(scale), 1.0)
-    columns = []
-    for k, step in enumerate(steps):
-        moved = np.zeros_like(x)
-        moved[k] = step
-        columns.append((function(x + moved) - function(x - moved)) / (2 * step))
-    return function(x), np.stack(columns, axis=1)
