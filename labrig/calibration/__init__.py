@@ -3,7 +3,6 @@
 from labrig.calibration.blank_file import BlankFile, read_blank_file, write_blank_file
 from labrig.calibration.camera_file import (
     CameraFile,
-    Factor,
     Linearity,
     Noise,
     read_camera_file,
@@ -16,33 +15,28 @@ from labrig.calibration.fade_file import (
     read_fade_file,
     write_fade_file,
 )
-from labrig.calibration.flat_field import Flat, rho_squared
 from labrig.calibration.irradiance_file import (
     IrradianceFile,
     read_irradiance_file,
     write_irradiance_file,
 )
-from labrig.calibration.lvf_file import LvfFile, Strip, read_lvf_file, write_lvf_file
+from labrig.calibration.lvf_file import LvfFile, read_lvf_file, write_lvf_file
 
 __all__ = [
     "BlankFile",
     "CameraFile",
     "Change",
-    "Factor",
     "FadeFile",
-    "Flat",
     "IrradianceFile",
     "Linearity",
     "LvfFile",
     "Noise",
-    "Strip",
     "Warming",
     "read_blank_file",
     "read_camera_file",
     "read_fade_file",
     "read_irradiance_file",
     "read_lvf_file",
-    "rho_squared",
     "write_blank_file",
     "write_camera_file",
     "write_fade_file",

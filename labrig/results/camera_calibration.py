@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from labrig.calibration import CameraFile, Flat, Noise, write_camera_file
+from labrig.calibration import CameraFile, Noise, write_camera_file
+from labrig.optics import Flat
 from labrig.results.arrays import FloatArray
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult

@@ -16,11 +16,11 @@ from labrig.analyse import Choices
 from labrig.analyse.choices import read_run_protocol
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.part import Part
-from labrig.calibration import LvfFile, Strip, write_lvf_file
+from labrig.calibration import LvfFile, write_lvf_file
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
 from labrig.clock import Clock
 from labrig.material import read_material
-from labrig.optics import Bands
+from labrig.optics import Bands, Strip
 from labrig.optics.piecewise import band_means, edges_about
 from labrig.record import read_run
 from labrig.region import region_pixels

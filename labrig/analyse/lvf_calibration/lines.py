@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from labrig.calibration import Strip
 from labrig.errors import DataError, FitError
 from labrig.fit.lvf import WavelengthFit, fit_wavelengths, locate_lines
 from labrig.nonnegative import nonnegative_least_squares
-from labrig.optics import Lvf, WavelengthMap
+from labrig.optics import Lvf, Strip, WavelengthMap
 from labrig.reduce.hdr import HdrFrame
 from labrig.reduce.strip import strip_profile
 from labrig.results.lvf_calibration import PlacedStrip, Stripes, StripLines
