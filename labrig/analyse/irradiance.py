@@ -9,11 +9,11 @@ import numpy as np
 from labrig.analyse.part import Part
 from labrig.analyse.strip_frames import StripFrames
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
-from labrig.calibration import IrradianceFile, Strip
+from labrig.calibration import IrradianceFile
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
-from labrig.optics import CameraResponse, Lvf, Spectrum, Transmittance
+from labrig.optics import CameraResponse, Lvf, Spectrum, Strip, Transmittance
 from labrig.optics.piecewise import band_integrals, quadrature
 from labrig.reduce.strip import FLICKER, slice_values
 from labrig.results import FloatArray

@@ -12,8 +12,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.analyse.part import Part
-from labrig.calibration.lvf_file import SLICES, Strip
 from labrig.errors import DataError
+from labrig.optics import SLICES, Strip
 from labrig.reduce import RawFrame
 from labrig.region import Region, region_pixels
 

@@ -11,7 +11,6 @@ from labrig.calibration.blank_file import BLANK_KIND, BlankFile, read_blank_file
 from labrig.calibration.camera_file import (
     CAMERA_KIND,
     CameraFile,
-    Factor,
     Linearity,
     Noise,
     read_camera_file,
@@ -25,7 +24,6 @@ from labrig.calibration.fade_file import (
     read_fade_file,
     write_fade_file,
 )
-from labrig.calibration.flat_field import Flat, rho_squared
 from labrig.calibration.irradiance_file import (
     IRRADIANCE_KIND,
     IrradianceFile,
@@ -33,7 +31,7 @@ from labrig.calibration.irradiance_file import (
     write_irradiance_file,
 )
 from labrig.calibration.kind import CalibrationKind
-from labrig.calibration.lvf_file import LVF_KIND, LvfFile, Strip, read_lvf_file, write_lvf_file
+from labrig.calibration.lvf_file import LVF_KIND, LvfFile, read_lvf_file, write_lvf_file
 
 #: Every kind, in the order of their keys in a rig file.
 KINDS: tuple[CalibrationKind[Any], ...] = (
@@ -55,21 +53,17 @@ __all__ = [
     "CalibrationKind",
     "CameraFile",
     "Change",
-    "Factor",
     "FadeFile",
-    "Flat",
     "IrradianceFile",
     "Linearity",
     "LvfFile",
     "Noise",
-    "Strip",
     "Warming",
     "read_blank_file",
     "read_camera_file",
     "read_fade_file",
     "read_irradiance_file",
     "read_lvf_file",
-    "rho_squared",
     "write_blank_file",
     "write_camera_file",
     "write_fade_file",

@@ -7,7 +7,7 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
-from labrig.calibration.lvf_file import Strip
+from labrig.optics import Strip
 from labrig.yaml_file import read_model, write_yaml
 
 Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]

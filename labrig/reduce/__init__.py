@@ -2,6 +2,7 @@
 
 from labrig.reduce.channels import ChannelStats, FrameMeasurement, measure
 from labrig.reduce.dark import DarkModel, fit_dark, hot_pixels
+from labrig.reduce.frame import LinearFrame, RegionSums
 from labrig.reduce.patches import reduce_patches, reduce_series
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
@@ -11,8 +12,10 @@ __all__ = [
     "ChannelStats",
     "DarkModel",
     "FrameMeasurement",
+    "LinearFrame",
     "PixelMask",
     "RawFrame",
+    "RegionSums",
     "SeriesFrame",
     "fit_dark",
     "hot_pixels",

@@ -4,14 +4,14 @@ from dataclasses import replace
 
 import numpy as np
 
-from labrig.calibration import CameraFile
 from labrig.errors import DataError
+from labrig.optics import CameraModel
 from labrig.region import Region
 from labrig.results import Series
 
 
 def calibrated(
-    series: Series, camera: CameraFile, region: Region, width: int, height: int
+    series: Series, camera: CameraModel, region: Region, width: int, height: int
 ) -> Series:
     """`series` of a region of frames of `width` × `height` pixels, in DN/s of its first row's
     settings in the middle of the lens.

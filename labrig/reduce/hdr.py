@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DataError
+from labrig.reduce.frame import LinearFrame
 from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
 
@@ -78,7 +79,7 @@ def hdr_frame(frames: Iterable[tuple[RawFrame, float]], hot: PixelMask | None = 
             seconds = np.zeros(raw.mosaic.shape)
         if raw.mosaic.shape != counts.shape or raw.cfa != first.cfa:
             raise DataError("expected frames of one sensor and size; choose those of one camera")
-        light = raw.mosaic - _black(raw)
+        light = LinearFrame(raw).value_dn()
         is_open = light < FULL * (raw.white - max(raw.black))
         counts += np.where(is_open, light, 0.0)
         seconds += np.where(is_open, exposure_s, 0.0)
@@ -89,11 +90,3 @@ def hdr_frame(frames: Iterable[tuple[RawFrame, float]], hot: PixelMask | None = 
     rate = np.full(counts.shape, np.nan, dtype=np.float32)
     np.divide(counts, seconds, out=rate, where=seconds > 0, casting="same_kind")
     return HdrFrame(rate, first.cfa, first.cfa_side, first.channels)
-
-
-def _black(raw: RawFrame) -> FloatArray:
-    """Of every pixel."""
-    side = raw.cfa_side
-    cell = np.array(raw.black).reshape(side, side)
-    repeats = (-(-raw.height // side), -(-raw.width // side))
-    return np.tile(cell, repeats)[: raw.height, : raw.width]

@@ -7,8 +7,8 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.calibration import CameraFile
 from labrig.errors import DataError
+from labrig.optics import CameraModel
 from labrig.reduce.calibrated import calibrated
 from labrig.reduce.dark import HOT_FRAMES, SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
 from labrig.reduce.noise import Floats
@@ -54,7 +54,7 @@ def reduce_patches(
     patches: Mapping[str, Region],
     darks: Sequence[SeriesFrame] = (),
     background: Region | None = None,
-    camera: CameraFile | None = None,
+    camera: CameraModel | None = None,
 ) -> dict[str, Series]:
     """The series of each patch, in DN/s, with a row for every frame in the given order.
 

@@ -3,6 +3,7 @@
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.reduce.frame import cell_means_dn
 from labrig.reduce.raw import RawFrame
 
 Picture = NDArray[np.float32]
@@ -15,39 +16,10 @@ def is_grey(raw: RawFrame) -> bool:
     return len(raw.channels) == 1
 
 
-def _cell(raw: RawFrame) -> int:
-    """Side of the cells of the CFA that become a pixel each; 2 if there is no CFA."""
-    return max(raw.cfa_side, 2)
-
-
 def binned(raw: RawFrame) -> Picture:
-    """R, G, B of every cell above black, 1 = saturated, shape (height / 2, width / 2, 3) of Bayer.
-
-    Binning and not demosaicing: the picture is shown smaller anyway, and nothing is invented.
-    """
-    side = _cell(raw)
-    rows, columns = raw.height // side, raw.width // side
-    picture = np.zeros((rows, columns, 3), np.float32)
-    times = side**2 // len(raw.cfa)
-    colours, black = raw.cfa * times, raw.black * times
-    for position, colour in enumerate(colours):
-        y, x = divmod(position, side)
-        plane = raw.mosaic[y : side * rows : side, x : side * columns : side]
-        scale = 1 / colours.count(colour) / (raw.white - black[position])
-        shown = (plane - np.float32(black[position])) * np.float32(scale)
-        for channel in range(3) if is_grey(raw) else ["RGB".index(colour)]:
-            picture[..., channel] += shown
-    return picture
-
-
-def saturated_cells(raw: RawFrame) -> Picture:
-    """1 where one of the pixels of a cell is saturated, else 0."""
-    side = _cell(raw)
-    rows, columns = raw.height // side, raw.width // side
-    cells = (raw.mosaic[: side * rows, : side * columns] >= raw.white).reshape(
-        rows, side, columns, side
-    )
-    return np.asarray(cells.any(axis=(1, 3)), dtype=np.float32)
+    """R, G, B of every cell above black, 1 = saturated; (height / 2, width / 2, 3) of Bayer."""
+    picture = cell_means_dn(raw) / np.float32(raw.white - max(raw.black))
+    return np.repeat(picture, 3, axis=-1) if is_grey(raw) else picture
 
 
 def small(picture: Picture, width: int) -> Picture:

@@ -8,9 +8,8 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.calibration import CameraFile
-from labrig.calibration.lvf_file import SLICES, Strip
 from labrig.errors import DataError
+from labrig.optics import SLICES, CameraModel, Strip
 from labrig.reduce.hdr import HdrFrame, Image
 from labrig.reduce.patches import reduce_patches
 from labrig.reduce.shots import SeriesFrame
@@ -168,7 +167,7 @@ def slice_values(
     frames: Sequence[SeriesFrame],
     strip: Strip,
     darks: Sequence[SeriesFrame],
-    camera: CameraFile | None,
+    camera: CameraModel | None,
 ) -> Mapping[str, SliceValues]:
     """Light in every slice of a strip, scene by scene.
 

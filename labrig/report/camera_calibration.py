@@ -8,7 +8,8 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, LogLocator, NullLocator
 
-from labrig.calibration import CameraFile, Factor, Linearity
+from labrig.calibration import CameraFile, Linearity
+from labrig.optics import Factor
 from labrig.report.figure_style import (
     INK,
     LEFT_PT,

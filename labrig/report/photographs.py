@@ -11,7 +11,8 @@ from numpy.typing import NDArray
 from labrig.errors import LabrigError, UsageError
 from labrig.record.frames import FrameRecord
 from labrig.reduce import RawFrame, read_raw
-from labrig.reduce.pictures import Picture, binned, is_grey, jpeg, saturated_cells, small
+from labrig.reduce.frame import LinearFrame, saturated_cells
+from labrig.reduce.pictures import Picture, binned, is_grey, jpeg, small
 from labrig.region import region_pixels
 from labrig.report.colours import Screen, encoded, into_gamut
 from labrig.report.content import GlowPhotograph, PatchReport
@@ -100,7 +101,7 @@ def daylight_picture(
         raw = _read(frame.path)
         if raw is None:
             continue
-        blown = float(np.mean(raw.mosaic >= raw.white))
+        blown = float(LinearFrame(raw).is_saturated().mean())
         if best is not None and blown > BLOWN_SHARE:
             break
         best = frame, raw
@@ -130,7 +131,8 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
         raw = _read(photograph.frame.path)
         if raw is not None:
             picture = small(binned(raw), GLOW_WIDTH)
-            blown = (small(saturated_cells(raw), GLOW_WIDTH) > BLOWN_LOOKS)[..., np.newaxis]
+            saturated = small(saturated_cells(raw).astype(np.float32), GLOW_WIDTH)
+            blown = (saturated > BLOWN_LOOKS)[..., np.newaxis]
             gathered = _light_gathered(photograph.frame)
             linear = into_gamut(_on_screen(raw, picture / gathered, screen.glow))
             shown.append((photograph, linear, blown))

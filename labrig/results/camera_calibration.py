@@ -5,7 +5,8 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any, ClassVar
 
-from labrig.calibration import CAMERA_KIND, CameraFile, Flat, Noise
+from labrig.calibration import CAMERA_KIND, CameraFile, Noise
+from labrig.optics import Flat
 from labrig.results.arrays import FloatArray
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult

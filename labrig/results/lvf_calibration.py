@@ -7,8 +7,8 @@ from typing import Any, ClassVar
 
 import numpy as np
 
-from labrig.calibration import LVF_KIND, LvfFile, Strip
-from labrig.optics import CameraResponse
+from labrig.calibration import LVF_KIND, LvfFile
+from labrig.optics import CameraResponse, Strip
 from labrig.results.arrays import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.results.strip import LocatedLines, SliceValues, StripProfile

@@ -8,7 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 from numpy.typing import NDArray
-from scipy.optimize import minimize_scalar
+
+from labrig.fit import least_squares
 
 FloatArray = NDArray[np.float64]
 
@@ -66,12 +67,15 @@ def _bright(glows: FloatArray) -> FloatArray:
 def _rate(charges_s: FloatArray, glow: FloatArray) -> float:
     """s, by least squares on the logarithms, which gives a at once."""
 
-    def misfit(log_s: float) -> float:
-        left = np.log(glow) - np.log(-np.expm1(-np.exp(log_s) * charges_s))
-        return float(left.var())
+    def residuals(log_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+        s = float(np.exp(log_s[0]))
+        left = np.log(-np.expm1(-s * charges_s)) - np.log(glow)
+        slope = _slopes(charges_s, s)[:, 1:]
+        return left - left.mean(), slope - slope.mean(axis=0)
 
-    bounds = (float(np.log(0.01 / charges_s.max())), float(np.log(10 / charges_s.min())))
-    return float(np.exp(minimize_scalar(misfit, bounds=bounds, method="bounded").x))
+    low, high = np.log(0.01 / charges_s.max()), np.log(10 / charges_s.min())
+    found = least_squares(residuals, [(low + high) / 2], lower=low, upper=high, tolerance=1e-6)
+    return float(np.exp(found.parameters[0]))
 
 
 def _slopes(charges_s: FloatArray, s: float) -> FloatArray:

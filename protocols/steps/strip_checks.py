@@ -4,8 +4,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from labrig.calibration import Strip
 from labrig.fit.lvf import locate_lines
+from labrig.optics import Strip
 from labrig.reduce.hdr import Exposure, read_hdr_frame
 from labrig.reduce.strip import find_strip, strip_profile
 from labrig.results.strip import StripProfile

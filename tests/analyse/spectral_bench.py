@@ -12,11 +12,11 @@ from numpy.typing import NDArray
 
 from labrig import shipped
 from labrig.acquire import Plan, RunObserver
-from labrig.calibration import LvfFile, Strip, write_lvf_file
+from labrig.calibration import LvfFile, write_lvf_file
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
 from labrig.clock import Clock
 from labrig.material import read_material
-from labrig.optics import Bands
+from labrig.optics import Bands, Strip
 from labrig.optics.piecewise import band_means, edges_about
 from labrig.region import region_pixels
 from labrig.results.emission_spectrum import WAVELENGTH_NM

@@ -8,12 +8,12 @@ import numpy as np
 import pytest
 
 from labrig.analyse.irradiance import in_bands, mean_ratio, strip_scale
-from labrig.calibration import Strip, read_irradiance_file, write_lvf_file
+from labrig.calibration import read_irradiance_file, write_lvf_file
 from labrig.errors import DataError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import CurveError
 from labrig.fit.spectrum.system import curve_modes
-from labrig.optics import CameraResponse, Lvf, Transmittance, nominal_lvf, read_camera
+from labrig.optics import CameraResponse, Lvf, Strip, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
 from labrig.process import process_run
 from labrig.results.irradiance import CardRatio, IrradianceResult

@@ -15,10 +15,11 @@ from labrig.analyse.emission_spectrum import analyse as analyse_spectra
 from labrig.analyse.inputs import Inputs
 from labrig.analyse.part import Part
 from labrig.analyse.strip_patches import StripPatch, cut, for_each_patch, lean
-from labrig.calibration import Strip, write_irradiance_file, write_lvf_file
+from labrig.calibration import write_irradiance_file, write_lvf_file
 from labrig.compare.result import read_patches
 from labrig.errors import DataError, FitError, UsageError
 from labrig.material import read_material
+from labrig.optics import Strip
 from labrig.process import Processed, process_and_report
 from labrig.record import read_run
 from labrig.reduce import RawFrame

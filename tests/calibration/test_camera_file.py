@@ -7,16 +7,9 @@ import numpy as np
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.calibration import (
-    CameraFile,
-    Factor,
-    Flat,
-    Linearity,
-    Noise,
-    read_camera_file,
-    write_camera_file,
-)
+from labrig.calibration import CameraFile, Linearity, Noise, read_camera_file, write_camera_file
 from labrig.errors import DataError, UsageError
+from labrig.optics import Factor, Flat
 
 BODY = "Canon EOS 5D Mark II, serial 7, firmware 2.1.2"
 

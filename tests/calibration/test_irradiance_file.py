@@ -6,13 +6,9 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.calibration import (
-    IrradianceFile,
-    Strip,
-    read_irradiance_file,
-    write_irradiance_file,
-)
+from labrig.calibration import IrradianceFile, read_irradiance_file, write_irradiance_file
 from labrig.errors import UsageError
+from labrig.optics import Strip
 from labrig.yaml_file import yaml_text
 
 Row = st.tuples(*[st.floats(0, 1e6)] * 2)

@@ -9,10 +9,10 @@ import pytest
 from hypothesis import given, strategies as st
 from pydantic import ValidationError
 
-from labrig.calibration import LvfFile, Strip, read_lvf_file, write_lvf_file
+from labrig.calibration import LvfFile, read_lvf_file, write_lvf_file
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
 from labrig.errors import UsageError
-from labrig.optics import Bands, WavelengthMap
+from labrig.optics import Bands, Strip, WavelengthMap
 
 STRIP = Strip(left=(0.1, 0.45), right=(0.9, 0.5), height=0.3, rising=False)
 Numbers = st.floats(allow_nan=False, allow_infinity=False)

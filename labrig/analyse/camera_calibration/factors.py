@@ -11,8 +11,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.calibration import Factor
 from labrig.errors import DataError
+from labrig.optics import Factor
 from labrig.results import FloatArray, Measured
 
 Setting = float | None

@@ -7,9 +7,9 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.calibration import Flat, rho_squared
 from labrig.errors import DataError
-from labrig.reduce import RawFrame
+from labrig.optics import Flat, rho_squared
+from labrig.reduce import LinearFrame, RawFrame
 from labrig.region import Region, region_pixels
 from labrig.results import FloatArray
 from labrig.results.camera_calibration import FittedFlat
@@ -38,12 +38,8 @@ def fit_flat(
     if not frames:
         raise DataError("expected frames of the lit card, got none")
     first = frames[0]
-    mosaic: FloatArray = np.mean([frame.mosaic for frame in frames], axis=0, dtype=np.float64)
-    blocks = [_blocks(first, mosaic, card, name) for name in first.channels]
-    fits = [
-        _fit(x, y, light - dark, first.width, first.height)
-        for (x, y, light), dark in zip(blocks, dark_dn.tolist(), strict=True)
-    ]
+    x, y, light = _blocks(frames, card, dark_dn)
+    fits = [_fit(x, y, own, first.width, first.height) for own in light.T]
     powers = max(fit.powers for fit in fits)
     flat = Flat(
         f_number=f_number,
@@ -66,26 +62,22 @@ class _Fit(NamedTuple):
 
 
 def _blocks(
-    frame: RawFrame, mosaic: FloatArray, card: Region, channel: str
+    frames: Sequence[RawFrame], card: Region, dark_dn: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Middles in pixels and mean light above black of blocks of a channel, each (blocks,)."""
-    left, top, width, height = region_pixels(card, frame.width, frame.height)
-    side = frame.cfa_side
+    """Middles in pixels of blocks of the card, (blocks,) each; their light, (blocks, channels)."""
+    left, top, width, height = region_pixels(card, frames[0].width, frames[0].height)
+    side = frames[0].cfa_side
     across = _edges(left, width, BLOCKS[0], side)
     down = _edges(top, height, BLOCKS[1], side)
-    total, count = np.zeros((2, len(down) - 1, len(across) - 1))
-    for position, letter in enumerate(frame.cfa):
-        if letter != channel:
-            continue
-        row, column = divmod(position, side)
-        for j, (low, high) in enumerate(pairwise(down.tolist())):
-            for i, (near, far) in enumerate(pairwise(across.tolist())):
-                here = mosaic[low + (row - low) % side : high : side,
-                              near + (column - near) % side : far : side]  # fmt: skip
-                total[j, i] += float((here - frame.black[position]).sum())
-                count[j, i] += here.size
+    areas = [
+        (near, low, far - near, high - low)
+        for low, high in pairwise(down.tolist())
+        for near, far in pairwise(across.tolist())
+    ]
+    linear = [LinearFrame(frame, dark_dn) for frame in frames]
+    light = np.mean([[one.sums(area).mean_dn for area in areas] for one in linear], axis=0)
     x, y = np.meshgrid((across[1:] + across[:-1]) / 2, (down[1:] + down[:-1]) / 2)
-    return x.ravel(), y.ravel(), (total / count).ravel()
+    return x.ravel(), y.ravel(), light
 
 
 def _edges(start: int, length: int, blocks: int, side: int) -> NDArray[np.intp]:

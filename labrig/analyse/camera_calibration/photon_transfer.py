@@ -16,7 +16,7 @@ import numpy as np
 from labrig.calibration import Noise
 from labrig.errors import DataError
 from labrig.record import FrameRecord
-from labrig.reduce import RawFrame
+from labrig.reduce import LinearFrame, RawFrame
 from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel, variance_terms
 from labrig.region import Region, region_pixels
 from labrig.results import FloatArray
@@ -47,23 +47,19 @@ def scatter(one: RawFrame, other: RawFrame, region: Region, dark_dn: float) -> P
     """
     if one.mosaic.shape != other.mosaic.shape or one.cfa != other.cfa:
         raise DataError("expected pairs of frames of one sensor; choose those of one camera")
-    x, y, width, height = _middle(region_pixels(region, one.width, one.height))
-    side = one.cfa_side
-    difference, levels = np.zeros((height, width)), []
-    for position in range(side * side):
-        row, column = divmod(position, side)
-        here = (slice(y + (row - y) % side, y + height, side),
-                slice(x + (column - x) % side, x + width, side))  # fmt: skip
-        black = one.black[position] + dark_dn
-        first, second = (frame.mosaic[here].astype(np.float64) - black for frame in (one, other))
+    area = _middle(region_pixels(region, one.width, one.height))
+    dark = np.full(len(one.channels), dark_dn)
+    values = [LinearFrame(frame, dark).value_dn(area) for frame in (one, other)]
+    difference, levels = np.zeros(values[0].shape), []
+    for row, column in np.ndindex(one.cfa_side, one.cfa_side):
+        here = np.s_[row :: one.cfa_side, column :: one.cfa_side]
+        first, second = (value[here] for value in values)
         brightness, again = float(first.mean()), float(second.mean())
         # Flicker is no noise of pixels; in the dark there is nothing to scale by.
         lit = min(brightness, again) > LIT_SIGMAS * float(first.std())
         scale = brightness / again if lit else 1.0
         apart = first - scale * second
-        difference[(row - y) % side :: side, (column - x) % side :: side] = (
-            apart - apart.mean()
-        ) / np.sqrt(1 + scale**2)
+        difference[here] = (apart - apart.mean()) / np.sqrt(1 + scale**2)
         levels.append((brightness + again) / 2)
     return _scatter(difference, float(np.mean(levels)))
 

@@ -14,7 +14,6 @@ from labrig.analyse.emission_spectrum.comparison import combined
 from labrig.analyse.part import Part
 from labrig.analyse.strip_patches import Slices, StripPatch, cut, lean, strip_patches
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
-from labrig.calibration.lvf_file import Strip
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError, SpectralSystem, system_through_lvf
 from labrig.optics import (
@@ -22,12 +21,13 @@ from labrig.optics import (
     CameraResponse,
     Lvf,
     Spectrum,
+    Strip,
     Transmittance,
     read_monochrome_camera,
     seen_through,
 )
-from labrig.reduce import RawFrame, SeriesFrame, read_raw
-from labrig.region import Region, region_pixels
+from labrig.reduce import LinearFrame, RawFrame, SeriesFrame, read_raw
+from labrig.region import Region
 from labrig.results import FloatArray
 from labrig.results.emission_spectrum import FilterFrames
 
@@ -201,15 +201,8 @@ def _positions(raw: RawFrame, strip: Strip, slices: Slices) -> FloatArray:
 
     Pixels of one colour are two apart: where slices are few pixels wide, that is some nanometres.
     """
-    side = raw.cfa_side
-    cell = np.array(list(raw.cfa)).reshape(side, side)
-    middles = np.empty((len(raw.channels), len(slices)))
-    for number, name in enumerate(raw.channels):
-        rows = np.count_nonzero(cell == name, axis=0)
-        for place, region in enumerate(slices.values()):
-            x, _, width, _ = region_pixels(region, raw.width, raw.height)
-            columns = np.arange(x, x + width)
-            middles[number, place] = np.average(columns + 0.5, weights=rows[columns % side])
+    linear = LinearFrame(raw)
+    middles = np.array([linear.middle_columns(region) for region in slices.values()]).T
     across = (strip.right[0] - strip.left[0]) * raw.width
     share = (middles - strip.left[0] * raw.width) / across + lean(strip, slices, raw)
     return share if strip.rising else 1 - share

@@ -15,12 +15,19 @@ import numpy as np
 from labrig.analyse.hot_pixels import hot_pixels_of
 from labrig.calibration import CameraFile
 from labrig.errors import DataError
-from labrig.reduce import DarkModel, PixelMask, RawFrame, SeriesFrame, fit_dark, read_raw
+from labrig.reduce import (
+    DarkModel,
+    LinearFrame,
+    PixelMask,
+    RawFrame,
+    SeriesFrame,
+    fit_dark,
+    read_raw,
+)
 from labrig.reduce.pairs import STRIPS
 from labrig.reduce.patches import TWO_DEGREES
 from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel, variance_terms
-from labrig.reduce.saturation import is_clipped
-from labrig.region import Region, region_pixels
+from labrig.region import Region
 from labrig.results import FloatArray, is_usable
 from labrig.results.emission_spectrum import FilterFrames
 
@@ -218,36 +225,15 @@ def pixel_noise(groups: Sequence[Sequence[MeasuredPlaces]]) -> list[NoiseModel]:
 def _measured(
     frame: SeriesFrame, raw: RawFrame, regions: Sequence[Region], hot: PixelMask | None
 ) -> MeasuredPlaces:
-    side = raw.cfa_side
-    cell = np.array([raw.channels.index(letter) for letter in raw.cfa]).reshape(side, side)
-    tiling = (-(-raw.height // side), -(-raw.width // side))
-    channel = np.tile(cell, tiling)[: raw.height, : raw.width]
-    black = np.tile(np.reshape(raw.black, (side, side)), tiling)[: raw.height, : raw.width]
-    level, pixels, strips = [], [], []
-    for region in regions:
-        x, y, width, height = region_pixels(region, raw.width, raw.height)
-        here = np.s_[y : y + height, x : x + width]
-        light, clips = raw.mosaic[here] - black[here], raw.mosaic[here] >= raw.white
-        starts = np.arange(min(STRIPS, height // side)) * height // min(STRIPS, height // side)
-        means, totals, counts = [], [], []
-        for number in range(len(raw.channels)):
-            own = channel[here] == number
-            if hot is not None:
-                own &= ~hot[here]
-            count = np.add.reduceat(own.sum(axis=1), starts)
-            total = np.add.reduceat(np.sum(light, axis=1, where=own), starts)
-            means.append(total / np.maximum(count, 1))
-            clipped = is_clipped(np.count_nonzero(clips & own), count.sum())
-            totals.append(np.nan if clipped else total.sum())
-            counts.append(max(count.sum(), 1))
-        level.append(np.array(totals) / counts)
-        pixels.append(counts)
-        strips.append(np.array(means))
+    linear = LinearFrame(raw, hot=hot)
+    sums = [linear.of_region(region) for region in regions]
     deviations = np.full((len(regions), len(raw.channels), STRIPS), np.nan)
-    for place, one in enumerate(strips):
-        deviations[place, :, : one.shape[1]] = one - one.mean(axis=1, keepdims=True)
-    counted = np.array(pixels, dtype=np.float64)
-    return MeasuredPlaces(frame, raw.width, raw.height, np.array(level), counted, deviations)
+    for own, one in zip(deviations, sums, strict=True):
+        means = one.strip_means_dn(min(STRIPS, len(one.pixels) // raw.cfa_side))
+        own[:, : len(means)] = (means - means.mean(axis=0)).T
+    level = np.array([np.where(one.is_clipped, np.nan, one.mean_dn) for one in sums])
+    pixels = np.array([np.maximum(one.pixels.sum(axis=0), 1.0) for one in sums])
+    return MeasuredPlaces(frame, raw.width, raw.height, level, pixels, deviations)
 
 
 def _pairs(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray, FloatArray]]:

@@ -10,10 +10,11 @@ from labrig.analyse.part import Part
 from labrig.analyse.strip_patches import Slices, StripPatch, cut, lean, strip_patches
 from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import timed, untimed
-from labrig.calibration import IrradianceFile, Strip, Warming
+from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
-from labrig.reduce import RawFrame, read_raw, reduce_patches
-from labrig.region import Region, region_pixels
+from labrig.optics import Strip
+from labrig.reduce import LinearFrame, RawFrame, read_raw, reduce_patches
+from labrig.region import Region
 from labrig.results import BoolArray, Charge, ChargingSeries, FloatArray, Series
 from labrig.results.excitation import PatchCharging
 
@@ -120,22 +121,11 @@ def _centred(
     left, right = strip.left[0] * raw.width, strip.right[0] * raw.width
     wanted = left + (along - lean(strip, slices, raw)) * (right - left)
     moved = values.copy()
-    for number, channel in enumerate(raw.channels):
-        x = np.array([_middle(region, raw, channel) for region in slices.values()])
+    middles = np.array([LinearFrame(raw).middle_columns(region) for region in slices.values()])
+    for number, x in enumerate(middles.T):
         slope = np.nan_to_num(np.gradient(values[..., number], x, axis=1))
         moved[..., number] += slope * (wanted - x)
     return moved
-
-
-def _middle(region: Region, raw: RawFrame, channel: str) -> float:
-    """Mean place in x of the pixels of that channel in a region, their middles at .5."""
-    x, y, width, height = region_pixels(region, raw.width, raw.height)
-    side = raw.cfa_side
-    colours = np.array(list(raw.cfa)).reshape(side, side)
-    rows, columns = np.arange(y, y + height) % side, np.arange(x, x + width)
-    own = colours[np.ix_(rows, columns % side)] == channel
-    found = own.sum(axis=0)
-    return float((found * (columns + 0.5)).sum() / found.sum())
 
 
 def _evened(

@@ -28,11 +28,11 @@ from labrig.bench_optics import (
     filter_transmittances,
     lamp_spectrum,
 )
-from labrig.calibration import LvfFile, Strip
+from labrig.calibration import LvfFile
 from labrig.calibration.lvf_file import BandColumns, CurveColumns, WavelengthColumns
 from labrig.errors import DataError
 from labrig.fit.lvf import LvfCalibration
-from labrig.optics import WavelengthMap
+from labrig.optics import Strip, WavelengthMap
 from labrig.reduce.hdr import read_hdr_frame
 from labrig.reduce.strip import find_strip, slice_values
 from labrig.results import FloatArray

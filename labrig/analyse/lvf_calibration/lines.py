@@ -5,11 +5,10 @@ from dataclasses import replace
 import numpy as np
 from scipy.optimize import minimize_scalar
 
-from labrig.calibration import Strip
 from labrig.errors import DataError, FitError
 from labrig.fit.lvf import WavelengthFit, fit_wavelengths, locate_lines
 from labrig.nonnegative import nonnegative_least_squares
-from labrig.optics import Lvf, WavelengthMap
+from labrig.optics import Lvf, Strip, WavelengthMap
 from labrig.reduce.hdr import HdrFrame
 from labrig.reduce.strip import strip_profile
 from labrig.results.lvf_calibration import PlacedStrip, Stripes, StripLines
@@ -124,6 +123,7 @@ def shifted_by_stripes(frame: HdrFrame, strip: Strip, lvf: Lvf, nm_per_strip: fl
     coarse = np.linspace(-MOST_SHIFT, MOST_SHIFT, 33)
     best = coarse[np.argmin([left(shift) for shift in coarse])]
     step = coarse[1] - coarse[0]
+    # Least squares, but of curves with a kink at every position of the filter: without slopes.
     found = minimize_scalar(left, bounds=(best - step, best + step), method="bounded")
     if not varies or found.fun > (1 - LEAST_EXPLAINED) * varies:
         raise FitError("no stripes of mercury lines are seen on the sample")

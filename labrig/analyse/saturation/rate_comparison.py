@@ -8,11 +8,11 @@ has them, say the same with less noise. Amplitudes are linear, so only the rates
 from collections.abc import Sequence
 
 import numpy as np
-from scipy.optimize import least_squares
 from scipy.special import fdtrc
 
 from labrig.errors import FitError
-from labrig.fit.least_squares import EPSILON
+from labrig.fit.decay.shapes import exponential_means_and_slopes
+from labrig.fit.least_squares import EPSILON, least_squares
 from labrig.material.rates import exponential_means
 from labrig.results import FittedDecay, FloatArray, Series
 from labrig.results.saturation import Curve, RatesTest
@@ -78,7 +78,7 @@ def compare_rates(
         own_sigma_per_s=np.array([(np.exp(found) * sigma)[falling] for found, _, sigma in alone]),
         amplitude=np.array([value[falling] for value, _ in amplitudes]),
         amplitude_sigma=np.array([sigma[falling] for _, sigma in amplitudes]),
-        residuals=tuple(-_misfit(one, np.exp(shared)[falling])[:-1] for one in curves),
+        residuals=tuple(-_misfit(one, np.exp(shared)[falling])[0][:-1] for one in curves),
         chi2_shared=shared_chi2,
         chi2_own=own_chi2,
         dof_own=dof,
@@ -90,32 +90,37 @@ def compare_rates(
 def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float, FloatArray]:
     """Log rates (s,), χ² and σ of the log rates."""
 
-    def residuals(log_rates: FloatArray) -> FloatArray:
-        return np.concatenate([_misfit(one, np.exp(log_rates)) for one in curves])
+    def residuals(log_rates: FloatArray) -> tuple[FloatArray, FloatArray]:
+        rest, slopes = zip(*(_misfit(one, np.exp(log_rates)) for one in curves), strict=True)
+        return np.concatenate(rest), np.concatenate(slopes)
 
-    found = least_squares(residuals, start, x_scale=0.1, xtol=1e-10, ftol=1e-12)
-    jacobian = np.asarray(found.jac, dtype=np.float64)
-    covariance = np.linalg.pinv(jacobian.T @ jacobian, rcond=1e3 * EPSILON)
-    return found.x, float(2 * found.cost), np.sqrt(np.diag(covariance))
+    found = least_squares(residuals, start)
+    return found.parameters, found.chi2, found.sigma
 
 
-def _misfit(one: Curve, rates_per_s: FloatArray) -> FloatArray:
-    """(n + 1,) model − value of the best amplitudes, whitened."""
-    design, target = _design(one, rates_per_s), _target(one)
+def _misfit(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n + 1,) model − value of the best amplitudes, whitened; (n + 1, s) its slopes by log rates.
+
+    The slopes are Kaufman's (BIT 15, 1975): what other amplitudes explain as well is taken off.
+    """
+    means, by_log_rate = exponential_means_and_slopes(rates_per_s, one.t_s, one.exposure_s)
+    design, target = _design(one, means), _target(one)
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)
-    return np.asarray(design @ solution - target)
+    moved = np.zeros((len(target), len(rates_per_s)))
+    moved[:-1] = by_log_rate * solution[:-1] / one.sigma[:, np.newaxis]
+    known = np.linalg.qr(design)[0]
+    return np.asarray(design @ solution - target), moved - known @ (known.T @ moved)
 
 
 def _amplitudes(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    design = _design(one, rates_per_s)
+    design = _design(one, exponential_means(rates_per_s, one.t_s, one.exposure_s))
     covariance = np.linalg.pinv(design.T @ design, rcond=1e3 * EPSILON)
     solution = covariance @ design.T @ _target(one)
     return solution[:-1], np.sqrt(np.diag(covariance))[:-1]
 
 
-def _design(one: Curve, rates_per_s: FloatArray) -> FloatArray:
-    """(n + 1, states + 1) whitened, its last row the offset's prior."""
-    shapes = exponential_means(rates_per_s, one.t_s, one.exposure_s)
+def _design(one: Curve, shapes: FloatArray) -> FloatArray:
+    """(n + 1, s + 1) of shapes (n, s), whitened; its last row the offset's prior."""
     offset = np.full((len(one.t_s), 1), one.offset_sigma)
     rows = np.hstack([shapes, offset]) / one.sigma[:, np.newaxis]
     prior = np.zeros((1, rows.shape[1]))

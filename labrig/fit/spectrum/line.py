@@ -87,6 +87,7 @@ def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm
         )
     between = (float(tried[best - 1]), float(tried[best + 1]))
     h = TOLERANCE * step
+    # Not least squares: the covariance, and its determinant with it, changes along the search.
     centre_nm = float(minimize_scalar(surprise, bounds=between, options={"xatol": h}).x)
     at = line_at(centre_nm)
     shift = (line_at(centre_nm + h).shape - line_at(centre_nm - h).shape) / (2 * h)

@@ -16,9 +16,9 @@ from labrig.analyse.excitation.charge_intervals import charge_frames
 from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IrradianceFile, write_irradiance_file
-from labrig.calibration.lvf_file import SLICES, Strip
 from labrig.errors import DataError
 from labrig.material import read_material
+from labrig.optics import SLICES, Strip
 from labrig.process import process_and_report, process_run
 from labrig.record import read_run
 from labrig.reduce import measure, read_raw

@@ -7,8 +7,8 @@ import numpy as np
 import yaml
 from scipy.interpolate import PchipInterpolator
 
-from labrig.calibration import Strip
 from labrig.fit.least_squares import FloatArray
+from labrig.optics import Strip
 from labrig.region import region_pixels
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, filament_spectrum
 from labrig.sim.lvf import Lvf, pieces

@@ -11,10 +11,9 @@ from labrig.analyse.lvf_calibration.lines import (
     strip_lines,
     wavelengths_along,
 )
-from labrig.calibration import Strip
 from labrig.errors import DataError, FitError
 from labrig.fit.least_squares import FloatArray
-from labrig.optics import Spectrum, nominal_lvf
+from labrig.optics import Spectrum, Strip, nominal_lvf
 from labrig.reduce.hdr import hdr_frame
 from labrig.reduce.strip import find_strip
 from tests.analyse.lvf_calibration.strip_pictures import (

@@ -1,0 +1,186 @@
+"""How one body and lens turn light and settings into numbers: what a reduction applies."""
+
+import math
+from typing import Annotated, Self
+
+import numpy as np
+from numpy.typing import ArrayLike, NDArray
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.errors import DataError
+from labrig.region import Region, region_pixels
+
+FloatArray = NDArray[np.float64]
+Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
+NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
+Number = Annotated[float, Field(allow_inf_nan=False)]
+Numbers = tuple[Number, ...]
+
+#: Two settings are the same if they differ by less: a Canon's dial says 1/60 s for 1/64 s.
+SAME_SETTING = 0.02
+#: Points across a region whose mean is taken.
+POINTS = 24
+
+
+class _Part(BaseModel):
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class Flat(_Part):
+    """1 + Σ_k c_k ρ^(2k), k = 1, 2 …, ρ the distance from the middle over half the diagonal.
+
+    What is even about the middle is the lens's. The odd part, `gradient`, is the lamp's: it is
+    kept for the record and not divided out. An even part of the lamp's light cannot be told from
+    the lens's.
+
+    Attributes
+    ----------
+    f_number
+        Null for a lens that does not tell it.
+    falloff
+        c_k, a row for each channel.
+    gradient
+        Of the lit card along x and y, over half the diagonal, a row for each channel.
+    sigma
+        What the card's light and these numbers differ by, relative, from place to place.
+    """
+
+    f_number: Annotated[float, Field(gt=0)] | None
+    falloff: tuple[Numbers, ...]
+    gradient: tuple[tuple[Number, Number], ...] = ()
+    sigma: Annotated[float, Field(ge=0)] = 0.0
+
+    @model_validator(mode="after")
+    def _falls_off(self) -> Self:
+        if not self.falloff or len({len(row) for row in self.falloff}) != 1:
+            raise ValueError("expected 'falloff' to have a row of the same length for each channel")
+        if (self.at(np.linspace(0, 1, 21)) <= 0).any():
+            raise ValueError("expected a 'falloff' that leaves some light everywhere in the frame")
+        return self
+
+    def at(self, rho2: ArrayLike) -> FloatArray:
+        """At squared distances (…,) from the middle, shape (…, channels)."""
+        squared = np.asarray(rho2, dtype=np.float64)
+        powers = squared[..., None] ** np.arange(1, len(self.falloff[0]) + 1)
+        result: FloatArray = 1 + powers @ np.array(self.falloff).T
+        return result
+
+    def mean(self, region: Region, width: int, height: int) -> FloatArray:
+        """Over a region of a frame of `width` × `height` pixels, shape (channels,)."""
+        left, top, wide, high = region_pixels(region, width, height)
+        steps = (np.arange(POINTS) + 0.5) / POINTS
+        x, y = np.meshgrid(left + steps * wide, top + steps * high)
+        mean: FloatArray = self.at(rho_squared(x, y, width, height)).mean(axis=(0, 1))
+        return mean
+
+
+class Factor(_Part):
+    """What a setting does over what its label says, and one standard deviation."""
+
+    setting: Positive
+    factor: Positive
+    sigma: NotNegative
+
+
+class CameraModel(_Part):
+    """A body and a lens, calibrated.
+
+    Attributes
+    ----------
+    iso, f_number
+        Settings at which all factors are 1; `f_number` is null for a lens that does not tell it.
+    channels
+        Of the sensor.
+    shutter
+        True shutter time over the one the camera tells, by the latter in s. 1 at the longest.
+    iso_gain
+        Signal of the same light over that at `iso` times the ratio of the labels.
+    aperture
+        Light over that at `f_number` times the squared ratio of the labels.
+    flats
+        By f-number.
+    """
+
+    iso: Positive
+    f_number: Positive | None
+    channels: tuple[str, ...]
+    shutter: tuple[Factor, ...] = ()
+    iso_gain: tuple[Factor, ...] = ()
+    aperture: tuple[Factor, ...] = ()
+    flats: Annotated[tuple[Flat, ...], Field(min_length=1)]
+
+    def exposure_s(self, told_s: float) -> tuple[float, float]:
+        """True shutter time of one the camera tells, and its relative σ.
+
+        Between two that were measured straight in the logarithm; beyond the longest as the camera
+        tells, since a shutter's error is of milliseconds; below the shortest as that.
+        """
+        if not self.shutter:
+            return told_s, 0.0
+        told = np.log([one.setting for one in self.shutter])
+        at = math.log(told_s)
+        longest = self.shutter[-1].setting
+        sigma = float(np.interp(at, told, [one.sigma for one in self.shutter]))
+        if told_s > longest * (1 + SAME_SETTING):
+            return told_s, sigma * longest / told_s
+        return told_s * float(np.interp(at, told, [one.factor for one in self.shutter])), sigma
+
+    def scale(self, iso: float, f_number: float | None) -> tuple[float, float]:
+        """Signal of some light at those settings over that at the file's own, and its relative σ.
+
+        The σ is common to all frames at those settings. A setting that was not calibrated counts
+        by its label.
+        """
+        gain, gain_sigma = _found(self.iso_gain, iso)
+        scale, sigma = gain * iso / self.iso, gain_sigma
+        if f_number is not None and self.f_number is not None:
+            light, light_sigma = _found(self.aperture, f_number)
+            scale *= light * (self.f_number / f_number) ** 2
+            sigma = math.hypot(sigma, light_sigma)
+        return scale, sigma
+
+    def flat(self, f_number: float | None, region: Region, width: int, height: int) -> FloatArray:
+        """Light in a region over that in the middle of the lens, (channels,).
+
+        Parameters
+        ----------
+        width, height
+            Of the frame, in pixels.
+
+        Raises
+        ------
+        DataError
+            The aperture was not calibrated.
+        """
+        flat = self.flat_at(f_number)
+        if flat is None:
+            raise DataError(f"the camera file has no flat field at {stop_text(f_number)}")
+        return flat.mean(region, width, height)
+
+    def flat_at(self, f_number: float | None) -> Flat | None:
+        """The flat field of an aperture; None if it was not calibrated."""
+        return next((flat for flat in self.flats if _same(flat.f_number, f_number)), None)
+
+
+def rho_squared(x: FloatArray, y: FloatArray, width: int, height: int) -> FloatArray:
+    """ρ² of places in pixels."""
+    across, down = x - width / 2, y - height / 2
+    return (across**2 + down**2) / ((width / 2) ** 2 + (height / 2) ** 2)
+
+
+def _found(factors: tuple[Factor, ...], setting: float) -> tuple[float, float]:
+    for one in factors:
+        if _same(one.setting, setting):
+            return one.factor, one.sigma
+    return 1.0, 0.0
+
+
+def _same(one: float | None, other: float | None) -> bool:
+    if one is None or other is None:
+        return one is other
+    return abs(math.log(one / other)) < SAME_SETTING
+
+
+def stop_text(f_number: float | None) -> str:
+    """An aperture in words."""
+    return "an unknown aperture" if f_number is None else f"f/{f_number:g}"

@@ -1,0 +1,83 @@
+"""Where the strip of a linear variable filter lies in the frame."""
+
+import math
+from itertools import pairwise
+from typing import Annotated, Self
+
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
+
+from labrig.region import Region, region_pixels
+
+#: Places along a strip at which pictures through it are read (paper, section 4.2).
+SLICES = 31
+
+Share = Annotated[float, Field(ge=0, le=1)]
+
+
+class Strip(BaseModel):
+    """Where the filter is in the frame, in fractions of its width and height.
+
+    Attributes
+    ----------
+    left, right
+        (x, y) of the two ends of the centre line.
+    height
+        Of the strip, less its blurred edges.
+    rising
+        Whether the wavelength rises from left to right.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    left: tuple[Share, Share]
+    right: tuple[Share, Share]
+    height: Annotated[float, Field(gt=0, le=1)]
+    rising: bool
+
+    @model_validator(mode="after")
+    def _inside_the_frame(self) -> Self:
+        if self.right[0] <= self.left[0]:
+            raise ValueError(
+                f"expected 'right' to the right of 'left', got x = {self.right[0]:g} and "
+                f"{self.left[0]:g}"
+            )
+        middles = (self.left[1], self.right[1])
+        if min(middles) < self.height / 2 or max(middles) > 1 - self.height / 2:
+            raise ValueError("expected a strip inside of the frame, it leaves it at a long side")
+        return self
+
+    def slices(self, count: int = SLICES) -> dict[str, Region]:
+        """Upright regions side by side along the strip, from the blue end to the red end.
+
+        Returns
+        -------
+        dict
+            `p00`, `p01`, … → region; slice k reaches from position k/count to (k + 1)/count.
+        """
+        ends = np.linspace(self.left[0], self.right[0], count + 1)
+        middles = np.linspace(self.left[1], self.right[1], 2 * count + 1)[1::2]
+        regions = [
+            (float(start), max(float(y) - self.height / 2, 0.0), float(end - start), self.height)
+            for (start, end), y in zip(pairwise(ends), middles, strict=True)
+        ]
+        ordered = regions if self.rising else regions[::-1]
+        return {f"p{number:02d}": region for number, region in enumerate(ordered)}
+
+    def positions(self, width: int, height: int, count: int = SLICES) -> tuple[float, ...]:
+        """Position 0 (blue end) to 1 (red end) of the middle of each slice, in whole pixels.
+
+        A frame of `width` × `height` pixels has no others: that is where a slice really lies.
+        """
+        found = []
+        for region in self.slices(count).values():
+            x, _, wide, _ = region_pixels(region, width, height)
+            share = ((x + wide / 2) / width - self.left[0]) / (self.right[0] - self.left[0])
+            found.append(share if self.rising else 1 - share)
+        return tuple(found)
+
+    def tilt_degrees(self, width: int, height: int) -> float:
+        """Of the strip in a frame of so many pixels; > 0 falls to the right."""
+        across = (self.right[0] - self.left[0]) * width
+        down = (self.right[1] - self.left[1]) * height
+        return math.degrees(math.atan2(down, across))

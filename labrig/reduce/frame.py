@@ -1,0 +1,203 @@
+"""A frame in linear numbers: light above black and dark, its variance, and what is saturated.
+
+Pixels are worked out where and when they are asked for: of a region no more than the region.
+"""
+
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
+from typing import NamedTuple, TypeVar
+
+import numpy as np
+import numpy.typing as npt
+
+from labrig.optics import Flat, rho_squared
+from labrig.reduce.noise import Floats
+from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel
+from labrig.reduce.planes import PixelMask
+from labrig.reduce.raw import RawFrame
+from labrig.reduce.saturation import is_clipped
+from labrig.region import Region, region_pixels
+
+Pixel = TypeVar("Pixel", np.uint16, np.bool_)
+
+#: x, y, width, height in pixels.
+Area = tuple[int, int, int, int]
+
+
+@dataclass(frozen=True, eq=False)
+class RegionSums:
+    """The pixels of each channel in a region, added up row by row of the sensor.
+
+    Attributes
+    ----------
+    value_dn, variance_dn2
+        (rows, C) sums of the values and of their variances; hot pixels are left out.
+    pixels, saturated
+        (rows, C) how many there are, and how many of them are saturated.
+    """
+
+    value_dn: Floats
+    variance_dn2: Floats
+    pixels: Floats
+    saturated: Floats
+
+    @property
+    def mean_dn(self) -> Floats:
+        """(C,) mean over the pixels; NaN without any."""
+        return self._over_pixels(self.value_dn.sum(axis=0))
+
+    @property
+    def sigma_dn(self) -> Floats:
+        """(C,) σ of the mean by the noise of the pixels; NaN where that is not known."""
+        return self._over_pixels(np.sqrt(self.variance_dn2.sum(axis=0)))
+
+    @property
+    def is_clipped(self) -> npt.NDArray[np.bool_]:
+        """(C,) whether the mean is too small because pixels are full."""
+        return is_clipped(self.saturated.sum(axis=0), self.pixels.sum(axis=0))
+
+    def strip_means_dn(self, strips: int) -> Floats:
+        """(strips, C) means over bands of rows as equal as can be."""
+        starts = np.arange(strips) * len(self.pixels) // strips
+        pixels = np.add.reduceat(self.pixels, starts)
+        return np.asarray(np.add.reduceat(self.value_dn, starts) / np.maximum(pixels, 1))
+
+    def _over_pixels(self, total: Floats) -> Floats:
+        pixels = self.pixels.sum(axis=0)
+        return np.where(pixels > 0, total / np.maximum(pixels, 1), np.nan)
+
+
+@dataclass(frozen=True, eq=False)
+class LinearFrame:
+    """A RAW frame and what is known of its camera.
+
+    Parameters
+    ----------
+    raw
+        The frame.
+    dark_dn
+        (C,) what each channel counts above black without light, such as a `DarkModel` says for the
+        exposure; None: nothing.
+    flat
+        Fall-off of the lens, divided out; None: there is none.
+    noise
+        Of a pixel of each of the C channels; None: not known.
+    hot
+        (height, width) pixels that no sum counts.
+    """
+
+    raw: RawFrame
+    dark_dn: Floats | None = None
+    flat: Flat | None = None
+    noise: Sequence[NoiseModel] | None = None
+    hot: PixelMask | None = None
+
+    def value_dn(self, area: Area | None = None) -> Floats:
+        """(rows, columns) light in DN, as it would be in the middle of the lens."""
+        light = self._window(self.raw.mosaic, area).astype(np.float64)
+        dark = np.zeros(len(self.raw.channels)) if self.dark_dn is None else self.dark_dn
+        for plane in self._planes(area):
+            light[plane.here] -= plane.black + dark[plane.channel]
+            if self.flat is not None:
+                light[plane.here] /= self._falloff(self.flat, plane, area)
+        return light
+
+    def variance_dn2(self, area: Area | None = None) -> Floats:
+        """(rows, columns) variance of `value_dn` by photons and reading; NaN if not known."""
+        level = self._window(self.raw.mosaic, area).astype(np.float64)
+        variance = np.full_like(level, np.nan)
+        if self.noise is None:
+            return variance
+        for plane in self._planes(area):
+            of_pixel = self.noise[plane.channel].variance_dn2(level[plane.here] - plane.black)
+            variance[plane.here] = np.maximum(of_pixel, ROUNDING_VARIANCE)
+            if self.flat is not None:
+                variance[plane.here] /= self._falloff(self.flat, plane, area) ** 2
+        return variance
+
+    def is_saturated(self, area: Area | None = None) -> PixelMask:
+        """(rows, columns) whether a pixel is at white or above."""
+        return np.asarray(self._window(self.raw.mosaic, area) >= self.raw.white)
+
+    def sums(self, area: Area) -> RegionSums:
+        """What each channel adds up to in an area of the frame."""
+        value, variance = self.value_dn(area), self.variance_dn2(area)
+        saturated = self.is_saturated(area)
+        kept = np.ones_like(saturated) if self.hot is None else ~self._window(self.hot, area)
+        total, spread, pixels, full = np.zeros((4, len(value), len(self.raw.channels)))
+        for plane in self._planes(area):
+            rows, own = (plane.here[0], plane.channel), kept[plane.here]
+            total[rows] += value[plane.here].sum(axis=1, where=own)
+            spread[rows] += variance[plane.here].sum(axis=1, where=own)
+            pixels[rows] += own.sum(axis=1)
+            full[rows] += (saturated[plane.here] & own).sum(axis=1)
+        return RegionSums(total, spread, pixels, full)
+
+    def of_region(self, region: Region) -> RegionSums:
+        """What each channel adds up to in a region, in fractions of the frame."""
+        return self.sums(region_pixels(region, self.raw.width, self.raw.height))
+
+    def middle_columns(self, region: Region) -> Floats:
+        """(C,) mean place of each channel's pixels across the frame, their middles at .5."""
+        area = region_pixels(region, self.raw.width, self.raw.height)
+        x, _, width, height = area
+        pixels = np.zeros((len(self.raw.channels), width))
+        for plane in self._planes(area):
+            rows, columns = plane.here
+            pixels[plane.channel, columns] += len(range(height)[rows])
+        return np.asarray(pixels @ (np.arange(x, x + width) + 0.5) / pixels.sum(axis=1))
+
+    def _window(self, pixels: npt.NDArray[Pixel], area: Area | None) -> npt.NDArray[Pixel]:
+        x, y, width, height = area or (0, 0, self.raw.width, self.raw.height)
+        return pixels[y : y + height, x : x + width]
+
+    def _planes(self, area: Area | None) -> Iterator["_Plane"]:
+        """The positions of the colour filter in an area."""
+        raw, (x, y, *_) = self.raw, area or (0, 0)
+        side = raw.cfa_side
+        for row, column in np.ndindex(side, side):
+            position = side * ((y + row) % side) + (x + column) % side
+            here = slice(row, None, side), slice(column, None, side)
+            yield _Plane(raw.channels.index(raw.cfa[position]), raw.black[position], here)
+
+    def _falloff(self, flat: Flat, plane: "_Plane", area: Area | None) -> Floats:
+        """What is left of the light at the pixels of a plane."""
+        raw, (x, y, width, height) = self.raw, area or (0, 0, self.raw.width, self.raw.height)
+        rows, columns = plane.here
+        across, down = np.meshgrid(
+            np.arange(x, x + width)[columns] + 0.5, np.arange(y, y + height)[rows] + 0.5
+        )
+        return flat.at(rho_squared(across, down, raw.width, raw.height))[..., plane.channel]
+
+
+class _Plane(NamedTuple):
+    """The pixels of one position of the colour filter: their channel, black level and place."""
+
+    channel: int
+    black: float
+    here: tuple[slice, slice]
+
+
+def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
+    """A picture (rows, columns, C): means above black of each channel in the colour filter's cells.
+
+    Binning and not demosaicing: nothing is invented. Without a filter, cells have 2 × 2 pixels.
+    """
+    side = max(raw.cfa_side, 2)
+    rows, columns = raw.height // side, raw.width // side
+    picture = np.zeros((rows, columns, len(raw.channels)), np.float32)
+    for y, x in np.ndindex(side, side):
+        position = raw.cfa_side * (y % raw.cfa_side) + x % raw.cfa_side
+        letter, black = raw.cfa[position], np.float32(raw.black[position])
+        share = np.float32(len(raw.cfa) / side**2 / raw.cfa.count(letter))
+        plane = raw.mosaic[y : side * rows : side, x : side * columns : side]
+        picture[..., raw.channels.index(letter)] += (plane - black) * share
+    return picture
+
+
+def saturated_cells(raw: RawFrame) -> PixelMask:
+    """(rows, columns) whether some pixel of a cell of `cell_means_dn` is saturated."""
+    side = max(raw.cfa_side, 2)
+    rows, columns = raw.height // side, raw.width // side
+    whole = raw.mosaic[: side * rows, : side * columns].reshape(rows, side, columns, side)
+    return np.asarray((whole >= raw.white).any(axis=(1, 3)))
