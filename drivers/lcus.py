@@ -10,8 +10,7 @@ from collections.abc import Sequence
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.acquire import Finding
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections, Finding
 from labrig.errors import UnclearAnswerError
 
 from .serial_line import LATEST_ANSWER_S, SerialLine

@@ -7,7 +7,7 @@ from collections.abc import Callable
 
 import serial
 
-from labrig.acquire.connections import SerialPort
+from labrig.acquire import SerialPort
 from labrig.clock import Clock
 from labrig.errors import DeviceLostError, UnclearAnswerError
 

@@ -6,7 +6,7 @@ or `cannot`, the reason and `\n`. The simulated room's hands speak the same.
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 from labrig.errors import DeviceError, UnclearAnswerError
 from labrig.quantity import DurationS
 

@@ -7,7 +7,7 @@ Addresses: `uvc://0` is the system's first video device; anything else that Open
 import cv2
 from pydantic import BaseModel, ConfigDict
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 from labrig.errors import DeviceError
 
 SCHEME = "uvc://"

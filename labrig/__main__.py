@@ -15,7 +15,7 @@ def main() -> None:
     """Run the command line; every ending has its exit code and at most one line of complaint."""
     for signum in STOP_SIGNALS:
         signal.signal(signum, end_at_once)
-    from labrig.cli.ending import guarded
+    from labrig.cli import guarded
 
     sys.exit(guarded(sys.argv[1:]))
 

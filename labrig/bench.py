@@ -11,10 +11,7 @@ from urllib.parse import urlsplit
 import serial
 import usb.core
 
-from labrig.acquire import Device, Rig, RigFile, load_driver
-from labrig.acquire.connections import SerialPort
-from labrig.acquire.rig import in_safe_order
-from labrig.acquire.rig_file import DeviceEntry
+from labrig.acquire import Device, DeviceEntry, Rig, RigFile, SerialPort, in_safe_order, load_driver
 from labrig.awake import kept_awake
 from labrig.clock import Clock, SystemClock
 from labrig.device_lock import held, network_devices, serial_devices, usb_device

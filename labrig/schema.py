@@ -12,8 +12,7 @@ from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
 from pydantic_core import core_schema
 
 from labrig import plugins
-from labrig.acquire import ROLES, RigFile
-from labrig.acquire.rig_file import DeviceEntry
+from labrig.acquire import ROLES, DeviceEntry, RigFile
 from labrig.errors import UsageError
 from labrig.material import Material
 from labrig.yaml_file import did_you_mean
@@ -57,7 +56,7 @@ def _rig() -> Any:
             summary = inspect.cleandoc(role.does.__doc__ or "").splitlines()[0]
             roles[key] = (_one_of("driver", fitting), Field(None, description=summary))
     devices = create_model("Devices", __config__={"extra": "forbid"}, **roles)
-    from labrig.sim.simulation import Simulation
+    from labrig.sim import Simulation
 
     return create_model(
         "Rig",

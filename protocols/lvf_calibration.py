@@ -9,8 +9,7 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import ProtocolModel, RigFile, Unit
-from labrig.acquire.rig_file import Optics
+from labrig.acquire import Optics, ProtocolModel, RigFile, Unit
 from labrig.quantity import Count, DurationS, WordOrDuration
 
 from .lvf_units import NO_FILTER, FilterUnit, LinesUnit, StripesUnit, StripUnit, filter_unit

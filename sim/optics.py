@@ -14,7 +14,7 @@ from scipy.optimize import brentq
 
 from labrig import shipped
 from labrig.errors import UsageError
-from labrig.material.file import Material
+from labrig.material import Material
 
 from .lamp import CELL_NM, WAVELENGTH_NM
 from .phosphor import band_cells

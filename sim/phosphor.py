@@ -17,7 +17,7 @@ from numpy.polynomial import legendre
 from numpy.typing import NDArray
 
 from labrig.errors import UsageError
-from labrig.material.file import Material, State
+from labrig.material import Material, State
 
 from .lamp import BURNING_K, CELL_EDGES_NM, CELL_NM, filament_spectrum
 

@@ -7,7 +7,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.material.file import read_material
+from labrig.material import read_material
 
 from .arrangement import Arrangement, Arrangements
 from .layout import Layout

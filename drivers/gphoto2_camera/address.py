@@ -4,7 +4,7 @@ from urllib.parse import urlsplit
 
 import usb.util
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 from labrig.clock import VirtualClock
 from labrig.errors import DeviceError, UsageError
 

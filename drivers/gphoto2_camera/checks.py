@@ -5,7 +5,7 @@ Names of settings: libgphoto2 2.5.34, camlibs/ptp2/config.c.
 
 from collections.abc import Iterator
 
-from labrig.acquire.findings import Finding
+from labrig.acquire import Finding
 
 from .exposure import MANUAL, MODE
 from .library import Library

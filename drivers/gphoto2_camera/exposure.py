@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import TypeVar
 
-from labrig.acquire.values import CameraOffers, ExposureSettings
+from labrig.acquire import CameraOffers, ExposureSettings
 from labrig.errors import DeviceError
 
 from .labels import SAME_F_NUMBER, f_number, iso, label_of_time, true_times_s

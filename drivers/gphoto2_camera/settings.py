@@ -5,7 +5,7 @@ from typing import Annotated, Literal
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.acquire.values import CameraOffers
+from labrig.acquire import CameraOffers
 from labrig.quantity import DurationS, SizeBytes
 
 #: In thirds of a stop, from 32 s down to 1/8192 s.

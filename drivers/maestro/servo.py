@@ -11,7 +11,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 from labrig.errors import UnclearAnswerError
 from labrig.quantity import DurationS
 

@@ -4,7 +4,7 @@ from typing import Self
 
 from pydantic import model_validator
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 
 from .servo import PulseS, ServoSettings, quarters
 from .swung import Swung

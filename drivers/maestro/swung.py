@@ -2,7 +2,7 @@
 
 from typing import ClassVar
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 
 from .servo import Servo, ServoSettings
 

@@ -6,7 +6,7 @@ board and their public sample code.
 
 import re
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 from labrig.errors import UnclearAnswerError
 
 from ..serial_line import SerialLine

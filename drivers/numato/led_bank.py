@@ -5,7 +5,7 @@ from typing import Annotated, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 from labrig.errors import DeviceError
 
 from .board import CHANNELS, Board

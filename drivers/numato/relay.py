@@ -2,7 +2,7 @@
 
 from pydantic import BaseModel, ConfigDict, Field
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 
 from .board import CHANNELS, Board
 

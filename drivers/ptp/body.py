@@ -3,8 +3,7 @@
 from collections.abc import Callable, Sequence
 from typing import Protocol
 
-from labrig.acquire.findings import Finding
-from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.acquire import CameraOffers, ExposureSettings, Finding, Frame
 
 
 class Body(Protocol):

@@ -3,9 +3,7 @@
 from collections.abc import Sequence
 from contextlib import ExitStack, suppress
 
-from labrig.acquire.connections import Connections
-from labrig.acquire.findings import Finding
-from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.acquire import CameraOffers, Connections, ExposureSettings, Finding, Frame
 from labrig.errors import DeviceError, DeviceLostError
 
 from .body import Body

@@ -3,7 +3,7 @@
 from typing import Any
 from urllib.parse import urlsplit
 
-from labrig.acquire.connections import Connections
+from labrig.acquire import Connections
 from labrig.clock import Clock
 from labrig.errors import DeviceError
 

@@ -4,7 +4,7 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field, field_validator
 
-from labrig.acquire.values import CameraOffers
+from labrig.acquire import CameraOffers
 from labrig.quantity import DurationS, SizeBytes
 
 from .eos.codes import F_NUMBERS, ISOS, bulb_times_s, shutter_time_s, third_stop_codes

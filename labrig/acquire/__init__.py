@@ -3,15 +3,15 @@
 from labrig.acquire import roles
 from labrig.acquire.actions import Missed, Timed, at
 from labrig.acquire.by_hand import ByHand, TakenBack
-from labrig.acquire.connections import Connections
-from labrig.acquire.findings import Finding
+from labrig.acquire.connections import Connections, SerialPort
+from labrig.acquire.findings import Finding, Severity
 from labrig.acquire.part import PartUnit
 from labrig.acquire.planner import MOST_STEPS, Plan, Step, plan
 from labrig.acquire.protocol import ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back
 from labrig.acquire.registered import load_driver, read_protocol
-from labrig.acquire.rig import Rig
-from labrig.acquire.rig_file import RigFile, read_rig_file
+from labrig.acquire.rig import Rig, in_safe_order
+from labrig.acquire.rig_file import DeviceEntry, Optics, RigFile, read_rig_file
 from labrig.acquire.roles import *  # noqa: F403, a role is listed once, there
 from labrig.acquire.runner import RunObserver, run_units
 from labrig.acquire.session import Session
@@ -22,10 +22,12 @@ __all__ = [
     "ByHand",
     "CameraOffers",
     "Connections",
+    "DeviceEntry",
     "ExposureSettings",
     "Finding",
     "Frame",
     "Missed",
+    "Optics",
     "PartUnit",
     "Plan",
     "ProtocolModel",
@@ -33,12 +35,15 @@ __all__ = [
     "RigFile",
     "RunObserver",
     "Sample",
+    "SerialPort",
     "Session",
+    "Severity",
     "Step",
     "TakenBack",
     "Timed",
     "Unit",
     "at",
+    "in_safe_order",
     "lights_that_read_back",
     "load_driver",
     "plan",

@@ -14,11 +14,11 @@ from labrig.clock import Clock
 from labrig.record import (
     TAKEN_BACK,
     ActionRecord,
+    AttemptWriter,
     FrameRecord,
     RunFolder,
     TemperatureRecord,
 )
-from labrig.record.attempt import AttemptWriter
 
 T = TypeVar("T")
 

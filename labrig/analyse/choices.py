@@ -6,8 +6,7 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any, Self
 
-from labrig.acquire import ProtocolModel, RigFile, read_protocol, read_rig_file
-from labrig.acquire.rig_file import Optics
+from labrig.acquire import Optics, ProtocolModel, RigFile, read_protocol, read_rig_file
 from labrig.errors import UsageError
 from labrig.record import FrameRecord
 from labrig.region import Region, parse_region

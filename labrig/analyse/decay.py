@@ -12,12 +12,10 @@ from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.errors import FitError
 from labrig.fit import DecayFit
 from labrig.material import Material, Provenance, State
-from labrig.record.history import charges_s
-from labrig.record.temperature import glow_temperature_c
+from labrig.record import charges_s, glow_temperature_c
 from labrig.reduce import reduce_patches
 from labrig.region import Region
-from labrig.results import Series
-from labrig.results.decay import DecayPatch, DecayResult
+from labrig.results import DecayPatch, DecayResult, Series
 
 
 def analyse(part: Part) -> DecayResult:

@@ -15,8 +15,7 @@ from labrig.calibration import (
     LvfFile,
 )
 from labrig.material import Material
-from labrig.results import FittedDecay, RunResult
-from labrig.results.emission_spectrum import EmissionSpectrum
+from labrig.results import EmissionSpectrum, FittedDecay, RunResult
 
 
 @dataclass(frozen=True)

@@ -11,14 +11,18 @@ from labrig.analyse.strip_frames import StripFrames
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.calibration import IrradianceFile
 from labrig.errors import DataError, UsageError
-from labrig.fit.spectrum import CurveError
-from labrig.fit.spectrum.system import curve_modes
-from labrig.optics import CameraResponse, Lvf, Spectrum, Strip, Transmittance
-from labrig.optics.piecewise import band_integrals, quadrature
-from labrig.reduce.strip import FLICKER, slice_values
-from labrig.results import FloatArray
-from labrig.results.irradiance import CardRatio, IrradianceResult, StripScale
-from labrig.results.strip import SliceValues
+from labrig.fit.spectrum import CurveError, curve_modes
+from labrig.optics import (
+    CameraResponse,
+    Lvf,
+    Spectrum,
+    Strip,
+    Transmittance,
+    band_integrals,
+    quadrature,
+)
+from labrig.reduce import FLICKER, slice_values
+from labrig.results import CardRatio, FloatArray, IrradianceResult, SliceValues, StripScale
 
 #: Change of the lamp between rounds that is worth a warning.
 DRIFT = 0.03

@@ -11,8 +11,15 @@ from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.errors import DataError
 from labrig.reduce import reduce_patches
-from labrig.results import FloatArray, Measured, Series
-from labrig.results.isotropy import PAPER, AngularGlow, IsotropyResult, is_within_paper
+from labrig.results import (
+    PAPER_REACH,
+    AngularGlow,
+    FloatArray,
+    IsotropyResult,
+    Measured,
+    Series,
+    is_within_paper,
+)
 from labrig.written_numbers import plus_minus
 
 BEFORE, AFTER = "angle-before", "angle-after"
@@ -129,8 +136,8 @@ def _warnings(glow: AngularGlow) -> Iterator[str]:
         yield (
             f"the emission is not isotropic: at {glow.worst_angle_deg}° it is "
             f"{plus_minus(glow.worst.value, glow.worst.sigma)} of the straight view (the paper's "
-            f"samples stay within {PAPER:.0%}); the model takes it for the same in all directions. "
-            "Does the patch still lie inside of the turned sample?"
+            f"samples stay within {PAPER_REACH:.0%}); the model takes it for the same in all "
+            "directions. Does the patch still lie inside of the turned sample?"
         )
     if not is_within_paper(glow.drift):
         yield (

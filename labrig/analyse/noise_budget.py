@@ -2,9 +2,8 @@
 
 import numpy as np
 
-from labrig.reduce.photon_transfer import NoiseModel, variance_terms
-from labrig.results import FittedDecay, FloatArray, Series
-from labrig.results.decay import NoiseBudget
+from labrig.reduce import NoiseModel, variance_terms
+from labrig.results import FittedDecay, FloatArray, NoiseBudget, Series
 
 #: Terms of the photon-transfer line: constant, ∝ light, ∝ light².
 _TERMS = 3

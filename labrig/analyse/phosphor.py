@@ -3,8 +3,7 @@
 from labrig import plugins
 from labrig.analyse.part import Part
 from labrig.errors import DataError, FitError
-from labrig.results import RunResult
-from labrig.results.phosphor import PhosphorResult
+from labrig.results import PhosphorResult, RunResult
 
 
 def analyse(part: Part) -> PhosphorResult:

@@ -7,8 +7,7 @@ from labrig.analyse.part import Part
 from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import steady_frames
 from labrig.errors import DataError
-from labrig.reduce import PixelMask, SeriesFrame, read_raw
-from labrig.reduce.hdr import HdrFrame, read_hdr_frame
+from labrig.reduce import HdrFrame, PixelMask, SeriesFrame, read_hdr_frame, read_raw
 
 
 class StripFrames:

@@ -5,15 +5,15 @@ from itertools import groupby
 import numpy as np
 
 from labrig.material import Material, Provenance
-from labrig.record import RunRecord
-from labrig.record.history import written_time
-from labrig.record.temperature import (
+from labrig.record import (
     KNOWN_FOR_S,
     Course,
+    RunRecord,
     degrees_text,
     glow_temperature_c,
     glowing,
     relative_rate_change,
+    written_time,
 )
 
 #: From here on it is said: rates then change by 4 %, more than their usual σ.

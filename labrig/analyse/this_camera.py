@@ -4,7 +4,7 @@ from collections.abc import Sequence
 
 from labrig.calibration import CameraFile
 from labrig.record import FrameRecord, RunRecord
-from labrig.reduce.exif import read_exif
+from labrig.reduce import read_exif
 
 
 def camera_identity(run: RunRecord) -> str:

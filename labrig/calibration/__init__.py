@@ -31,7 +31,15 @@ from labrig.calibration.irradiance_file import (
     write_irradiance_file,
 )
 from labrig.calibration.kind import CalibrationKind
-from labrig.calibration.lvf_file import LVF_KIND, LvfFile, read_lvf_file, write_lvf_file
+from labrig.calibration.lvf_file import (
+    LVF_KIND,
+    BandColumns,
+    CurveColumns,
+    LvfFile,
+    WavelengthColumns,
+    read_lvf_file,
+    write_lvf_file,
+)
 
 #: Every kind, in the order of their keys in a rig file.
 KINDS: tuple[CalibrationKind[Any], ...] = (
@@ -49,16 +57,19 @@ __all__ = [
     "IRRADIANCE_KIND",
     "KINDS",
     "LVF_KIND",
+    "BandColumns",
     "BlankFile",
     "CalibrationKind",
     "CameraFile",
     "Change",
+    "CurveColumns",
     "FadeFile",
     "IrradianceFile",
     "Linearity",
     "LvfFile",
     "Noise",
     "Warming",
+    "WavelengthColumns",
     "read_blank_file",
     "read_camera_file",
     "read_fade_file",

@@ -9,12 +9,10 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
 from labrig.errors import DataError
+from labrig.finite import Finite, NotNegative, Positive
 from labrig.yaml_file import read_model, write_yaml
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Row = tuple[Number, ...]
+Row = tuple[Finite, ...]
 
 #: A constant level is worth a word from so many σ on.
 SIGNIFICANT = 4.0
@@ -48,7 +46,7 @@ class BlankFile(BaseModel):
     iso: Positive
     f_number: Positive | None
     channels: tuple[str, ...]
-    t_s: Annotated[tuple[Number, ...], Field(min_length=1)]
+    t_s: Annotated[tuple[Finite, ...], Field(min_length=1)]
     rate_dn_per_s: tuple[Row, ...]
     sigma_dn_per_s: tuple[tuple[NotNegative, ...], ...]
     constant_dn_per_s: Row

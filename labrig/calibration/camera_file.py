@@ -7,8 +7,8 @@ from pydantic import BaseModel, ConfigDict, model_validator
 
 from labrig.calibration.kind import CalibrationKind
 from labrig.errors import DataError
-from labrig.optics import CameraModel
-from labrig.optics.camera_model import NotNegative, Number, Positive, stop_text
+from labrig.finite import Finite, NotNegative, Positive
+from labrig.optics import CameraModel, stop_text
 from labrig.yaml_file import read_model, write_yaml
 
 
@@ -47,7 +47,7 @@ class Linearity(_Part):
     """
 
     level_dn: tuple[Positive, ...]
-    deviation: tuple[Number, ...]
+    deviation: tuple[Finite, ...]
     sigma: tuple[NotNegative, ...]
     saturation_dn: Positive | None = None
 

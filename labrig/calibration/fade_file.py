@@ -9,11 +9,10 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
+from labrig.finite import NotNegative, Positive
 from labrig.yaml_file import read_model, write_yaml
 
 FloatArray = NDArray[np.float64]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Row = tuple[NotNegative, ...]
 
 

@@ -7,11 +7,10 @@ from typing import Annotated, Literal, Self
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.calibration.kind import CalibrationKind
+from labrig.finite import NotNegative, Positive
 from labrig.optics import Strip
 from labrig.yaml_file import read_model, write_yaml
 
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 Numbers = tuple[NotNegative, ...]
 
 

@@ -1,18 +1,17 @@
 """The LVF file: what a linear variable filter lets through, and where it lies in the frame."""
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Literal, Self
 
 import numpy as np
-from pydantic import BaseModel, ConfigDict, Field, model_validator
+from pydantic import BaseModel, ConfigDict, model_validator
 
 from labrig.calibration.kind import CalibrationKind
+from labrig.finite import Finite, NotNegative
 from labrig.optics import Bands, CameraResponse, Lvf, Strip, WavelengthMap
 from labrig.yaml_file import read_model, write_yaml
 
-Number = Annotated[float, Field(allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Numbers = tuple[Number, ...]
+Numbers = tuple[Finite, ...]
 
 
 class _Part(BaseModel):
@@ -42,7 +41,7 @@ class WavelengthColumns(_Part):
     """Position → wavelength along the whole strip; as in `labrig.optics.WavelengthMap`."""
 
     coefficients: Numbers
-    span: tuple[Number, Number]
+    span: tuple[Finite, Finite]
     covariance: tuple[Numbers, ...]
 
     @classmethod

@@ -1,1 +1,5 @@
 """The command line: thin, one file per noun."""
+
+from labrig.cli.ending import guarded
+
+__all__ = ["guarded"]

@@ -8,7 +8,7 @@ import typer
 if TYPE_CHECKING:
     from labrig.compare import RunComparison
     from labrig.fit import DecayFit
-    from labrig.report.sections import Section
+    from labrig.report import Section
     from labrig.results import Series
 
 
@@ -88,7 +88,7 @@ def _tell(section: "Section") -> None:
 
 def _draw(section: "Section", folder: Path) -> None:
     """As PNG to look at and as PDF to print."""
-    from labrig.report.figure_style import figure_style
+    from labrig.report import figure_style
 
     if section.figures:
         folder.mkdir(parents=True, exist_ok=True)

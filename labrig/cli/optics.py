@@ -19,10 +19,11 @@ def show(
     ] = None,
 ) -> None:
     """What is in a file of measured curves, and how they look."""
-    from labrig.report.curve_sketch import describe, draw, shown
+    from labrig.optics import read_sound_curves
+    from labrig.report import describe_curves, draw_curves
 
-    found = shown(file, curve)
-    typer.echo(describe(found))
+    found = read_sound_curves(file, curve)
+    typer.echo(describe_curves(found))
     if picture is not None:
-        draw(found, picture)
+        draw_curves(found, picture)
         typer.echo(f"drawn into {picture}")

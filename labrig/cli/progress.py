@@ -23,7 +23,7 @@ from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
-from labrig.watch.glances import Glances, Seen
+from labrig.watch import Glances, Seen
 
 #: Of the last frame, in characters.
 THUMBNAIL_WIDTH = 48

@@ -190,7 +190,7 @@ def _print_comparison(comparison: "Comparison") -> None:
 
 def _tell_results(folder: Path) -> None:
     """Each result and what it was made with otherwise than the one before it."""
-    from labrig.process.changes import other_settings
+    from labrig.process import other_settings
     from labrig.results import read_fitted_decays
 
     results = _result_folders(folder)

@@ -23,7 +23,7 @@ def view(
 ) -> None:
     """Live view for aiming and focus, regions drawn into a protocol. Ctrl-C ends it."""
     from labrig import shipped
-    from labrig.setup.view import view_rig
+    from labrig.setup import view_rig
 
     def tell(url: str) -> None:
         typer.echo(url)

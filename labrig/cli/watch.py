@@ -22,7 +22,7 @@ def watch(
     from labrig.catalogue import find_run
     from labrig.clock import SystemClock
     from labrig.signals import interrupting
-    from labrig.watch.watching import watch_run
+    from labrig.watch import watch_run
 
     def tell(url: str) -> None:
         typer.echo(url)

@@ -8,7 +8,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import UsageError
 from labrig.optics import CameraResponse
-from labrig.report.colours import camera_to_xyz
+from labrig.report import camera_to_xyz
 from labrig.yaml_file import did_you_mean
 
 FloatArray = NDArray[np.float64]

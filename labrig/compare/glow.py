@@ -9,8 +9,7 @@ from numpy.typing import NDArray
 from labrig.compare.colorimetry import FloatArray, Viewing, delta_e, lab
 from labrig.compare.paper import DELTA_E
 from labrig.errors import DataError
-from labrig.report.fitted_curve import middles_s
-from labrig.report.sections import Table
+from labrig.report import Table, middles_s
 from labrig.results import Series
 
 RGB = ("R", "G", "B")

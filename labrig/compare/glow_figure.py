@@ -10,14 +10,15 @@ from numpy.typing import NDArray
 
 from labrig.compare.colorimetry import FloatArray
 from labrig.compare.glow import GlowComparison
-from labrig.report.colours import css_colour, into_gamut
-from labrig.report.figure_style import (
+from labrig.report import (
     EDGE_PT,
     FONT_PT,
     INK,
     MUTED,
     SMALL_PT,
     WIDTH_PT,
+    css_colour,
+    into_gamut,
     new_figure,
 )
 from labrig.written_numbers import rounded

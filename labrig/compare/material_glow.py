@@ -5,8 +5,7 @@ import numpy as np
 from labrig.compare.colorimetry import FloatArray
 from labrig.compare.emission import emission
 from labrig.errors import UsageError
-from labrig.material import Material
-from labrig.material.rates import phi1
+from labrig.material import Material, phi1
 from labrig.optics import CameraResponse, Spectrum
 from labrig.results import Series
 

@@ -9,7 +9,7 @@ from labrig.compare.colorimetry import FloatArray
 from labrig.compare.paper import LAST_RESIDUALS, RESIDUALS
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
-from labrig.report.sections import Table
+from labrig.report import Table
 from labrig.results import Series
 
 #: A fit to a series: so many states, and so much flicker.

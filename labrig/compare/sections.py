@@ -9,8 +9,7 @@ from labrig.compare.residuals import residuals_table
 from labrig.compare.run import RunComparison
 from labrig.compare.spectra_figure import spectra_figure
 from labrig.compare.three_channels import three_channels_table
-from labrig.report.material_tables import comparison_table
-from labrig.report.sections import Picture, Section
+from labrig.report import Picture, Section, comparison_table
 
 
 def sections(comparison: RunComparison) -> tuple[Section, ...]:

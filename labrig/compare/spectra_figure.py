@@ -10,18 +10,20 @@ from matplotlib.patches import Rectangle
 
 from labrig.compare.colorimetry import FloatArray
 from labrig.compare.three_channels import ThreeChannels
-from labrig.report.colours import css_colour, into_gamut
-from labrig.report.figure_style import (
+from labrig.report import (
     DASHED,
     EDGE_PT,
     INK,
     MUTED,
     SMALL_PT,
     WIDTH_PT,
+    css_colour,
+    into_gamut,
+    legend_above,
+    lined,
     new_figure,
     place,
 )
-from labrig.report.legend import legend_above, lined
 
 COLUMNS = 3
 PANEL_HEIGHT_PT, LEGEND_PT, BELOW_PT, LEFT_PT = 112.0, 22.0, 18.0, 16.0

@@ -22,7 +22,7 @@ from labrig.compare.colorimetry import (
 )
 from labrig.errors import DataError
 from labrig.optics import CameraResponse, Spectrum
-from labrig.report.sections import Table
+from labrig.report import Table
 
 
 @dataclass(frozen=True, eq=False)

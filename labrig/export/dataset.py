@@ -10,16 +10,16 @@ from numpy.typing import NDArray
 from labrig.errors import UsageError
 from labrig.record import read_run
 from labrig.results import (
+    DecayResult,
     FittedDecay,
     Measured,
+    PhosphorResult,
     RunResult,
     Series,
     leaves,
     read_result,
     unit_of,
 )
-from labrig.results.decay import DecayResult
-from labrig.results.phosphor import PhosphorResult
 
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree

@@ -16,11 +16,8 @@ from labrig.errors import DiskError
 from labrig.export.hdf5 import add_group, add_note, add_number, add_text
 from labrig.export.nexus_decay import add_decays, add_fit, valid_names
 from labrig.export.nexus_fields import add_fields
-from labrig.record import RunRecord
-from labrig.record.description import DeviceLine, RunDescription
-from labrig.results import RunResult
-from labrig.results.decay import DecayResult
-from labrig.results.phosphor import PhosphorResult
+from labrig.record import DeviceLine, RunDescription, RunRecord
+from labrig.results import DecayResult, PhosphorResult, RunResult
 
 YAML = "application/yaml"
 #: NeXus classes of the devices that have one.

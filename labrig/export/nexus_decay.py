@@ -9,8 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.export.hdf5 import add_group, add_note, add_number, add_text
-from labrig.results import FittedDecay, Series
-from labrig.results.decay import DecayPatch
+from labrig.results import DecayPatch, FittedDecay, Series
 
 DN_PER_S = "DN/s"
 #: silx and h5web plot it so: a decay is looked at on a logarithmic scale.

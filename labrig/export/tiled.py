@@ -6,8 +6,7 @@ from typing import TYPE_CHECKING
 
 from labrig.errors import UsageError
 from labrig.export.dataset import read_dataset
-from labrig.record import read_run
-from labrig.record.journal import Document, read_journal
+from labrig.record import Document, read_journal, read_run
 
 if TYPE_CHECKING:
     from tiled.client.container import Container

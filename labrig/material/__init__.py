@@ -10,6 +10,13 @@ from labrig.material.file import (
     read_material,
     write_material,
 )
+from labrig.material.rates import (
+    concentration,
+    exponential_means,
+    phi1,
+    phi2,
+    relaxation_with_slopes,
+)
 
 __all__ = [
     "IrradianceNorm",
@@ -20,6 +27,11 @@ __all__ = [
     "Spectrum",
     "State",
     "compare_materials",
+    "concentration",
+    "exponential_means",
+    "phi1",
+    "phi2",
     "read_material",
+    "relaxation_with_slopes",
     "write_material",
 ]

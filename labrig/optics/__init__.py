@@ -1,8 +1,20 @@
 """Spectra and what light passes on its way to a number."""
 
-from labrig.optics.band import Bands
-from labrig.optics.camera import CameraResponse, read_camera, read_monochrome_camera
-from labrig.optics.camera_model import CameraModel, Factor, Flat, rho_squared
+from labrig.optics.band import Bands, peak_shape
+from labrig.optics.camera import (
+    CHANNELS,
+    CameraResponse,
+    read_camera,
+    read_monochrome_camera,
+    read_sound_curves,
+)
+from labrig.optics.camera_model import (
+    CameraModel,
+    Factor,
+    Flat,
+    rho_squared,
+    stop_text,
+)
 from labrig.optics.curve_file import (
     Curve,
     CurveFile,
@@ -10,12 +22,15 @@ from labrig.optics.curve_file import (
     read_spectrum,
     read_transmittance,
 )
-from labrig.optics.lvf import Lvf, nominal_lvf, seen_through
+from labrig.optics.lvf import NOMINAL_FWHM_NM, Lvf, nominal_lvf, seen_through
+from labrig.optics.piecewise import band_integrals, band_means, edges_about, hats, quadrature
 from labrig.optics.spectrum import Spectrum, Transmittance
 from labrig.optics.strip import SLICES, Strip
 from labrig.optics.wavelength_map import WavelengthMap
 
 __all__ = [
+    "CHANNELS",
+    "NOMINAL_FWHM_NM",
     "SLICES",
     "Bands",
     "CameraModel",
@@ -29,12 +44,20 @@ __all__ = [
     "Strip",
     "Transmittance",
     "WavelengthMap",
+    "band_integrals",
+    "band_means",
+    "edges_about",
+    "hats",
     "nominal_lvf",
+    "peak_shape",
+    "quadrature",
     "read_camera",
     "read_curve_file",
     "read_monochrome_camera",
+    "read_sound_curves",
     "read_spectrum",
     "read_transmittance",
     "rho_squared",
     "seen_through",
+    "stop_text",
 ]

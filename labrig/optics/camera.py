@@ -1,7 +1,8 @@
 """Spectral sensitivity of a camera's channels."""
 
 import os
-from dataclasses import dataclass
+from collections.abc import Sequence
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
@@ -102,6 +103,24 @@ def read_monochrome_camera(
     name, columns = file.pick(curve)
     one = CurveFile(file.path, file.title, {name: columns})
     return checked(file.path, lambda known: _camera(known, (name,)), one)
+
+
+def read_sound_curves(
+    name_or_path: str | os.PathLike[str], names: Sequence[str] | None = None
+) -> CurveFile:
+    """A file with the curves of some names, all of them sound.
+
+    Raises
+    ------
+    UsageError
+        No such file or curve, or a curve that makes no sense.
+    """
+    file = read_curve_file(camera_path(name_or_path))
+    if names:
+        file = replace(file, curves=dict(file.pick(name) for name in names))
+    for name, curve in file.curves.items():
+        checked(f"{file.path}: {name}", lambda c: check_curve(*c), curve)
+    return file
 
 
 def camera_path(name_or_path: str | os.PathLike[str]) -> Path:

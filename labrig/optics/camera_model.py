@@ -8,13 +8,11 @@ from numpy.typing import ArrayLike, NDArray
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.errors import DataError
+from labrig.finite import Finite, NotNegative, Positive
 from labrig.region import Region, region_pixels
 
 FloatArray = NDArray[np.float64]
-Positive = Annotated[float, Field(gt=0, allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
-Number = Annotated[float, Field(allow_inf_nan=False)]
-Numbers = tuple[Number, ...]
+Numbers = tuple[Finite, ...]
 
 #: Two settings are the same if they differ by less: a Canon's dial says 1/60 s for 1/64 s.
 SAME_SETTING = 0.02
@@ -47,7 +45,7 @@ class Flat(_Part):
 
     f_number: Annotated[float, Field(gt=0)] | None
     falloff: tuple[Numbers, ...]
-    gradient: tuple[tuple[Number, Number], ...] = ()
+    gradient: tuple[tuple[Finite, Finite], ...] = ()
     sigma: Annotated[float, Field(ge=0)] = 0.0
 
     @model_validator(mode="after")

@@ -7,12 +7,11 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
+from labrig.finite import Share
 from labrig.region import Region, region_pixels
 
 #: Places along a strip at which pictures through it are read (paper, section 4.2).
 SLICES = 31
-
-Share = Annotated[float, Field(ge=0, le=1)]
 
 
 class Strip(BaseModel):

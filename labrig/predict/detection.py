@@ -5,7 +5,7 @@ from scipy.special import fdtri, ncfdtr
 
 from labrig.errors import FitError
 from labrig.fit import fit_decay
-from labrig.fit.decay.selection import F_TEST_LEVEL
+from labrig.fit.decay import F_TEST_LEVEL
 from labrig.predict.series import ExpectedSeries
 
 #: Parameters that one more state takes.

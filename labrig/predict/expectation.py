@@ -13,8 +13,7 @@ from labrig.predict.frames import dark_frames, glow_frames
 from labrig.predict.glow import Glow
 from labrig.predict.information import Information, information
 from labrig.predict.series import ExpectedSeries, expected_series, repeated
-from labrig.reduce import FrameMeasurement
-from labrig.reduce.saturation import is_clipped
+from labrig.reduce import FrameMeasurement, is_clipped
 from labrig.region import Region
 
 

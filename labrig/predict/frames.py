@@ -5,12 +5,11 @@ from dataclasses import dataclass
 import numpy as np
 from scipy.special import ndtr
 
-from labrig.fit.least_squares import FloatArray
-from labrig.material.rates import exponential_means
+from labrig.fit import FloatArray
+from labrig.material import exponential_means
 from labrig.predict.camera import CameraFigures
 from labrig.predict.glow import Glow
-from labrig.reduce import ChannelStats, FrameMeasurement
-from labrig.reduce.photon_transfer import ROUNDING_VARIANCE
+from labrig.reduce import ROUNDING_VARIANCE, ChannelStats, FrameMeasurement
 from labrig.region import Region
 
 #: Standard deviations above the mean at which a normal variate has its 99.5 % quantile.

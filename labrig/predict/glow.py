@@ -7,10 +7,9 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from labrig.errors import UsageError
-from labrig.fit.least_squares import FloatArray
+from labrig.fit import FloatArray
 from labrig.material import Material, State
-from labrig.optics import CameraResponse
-from labrig.optics.camera import CHANNELS
+from labrig.optics import CHANNELS, CameraResponse
 
 #: A fit tells no more states apart; with more, a file describes something like a power law.
 MOST_STATES = 3

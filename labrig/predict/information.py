@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.decay.shapes import exponential_means_and_slopes
-from labrig.fit.least_squares import EPSILON, FloatArray
+from labrig.fit import EPSILON, FloatArray
+from labrig.fit.decay import exponential_means_and_slopes
 from labrig.predict.series import DARK, FLICKER, ExpectedSeries
 
 

@@ -7,8 +7,8 @@ from typing import Any
 
 import numpy as np
 
-from labrig.fit.decay.states import APART_SIGMAS
-from labrig.fit.least_squares import FloatArray
+from labrig.fit import FloatArray
+from labrig.fit.decay import APART_SIGMAS
 from labrig.predict.detection import chance_of_all_states
 from labrig.predict.expectation import Expectation
 

@@ -16,8 +16,7 @@ from labrig.predict.camera import (
 from labrig.predict.expectation import predictable
 from labrig.predict.frames import PEAK_SIGMAS
 from labrig.record import FrameRecord, RunRecord, read_run
-from labrig.reduce import FrameMeasurement, fit_dark, measure, read_raw
-from labrig.reduce.photon_transfer import NoiseModel, variance_terms
+from labrig.reduce import FrameMeasurement, NoiseModel, fit_dark, measure, read_raw, variance_terms
 from labrig.region import Region
 from labrig.results import Series, find_fitted_decays, read_fitted_decay, read_series
 from labrig.yaml_file import read_yaml

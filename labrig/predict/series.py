@@ -6,12 +6,11 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.least_squares import FloatArray
-from labrig.material.rates import exponential_means
+from labrig.fit import FloatArray
+from labrig.material import exponential_means
 from labrig.predict.frames import ExpectedFrames
 from labrig.predict.glow import Glow
-from labrig.reduce import fit_dark
-from labrig.reduce.patches import TWO_DEGREES
+from labrig.reduce import TWO_DEGREES, fit_dark
 
 PHOTONS, READING, FLICKER, DARK = "photons", "reading", "flicker", "dark"
 

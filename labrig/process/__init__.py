@@ -1,5 +1,11 @@
 """A run folder through analysis, report and exports to its result."""
 
+from labrig.process.changes import other_settings
 from labrig.process.run import Processed, process_and_report, process_run
 
-__all__ = ["Processed", "process_and_report", "process_run"]
+__all__ = [
+    "Processed",
+    "other_settings",
+    "process_and_report",
+    "process_run",
+]

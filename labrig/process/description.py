@@ -4,9 +4,14 @@ from importlib.metadata import version
 
 from labrig.acquire import ProtocolModel, RigFile
 from labrig.process.provenance import library_versions
-from labrig.record import RunRecord, read_notes
-from labrig.record.description import DeviceLine, RunDescription
-from labrig.record.history import interruptions, written_time
+from labrig.record import (
+    DeviceLine,
+    RunDescription,
+    RunRecord,
+    interruptions,
+    read_notes,
+    written_time,
+)
 
 
 def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDescription:

@@ -5,9 +5,7 @@ from pathlib import Path
 
 from labrig import plugins
 from labrig.acquire import RigFile
-from labrig.analyse import Choices, Inputs, Part
-from labrig.analyse.choices import read_run_protocol
-from labrig.analyse.temperature import temperature_warnings
+from labrig.analyse import Choices, Inputs, Part, read_run_protocol, temperature_warnings
 from labrig.bench_optics import camera_curves
 from labrig.calibration import LvfFile
 from labrig.errors import FitError, UsageError

@@ -1,6 +1,9 @@
 """The run folder: written while it happens, read afterwards."""
 
+from labrig.record.attempt import AttemptWriter
+from labrig.record.description import DeviceLine, RunDescription
 from labrig.record.disk import REAL_DISK, Disk
+from labrig.record.durable import write_durably
 from labrig.record.frames import (
     PERSON,
     TAKEN_BACK,
@@ -10,24 +13,51 @@ from labrig.record.frames import (
     unit_in,
     unit_within,
 )
+from labrig.record.history import charges_s, interruptions, written_time
+from labrig.record.journal import Document, read_journal
 from labrig.record.notes import add_note, read_notes
 from labrig.record.reading import Attempt, RunRecord, read_run
 from labrig.record.run_folder import RunFolder
+from labrig.record.temperature import (
+    KNOWN_FOR_S,
+    SMOOTHED_S,
+    Course,
+    degrees_text,
+    glow_temperature_c,
+    glowing,
+    relative_rate_change,
+)
 
 __all__ = [
+    "KNOWN_FOR_S",
     "PERSON",
     "REAL_DISK",
+    "SMOOTHED_S",
     "TAKEN_BACK",
     "ActionRecord",
     "Attempt",
+    "AttemptWriter",
+    "Course",
+    "DeviceLine",
     "Disk",
+    "Document",
     "FrameRecord",
+    "RunDescription",
     "RunFolder",
     "RunRecord",
     "TemperatureRecord",
     "add_note",
+    "charges_s",
+    "degrees_text",
+    "glow_temperature_c",
+    "glowing",
+    "interruptions",
+    "read_journal",
     "read_notes",
     "read_run",
+    "relative_rate_change",
     "unit_in",
     "unit_within",
+    "write_durably",
+    "written_time",
 ]

@@ -1,26 +1,8 @@
-"""From a RAW file to linear values of each channel with uncertainties, and to a time series."""
+"""From a RAW file to linear values of each channel with uncertainties, and to a time series.
 
-from labrig.reduce.channels import ChannelStats, FrameMeasurement, measure
-from labrig.reduce.dark import DarkModel, fit_dark, hot_pixels
-from labrig.reduce.frame import LinearFrame, RegionSums
-from labrig.reduce.patches import reduce_patches, reduce_series
-from labrig.reduce.planes import PixelMask
-from labrig.reduce.raw import RawFrame, read_raw
-from labrig.reduce.shots import SeriesFrame
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "ChannelStats",
-    "DarkModel",
-    "FrameMeasurement",
-    "LinearFrame",
-    "PixelMask",
-    "RawFrame",
-    "RegionSums",
-    "SeriesFrame",
-    "fit_dark",
-    "hot_pixels",
-    "measure",
-    "read_raw",
-    "reduce_patches",
-    "reduce_series",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -13,8 +13,7 @@ from labrig.optics import SLICES, CameraModel, Strip
 from labrig.reduce.hdr import HdrFrame, Image
 from labrig.reduce.patches import reduce_patches
 from labrig.reduce.shots import SeriesFrame
-from labrig.results import FloatArray
-from labrig.results.strip import SliceValues, StripProfile
+from labrig.results import FloatArray, SliceValues, StripProfile
 
 #: Lit is what is brighter than so many times the noise of the dark surroundings,
 SEEN_SIGMA = 6.0

@@ -1,22 +1,8 @@
-"""The report of a run: what was measured, for people; figures and words, from results."""
+"""The report of a run: what was measured, for people; figures and words, from results.
 
-from labrig.report.figure_style import figure_style
-from labrig.report.page import Report, write_report
-from labrig.report.render import render
-from labrig.report.rendering import Rendered, Source
-from labrig.report.run_sections import lamp_sections, temperature_sections
-from labrig.report.sections import Picture, Section, Table
+Names are listed in `__init__.pyi`, and loaded when first used.
+"""
 
-__all__ = [
-    "Picture",
-    "Rendered",
-    "Report",
-    "Section",
-    "Source",
-    "Table",
-    "figure_style",
-    "lamp_sections",
-    "render",
-    "temperature_sections",
-    "write_report",
-]
+import lazy_loader
+
+__getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -22,7 +22,7 @@ from labrig.report.figure_style import (
 from labrig.report.legend import legend_above, lined, marked
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
-from labrig.results.blank import BlankResult
+from labrig.results import BlankResult
 from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 250.0

@@ -26,10 +26,10 @@ from labrig.report.figure_style import (
 from labrig.report.legend import legend_above, marked
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
-from labrig.results import Measured
-from labrig.results.camera_calibration import (
+from labrig.results import (
     CameraCalibrationResult,
     FittedFlat,
+    Measured,
     PhotonTransfer,
 )
 from labrig.written_numbers import exposure_text, plus_minus, rounded

@@ -3,11 +3,9 @@
 from dataclasses import dataclass
 
 from labrig.optics import CameraResponse
-from labrig.record.description import RunDescription
-from labrig.record.frames import FrameRecord
+from labrig.record import FrameRecord, RunDescription
 from labrig.region import Region
-from labrig.results import FittedDecay, Series
-from labrig.results.decay import NoiseBudget
+from labrig.results import FittedDecay, NoiseBudget, Series
 
 #: What every decay measured with a camera rests on.
 DECAY_ASSUMPTIONS = (

@@ -1,17 +1,15 @@
 """Curves to look at: a line of text each, or a picture."""
 
-import os
-from collections.abc import Sequence
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 
 from labrig.errors import UsageError
-from labrig.optics.camera import camera_path
-from labrig.optics.curve_file import Curve, CurveFile, checked, read_curve_file
-from labrig.optics.piecewise import band_means
-from labrig.optics.spectrum import check_curve
+from labrig.optics import (
+    Curve,
+    CurveFile,
+    band_means,
+)
 
 #: Eighths of a line of text.
 BARS = " ▁▂▃▄▅▆▇█"
@@ -22,23 +20,7 @@ PICTURES = (".png", ".svg", ".pdf")
 _COLOURS = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 
 
-def shown(name_or_path: str | os.PathLike[str], names: Sequence[str] | None = None) -> CurveFile:
-    """A file with the curves of some names, all of them sound.
-
-    Raises
-    ------
-    UsageError
-        No such file or curve, or a curve that makes no sense.
-    """
-    file = read_curve_file(camera_path(name_or_path))
-    if names:
-        file = replace(file, curves=dict(file.pick(name) for name in names))
-    for name, curve in file.curves.items():
-        checked(f"{file.path}: {name}", lambda c: check_curve(*c), curve)
-    return file
-
-
-def describe(file: CurveFile) -> str:
+def describe_curves(file: CurveFile) -> str:
     """Title, and of every curve its grid, its range, its peak and its shape."""
     curves = list(file.curves.items())
     what = "one curve" if len(curves) == 1 else f"{len(curves)} curves"
@@ -64,7 +46,7 @@ def _described(name: str, curve: Curve) -> str:
     )
 
 
-def draw(file: CurveFile, path: Path) -> None:
+def draw_curves(file: CurveFile, path: Path) -> None:
     """All curves of a file over wavelength.
 
     Raises

@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from labrig.record.frames import FrameRecord
+from labrig.record import FrameRecord
 from labrig.report.colours import Screen, screen_for
 from labrig.report.content import (
     DECAY_ASSUMPTIONS,
@@ -23,8 +23,7 @@ from labrig.report.sections import Picture, Section
 from labrig.report.stability import Repeat, Steady, repeats, steady
 from labrig.report.swatches import Swatch, swatches
 from labrig.report.timing import FrameTiming, Lateness, frame_timings, lateness
-from labrig.results import FittedDecay, Series
-from labrig.results.decay import DecayPatch, DecayResult
+from labrig.results import DecayPatch, DecayResult, FittedDecay, Series
 
 #: With more patches than this, photographs show their numbers and not their names.
 NAMES_ON_PHOTOGRAPH = 3

@@ -23,10 +23,10 @@ from labrig.report.figure_style import (
 from labrig.report.legend import BAND_OPACITY, legend_above, lined, marked, shaded
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
-from labrig.results import FloatArray
-from labrig.results.emission_spectrum import (
+from labrig.results import (
     EmissionSpectrum,
     EmissionSpectrumResult,
+    FloatArray,
     PatchSpectrum,
     SpectralComparison,
 )

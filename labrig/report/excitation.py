@@ -23,9 +23,15 @@ from labrig.report.figure_style import (
 from labrig.report.legend import legend_above, lined, marked
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
-from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray
-from labrig.results.closure import spans_decades
-from labrig.results.excitation import ExcitationResult, PatchExcitation
+from labrig.results import (
+    ChargingSeries,
+    Closure,
+    ExcitationResult,
+    FittedExcitation,
+    FloatArray,
+    PatchExcitation,
+    spans_decades,
+)
 from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 270.0

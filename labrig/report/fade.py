@@ -19,7 +19,7 @@ from labrig.report.figure_style import (
 from labrig.report.legend import legend_above, lined
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
-from labrig.results.fade import FadeResult, LampChange, WarmingLight
+from labrig.results import FadeResult, LampChange, WarmingLight
 from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 250.0

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.decay.shapes import exponential_means_and_slopes
+from labrig.fit.decay import exponential_means_and_slopes
 from labrig.results import FittedDecay, Series
 
 FloatArray = NDArray[np.float64]

@@ -21,7 +21,7 @@ from labrig.report.figure_style import (
 from labrig.report.legend import legend_above, lined
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
-from labrig.results.irradiance import IrradianceResult
+from labrig.results import IrradianceResult
 from labrig.written_numbers import plus_minus, rounded
 
 

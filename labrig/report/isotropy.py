@@ -22,7 +22,7 @@ from labrig.report.figure_style import (
 from labrig.report.legend import legend_above, marked, shaded
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
-from labrig.results.isotropy import PAPER, AngularGlow, IsotropyResult, is_within_paper
+from labrig.results import PAPER_REACH, AngularGlow, IsotropyResult, is_within_paper
 from labrig.written_numbers import plus_minus
 
 #: By how much more than the paper's samples fluctuate the figure reaches at least.
@@ -44,7 +44,8 @@ def _line(glow: AngularGlow) -> str:
     return (
         f"isotropy: within {abs(worst.value - 1):.1%} of the straight view up to "
         f"{glow.angle_deg.max()}° (at {glow.worst_angle_deg}°: "
-        f"{plus_minus(worst.value, worst.sigma)}; the paper's samples: less than {PAPER:.0%})"
+        f"{plus_minus(worst.value, worst.sigma)}; the paper's samples: less than "
+        f"{PAPER_REACH:.0%})"
     )
 
 
@@ -62,7 +63,7 @@ def _section(result: IsotropyResult) -> Section:
     )
     caption = (
         "Glow at an angle relative to the straight view at the same time after lamp off; bars: "
-        f"1 σ; shaded: the {100 * PAPER:g} % that the paper's samples stay within."
+        f"1 σ; shaded: the {100 * PAPER_REACH:g} % that the paper's samples stay within."
     )
     first = next(iter(patches.values()))
     rows = (
@@ -90,17 +91,17 @@ def _statement(name: str, glow: AngularGlow) -> str:
     return (
         f"{name}: the largest deviation is {worst.value - 1:+.1%} ± {worst.sigma:.1%} at "
         f"{glow.worst_angle_deg}°, {'no more' if is_within_paper(worst) else 'more'} than the "
-        f"paper's {PAPER:.0%}."
+        f"paper's {PAPER_REACH:.0%}."
     )
 
 
 def _figure(patches: Mapping[str, AngularGlow]) -> Figure:
     figure = new_figure(220.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
-    axes.axhspan(1 - PAPER, 1 + PAPER, color=SHADE, zorder=0)
+    axes.axhspan(1 - PAPER_REACH, 1 + PAPER_REACH, color=SHADE, zorder=0)
     axes.axhline(1.0, color=MUTED, linewidth=0.9)
-    entries: list[Artist] = [shaded(f"paper: ± {100 * PAPER:g} %", MUTED)]
-    reach = LEAST_REACH * PAPER
+    entries: list[Artist] = [shaded(f"paper: ± {100 * PAPER_REACH:g} %", MUTED)]
+    reach = LEAST_REACH * PAPER_REACH
     for number, (name, glow) in enumerate(patches.items()):
         colour = (INK, *OTHER_CHANNELS)[number % (1 + len(OTHER_CHANNELS))]
         marker = MARKERS[number % len(MARKERS)]

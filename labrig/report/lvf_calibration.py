@@ -22,9 +22,7 @@ from labrig.report.figure_style import (
 from labrig.report.legend import legend_above, lined
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
-from labrig.results import FloatArray
-from labrig.results.lvf_calibration import CameraCurves, LvfCalibrationResult, StripLines
-from labrig.results.strip import LocatedLines
+from labrig.results import CameraCurves, FloatArray, LocatedLines, LvfCalibrationResult, StripLines
 from labrig.written_numbers import plus_minus, rounded
 
 _WAVELENGTH = "Wavelength / nm"

@@ -19,8 +19,7 @@ from labrig.report.figure_style import (
 )
 from labrig.report.legend import BAND_OPACITY, legend_above, lined
 from labrig.report.log_axis import mark_decades
-from labrig.results import FloatArray
-from labrig.results.decay import NoiseBudget
+from labrig.results import FloatArray, NoiseBudget
 
 HEIGHT_PT = 268.0
 #: Parts below this share of the whole are not worth their line.

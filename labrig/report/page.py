@@ -8,8 +8,7 @@ from markupsafe import Markup
 
 from labrig.errors import DiskError
 from labrig.optics import CameraResponse
-from labrig.record.description import RunDescription
-from labrig.record.frames import FrameRecord
+from labrig.record import FrameRecord, RunDescription
 from labrig.report.figure_style import figure_style
 from labrig.report.plates import Plates
 from labrig.report.sections import Section

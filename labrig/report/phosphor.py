@@ -18,11 +18,10 @@ from labrig.report.figure_style import INK, LEFT_PT, new_figure, place
 from labrig.report.legend import BAND_OPACITY, legend_above, lined, shaded
 from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
-from labrig.report.render import render as render_result
+from labrig.report.registered import render as render_result
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section
-from labrig.results.decay import DecayPatch, DecayResult
-from labrig.results.phosphor import PhosphorResult
+from labrig.results import DecayPatch, DecayResult, PhosphorResult
 
 SPECTRUM_HEIGHT_PT = 256.0
 

@@ -9,10 +9,18 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import LabrigError, UsageError
-from labrig.record.frames import FrameRecord
-from labrig.reduce import RawFrame, read_raw
-from labrig.reduce.frame import LinearFrame, saturated_cells
-from labrig.reduce.pictures import Picture, binned, is_grey, jpeg, small
+from labrig.record import FrameRecord
+from labrig.reduce import (
+    LinearFrame,
+    Picture,
+    RawFrame,
+    binned,
+    is_grey,
+    jpeg,
+    read_raw,
+    saturated_cells,
+    small,
+)
 from labrig.region import region_pixels
 from labrig.report.colours import Screen, encoded, into_gamut
 from labrig.report.content import GlowPhotograph, PatchReport

@@ -7,7 +7,7 @@ import numpy as np
 
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
-from labrig.record.frames import FrameRecord
+from labrig.record import FrameRecord
 from labrig.region import region_pixels
 from labrig.report.content import DecayReport
 from labrig.report.photographs import Sensor

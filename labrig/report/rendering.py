@@ -5,8 +5,7 @@ from typing import Any, Protocol
 
 from labrig.acquire import RigFile
 from labrig.optics import CameraResponse
-from labrig.record import RunRecord
-from labrig.record.description import RunDescription
+from labrig.record import RunDescription, RunRecord
 from labrig.report.sections import Section
 
 

@@ -6,10 +6,10 @@ from itertools import groupby
 import numpy as np
 
 from labrig.quantity import duration_text
-from labrig.record import RunRecord
-from labrig.record.temperature import (
+from labrig.record import (
     SMOOTHED_S,
     Course,
+    RunRecord,
     degrees_text,
     glow_temperature_c,
     glowing,

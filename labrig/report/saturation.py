@@ -24,8 +24,14 @@ from labrig.report.legend import legend_above, lined, marked
 from labrig.report.log_axis import mark_decades
 from labrig.report.rendering import Rendered, Source
 from labrig.report.sections import Picture, Section, Table
-from labrig.results import Measured
-from labrig.results.saturation import FULL, LIGHTS, PatchSaturation, RatesTest, SaturationResult
+from labrig.results import (
+    FULL_LIGHT,
+    LIGHTS,
+    Measured,
+    PatchSaturation,
+    RatesTest,
+    SaturationResult,
+)
 from labrig.written_numbers import plus_minus, rounded
 
 
@@ -47,7 +53,8 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
         f"{_percent(growth.value)} ± {_percent(growth.sigma)}"
         for growth in (patch.growth_at_begin, patch.growth_at_end)
     )
-    shorter, longer = (duration_text(float(patch.charge_s[row])) for row in patch.rows(FULL)[-2:])
+    last = patch.rows(FULL_LIGHT)[-2:]
+    shorter, longer = (duration_text(float(patch.charge_s[row])) for row in last)
     yield (
         f"from {shorter} to {longer} of charge the glow changes by {begin} at lamp off, {end} at "
         f"the end of the decay: {patch.in_time}"
@@ -139,7 +146,7 @@ def _plateau_figure(patch: PatchSaturation) -> Figure:
     for style, light in zip(("-", DASHED), lights, strict=False):
         rows = patch.rows(light)
         minutes = patch.charge_s[rows] / 60
-        full = light == FULL
+        full = light == FULL_LIGHT
         entries.append(lined(f"{light} light", MUTED, style))
         for state in range(patch.rates.amplitude.shape[1]):
             colour, marker = _look(state)

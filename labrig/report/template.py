@@ -10,7 +10,7 @@ from jinja2 import Environment, FileSystemLoader, StrictUndefined
 from markupsafe import Markup, escape
 
 from labrig.quantity import duration_text
-from labrig.record.frames import FrameRecord
+from labrig.record import FrameRecord
 from labrig.report import parameters
 from labrig.written_numbers import plus_minus, rounded
 

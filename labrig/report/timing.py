@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.record.frames import ActionRecord, FrameRecord
+from labrig.record import ActionRecord, FrameRecord
 from labrig.report.content import PatchReport
 from labrig.written_numbers import rounded
 

@@ -4,22 +4,20 @@ import csv
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Annotated, Any, ClassVar, Literal, Self
+from typing import Any, ClassVar, Literal, Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 from scipy.interpolate import CubicSpline
 
+from labrig.finite import Finite, NotNegative
 from labrig.material import Spectrum
-from labrig.optics.piecewise import band_means, edges_about
+from labrig.optics import band_means, edges_about
 from labrig.results.arrays import FloatArray
 from labrig.results.measured import Measured
 from labrig.results.run_result import RunResult
 from labrig.yaml_file import read_model, write_yaml
-
-Finite = Annotated[float, Field(allow_inf_nan=False)]
-NotNegative = Annotated[float, Field(ge=0, allow_inf_nan=False)]
 
 #: The grid of the paper's section 4.7.
 WAVELENGTH_NM: FloatArray = np.arange(400.0, 701.0, 10.0)

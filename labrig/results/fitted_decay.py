@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import DataError, FitError
-from labrig.material.rates import exponential_means
+from labrig.material import exponential_means
 from labrig.results.arrays import FloatArray
 from labrig.results.measured import Measured, with_uncertainty
 from labrig.results.text_files import write_text

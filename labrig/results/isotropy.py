@@ -13,14 +13,14 @@ from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 
 #: What the paper found its samples to fluctuate by at most (section 4).
-PAPER = 0.05
+PAPER_REACH = 0.05
 #: A deviation is believed when it is so many σ beyond that.
 SIGMAS = 2.0
 
 
 def is_within_paper(ratio: Measured) -> bool:
     """Whether a ratio of two views may be as near to 1 as the paper's samples are."""
-    return abs(ratio.value - 1) < PAPER + SIGMAS * ratio.sigma
+    return abs(ratio.value - 1) < PAPER_REACH + SIGMAS * ratio.sigma
 
 
 @dataclass(frozen=True, eq=False)

@@ -15,7 +15,7 @@ from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 
 #: Lights of a saturation run, as its units are called.
-LIGHTS = FULL, WEAKER = "full", "weaker"
+LIGHTS = FULL_LIGHT, WEAKER = "full", "weaker"
 #: r(0) = 1 may be believed from here on, and not below.
 NEARLY_ONE = 0.95
 #: Where a longer charge brightens the glow by less, the plateau is reached.

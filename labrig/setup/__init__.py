@@ -4,6 +4,7 @@ from labrig.setup.check import check_rig
 from labrig.setup.discover import Discovery, Found, discover
 from labrig.setup.report import DeviceReport, RigReport
 from labrig.setup.surroundings import Process, Surroundings
+from labrig.setup.view import view_rig
 
 __all__ = [
     "DeviceReport",
@@ -14,4 +15,5 @@ __all__ = [
     "Surroundings",
     "check_rig",
     "discover",
+    "view_rig",
 ]

@@ -11,7 +11,7 @@ from labrig.acquire import ProtocolModel, plan, read_protocol, read_rig_file
 from labrig.catalogue import RunState, state_of
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.record import Attempt, FrameRecord, RunRecord, read_run
-from labrig.reduce.pictures import jpeg
+from labrig.reduce import jpeg
 from labrig.region import Region
 from labrig.results import read_fitted_decays
 from labrig.watch.glance import Glance, glance

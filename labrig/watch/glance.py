@@ -7,8 +7,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.reduce import measure, read_raw
-from labrig.reduce.pictures import binned, small
+from labrig.reduce import binned, measure, read_raw, small
 from labrig.region import Region
 
 #: Brought to full brightness: this quantile of the pixels, so that hot ones do not decide.

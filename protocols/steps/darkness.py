@@ -8,7 +8,7 @@ import numpy.typing as npt
 
 from labrig.errors import DataError, DeviceError
 from labrig.quantity import duration_text
-from labrig.reduce.saturation import is_clipped
+from labrig.reduce import is_clipped
 
 from .metering import Look
 

@@ -6,9 +6,8 @@ import numpy as np
 
 from labrig.fit.lvf import locate_lines
 from labrig.optics import Strip
-from labrig.reduce.hdr import Exposure, read_hdr_frame
-from labrig.reduce.strip import find_strip, strip_profile
-from labrig.results.strip import StripProfile
+from labrig.reduce import Exposure, find_strip, read_hdr_frame, strip_profile
+from labrig.results import StripProfile
 
 #: Scenes are alike if this share of the strip, in per cent, agrees to that; two gels do not.
 NEARLY_ALL, ALIKE = 90, 0.02

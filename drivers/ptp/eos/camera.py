@@ -4,8 +4,7 @@ from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import replace
 
-from labrig.acquire.findings import Finding
-from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.acquire import CameraOffers, ExposureSettings, Finding, Frame
 from labrig.clock import Clock
 
 from ..device_info import DeviceInfo

@@ -7,7 +7,7 @@ Menus are named as a 5D Mark II shows them. Sources of codes: libgphoto2's ptp.h
 
 from collections.abc import Iterable, Iterator
 
-from labrig.acquire.findings import Finding
+from labrig.acquire import Finding
 
 from ..device_info import DeviceInfo
 from ..settings import PtpCameraSettings

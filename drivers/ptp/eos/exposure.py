@@ -3,7 +3,7 @@
 import math
 from collections.abc import Collection
 
-from labrig.acquire.values import CameraOffers, ExposureSettings
+from labrig.acquire import CameraOffers, ExposureSettings
 from labrig.errors import DeviceError
 
 from ..settings import PtpCameraSettings

@@ -2,8 +2,7 @@
 
 from collections.abc import Callable, Sequence
 
-from labrig.acquire.findings import Finding
-from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
+from labrig.acquire import CameraOffers, ExposureSettings, Finding, Frame
 from labrig.clock import Clock
 from labrig.errors import DeviceError
 

@@ -8,7 +8,7 @@ from collections.abc import Collection, Iterator
 from contextlib import suppress
 from dataclasses import dataclass
 
-from labrig.acquire.findings import Finding, Severity
+from labrig.acquire import Finding, Severity
 
 from ..codes import Standard, StandardEvent, StandardProperty
 from ..device_info import DeviceInfo

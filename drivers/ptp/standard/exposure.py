@@ -7,7 +7,7 @@ dial says (1/60 s is 16.6 ms), whatever the shutter does. The number is used as 
 import math
 from collections.abc import Iterable, Sequence
 
-from labrig.acquire.values import CameraOffers, ExposureSettings
+from labrig.acquire import CameraOffers, ExposureSettings
 from labrig.errors import DeviceError
 
 from ..codes import StandardProperty

@@ -13,7 +13,7 @@ from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.calibration import BlankFile
 from labrig.reduce import measure, read_raw, reduce_patches
-from labrig.results.blank import BlankResult, StrayLight
+from labrig.results import BlankResult, StrayLight
 
 
 def analyse(part: Part) -> BlankResult:

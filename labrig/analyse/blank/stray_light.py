@@ -6,8 +6,7 @@ import numpy as np
 
 from labrig.errors import DataError
 from labrig.reduce import FrameMeasurement, fit_dark
-from labrig.results import FloatArray, Series
-from labrig.results.blank import StrayLight
+from labrig.results import FloatArray, Series, StrayLight
 
 #: Share of the frames, the latest ones, that tell the constant level.
 LATE = 1 / 2

@@ -18,12 +18,13 @@ from labrig.errors import DataError
 from labrig.record import FrameRecord
 from labrig.reduce import measure, read_raw, reduce_patches
 from labrig.region import Region
-from labrig.results import FloatArray, Series
-from labrig.results.camera_calibration import (
+from labrig.results import (
     CameraCalibrationResult,
     FittedFlat,
+    FloatArray,
     PairScatter,
     PhotonTransfer,
+    Series,
 )
 from labrig.written_numbers import exposure_text, plus_minus
 

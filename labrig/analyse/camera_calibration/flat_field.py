@@ -11,8 +11,7 @@ from labrig.errors import DataError
 from labrig.optics import Flat, rho_squared
 from labrig.reduce import LinearFrame, RawFrame
 from labrig.region import Region, region_pixels
-from labrig.results import FloatArray
-from labrig.results.camera_calibration import FittedFlat
+from labrig.results import FittedFlat, FloatArray
 
 #: Blocks across and down the card whose means are fitted.
 BLOCKS = (16, 12)

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.calibration import Linearity
-from labrig.optics.piecewise import hats
+from labrig.optics import hats
 from labrig.results import FloatArray
 
 #: Knots of D, as shares of the range up to saturation.

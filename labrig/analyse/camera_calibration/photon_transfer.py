@@ -16,11 +16,9 @@ import numpy as np
 from labrig.calibration import Noise
 from labrig.errors import DataError
 from labrig.record import FrameRecord
-from labrig.reduce import LinearFrame, RawFrame
-from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel, variance_terms
+from labrig.reduce import ROUNDING_VARIANCE, LinearFrame, NoiseModel, RawFrame, variance_terms
 from labrig.region import Region, region_pixels
-from labrig.results import FloatArray
-from labrig.results.camera_calibration import PairScatter, PhotonTransfer
+from labrig.results import FloatArray, PairScatter, PhotonTransfer
 
 #: Pixels that differ by more standard deviations are hot, or were struck by a cosmic ray.
 OUTLIER_SIGMAS = 6.0

@@ -28,13 +28,13 @@ from labrig.analyse.timed_frames import intact_frames, steady_frames, timing_war
 from labrig.errors import DataError
 from labrig.fit.spectrum import fit_spectrum
 from labrig.reduce import SeriesFrame
-from labrig.results import is_usable
-from labrig.results.emission_spectrum import (
+from labrig.results import (
     ChargeSpectrum,
     EmissionSpectrum,
     EmissionSpectrumResult,
     FilterFrames,
     PatchSpectrum,
+    is_usable,
 )
 
 #: Draws of the spectrum, and of those that are only shown.

@@ -11,8 +11,7 @@ import numpy as np
 from scipy.special import chdtrc
 
 from labrig.errors import DataError
-from labrig.results import FloatArray
-from labrig.results.emission_spectrum import FilterFrames, SpectralComparison
+from labrig.results import FilterFrames, FloatArray, SpectralComparison
 
 #: Rounds in which brightness and mean follow each other; each gains a digit or more.
 COMBINING_ROUNDS = 20

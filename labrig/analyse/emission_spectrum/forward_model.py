@@ -28,8 +28,7 @@ from labrig.optics import (
 )
 from labrig.reduce import LinearFrame, RawFrame, SeriesFrame, read_raw
 from labrig.region import Region
-from labrig.results import FloatArray
-from labrig.results.emission_spectrum import FilterFrames
+from labrig.results import FilterFrames, FloatArray
 
 #: From where to where the holder is read, in heights of the strip from its middle; the filter's own
 #: blurred edges end at 0.7.

@@ -16,20 +16,21 @@ from labrig.analyse.hot_pixels import hot_pixels_of
 from labrig.calibration import CameraFile
 from labrig.errors import DataError
 from labrig.reduce import (
+    ROUNDING_VARIANCE,
+    STRIPS,
+    TWO_DEGREES,
     DarkModel,
     LinearFrame,
+    NoiseModel,
     PixelMask,
     RawFrame,
     SeriesFrame,
     fit_dark,
     read_raw,
+    variance_terms,
 )
-from labrig.reduce.pairs import STRIPS
-from labrig.reduce.patches import TWO_DEGREES
-from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel, variance_terms
 from labrig.region import Region
-from labrig.results import FloatArray, is_usable
-from labrig.results.emission_spectrum import FilterFrames
+from labrig.results import FilterFrames, FloatArray, is_usable
 
 Patch = TypeVar("Patch", bound=Hashable)
 

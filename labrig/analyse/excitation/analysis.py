@@ -17,8 +17,13 @@ from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
 from labrig.fit.excitation import Uncertain, fit_excitation
-from labrig.results import FittedDecay, FittedExcitation
-from labrig.results.excitation import ExcitationResult, PatchCharging, PatchExcitation
+from labrig.results import (
+    ExcitationResult,
+    FittedDecay,
+    FittedExcitation,
+    PatchCharging,
+    PatchExcitation,
+)
 
 #: Of a lamp's brightness from charge to charge.
 LAMP = 0.01

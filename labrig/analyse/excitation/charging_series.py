@@ -15,8 +15,7 @@ from labrig.errors import DataError
 from labrig.optics import Strip
 from labrig.reduce import LinearFrame, RawFrame, read_raw, reduce_patches
 from labrig.region import Region
-from labrig.results import BoolArray, Charge, ChargingSeries, FloatArray, Series
-from labrig.results.excitation import PatchCharging
+from labrig.results import BoolArray, Charge, ChargingSeries, FloatArray, PatchCharging, Series
 
 #: All of the strip, from which the rates to start with are taken.
 WHOLE = "whole strip"

@@ -7,8 +7,7 @@ import numpy as np
 
 from labrig.calibration import IrradianceFile
 from labrig.fit.excitation import Charging, Uncertain, closure, levels_at_off
-from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray
-from labrig.results.excitation import PatchCharging
+from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray, PatchCharging
 
 #: Of σ, for derivatives.
 STEP = 0.01

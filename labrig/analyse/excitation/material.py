@@ -4,10 +4,9 @@ from importlib.metadata import version
 
 import numpy as np
 
-from labrig.calibration.irradiance_file import IrradianceFile
+from labrig.calibration import IrradianceFile
 from labrig.material import IrradianceNorm, Material, Provenance, State
-from labrig.results import ExcitedState, FittedExcitation, FloatArray
-from labrig.results.emission_spectrum import EmissionSpectrum
+from labrig.results import EmissionSpectrum, ExcitedState, FittedExcitation, FloatArray
 
 SOURCE = (
     "decay and excitation measured with labrig; amplitudes in DN/s of the brightest channel, Λ = "

@@ -23,8 +23,7 @@ from labrig.optics import CameraResponse, Spectrum
 from labrig.record import FrameRecord
 from labrig.reduce import read_raw
 from labrig.region import Region
-from labrig.results import FloatArray
-from labrig.results.fade import FadeResult, LampChange, WarmingLight
+from labrig.results import FadeResult, FloatArray, LampChange, WarmingLight
 from labrig.written_numbers import plus_minus
 
 #: Of a photograph's light where no camera file says.

@@ -12,8 +12,7 @@ from typing import Protocol
 
 import numpy as np
 
-from labrig.results import FloatArray, Measured
-from labrig.results.fade import FittedShape, LampChange, SwitchedFrames
+from labrig.results import FittedShape, FloatArray, LampChange, Measured, SwitchedFrames
 
 #: Wavelength at which u is minus the logarithm of the share.
 REFERENCE_NM = 550.0

@@ -17,9 +17,8 @@ from labrig.analyse.fade.change import (
     share_of,
 )
 from labrig.errors import FitError
-from labrig.fit.least_squares import least_squares
-from labrig.results import FloatArray, Measured
-from labrig.results.fade import SwitchedFrames
+from labrig.fit import least_squares
+from labrig.results import FloatArray, Measured, SwitchedFrames
 
 #: On which shares are integrated.
 STEP_S = 2e-3

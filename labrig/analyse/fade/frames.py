@@ -12,8 +12,7 @@ from labrig.errors import DataError
 from labrig.record import FrameRecord, RunRecord
 from labrig.reduce import reduce_patches
 from labrig.region import Region
-from labrig.results import FloatArray, Series
-from labrig.results.fade import SwitchedFrames, WarmingLight
+from labrig.results import FloatArray, Series, SwitchedFrames, WarmingLight
 
 #: Of a change, fewer tell nothing.
 FEWEST = 6

@@ -28,17 +28,15 @@ from labrig.bench_optics import (
     filter_transmittances,
     lamp_spectrum,
 )
-from labrig.calibration import LvfFile
-from labrig.calibration.lvf_file import BandColumns, CurveColumns, WavelengthColumns
+from labrig.calibration import BandColumns, CurveColumns, LvfFile, WavelengthColumns
 from labrig.errors import DataError
 from labrig.fit.lvf import LvfCalibration
 from labrig.optics import Strip, WavelengthMap
-from labrig.reduce.hdr import read_hdr_frame
-from labrig.reduce.strip import find_strip, slice_values
-from labrig.results import FloatArray
-from labrig.results.lvf_calibration import (
+from labrig.reduce import find_strip, read_hdr_frame, slice_values
+from labrig.results import (
     CameraCurves,
     FilterMisfit,
+    FloatArray,
     LvfCalibrationResult,
     Stripes,
 )

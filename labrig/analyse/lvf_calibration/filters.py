@@ -14,12 +14,10 @@ from labrig.optics import (
     Transmittance,
     WavelengthMap,
     nominal_lvf,
+    quadrature,
 )
-from labrig.optics.piecewise import quadrature
-from labrig.reduce.strip import FLICKER
-from labrig.results import FloatArray
-from labrig.results.lvf_calibration import FilterMisfit
-from labrig.results.strip import SliceValues
+from labrig.reduce import FLICKER
+from labrig.results import FilterMisfit, FloatArray, SliceValues
 
 #: Root mean square by which transmittances along a strip may be off: the map, bands of another
 #: shape, a filter that is not quite as its table.

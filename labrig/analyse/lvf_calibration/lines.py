@@ -9,9 +9,8 @@ from labrig.errors import DataError, FitError
 from labrig.fit.lvf import WavelengthFit, fit_wavelengths, locate_lines
 from labrig.nonnegative import nonnegative_least_squares
 from labrig.optics import Lvf, Strip, WavelengthMap
-from labrig.reduce.hdr import HdrFrame
-from labrig.reduce.strip import strip_profile
-from labrig.results.lvf_calibration import PlacedStrip, Stripes, StripLines
+from labrig.reduce import HdrFrame, strip_profile
+from labrig.results import PlacedStrip, Stripes, StripLines
 
 #: From blue end to red end.
 WHOLE = (0.0, 1.0)

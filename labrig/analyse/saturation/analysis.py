@@ -13,17 +13,18 @@ from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.errors import DataError
 from labrig.protocols.saturation import WeakerLight
-from labrig.record import RunRecord
-from labrig.record.history import charges_s
+from labrig.record import RunRecord, charges_s
 from labrig.reduce import reduce_patches
-from labrig.results import FloatArray, Measured, Series
-from labrig.results.saturation import (
+from labrig.results import (
     LIGHTS,
     ChargeLevel,
     Curve,
+    FloatArray,
+    Measured,
     PatchSaturation,
     RatesTest,
     SaturationResult,
+    Series,
 )
 from labrig.written_numbers import plus_minus
 

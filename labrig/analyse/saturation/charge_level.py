@@ -8,7 +8,7 @@ compared, so that neither Λ nor the camera's scale matter.
 import numpy as np
 from scipy.optimize import brentq
 
-from labrig.results.saturation import ChargeLevel
+from labrig.results import ChargeLevel
 
 #: Lights searched, in multiples of the rate of re-radiation: r∞ of 1e-4 to 0.9999.
 FAINTEST, STRONGEST = 1e-4, 1e4

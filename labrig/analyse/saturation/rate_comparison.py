@@ -11,11 +11,10 @@ import numpy as np
 from scipy.special import fdtrc
 
 from labrig.errors import FitError
-from labrig.fit.decay.shapes import exponential_means_and_slopes
-from labrig.fit.least_squares import EPSILON, least_squares
-from labrig.material.rates import exponential_means
-from labrig.results import FittedDecay, FloatArray, Series
-from labrig.results.saturation import Curve, RatesTest
+from labrig.fit import EPSILON, least_squares
+from labrig.fit.decay import exponential_means_and_slopes
+from labrig.material import exponential_means
+from labrig.results import Curve, FittedDecay, FloatArray, RatesTest, Series
 
 
 def curve(series: Series, fit: FittedDecay) -> Curve:

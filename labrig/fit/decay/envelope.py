@@ -16,7 +16,7 @@ from labrig.fit.decay.search import projection
 from labrig.fit.decay.series import NO_DECAY, DecaySeries
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
-from labrig.material.rates import exponential_means
+from labrig.material import exponential_means
 from labrig.nonnegative import nonnegative_least_squares
 
 COARSE_RATES = 48

@@ -19,7 +19,7 @@ import numpy as np
 
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
-from labrig.material.rates import exponential_means
+from labrig.material import exponential_means
 
 #: Combinations of rates looked at; decides how fine the grid can be.
 COMBINATIONS = 4000

@@ -3,7 +3,7 @@
 import numpy as np
 
 from labrig.fit.least_squares import FloatArray
-from labrig.material.rates import phi1
+from labrig.material import phi1
 
 #: Below this k T the difference of two nearly equal numbers gives way to its Taylor series.
 SERIES_BELOW = 0.03

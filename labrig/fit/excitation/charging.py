@@ -6,9 +6,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import DataError
-from labrig.material.rates import concentration, phi1
-from labrig.results import Closure, FloatArray
-from labrig.results.closure import spans_decades
+from labrig.material import concentration, phi1
+from labrig.results import Closure, FloatArray, spans_decades
 
 #: Of the curve.
 POINTS = 200

@@ -10,7 +10,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.material.rates import phi1, phi2, relaxation_with_slopes
+from labrig.material import phi1, phi2, relaxation_with_slopes
 from labrig.results import ChargingSeries, FloatArray
 
 

@@ -18,8 +18,15 @@ from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import strip_problem as of
 from labrig.fit.lvf.strip_problem import Expected, Found, StripProblem
 from labrig.fit.spectrum.system import CurveError
-from labrig.optics import Bands, CameraResponse, Lvf, Spectrum, Transmittance, WavelengthMap
-from labrig.optics.lvf import NOMINAL_FWHM_NM
+from labrig.optics import (
+    NOMINAL_FWHM_NM,
+    Bands,
+    CameraResponse,
+    Lvf,
+    Spectrum,
+    Transmittance,
+    WavelengthMap,
+)
 
 #: What is known of a band before it is measured: mean and σ. Leakage and remainder in units of the
 #: peak, the width as its logarithm.

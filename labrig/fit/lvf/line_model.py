@@ -6,8 +6,8 @@ import numpy as np
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray, least_squares
-from labrig.optics.band import peak_shape
-from labrig.results.strip import LocatedLines
+from labrig.optics import peak_shape
+from labrig.results import LocatedLines
 
 FEWEST_LINES = 3
 #: Share of the profile's variance that lines and background explain, if there are lines.

@@ -14,8 +14,8 @@ from labrig.fit.lvf.line_model import (
     Line,
     LineModel,
 )
-from labrig.optics.lvf import NOMINAL_FWHM_NM
-from labrig.results.strip import LocatedLines
+from labrig.optics import NOMINAL_FWHM_NM
+from labrig.results import LocatedLines
 
 #: Lines of the model agree with what was found to this share of their width.
 TOLERANCE = 0.4

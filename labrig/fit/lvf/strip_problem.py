@@ -12,9 +12,7 @@ import numpy as np
 
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.system import CurveError, curve_modes
-from labrig.optics import CameraResponse, Spectrum, Transmittance
-from labrig.optics.band import peak_shape
-from labrig.optics.piecewise import hats, quadrature
+from labrig.optics import CameraResponse, Spectrum, Transmittance, hats, peak_shape, quadrature
 
 #: Figures of a position: centre, log width, skew, log peak, and leakage in units of the peak; then
 #: the remainder in units of the peak, at knots so far apart.

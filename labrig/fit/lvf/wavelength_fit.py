@@ -7,8 +7,8 @@ from scipy.stats import chi2 as chi2_distribution
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
-from labrig.optics.wavelength_map import WavelengthMap
-from labrig.results.strip import LocatedLines
+from labrig.optics import WavelengthMap
+from labrig.results import LocatedLines
 
 #: A bend is believed if chance gives so good a one this rarely (F-test with known σ).
 RARE = 0.01

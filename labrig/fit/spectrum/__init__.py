@@ -2,7 +2,7 @@
 
 from labrig.fit.spectrum.fit import BandedSpectrum, SpectrumFit, fit_spectrum
 from labrig.fit.spectrum.line import LineFit, fit_line
-from labrig.fit.spectrum.system import CurveError, SpectralSystem, system_through_lvf
+from labrig.fit.spectrum.system import CurveError, SpectralSystem, curve_modes, system_through_lvf
 
 __all__ = [
     "BandedSpectrum",
@@ -10,6 +10,7 @@ __all__ = [
     "LineFit",
     "SpectralSystem",
     "SpectrumFit",
+    "curve_modes",
     "fit_line",
     "fit_spectrum",
     "system_through_lvf",

@@ -23,7 +23,7 @@ from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.nonnegative_quadratic import nonnegative_minimum
 from labrig.fit.spectrum.system import SpectralSystem
 from labrig.fit.spectrum.values import measured
-from labrig.optics.piecewise import band_means
+from labrig.optics import band_means
 
 SAMPLES = 400
 #: Rounds in which the covariance of a wrong design follows the spectrum.

@@ -6,8 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.optics import Bands, CameraResponse, Lvf
-from labrig.optics.piecewise import hats, quadrature
+from labrig.optics import Bands, CameraResponse, Lvf, hats, quadrature
 
 FloatArray = NDArray[np.float64]
 

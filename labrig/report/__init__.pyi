@@ -1,0 +1,51 @@
+from .colours import (
+    camera_to_xyz as camera_to_xyz,
+    css_colour as css_colour,
+    into_gamut as into_gamut,
+)
+from .curve_sketch import (
+    describe_curves as describe_curves,
+    draw_curves as draw_curves,
+)
+from .figure_style import (
+    DASHED as DASHED,
+    EDGE_PT as EDGE_PT,
+    FONT_PT as FONT_PT,
+    INK as INK,
+    MUTED as MUTED,
+    SMALL_PT as SMALL_PT,
+    WIDTH_PT as WIDTH_PT,
+    figure_style as figure_style,
+    new_figure as new_figure,
+    place as place,
+)
+from .fitted_curve import (
+    middles_s as middles_s,
+)
+from .legend import (
+    legend_above as legend_above,
+    lined as lined,
+)
+from .material_tables import (
+    comparison_table as comparison_table,
+)
+from .page import (
+    Report as Report,
+    write_report as write_report,
+)
+from .registered import (
+    render as render,
+)
+from .rendering import (
+    Rendered as Rendered,
+    Source as Source,
+)
+from .run_sections import (
+    lamp_sections as lamp_sections,
+    temperature_sections as temperature_sections,
+)
+from .sections import (
+    Picture as Picture,
+    Section as Section,
+    Table as Table,
+)

@@ -1,0 +1,127 @@
+from .arrays import (
+    BoolArray as BoolArray,
+    FloatArray as FloatArray,
+    IntArray as IntArray,
+)
+from .blank import (
+    BlankResult as BlankResult,
+    StrayLight as StrayLight,
+)
+from .camera_calibration import (
+    CameraCalibrationResult as CameraCalibrationResult,
+    FittedFlat as FittedFlat,
+    PairScatter as PairScatter,
+    PhotonTransfer as PhotonTransfer,
+)
+from .charging_series import (
+    Charge as Charge,
+    ChargingSeries as ChargingSeries,
+    Transient as Transient,
+)
+from .closure import (
+    Closure as Closure,
+    spans_decades as spans_decades,
+)
+from .decay import (
+    DecayPatch as DecayPatch,
+    DecayResult as DecayResult,
+    NoiseBudget as NoiseBudget,
+)
+from .emission_spectrum import (
+    ChargeSpectrum as ChargeSpectrum,
+    EmissionSpectrum as EmissionSpectrum,
+    EmissionSpectrumResult as EmissionSpectrumResult,
+    FilterFrames as FilterFrames,
+    PatchSpectrum as PatchSpectrum,
+    SpectralComparison as SpectralComparison,
+)
+from .excitation import (
+    ExcitationResult as ExcitationResult,
+    PatchCharging as PatchCharging,
+    PatchExcitation as PatchExcitation,
+)
+from .fade import (
+    FadeResult as FadeResult,
+    FittedShape as FittedShape,
+    LampChange as LampChange,
+    SwitchedFrames as SwitchedFrames,
+    WarmingLight as WarmingLight,
+)
+from .fields import (
+    leaves as leaves,
+    unit_of as unit_of,
+)
+from .fitted_decay import (
+    Candidate as Candidate,
+    DecayState as DecayState,
+    FittedDecay as FittedDecay,
+    Rival as Rival,
+    find_fitted_decays as find_fitted_decays,
+    read_fitted_decay as read_fitted_decay,
+    read_fitted_decays as read_fitted_decays,
+    write_fitted_decay as write_fitted_decay,
+)
+from .fitted_excitation import (
+    ExcitedState as ExcitedState,
+    FittedExcitation as FittedExcitation,
+    LevelAtOff as LevelAtOff,
+)
+from .irradiance import (
+    CardRatio as CardRatio,
+    IrradianceResult as IrradianceResult,
+    StripScale as StripScale,
+)
+from .isotropy import (
+    PAPER_REACH as PAPER_REACH,
+    AngularGlow as AngularGlow,
+    IsotropyResult as IsotropyResult,
+    is_within_paper as is_within_paper,
+)
+from .joined_series import (
+    joined as joined,
+)
+from .lvf_calibration import (
+    CameraCurves as CameraCurves,
+    FilterMisfit as FilterMisfit,
+    LvfCalibrationResult as LvfCalibrationResult,
+    PlacedStrip as PlacedStrip,
+    Stripes as Stripes,
+    StripLines as StripLines,
+)
+from .measured import (
+    Measured as Measured,
+    with_uncertainty as with_uncertainty,
+)
+from .phosphor import (
+    PhosphorResult as PhosphorResult,
+)
+from .run_result import (
+    AnyResult as AnyResult,
+    RunResult as RunResult,
+    read_result as read_result,
+    write_result as write_result,
+)
+from .saturation import (
+    FULL_LIGHT as FULL_LIGHT,
+    LIGHTS as LIGHTS,
+    ChargeLevel as ChargeLevel,
+    Curve as Curve,
+    PatchSaturation as PatchSaturation,
+    RatesTest as RatesTest,
+    SaturationResult as SaturationResult,
+)
+from .series import (
+    Series as Series,
+    add_flag as add_flag,
+    is_usable as is_usable,
+    write_series as write_series,
+)
+from .series_table import (
+    parse_series as parse_series,
+    read_series as read_series,
+)
+from .strip import (
+    LocatedLines as LocatedLines,
+    SliceValues as SliceValues,
+    StripProfile as StripProfile,
+)

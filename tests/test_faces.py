@@ -1,0 +1,72 @@
+"""Packages are used through their faces: what their `__init__` exports."""
+
+import ast
+from collections.abc import Iterator
+from pathlib import Path
+
+import pytest
+
+HOME = Path(__file__).parents[1]
+BESIDE = ("drivers", "protocols", "sim")
+#: A protocol's module is its face: its model, units and frame roles, for its analysis.
+OPEN = ("labrig.protocols",)
+
+
+def modules() -> Iterator[Path]:
+    """Paths of the product's modules from the repository's root."""
+    for folder in ("labrig", *BESIDE):
+        for path in (HOME / folder).rglob("*.py"):
+            inside = path.relative_to(HOME)
+            # Installed for editing, the folders beside are links in labrig.
+            if inside.parts[:2] not in [("labrig", linked) for linked in (*BESIDE, "config")]:
+                yield inside
+
+
+def dotted(path: Path) -> str:
+    whole = path if path.parts[0] == "labrig" else Path("labrig", path)
+    return ".".join(whole.with_suffix("").parts).removesuffix(".__init__")
+
+
+def past_faces(source: str, importer: str, packages: set[str]) -> Iterator[str]:
+    """Imports in `source` of what lies deeper in another package than its face."""
+    for node in ast.walk(ast.parse(source)):
+        if isinstance(node, ast.ImportFrom) and node.level == 0:
+            names = [node.module or ""]
+        elif isinstance(node, ast.Import):
+            names = [name.name for name in node.names]
+        else:
+            continue
+        for name in names:
+            parts = name.split(".")
+            package = ".".join(parts[:2])
+            is_other = len(parts) > 2 and package not in (*OPEN, ".".join(importer.split(".")[:2]))
+            if is_other and parts[0] == "labrig" and name not in packages:
+                yield f"{importer} imports {name}; import from {name.rpartition('.')[0]}"
+
+
+def test_no_import_goes_past_a_face() -> None:
+    paths = list(modules())
+    packages = {dotted(path) for path in paths if path.name == "__init__.py"}
+    assert {"labrig.reduce", "labrig.fit.decay", "labrig.sim.camera"} <= packages
+    found = [
+        line
+        for path in paths
+        for line in past_faces((HOME / path).read_text(encoding="utf-8"), dotted(path), packages)
+    ]
+    assert not found, "\n".join(found)
+
+
+@pytest.mark.parametrize(
+    ("line", "is_past"),
+    [
+        ("from labrig.reduce.raw import read_raw", True),
+        ("import labrig.reduce.raw", True),
+        ("from labrig.reduce import read_raw", False),
+        ("from labrig.fit.decay import fit_decay", False),
+        ("from labrig.report.page import Report", False),
+        ("from labrig.protocols.decay import Decay", False),
+    ],
+)
+def test_an_import_past_a_face_is_seen(line: str, is_past: bool) -> None:
+    packages = {"labrig.reduce", "labrig.fit.decay", "labrig.report"}
+    assert bool(list(past_faces(line, "labrig.report.decay", packages))) == is_past
