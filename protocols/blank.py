@@ -23,6 +23,7 @@ from labrig.acquire import (
 )
 from labrig.errors import ProtocolError
 from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
+from labrig.record import FrameRole
 from labrig.region import CENTRE, Region
 
 from .steps.arrangement import Arrangement
@@ -37,6 +38,8 @@ BLANK = ByHand(
     "what the sequence shows without a glow is measured",
     "blank",
 )
+#: What the frames of the sequence are for.
+BLANK_FRAMES = "blank"
 #: The first frame of a sequence without a door.
 EARLIEST_S = 0.1
 
@@ -111,7 +114,7 @@ class BlankDarkUnit:
         times_s = [offers.exposures_s[0], *self.protocol.exposures_s(offers)]
         for exposure_s in dict.fromkeys(times_s):
             for _ in range(DARKS_PER_EXPOSURE):
-                session.perform(Shoot("dark", self.protocol.settings(exposure_s)))
+                session.perform(Shoot(FrameRole.DARK, self.protocol.settings(exposure_s)))
         shorter = [self.protocol.settings(time_s) for time_s in offers.exposures_s[:3]]
         Watcher(session, self.name, [self.protocol.region], None).insist_on_darkness(shorter)
 
@@ -145,7 +148,10 @@ class SequenceUnit:
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot("blank", protocol.settings(others_s if number else first_s)))
+                    at(
+                        time_s,
+                        Shoot(BLANK_FRAMES, protocol.settings(others_s if number else first_s)),
+                    )
                     for number, time_s in enumerate(times_s)
                 ),
             ]

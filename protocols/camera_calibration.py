@@ -15,6 +15,7 @@ from labrig.quantity import Count, DurationS
 from labrig.region import CENTRE, Region
 
 from .camera_calibration_units import (
+    LINEARITY,
     BracketUnit,
     CardDarkUnit,
     FlatUnit,
@@ -65,7 +66,7 @@ class CameraCalibration(ProtocolModel):
         reference = self.settings()
         apertures: list[float | None] = [*self.f_numbers] or [None]
         brackets = {
-            "linearity": linearity_bracket,
+            LINEARITY: linearity_bracket,
             "shutter": shutter_bracket(self.every_nth_shutter_time, apertures),
             "iso": iso_bracket(self.isos),
             "aperture": aperture_bracket(apertures),

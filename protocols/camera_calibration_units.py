@@ -2,14 +2,29 @@
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 
 import numpy as np
 
 from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, Session, Shoot
+from labrig.record import FrameRole
 from labrig.region import Region
 
 from .steps.lit_card import GREY_CARD, CardLight, card_light, light_card
 from .steps.watching import Watcher
+
+
+class CardFrames(StrEnum):
+    """The card in pairs at rising light, again and again, in brackets, and for the flat field."""
+
+    PHOTON = "photon"
+    REPEAT = "repeat"
+    BRACKET = "bracket"
+    FLAT = "flat"
+
+
+#: The unit whose bracket tells the deviation from linearity.
+LINEARITY = "linearity"
 
 #: Shares of the range that the lit card fills: the reference exposure of brackets, flats, repeats.
 HALF = 0.4
@@ -53,7 +68,7 @@ class CardDarkUnit:
         for exposure_s in (offers.exposures_s[0], longest_s):
             shot = ExposureSettings(exposure_s, self.iso, self.reference.f_number)
             for _ in range(DARKS_EACH):
-                session.perform(Shoot("dark", shot))
+                session.perform(Shoot(FrameRole.DARK, shot))
         shorter = [replace(shot, exposure_s=time_s) for time_s in offers.exposures_s[:3]]
         Watcher(session, self.name, [self.card], None).insist_on_darkness(shorter)
 
@@ -80,8 +95,8 @@ class PhotonUnit:
         shares = np.linspace(*PHOTON_SHARES, self.levels)
         wanted = [light.exposed(float(share), settings, offers) for share in shares]
         for shot in dict.fromkeys(wanted):
-            session.perform(Shoot("photon", shot))
-            session.perform(Shoot("photon", shot))
+            session.perform(Shoot(CardFrames.PHOTON, shot))
+            session.perform(Shoot(CardFrames.PHOTON, shot))
 
 
 @dataclass(frozen=True)
@@ -99,7 +114,7 @@ class RepeatUnit:
         light = card_light(session, self.reference, self.card)
         shot = light.exposed(HALF, self.reference, session.rig[CAMERA].offers())
         for _ in range(self.repeats):
-            session.perform(Shoot("repeat", shot))
+            session.perform(Shoot(CardFrames.REPEAT, shot))
 
 
 @dataclass(frozen=True)
@@ -122,7 +137,7 @@ class FlatUnit:
         settings = replace(self.reference, f_number=self.f_number)
         shot = light.exposed(HALF, settings, session.rig[CAMERA].offers())
         for _ in range(FLATS):
-            session.perform(Shoot("flat", shot))
+            session.perform(Shoot(CardFrames.FLAT, shot))
 
 
 @dataclass(frozen=True)
@@ -143,7 +158,7 @@ class BracketUnit:
         for cycle in range(self.cycles):
             order = others if cycle % 2 == 0 else others[::-1]
             for shot in _interleaved(order, first):
-                session.perform(Shoot("bracket", shot))
+                session.perform(Shoot(CardFrames.BRACKET, shot))
 
 
 def linearity_bracket(

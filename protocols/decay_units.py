@@ -1,13 +1,22 @@
 """What a decay consists of: dark frames, a metered charge, charge and decay, daylight."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 from labrig.acquire import CAMERA, LAMP_ON, Session, Shoot, at
 from labrig.quantity import duration_text
+from labrig.record import FrameRole
 
 from .decay_settings import DecaySettings
 from .steps.metering import Schedule, glow, look
 from .steps.posing import check_seen, face_lamp, has_door, lights_out
+
+
+class DecayFrames(StrEnum):
+    """The glow between two charges, to see whether it still grows."""
+
+    PLATEAU = "plateau"
+
 
 #: Shutter times of the daylight photograph: one of them is right whatever the lamp.
 DAYLIGHT_EXPOSURES_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8)
@@ -32,7 +41,7 @@ class DecayUnit:
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot("decay", self.protocol.settings(exposure_s)))
+                    at(time_s, Shoot(FrameRole.DECAY, self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in schedule.frames()
                 ),
             ]
@@ -46,7 +55,7 @@ class DecayUnit:
         regions = list(protocol.patches.values())
 
         def decide() -> Schedule:
-            frames = [one for one in session.frames("meter") if one.unit == self.metering]
+            frames = [one for one in session.frames(FrameRole.METER) if one.unit == self.metering]
             looks = [look(frame, regions) for frame in frames]
             return protocol.schedule(offers, looks, session.warn)
 
@@ -64,7 +73,7 @@ class DecayUnit:
         self.protocol.charge_sample(session, rule.check_every)
         charged_s = rule.check_every
         while charged_s < rule.at_most:
-            look = Shoot("plateau", self.protocol.settings(exposure_s))
+            look = Shoot(DecayFrames.PLATEAU, self.protocol.settings(exposure_s))
             session.run_sequence([*lights_out(session), at(self.protocol.first, look)])
             face_lamp(session)
             session.perform(LAMP_ON)
@@ -80,7 +89,7 @@ class DecayUnit:
 
     def _level(self, session: Session) -> bool:
         """Whether every patch grew by less than the rule allows since the last look."""
-        looks = [frame for frame in session.frames("plateau") if frame.unit == self.name]
+        looks = [frame for frame in session.frames(DecayFrames.PLATEAU) if frame.unit == self.name]
         if len(looks) < 2:
             return False
         before, now = (
@@ -111,5 +120,5 @@ class DaylightUnit:
             for wanted_s in DAYLIGHT_EXPOSURES_S
         ]
         for settings in under_lamp:
-            session.perform(Shoot("daylight", settings))
+            session.perform(Shoot(FrameRole.DAYLIGHT, settings))
         self.protocol.watcher(session, self.name).switch_off(under_lamp)

@@ -5,6 +5,7 @@ After Nalbach et al., sec. 4.3: it is to be the same at all times, and whatever 
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
@@ -23,6 +24,14 @@ from .steps.lit_card import light_card
 from .steps.patch_names import FilterPatches
 from .steps.posing import check_seen, lights_out
 from .steps.prepared import Arranged, PutBackUnit
+
+
+class SpectrumFrames(StrEnum):
+    """The glow through the filter, and the lit card."""
+
+    GLOW = "spectrum"
+    WHITE = "white"
+
 
 Time = Annotated[DurationS, Field(gt=0)]
 
@@ -64,7 +73,7 @@ class EmissionSpectrum(GlowSettings):
     @property
     def purpose(self) -> str:
         """Of the frames of the glow."""
-        return "spectrum"
+        return SpectrumFrames.GLOW
 
     def times_s(self) -> Sequence[float]:
         """Begin of each frame, seconds after lamp off."""
@@ -135,7 +144,9 @@ class WhiteUnit:
         light_card(session)
         offers = session.rig[CAMERA].offers()
         for wanted_s in WHITE_EXPOSURES_S:
-            shoot = Shoot("white", self.protocol.settings(offers.exposure_at_most(wanted_s)))
+            shoot = Shoot(
+                SpectrumFrames.WHITE, self.protocol.settings(offers.exposure_at_most(wanted_s))
+            )
             for _ in range(WHITES_PER_EXPOSURE):
                 session.perform(shoot)
         session.perform(LAMP_OFF)

@@ -6,9 +6,9 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.acquire import CAMERA, ByHand, Session, Shoot, at
-from labrig.record import FrameRecord
+from labrig.record import FrameRecord, FrameRole
 
-from .excitation_settings import PLACES, ExcitationSettings
+from .excitation_settings import PLACES, ExcitationFrames, ExcitationSettings
 from .steps.afterglow import dark_level
 from .steps.album import Album
 from .steps.charge_times import FloatArray
@@ -44,7 +44,7 @@ class ExcitationUnit:
 
     def darks(self, session: Session) -> list[Look]:
         """One dark frame of each shutter time."""
-        frames = {frame.exposure_s: frame for frame in session.frames("dark")}
+        frames = {frame.exposure_s: frame for frame in session.frames(FrameRole.DARK)}
         return [self.album.look(frame) for frame in frames.values()]
 
     def rates(self, frame: FrameRecord, darks: Sequence[Look]) -> FloatArray:
@@ -64,7 +64,7 @@ class ExcitationUnit:
         exposure_s = max(
             self.protocol.longest_exposures_s(session.rig[CAMERA].offers(), self.protocol.duration)
         )
-        look_now = Shoot("rest", self.protocol.settings(exposure_s))
+        look_now = Shoot(FrameRole.REST, self.protocol.settings(exposure_s))
         while True:
             face_camera(session)
             session.perform(look_now)
@@ -78,12 +78,16 @@ class ExcitationUnit:
 
     def _is_dark(self, session: Session) -> bool:
         """Whether the glow of every patch is low against that just after the last charge."""
-        frames = [*session.frames("strip"), *session.frames("bare"), *session.frames("meter")]
+        frames = [
+            *session.frames(ExcitationFrames.STRIP),
+            *session.frames(ExcitationFrames.BARE),
+            *session.frames(FrameRole.METER),
+        ]
         darks = self.darks(session)
         last_unit = max(frames, key=lambda frame: frame.start_time).unit
         after = [frame for frame in frames if frame.unit == last_unit]
         brightest = np.max([self.rates(frame, darks).max(axis=1) for frame in after], axis=0)
-        now = self.rates(session.frames("rest")[-1], darks).max(axis=1)
+        now = self.rates(session.frames(FrameRole.REST)[-1], darks).max(axis=1)
         return bool((now < self.protocol.rest.below * brightest).all())
 
 
@@ -118,7 +122,7 @@ class _Meter(ExcitationUnit):
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot("meter", self.protocol.settings(exposure_s)))
+                    at(time_s, Shoot(FrameRole.METER, self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in ladder
                 ),
             ]

@@ -1,5 +1,6 @@
 """The keys of an excitation protocol, and the times and exposures that follow."""
 
+from enum import StrEnum
 from itertools import pairwise
 from typing import Literal, Self
 
@@ -12,6 +13,30 @@ from labrig.region import Region
 
 from .steps.camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
 from .steps.patch_names import FilterPatches
+
+
+class ExcitationFrames(StrEnum):
+    """The glow after a charge through the filter, and after one by the lamp itself."""
+
+    STRIP = "strip"
+    BARE = "bare"
+
+
+class UnitKind(StrEnum):
+    """Charges through the filter, each twice as long; those that tell most; those without it."""
+
+    STRIP = "strip"
+    REFINE = "refine"
+    BARE = "bare"
+
+    def numbered(self, number: int) -> str:
+        """The name of a unit of this kind."""
+        return f"{self}-{number}"
+
+    def has(self, unit: str) -> bool:
+        """Whether a unit is of this kind."""
+        return unit.rpartition("-")[0] == self
+
 
 #: Each pause between two frames is longer than the one before by this factor.
 PAUSES_GROW = 1.25
@@ -39,6 +64,7 @@ class Rest(BaseModel):
 class ExcitationSettings(ProtocolModel):
     """The keys; see `excitation.yaml` for what each means."""
 
+    rate_frames = tuple(ExcitationFrames)
     rests_on = (IRRADIANCE_KIND,)
 
     protocol: Literal["excitation"] = "excitation"

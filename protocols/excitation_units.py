@@ -6,9 +6,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.acquire import CAMERA, Session, Shoot, at
-from labrig.record import FrameRecord
+from labrig.record import FrameRecord, FrameRole
 
 from .excitation_metering import ExcitationUnit
+from .excitation_settings import ExcitationFrames, UnitKind
 from .steps.charge_times import FloatArray, most_telling_s, still_grows
 from .steps.metering import DecayMeter, Schedule
 from .steps.posing import charge, check_seen, lights_out
@@ -67,7 +68,9 @@ class _Charged(ExcitationUnit):
         if done:
             return max(done, key=lambda one: one[0])
         meter = f"{purpose}-meter"
-        return _lit_s(session, meter), [f for f in session.frames("meter") if f.unit == meter]
+        return _lit_s(session, meter), [
+            f for f in session.frames(FrameRole.METER) if f.unit == meter
+        ]
 
     def _done(self, session: Session, purpose: str) -> list[tuple[float, list[FrameRecord]]]:
         """Charge time and frames of every charge of the kind so far."""
@@ -101,13 +104,13 @@ class DoublingUnit(_Charged):
     @property
     def name(self) -> str:
         """`strip-1`, `strip-2`, …"""
-        return f"strip-{self.number}"
+        return UnitKind.STRIP.numbered(self.number)
 
     def run(self, session: Session) -> None:
         """Charge and photograph, or find that it is enough."""
 
         def grows() -> bool:
-            done = self._done(session, "strip")
+            done = self._done(session, ExcitationFrames.STRIP)
             return len(done) == self.number - 1 and still_grows(
                 self._grown(session, done)[1], self.protocol.growth
             )
@@ -116,7 +119,7 @@ class DoublingUnit(_Charged):
             return
         session.wait_until_warm("camera")
         charge_s = self.protocol.doubled_s(self.number)
-        self._charge(session, "strip", charge_s, self.protocol.duration)
+        self._charge(session, ExcitationFrames.STRIP, charge_s, self.protocol.duration)
 
 
 @dataclass(frozen=True)
@@ -128,18 +131,20 @@ class RefiningUnit(_Charged):
     @property
     def name(self) -> str:
         """`refine-1`, `refine-2`, …"""
-        return f"refine-{self.number}"
+        return UnitKind.REFINE.numbered(self.number)
 
     def run(self, session: Session) -> None:
         """Charge and photograph."""
         session.wait_until_warm("camera")
 
         def decide() -> float:
-            return most_telling_s(*self._grown(session, self._done(session, "strip")))
+            return most_telling_s(
+                *self._grown(session, self._done(session, ExcitationFrames.STRIP))
+            )
 
         worst_s = self.protocol.doubled_s(self.protocol.at_most)
         charge_s = session.choose("charge for so many seconds", decide, worst_s)
-        self._charge(session, "strip", charge_s, self.protocol.duration)
+        self._charge(session, ExcitationFrames.STRIP, charge_s, self.protocol.duration)
 
 
 @dataclass(frozen=True)
@@ -151,7 +156,7 @@ class BareUnit(_Charged):
     @property
     def name(self) -> str:
         """`bare-1`, `bare-2`, …"""
-        return f"bare-{self.number}"
+        return UnitKind.BARE.numbered(self.number)
 
     def run(self, session: Session) -> None:
         """Charge and photograph."""
@@ -159,4 +164,4 @@ class BareUnit(_Charged):
         protocol = self.protocol
         last = self.number == len(protocol.bare)
         lasting_s = protocol.last_decay if last else protocol.duration
-        self._charge(session, "bare", protocol.bare[self.number - 1], lasting_s)
+        self._charge(session, ExcitationFrames.BARE, protocol.bare[self.number - 1], lasting_s)

@@ -8,6 +8,7 @@ is photographed before each. (Nalbach et al., section 4.4, give 320 ms until the
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Literal, Self
 
 from pydantic import Field, model_validator
@@ -34,6 +35,19 @@ from .steps.camera_settings import CameraSettings
 from .steps.frame_times import frame_times_s
 from .steps.lit_card import CardLight, CardMeterUnit, card_light, light_card
 from .steps.prepared import PutBackUnit
+
+
+class LampFrames(StrEnum):
+    """The card under the steady lamp, after it was switched off or on, and while it warms."""
+
+    STEADY = "steady"
+    FADE = "fade"
+    RISE = "rise"
+    WARMING = "warming"
+
+
+#: What is photographed after a switch.
+SWITCHED = LampFrames.FADE, LampFrames.RISE
 
 LVF = ByHand(
     "put the variable filter before the camera", "the fade is measured band by band",
@@ -153,15 +167,15 @@ class PassUnit:
         self, session: Session, delay_s: float, steady: ExposureSettings, exposure_s: float
     ) -> bool:
         """Photograph one delay; whether something began late."""
-        session.perform(Shoot("steady", steady))
-        fading = Shoot("fade", replace(steady, exposure_s=exposure_s))
+        session.perform(Shoot(LampFrames.STEADY, steady))
+        fading = Shoot(LampFrames.FADE, replace(steady, exposure_s=exposure_s))
         missed = session.run_sequence([at(0.0, LAMP_OFF), at(delay_s, fading)])
         if not self.protocol.rise:
             session.perform(LAMP_ON)
             session.wait(STEADY_S, "lamp settles")
             return bool(missed)
         session.wait(STEADY_S, "lamp cools")
-        rising = [at(0.0, LAMP_ON), at(delay_s, Shoot("rise", steady))]
+        rising = [at(0.0, LAMP_ON), at(delay_s, Shoot(LampFrames.RISE, steady))]
         missed = [*missed, *session.run_sequence(rising)]
         session.wait(STEADY_S, "lamp settles")
         return bool(missed)
@@ -184,7 +198,7 @@ class WarmingUnit:
         session.perform(LAMP_OFF)
         session.wait(COOLS_S, "lamp's housing cools")
         shots = [
-            at(time_s + number * WARMING_EVERY_S, Shoot("warming", steady))
+            at(time_s + number * WARMING_EVERY_S, Shoot(LampFrames.WARMING, steady))
             for time_s in WARMING_S
             for number in range(WARMING_SHOTS)
         ]

@@ -5,6 +5,7 @@ Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.6): it i
 """
 
 from collections.abc import Sequence
+from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
@@ -20,6 +21,14 @@ from .steps.camera_settings import CameraSettings
 from .steps.prepared import PutBackUnit
 from .steps.scene_units import SceneUnit, StillDarkUnit
 from .steps.still_life import StillLife
+
+
+class CardFrames(StrEnum):
+    """The card under the lamp by itself, and through the filter."""
+
+    DIRECT = "irradiance-direct"
+    THROUGH = "irradiance-through"
+
 
 Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
@@ -63,7 +72,7 @@ class Irradiance(ProtocolModel):
             why = "how bright the lamp is by itself"
             units.append(
                 SceneUnit(
-                    self.still_life, f"direct-{number}", "irradiance-direct", _DIRECT, before, why
+                    self.still_life, f"direct-{number}", CardFrames.DIRECT, _DIRECT, before, why
                 )
             )
             why = "how much of it the variable filter leaves"
@@ -71,7 +80,7 @@ class Irradiance(ProtocolModel):
                 StripUnit(
                     self.still_life,
                     f"through-{number}",
-                    "irradiance-through",
+                    CardFrames.THROUGH,
                     _THROUGH,
                     _DIRECT,
                     why,

@@ -12,7 +12,15 @@ from pydantic import Field, model_validator
 from labrig.acquire import Optics, ProtocolModel, RigFile, Unit
 from labrig.quantity import Count, DurationS, WordOrDuration
 
-from .lvf_units import NO_FILTER, FilterUnit, LinesUnit, StripesUnit, StripUnit, filter_unit
+from .lvf_units import (
+    NO_FILTER,
+    FilterUnit,
+    LinesUnit,
+    LvfFrames,
+    StripesUnit,
+    StripUnit,
+    filter_unit,
+)
 from .steps.arrangement import Arrangement
 from .steps.camera_settings import CameraSettings
 from .steps.prepared import PutBackUnit
@@ -26,13 +34,13 @@ _ON_SAMPLE = Arrangement("grey card", "on sample")
 _BEFORE_CAMERA = Arrangement("grey card", "before camera")
 
 #: Why a scene is arranged, by the purpose of its frames.
-_WHY = {
-    "lvf-card": "how bright the card is at every place by itself",
-    "lvf-strip-on-sample": "where the filter's strip falls on the sample",
-    "lvf-filter": "what the variable filter passes follows from what colour filters take away",
-    "lvf-lines": "mercury lines tell the wavelength of every place",
-    "lvf-lines-on-sample": "mercury lines tell the wavelength of every place on the sample",
-    "lvf-stripes": "the stripes glow where the camera will see the sample",
+_WHY: dict[str, str] = {
+    LvfFrames.CARD: "how bright the card is at every place by itself",
+    LvfFrames.STRIP_ON_SAMPLE: "where the filter's strip falls on the sample",
+    LvfFrames.FILTER: "what the variable filter passes follows from what colour filters take away",
+    LvfFrames.LINES: "mercury lines tell the wavelength of every place",
+    LvfFrames.LINES_ON_SAMPLE: "mercury lines tell the wavelength of every place on the sample",
+    LvfFrames.STRIPES: "the stripes glow where the camera will see the sample",
 }
 #: Kind and name of a unit, purpose of its frames, what lies where, and the kind's own keys.
 _Scene = tuple[type[SceneUnit], str, str, Arrangement, dict[str, Any]]
@@ -87,24 +95,24 @@ class LvfCalibration(ProtocolModel):
         return [StillDarkUnit(self.still_life), *units, PutBackUnit(units[-1].wanted)]
 
     def _scenes(self) -> Iterator[_Scene]:
-        none, strip = filter_unit(None), "lvf-strip-on-sample"
-        yield SceneUnit, "card", "lvf-card", _CARD, {}
+        none, strip = filter_unit(None), LvfFrames.STRIP_ON_SAMPLE
+        yield SceneUnit, "card", LvfFrames.CARD, _CARD, {}
         yield StripUnit, "strip-on-sample", strip, _ON_SAMPLE, {}
-        yield StripUnit, none, "lvf-filter", _BEFORE_CAMERA, {}
+        yield StripUnit, none, LvfFrames.FILTER, _BEFORE_CAMERA, {}
         lit = replace(_BEFORE_CAMERA, lamp="mercury")
-        more = {"strip": ("lvf-filter", none), "rising": self.rising}
-        yield LinesUnit, "lines", "lvf-lines", lit, more
+        more = {"strip": (LvfFrames.FILTER, none), "rising": self.rising}
+        yield LinesUnit, "lines", LvfFrames.LINES, lit, more
         lit = replace(_ON_SAMPLE, lamp="mercury")
         more = {"strip": (strip, "strip-on-sample"), "rising": self.rising_on_sample}
-        yield LinesUnit, "lines-on-sample", "lvf-lines-on-sample", lit, more
+        yield LinesUnit, "lines-on-sample", LvfFrames.LINES_ON_SAMPLE, lit, more
         if isinstance(self.stripes, float):
             lit = replace(lit, stage="sample")
-            yield StripesUnit, "stripes", "lvf-stripes", lit, {"charge_s": self.stripes}
+            yield StripesUnit, "stripes", LvfFrames.STRIPES, lit, {"charge_s": self.stripes}
         for name in self.filter_names():
             yield (
                 FilterUnit,
                 filter_unit(name),
-                "lvf-filter",
+                LvfFrames.FILTER,
                 replace(_BEFORE_CAMERA, filter=name),
                 {},
             )

@@ -1,6 +1,7 @@
 """What the calibration of an LVF consists of besides darkness: a strip in several lights."""
 
 from dataclasses import dataclass
+from enum import StrEnum
 
 from labrig.acquire import CAMERA, Session, Shoot, Timed, at
 
@@ -8,6 +9,18 @@ from .steps.arrangement import light
 from .steps.camera_settings import MARGIN_S
 from .steps.posing import charge, face_lamp, lights_out, seen_s
 from .steps.scene_units import SceneUnit, frames_of
+
+
+class LvfFrames(StrEnum):
+    """The card; the strip looked through and on the sample; mercury lines there; their stripes."""
+
+    CARD = "lvf-card"
+    FILTER = "lvf-filter"
+    STRIP_ON_SAMPLE = "lvf-strip-on-sample"
+    LINES = "lvf-lines"
+    LINES_ON_SAMPLE = "lvf-lines-on-sample"
+    STRIPES = "lvf-stripes"
+
 
 #: What the unit without a colour filter is called by.
 NO_FILTER = "none"

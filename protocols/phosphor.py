@@ -14,6 +14,7 @@ from labrig.record import unit_within
 from labrig.region import Region
 from labrig.yaml_file import validate
 
+from .excitation_settings import ExcitationFrames
 from .steps.patch_names import FilterPatches
 
 #: Protocols that measure every patch of the chain.
@@ -22,6 +23,8 @@ OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation")
 
 class Phosphor(ProtocolModel):
     """The chain; see `phosphor.yaml` for what each key means."""
+
+    rate_frames = (*ProtocolModel.rate_frames, *ExcitationFrames)
 
     protocol: Literal["phosphor"] = "phosphor"
     patches: FilterPatches = Field(default_factory=dict)

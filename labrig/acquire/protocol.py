@@ -1,7 +1,7 @@
 """What every protocol is: a small YAML file as a frozen model, that says which units it takes."""
 
 from abc import abstractmethod
-from collections.abc import Mapping, Sequence
+from collections.abc import Collection, Mapping, Sequence
 from typing import Any, ClassVar, Protocol, Self
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -9,6 +9,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
 from labrig.calibration import CalibrationKind
+from labrig.record import FrameRole
 from labrig.region import Region
 
 
@@ -40,6 +41,8 @@ class ProtocolModel(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
+    #: Roles of the frames to whose glow rates are fitted: rates belong to their temperature.
+    rate_frames: ClassVar[Collection[str]] = (FrameRole.DECAY,)
     #: Calibrations on which this one's results rest.
     rests_on: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
 

@@ -12,7 +12,7 @@ from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.errors import FitError
 from labrig.fit import DecayFit
 from labrig.material import Material, Provenance, State
-from labrig.record import charges_s, glow_temperature_c
+from labrig.record import FrameRole, charges_s, glow_temperature_c
 from labrig.reduce import reduce_patches
 from labrig.region import Region
 from labrig.results import DecayPatch, DecayResult, Series
@@ -31,11 +31,11 @@ def analyse(part: Part) -> DecayResult:
     regions = choices.patches(protocol)
     background = protocol.background if protocol.dark == "background" else None
     frames, stray = cleaned(intact_frames(run, choices), part.inputs.blank)
-    insist_on_this_camera(part.inputs.camera, run, run.frames("decay"))
+    insist_on_this_camera(part.inputs.camera, run, run.frames(FrameRole.DECAY))
     series = reduce_patches(frames.decay, regions, frames.dark, background, part.inputs.camera)
     states = choices.states or (None if protocol.states == "auto" else protocol.states)
     fits = _fit_all(series, states, choices.fixed_rates_per_s)
-    temperature_c = glow_temperature_c(run)
+    temperature_c = glow_temperature_c(run, part.protocol.rate_frames)
     only = protocol.sample.name if len(fits) == 1 else None
     return DecayResult(
         patches={

@@ -21,6 +21,7 @@ from labrig.optics import (
     band_integrals,
     quadrature,
 )
+from labrig.protocols.irradiance import CardFrames
 from labrig.reduce import FLICKER, slice_values
 from labrig.results import CardRatio, FloatArray, IrradianceResult, SliceValues, StripScale
 
@@ -72,7 +73,7 @@ def analyse(part: Part) -> IrradianceResult:
 
 
 def _card_ratio(part: Part, frames: StripFrames, strip: Strip) -> CardRatio:
-    lit = [*frames.of("irradiance-direct"), *frames.of("irradiance-through")]
+    lit = [*frames.of(CardFrames.DIRECT), *frames.of(CardFrames.THROUGH)]
     values = slice_values(lit, strip, frames.dark, part.inputs.camera)
     return mean_ratio(
         [

@@ -7,6 +7,7 @@ from labrig.analyse.part import Part
 from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import steady_frames
 from labrig.errors import DataError
+from labrig.record import FrameRole
 from labrig.reduce import HdrFrame, PixelMask, SeriesFrame, read_hdr_frame, read_raw
 
 
@@ -22,8 +23,8 @@ class StripFrames:
 
     def __init__(self, part: Part) -> None:
         self._part = part
-        self.dark = self.of("dark")
-        insist_on_this_camera(part.inputs.camera, part.run, part.run.frames("dark"))
+        self.dark = self.of(FrameRole.DARK)
+        insist_on_this_camera(part.inputs.camera, part.run, part.run.frames(FrameRole.DARK))
 
     def of(self, purpose: str, unit: str | None = None) -> list[SeriesFrame]:
         """Of a purpose, and of one unit where that matters."""

@@ -1,5 +1,6 @@
 """What a run's temperature says of its rates."""
 
+from collections.abc import Collection
 from itertools import groupby
 
 import numpy as np
@@ -11,7 +12,7 @@ from labrig.record import (
     RunRecord,
     degrees_text,
     glow_temperature_c,
-    glowing,
+    in_roles,
     relative_rate_change,
     written_time,
 )
@@ -21,9 +22,9 @@ MOVED_K = 0.5
 CHECK_IT = "check it before the next run (labrig rig check)"
 
 
-def temperature_warnings(run: RunRecord) -> tuple[str, ...]:
-    """A temperature that moved while rates were measured, and a thermometer that fell silent."""
-    photographs = glowing(run)
+def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, ...]:
+    """A temperature that moved while frames of these roles were taken; a silent thermometer."""
+    photographs = in_roles(run, roles)
     if not photographs or "thermometer" not in run.attempts[-1].start.get("devices", {}):
         return ()
     if not run.temperatures():
@@ -46,9 +47,9 @@ def temperature_warnings(run: RunRecord) -> tuple[str, ...]:
     return tuple(warnings)
 
 
-def at_temperature(material: Material, run: RunRecord) -> Material:
-    """`material` with the temperature in its provenance, where it is known."""
-    mean = glow_temperature_c(run)
+def at_temperature(material: Material, run: RunRecord, roles: Collection[str]) -> Material:
+    """`material` with the temperature of such frames in its provenance, where it is known."""
+    mean = glow_temperature_c(run, roles)
     if mean is None or material.provenance is None:
         return material
     provenance: Provenance = material.provenance.model_copy(update={"temperature_c": mean})

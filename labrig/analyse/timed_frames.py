@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from labrig.analyse.choices import Choices
 from labrig.analyse.intact import damaged_frames, insist
 from labrig.errors import DataError
-from labrig.record import Attempt, FrameRecord, RunRecord
+from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord
 from labrig.reduce import SeriesFrame
 from labrig.results import add_flag
 
@@ -33,7 +33,7 @@ class IntactFrames:
     warnings: list[str]
 
 
-def intact_frames(run: RunRecord, choices: Choices, purpose: str = "decay") -> IntactFrames:
+def intact_frames(run: RunRecord, choices: Choices, purpose: str = FrameRole.DECAY) -> IntactFrames:
     """Every frame held against its checksum; those after lamp off timed from it.
 
     Parameters
@@ -46,7 +46,7 @@ def intact_frames(run: RunRecord, choices: Choices, purpose: str = "decay") -> I
     DataError
         No decay is complete, or a frame is missing or was changed and is not excluded.
     """
-    damaged = _damaged(run, choices, (purpose, "dark"))
+    damaged = _damaged(run, choices, (purpose, FrameRole.DARK))
     decay = [
         _flagged(frame, attempt, choices)
         for attempt in run.completed().values()
@@ -62,14 +62,14 @@ def intact_frames(run: RunRecord, choices: Choices, purpose: str = "decay") -> I
         decay=decay,
         dark=[
             untimed(frame)
-            for frame in run.frames("dark")
+            for frame in run.frames(FrameRole.DARK)
             if frame not in damaged and not choices.excludes(frame)
         ],
-        daylight=[frame for frame in run.frames("daylight") if frame not in damaged],
+        daylight=[frame for frame in run.frames(FrameRole.DAYLIGHT) if frame not in damaged],
         warnings=[
             f"{frame.path.name} {damage}; the report does without it"
             for frame, damage in damaged.items()
-            if frame.purpose == "daylight"
+            if frame.purpose == FrameRole.DAYLIGHT
         ],
     )
 
@@ -90,7 +90,7 @@ def steady_frames(run: RunRecord, choices: Choices, purpose: str) -> list[Series
     ]
 
 
-def timing_warnings(run: RunRecord, purpose: str = "decay") -> list[str]:
+def timing_warnings(run: RunRecord, purpose: str = FrameRole.DECAY) -> list[str]:
     """What is odd about the times in the journal."""
     warnings = []
     if run.torn:
@@ -110,7 +110,7 @@ def timing_warnings(run: RunRecord, purpose: str = "decay") -> list[str]:
 
 def _damaged(run: RunRecord, choices: Choices, measured: tuple[str, ...]) -> dict[FrameRecord, str]:
     """What is wrong with frames, those that are `measured` only if they are excluded."""
-    damaged = damaged_frames(run, (*measured, "daylight"))
+    damaged = damaged_frames(run, (*measured, FrameRole.DAYLIGHT))
     insist(run, {f: damage for f, damage in damaged.items() if f.purpose in measured}, choices)
     return damaged
 

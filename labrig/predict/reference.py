@@ -15,7 +15,7 @@ from labrig.predict.camera import (
 )
 from labrig.predict.expectation import predictable
 from labrig.predict.frames import PEAK_SIGMAS
-from labrig.record import FrameRecord, RunRecord, read_run
+from labrig.record import FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import FrameMeasurement, NoiseModel, fit_dark, measure, read_raw, variance_terms
 from labrig.region import Region
 from labrig.results import Series, find_fitted_decays, read_fitted_decay, read_series
@@ -128,7 +128,7 @@ def _region(folder: Path, patch: str) -> Region:
 
 def _first_usable(run: RunRecord, series: Series) -> FrameRecord:
     usable = {name for name, good in zip(series.frame, series.usable, strict=True) if good}
-    for frame in run.frames("decay"):
+    for frame in run.frames(FrameRole.DECAY):
         if frame.path.name in usable:
             return frame
     raise DataError(f"{run.folder}: expected a usable frame of a decay, got none; take another run")
@@ -136,7 +136,7 @@ def _first_usable(run: RunRecord, series: Series) -> FrameRecord:
 
 def _darks(run: RunRecord, region: Region) -> list[FrameMeasurement]:
     """Dark frames of the shortest and the longest exposures."""
-    darks = sorted(run.frames("dark"), key=lambda frame: frame.exposure_s)
+    darks = sorted(run.frames(FrameRole.DARK), key=lambda frame: frame.exposure_s)
     if len(darks) > 2 * DARKS_EACH:
         darks = darks[:DARKS_EACH] + darks[-DARKS_EACH:]
     return [

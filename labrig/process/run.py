@@ -90,7 +90,7 @@ def process_and_report(folder: Path | str, choices: Choices | None = None) -> Pr
     result: RunResult = analyse(Part(run, protocol, rig, choices, inputs))
     lvf = inputs.with_those_of(result).lvf
     camera, unknown_camera = _camera_response(rig, choices.camera, lvf)
-    warnings = (*result.warnings, *unknown_camera, *temperature_warnings(run))
+    warnings = (*result.warnings, *unknown_camera, *temperature_warnings(run, protocol.rate_frames))
     result = replace(result, warnings=warnings)
 
     about = describe_run(run, protocol, rig)
@@ -101,7 +101,7 @@ def process_and_report(folder: Path | str, choices: Choices | None = None) -> Pr
     rendered = render(result, Source(run, protocol, rig, about, camera))
     # After the parts of a chain, what is about all of them.
     part = "the_run" if any(section.part for section in rendered.sections) else ""
-    about_run = (*lamp_sections(run), *temperature_sections(run))
+    about_run = (*lamp_sections(run), *temperature_sections(run, protocol.rate_frames))
     sections = (*rendered.sections, *(replace(one, part=part) for one in about_run))
     report = Report(about, warnings, sections, rendered.methods, frames, camera)
     write_report(made / "report.html", report)

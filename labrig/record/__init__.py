@@ -9,6 +9,7 @@ from labrig.record.frames import (
     TAKEN_BACK,
     ActionRecord,
     FrameRecord,
+    FrameRole,
     TemperatureRecord,
     unit_in,
     unit_within,
@@ -24,7 +25,7 @@ from labrig.record.temperature import (
     Course,
     degrees_text,
     glow_temperature_c,
-    glowing,
+    in_roles,
     relative_rate_change,
 )
 
@@ -42,6 +43,7 @@ __all__ = [
     "Disk",
     "Document",
     "FrameRecord",
+    "FrameRole",
     "RunDescription",
     "RunFolder",
     "RunRecord",
@@ -50,7 +52,7 @@ __all__ = [
     "charges_s",
     "degrees_text",
     "glow_temperature_c",
-    "glowing",
+    "in_roles",
     "interruptions",
     "read_journal",
     "read_notes",

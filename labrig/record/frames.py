@@ -2,8 +2,24 @@
 
 import os
 from dataclasses import dataclass
+from enum import StrEnum
 from hashlib import file_digest
 from pathlib import Path
+
+
+class FrameRole(StrEnum):
+    """What a frame of any protocol may be for; protocols have roles of their own besides.
+
+    `METER` sets exposures, `LOOK` answers a question on the way, `REST` shows the sample before it
+    is charged, `DECAY` tells rates.
+    """
+
+    DARK = "dark"
+    METER = "meter"
+    LOOK = "look"
+    DAYLIGHT = "daylight"
+    REST = "rest"
+    DECAY = "decay"
 
 
 @dataclass(frozen=True)
@@ -15,7 +31,7 @@ class FrameRecord:
     path
         The file, as the camera delivered it.
     unit, purpose
-        Which unit took it, and what for: `dark`, `meter`, `decay`, `daylight`.
+        Which unit took it, and what for: a `FrameRole`, or one of its protocol's own.
     start_time, end_time
         Measured begin and end of the exposure.
     late_s

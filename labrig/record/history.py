@@ -4,6 +4,7 @@ from collections.abc import Iterator
 from dataclasses import dataclass
 from datetime import UTC, datetime
 
+from labrig.record.frames import FrameRole
 from labrig.record.reading import Attempt, RunRecord
 
 
@@ -21,7 +22,7 @@ def charges_s(run: RunRecord) -> tuple[float, ...]:
     return tuple(
         sum(_shining_s(attempt, decay[0].start_time))
         for attempt in run.completed().values()
-        if (decay := [frame for frame in attempt.frames if frame.purpose == "decay"])
+        if (decay := [frame for frame in attempt.frames if frame.purpose == FrameRole.DECAY])
     )
 
 

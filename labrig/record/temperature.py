@@ -1,7 +1,7 @@
 """The temperature over a run, as its thermometer told it: rates belong to a temperature."""
 
 import math
-from collections.abc import Sequence
+from collections.abc import Collection, Sequence
 
 import numpy as np
 from numpy.typing import NDArray
@@ -11,8 +11,6 @@ from labrig.record.reading import RunRecord
 
 FloatArray = NDArray[np.float64]
 
-#: Purposes of the frames to whose glow rates are fitted: of decay, and of excitation.
-RATE_PURPOSES = ("decay", "strip", "bare")
 #: Rates of traps 0.65 eV deep follow exp(−E / kT): 8.7 % for a degree at room temperature.
 TRAP_K, ZERO_C_K = 0.65 / 8.617333e-5, 273.15
 #: Readings scatter by a tenth of a degree, rooms change slowly.
@@ -54,20 +52,20 @@ class Course:
         return found
 
 
-def glow_temperature_c(run: RunRecord) -> float | None:
-    """Mean over the photographs that tell rates, to a hundredth; None where nothing is known."""
-    frames = glowing(run)
+def glow_temperature_c(run: RunRecord, roles: Collection[str]) -> float | None:
+    """Mean over the frames of these roles, to a hundredth; None where nothing is known."""
+    frames = in_roles(run, roles)
     known = Course(run).during(frames) if run.temperatures() and frames else np.array([])
     return round(float(known.mean()), 2) if known.size else None
 
 
-def glowing(run: RunRecord) -> list[FrameRecord]:
-    """The photographs that tell rates, by time."""
+def in_roles(run: RunRecord, roles: Collection[str]) -> list[FrameRecord]:
+    """The frames of these roles in completed units, by time."""
     return [
         frame
         for attempt in run.completed().values()
         for frame in attempt.frames
-        if frame.purpose in RATE_PURPOSES
+        if frame.purpose in roles
     ]
 
 

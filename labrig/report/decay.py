@@ -4,7 +4,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from functools import partial
 
-from labrig.record import FrameRecord
+from labrig.record import FrameRecord, FrameRole
 from labrig.report.colours import Screen, screen_for
 from labrig.report.content import (
     DECAY_ASSUMPTIONS,
@@ -71,7 +71,7 @@ def render(result: DecayResult, source: Source) -> Rendered:
         about=source.about,
         patches=tuple(_reported(name, one) for name, one in result.patches.items()),
         frames=tuple(frames),
-        daylight=tuple(frame for frame in frames if frame.purpose == "daylight"),
+        daylight=tuple(frame for frame in frames if frame.purpose == FrameRole.DAYLIGHT),
         glow=_glow(frames, first),
         camera=source.camera,
         charges_s=result.charges_s,

@@ -10,7 +10,7 @@ from matplotlib.figure import Figure
 
 from labrig import shipped
 from labrig.material import Material, Spectrum, compare_materials, read_material
-from labrig.record import FrameRecord
+from labrig.record import FrameRecord, FrameRole
 from labrig.report.colours import Screen, screen_for, spectrum_colour
 from labrig.report.content import GlowPhotograph
 from labrig.report.decay_figures import logarithmic_decay
@@ -103,7 +103,9 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
             )
     frames = [frame for attempt in source.run.completed().values() for frame in attempt.frames]
     screen = screen_for(source.camera)
-    daylight = daylight_picture([one for one in frames if one.purpose == "daylight"], (), screen)
+    daylight = daylight_picture(
+        [one for one in frames if one.purpose == FrameRole.DAYLIGHT], (), screen
+    )
     return Section(
         "The material as measured",
         figures=tuple(figures),

@@ -7,11 +7,11 @@ import numpy as np
 
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
-from labrig.record import FrameRecord
+from labrig.record import FrameRecord, FrameRole
 from labrig.region import region_pixels
 from labrig.report.content import DecayReport
 from labrig.report.photographs import Sensor
-from labrig.report.timing import DECAY, ON_TIME_S, Lateness
+from labrig.report.timing import ON_TIME_S, Lateness
 from labrig.written_numbers import exposure_text, rounded
 
 #: Durations and exposures that differ by less are said as one.
@@ -22,7 +22,7 @@ def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None)
     """From the charge to the values, a sentence each."""
     how = "simulated" if report.about.simulated else "measured"
     yield f"The decay of the phosphorescence of {report.about.title} was {how} with labrig."
-    decays = [frame for frame in report.frames if frame.purpose == DECAY]
+    decays = [frame for frame in report.frames if frame.purpose == FrameRole.DECAY]
     if decays:
         yield from _charge(report, decays)
         yield from _frames(report, sensor, decays)
@@ -115,8 +115,8 @@ def _sizes(report: DecayReport, sensor: Sensor | None) -> str:
 
 
 def _dark(report: DecayReport) -> Iterator[str]:
-    darks = [frame for frame in report.frames if frame.purpose == "dark"]
-    decays = [frame for frame in report.frames if frame.purpose == DECAY]
+    darks = [frame for frame in report.frames if frame.purpose == FrameRole.DARK]
+    decays = [frame for frame in report.frames if frame.purpose == FrameRole.DECAY]
     if report.background is not None:
         yield "The level of a dark region of the same frame was subtracted from each."
     elif darks and decays:

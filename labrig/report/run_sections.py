@@ -1,5 +1,6 @@
 """What a report says of a run whatever it measured: lamp, shield and door; the temperature."""
 
+from collections.abc import Collection
 from functools import partial
 from itertools import groupby
 
@@ -12,7 +13,7 @@ from labrig.record import (
     RunRecord,
     degrees_text,
     glow_temperature_c,
-    glowing,
+    in_roles,
     relative_rate_change,
 )
 from labrig.report.sections import Picture, Section
@@ -44,11 +45,11 @@ def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
     return (Section("Lamp, shield and door", tuple(text)),) if text else ()
 
 
-def temperature_sections(run: RunRecord) -> tuple[Section, ...]:
-    """Picture and words; nothing without a thermometer."""
+def temperature_sections(run: RunRecord, roles: Collection[str]) -> tuple[Section, ...]:
+    """Picture and words; nothing without a thermometer. Rates rest on frames of these roles."""
     if not run.temperatures():
         return ()
-    course, photographs = Course(run), glowing(run)
+    course, photographs = Course(run), in_roles(run, roles)
     units = [list(group) for _, group in groupby(photographs, key=lambda frame: frame.unit)]
     began = run.attempts[0].start["time"]
     spans = [(one[0].start_time, one[-1].end_time) for one in units]
@@ -63,7 +64,7 @@ def temperature_sections(run: RunRecord) -> tuple[Section, ...]:
         f"{degrees_text(course.smooth)} over the run ({len(course.time)} readings, smoothed over "
         f"{duration_text(SMOOTHED_S)})."
     )
-    mean = glow_temperature_c(run)
+    mean = glow_temperature_c(run, roles)
     if mean is not None:
         change = relative_rate_change(mean, mean + 1)
         text += (

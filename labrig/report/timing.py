@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.record import ActionRecord, FrameRecord
+from labrig.record import ActionRecord, FrameRecord, FrameRole
 from labrig.report.content import PatchReport
 from labrig.written_numbers import rounded
 
@@ -51,7 +51,7 @@ def frame_timings(
     return tuple(
         FrameTiming(frame.path.name, frame.unit, t_s[frame.path.name], frame.late_s)
         for frame in frames
-        if frame.purpose == DECAY and frame.path.name in t_s
+        if frame.purpose == FrameRole.DECAY and frame.path.name in t_s
     )
 
 

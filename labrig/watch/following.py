@@ -10,7 +10,7 @@ from typing import Any
 from labrig.acquire import ProtocolModel, plan, read_protocol, read_rig_file
 from labrig.catalogue import RunState, state_of
 from labrig.errors import DataError, LabrigError, UsageError
-from labrig.record import Attempt, FrameRecord, RunRecord, read_run
+from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
 from labrig.region import Region
 from labrig.results import read_fitted_decays
@@ -20,7 +20,6 @@ from labrig.written_numbers import plus_minus
 
 PICTURE_WIDTH = 720
 #: Purpose of the frames that are drawn as a decay.
-DECAY = "decay"
 #: Of the decay's frames that were there before somebody watched, so many are taken in at a look:
 #: the page does not wait for thousands of them.
 MOST_EARLIER = 4
@@ -190,7 +189,7 @@ class Following:
             (attempt, frame)
             for attempt in self._counting()
             for frame in attempt.frames
-            if frame.purpose == DECAY and frame.path.name not in self._points
+            if frame.purpose == FrameRole.DECAY and frame.path.name not in self._points
         ]
         for attempt, frame in earlier[:MOST_EARLIER]:
             self._look_at(attempt, frame)
@@ -211,7 +210,7 @@ class Following:
             if (action.device, action.action) == ("lamp", "off")
             and action.middle_time <= frame.start_time
         ]
-        if frame.purpose == DECAY and off_times:
+        if frame.purpose == FrameRole.DECAY and off_times:
             self._points[name] = _points(frame, seen, off_times[-1])
         return seen
 

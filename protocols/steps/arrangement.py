@@ -4,9 +4,9 @@ from dataclasses import dataclass
 from typing import Literal
 
 from labrig.acquire import LAMP, LAMP_OFF, LAMP_ON, ByHand, Session
+from labrig.record import FrameRole
 
 from .posing import face_lamp
-from .still_life import LOOK
 
 Stage = Literal["sample", "grey card"]
 LvfPlace = Literal["away", "before camera", "on sample"]
@@ -90,7 +90,7 @@ def left_by(before: Arrangement, session: Session) -> Arrangement | None:
 
     def decide() -> bool:
         since = session.clock.wall(session.rig.connected_s)
-        frames = [*session.frames("dark"), *session.frames(LOOK)]
+        frames = [*session.frames(FrameRole.DARK), *session.frames(FrameRole.LOOK)]
         return any(frame.start_time >= since for frame in frames)
 
     untouched = session.choose("bench as the unit before left it", decide, worst=True)

@@ -8,6 +8,7 @@ from pydantic import Field
 
 from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, ProtocolModel, Session
 from labrig.quantity import DurationS
+from labrig.record import FrameRole
 from labrig.region import Region
 
 from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
@@ -104,7 +105,7 @@ def metered_schedule(session: Session, protocol: GlowSettings, metering: str) ->
     offers = session.rig[CAMERA].offers()
 
     def decide() -> Schedule:
-        frames = [frame for frame in session.frames("meter") if frame.unit == metering]
+        frames = [frame for frame in session.frames(FrameRole.METER) if frame.unit == metering]
         looks = [look(frame, protocol.regions()) for frame in frames]
         return protocol.schedule(offers, looks, session.warn)
 

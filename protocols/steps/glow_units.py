@@ -5,6 +5,7 @@ from dataclasses import dataclass
 from typing import Protocol
 
 from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, Session, Shoot, at
+from labrig.record import FrameRole
 
 from .posing import check_seen, lights_out
 from .resting import dark_frames
@@ -71,7 +72,7 @@ class MeterUnit:
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot("meter", self.protocol.settings(exposure_s)))
+                    at(time_s, Shoot(FrameRole.METER, self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in ladder
                 ),
             ]

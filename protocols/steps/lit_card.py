@@ -15,6 +15,7 @@ from labrig.acquire import (
 )
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
+from labrig.record import FrameRole
 from labrig.region import Region
 
 from .darkness import range_dn
@@ -85,7 +86,7 @@ class CardMeterUnit:
         for wanted_s in METERED_S:
             exposure_s = offers.exposure_at_most(wanted_s)
             shot = ExposureSettings(exposure_s, self.settings.iso, self.settings.f_number)
-            session.perform(Shoot("meter", shot))
+            session.perform(Shoot(FrameRole.METER, shot))
         card_light(session, self.settings, self.card)
 
 
@@ -107,7 +108,7 @@ def card_light(session: Session, settings: ExposureSettings, card: Region) -> Ca
     """
 
     def decide() -> CardLight:
-        looks = [look(frame, [card]) for frame in session.frames("meter")]
+        looks = [look(frame, [card]) for frame in session.frames(FrameRole.METER)]
         return CardLight(_per_s(looks), settings)
 
     return session.choose("light of the card", decide, CardLight(DIM_PER_S, settings))

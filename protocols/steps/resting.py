@@ -6,6 +6,7 @@ import numpy as np
 
 from labrig.acquire import ExposureSettings, Session, Shoot
 from labrig.quantity import duration_text
+from labrig.record import FrameRole
 from labrig.region import Region
 
 from .afterglow import glow
@@ -40,7 +41,7 @@ def dark_frames(
         longest = max(exposures, key=lambda settings: settings.exposure_s)
         _rest_until_dark(session, unit, regions, longest)
     for settings in exposures:
-        session.perform(Shoot("dark", settings))
+        session.perform(Shoot(FrameRole.DARK, settings))
 
 
 def _rest_until_dark(
@@ -48,11 +49,11 @@ def _rest_until_dark(
 ) -> None:
     """Ends with the door open. What the camera sees behind the closed one is what dark means."""
     face_lamp(session)
-    session.perform(Shoot("rest", longest))
+    session.perform(Shoot(FrameRole.REST, longest))
     face_camera(session)
     before, rested_s = np.inf, 0.0
     while True:
-        session.perform(Shoot("rest", longest))
+        session.perform(Shoot(FrameRole.REST, longest))
         light = session.choose("light before", lambda: _light(session, unit, regions), worst=0.0)
         fades = light < (1 - FADES) * before
         if not light or not fades or rested_s >= AT_MOST_S:
@@ -74,7 +75,7 @@ def _rest_until_dark(
 
 def _light(session: Session, unit: str, regions: Sequence[Region]) -> float:
     """Share of the range by which the last look is brighter than the closed door; 0 for noise."""
-    closed, *_, seen = (frame for frame in session.frames("rest") if frame.unit == unit)
+    closed, *_, seen = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
     dark = look(closed, regions)
     found = glow(look(seen, regions), levels(dark), seen.start_time)
     share = found.brightest * seen.exposure_s / range_dn(dark)

@@ -3,7 +3,7 @@
 from dataclasses import dataclass
 
 from labrig.acquire import CAMERA, Session, Shoot
-from labrig.record import FrameRecord
+from labrig.record import FrameRecord, FrameRole
 from labrig.region import CENTRE
 
 from .arrangement import Arrangement, left_by, light
@@ -24,7 +24,7 @@ class StillDarkUnit:
         scene = self.still_life
         exposures_s = scene.dark_exposures_s(session.rig[CAMERA].offers())
         for exposure_s in exposures_s:
-            session.perform(Shoot("dark", scene.settings(exposure_s)))
+            session.perform(Shoot(FrameRole.DARK, scene.settings(exposure_s)))
         Watcher(session, self.name, [CENTRE], None).insist_on_darkness(
             [scene.settings(exposure_s) for exposure_s in sorted(set(exposures_s))]
         )

@@ -8,7 +8,7 @@ import numpy as np
 from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, Session, Shoot
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
-from labrig.record import FrameRecord
+from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import measure, read_raw
 
 from .camera_settings import DARKS_PER_EXPOSURE, CameraSettings
@@ -20,7 +20,6 @@ LADDER = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
 ENOUGH = 0.05
 #: The second exposure of a bracket, for the dim parts, in which bright ones clip.
 LONGER = 8.0
-LOOK = "look"
 
 
 @dataclass(frozen=True)
@@ -69,7 +68,7 @@ class StillLife:
         """
         offers = session.rig[CAMERA].offers()
         for exposure_s in self._ladder(offers):
-            session.perform(Shoot(LOOK, self.settings(exposure_s)))
+            session.perform(Shoot(FrameRole.LOOK, self.settings(exposure_s)))
             if session.choose("bright enough", lambda: self._enough(session, unit), worst=False):
                 break
         # That takes longest: both exposures of a bracket, and the longer one as long as it may be.
@@ -135,4 +134,4 @@ def _seen(frame: FrameRecord) -> _Seen:
 
 
 def _looks(session: Session, unit: str) -> list[FrameRecord]:
-    return [frame for frame in session.frames(LOOK) if frame.unit == unit]
+    return [frame for frame in session.frames(FrameRole.LOOK) if frame.unit == unit]

@@ -9,7 +9,7 @@ import numpy as np
 from labrig.acquire import LAMP_OFF, ExposureSettings, Session, Shoot, at
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
-from labrig.record import FrameRecord
+from labrig.record import FrameRecord, FrameRole
 from labrig.region import Region
 
 from .afterglow import (
@@ -55,7 +55,7 @@ class Watcher:
     unit: str
     patches: Sequence[Region]
     background: Region | None
-    purpose: str = "decay"
+    purpose: str = FrameRole.DECAY
     metering: str = "meter"
 
     def insist_on_darkness(self, shorter: Sequence[ExposureSettings]) -> None:
@@ -73,7 +73,7 @@ class Watcher:
         """
 
         def decide() -> Darkness:
-            frames = self._own("dark")
+            frames = self._own(FrameRole.DARK)
             longest_s = max(frame.exposure_s for frame in frames)
             longest = [frame for frame in frames if frame.exposure_s == longest_s]
             looks = [self._look(frame) for frame in (*_one_each(frames), *longest[1:])]
@@ -92,7 +92,7 @@ class Watcher:
         DeviceError
             As `Afterglow.insist`.
         """
-        self._insist(lambda: metered(self._glows(self._own("meter"))), shorter)
+        self._insist(lambda: metered(self._glows(self._own(FrameRole.METER))), shorter)
 
     def insist_on_decay(self, shorter: Sequence[ExposureSettings]) -> None:
         """Refuse a decay that is none; as `insist_on_glow`."""
@@ -122,16 +122,16 @@ class Watcher:
         """
 
         def longest_open() -> ExposureSettings:
-            lit = zip(under_lamp, self._glows(self._own("daylight")), strict=True)
+            lit = zip(under_lamp, self._glows(self._own(FrameRole.DAYLIGHT)), strict=True)
             fitting = [settings for settings, seen in lit if not seen.clips]
             return fitting[-1] if fitting else under_lamp[0]
 
         def gone_out() -> bool:
-            lit = self._own("daylight")[under_lamp.index(compared)]
-            return went_out(*self._glows([lit, *self._own("look")]))
+            lit = self._own(FrameRole.DAYLIGHT)[under_lamp.index(compared)]
+            return went_out(*self._glows([lit, *self._own(FrameRole.LOOK)]))
 
         compared = self.session.choose("frame to compare with", longest_open, under_lamp[-1])
-        look_again = Shoot("look", compared)
+        look_again = Shoot(FrameRole.LOOK, compared)
         self.session.run_sequence([at(0.0, LAMP_OFF), at(LAMP_GONE_S, look_again)])
         if not self.session.choose("lamp has gone out", gone_out, worst=True):
             raise DeviceError(
@@ -178,7 +178,7 @@ class Watcher:
         """Whether it fades: the same frames, and again after a while."""
 
         def decide() -> Afterglow:
-            glows = self._glows(self._own("look"))
+            glows = self._glows(self._own(FrameRole.LOOK))
             return looked_at(glows[: len(shorter)], glows[len(shorter) :])
 
         self._shoot(shorter)
@@ -188,7 +188,7 @@ class Watcher:
 
     def _shoot(self, settings: Sequence[ExposureSettings]) -> None:
         for one in settings:
-            self.session.perform(Shoot("look", one))
+            self.session.perform(Shoot(FrameRole.LOOK, one))
 
     def _own(self, purpose: str) -> list[FrameRecord]:
         return [frame for frame in self.session.frames(purpose) if frame.unit == self.unit]
@@ -196,7 +196,9 @@ class Watcher:
     def _before(self) -> list[Glow]:
         """Of the metering, else the begin of the first decay that is complete."""
         decays = self.session.frames(self.purpose)
-        metering = [one for one in self.session.frames("meter") if one.unit == self.metering]
+        metering = [
+            one for one in self.session.frames(FrameRole.METER) if one.unit == self.metering
+        ]
         if not metering and decays[0].unit == self.unit:
             return []
         return self._glows(metering or decays[:2])
@@ -204,7 +206,7 @@ class Watcher:
     def _glows(self, frames: Sequence[FrameRecord]) -> list[Glow]:
         """Times count from the planned begin of the first of them."""
         zero_s = frames[0].start_time - frames[0].late_s
-        darks = [self._look(frame) for frame in _one_each(self.session.frames("dark"))]
+        darks = [self._look(frame) for frame in _one_each(self.session.frames(FrameRole.DARK))]
         if darks and darkness(darks, frames[0].iso).light:
             darks = []  # they hold an earlier glow
         return [self._glow(frame, darks, zero_s) for frame in frames]

@@ -12,6 +12,7 @@ from labrig.analyse.part_frames import part_frames, part_region
 from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.calibration import BlankFile
+from labrig.protocols.blank import BLANK_FRAMES
 from labrig.reduce import measure, read_raw, reduce_patches
 from labrig.results import BlankResult, StrayLight
 
@@ -26,8 +27,8 @@ def analyse(part: Part) -> BlankResult:
     """
     protocol, run, camera = part.protocol, part.run, part.inputs.camera
     region = part_region(part, protocol.region)
-    frames = intact_frames(run, part.choices, "blank")
-    insist_on_this_camera(camera, run, part_frames(part, "blank"))
+    frames = intact_frames(run, part.choices, BLANK_FRAMES)
+    insist_on_this_camera(camera, run, part_frames(part, BLANK_FRAMES))
     series = reduce_patches(frames.decay, {"blank": region}, frames.dark, camera=camera)["blank"]
     # Hot pixels are of one colour: left in, they look like light.
     hot = hot_pixels_of(frames.dark)

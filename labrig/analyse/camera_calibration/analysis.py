@@ -15,7 +15,8 @@ from labrig.analyse.this_camera import camera_identity, lens_of
 from labrig.analyse.timed_frames import timed, untimed
 from labrig.calibration import CameraFile, Linearity
 from labrig.errors import DataError
-from labrig.record import FrameRecord
+from labrig.protocols.camera_calibration_units import LINEARITY, CardFrames
+from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import measure, read_raw, reduce_patches
 from labrig.region import Region
 from labrig.results import (
@@ -28,7 +29,7 @@ from labrig.results import (
 )
 from labrig.written_numbers import exposure_text, plus_minus
 
-LIT = ("photon", "repeat", "bracket", "flat")
+LIT = tuple(CardFrames)
 #: Where a sensor is further from a straight line, its frames tell nothing of a shutter.
 MOST_BENT = 0.02
 #: χ² per degree of freedom beyond which the photon-transfer line is none.
@@ -49,18 +50,20 @@ def analyse(part: Part) -> CameraCalibrationResult:
     """
     protocol, run = part.protocol, part.run
     region, iso = part_region(part, protocol.card), protocol.camera.iso
-    darks = part_frames(part, "dark")
+    darks = part_frames(part, FrameRole.DARK)
     lit = part_frames(part, *LIT)
     card = card_levels(lit, darks, region)
-    photon = [frame for frame in lit if frame.purpose == "photon"]
+    photon = [frame for frame in lit if frame.purpose == CardFrames.PHOTON]
     transfers = tuple(_transfer(one, photon, darks, region) for one in protocol.isos)
-    bracket = [frame for frame in lit if frame.unit == "linearity"]
+    bracket = [frame for frame in lit if frame.unit == LINEARITY]
     if not bracket:
         raise DataError("expected the brackets of 'linearity', got none; resume the run")
     range_dn, full_dn = _saturation(max(bracket, key=lambda frame: frame.exposure_s), region)
     linearity = card.linearity(iso, range_dn, full_dn)
     factors = fit_factors(
-        card.card_frames(("repeat", "bracket"), linearity), iso, protocol.camera.f_number
+        card.card_frames((CardFrames.REPEAT, CardFrames.BRACKET), linearity),
+        iso,
+        protocol.camera.f_number,
     )
     flats = _flats(part, lit, darks)
     file = CameraFile(
@@ -111,7 +114,7 @@ class CardLevels:
     def clipped(self) -> int:
         """How many frames clip that are not meant to."""
         rows = zip(self.frames, self.series.usable, strict=True)
-        return sum(frame.purpose != "bracket" and not usable for frame, usable in rows)
+        return sum(frame.purpose != CardFrames.BRACKET and not usable for frame, usable in rows)
 
     def linearity(
         self, iso: float, range_dn: float, saturation_dn: float | None
@@ -213,7 +216,7 @@ def _flats(
 ) -> tuple[FittedFlat, ...]:
     card, reference = part_region(part, part.protocol.card), part.protocol.camera.iso
     dark_dn = _dark_levels([frame for frame in darks if frame.iso == reference], card)
-    of_flats = [frame for frame in lit if frame.purpose == "flat"]
+    of_flats = [frame for frame in lit if frame.purpose == CardFrames.FLAT]
     return tuple(
         fit_flat(
             [read_raw(frame.path) for frame in of_flats if frame.f_number == f_number],

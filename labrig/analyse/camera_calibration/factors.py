@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import DataError
 from labrig.optics import Factor
+from labrig.protocols.camera_calibration_units import CardFrames
 from labrig.results import FloatArray, Measured
 
 Setting = float | None
@@ -71,7 +72,7 @@ def fit_factors(frames: Sequence[CardFrame], iso: float, f_number: Setting) -> F
     DataError
         Too few frames.
     """
-    repeats = [frame for frame in frames if frame.purpose == "repeat"]
+    repeats = [frame for frame in frames if frame.purpose == CardFrames.REPEAT]
     if len(repeats) < 4 or len(frames) < 8:
         raise DataError(
             f"expected repeats and brackets of the lit card that do not clip, got {len(frames)} "

@@ -27,6 +27,7 @@ from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import intact_frames, steady_frames, timing_warnings
 from labrig.errors import DataError
 from labrig.fit.spectrum import fit_spectrum
+from labrig.protocols.emission_spectrum import SpectrumFrames
 from labrig.reduce import SeriesFrame
 from labrig.results import (
     ChargeSpectrum,
@@ -65,11 +66,11 @@ def analyse(part: Part) -> EmissionSpectrumResult:
     FitError
         Too much clips.
     """
-    intact = intact_frames(part.run, part.choices, "spectrum")
+    intact = intact_frames(part.run, part.choices, SpectrumFrames.GLOW)
     frames, stray = cleaned(intact, part.inputs.blank)
-    insist_on_this_camera(part.inputs.camera, part.run, part.run.frames("spectrum"))
+    insist_on_this_camera(part.inputs.camera, part.run, part.run.frames(SpectrumFrames.GLOW))
     models, refused = forward_models(part, frames.decay[0])
-    white = steady_frames(part.run, part.choices, "white")
+    white = steady_frames(part.run, part.choices, SpectrumFrames.WHITE)
     reductions = reduce_places(
         [*frames.decay, *white],
         frames.dark,

@@ -17,6 +17,7 @@ from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
 from labrig.fit.excitation import Uncertain, fit_excitation
+from labrig.record import FrameRole
 from labrig.results import (
     ExcitationResult,
     FittedDecay,
@@ -49,7 +50,7 @@ def analyse(part: Part) -> ExcitationResult:
             "expected the light on every place of the sample, got none; run irradiance and name "
             "its run in the rig file ('optics: {irradiance: …}') or to labrig process --optics"
         )
-    insist_on_intact(part.run, (*GLOWING, "dark"), part.choices)
+    insist_on_intact(part.run, (*GLOWING, FrameRole.DARK), part.choices)
     warming = USUAL if fade is None or fade.warming is None else fade.warming
     chargings, left_out = patch_chargings(part, irradiance, warming)
     patches, warnings = for_each_patch(
@@ -100,8 +101,9 @@ def _of_patch(
         if spectra and spectrum is None
         else ()
     )
+    material = at_temperature(material, run, part.protocol.rate_frames)
     return (
-        PatchExcitation(charging, decay, fit, at_temperature(material, run), closure),
+        PatchExcitation(charging, decay, fit, material, closure),
         (*decay.warnings, *fit.warnings, *no_spectrum),
     )
 

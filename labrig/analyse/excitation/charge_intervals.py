@@ -8,12 +8,11 @@ from labrig.analyse.choices import Choices
 from labrig.analyse.clean import left_out_lines
 from labrig.calibration import BlankFile
 from labrig.errors import DataError
-from labrig.record import Attempt, FrameRecord, RunRecord
+from labrig.protocols.excitation_settings import ExcitationFrames, UnitKind
+from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord
 
 #: Frames that show the glow after a charge; those of a metering are exposed too long or too short.
-GLOWING = ("strip", "bare", "rest")
-#: Units that charged by the lamp itself; all others charged through the filter.
-DIRECT = "bare-"
+GLOWING = (*ExcitationFrames, FrameRole.REST)
 
 
 @dataclass(frozen=True)
@@ -38,7 +37,7 @@ class ChargeInterval:
     @property
     def is_direct(self) -> bool:
         """Whether it charged by the lamp itself."""
-        return self.unit.startswith(DIRECT)
+        return UnitKind.BARE.has(self.unit)
 
 
 @dataclass(frozen=True)
@@ -141,6 +140,6 @@ def _interval_before(
 ) -> ChargeInterval | None:
     """The last one; None if there was none in the same arrangement of filter and lamp."""
     before = [one for one in intervals if one.off_s < frame.start_time]
-    if not before or before[-1].is_direct is not frame.unit.startswith(DIRECT):
+    if not before or before[-1].is_direct is not UnitKind.BARE.has(frame.unit):
         return None
     return before[-1]

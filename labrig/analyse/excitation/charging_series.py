@@ -13,6 +13,7 @@ from labrig.analyse.timed_frames import timed, untimed
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
 from labrig.optics import Strip
+from labrig.record import FrameRole
 from labrig.reduce import LinearFrame, RawFrame, read_raw, reduce_patches
 from labrig.region import Region
 from labrig.results import BoolArray, Charge, ChargingSeries, FloatArray, PatchCharging, Series
@@ -56,7 +57,11 @@ def patch_chargings(
             for patch, slices in sites.items()
             for name, region in {**slices, WHOLE: _around(slices)}.items()
         },
-        [untimed(frame) for frame in part.run.frames("dark") if not choices.excludes(frame)],
+        [
+            untimed(frame)
+            for frame in part.run.frames(FrameRole.DARK)
+            if not choices.excludes(frame)
+        ],
         camera=known.camera,
     )
     rise, fade = lamp_transients(known.fade, np.array(irradiance.bands_nm))

@@ -20,7 +20,8 @@ from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import Change, FadeFile, Warming
 from labrig.errors import DataError
 from labrig.optics import CameraResponse, Spectrum
-from labrig.record import FrameRecord
+from labrig.protocols.fade import SWITCHED, LampFrames
+from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import read_raw
 from labrig.region import Region
 from labrig.results import FadeResult, FloatArray, LampChange, WarmingLight
@@ -53,9 +54,9 @@ def analyse(part: Part) -> FadeResult:
     protocol, camera = part.protocol, part.inputs.camera
     curves = camera_curves(part.rig, part.choices.camera, part.inputs.lvf)
     lamp = lamp_spectrum(part.rig)
-    frames = part_frames(part, "fade", "rise", "steady")
+    frames = part_frames(part, LampFrames.FADE, LampFrames.RISE, LampFrames.STEADY)
     insist_on_this_camera(camera, part.run, frames)
-    darks = part_frames(part, "dark")
+    darks = part_frames(part, FrameRole.DARK)
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
     edges = np.array(protocol.bands)
     nm = np.arange(edges[0], edges[-1] + STEP_NM / 2, STEP_NM)
@@ -64,14 +65,14 @@ def analyse(part: Part) -> FadeResult:
     changes: dict[str, LampChange] = {}
     tables: dict[str, Change] = {}
     lag = ANY_LAG
-    for purpose in ("fade", "rise") if protocol.rise else ("fade",):
+    for purpose in SWITCHED if protocol.rise else SWITCHED[:1]:
         switched = frames_after_switch(part.run, frames, darks, places, camera, purpose)
         seen = weights
         if protocol.through_lvf:
             # All channels of a place see the same band: one of them is enough.
             columns = brightest_channels(switched, len(curves.channels))
             switched, seen = take_columns(switched, columns), weights[columns]
-        rises = purpose == "rise"
+        rises = purpose == LampFrames.RISE
         change = fit_change(switched, seen, nm, flicker, rises=rises, lag=lag)
         lag = replace(change.lag, sigma=float(np.hypot(change.lag.sigma, RELAY_S)))
         changes[purpose] = change.result(switched)
@@ -98,7 +99,7 @@ def analyse(part: Part) -> FadeResult:
 def _warming(
     part: Part, darks: Sequence[FrameRecord], flicker: float
 ) -> tuple[Warming, WarmingLight] | tuple[None, None]:
-    frames = part_frames(part, "warming")
+    frames = part_frames(part, LampFrames.WARMING)
     if not frames:
         return None, None
     card = part_region(part, part.protocol.card)

@@ -9,6 +9,7 @@ from numpy.typing import NDArray
 from labrig.analyse.timed_frames import switched_time, timed, untimed
 from labrig.calibration import CameraFile, Warming
 from labrig.errors import DataError
+from labrig.protocols.fade import LampFrames
 from labrig.record import FrameRecord, RunRecord
 from labrig.reduce import reduce_patches
 from labrig.region import Region
@@ -42,14 +43,14 @@ def frames_after_switch(
     DataError
         Too few of them are of any use.
     """
-    state = "on" if purpose == "rise" else "off"
+    state = "on" if purpose == LampFrames.RISE else "off"
     attempts = run.completed()
     taken = [
         timed(frame, switched_time(attempts[frame.unit], frame, state))
         for frame in frames
         if frame.purpose == purpose
     ]
-    steady = [untimed(frame) for frame in frames if frame.purpose == "steady"]
+    steady = [untimed(frame) for frame in frames if frame.purpose == LampFrames.STEADY]
     if len(taken) < FEWEST or not steady:
         raise DataError(
             f"expected {FEWEST} photographs of the {purpose} or more, and of the steady lamp, got "

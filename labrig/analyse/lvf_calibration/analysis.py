@@ -32,6 +32,7 @@ from labrig.calibration import BandColumns, CurveColumns, LvfFile, WavelengthCol
 from labrig.errors import DataError
 from labrig.fit.lvf import LvfCalibration
 from labrig.optics import Strip, WavelengthMap
+from labrig.protocols.lvf_units import LvfFrames, filter_unit
 from labrig.reduce import find_strip, read_hdr_frame, slice_values
 from labrig.results import (
     CameraCurves,
@@ -58,11 +59,11 @@ def analyse(part: Part) -> LvfCalibrationResult:
         No mercury lines, the filter the wrong way round, or too few filters.
     """
     protocol, frames = part.protocol, StripFrames(part)
-    strip = find_strip(frames.hdr("lvf-filter", "filter-none")).strip(rising=True)
-    before_camera = strip_lines(frames.hdr("lvf-lines"), strip, protocol.rising)
+    strip = find_strip(frames.hdr(LvfFrames.FILTER, filter_unit(None))).strip(rising=True)
+    before_camera = strip_lines(frames.hdr(LvfFrames.LINES), strip, protocol.rising)
     fit = wavelengths_along(before_camera)
-    strip = find_strip(frames.hdr("lvf-strip-on-sample")).strip(rising=True)
-    on_sample = strip_lines(frames.hdr("lvf-lines-on-sample"), strip, protocol.rising_on_sample)
+    strip = find_strip(frames.hdr(LvfFrames.STRIP_ON_SAMPLE)).strip(rising=True)
+    on_sample = strip_lines(frames.hdr(LvfFrames.LINES_ON_SAMPLE), strip, protocol.rising_on_sample)
     placed = place_on_sample(on_sample, fit.map)
     bench = Bench(
         lamp_spectrum(part.rig),
@@ -114,7 +115,7 @@ def analyse(part: Part) -> LvfCalibrationResult:
 def _scenes(part: Part, frames: StripFrames, strip: Strip) -> FilterScenes:
     completed = part.run.completed()
     names = [name for name in part.protocol.filter_names() if f"filter-{name}" in completed]
-    lit = [*frames.of("lvf-card"), *frames.of("lvf-filter")]
+    lit = [*frames.of(LvfFrames.CARD), *frames.of(LvfFrames.FILTER)]
     values = slice_values(lit, strip, frames.dark, part.inputs.camera)
     return FilterScenes(
         np.array(strip.positions(*frames.size)),
@@ -137,7 +138,7 @@ def _stripes(
     nm = wavelengths.wavelength_nm([0.0, 1.0])
     why = "no stripes were photographed"
     # A glow fades while it is photographed: one frame, the fullest that does not clip.
-    for frame in sorted(frames.of("lvf-stripes"), key=lambda frame: -frame.exposure_s):
+    for frame in sorted(frames.of(LvfFrames.STRIPES), key=lambda frame: -frame.exposure_s):
         try:
             hdr = read_hdr_frame([frame], frames.hot)
             return shifted_by_stripes(hdr, strip, found.lvf, float(abs(nm[1] - nm[0]))), ""

@@ -13,7 +13,7 @@ from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.errors import DataError
 from labrig.protocols.saturation import WeakerLight
-from labrig.record import RunRecord, charges_s
+from labrig.record import FrameRole, RunRecord, charges_s
 from labrig.reduce import reduce_patches
 from labrig.results import (
     LIGHTS,
@@ -41,7 +41,7 @@ def analyse(part: Part) -> SaturationResult:
     """
     protocol, run, camera = part.protocol, part.run, part.inputs.camera
     frames, stray = cleaned(intact_frames(run, part.choices), part.inputs.blank)
-    insist_on_this_camera(camera, run, run.frames("decay"))
+    insist_on_this_camera(camera, run, run.frames(FrameRole.DECAY))
     regions = part.choices.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
     lasted_s, weaker = _charges_s(run), protocol.weaker
@@ -66,7 +66,7 @@ def _charges_s(run: RunRecord) -> dict[str, float]:
     units = [
         unit
         for unit, attempt in run.completed().items()
-        if any(frame.purpose == "decay" for frame in attempt.frames)
+        if any(frame.purpose == FrameRole.DECAY for frame in attempt.frames)
     ]
     return dict(zip(units, charges_s(run), strict=True))
 
