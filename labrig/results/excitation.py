@@ -1,6 +1,5 @@
 """How fast light of each band charges a sample, and the material that follows."""
 
-import json
 from collections.abc import Mapping
 from dataclasses import dataclass
 from pathlib import Path
@@ -17,7 +16,7 @@ from labrig.results.fitted_decay import FittedDecay
 from labrig.results.fitted_excitation import FittedExcitation
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
-from labrig.results.text_files import write_text
+from labrig.results.text_files import write_json
 
 
 @dataclass(frozen=True, eq=False)
@@ -104,11 +103,12 @@ class ExcitationResult(RunResult):
             place = folder / name
             place.mkdir(exist_ok=True)
             write_material(place / "material.yaml", patch.material)
-            write_text(place / "excitation.json", self._fit_json(patch.fit))
+            write_json(place / "excitation.json", self._fit_content(patch.fit))
 
-    def _fit_json(self, fit: FittedExcitation) -> str:
+    def _fit_content(self, fit: FittedExcitation) -> dict[str, Any]:
         off = fit.at_off[-1]
-        content = {
+        return {
+            "schema_version": self.schema_version,
             "bands_nm": self.irradiance.bands_nm,
             "irradiance_vector_length": self.irradiance.vector_length,
             "states": [
@@ -128,7 +128,7 @@ class ExcitationResult(RunResult):
             "channel_weights": fit.channel_weights.tolist(),
             "reduced_chi2": fit.reduced_chi2,
             "dof": fit.dof,
+            "covariance_parameters": list(fit.covariance_parameters),
             "covariance": fit.covariance.tolist(),
             "warnings": list(fit.warnings),
         }
-        return json.dumps(content, ensure_ascii=False, indent=1) + "\n"

@@ -14,7 +14,7 @@ from labrig.errors import DataError, FitError
 from labrig.material import exponential_means
 from labrig.results.arrays import FloatArray
 from labrig.results.measured import Measured, with_uncertainty
-from labrig.results.text_files import write_text
+from labrig.results.text_files import finite, json_text, write_json
 
 FILE = "fit.json"
 #: Of that file: another number says that keys were renamed or mean something else.
@@ -254,12 +254,12 @@ class FittedDecay:
             "rivals": [asdict(rival) for rival in self.rivals],
             "better_rival": self.better_rival.name if self.better_rival else None,
         }
-        finite: dict[str, Any] = _finite(fields)
-        return finite
+        content: dict[str, Any] = finite(fields)
+        return content
 
     def to_json(self) -> str:
         """The text of `fit.json`."""
-        return json.dumps(self.to_dict(), indent=2, ensure_ascii=False, allow_nan=False)
+        return json_text(self.to_dict())
 
     def __str__(self) -> str:
         """A table for people; digits in brackets are σ in units of the last places."""
@@ -304,7 +304,7 @@ def write_fitted_decay(path: Path, result: FittedDecay) -> None:
     DiskError
         It cannot be written.
     """
-    write_text(path, result.to_json())
+    write_json(path, result.to_dict())
 
 
 def read_fitted_decay(path: Path) -> FittedDecay:
@@ -405,14 +405,3 @@ def _table(rows: Sequence[Sequence[str]]) -> list[str]:
         "  ".join(cell.ljust(width) for cell, width in zip(row, widths, strict=True)).rstrip()
         for row in rows
     ]
-
-
-def _finite(item: Any) -> Any:
-    """JSON knows no infinity and no NaN."""
-    if isinstance(item, dict):
-        return {key: _finite(value) for key, value in item.items()}
-    if isinstance(item, list):
-        return [_finite(value) for value in item]
-    if isinstance(item, float) and not math.isfinite(item):
-        return None
-    return item

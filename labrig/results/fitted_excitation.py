@@ -82,7 +82,7 @@ class FittedExcitation:
     chi2, dof
         Sum of squared whitened residuals, degrees of freedom.
     covariance
-        Rows of k_r (N), amplitude (N), k_e (N·B, state by state).
+        Of the `covariance_parameters`.
     warnings
         What to distrust, and what to do about it.
     residuals
@@ -103,6 +103,17 @@ class FittedExcitation:
     def reduced_chi2(self) -> float:
         """χ² per degree of freedom."""
         return self.chi2 / self.dof if self.dof > 0 else float("nan")
+
+    @property
+    def covariance_parameters(self) -> tuple[str, ...]:
+        """Names of the rows of `covariance`: k_r of all states, amplitudes, k_e of all bands."""
+        states = range(1, len(self.states) + 1)
+        bands = range(1, self.k_e().shape[1] + 1)
+        return (
+            *(f"k_r_per_s {state}" for state in states),
+            *(f"amplitude_at_full_charge {state}" for state in states),
+            *(f"k_e_per_s {state} {band}" for state in states for band in bands),
+        )
 
     def k_e(self) -> FloatArray:
         """(N, B) of all states."""

@@ -2,7 +2,9 @@
 
 import csv
 import io
-from collections.abc import Iterable, Sequence
+import json
+import math
+from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -36,3 +38,30 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) ->
     table.writerow(head)
     table.writerows(rows)
     write_text(path, text.getvalue())
+
+
+def write_json(path: Path, content: Mapping[str, Any]) -> None:
+    """Write an object, a key a line; null for what is not finite, which JSON does not know.
+
+    Raises
+    ------
+    DiskError
+        The file cannot be written.
+    """
+    write_text(path, json_text(content) + "\n")
+
+
+def json_text(content: Mapping[str, Any]) -> str:
+    """The text of such a file."""
+    return json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False)
+
+
+def finite(item: Any) -> Any:
+    """`item` with None for numbers that are not finite."""
+    if isinstance(item, Mapping):
+        return {key: finite(value) for key, value in item.items()}
+    if isinstance(item, list | tuple):
+        return [finite(value) for value in item]
+    if isinstance(item, float) and not math.isfinite(item):
+        return None
+    return item

@@ -58,7 +58,11 @@ def test_files_lie_in_folders_of_the_patches(result: ExcitationResult, tmp_path:
     for name, patch in result.patches.items():
         assert read_material(tmp_path / name / "material.yaml") == patch.material
         fit = json.loads((tmp_path / name / "excitation.json").read_text())
-        assert fit["covariance"] == patch.fit.covariance.tolist()
+        covariance = np.array(fit["covariance"], dtype=np.float64)
+        known = np.isfinite(patch.fit.covariance)
+        np.testing.assert_array_equal(covariance, np.where(known, patch.fit.covariance, np.nan))
+        assert len(fit["covariance_parameters"]) == len(fit["covariance"])
+        assert fit["covariance_parameters"][0] == "k_r_per_s 1"
     assert result.provides() == {
         "materials": {name: patch.material for name, patch in result.patches.items()}
     }
