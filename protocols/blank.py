@@ -26,11 +26,9 @@ from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.record import FrameRole
 from labrig.region import CENTRE, Region
 
-from .steps.arrangement import Arrangement
-from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings
-from .steps.frame_times import frame_times_s
+from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, frame_times_s
 from .steps.posing import charge, face_camera, lights_out, seen_s
-from .steps.prepared import PutBackUnit
+from .steps.scenes import Arrangement, PutBackUnit
 from .steps.watching import Watcher
 
 BLANK = ByHand(

@@ -5,31 +5,251 @@ Standard 1288 has them; brackets are interleaved with one reference exposure, so
 lamp's drift nor the shutter's flicker is taken for a factor.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Iterator, Sequence
+from dataclasses import dataclass, replace
+from enum import StrEnum
 from typing import Literal, Self
 
+import numpy as np
 from pydantic import Field, model_validator
 
-from labrig.acquire import ExposureSettings, ProtocolModel, Unit
+from labrig.acquire import (
+    CAMERA,
+    CameraOffers,
+    ExposureSettings,
+    ProtocolModel,
+    Session,
+    Shoot,
+    Unit,
+)
 from labrig.quantity import Count, DurationS
+from labrig.record import FrameRole
 from labrig.region import CENTRE, Region
 
-from .camera_calibration_units import (
-    LINEARITY,
-    BracketUnit,
-    CardDarkUnit,
-    FlatUnit,
-    PhotonUnit,
-    RepeatUnit,
-    aperture_bracket,
-    iso_bracket,
-    linearity_bracket,
-    shutter_bracket,
-)
-from .steps.arrangement import Arrangement
 from .steps.camera_settings import CameraSettings
-from .steps.lit_card import CardMeterUnit
-from .steps.prepared import PutBackUnit
+from .steps.lit_card import GREY_CARD, CardLight, CardMeterUnit, card_light, light_card
+from .steps.scenes import Arrangement, PutBackUnit
+from .steps.watching import Watcher
+
+
+class CardFrames(StrEnum):
+    """The card in pairs at rising light, again and again, in brackets, and for the flat field."""
+
+    PHOTON = "photon"
+    REPEAT = "repeat"
+    BRACKET = "bracket"
+    FLAT = "flat"
+
+
+#: The unit whose bracket tells the deviation from linearity.
+LINEARITY = "linearity"
+
+#: Shares of the range that the lit card fills: the reference exposure of brackets, flats, repeats.
+HALF = 0.4
+#: … of a bracket: less is noise, more may clip where the lens is brightest.
+LEAST, MOST = 0.012, 0.7
+#: … of the photon transfer.
+PHOTON_SHARES = (0.03, 0.75)
+#: … of the linearity, into saturation.
+LINEARITY_SHARES = (0.015, 2.0)
+#: After so many exposures of a bracket comes its reference again.
+REFERENCE_EVERY = 3
+DARKS_EACH = 4
+FLATS = 4
+
+#: The settings of a bracket, its reference first.
+Bracket = Callable[[CardLight, CameraOffers, ExposureSettings], Sequence[ExposureSettings]]
+
+
+@dataclass(frozen=True)
+class CardDarkUnit:
+    """Dark frames at one ISO, the card already in its place."""
+
+    reference: ExposureSettings
+    card: Region
+    iso: int
+    longest_s: float
+    asks: bool
+
+    @property
+    def name(self) -> str:
+        """`dark-iso-100`."""
+        return f"dark-iso-{self.iso}"
+
+    def run(self, session: Session) -> None:
+        """Photograph darkness, shortest and longest exposure, and see that it is dark."""
+        if self.asks:
+            session.ask(GREY_CARD)
+        session.wait_until_warm("camera")
+        offers = session.rig[CAMERA].offers()
+        longest_s = offers.exposure_at_most(self.longest_s)
+        for exposure_s in (offers.exposures_s[0], longest_s):
+            shot = ExposureSettings(exposure_s, self.iso, self.reference.f_number)
+            for _ in range(DARKS_EACH):
+                session.perform(Shoot(FrameRole.DARK, shot))
+        shorter = [replace(shot, exposure_s=time_s) for time_s in offers.exposures_s[:3]]
+        Watcher(session, self.name, [self.card], None).insist_on_darkness(shorter)
+
+
+@dataclass(frozen=True)
+class PhotonUnit:
+    """Pairs of frames of the lit card at several levels, at one ISO."""
+
+    reference: ExposureSettings
+    card: Region
+    iso: int
+    levels: int
+
+    @property
+    def name(self) -> str:
+        """`photon-iso-100`."""
+        return f"photon-iso-{self.iso}"
+
+    def run(self, session: Session) -> None:
+        """Two frames at each level."""
+        light_card(session)
+        light, offers = card_light(session, self.reference, self.card), session.rig[CAMERA].offers()
+        settings = replace(self.reference, iso=self.iso)
+        shares = np.linspace(*PHOTON_SHARES, self.levels)
+        wanted = [light.exposed(float(share), settings, offers) for share in shares]
+        for shot in dict.fromkeys(wanted):
+            session.perform(Shoot(CardFrames.PHOTON, shot))
+            session.perform(Shoot(CardFrames.PHOTON, shot))
+
+
+@dataclass(frozen=True)
+class RepeatUnit:
+    """The same frame again and again: the flicker."""
+
+    reference: ExposureSettings
+    card: Region
+    repeats: int
+    name: str = "repeats"
+
+    def run(self, session: Session) -> None:
+        """At the reference exposure."""
+        light_card(session)
+        light = card_light(session, self.reference, self.card)
+        shot = light.exposed(HALF, self.reference, session.rig[CAMERA].offers())
+        for _ in range(self.repeats):
+            session.perform(Shoot(CardFrames.REPEAT, shot))
+
+
+@dataclass(frozen=True)
+class FlatUnit:
+    """The lit card at one aperture."""
+
+    reference: ExposureSettings
+    card: Region
+    f_number: float | None
+
+    @property
+    def name(self) -> str:
+        """`flat-f4`."""
+        return "flat" if self.f_number is None else f"flat-f{self.f_number:g}"
+
+    def run(self, session: Session) -> None:
+        """A few frames, whose noise averages out."""
+        light_card(session)
+        light = card_light(session, self.reference, self.card)
+        settings = replace(self.reference, f_number=self.f_number)
+        shot = light.exposed(HALF, settings, session.rig[CAMERA].offers())
+        for _ in range(FLATS):
+            session.perform(Shoot(CardFrames.FLAT, shot))
+
+
+@dataclass(frozen=True)
+class BracketUnit:
+    """Frames that differ in one setting, there and back again, the reference in between."""
+
+    reference: ExposureSettings
+    card: Region
+    name: str
+    bracket: Bracket
+    cycles: int
+
+    def run(self, session: Session) -> None:
+        """Forwards in one cycle, backwards in the next: a lamp's drift then is no factor."""
+        light_card(session)
+        light = card_light(session, self.reference, self.card)
+        first, *others = self.bracket(light, session.rig[CAMERA].offers(), self.reference)
+        for cycle in range(self.cycles):
+            order = others if cycle % 2 == 0 else others[::-1]
+            for shot in _interleaved(order, first):
+                session.perform(Shoot(CardFrames.BRACKET, shot))
+
+
+def linearity_bracket(
+    light: CardLight, offers: CameraOffers, reference: ExposureSettings
+) -> Sequence[ExposureSettings]:
+    """Shutter times from next to nothing to what is too long."""
+    low, high = (light.exposure_s(share, reference) for share in LINEARITY_SHARES)
+    return [
+        light.exposed(HALF, reference, offers),
+        *(replace(reference, exposure_s=time_s) for time_s in _between(offers, low, high)),
+    ]
+
+
+def shutter_bracket(every_nth: int, f_numbers: Sequence[float | None]) -> Bracket:
+    """Shutter times at the reference aperture, then longer ones at the smallest aperture."""
+    smallest = max((f_number or 0.0 for f_number in f_numbers), default=0.0)
+
+    def bracket(
+        light: CardLight, offers: CameraOffers, reference: ExposureSettings
+    ) -> Sequence[ExposureSettings]:
+        shots = [light.exposed(HALF, reference, offers)]
+        stopped_down = replace(reference, f_number=smallest) if smallest else reference
+        for settings in dict.fromkeys([reference, stopped_down]):
+            low, high = (light.exposure_s(share, settings) for share in (LEAST, MOST))
+            times_s = _between(offers, low, high)[::-1][::every_nth]
+            shots += [replace(settings, exposure_s=time_s) for time_s in times_s]
+        return shots
+
+    return bracket
+
+
+def iso_bracket(isos: Sequence[int]) -> Bracket:
+    """One shutter time at every ISO."""
+
+    def bracket(
+        light: CardLight, offers: CameraOffers, reference: ExposureSettings
+    ) -> Sequence[ExposureSettings]:
+        shot = light.exposed(MOST, replace(reference, iso=max(isos)), offers)
+        same = replace(reference, exposure_s=shot.exposure_s)
+        return [same, *(replace(same, iso=iso) for iso in isos if iso != reference.iso)]
+
+    return bracket
+
+
+def aperture_bracket(f_numbers: Sequence[float | None]) -> Bracket:
+    """One shutter time at every aperture."""
+
+    def bracket(
+        light: CardLight, offers: CameraOffers, reference: ExposureSettings
+    ) -> Sequence[ExposureSettings]:
+        widest = min(f_numbers, key=lambda f_number: f_number or 0.0)
+        shot = light.exposed(MOST, replace(reference, f_number=widest), offers)
+        same = replace(reference, exposure_s=shot.exposure_s)
+        others = [one for one in f_numbers if one != reference.f_number]
+        return [same, *(replace(same, f_number=f_number) for f_number in others)]
+
+    return bracket
+
+
+def _between(offers: CameraOffers, low_s: float, high_s: float) -> list[float]:
+    """Offered shutter times of that range, two at the least."""
+    times_s = [time_s for time_s in offers.exposures_s if low_s <= time_s <= high_s * 1.0001]
+    return times_s if len(times_s) > 1 else list(offers.exposures_s[:2])
+
+
+def _interleaved(
+    shots: Sequence[ExposureSettings], reference: ExposureSettings
+) -> Iterator[ExposureSettings]:
+    for number, shot in enumerate(shots):
+        if number % REFERENCE_EVERY == 0:
+            yield reference
+        yield shot
+    yield reference
 
 
 class CameraCalibration(ProtocolModel):

@@ -3,13 +3,284 @@
 After Nalbach et al., Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.4.
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from typing import Annotated, Literal, Self
 
-from labrig.acquire import Unit
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from .decay_settings import DecaySettings
-from .decay_units import DaylightUnit, DecayUnit
-from .steps.glow_units import METER_CHARGE_S, DarkUnit, MeterUnit
+from labrig.acquire import (
+    CAMERA,
+    LAMP_ON,
+    CameraOffers,
+    ExposureSettings,
+    ProtocolModel,
+    Session,
+    Shoot,
+    Unit,
+    at,
+)
+from labrig.quantity import Count, DurationS, Fraction, WordOrDuration, duration_text
+from labrig.record import FrameRole
+from labrig.reduce import FrameMeasurement
+from labrig.region import CENTRE, Region
+
+from .steps.camera_settings import (
+    DARKS_PER_EXPOSURE,
+    MARGIN_S,
+    CameraSettings,
+    dark_exposures_s,
+    frame_times_s,
+)
+from .steps.glow import METER_CHARGE_S, DarkUnit, MeterUnit
+from .steps.metering import DecayMeter, Look, Schedule, glow, look
+from .steps.patch_names import Patches
+from .steps.posing import charge, check_seen, face_lamp, has_door, lights_out
+from .steps.watching import Watcher
+
+
+class Plateau(BaseModel):
+    """When `charge: plateau` ends: the glow grew by less than `growth` since the last look."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    growth: Fraction = Field(0.01, gt=0, lt=1)
+    check_every: DurationS = Field(300.0, gt=0)
+    at_most: DurationS = Field(7200.0, gt=0)
+
+
+class DecaySettings(ProtocolModel):
+    """The keys; see `decay.yaml` for what each means."""
+
+    protocol: Literal["decay"] = "decay"
+    charge: Annotated[float | Literal["plateau"], WordOrDuration("plateau")] = 5400.0
+    plateau: Plateau = Plateau()
+    every: DurationS = Field(5.0, gt=0)
+    duration: DurationS = Field(180.0, gt=0, alias="for")
+    first: DurationS = Field(0.5, ge=0)
+    repeats: Count = Field(1, ge=1)
+    camera: CameraSettings = CameraSettings()
+    exposure: Annotated[float | Literal["auto", "grow"], WordOrDuration("auto", "grow")] = "auto"
+    grow_at_most: float = Field(16.0, ge=1)
+    dark: Literal["frames", "background"] = "frames"
+    background: Region | None = None
+    patches: Patches = Field({"sample": CENTRE}, min_length=1)
+    daylight: bool = False
+    states: Literal["auto", 1, 2, 3] = "auto"
+
+    @model_validator(mode="after")
+    def _complete(self) -> Self:
+        if self.dark == "background" and self.background is None:
+            raise ValueError(
+                "dark: background needs the key 'background: [x, y, width, height]', a region of "
+                "the frame that never glows"
+            )
+        if self.first + self.every > self.duration:
+            raise ValueError(
+                f"for: {duration_text(self.duration)} leaves no two frames "
+                f"{duration_text(self.every)} apart; make it longer"
+            )
+        if isinstance(self.exposure, float) and self.exposure >= self.every:
+            raise ValueError(
+                f"an exposure of {duration_text(self.exposure)} does not fit between frames every "
+                f"{duration_text(self.every)}; expose for less or leave more time"
+            )
+        return self
+
+    def frame_times_s(self) -> list[float]:
+        """Planned begin of each frame, seconds after lamp off."""
+        return frame_times_s(self.first, self.every, self.duration)
+
+    def settings(self, exposure_s: float) -> ExposureSettings:
+        """Camera settings with that shutter time."""
+        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
+
+    def longest_exposure_s(self, offers: CameraOffers) -> float:
+        """Longest offered shutter time that fits between two frames."""
+        return offers.exposure_at_most(self.every - offers.overhead_s - MARGIN_S)
+
+    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+        """Shutter time of each dark frame."""
+        if isinstance(self.exposure, float):
+            return [offers.exposure_near(self.exposure)] * DARKS_PER_EXPOSURE
+        return dark_exposures_s(self.longest_exposure_s(offers), offers)
+
+    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+        """Begin after lamp off and shutter time of each metering frame; for `grow`, to the end."""
+        longest_s = self.longest_exposure_s(offers)
+        pause_s = offers.overhead_s + MARGIN_S
+        ladder, at_s = [], self.first
+        for share in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
+            exposure_s = offers.exposure_at_most(longest_s * share)
+            ladder.append((at_s, exposure_s))
+            at_s += exposure_s + pause_s
+        if self.exposure == "grow":
+            while at_s < self.duration:
+                for share in (1 / 16, 1):
+                    exposure_s = offers.exposure_at_most(longest_s * share)
+                    ladder.append((at_s, exposure_s))
+                    at_s += exposure_s + pause_s
+                at_s *= 1.5
+        return ladder
+
+    def schedule(
+        self,
+        offers: CameraOffers,
+        looks: Sequence[Look],
+        warn: Callable[[str], None],
+    ) -> Schedule:
+        """Frames of a decay; their shutter times rest on the metering's, unless they are given."""
+        times_s = self.frame_times_s()
+        if isinstance(self.exposure, float):
+            return Schedule.constant(times_s, offers.exposure_near(self.exposure))
+        growth = self.grow_at_most if self.exposure == "grow" else 1.0
+        longest_s = self.longest_exposure_s(offers)
+        return DecayMeter(looks).schedule(times_s, offers, longest_s, growth, warn)
+
+    def expected_schedule(
+        self,
+        offers: CameraOffers,
+        expected: Callable[[float, float], Sequence[FrameMeasurement]],
+        warn: Callable[[str], None],
+    ) -> Schedule:
+        """What `schedule` will come to, before anything is measured.
+
+        Parameters
+        ----------
+        expected
+            What a frame of the glow will show in each patch, from its begin after lamp off and its
+            shutter time in seconds.
+        """
+        looks = [Look(*at, expected(*at)) for at in self.meter_ladder(offers)]
+        return self.schedule(offers, looks, warn)
+
+    def short_settings(self, session: Session) -> list[ExposureSettings]:
+        """For a closer look at what clips."""
+        ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
+        return [self.settings(exposure_s) for _, exposure_s in ladder]
+
+    def watcher(self, session: Session, unit: str, metering: str = "meter") -> Watcher:
+        """Holds a unit's frames against what should have happened, and what `metering` saw."""
+        background = self.background if self.dark == "background" else None
+        regions = list(self.patches.values())
+        return Watcher(session, unit, regions, background, metering=metering)
+
+    def charge_sample(self, session: Session, duration_s: float) -> None:
+        """Lamp on for that long, for its own warm-up at the least."""
+        charge(session, max(duration_s, session.rig.warm_up_s("lamp")))
+
+
+class DecayFrames(StrEnum):
+    """The glow between two charges, to see whether it still grows."""
+
+    PLATEAU = "plateau"
+
+
+#: Shutter times of the daylight photograph: one of them is right whatever the lamp.
+DAYLIGHT_EXPOSURES_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8)
+LAMP_SETTLES_S = 5.0
+
+
+@dataclass(frozen=True)
+class DecayUnit:
+    """One charge and the decay after it, exposed as the unit `metering` found."""
+
+    protocol: DecaySettings
+    name: str
+    metering: str = "meter"
+
+    def run(self, session: Session) -> None:
+        """Charge, lamp off, one frame every `every` seconds."""
+        session.wait_until_warm("camera")
+        schedule = self._schedule(session)
+        check_seen(session, self.protocol.first)
+        self._charge(session, schedule.exposures_s[0])
+        session.run_sequence(
+            [
+                *lights_out(session),
+                *(
+                    at(time_s, Shoot(FrameRole.DECAY, self.protocol.settings(exposure_s)))
+                    for time_s, exposure_s in schedule.frames()
+                ),
+            ]
+        )
+        watcher = self.protocol.watcher(session, self.name, self.metering)
+        watcher.tell_of_delays(schedule.times_s)
+        watcher.insist_on_decay(self.protocol.short_settings(session))
+
+    def _schedule(self, session: Session) -> Schedule:
+        protocol, offers = self.protocol, session.rig[CAMERA].offers()
+        regions = list(protocol.patches.values())
+
+        def decide() -> Schedule:
+            frames = [one for one in session.frames(FrameRole.METER) if one.unit == self.metering]
+            looks = [look(frame, regions) for frame in frames]
+            return protocol.schedule(offers, looks, session.warn)
+
+        if isinstance(protocol.exposure, float):
+            return protocol.schedule(offers, [], session.warn)
+        longest_s = protocol.longest_exposure_s(offers)
+        worst = Schedule.constant(protocol.frame_times_s(), longest_s)
+        return session.choose("exposure", decide, worst)
+
+    def _charge(self, session: Session, exposure_s: float) -> None:
+        if isinstance(self.protocol.charge, float):
+            self.protocol.charge_sample(session, self.protocol.charge)
+            return
+        rule = self.protocol.plateau
+        self.protocol.charge_sample(session, rule.check_every)
+        charged_s = rule.check_every
+        while charged_s < rule.at_most:
+            look = Shoot(DecayFrames.PLATEAU, self.protocol.settings(exposure_s))
+            session.run_sequence([*lights_out(session), at(self.protocol.first, look)])
+            face_lamp(session)
+            session.perform(LAMP_ON)
+            if session.choose("plateau reached", lambda: self._level(session), worst=False):
+                session.wait(LAMP_SETTLES_S, "lamp settles, charge topped up")
+                return
+            session.wait(rule.check_every, "charging")
+            charged_s += rule.check_every
+        session.warn(
+            f"the glow still grows after {duration_text(rule.at_most)} of charge; amplitudes are "
+            "below saturation (raise plateau.at_most)"
+        )
+
+    def _level(self, session: Session) -> bool:
+        """Whether every patch grew by less than the rule allows since the last look."""
+        looks = [frame for frame in session.frames(DecayFrames.PLATEAU) if frame.unit == self.name]
+        if len(looks) < 2:
+            return False
+        before, now = (
+            [glow(frame.path, region) for region in self.protocol.patches.values()]
+            for frame in looks[-2:]
+        )
+        limit = 1 + self.protocol.plateau.growth
+        return all(new <= old * limit for old, new in zip(before, now, strict=True))
+
+
+@dataclass(frozen=True)
+class DaylightUnit:
+    """What the samples look like under the lamp."""
+
+    protocol: DecaySettings
+    name: str = "daylight"
+
+    def run(self, session: Session) -> None:
+        """Lamp on, a ladder of short exposures, lamp off."""
+        if has_door(session):
+            session.warn("no daylight photograph: behind a door the lamp lights the sample unseen")
+            return
+        offers = session.rig[CAMERA].offers()
+        session.perform(LAMP_ON)
+        session.wait(LAMP_SETTLES_S, "lamp settles")
+        under_lamp = [
+            self.protocol.settings(offers.exposure_at_most(wanted_s))
+            for wanted_s in DAYLIGHT_EXPOSURES_S
+        ]
+        for settings in under_lamp:
+            session.perform(Shoot(FrameRole.DAYLIGHT, settings))
+        self.protocol.watcher(session, self.name).switch_off(under_lamp)
 
 
 class Decay(DecaySettings):

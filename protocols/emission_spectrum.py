@@ -16,14 +16,12 @@ from labrig.calibration import LVF_KIND
 from labrig.quantity import DurationS, duration_text
 from labrig.region import Region
 
-from .steps.arrangement import Arrangement, LampKind
 from .steps.camera_settings import CameraSettings
-from .steps.glow_settings import GlowSettings, metered_schedule
-from .steps.glow_units import DarkUnit, MeterUnit
+from .steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from .steps.lit_card import light_card
 from .steps.patch_names import FilterPatches
 from .steps.posing import check_seen, lights_out
-from .steps.prepared import Arranged, PutBackUnit
+from .steps.scenes import Arranged, Arrangement, LampKind, PutBackUnit
 
 
 class SpectrumFrames(StrEnum):

@@ -4,13 +4,463 @@ After Nalbach et al., sec. 4.5 and 4.6, where bands are charged one by one with 
 """
 
 from collections.abc import Sequence
+from dataclasses import dataclass
+from enum import StrEnum
+from itertools import pairwise
+from typing import Literal, Self
 
-from labrig.acquire import Unit
+import numpy as np
+from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from .excitation_metering import BareMeter, DarkUnit, StripMeter
-from .excitation_settings import ExcitationSettings
-from .excitation_units import BareUnit, DoublingUnit, RefiningUnit
+from labrig.acquire import (
+    CAMERA,
+    ByHand,
+    CameraOffers,
+    ExposureSettings,
+    ProtocolModel,
+    Session,
+    Shoot,
+    Unit,
+    at,
+)
+from labrig.calibration import IRRADIANCE_KIND
+from labrig.quantity import Count, DurationS, Fraction, duration_text
+from labrig.record import FrameRecord, FrameRole
+from labrig.region import Region
+
+from .steps.afterglow import dark_level
 from .steps.album import Album
+from .steps.camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
+from .steps.charge_times import FloatArray, most_telling_s, still_grows
+from .steps.darkness import levels
+from .steps.glow import dark_frames
+from .steps.metering import DecayMeter, Look, Schedule
+from .steps.patch_names import FilterPatches
+from .steps.posing import charge, check_seen, face_camera, face_lamp, lights_out
+from .steps.watching import Watcher
+
+
+class ExcitationFrames(StrEnum):
+    """The glow after a charge through the filter, and after one by the lamp itself."""
+
+    STRIP = "strip"
+    BARE = "bare"
+
+
+class UnitKind(StrEnum):
+    """Charges through the filter, each twice as long; those that tell most; those without it."""
+
+    STRIP = "strip"
+    REFINE = "refine"
+    BARE = "bare"
+
+    def numbered(self, number: int) -> str:
+        """The name of a unit of this kind."""
+        return f"{self}-{number}"
+
+    def has(self, unit: str) -> bool:
+        """Whether a unit is of this kind."""
+        return unit.rpartition("-")[0] == self
+
+
+#: Each pause between two frames is longer than the one before by this factor.
+PAUSES_GROW = 1.25
+#: Places along each patch, for metering and for choosing charge times.
+PLACES = 12
+
+
+class Rest(BaseModel):
+    """Darkness between two charges: at least and at most so long, until the glow is that low."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    below: Fraction = Field(0.02, gt=0, lt=1)
+    at_least: DurationS = Field(60.0, ge=0)
+    check_every: DurationS = Field(180.0, gt=0)
+    at_most: DurationS = Field(900.0, ge=0)
+
+    @model_validator(mode="after")
+    def _floor_below_ceiling(self) -> Self:
+        if self.at_least > self.at_most:
+            raise ValueError("expected 'at_least' of no more than 'at_most'")
+        return self
+
+
+class ExcitationSettings(ProtocolModel):
+    """The keys; see `excitation.yaml` for what each means."""
+
+    rate_frames = tuple(ExcitationFrames)
+    rests_on = (IRRADIANCE_KIND,)
+
+    protocol: Literal["excitation"] = "excitation"
+    first_charge: DurationS = Field(8.0, gt=0)
+    growth: Fraction = Field(0.03, gt=0, lt=1)
+    at_most: Count = Field(9, ge=2)
+    refine: Count = Field(3, ge=0)
+    bare: tuple[DurationS, ...] = Field((3.0, 10.0, 60.0, 900.0), min_length=1)
+    first: DurationS = Field(1.0, ge=0)
+    every: DurationS = Field(4.0, gt=0)
+    duration: DurationS = Field(90.0, gt=0, alias="for")
+    last_decay: DurationS = Field(180.0, gt=0)
+    rest: Rest = Rest()
+    samples: Count = Field(1, ge=1)
+    camera: CameraSettings = CameraSettings()
+    sites: Region = Field((0.1, 0.4, 0.8, 0.2))
+    patches: FilterPatches = Field(default_factory=dict)
+    states: Literal["auto", 1, 2, 3] = "auto"
+    saturated: bool = False
+
+    @model_validator(mode="after")
+    def _rising_charges(self) -> Self:
+        if any(later <= earlier for earlier, later in pairwise(self.bare)):
+            raise ValueError("expected charges in 'bare' that become longer and longer")
+        if self.first + self.every > self.duration:
+            raise ValueError(
+                f"for: {duration_text(self.duration)} leaves no two frames "
+                f"{duration_text(self.every)} apart; make it longer"
+            )
+        return self
+
+    def doubled_s(self, number: int) -> float:
+        """The charge of that number, from 1, while they double."""
+        return self.first_charge * 2.0 ** (number - 1)
+
+    def frame_times_s(self, lasting_s: float) -> list[float]:
+        """Planned begin of each frame after lamp off."""
+        times_s, pause_s = [self.first], self.every
+        while times_s[-1] + pause_s <= lasting_s:
+            times_s.append(times_s[-1] + pause_s)
+            pause_s *= PAUSES_GROW
+        return times_s
+
+    def longest_exposures_s(self, offers: CameraOffers, lasting_s: float) -> list[float]:
+        """Longest offered shutter time of each frame; the last one has the time of the one before.
+
+        A camera must be ready again before the next.
+        """
+        times_s = self.frame_times_s(lasting_s)
+        pauses_s = [later - earlier for earlier, later in pairwise(times_s)]
+        spare_s = offers.overhead_s + MARGIN_S
+        return [offers.exposure_at_most(pause_s - spare_s) for pause_s in (*pauses_s, pauses_s[-1])]
+
+    def settings(self, exposure_s: float) -> ExposureSettings:
+        """Camera settings with that shutter time."""
+        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
+
+    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+        """Shutter time of each dark frame."""
+        return dark_exposures_s(max(self.longest_exposures_s(offers, self.last_decay)), offers)
+
+    def ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+        """Begin after lamp off and shutter time of each metering frame."""
+        longest_s = max(self.longest_exposures_s(offers, self.duration))
+        at_s, ladder = self.first, []
+        for share in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
+            exposure_s = offers.exposure_at_most(longest_s * share)
+            ladder.append((at_s, exposure_s))
+            at_s += exposure_s + offers.overhead_s + MARGIN_S
+        return ladder
+
+    def regions(self) -> list[Region]:
+        """Where a glow is to be seen: every patch, or the strip on the sample."""
+        return list(self.patches.values()) or [self.sites]
+
+    def strip(self) -> list[Region]:
+        """Places along each of the regions, those of one after those of another."""
+        return [
+            (x + width * k / PLACES, y, width / PLACES, height)
+            for x, y, width, height in self.regions()
+            for k in range(PLACES)
+        ]
+
+
+LVF_ON = ByHand(
+    "lay the variable filter on the sample, between it and the lamp",
+    "every place is then charged by light of another wavelength",
+    "lvf on sample",
+)
+LVF_AWAY = ByHand(
+    "take the variable filter away",
+    "the lamp by itself charges the sample now",
+    "lvf away",
+)
+FRESH = ByHand(
+    "put in a fresh sample, one that has been in the dark for hours",
+    "it takes the place of waiting until the glow is gone",
+    "fresh sample",
+)
+
+
+@dataclass(frozen=True)
+class ExcitationUnit:
+    """What all units share."""
+
+    protocol: ExcitationSettings
+    album: Album
+
+    def darks(self, session: Session) -> list[Look]:
+        """One dark frame of each shutter time."""
+        frames = {frame.exposure_s: frame for frame in session.frames(FrameRole.DARK)}
+        return [self.album.look(frame) for frame in frames.values()]
+
+    def rates(self, frame: FrameRecord, darks: Sequence[Look]) -> FloatArray:
+        """(patches, places) along the strip, brightest channel above darkness, DN/s."""
+        seen = self.album.look(frame)
+        above = levels(seen) - dark_level(darks, frame.exposure_s)
+        return np.asarray(above.max(axis=1) / frame.exposure_s).reshape(-1, PLACES)
+
+    def rest(self, session: Session) -> None:
+        """Darkness until hardly anything glows, or another sample."""
+        rule = self.protocol.rest
+        if self.protocol.samples > 1:
+            session.ask(FRESH)
+            return
+        session.wait(rule.at_least, "resting in the dark")
+        rested_s = rule.at_least
+        exposure_s = max(
+            self.protocol.longest_exposures_s(session.rig[CAMERA].offers(), self.protocol.duration)
+        )
+        look_now = Shoot(FrameRole.REST, self.protocol.settings(exposure_s))
+        while True:
+            face_camera(session)
+            session.perform(look_now)
+            face_lamp(session)
+            dark = session.choose("dark again", lambda: self._is_dark(session), worst=False)
+            left_s = rule.at_most - rested_s
+            if dark or left_s <= 0:
+                return
+            session.wait(min(rule.check_every, left_s), "resting in the dark")
+            rested_s += rule.check_every
+
+    def _is_dark(self, session: Session) -> bool:
+        """Whether the glow of every patch is low against that just after the last charge."""
+        frames = [
+            *session.frames(ExcitationFrames.STRIP),
+            *session.frames(ExcitationFrames.BARE),
+            *session.frames(FrameRole.METER),
+        ]
+        darks = self.darks(session)
+        last_unit = max(frames, key=lambda frame: frame.start_time).unit
+        after = [frame for frame in frames if frame.unit == last_unit]
+        brightest = np.max([self.rates(frame, darks).max(axis=1) for frame in after], axis=0)
+        now = self.rates(session.frames(FrameRole.REST)[-1], darks).max(axis=1)
+        return bool((now < self.protocol.rest.below * brightest).all())
+
+
+@dataclass(frozen=True)
+class DarkUnit(ExcitationUnit):
+    """Dark frames at the exposures to come, before anything glows."""
+
+    name: str = "dark"
+
+    def run(self, session: Session) -> None:
+        """Warm the camera up, then photograph darkness."""
+        session.wait_until_warm("camera")
+        offers, regions = session.rig[CAMERA].offers(), self.protocol.regions()
+        exposures_s = self.protocol.dark_exposures_s(offers)
+        exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
+        dark_frames(session, self.name, regions, exposures)
+        shorter = [self.protocol.settings(time_s) for _, time_s in self.protocol.ladder(offers)[:3]]
+        Watcher(session, self.name, regions, None).insist_on_darkness(shorter)
+
+
+@dataclass(frozen=True)
+class _Meter(ExcitationUnit):
+    """A charge whose glow says how long to expose."""
+
+    def _meter(self, session: Session, unit: str, hand: ByHand, charge_s: float) -> None:
+        session.wait_until_warm("camera")
+        session.ask(hand)
+        ladder = self.protocol.ladder(session.rig[CAMERA].offers())
+        check_seen(session, ladder[0][0])
+        charge(session, charge_s)
+        session.run_sequence(
+            [
+                *lights_out(session),
+                *(
+                    at(time_s, Shoot(FrameRole.METER, self.protocol.settings(exposure_s)))
+                    for time_s, exposure_s in ladder
+                ),
+            ]
+        )
+        shorter = [self.protocol.settings(exposure_s) for _, exposure_s in ladder[:3]]
+        Watcher(session, unit, self.protocol.regions(), None).insist_on_glow(shorter)
+
+
+@dataclass(frozen=True)
+class StripMeter(_Meter):
+    """Through the variable filter."""
+
+    name: str = "strip-meter"
+
+    def run(self, session: Session) -> None:
+        """Lay the filter on, charge, a ladder of exposures."""
+        self._meter(session, self.name, LVF_ON, self.protocol.first_charge)
+
+
+@dataclass(frozen=True)
+class BareMeter(_Meter):
+    """Without the filter."""
+
+    name: str = "bare-meter"
+
+    def run(self, session: Session) -> None:
+        """Take the filter away, charge, a ladder of exposures."""
+        self.rest(session)
+        self._meter(session, self.name, LVF_AWAY, self.protocol.bare[0])
+
+
+#: Frames of a charge are made for it to glow at most this much brighter than the one looked at.
+HEADROOM = 2.0
+#: A growing exposure saves counts late in a decay.
+EXPOSURES_GROW = 16.0
+
+
+@dataclass(frozen=True)
+class _Charged(ExcitationUnit):
+    """One charge and the decay after it."""
+
+    def _charge(self, session: Session, purpose: str, charge_s: float, lasting_s: float) -> None:
+        self.rest(session)
+        offers = session.rig[CAMERA].offers()
+        schedule = self._schedule(session, purpose, charge_s, lasting_s)
+        longest_s = self.protocol.longest_exposures_s(offers, lasting_s)
+        check_seen(session, self.protocol.first)
+        charge(session, charge_s)
+        session.run_sequence(
+            [
+                *lights_out(session),
+                *(
+                    at(time_s, Shoot(purpose, self.protocol.settings(min(exposure_s, most_s))))
+                    for (time_s, exposure_s), most_s in zip(
+                        schedule.frames(), longest_s, strict=True
+                    )
+                ),
+            ]
+        )
+
+    def _schedule(
+        self, session: Session, purpose: str, charge_s: float, lasting_s: float
+    ) -> Schedule:
+        """Exposures by what was seen after the longest charge like this one, else by the meter."""
+        protocol, offers = self.protocol, session.rig[CAMERA].offers()
+        times_s = protocol.frame_times_s(lasting_s)
+        longest_s = max(protocol.longest_exposures_s(offers, lasting_s))
+
+        def decide() -> Schedule:
+            looked_s, frames = self._looked_at(session, purpose)
+            found = DecayMeter([self.album.look(frame) for frame in frames]).schedule(
+                times_s, offers, longest_s, EXPOSURES_GROW, session.warn
+            )
+            shorter = max(charge_s / looked_s / HEADROOM, 1.0)
+            exposures_s = [offers.exposure_at_most(one_s / shorter) for one_s in found.exposures_s]
+            return Schedule(found.times_s, tuple(exposures_s))
+
+        return session.choose("exposure", decide, Schedule.constant(times_s, longest_s))
+
+    def _looked_at(self, session: Session, purpose: str) -> tuple[float, list[FrameRecord]]:
+        """Charge time and frames of the longest charge of the kind."""
+        done = self._done(session, purpose)
+        if done:
+            return max(done, key=lambda one: one[0])
+        meter = f"{purpose}-meter"
+        return _lit_s(session, meter), [
+            f for f in session.frames(FrameRole.METER) if f.unit == meter
+        ]
+
+    def _done(self, session: Session, purpose: str) -> list[tuple[float, list[FrameRecord]]]:
+        """Charge time and frames of every charge of the kind so far."""
+        units: dict[str, list[FrameRecord]] = {}
+        for frame in session.frames(purpose):
+            units.setdefault(frame.unit, []).append(frame)
+        return [(_lit_s(session, unit), frames) for unit, frames in units.items()]
+
+    def _grown(
+        self, session: Session, done: Sequence[tuple[float, list[FrameRecord]]]
+    ) -> tuple[list[float], FloatArray]:
+        """Charge times, and the glow of every place in the first frame after each."""
+        darks = self.darks(session)
+        return [one[0] for one in done], np.array(
+            [self.rates(frames[0], darks) for _, frames in done]
+        )
+
+
+def _lit_s(session: Session, unit: str) -> float:
+    """For how long the lamp shone in a unit."""
+    times_s = [action.start_time for action in session.actions("lamp") if action.unit == unit]
+    return times_s[1] - times_s[0]
+
+
+@dataclass(frozen=True)
+class DoublingUnit(_Charged):
+    """Through the filter, twice as long as the one before, unless the glow has stopped growing."""
+
+    number: int
+
+    @property
+    def name(self) -> str:
+        """`strip-1`, `strip-2`, …"""
+        return UnitKind.STRIP.numbered(self.number)
+
+    def run(self, session: Session) -> None:
+        """Charge and photograph, or find that it is enough."""
+
+        def grows() -> bool:
+            done = self._done(session, ExcitationFrames.STRIP)
+            return len(done) == self.number - 1 and still_grows(
+                self._grown(session, done)[1], self.protocol.growth
+            )
+
+        if self.number > 2 and not session.choose("the glow still grows", grows, worst=True):
+            return
+        session.wait_until_warm("camera")
+        charge_s = self.protocol.doubled_s(self.number)
+        self._charge(session, ExcitationFrames.STRIP, charge_s, self.protocol.duration)
+
+
+@dataclass(frozen=True)
+class RefiningUnit(_Charged):
+    """Through the filter, for as long as tells most."""
+
+    number: int
+
+    @property
+    def name(self) -> str:
+        """`refine-1`, `refine-2`, …"""
+        return UnitKind.REFINE.numbered(self.number)
+
+    def run(self, session: Session) -> None:
+        """Charge and photograph."""
+        session.wait_until_warm("camera")
+
+        def decide() -> float:
+            return most_telling_s(
+                *self._grown(session, self._done(session, ExcitationFrames.STRIP))
+            )
+
+        worst_s = self.protocol.doubled_s(self.protocol.at_most)
+        charge_s = session.choose("charge for so many seconds", decide, worst_s)
+        self._charge(session, ExcitationFrames.STRIP, charge_s, self.protocol.duration)
+
+
+@dataclass(frozen=True)
+class BareUnit(_Charged):
+    """Under the lamp itself; after the last one, a longer decay."""
+
+    number: int
+
+    @property
+    def name(self) -> str:
+        """`bare-1`, `bare-2`, …"""
+        return UnitKind.BARE.numbered(self.number)
+
+    def run(self, session: Session) -> None:
+        """Charge and photograph."""
+        session.wait_until_warm("camera")
+        protocol = self.protocol
+        last = self.number == len(protocol.bare)
+        lasting_s = protocol.last_decay if last else protocol.duration
+        self._charge(session, ExcitationFrames.BARE, protocol.bare[self.number - 1], lasting_s)
 
 
 class Excitation(ExcitationSettings):

@@ -29,12 +29,10 @@ from labrig.acquire import (
 from labrig.quantity import Count, DurationS, duration_text
 from labrig.region import CENTRE, Region
 
-from .camera_calibration_units import HALF, CardDarkUnit
-from .steps.arrangement import Arrangement
-from .steps.camera_settings import CameraSettings
-from .steps.frame_times import frame_times_s
+from .camera_calibration import HALF, CardDarkUnit
+from .steps.camera_settings import CameraSettings, frame_times_s
 from .steps.lit_card import CardLight, CardMeterUnit, card_light, light_card
-from .steps.prepared import PutBackUnit
+from .steps.scenes import Arrangement, PutBackUnit
 
 
 class LampFrames(StrEnum):

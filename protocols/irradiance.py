@@ -15,12 +15,9 @@ from labrig.acquire import ProtocolModel, Unit
 from labrig.calibration import LVF_KIND
 from labrig.quantity import Count, DurationS
 
-from .lvf_units import StripUnit
-from .steps.arrangement import Arrangement
+from .lvf_calibration import StripUnit
 from .steps.camera_settings import CameraSettings
-from .steps.prepared import PutBackUnit
-from .steps.scene_units import SceneUnit, StillDarkUnit
-from .steps.still_life import StillLife
+from .steps.scenes import Arrangement, PutBackUnit, SceneUnit, StillDarkUnit, StillLife
 
 
 class CardFrames(StrEnum):

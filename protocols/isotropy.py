@@ -13,8 +13,7 @@ from labrig.acquire import ByHand, Session, Shoot, Unit, at
 from labrig.quantity import Count, DurationS, duration_text
 from labrig.region import Region
 
-from .steps.glow_settings import GlowSettings, metered_schedule
-from .steps.glow_units import DarkUnit, MeterUnit
+from .steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from .steps.patch_names import Patches
 from .steps.posing import lights_out
 

@@ -14,7 +14,7 @@ from labrig.record import unit_within
 from labrig.region import Region
 from labrig.yaml_file import validate
 
-from .excitation_settings import ExcitationFrames
+from .excitation import ExcitationFrames
 from .steps.patch_names import FilterPatches
 
 #: Protocols that measure every patch of the chain.

@@ -14,13 +14,11 @@ from labrig.acquire import ByHand, ProtocolModel, Unit
 from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.region import CENTRE
 
-from .decay import Decay
-from .decay_units import DecayUnit
-from .steps.arrangement import Arrangement
+from .decay import Decay, DecayUnit
 from .steps.camera_settings import CameraSettings
-from .steps.glow_units import DarkUnit, MeterUnit
+from .steps.glow import DarkUnit, MeterUnit
 from .steps.patch_names import Patches
-from .steps.prepared import Arranged, Prepared
+from .steps.scenes import Arranged, Arrangement, Prepared
 
 Charge = Annotated[DurationS, Field(gt=0)]
 

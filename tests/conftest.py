@@ -23,9 +23,9 @@ from matplotlib.figure import Figure
 
 from labrig import shipped
 from labrig.cli.ending import guarded
+from labrig.report.page import Shown, draw
 from labrig.report.plates import Plates
 from labrig.report.sections import Picture, Section
-from labrig.report.shown import Shown, draw
 from labrig.signals import STOP_SIGNALS
 from tests.analyse import recorded
 from tests.quick_yaml import read_quickly, write_quickly

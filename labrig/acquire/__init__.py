@@ -1,18 +1,16 @@
 """Devices by role, the rig file, protocols as units, the plan and the runner."""
 
 from labrig.acquire import roles
-from labrig.acquire.actions import Missed, Timed, at
-from labrig.acquire.by_hand import ByHand, TakenBack
+from labrig.acquire.actions import ByHand, Missed, TakenBack, Timed, at
 from labrig.acquire.connections import Connections, SerialPort
-from labrig.acquire.findings import Finding, Severity
-from labrig.acquire.part import PartUnit
 from labrig.acquire.planner import MOST_STEPS, Plan, Step, plan
-from labrig.acquire.protocol import ProtocolModel, Sample, Unit
+from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
 from labrig.acquire.readback import lights_that_read_back
 from labrig.acquire.registered import load_driver, read_protocol
 from labrig.acquire.rig import Rig, in_safe_order
 from labrig.acquire.rig_file import DeviceEntry, Optics, RigFile, read_rig_file
 from labrig.acquire.roles import *  # noqa: F403, a role is listed once, there
+from labrig.acquire.roles.role import Finding, Severity
 from labrig.acquire.runner import RunObserver, run_units
 from labrig.acquire.session import Session
 from labrig.acquire.values import CameraOffers, ExposureSettings, Frame

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TypeVar
 
-from labrig.acquire.by_hand import ByHand
+from labrig.acquire.actions import ByHand
 from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.registered import load_driver
 from labrig.acquire.rig import Rig

@@ -2,6 +2,7 @@
 
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
+from dataclasses import dataclass
 from typing import Any, ClassVar, Protocol, Self
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -9,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field
 from labrig.acquire.rig_file import RigFile
 from labrig.acquire.session import Session
 from labrig.calibration import CalibrationKind
-from labrig.record import FrameRole
+from labrig.record import FrameRole, unit_in
 from labrig.region import Region
 
 
@@ -71,3 +72,20 @@ class ProtocolModel(BaseModel):
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
         """Protocols on whose results this one's rest, of which the rig file names no run."""
         return [kind.protocol for kind in self.rests_on if rig.optics.named(kind) is None]
+
+
+@dataclass(frozen=True)
+class PartUnit:
+    """A unit of a protocol that is the part called `part` of a chain."""
+
+    part: str
+    unit: Unit
+
+    @property
+    def name(self) -> str:
+        """`decay/decay-1`."""
+        return unit_in(self.part, self.unit.name)
+
+    def run(self, session: Session) -> None:
+        """Do it, seeing what its own part has photographed."""
+        self.unit.run(session.within(self.part))

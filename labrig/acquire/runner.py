@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
-from labrig.acquire.by_hand import TakenBack
+from labrig.acquire.actions import TakenBack
 from labrig.acquire.protocol import Unit
 from labrig.acquire.readback import LightReadback
 from labrig.acquire.rig import Rig

@@ -8,8 +8,7 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Protocol, TypeVar
 
-from labrig.acquire.actions import Action, Missed, Timed
-from labrig.acquire.by_hand import ByHand, TakenBack
+from labrig.acquire.actions import Action, ByHand, Missed, TakenBack, Timed
 from labrig.acquire.readback import LightReadback
 from labrig.acquire.rig import Rig, device_errors
 from labrig.acquire.roles import CAMERA, HANDS, Guarded, KeptAwake, Shoot

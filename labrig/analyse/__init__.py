@@ -1,8 +1,7 @@
 """From the frames of a run to numbers: one file or package a protocol, each to its typed result."""
 
 from labrig.analyse.choices import Choices, read_run_protocol
-from labrig.analyse.inputs import Inputs
-from labrig.analyse.part import Part
+from labrig.analyse.part import Inputs, Part
 from labrig.analyse.series_fit import fit_series, fit_table
 from labrig.analyse.temperature import temperature_warnings
 

@@ -4,11 +4,9 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from labrig.analyse.clean import cleaned
+from labrig.analyse.frames import cleaned, insist_on_this_camera, intact_frames, timing_warnings
 from labrig.analyse.part import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
-from labrig.analyse.this_camera import insist_on_this_camera
-from labrig.analyse.timed_frames import intact_frames, timing_warnings
 from labrig.errors import DataError
 from labrig.reduce import reduce_patches
 from labrig.results import (

@@ -1,12 +1,70 @@
 """What the analysis of one protocol is given."""
 
-from dataclasses import dataclass
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass, field, replace
+from typing import Any, Self
 
 from labrig.acquire import RigFile
 from labrig.analyse.choices import Choices
-from labrig.analyse.inputs import Inputs
+from labrig.bench_optics import calibration
+from labrig.calibration import (
+    KINDS,
+    BlankFile,
+    CameraFile,
+    FadeFile,
+    IrradianceFile,
+    LvfFile,
+)
+from labrig.material import Material
 from labrig.record import RunRecord
+from labrig.results import EmissionSpectrum, FittedDecay, RunResult
+
+
+@dataclass(frozen=True)
+class Inputs:
+    """Calibrations and earlier results; None or empty where nothing is known.
+
+    Attributes
+    ----------
+    camera, blank, fade, lvf, irradiance
+        Calibrations, by the names of their kinds: from a rig file's `optics:`, or measured earlier
+        in the same run.
+    spectra
+        By patch; under "" of the only one.
+    decays
+        By patch.
+    materials
+        As excitation, decay and spectrum together say, by patch; under "" the only one.
+    """
+
+    camera: CameraFile | None = None
+    blank: BlankFile | None = None
+    fade: FadeFile | None = None
+    lvf: LvfFile | None = None
+    irradiance: IrradianceFile | None = None
+    spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)
+    decays: Mapping[str, FittedDecay] = field(default_factory=dict)
+    materials: Mapping[str, Material] = field(default_factory=dict)
+
+    @classmethod
+    def of(cls, rig: RigFile) -> Self:
+        """Read the files that the rig file names.
+
+        Raises
+        ------
+        UsageError
+            One is missing or malformed.
+        """
+        named: dict[str, Any] = {kind.name: calibration(rig, kind) for kind in KINDS}
+        return cls(**named)
+
+    def with_those_of(self, result: RunResult) -> Self:
+        """These, and what a result provides; of mappings by patch, the other patches stay."""
+        provided: dict[str, Any] = {
+            name: {**getattr(self, name), **value} if isinstance(value, Mapping) else value
+            for name, value in result.provides().items()
+        }
+        return replace(self, **provided)
 
 
 @dataclass(frozen=True)

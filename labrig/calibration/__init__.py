@@ -1,7 +1,7 @@
 """Calibrations of a bench as files: what its own protocols measure and later ones use.
 
 To add a kind, write its file's module with its `CalibrationKind` and list that in `KINDS`: rig
-files then have its key. Analyses find it in the field of `labrig.analyse.inputs.Inputs` that has
+files then have its key. Analyses find it in the field of `labrig.analyse.part.Inputs` that has
 its name.
 """
 

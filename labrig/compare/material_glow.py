@@ -3,7 +3,7 @@
 import numpy as np
 
 from labrig.compare.colorimetry import FloatArray
-from labrig.compare.emission import emission
+from labrig.compare.paper import emission
 from labrig.errors import UsageError
 from labrig.material import Material, phi1
 from labrig.optics import CameraResponse, Spectrum

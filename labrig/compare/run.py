@@ -8,10 +8,9 @@ from labrig.acquire import read_rig_file
 from labrig.bench_optics import calibration, camera_curves
 from labrig.calibration import LVF_KIND
 from labrig.compare.colorimetry import DEFAULT_WHITE, FloatArray, viewing
-from labrig.compare.emission import emission, emission_grid
 from labrig.compare.glow import GlowComparison, compare_glow, predicted_by
 from labrig.compare.material_glow import glow_of, in_colour
-from labrig.compare.paper import TABLE_1
+from labrig.compare.paper import TABLE_1, emission, emission_grid
 from labrig.compare.residuals import (
     Refit,
     Residuals,

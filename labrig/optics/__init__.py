@@ -1,6 +1,5 @@
 """Spectra and what light passes on its way to a number."""
 
-from labrig.optics.band import Bands, peak_shape
 from labrig.optics.camera import (
     CHANNELS,
     CameraResponse,
@@ -22,11 +21,18 @@ from labrig.optics.curve_file import (
     read_spectrum,
     read_transmittance,
 )
-from labrig.optics.lvf import NOMINAL_FWHM_NM, Lvf, nominal_lvf, seen_through
+from labrig.optics.lvf import (
+    NOMINAL_FWHM_NM,
+    Bands,
+    Lvf,
+    WavelengthMap,
+    nominal_lvf,
+    peak_shape,
+    seen_through,
+)
 from labrig.optics.piecewise import band_integrals, band_means, edges_about, hats, quadrature
 from labrig.optics.spectrum import Spectrum, Transmittance
 from labrig.optics.strip import SLICES, Strip
-from labrig.optics.wavelength_map import WavelengthMap
 
 __all__ = [
     "CHANNELS",

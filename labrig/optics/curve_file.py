@@ -5,20 +5,205 @@ Read are JSON of rawtoaces, of LSPDD and of a gel catalogue (color-filter-sds), 
 header wavelength and R, G, B (Jiang et al. 2013) or wavelength and value.
 """
 
+import csv
 import json
 import os
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import NamedTuple, TypeVar
+from typing import Any, NamedTuple, TypeAlias, TypeVar
+
+import numpy as np
 
 from labrig.errors import UsageError
 from labrig.input_file import read_text
-from labrig.optics.curve_json import curves_from_json
-from labrig.optics.curve_text import curves_from_text
 from labrig.optics.piecewise import FloatArray
 from labrig.optics.spectrum import Spectrum, Transmittance
 from labrig.yaml_file import did_you_mean
+
+#: Wavelengths, values and σ of a curve.
+Columns: TypeAlias = tuple[FloatArray, FloatArray, FloatArray | None]
+#: Name → columns; the only curve of a file without names is called "".
+Curves: TypeAlias = dict[str, Columns]
+
+WAVELENGTH = "wavelength_nm"
+_UNNAMED = {2: ("",), 4: ("R", "G", "B")}
+_EXPECTED_TEXT = (
+    "expected a header that begins with wavelength_nm or name,wavelength_nm; or, without a header, "
+    "wavelength and value, or wavelength, R, G and B"
+)
+#: Wavelengths of a table in µm or in Hz lie outside.
+PLAUSIBLE_NM = (100.0, 20_000.0)
+
+
+def curves_from_text(text: str) -> tuple[str, Curves]:
+    """Title (may be empty) and name → columns.
+
+    Raises
+    ------
+    ValueError
+        Not such a table.
+    """
+    lines = [line for line in text.splitlines() if line.strip()]
+    rows = _rows([line for line in lines if not line.startswith("#")])
+    title = next((line[8:].strip() for line in lines if line.startswith("#Camera:")), "")
+    header = rows[0]
+    if _is_number(header[0]):
+        if len(header) not in _UNNAMED:
+            raise ValueError(f"{_EXPECTED_TEXT}; got {len(header)} columns")
+        return title, _side_by_side(_UNNAMED[len(header)], rows)
+    if header[0] == WAVELENGTH and len(header) > 1:
+        return title, _side_by_side(tuple(header[1:]), rows[1:])
+    if header[:2] == ["name", WAVELENGTH] and len(header) == 3:
+        return title, _one_below_the_other(rows[1:])
+    raise ValueError(f"{_EXPECTED_TEXT}; got '{','.join(header[:3])}'")
+
+
+def sorted_columns(wavelength_nm: FloatArray, values: FloatArray) -> Columns:
+    """Rows sorted by wavelength, no σ."""
+    order = np.argsort(wavelength_nm, kind="stable")
+    return wavelength_nm[order], values[order], None
+
+
+def _rows(lines: list[str]) -> list[list[str]]:
+    if not lines:
+        raise ValueError("there is nothing in it")
+    if ";" in lines[0]:
+        raise ValueError("it has semicolons; save it with commas between and points in numbers")
+    try:
+        rows = list(csv.reader(lines)) if "," in lines[0] else [line.split() for line in lines]
+    except csv.Error as error:
+        raise ValueError(f"not a table ({error})") from None
+    rows = [[cell.strip() for cell in row] for row in rows]
+    odd = next((number for number, row in enumerate(rows) if len(row) != len(rows[0])), None)
+    if odd is not None:
+        raise ValueError(
+            f"row {odd + 1} has {len(rows[odd])} columns, the first has {len(rows[0])}"
+        )
+    return rows
+
+
+def _side_by_side(names: tuple[str, ...], rows: list[list[str]]) -> Curves:
+    if len(set(names)) < len(names):
+        twice = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the column '{twice}' stands twice")
+    table = _numbers(rows)
+    wavelength_nm, values, _ = sorted_columns(table[:, 0], table[:, 1:])
+    if names in (("value",), ("value", "sigma")):
+        sigma = values[:, 1] if len(names) == 2 else None
+        return {"": (wavelength_nm, values[:, 0], sigma)}
+    return {name: (wavelength_nm, values[:, k], None) for k, name in enumerate(names)}
+
+
+def _one_below_the_other(rows: list[list[str]]) -> Curves:
+    of_name: dict[str, list[list[str]]] = {}
+    for row in rows:
+        of_name.setdefault(row[0], []).append(row[1:])
+    tables = {name: _numbers(part) for name, part in of_name.items()}
+    return {name: sorted_columns(table[:, 0], table[:, 1]) for name, table in tables.items()}
+
+
+def _numbers(rows: list[list[str]]) -> FloatArray:
+    try:
+        table = np.array(rows, dtype=np.float64)
+    except ValueError as error:
+        raise ValueError(f"something is not a number ({error})") from None
+    if table.ndim != 2:
+        raise ValueError("there are no rows of numbers")
+    low, high = PLAUSIBLE_NM
+    if not ((table[:, 0] >= low) & (table[:, 0] <= high)).all():
+        raise ValueError(f"{WAVELENGTH} is expected from {low:g} to {high:g} nm in every row")
+    return table
+
+
+def _is_number(cell: str) -> bool:
+    try:
+        float(cell)
+    except ValueError:
+        return False
+    return True
+
+
+_EXPECTED_JSON = (
+    "; expected rawtoaces data, such as R, G and B under every wavelength in "
+    "spectral_data.data.main"
+)
+
+
+def curves_from_json(content: Any) -> tuple[str, Curves]:
+    """Title (may be empty) and name → columns.
+
+    Raises
+    ------
+    ValueError
+        None of the formats.
+    """
+    if isinstance(content, dict) and isinstance(content.get("spectraldata"), str):
+        return _lspdd(content)
+    if isinstance(content, dict) and isinstance(content.get("filters"), dict):
+        return "gel catalogue", _gels(content["filters"])
+    try:
+        return _rawtoaces(content)
+    except ValueError as error:
+        raise ValueError(f"{error}{_EXPECTED_JSON}") from None
+
+
+def _lspdd(content: dict[str, Any]) -> tuple[str, Curves]:
+    _, curves = curves_from_text(content["spectraldata"].replace("wavelength,", "wavelength_nm,"))
+    parts = (content.get(key) for key in ("brand", "category", "lamptype", "id"))
+    title = " ".join(str(part) for part in parts if part)
+    return title, {title or name: columns for name, columns in curves.items()}
+
+
+def _gels(filters: dict[str, Any]) -> Curves:
+    """Those of which there is a spectrum."""
+    return {
+        name: _columns(gel["sd"])
+        for name, gel in filters.items()
+        if isinstance(gel, dict) and isinstance(gel.get("sd"), dict)
+    }
+
+
+def _rawtoaces(content: Any) -> tuple[str, Curves]:
+    table = content
+    for key in ("spectral_data", "data", "main"):
+        if not isinstance(table, dict) or key not in table:
+            raise ValueError(f"the key '{key}' is missing")
+        table = table[key]
+    if not isinstance(table, dict) or len(table) < 2:
+        raise ValueError("there are fewer than two wavelengths")
+    wavelength_nm, values, _ = _columns(table)
+    if values.ndim == 1:
+        values = values[:, np.newaxis]
+    names = _entry(content["spectral_data"], "index", "main")
+    if names is None:
+        names = ["R", "G", "B"]
+    if not isinstance(names, list) or values.shape[1] != len(names):
+        raise ValueError("some wavelength has not one value for every name in index.main")
+    title = " ".join(
+        str(part)
+        for part in (_entry(content, "header", key) for key in ("manufacturer", "model"))
+        if part
+    )
+    return title, {
+        str(name): (wavelength_nm, values[:, column], None) for column, name in enumerate(names)
+    }
+
+
+def _columns(table: dict[str, Any]) -> Columns:
+    try:
+        wavelength_nm = np.array([float(key) for key in table])
+        values = np.array(list(table.values()), dtype=np.float64)
+    except (TypeError, ValueError):
+        raise ValueError("something is not a number") from None
+    return sorted_columns(wavelength_nm, values)
+
+
+def _entry(content: dict[str, Any], section: str, key: str) -> Any:
+    """`content[section][key]`, None if it is not there."""
+    part = content.get(section)
+    return part.get(key) if isinstance(part, dict) else None
+
 
 T = TypeVar("T")
 

@@ -1,15 +1,173 @@
 """A linear variable filter (LVF): a band whose wavelength depends on the place along a strip."""
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, fields
+from typing import Self
 
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.optics.band import Bands
 from labrig.optics.camera import CameraResponse
 from labrig.optics.piecewise import FloatArray, hats, quadrature
 from labrig.optics.spectrum import Spectrum
-from labrig.optics.wavelength_map import WavelengthMap
+
+#: Below this skewness the limit, a Gaussian, is as exact.
+_GAUSSIAN = 1e-9
+_LN2 = float(np.log(2.0))
+
+
+def peak_shape(distance_nm: FloatArray, fwhm_nm: ArrayLike, skew: ArrayLike) -> FloatArray:
+    """A skewed Gaussian of height 1.
+
+    exp(−ln 2 · [ln(1 + 2 a x / w) / a]²) with a = `skew` and w so that the full width at half
+    maximum is `fwhm_nm`; a > 0 reaches further to long wavelengths, a = 0 is a Gaussian (Fraser
+    and Suzuki, *Resolution of overlapping absorption bands by least squares procedures*, Anal.
+    Chem. 38, 1966).
+
+    Parameters
+    ----------
+    distance_nm
+        λ minus that of the peak.
+    fwhm_nm, skew
+        Broadcast against `distance_nm`.
+    """
+    a = np.asarray(skew, dtype=np.float64)
+    skewed = np.abs(a) > _GAUSSIAN
+    a = np.where(skewed, a, 1.0)
+    width = np.asarray(fwhm_nm, dtype=np.float64) * np.where(skewed, a / np.sinh(a), 1.0)
+    x = 2 * distance_nm / width
+    inside = 1 + a * x > 0
+    stretched = np.where(skewed, np.log1p(np.where(inside, a * x, 0.0)) / a, x)
+    shape: FloatArray = np.where(~skewed | inside, np.exp(-_LN2 * stretched**2), 0.0)
+    return shape
+
+
+@dataclass(frozen=True, eq=False)
+class Bands:
+    """Pass bands of a filter at some positions, every array of shape (positions,).
+
+    Attributes
+    ----------
+    centre_nm
+        Wavelength of highest transmission.
+    fwhm_nm
+        Full width at half maximum, above the leakage.
+    skew
+        As in `peak_shape`.
+    peak
+        Transmission at the centre, above the leakage.
+    leakage
+        Transmission everywhere else.
+    """
+
+    centre_nm: FloatArray
+    fwhm_nm: FloatArray
+    skew: FloatArray
+    peak: FloatArray
+    leakage: FloatArray
+
+    def transmission(self, wavelength_nm: FloatArray) -> FloatArray:
+        """T_p(λ) at (q,) wavelengths, shape (positions, q)."""
+        distance = wavelength_nm - self.centre_nm[:, np.newaxis]
+        shape = peak_shape(distance, self.fwhm_nm[:, np.newaxis], self.skew[:, np.newaxis])
+        return self.leakage[:, np.newaxis] + self.peak[:, np.newaxis] * shape
+
+    def between(self, position: FloatArray, wanted: FloatArray) -> Self:
+        """The bands at `wanted` positions, every figure interpolated along `position`."""
+        return type(self)(
+            *(np.interp(wanted, position, getattr(self, field.name)) for field in fields(self))
+        )
+
+
+#: Points at which a map is tested, and between which it is inverted.
+_SAMPLES = 2049
+
+
+@dataclass(frozen=True, eq=False)
+class WavelengthMap:
+    """λ(u) = Σ_k c_k ((u − u_0)/s)^k along a strip.
+
+    Parameters
+    ----------
+    coefficients
+        c, shape (k,), in nm, the constant first.
+    span
+        First and last position where the map holds: u_0 is their middle, s half their distance.
+    covariance
+        Of the coefficients, shape (k, k), in nm².
+
+    Raises
+    ------
+    ValueError
+        A map that does not rise or fall all the way within `span`.
+    """
+
+    coefficients: FloatArray
+    span: tuple[float, float]
+    covariance: FloatArray | None = None
+
+    def __post_init__(self) -> None:
+        steps = np.diff(self.wavelength_nm(np.linspace(*self.span, _SAMPLES)))
+        if not ((steps > 0).all() or (steps < 0).all()):
+            raise ValueError(
+                "the wavelength does not rise or fall all the way along the strip; check which "
+                "lines were taken for which"
+            )
+
+    @property
+    def rising(self) -> bool:
+        """Whether the wavelength grows with the position."""
+        first, last = self.wavelength_nm(np.array(self.span))
+        return bool(last > first)
+
+    def wavelength_nm(self, position: ArrayLike) -> FloatArray:
+        """Centre wavelengths at some positions."""
+        return self._powers(position) @ self.coefficients
+
+    def sigma_nm(self, position: ArrayLike) -> FloatArray:
+        """One standard deviation of `wavelength_nm`, 0 where no covariance is known."""
+        powers = self._powers(position)
+        if self.covariance is None:
+            return np.zeros(len(powers))
+        variance: FloatArray = np.einsum("pk,kl,pl->p", powers, self.covariance, powers)
+        return np.sqrt(np.maximum(variance, 0.0))
+
+    def position(self, wavelength_nm: ArrayLike) -> FloatArray:
+        """Where some wavelengths are, by Newton's method from a table.
+
+        Raises
+        ------
+        ValueError
+            A wavelength that is not on the strip.
+        """
+        wanted = np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
+        places = np.linspace(*self.span, _SAMPLES)
+        known = self.wavelength_nm(places)
+        if wanted.min() < known.min() or wanted.max() > known.max():
+            raise ValueError(
+                f"expected wavelengths from {known.min():.1f} to {known.max():.1f} nm, which the "
+                f"strip shows, got {wanted.min():.1f} to {wanted.max():.1f}"
+            )
+        order = slice(None) if self.rising else slice(None, None, -1)
+        position = np.interp(wanted, known[order], places[order])
+        for _ in range(2):
+            position = position - (self.wavelength_nm(position) - wanted) / self._slope(position)
+        return position
+
+    def _scaled(self, position: ArrayLike) -> FloatArray:
+        low, high = self.span
+        u = np.atleast_1d(np.asarray(position, dtype=np.float64))
+        return (u - (low + high) / 2) / ((high - low) / 2)
+
+    def _powers(self, position: ArrayLike) -> FloatArray:
+        return np.vander(self._scaled(position), len(self.coefficients), increasing=True)
+
+    def _slope(self, position: FloatArray) -> FloatArray:
+        low, high = self.span
+        orders = np.arange(1, len(self.coefficients))
+        lower = self._powers(position)[:, :-1]
+        slope: FloatArray = lower @ (orders * self.coefficients[1:]) / ((high - low) / 2)
+        return slope
+
 
 #: Of an LVF of which nothing else is known (paper, section 4.1).
 NOMINAL_FWHM_NM = 25.0

@@ -1,9 +1,7 @@
 """The run folder: written while it happens, read afterwards."""
 
 from labrig.record.attempt import AttemptWriter
-from labrig.record.description import DeviceLine, RunDescription
-from labrig.record.disk import REAL_DISK, Disk
-from labrig.record.durable import write_durably
+from labrig.record.durable import REAL_DISK, Disk, write_durably
 from labrig.record.frames import (
     PERSON,
     TAKEN_BACK,
@@ -14,7 +12,7 @@ from labrig.record.frames import (
     unit_in,
     unit_within,
 )
-from labrig.record.history import charges_s, interruptions, written_time
+from labrig.record.history import DeviceLine, RunDescription, charges_s, interruptions, written_time
 from labrig.record.journal import Document, read_journal
 from labrig.record.notes import add_note, read_notes
 from labrig.record.reading import Attempt, RunRecord, read_run

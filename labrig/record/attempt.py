@@ -8,8 +8,7 @@ from typing import Any
 
 import event_model
 
-from labrig.record.disk import Disk
-from labrig.record.durable import write_durably
+from labrig.record.durable import Disk, write_durably
 from labrig.record.frames import ActionRecord, FrameRecord, TemperatureRecord
 from labrig.record.journal import Journal
 

@@ -3,9 +3,36 @@
 import os
 from contextlib import suppress
 from pathlib import Path
+from typing import BinaryIO, Protocol
 
 from labrig.errors import DiskError
-from labrig.record.disk import REAL_DISK, Disk
+
+
+class Disk(Protocol):
+    """Takes what has to survive a power cut."""
+
+    def write(self, file: BinaryIO, data: bytes) -> None:
+        """Append to an unbuffered file and wait until the disk has it.
+
+        Raises
+        ------
+        OSError
+            Full, or gone; part of `data` may be in the file.
+        """
+
+
+class RealDisk:
+    """The disk of this PC."""
+
+    def write(self, file: BinaryIO, data: bytes) -> None:
+        """As `Disk.write`."""
+        left = memoryview(data)
+        while left:
+            left = left[file.write(left) :]
+        os.fsync(file.fileno())
+
+
+REAL_DISK: Disk = RealDisk()
 
 
 def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:

@@ -10,8 +10,7 @@ from types import TracebackType
 from typing import Any, BinaryIO, Self
 
 from labrig.errors import DataError, DiskError
-from labrig.record.disk import REAL_DISK, Disk
-from labrig.record.durable import write_durably
+from labrig.record.durable import REAL_DISK, Disk, write_durably
 
 JOURNAL = "journal.jsonl"
 Document = tuple[str, dict[str, Any]]

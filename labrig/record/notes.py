@@ -4,8 +4,7 @@ from datetime import UTC, datetime
 from pathlib import Path
 
 from labrig.errors import DiskError, UsageError
-from labrig.record.disk import REAL_DISK
-from labrig.record.durable import sync_folder
+from labrig.record.durable import REAL_DISK, sync_folder
 
 _NAME = "notes.md"
 

@@ -8,9 +8,6 @@ from .dark import (
     fit_dark as fit_dark,
     hot_pixels as hot_pixels,
 )
-from .exif import (
-    read_exif as read_exif,
-)
 from .frame import (
     LinearFrame as LinearFrame,
     RegionSums as RegionSums,
@@ -46,6 +43,7 @@ from .planes import (
 )
 from .raw import (
     RawFrame as RawFrame,
+    read_exif as read_exif,
     read_raw as read_raw,
 )
 from .saturation import (

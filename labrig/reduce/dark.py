@@ -7,11 +7,10 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import DataError
-from labrig.reduce.histogram import histogram
 from labrig.reduce.noise import Floats
-from labrig.reduce.outliers import OUTLIER_SIGMAS
-from labrig.reduce.planes import PixelMask
+from labrig.reduce.planes import OUTLIER_SIGMAS, PixelMask
 from labrig.reduce.raw import RawFrame
+from labrig.reduce.saturation import histogram
 
 #: Exposures that differ by less than cameras round them by are one exposure.
 SAME_EXPOSURE = 0.02

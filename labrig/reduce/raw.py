@@ -1,6 +1,13 @@
 """A RAW file as the numbers the sensor counted, with what the camera says about them."""
 
 import io
+import logging
+import math
+import os
+import tempfile
+import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -9,12 +16,182 @@ import numpy as np
 
 from labrig.errors import FrameError
 from labrig.input_file import read_bytes
-from labrig.reduce.cfa import channels_of, side_of
-from labrig.reduce.exif import Exif, read_exif
-from labrig.reduce.noise import Mosaic
-from labrig.reduce.quiet import quiet_stderr
+from labrig.reduce.cfa import MONOCHROME, Letters, channels_of, side_of, smallest_square
+from labrig.reduce.dng import DngPattern, read_dng
+from labrig.reduce.noise import Floats, Mosaic
 from labrig.reduce.saturation import clip_level
-from labrig.reduce.sensor import sensor_pattern
+
+_STDERR = 2
+#: How LibRaw's lines begin (it names the file, which a buffer has not), and those of its libjpeg.
+_PREFIXES = (b"unknown file:", b"Corrupt JPEG data:", b"Premature end of JPEG file")
+#: The process has one stderr: two redirections at once would restore each other's.
+_lock = threading.Lock()
+
+
+@contextmanager
+def quiet_stderr() -> Iterator[None]:
+    """While open, LibRaw's lines on the process's stderr are dropped.
+
+    Lines that other threads write meanwhile are passed on at the end.
+    """
+    with _lock, tempfile.TemporaryFile() as caught:
+        try:
+            kept = os.dup(_STDERR)
+        except OSError:  # a process without stderr has nothing to keep quiet
+            yield
+            return
+        os.dup2(caught.fileno(), _STDERR)
+        try:
+            yield
+        finally:
+            os.dup2(kept, _STDERR)
+            os.close(kept)
+            caught.seek(0)
+            for line in caught:
+                if not line.startswith(_PREFIXES):
+                    os.write(_STDERR, line)
+
+
+@dataclass(frozen=True)
+class Exif:
+    """EXIF of one frame; None where absent, unreadable or a placeholder such as 0.
+
+    `lens` is its name and focal length, as far as the camera tells. `dng`: the file says that it is
+    a DNG.
+    """
+
+    exposure_s: float | None = None
+    iso: float | None = None
+    f_number: float | None = None
+    make: str | None = None
+    model: str | None = None
+    lens: str | None = None
+    dng: bool = False
+
+
+#: The value by which EXIF 2.3 says "more than 65534, look elsewhere".
+_ISO_OVERFLOW = 65535
+#: What exifread calls the tag that only DNG files have: by its number, as long as it has no name.
+_DNG_VERSION = ("Image Tag 0xC612", "Image DNGVersion")
+
+
+# exifread warns through logging of every odd tag; what matters shows as None.
+logging.getLogger("exifread").setLevel(logging.CRITICAL)
+
+
+def read_exif(content: bytes) -> Exif:
+    """EXIF in the bytes of a RAW file.
+
+    Damaged EXIF is as good as none: the picture can be reduced without it.
+    """
+    import exifread  # with its maker-note tables, only when a RAW file is read
+
+    try:
+        tags: dict[str, Any] = exifread.process_file(io.BytesIO(content), details=False)
+    except Exception:  # a damaged file can fail anywhere in exifread, with any exception
+        return Exif()
+    speeds = (_positive(tags, name) for name in ("ISOSpeedRatings", "RecommendedExposureIndex"))
+    return Exif(
+        exposure_s=_positive(tags, "ExposureTime"),
+        iso=next((iso for iso in speeds if iso is not None and iso != _ISO_OVERFLOW), None),
+        f_number=_positive(tags, "FNumber"),
+        make=_text(tags, "Image Make"),
+        model=_text(tags, "Image Model"),
+        lens=_lens(tags),
+        dng=any(name in tags for name in _DNG_VERSION),
+    )
+
+
+def _positive(tags: dict[str, Any], name: str) -> float | None:
+    """First value of a tag, in the EXIF directory or, as TIFF/EP has it, beside the image."""
+    for directory in ("EXIF", "Image"):
+        values = getattr(tags.get(f"{directory} {name}"), "values", None)
+        try:
+            number = float(values[0]) if values else 0.0
+        except (TypeError, ValueError, ZeroDivisionError, OverflowError, IndexError):
+            continue
+        if number > 0 and math.isfinite(number):
+            return number
+    return None
+
+
+def _lens(tags: dict[str, Any]) -> str | None:
+    """`EF50mm f/1.4 USM, 50 mm`."""
+    focal_mm = _positive(tags, "FocalLength")
+    said = (_text(tags, "EXIF LensModel"), None if focal_mm is None else f"{focal_mm:g} mm")
+    return ", ".join(filter(None, said)) or None
+
+
+def _text(tags: dict[str, Any], name: str) -> str | None:
+    """A tag's text without the padding cameras write, None if nothing legible is left."""
+    words = str(tags.get(name, "")).split()
+    text = " ".join(words)
+    return text if text.isprintable() and text else None
+
+
+#: LibRaw's colour numbers: the second green, in the blue's row, is 3.
+_RGBG = "RGBG"
+#: LibRaw's number of the channel whose black level stands for each letter.
+_BLACK_NUMBER = {"R": 0, "G": 1, "B": 2, MONOCHROME: 0}
+#: Rows of an X-Trans pattern.
+_X_TRANS = 6
+
+
+def sensor_pattern(raw: Any, dng: bytes | None) -> tuple[str, tuple[float, ...]]:
+    """`cfa` and `black` of a `RawFrame`.
+
+    Parameters
+    ----------
+    raw
+        An open rawpy file.
+    dng
+        Its bytes if it is a DNG, whose own tags then go before what LibRaw makes of them.
+
+    Raises
+    ------
+    FrameError
+        The sensor has other colours, or no pattern that is known for certain.
+    """
+    if dng is not None:
+        found = read_dng(dng, raw.sizes.raw_height, raw.sizes.raw_width)
+        if found is not None:
+            return smallest_square(*_from_first_pixel(raw, found))
+    return smallest_square(*_by_libraw(raw))
+
+
+def _from_first_pixel(raw: Any, found: DngPattern) -> tuple[Letters, Floats]:
+    """Both repeats of a DNG, shifted to where LibRaw's visible part begins."""
+    shift = (found.corner[0] - raw.sizes.top_margin, found.corner[1] - raw.sizes.left_margin)
+    colours = np.roll(found.colours, shift, axis=(0, 1))
+    if found.black is not None:
+        return colours, np.roll(found.black, shift, axis=(0, 1))
+    # LibRaw then has measured it in the masked borders, or knows the camera.
+    by_number = raw.black_level_per_channel
+    numbers = [_BLACK_NUMBER.get(str(letter), 0) for letter in colours.flat]
+    return colours, np.array([float(by_number[i]) for i in numbers]).reshape(colours.shape)
+
+
+def _by_libraw(raw: Any) -> tuple[Letters, Floats]:
+    """Colours and black levels as LibRaw says; its patterns begin at the first visible pixel."""
+    pattern, levels = raw.raw_pattern, raw.black_level_per_channel
+    if pattern is None or pattern.shape == (1, 1):
+        return np.array([[MONOCHROME]]), np.array([[float(levels[0])]])
+    names = raw.color_desc.decode("ascii", "replace")
+    if names != _RGBG:
+        raise FrameError(
+            f"expected a sensor with filters of red, green and blue, got {names}; "
+            "labrig cannot reduce this kind of sensor"
+        )
+    margins = (raw.sizes.top_margin, raw.sizes.left_margin)
+    if len(pattern) == _X_TRANS and any(margin % _X_TRANS for margin in margins):
+        # LibRaw and rawpy then count the pattern's rows from different ones.
+        raise FrameError(
+            "expected an X-Trans pattern whose repeats begin at the border, got margins "
+            f"{margins}; convert the file to DNG"
+        )
+    colours = np.array(list(names))[pattern]
+    return colours, np.asarray(levels, dtype=np.float64)[pattern]
+
 
 #: No camera's file is larger.
 MOST_BYTES = 1_000_000_000

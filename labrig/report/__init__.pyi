@@ -7,6 +7,9 @@ from .curve_sketch import (
     describe_curves as describe_curves,
     draw_curves as draw_curves,
 )
+from .decay_figures import (
+    middles_s as middles_s,
+)
 from .figure_style import (
     DASHED as DASHED,
     EDGE_PT as EDGE_PT,
@@ -16,15 +19,10 @@ from .figure_style import (
     SMALL_PT as SMALL_PT,
     WIDTH_PT as WIDTH_PT,
     figure_style as figure_style,
-    new_figure as new_figure,
-    place as place,
-)
-from .fitted_curve import (
-    middles_s as middles_s,
-)
-from .legend import (
     legend_above as legend_above,
     lined as lined,
+    new_figure as new_figure,
+    place as place,
 )
 from .material_tables import (
     comparison_table as comparison_table,
@@ -36,16 +34,14 @@ from .page import (
 from .registered import (
     render as render,
 )
-from .rendering import (
-    Rendered as Rendered,
-    Source as Source,
-)
 from .run_sections import (
     lamp_sections as lamp_sections,
     temperature_sections as temperature_sections,
 )
 from .sections import (
     Picture as Picture,
+    Rendered as Rendered,
     Section as Section,
+    Source as Source,
     Table as Table,
 )

@@ -4,8 +4,7 @@ from typing import Any
 
 import numpy as np
 
-from labrig.report.rendering import Rendered, Source
-from labrig.report.sections import Section, Table
+from labrig.report.sections import Rendered, Section, Source, Table
 from labrig.results import RunResult, leaves
 
 #: Longer arrays are not shown, only how long they are.

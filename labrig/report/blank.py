@@ -15,13 +15,14 @@ from labrig.report.figure_style import (
     PAPER,
     channel_colour,
     error_bars,
+    legend_above,
+    lined,
+    marked,
     new_figure,
     place,
     points,
 )
-from labrig.report.legend import legend_above, lined, marked
-from labrig.report.rendering import Rendered, Source
-from labrig.report.sections import Picture, Section, Table
+from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import BlankResult
 from labrig.written_numbers import plus_minus, rounded
 

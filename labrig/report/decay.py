@@ -12,17 +12,27 @@ from labrig.report.content import (
     GlowPhotograph,
     PatchReport,
 )
-from labrig.report.decay_figures import linear_decay, logarithmic_decay, values_below_axis
+from labrig.report.decay_figures import (
+    linear_decay,
+    logarithmic_decay,
+    noise_figure,
+    overview_figures,
+    residual_figure,
+    timing_figure,
+    values_below_axis,
+    visible_parts,
+)
 from labrig.report.methods import REFERENCES, UNKNOWN, methods
-from labrig.report.noise_figure import noise_figure, visible_parts
 from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
-from labrig.report.rendering import Rendered, Source
-from labrig.report.residual_figure import residual_figure
-from labrig.report.run_figures import overview_figures, timing_figure
-from labrig.report.sections import Picture, Section
+from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.report.stability import Repeat, Steady, repeats, steady
 from labrig.report.swatches import Swatch, swatches
-from labrig.report.timing import FrameTiming, Lateness, frame_timings, lateness
+from labrig.report.timing import (
+    FrameTiming,
+    Lateness,
+    frame_timings,
+    lateness,
+)
 from labrig.results import DecayPatch, DecayResult, FittedDecay, Series
 
 #: With more patches than this, photographs show their numbers and not their names.

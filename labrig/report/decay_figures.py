@@ -1,34 +1,111 @@
 """A decay as measured and fitted, on a linear and on a logarithmic scale."""
 
 import math
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from functools import partial
 
 import numpy as np
 from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
-from matplotlib.ticker import FuncFormatter
-from numpy.typing import NDArray
+from matplotlib.ticker import FuncFormatter, MaxNLocator
 
+from labrig.fit.decay import exponential_means_and_slopes
+from labrig.report.content import PatchReport
 from labrig.report.figure_style import (
+    BAND_OPACITY,
+    DASH_DOTTED,
     DASHED,
+    DOTTED,
     INK,
     LEFT_PT,
+    LONG_DASHED,
     MARKERS,
     MUTED,
+    OTHER_CHANNELS,
     PAPER,
+    SHADE,
+    LineStyle,
     channel_colour,
     error_bars,
+    legend_above,
+    lined,
+    mark_decades,
+    marked,
     new_figure,
     place,
     points,
+    shaded,
 )
-from labrig.report.fitted_curve import fitted_curve, middles_s
-from labrig.report.legend import BAND_OPACITY, legend_above, lined, marked, shaded
-from labrig.report.log_axis import mark_decades
-from labrig.results import FittedDecay, Series
+from labrig.report.timing import FrameTiming
+from labrig.results import FittedDecay, FloatArray, NoiseBudget, Series
 from labrig.written_numbers import power_of_ten, rounded
 
-FloatArray = NDArray[np.float64]
+POINTS = 160
+
+
+@dataclass(frozen=True, eq=False)
+class Curve:
+    """The fit as a line.
+
+    Parameters
+    ----------
+    t_s
+        Shape (m,): middles of exposures.
+    total
+        Shape (m, C), what frames there would measure.
+    sigma
+        Shape (m,), the standard uncertainty of `total` in the brightest channel; the covariance of
+        a fit says nothing of the others. Infinite where a parameter is not known.
+    states
+        Shape (m, n): each state in the brightest channel, offset left out.
+    brightest
+        That channel's number.
+    """
+
+    t_s: FloatArray
+    total: FloatArray
+    sigma: FloatArray
+    states: FloatArray
+    brightest: int
+
+
+def middles_s(series: Series) -> FloatArray:
+    """Middle of each exposure after lamp off, where its value is drawn."""
+    return series.t_s + series.exposure_s / 2
+
+
+def fitted_curve(series: Series, fit: FittedDecay) -> Curve:
+    """`fit` along the times of `series`, for the exposures that frames had around them."""
+    order = np.argsort(series.t_s, kind="stable")
+    known_t, known_exposure = series.t_s[order], series.exposure_s[order]
+    t_s = np.linspace(known_t[0], known_t[-1], POINTS)
+    exposure_s = np.interp(t_s, known_t, known_exposure)
+    middle_s = t_s + exposure_s / 2
+    states = [state.amplitude * np.exp(-state.k_r_per_s * middle_s) for state in fit.states]
+    return Curve(
+        t_s=middle_s,
+        total=fit.predict(t_s, exposure_s),
+        sigma=_sigma(fit, t_s, exposure_s),
+        states=np.stack(states, axis=1),
+        brightest=fit.brightest,
+    )
+
+
+def _sigma(fit: FittedDecay, t_s: FloatArray, exposure_s: FloatArray) -> FloatArray:
+    """σ = √(J Cov Jᵀ), J the derivatives by k₁, a₁, k₂, a₂, …, offset."""
+    if not np.isfinite(fit.covariance).all():
+        return np.full_like(t_s, np.inf)
+    rates = np.array([state.k_r_per_s for state in fit.states])
+    amplitudes = np.array([state.amplitude for state in fit.states])
+    means, slopes = exponential_means_and_slopes(rates, t_s, exposure_s)
+    jacobian = np.ones((len(t_s), len(fit.covariance)))
+    jacobian[:, 0:-1:2] = amplitudes * slopes / rates
+    jacobian[:, 1:-1:2] = means
+    variance = np.einsum("mp,pq,mq->m", jacobian, fit.covariance, jacobian)
+    return np.asarray(np.sqrt(np.maximum(variance, 0.0)))
+
 
 TIME_LABEL = "Time after lamp off / s"
 SIGNAL_LABEL = "Signal / (DN/s)"
@@ -176,3 +253,230 @@ def _legend(figure: Figure, series: Series, fit: FittedDecay | None) -> None:
     if not series.usable.all():
         entries.append(marked("left out", "o", MUTED, PAPER))
     legend_above(figure, entries, columns=7)
+
+
+RESIDUALS_HEIGHT_PT = 268.0
+LOW_HEIGHT_PT = 200.0
+BAND = 2.0
+#: Beyond this many σ a residual is drawn at the edge of the figure.
+FARTHEST = 8.0
+#: A frame's common deviation is shown if its own noise leaves it known to this, or to three times
+#: what the best frame has.
+COMMON_SIGMA = 0.02
+
+
+@dataclass(frozen=True, eq=False)
+class Residuals:
+    """Deviations of the values from the fit.
+
+    Parameters
+    ----------
+    normalised
+        Shape (n, C): over the standard deviation expected of a value, flicker included.
+    common, common_sigma
+        Shape (n,): relative deviation that fits all channels of a frame best, and what photon and
+        read noise leave it uncertain by.
+    """
+
+    normalised: FloatArray
+    common: FloatArray
+    common_sigma: FloatArray
+
+
+def residuals(series: Series, fit: FittedDecay) -> Residuals:
+    """Of all rows of `series`, those left out of the fit, too."""
+    model = fit.predict(series.t_s, series.exposure_s)
+    signal = model - fit.offsets
+    deviation = series.values - model
+    # Without σ (a table from elsewhere) the scatter of the residuals has to do.
+    scatter = np.full_like(deviation, np.sqrt(np.mean(deviation**2)) or 1.0)
+    sigma = np.where(np.isfinite(series.sigma), series.sigma, scatter)
+    information = np.sum((signal / sigma) ** 2, axis=1)
+    information = np.where(information > 0, information, np.nan)
+    return Residuals(
+        normalised=deviation / np.hypot(sigma, fit.flicker * signal),
+        common=np.sum(deviation * signal / sigma**2, axis=1) / information,
+        common_sigma=1 / np.sqrt(information),
+    )
+
+
+def residual_figure(series: Series, fit: FittedDecay) -> Figure:
+    """Normalised residuals; with several channels below them what a frame's channels share."""
+    left = residuals(series, fit)
+    several = len(series.channels) > 1
+    figure = new_figure(RESIDUALS_HEIGHT_PT if several else LOW_HEIGHT_PT)
+    upper = place(figure, left=LEFT_PT, bottom=136 if several else 38, right=12, top=30)
+    t_s, usable = middles_s(series), series.usable
+    last = float(t_s.max())
+    upper.axhspan(-BAND, BAND, color=SHADE, linewidth=0)
+    upper.axhline(0, color=MUTED, linewidth=0.8)
+    cut = np.clip(left.normalised, -FARTHEST, FARTHEST)
+    for number, name in enumerate(series.channels):
+        marker = MARKERS[number % len(MARKERS)]
+        colour = channel_colour(name, number)
+        for rows, face in ((usable, colour), (~usable, PAPER)):
+            points(upper, t_s[rows], cut[rows, number], marker, colour, face, size=3.6)
+    _residual_legend(figure, series)
+    reach = float(np.abs(cut[usable]).max()) if usable.any() else BAND
+    upper.set_ylim(-max(reach * 1.1, 3.2), max(reach * 1.1, 3.2))
+    upper.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
+    upper.set_ylabel("Residual / σ")
+    if not several:
+        upper.set_xlabel(TIME_LABEL)
+        return figure
+    upper.tick_params(labelbottom=False)
+    lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=150, share_x=upper)
+    lower.axhspan(-200 * fit.flicker, 200 * fit.flicker, color=SHADE, linewidth=0)
+    lower.axhline(0, color=MUTED, linewidth=0.8)
+    known = left.common_sigma <= max(COMMON_SIGMA, 3 * np.nanmin(left.common_sigma))
+    shown = known & usable if (known & usable).any() else known
+    common, common_sigma = 100 * left.common[shown], 100 * left.common_sigma[shown]
+    error_bars(lower, t_s[shown], common, common_sigma, INK)
+    points(lower, t_s[shown], common, "o", INK, INK, size=2.6)
+    reach = max(
+        float(np.max(np.abs(left.common[shown]) + left.common_sigma[shown])), 2.4 * fit.flicker
+    )
+    lower.set_ylim(-110 * reach, 110 * reach)
+    lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
+    lower.set_ylabel("In common / %")
+    lower.set_xlabel(TIME_LABEL)
+    return figure
+
+
+def _residual_legend(figure: Figure, series: Series) -> None:
+    entries = [
+        marked(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
+        for number, name in enumerate(series.channels)
+    ]
+    if len(series.channels) > 1:
+        entries.append(marked("in common", ".", INK))
+    if not series.usable.all():
+        entries.append(marked("left out", "o", MUTED, PAPER))
+    legend_above(figure, entries, columns=7)
+
+
+NOISE_HEIGHT_PT = 268.0
+#: Parts below this share of the whole are not worth their line.
+LEAST_SHARE = 0.03
+_LINES: dict[str, tuple[str, LineStyle]] = {
+    "photons": (OTHER_CHANNELS[1], "-"),
+    "reading": (OTHER_CHANNELS[2], DASHED),
+    "uneven light": (OTHER_CHANNELS[3], DASH_DOTTED),
+    "flicker": (OTHER_CHANNELS[0], DOTTED),
+    "dark level": (MUTED, LONG_DASHED),
+}
+#: Where nothing is seen any more, how little need not be shown.
+MOST_PERCENT = 300.0
+
+
+def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
+    """The parts that somewhere are worth a line, by their names."""
+    parts = {
+        "photons": budget.photons,
+        "reading": budget.reading,
+        "uneven light": budget.uneven,
+        "flicker": budget.flicker,
+        "dark level": budget.dark_level,
+    }
+    worth = LEAST_SHARE * budget.together
+    return {name: part for name, part in parts.items() if (part > worth).any()}
+
+
+def noise_figure(budget: NoiseBudget) -> Figure:
+    """Relative standard uncertainty of a value of the brightest channel, and what it is made of."""
+    figure = new_figure(NOISE_HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
+    together = 100 * budget.together
+    axes.set_yscale("log")
+    # Broad and pale, since the largest part is nearly as large.
+    entries: list[Artist] = [lined("together", INK, width=4.5, opacity=BAND_OPACITY)]
+    shown = [together]
+    axes.plot(budget.t_s, together, color=INK, linewidth=4.5, alpha=BAND_OPACITY)
+    for name, part in visible_parts(budget).items():
+        percent, (colour, style) = 100 * part, _LINES[name]
+        axes.plot(budget.t_s, percent, color=colour, linewidth=1.2, linestyle=style)
+        entries.append(lined(name, colour, style))
+        shown.append(percent[percent > LEAST_SHARE * together])
+    low, high = min(part.min() for part in shown), max(part.max() for part in shown)
+    axes.set_ylim(0.8 * low, 1.3 * max(min(high, MOST_PERCENT), together.min()))
+    mark_decades(axes)
+    last = float(budget.t_s.max())
+    axes.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
+    axes.set_xlabel(TIME_LABEL)
+    axes.set_ylabel("σ of a value / % of the signal")
+    legend_above(figure, entries, columns=3)
+    return figure
+
+
+SMALL_WIDTH_PT, SMALL_HEIGHT_PT = 190.0, 140.0
+SMALL_FONT_PT = 9.5
+TIMING_HEIGHT_PT = 200.0
+
+
+def overview_figures(patches: Sequence[PatchReport]) -> list[Callable[[], Figure]]:
+    """What draws a small logarithmic decay for each patch, all with the same axes."""
+    ends = [log_axis_ends(patch.series) for patch in patches]
+    low, high = min(end[0] for end in ends), max(end[1] for end in ends)
+    last_s = max(float(middles_s(patch.series).max()) for patch in patches) or 1.0
+    return [partial(_small_decay, patch, low, high, last_s) for patch in patches]
+
+
+def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> Figure:
+    figure = new_figure(SMALL_HEIGHT_PT, SMALL_WIDTH_PT)
+    axes = place(figure, left=50, bottom=32, right=14, top=6)
+    axes.set_yscale("log", nonpositive="clip")
+    axes.set_ylim(low, high)
+    axes.set_xlim(-0.03 * last_s, 1.03 * last_s)
+    axes.xaxis.set_major_locator(MaxNLocator(4))
+    mark_decades(axes, most=6)
+    axes.tick_params(labelsize=SMALL_FONT_PT, pad=2)
+    axes.set_xlabel("Time / s", fontsize=SMALL_FONT_PT)
+    axes.set_ylabel("DN/s", fontsize=SMALL_FONT_PT)
+    series = patch.series
+    curve = fitted_curve(series, patch.fit) if isinstance(patch.fit, FittedDecay) else None
+    for number, name in enumerate(series.channels):
+        colour = channel_colour(name, number)
+        axes.plot(
+            middles_s(series)[series.usable],
+            series.values[series.usable, number],
+            linestyle="none",
+            marker=MARKERS[number % len(MARKERS)],
+            markersize=2.2,
+            markeredgewidth=0,
+            color=colour,
+        )
+        if curve is not None:
+            axes.plot(curve.t_s, curve.total[:, number], color=colour, linewidth=0.9)
+    return figure
+
+
+def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
+    """How much later than planned each exposure began, one mark a frame, one colour a unit."""
+    units = list(dict.fromkeys(timing.unit for timing in timings))
+    several = 1 < len(units) <= len(MARKERS)
+    figure = new_figure(TIMING_HEIGHT_PT)
+    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46 if several else 14)
+    axes.axhline(0, color=MUTED, linewidth=0.8)
+    entries = []
+    for number, unit in enumerate(units):
+        of_unit = [timing for timing in timings if timing.unit == unit]
+        marker = MARKERS[number % len(MARKERS)]
+        colour = INK if number == 0 else OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
+        entries.append(marked(unit, marker, colour))
+        axes.plot(
+            [timing.t_s for timing in of_unit],
+            [1e3 * timing.late_s for timing in of_unit],
+            linestyle="none",
+            marker=marker,
+            markersize=3.6,
+            color=colour,
+        )
+    late_ms = np.array([1e3 * timing.late_s for timing in timings])
+    reach = max(float(np.abs(late_ms).max()), 0.1)
+    axes.set_ylim(min(float(late_ms.min()) * 1.15, -0.08 * reach), 1.15 * reach)
+    axes.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
+    axes.set_xlabel(TIME_LABEL)
+    axes.set_ylabel("Late by / ms")
+    if several:
+        legend_above(figure, entries, columns=4)
+    return figure

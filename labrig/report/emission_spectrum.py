@@ -10,19 +10,22 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
 
 from labrig.report.figure_style import (
+    BAND_OPACITY,
     INK,
     LEFT_PT,
     MARKERS,
     MUTED,
     OTHER_CHANNELS,
     error_bars,
+    legend_above,
+    lined,
+    marked,
     new_figure,
     place,
     points,
+    shaded,
 )
-from labrig.report.legend import BAND_OPACITY, legend_above, lined, marked, shaded
-from labrig.report.rendering import Rendered, Source
-from labrig.report.sections import Picture, Section, Table
+from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import (
     EmissionSpectrum,
     EmissionSpectrumResult,

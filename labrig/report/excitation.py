@@ -16,13 +16,14 @@ from labrig.report.figure_style import (
     OTHER_CHANNELS,
     RULE,
     error_bars,
+    legend_above,
+    lined,
+    marked,
     new_figure,
     place,
     points,
 )
-from labrig.report.legend import legend_above, lined, marked
-from labrig.report.rendering import Rendered, Source
-from labrig.report.sections import Picture, Section, Table
+from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import (
     ChargingSeries,
     Closure,

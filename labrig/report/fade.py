@@ -12,13 +12,13 @@ from labrig.report.figure_style import (
     INK,
     LEFT_PT,
     OTHER_CHANNELS,
+    legend_above,
+    lined,
     new_figure,
     place,
     points,
 )
-from labrig.report.legend import legend_above, lined
-from labrig.report.rendering import Rendered, Source
-from labrig.report.sections import Picture, Section, Table
+from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import FadeResult, LampChange, WarmingLight
 from labrig.written_numbers import plus_minus, rounded
 

@@ -15,13 +15,14 @@ from labrig.report.figure_style import (
     OTHER_CHANNELS,
     SHADE,
     error_bars,
+    legend_above,
+    marked,
     new_figure,
     place,
     points,
+    shaded,
 )
-from labrig.report.legend import legend_above, marked, shaded
-from labrig.report.rendering import Rendered, Source
-from labrig.report.sections import Picture, Section, Table
+from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import PAPER_REACH, AngularGlow, IsotropyResult, is_within_paper
 from labrig.written_numbers import plus_minus
 

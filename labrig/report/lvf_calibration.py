@@ -15,13 +15,13 @@ from labrig.report.figure_style import (
     MUTED,
     channel_colour,
     error_bars,
+    legend_above,
+    lined,
     new_figure,
     place,
     points,
 )
-from labrig.report.legend import legend_above, lined
-from labrig.report.rendering import Rendered, Source
-from labrig.report.sections import Picture, Section, Table
+from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import CameraCurves, FloatArray, LocatedLines, LvfCalibrationResult, StripLines
 from labrig.written_numbers import plus_minus, rounded
 

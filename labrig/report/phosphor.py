@@ -14,13 +14,20 @@ from labrig.record import FrameRecord, FrameRole
 from labrig.report.colours import Screen, screen_for, spectrum_colour
 from labrig.report.content import GlowPhotograph
 from labrig.report.decay_figures import logarithmic_decay
-from labrig.report.figure_style import INK, LEFT_PT, new_figure, place
-from labrig.report.legend import BAND_OPACITY, legend_above, lined, shaded
+from labrig.report.figure_style import (
+    BAND_OPACITY,
+    INK,
+    LEFT_PT,
+    legend_above,
+    lined,
+    new_figure,
+    place,
+    shaded,
+)
 from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
 from labrig.report.registered import render as render_result
-from labrig.report.rendering import Rendered, Source
-from labrig.report.sections import Picture, Section
+from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.results import DecayPatch, DecayResult, PhosphorResult
 
 SPECTRUM_HEIGHT_PT = 256.0

@@ -2,7 +2,7 @@
 
 from labrig.plugins import REPORTS, load, names
 from labrig.report import any_result
-from labrig.report.rendering import Rendered, Renderer, Source
+from labrig.report.sections import Rendered, Renderer, Source
 from labrig.results import RunResult
 
 

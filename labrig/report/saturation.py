@@ -16,14 +16,15 @@ from labrig.report.figure_style import (
     OTHER_CHANNELS,
     PAPER,
     error_bars,
+    legend_above,
+    lined,
+    mark_decades,
+    marked,
     new_figure,
     place,
     points,
 )
-from labrig.report.legend import legend_above, lined, marked
-from labrig.report.log_axis import mark_decades
-from labrig.report.rendering import Rendered, Source
-from labrig.report.sections import Picture, Section, Table
+from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import (
     FULL_LIGHT,
     LIGHTS,

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.report.residual_figure import residuals
+from labrig.report.decay_figures import residuals
 from labrig.results import FittedDecay, Series
 
 #: What stands out of its own σ by less was dark.

@@ -1,8 +1,3 @@
-from .arrays import (
-    BoolArray as BoolArray,
-    FloatArray as FloatArray,
-    IntArray as IntArray,
-)
 from .blank import (
     BlankResult as BlankResult,
     StrayLight as StrayLight,
@@ -18,10 +13,6 @@ from .charging_series import (
     ChargingSeries as ChargingSeries,
     Transient as Transient,
 )
-from .closure import (
-    Closure as Closure,
-    spans_decades as spans_decades,
-)
 from .decay import (
     DecayPatch as DecayPatch,
     DecayResult as DecayResult,
@@ -36,9 +27,11 @@ from .emission_spectrum import (
     SpectralComparison as SpectralComparison,
 )
 from .excitation import (
+    Closure as Closure,
     ExcitationResult as ExcitationResult,
     PatchCharging as PatchCharging,
     PatchExcitation as PatchExcitation,
+    spans_decades as spans_decades,
 )
 from .fade import (
     FadeResult as FadeResult,
@@ -46,10 +39,6 @@ from .fade import (
     LampChange as LampChange,
     SwitchedFrames as SwitchedFrames,
     WarmingLight as WarmingLight,
-)
-from .fields import (
-    leaves as leaves,
-    unit_of as unit_of,
 )
 from .fitted_decay import (
     Candidate as Candidate,
@@ -77,19 +66,24 @@ from .isotropy import (
     IsotropyResult as IsotropyResult,
     is_within_paper as is_within_paper,
 )
-from .joined_series import (
-    joined as joined,
-)
 from .lvf_calibration import (
     CameraCurves as CameraCurves,
     FilterMisfit as FilterMisfit,
+    LocatedLines as LocatedLines,
     LvfCalibrationResult as LvfCalibrationResult,
     PlacedStrip as PlacedStrip,
+    SliceValues as SliceValues,
     Stripes as Stripes,
     StripLines as StripLines,
+    StripProfile as StripProfile,
 )
 from .measured import (
+    BoolArray as BoolArray,
+    FloatArray as FloatArray,
+    IntArray as IntArray,
     Measured as Measured,
+    leaves as leaves,
+    unit_of as unit_of,
     with_uncertainty as with_uncertainty,
 )
 from .phosphor import (
@@ -117,11 +111,7 @@ from .series import (
     write_series as write_series,
 )
 from .series_table import (
+    joined as joined,
     parse_series as parse_series,
     read_series as read_series,
-)
-from .strip import (
-    LocatedLines as LocatedLines,
-    SliceValues as SliceValues,
-    StripProfile as StripProfile,
 )

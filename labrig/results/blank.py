@@ -6,7 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import BLANK_KIND, BlankFile
-from labrig.results.arrays import BoolArray, FloatArray
+from labrig.results.measured import BoolArray, FloatArray
 from labrig.results.run_result import RunResult
 
 

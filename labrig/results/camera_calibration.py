@@ -7,8 +7,7 @@ from typing import Any, ClassVar
 
 from labrig.calibration import CAMERA_KIND, CameraFile, Noise
 from labrig.optics import Flat
-from labrig.results.arrays import FloatArray
-from labrig.results.measured import Measured
+from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
 

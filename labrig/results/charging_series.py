@@ -12,7 +12,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.results.arrays import BoolArray, FloatArray
+from labrig.results.measured import BoolArray, FloatArray
 
 #: Charges that are first looked at so many times later than most (those of a metering, by the next
 #: look at what is left) do not go with the others.

@@ -14,8 +14,7 @@ from scipy.interpolate import CubicSpline
 from labrig.finite import Finite, NotNegative
 from labrig.material import Spectrum
 from labrig.optics import band_means, edges_about
-from labrig.results.arrays import FloatArray
-from labrig.results.measured import Measured
+from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.yaml_file import read_model, write_yaml
 

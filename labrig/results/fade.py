@@ -6,8 +6,7 @@ from pathlib import Path
 from typing import Any, ClassVar
 
 from labrig.calibration import FADE_KIND, FadeFile
-from labrig.results.arrays import FloatArray
-from labrig.results.measured import Measured
+from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 
 

@@ -12,8 +12,7 @@ from numpy.typing import ArrayLike
 
 from labrig.errors import DataError, FitError
 from labrig.material import exponential_means
-from labrig.results.arrays import FloatArray
-from labrig.results.measured import Measured, with_uncertainty
+from labrig.results.measured import FloatArray, Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text, write_json
 
 FILE = "fit.json"

@@ -4,7 +4,7 @@ from dataclasses import dataclass
 
 import numpy as np
 
-from labrig.results.arrays import BoolArray, FloatArray
+from labrig.results.measured import BoolArray, FloatArray
 
 #: One-sided 95 %.
 UPPER_SIGMAS = 1.645

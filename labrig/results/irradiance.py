@@ -8,7 +8,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from labrig.calibration import IRRADIANCE_KIND, IrradianceFile
-from labrig.results.arrays import FloatArray
+from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 
 

@@ -8,9 +8,8 @@ from typing import ClassVar, Literal
 import numpy as np
 from scipy.special import chdtrc, fdtrc
 
-from labrig.results.arrays import FloatArray
 from labrig.results.fitted_decay import FittedDecay
-from labrig.results.measured import Measured
+from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 

@@ -8,7 +8,7 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.errors import DataError
-from labrig.results.arrays import FloatArray
+from labrig.results.measured import FloatArray
 from labrig.results.text_files import write_csv
 
 #: Columns of series.csv that are not channels (contracts.md).

@@ -4,15 +4,32 @@ import csv
 import math
 import os
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from pathlib import Path
 
 import numpy as np
 
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.input_file import read_text
-from labrig.results.arrays import FloatArray
+from labrig.results.measured import FloatArray
 from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
+
+
+def joined(parts: Sequence[Series]) -> Series:
+    """One below the other; what they have in common is taken from the first."""
+    return replace(
+        parts[0],
+        t_s=np.concatenate([part.t_s for part in parts]),
+        exposure_s=np.concatenate([part.exposure_s for part in parts]),
+        values=np.concatenate([part.values for part in parts]),
+        sigma=np.concatenate([part.sigma for part in parts]),
+        iso=np.concatenate([part.iso for part in parts]),
+        f_number=np.concatenate([part.f_number for part in parts]),
+        frame=tuple(frame for part in parts for frame in part.frame),
+        unit=tuple(unit for part in parts for unit in part.unit),
+        flag=tuple(flag for part in parts for flag in part.flag),
+    )
+
 
 _TIME_NAMES = frozenset({TIME, "t", "time_s", "time", "t (s)", "time (s)"})
 _EXPOSURE_NAMES = frozenset({EXPOSURE, "exposure"})

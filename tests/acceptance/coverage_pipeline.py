@@ -29,7 +29,7 @@ import yaml
 from numpy.typing import NDArray
 
 from labrig.analyse import Choices, fit_series
-from labrig.analyse.timed_frames import intact_frames
+from labrig.analyse.frames import intact_frames
 from labrig.cli.ending import guarded
 from labrig.errors import FitError
 from labrig.fit import DecayFit

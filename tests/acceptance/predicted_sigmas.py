@@ -24,8 +24,8 @@ import numpy as np
 import yaml
 
 from labrig.analyse.choices import Choices, read_run_protocol
+from labrig.analyse.frames import intact_frames
 from labrig.analyse.series_fit import fit_series
-from labrig.analyse.timed_frames import intact_frames
 from labrig.cli.ending import guarded
 from labrig.errors import FitError
 from labrig.record import read_run

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.analyse.choices import Choices
-from labrig.analyse.timed_frames import IntactFrames, intact_frames, timing_warnings
+from labrig.analyse.frames import IntactFrames, intact_frames, timing_warnings
 from labrig.errors import DataError, LabrigError
 from labrig.record import read_run
 from tests.conftest import Ended

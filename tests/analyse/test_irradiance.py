@@ -17,7 +17,7 @@ from labrig.optics import CameraResponse, Lvf, Strip, Transmittance, nominal_lvf
 from labrig.optics.piecewise import quadrature
 from labrig.process import process_run
 from labrig.results.irradiance import CardRatio, IrradianceResult
-from labrig.results.strip import SliceValues
+from labrig.results.lvf_calibration import SliceValues
 from tests.analyse.lvf_calibration.room_truth import simulation_of, true_irradiance
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
 from tests.analyse.recorded import record

@@ -5,10 +5,10 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from labrig.analyse.noise_budget import noise_budget, noise_parts
+from labrig.analyse.decay import noise_budget, noise_parts
 from labrig.fit import DecayFit
+from labrig.report.decay_figures import noise_figure, visible_parts
 from labrig.report.figure_style import figure_style
-from labrig.report.noise_figure import noise_figure, visible_parts
 from labrig.results import Series
 from tests.report.made import decay_series, fitted
 

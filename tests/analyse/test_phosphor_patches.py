@@ -12,9 +12,8 @@ from hypothesis import given, strategies as st
 from labrig.acquire import read_protocol, read_rig_file
 from labrig.analyse import Choices
 from labrig.analyse.emission_spectrum import analyse as analyse_spectra
-from labrig.analyse.inputs import Inputs
-from labrig.analyse.part import Part
-from labrig.analyse.strip_patches import StripPatch, cut, for_each_patch, lean
+from labrig.analyse.part import Inputs, Part
+from labrig.analyse.strip import StripPatch, cut, for_each_patch, lean
 from labrig.calibration import write_irradiance_file, write_lvf_file
 from labrig.compare.result import read_patches
 from labrig.errors import DataError, FitError, UsageError

@@ -9,9 +9,7 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.acquire import read_rig_file
-from labrig.analyse.saturation import analyse
-from labrig.analyse.saturation.charge_level import charge_level, charged
-from labrig.analyse.saturation.rate_comparison import compare_rates
+from labrig.analyse.saturation import analyse, charge_level, charged, compare_rates
 from labrig.bench import open_bench
 from labrig.errors import DataError
 from labrig.process import process_and_report

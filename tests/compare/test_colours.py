@@ -9,9 +9,8 @@ from numpy.typing import NDArray
 
 from labrig.compare import three_channels
 from labrig.compare.colorimetry import CIE_1931, CIE_2015, observer, viewing, white_xyz
-from labrig.compare.emission import emission
 from labrig.compare.glow import compare_glow
-from labrig.compare.paper import TABLE_1
+from labrig.compare.paper import TABLE_1, emission
 from labrig.compare.residuals import equally_weighted, fits_by_states, residuals
 from labrig.compare.spectra_figure import spectra_figure
 from labrig.errors import DataError, UsageError

@@ -15,7 +15,7 @@ from labrig.clock import Clock
 from labrig.process import process_run
 from labrig.process.description import describe_run
 from labrig.record import read_run
-from labrig.record.description import RunDescription
+from labrig.record.history import RunDescription
 from labrig.results import read_result
 from labrig.results.decay import DecayResult
 from labrig.run import Recording

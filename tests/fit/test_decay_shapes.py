@@ -5,8 +5,8 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from labrig.fit.decay.rival_shapes import power_law_mean, stretched_mean
-from labrig.fit.decay.shapes import exponential_means_and_slopes
+from labrig.fit.decay.rivals import power_law_mean, stretched_mean
+from labrig.fit.decay.states import exponential_means_and_slopes
 from labrig.fit.least_squares import FloatArray
 from labrig.material.rates import exponential_means
 from tests.fit import truths

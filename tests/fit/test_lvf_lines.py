@@ -9,7 +9,7 @@ from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import MERCURY, Line, fit_wavelengths, locate_lines
 from labrig.optics import Bands, CameraResponse, Lvf, WavelengthMap, read_spectrum, seen_through
-from labrig.results.strip import LocatedLines
+from labrig.results.lvf_calibration import LocatedLines
 from tests.fit import lvf_pictures as made
 
 PIXELS = np.arange(0.0, 1001.0, 2.0)

@@ -13,7 +13,7 @@ from labrig.optics import (
     read_camera,
     seen_through,
 )
-from labrig.optics.band import peak_shape
+from labrig.optics.lvf import peak_shape
 
 BENT = WavelengthMap(np.array([550.0, -170.0, 6.0]), (0.0, 800.0), np.diag([0.01, 0.04, 0.09]))
 

@@ -8,7 +8,7 @@ from hypothesis import HealthCheck, given, settings, strategies as st
 
 from labrig.errors import FrameError, UsageError
 from labrig.reduce import RawFrame, read_raw
-from labrig.reduce.quiet import quiet_stderr
+from labrig.reduce.raw import quiet_stderr
 
 WriteDng = Callable[..., bytes]
 MOSAIC = np.random.default_rng(1).integers(0, 65536, (40, 60)).astype(np.uint16)

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from labrig.errors import FrameError
-from labrig.reduce.sensor import sensor_pattern
+from labrig.reduce.raw import sensor_pattern
 
 X_TRANS = "GGRGGBGGBGGRBRGRBGGGBGGRGGRGGBRBGBRG"
 

@@ -7,12 +7,12 @@ import numpy as np
 import tifffile
 from numpy.typing import NDArray
 
-from labrig.analyse.noise_budget import noise_budget
+from labrig.analyse.decay import noise_budget
 from labrig.errors import LabrigError
 from labrig.fit import DecayFit, fit_decay
 from labrig.optics import read_camera
-from labrig.record.description import DeviceLine, RunDescription
 from labrig.record.frames import FrameRecord
+from labrig.record.history import DeviceLine, RunDescription
 from labrig.report import Report
 from labrig.report.content import DecayReport, GlowPhotograph, PatchReport
 from labrig.report.decay import decay_sections

@@ -10,15 +10,17 @@ from matplotlib.figure import Figure
 
 from labrig.fit import DecayFit
 from labrig.report.decay_figures import (
+    fitted_curve,
     linear_decay,
     logarithmic_decay,
+    overview_figures,
+    residual_figure,
+    residuals,
+    timing_figure,
     values_below_axis,
 )
 from labrig.report.figure_style import figure_style
-from labrig.report.fitted_curve import fitted_curve
 from labrig.report.plates import Plates
-from labrig.report.residual_figure import residual_figure, residuals
-from labrig.report.run_figures import overview_figures, timing_figure
 from labrig.report.timing import FrameTiming
 from labrig.results import Series
 

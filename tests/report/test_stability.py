@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labrig.fit import DecayFit
-from labrig.report.fitted_curve import fitted_curve
+from labrig.report.decay_figures import fitted_curve
 from labrig.report.stability import repeats, steady
 from labrig.report.timing import FrameTiming, lateness
 from labrig.results import Series

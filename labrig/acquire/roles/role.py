@@ -2,11 +2,33 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
-from typing import Any, Generic, Protocol, TypeVar, runtime_checkable
+from typing import Any, Generic, Literal, Protocol, TypeVar, runtime_checkable
 
-from labrig.acquire.findings import Finding
 from labrig.acquire.values import Frame
 from labrig.clock import Clock, VirtualClock
+
+#: `refuse`: photometry would be spoilt. `warn`: somebody should look. `fine`: as it should be.
+Severity = Literal["refuse", "warn", "fine"]
+
+
+@dataclass(frozen=True)
+class Finding:
+    """One setting of a device.
+
+    Attributes
+    ----------
+    what
+        How it is set, and what that does.
+    remedy
+        What to do, and where: the place in the menu. Empty where all is fine.
+    """
+
+    severity: Severity
+    what: str
+    remedy: str = ""
+
+    def __str__(self) -> str:
+        return f"{self.what}: {self.remedy}" if self.remedy else self.what
 
 
 @runtime_checkable

@@ -9,13 +9,11 @@ from labrig.analyse.camera_calibration.factors import CardFrame, Factors, fit_fa
 from labrig.analyse.camera_calibration.flat_field import fit_flat
 from labrig.analyse.camera_calibration.linearity import deviation, fit_linearity
 from labrig.analyse.camera_calibration.photon_transfer import pairs_of, photon_transfer, scatter
+from labrig.analyse.frames import camera_identity, lens_of, part_frames, part_region, timed, untimed
 from labrig.analyse.part import Part
-from labrig.analyse.part_frames import part_frames, part_region
-from labrig.analyse.this_camera import camera_identity, lens_of
-from labrig.analyse.timed_frames import timed, untimed
 from labrig.calibration import CameraFile, Linearity
 from labrig.errors import DataError
-from labrig.protocols.camera_calibration_units import LINEARITY, CardFrames
+from labrig.protocols.camera_calibration import LINEARITY, CardFrames
 from labrig.record import FrameRecord, FrameRole
 from labrig.reduce import measure, read_raw, reduce_patches
 from labrig.region import Region

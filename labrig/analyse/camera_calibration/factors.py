@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from labrig.errors import DataError
 from labrig.optics import Factor
-from labrig.protocols.camera_calibration_units import CardFrames
+from labrig.protocols.camera_calibration import CardFrames
 from labrig.results import FloatArray, Measured
 
 Setting = float | None

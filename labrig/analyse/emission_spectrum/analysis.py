@@ -6,7 +6,6 @@ from itertools import pairwise
 
 import numpy as np
 
-from labrig.analyse.clean import cleaned
 from labrig.analyse.emission_spectrum.comparison import (
     CombinedFrame,
     combined,
@@ -21,10 +20,15 @@ from labrig.analyse.emission_spectrum.forward_model import (
     with_white_reference,
 )
 from labrig.analyse.emission_spectrum.reduction import PatchReduction, reduce_places
+from labrig.analyse.frames import (
+    cleaned,
+    insist_on_this_camera,
+    intact_frames,
+    steady_frames,
+    timing_warnings,
+)
 from labrig.analyse.part import Part
-from labrig.analyse.strip_patches import StripPatch, for_each_patch
-from labrig.analyse.this_camera import insist_on_this_camera
-from labrig.analyse.timed_frames import intact_frames, steady_frames, timing_warnings
+from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.errors import DataError
 from labrig.fit.spectrum import fit_spectrum
 from labrig.protocols.emission_spectrum import SpectrumFrames

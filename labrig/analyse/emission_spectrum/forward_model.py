@@ -12,7 +12,7 @@ import numpy as np
 
 from labrig.analyse.emission_spectrum.comparison import combined
 from labrig.analyse.part import Part
-from labrig.analyse.strip_patches import Slices, StripPatch, cut, lean, strip_patches
+from labrig.analyse.strip import Slices, StripPatch, cut, lean, strip_patches
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError, SpectralSystem, system_through_lvf

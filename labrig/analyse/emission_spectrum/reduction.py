@@ -12,7 +12,7 @@ from typing import TypeVar
 
 import numpy as np
 
-from labrig.analyse.hot_pixels import hot_pixels_of
+from labrig.analyse.frames import hot_pixels_of
 from labrig.calibration import CameraFile
 from labrig.errors import DataError
 from labrig.reduce import (

@@ -9,10 +9,10 @@ from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.excitation.closure import predicted_charging
 from labrig.analyse.excitation.lamp_light import band_sigma, scale_sigma
 from labrig.analyse.excitation.material import excited_material
-from labrig.analyse.intact import insist_on_intact
+from labrig.analyse.frames import insist_on_intact
 from labrig.analyse.part import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
-from labrig.analyse.strip_patches import StripPatch, for_each_patch
+from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError

@@ -5,10 +5,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from labrig.analyse.choices import Choices
-from labrig.analyse.clean import left_out_lines
+from labrig.analyse.frames import left_out_lines
 from labrig.calibration import BlankFile
 from labrig.errors import DataError
-from labrig.protocols.excitation_settings import ExcitationFrames, UnitKind
+from labrig.protocols.excitation import ExcitationFrames, UnitKind
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord
 
 #: Frames that show the glow after a charge; those of a metering are exposed too long or too short.

@@ -6,10 +6,9 @@ import numpy as np
 
 from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
 from labrig.analyse.excitation.lamp_light import across_sites, lamp_transients, site_modes
+from labrig.analyse.frames import insist_on_this_camera, timed, untimed
 from labrig.analyse.part import Part
-from labrig.analyse.strip_patches import Slices, StripPatch, cut, lean, strip_patches
-from labrig.analyse.this_camera import insist_on_this_camera
-from labrig.analyse.timed_frames import timed, untimed
+from labrig.analyse.strip import Slices, StripPatch, cut, lean, strip_patches
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
 from labrig.optics import Strip

@@ -13,9 +13,8 @@ from labrig.analyse.fade.frames import (
     take_columns,
     warming,
 )
+from labrig.analyse.frames import insist_on_this_camera, part_frames, part_region
 from labrig.analyse.part import Part
-from labrig.analyse.part_frames import part_frames, part_region
-from labrig.analyse.this_camera import insist_on_this_camera
 from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import Change, FadeFile, Warming
 from labrig.errors import DataError

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.analyse.timed_frames import switched_time, timed, untimed
+from labrig.analyse.frames import switched_time, timed, untimed
 from labrig.calibration import CameraFile, Warming
 from labrig.errors import DataError
 from labrig.protocols.fade import LampFrames

@@ -21,7 +21,7 @@ from labrig.analyse.lvf_calibration.lines import (
     wavelengths_along,
 )
 from labrig.analyse.part import Part
-from labrig.analyse.strip_frames import StripFrames
+from labrig.analyse.strip import StripFrames
 from labrig.bench_optics import (
     camera_curves,
     card_reflectance,
@@ -32,7 +32,7 @@ from labrig.calibration import BandColumns, CurveColumns, LvfFile, WavelengthCol
 from labrig.errors import DataError
 from labrig.fit.lvf import LvfCalibration
 from labrig.optics import Strip, WavelengthMap
-from labrig.protocols.lvf_units import LvfFrames, filter_unit
+from labrig.protocols.lvf_calibration import LvfFrames, filter_unit
 from labrig.reduce import find_strip, read_hdr_frame, slice_values
 from labrig.results import (
     CameraCurves,

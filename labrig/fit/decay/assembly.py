@@ -1,16 +1,32 @@
 """From the fit's own units to the user's: rates, amplitudes, covariance, warnings."""
 
+from dataclasses import dataclass
+
 import numpy as np
 
 from labrig.fit.decay.envelope import Envelope
 from labrig.fit.decay.joint import weight_sigma
-from labrig.fit.decay.result import DecayFit
 from labrig.fit.decay.selection import bic
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.verdict import Evidence, warnings_about
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
-from labrig.results import DecayState
+from labrig.results import DecayState, FittedDecay
+
+
+@dataclass(frozen=True)
+class DecayFit(FittedDecay):
+    """A decay's result with the residuals of its fit.
+
+    Attributes
+    ----------
+    residuals, normalised_residuals
+        Value − model, one row per frame in the order given, one column per channel: in the values'
+        units, and whitened (independent, unit variance if the noise is as assumed).
+    """
+
+    residuals: FloatArray
+    normalised_residuals: FloatArray
 
 
 def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayFit:

@@ -7,9 +7,8 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.fit.decay.assembly import assemble
+from labrig.fit.decay.assembly import DecayFit, assemble
 from labrig.fit.decay.envelope import Envelope, envelope
-from labrig.fit.decay.result import DecayFit
 from labrig.fit.decay.rivals import RIVALS, fit_rival, fitted_rival
 from labrig.fit.decay.selection import CLEAR_BIC, bic, choose_states
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series

@@ -17,13 +17,94 @@ from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
-from scipy.linalg import solve_triangular
+from scipy.linalg import LinAlgError, cholesky, lapack, solve_triangular
 
-from labrig.fit.least_squares import FloatArray
-from labrig.fit.spectrum.nonnegative_quadratic import nonnegative_minimum
+from labrig.errors import FitError
+from labrig.fit.least_squares import EPSILON, FloatArray
 from labrig.fit.spectrum.system import SpectralSystem
-from labrig.fit.spectrum.values import measured
+from labrig.nonnegative import nonnegative_least_squares
 from labrig.optics import band_means
+
+FEWEST_VALUES = 3
+
+
+def measured(
+    value: ArrayLike, sigma: ArrayLike, system: SpectralSystem
+) -> tuple[NDArray[np.bool_], SpectralSystem, FloatArray, FloatArray]:
+    """Which of them take part, the system of those, their values and σ.
+
+    Raises
+    ------
+    FitError
+        Too few values, none above its noise, or a σ of 0.
+    """
+    values, sigmas = np.asarray(value, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
+    used = np.isfinite(values) & np.isfinite(sigmas) & system.design.any(axis=1)
+    if (sigmas[used] <= 0).any():
+        raise FitError("expected every σ above 0, got some of 0; give the noise of every value")
+    if used.sum() < FEWEST_VALUES:
+        raise FitError(
+            f"expected {FEWEST_VALUES} or more values that are neither clipped nor missing, got "
+            f"{used.sum()}; expose shorter or light more of the filter"
+        )
+    part = system.of(used)
+    if not values[used] @ part.design.sum(axis=1) > 0:
+        raise FitError("expected values above 0, got none above their noise; expose longer")
+    return used, part, values[used], sigmas[used]
+
+
+#: Exchanges after which it goes round in circles.
+MOST_EXCHANGES = 25
+#: Slopes, and coordinates relative to the largest, this far on the wrong side are rounding.
+ROUNDING = 100 * EPSILON
+SMALLEST = 1e-9
+
+
+def nonnegative_minimum(
+    curvature: FloatArray, linear: FloatArray, free: NDArray[np.bool_]
+) -> FloatArray:
+    """Minimise xᵀGx/2 − bᵀx over x ≥ 0, started from the answer to a neighbouring problem.
+
+    Block principal pivoting: all coordinates on the wrong side change sides at once (Júdice and
+    Pires, *A block principal pivoting algorithm for large-scale strictly monotone linear
+    complementarity problems*, Comput. Oper. Res. 21, 1994). Where it goes round in circles, Lawson
+    and Hanson's active sets find the way.
+
+    Parameters
+    ----------
+    curvature, linear
+        (n, n) G, positive definite, and (n,) b.
+    free
+        (n,) guess which coordinates are not zero.
+
+    Returns
+    -------
+    (n,) x, exactly 0 where the bound holds it.
+    """
+    free = free.copy()
+    size = np.abs(curvature)
+    for _ in range(MOST_EXCHANGES):
+        x = np.zeros_like(linear)
+        if free.any():
+            x[free] = _solved(curvature[np.ix_(free, free)], linear[free])
+        slope = curvature @ x - linear
+        slack = ROUNDING * (size @ np.abs(x) + np.abs(linear))
+        below = x < -SMALLEST * float(np.abs(x).max(initial=0.0))
+        wrong = np.flatnonzero(np.where(free, below, slope < -slack))
+        if not wrong.size:
+            return np.maximum(x, 0.0)
+        free[wrong] = ~free[wrong]
+    upper = cholesky(curvature)
+    return nonnegative_least_squares(upper, solve_triangular(upper, linear, trans="T"))
+
+
+def _solved(curvature: FloatArray, linear: FloatArray) -> FloatArray:
+    # SciPy's own Cholesky functions take ten times as long to call as such a system to solve.
+    _, solution, info = lapack.dposv(curvature, linear)
+    if info:
+        raise LinAlgError("expected a positive definite matrix")
+    return np.asarray(solution)
+
 
 SAMPLES = 400
 #: Rounds in which the covariance of a wrong design follows the spectrum.

@@ -16,8 +16,8 @@ from scipy.special import ndtr
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
+from labrig.fit.spectrum.fit import measured
 from labrig.fit.spectrum.system import SpectralSystem
-from labrig.fit.spectrum.values import measured
 
 #: Full width at half maximum over σ of a Gaussian.
 FWHM_OVER_SIGMA = 2 * np.sqrt(2 * np.log(2))

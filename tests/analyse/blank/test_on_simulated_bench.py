@@ -9,8 +9,8 @@ import numpy as np
 import pytest
 
 from labrig.analyse import Choices, decay as decay_analysis
-from labrig.analyse.inputs import Inputs
-from labrig.analyse.timed_frames import intact_frames
+from labrig.analyse.frames import intact_frames
+from labrig.analyse.part import Inputs
 from labrig.calibration import read_blank_file
 from labrig.errors import DataError
 from labrig.process import process_run

@@ -17,7 +17,7 @@ from labrig.analyse.lvf_calibration.filters import (
 from labrig.fit.least_squares import FloatArray
 from labrig.optics import Lvf, Transmittance, nominal_lvf, read_camera
 from labrig.optics.piecewise import quadrature
-from labrig.results.strip import SliceValues
+from labrig.results.lvf_calibration import SliceValues
 from tests.analyse.lvf_calibration.strip_pictures import TRUE_MAP, halogen
 
 CARD = Transmittance("card", np.array([380.0, 780.0]), np.array([0.17, 0.19]))

@@ -1,12 +1,24 @@
-"""What is left of light after lamp-off, from frames of something that does not glow."""
+"""A blank, from its frames to its result."""
 
-from collections.abc import Sequence
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 
 import numpy as np
 
+from labrig.analyse.frames import (
+    hot_pixels_of,
+    insist_on_this_camera,
+    intact_frames,
+    part_frames,
+    part_region,
+    timing_warnings,
+)
+from labrig.analyse.part import Part
+from labrig.calibration import BlankFile
 from labrig.errors import DataError
-from labrig.reduce import FrameMeasurement, fit_dark
-from labrig.results import FloatArray, Series, StrayLight
+from labrig.protocols.blank import BLANK_FRAMES
+from labrig.reduce import FrameMeasurement, fit_dark, measure, read_raw, reduce_patches
+from labrig.results import BlankResult, FloatArray, Series, StrayLight
 
 #: Share of the frames, the latest ones, that tell the constant level.
 LATE = 1 / 2
@@ -80,3 +92,66 @@ def _mean(values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray
     mean = np.average(values, axis=0, weights=weights)
     misfit = (weights * np.square(values - mean)).sum(axis=0) / max(len(values) - 1, 1)
     return mean, np.sqrt(np.maximum(misfit, 1.0) / weights.sum(axis=0))
+
+
+def analyse(part: Part) -> BlankResult:
+    """Find what light there is after lamp-off where nothing glows.
+
+    Raises
+    ------
+    DataError
+        No sequence is complete, or a frame is missing or was changed.
+    """
+    protocol, run, camera = part.protocol, part.run, part.inputs.camera
+    region = part_region(part, protocol.region)
+    frames = intact_frames(run, part.choices, BLANK_FRAMES)
+    insist_on_this_camera(camera, run, part_frames(part, BLANK_FRAMES))
+    series = reduce_patches(frames.decay, {"blank": region}, frames.dark, camera=camera)["blank"]
+    # Hot pixels are of one colour: left in, they look like light.
+    hot = hot_pixels_of(frames.dark)
+    darks = [
+        replace(measure(read_raw(frame.path), region, hot), exposure_s=frame.exposure_s)
+        for frame in frames.dark
+    ]
+    least_dn = protocol.clean.share * darks[0].range_dn
+    found = stray_light(series, protocol.clean.sigmas, least_dn)
+    leak, leak_sigma = ambient(darks)
+    rows = _rows_worth_keeping(found)
+    file = BlankFile(
+        iso=protocol.camera.iso,
+        f_number=protocol.camera.f_number,
+        channels=series.channels,
+        t_s=tuple(found.t_s[rows].tolist()),
+        rate_dn_per_s=tuple(tuple(row) for row in found.rate[rows].tolist()),
+        sigma_dn_per_s=tuple(tuple(row) for row in found.sigma[rows].tolist()),
+        constant_dn_per_s=tuple(found.constant.tolist()),
+        constant_sigma_dn_per_s=tuple(found.constant_sigma.tolist()),
+        ambient_dn_per_s=tuple(leak.tolist()),
+        ambient_sigma_dn_per_s=tuple(leak_sigma.tolist()),
+        first_clean_s=found.first_clean_s,
+        source="measured with labrig, blank",
+        run=run.folder.resolve().name,
+    )
+    return BlankResult(
+        calibration=file,
+        stray_light=found,
+        warnings=(*timing_warnings(run, "blank"), *_warnings(file, found)),
+    )
+
+
+def _rows_worth_keeping(found: StrayLight) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
+    """Up to the first clean frame, its time not twice."""
+    last = len(found.t_s)
+    if found.first_clean_s is not None:
+        last = int(np.searchsorted(found.start_s, found.first_clean_s)) + 1
+    _, once = np.unique(found.t_s[:last], return_index=True)
+    return once
+
+
+def _warnings(file: BlankFile, found: StrayLight) -> Iterator[str]:
+    if found.fades:
+        yield (
+            "the blank still gets darker at its end: the lamp glows on for long (use a shield), or "
+            "the card itself glows (take another); record it for longer"
+        )
+    yield from file.leaks()

@@ -1,4 +1,4 @@
-"""Patches below the filter: rows of its strip, each of a material of its own.
+"""The filter's strip in a run: its frames, and its slices in every patch.
 
 A patch is seen in those rows of the strip's slices that lie in its region. The light there is that
 of the same place along the strip.
@@ -6,16 +6,65 @@ of the same place along the strip.
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
+from functools import cached_property
 from typing import TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig.analyse.frames import hot_pixels_of, insist_on_this_camera, steady_frames
 from labrig.analyse.part import Part
 from labrig.errors import DataError
 from labrig.optics import SLICES, Strip
-from labrig.reduce import RawFrame
+from labrig.record import FrameRole
+from labrig.reduce import HdrFrame, PixelMask, RawFrame, SeriesFrame, read_hdr_frame, read_raw
 from labrig.region import Region, region_pixels
+
+
+class StripFrames:
+    """By purpose; those of completed units, as they were recorded.
+
+    Raises
+    ------
+    DataError
+        None with a purpose that is asked for, or they are damaged, or of another camera than the
+        one that is known.
+    """
+
+    def __init__(self, part: Part) -> None:
+        self._part = part
+        self.dark = self.of(FrameRole.DARK)
+        insist_on_this_camera(part.inputs.camera, part.run, part.run.frames(FrameRole.DARK))
+
+    def of(self, purpose: str, unit: str | None = None) -> list[SeriesFrame]:
+        """Of a purpose, and of one unit where that matters."""
+        frames = [
+            frame
+            for frame in steady_frames(self._part.run, self._part.choices, purpose)
+            if unit is None or frame.unit == unit
+        ]
+        if not frames:
+            raise DataError(
+                f"{self._part.run.folder}: the unit {unit or purpose} is not complete; go on "
+                f"with: labrig resume {self._part.run.folder}"
+            )
+        return frames
+
+    def hdr(self, purpose: str, unit: str | None = None) -> HdrFrame:
+        """All of them together."""
+        return read_hdr_frame(self.of(purpose, unit), self.hot)
+
+    @cached_property
+    def size(self) -> tuple[int, int]:
+        """Width and height in pixels."""
+        raw = read_raw(self.dark[0].path)
+        return raw.width, raw.height
+
+    @cached_property
+    def hot(self) -> PixelMask | None:
+        """Pixels that are bright in the dark, where there are frames to tell."""
+        return hot_pixels_of(self.dark)
+
 
 FloatArray = NDArray[np.float64]
 Found = TypeVar("Found")

@@ -1,0 +1,328 @@
+"""A saturation run, from its frames to its result.
+
+How far a state is charged follows from how much less it glows after a weaker light. Under a
+constant light r(t) = κ/s (1 − e^(−s t)), s = κ + k. A light weaker by the factor q gives q κ: where
+r is small the glow falls by q, where it is near 1 hardly at all. Amplitudes are only compared, so
+that neither Λ nor the camera's scale matter.
+
+Decays after several charges have rates in common or rates of their own. All are one channel wide
+here: the channels of a frame, weighed as the fit of the brightest decay has them, say the same with
+less noise. Amplitudes are linear, so only the rates are searched for (variable projection).
+"""
+
+from collections.abc import Iterable, Iterator, Mapping, Sequence
+
+import numpy as np
+from scipy.optimize import brentq
+from scipy.special import fdtrc
+
+from labrig.analyse.frames import cleaned, insist_on_this_camera, intact_frames, timing_warnings
+from labrig.analyse.part import Part
+from labrig.analyse.series_fit import fit_series
+from labrig.errors import DataError, FitError
+from labrig.fit import EPSILON, least_squares
+from labrig.fit.decay import exponential_means_and_slopes
+from labrig.material import exponential_means
+from labrig.protocols.saturation import WeakerLight
+from labrig.record import FrameRole, RunRecord, charges_s
+from labrig.reduce import reduce_patches
+from labrig.results import (
+    LIGHTS,
+    ChargeLevel,
+    Curve,
+    FittedDecay,
+    FloatArray,
+    Measured,
+    PatchSaturation,
+    RatesTest,
+    SaturationResult,
+    Series,
+)
+from labrig.written_numbers import plus_minus
+
+#: Lights searched, in multiples of the rate of re-radiation: r∞ of 1e-4 to 0.9999.
+FAINTEST, STRONGEST = 1e-4, 1e4
+#: Relative step of the derivatives.
+STEP = 1e-3
+
+
+def charged(kappa_per_s: float, k_per_s: float, charge_s: float) -> float:
+    """The level r after a charge from the dark (physics: exact for constant light)."""
+    s = kappa_per_s + k_per_s
+    return float(kappa_per_s / s * -np.expm1(-s * charge_s))
+
+
+def charge_level(
+    ratio: float,
+    ratio_sigma: float,
+    share: float,
+    share_sigma: float,
+    k_per_s: float,
+    charges_s: tuple[float, float],
+) -> ChargeLevel:
+    """The level under the full light.
+
+    Parameters
+    ----------
+    ratio, ratio_sigma
+        Amplitude after the weaker light over that after the full one.
+    share, share_sigma
+        What is left of the light, q; its σ relative.
+    charges_s
+        Under the weaker and under the full light.
+    """
+    r = _level(ratio, share, k_per_s, charges_s)
+    by_ratio = (_level(ratio * (1 + STEP), share, k_per_s, charges_s) - r) / STEP
+    by_share = (_level(ratio, share * (1 + STEP), k_per_s, charges_s) - r) / STEP
+    sigma = np.hypot(by_ratio * ratio_sigma / ratio, by_share * share_sigma)
+    # At an end of the range, where nothing changes any more, the σ is that just inside.
+    least = ratio_sigma / ratio * share / (1 - share)
+    return ChargeLevel(r, float(max(sigma, least)))
+
+
+def _level(ratio: float, share: float, k_per_s: float, charges_s: tuple[float, float]) -> float:
+    def excess(log_kappa: float) -> float:
+        kappa = float(np.exp(log_kappa))
+        weaker, full = charges_s
+        return charged(share * kappa, k_per_s, weaker) / charged(kappa, k_per_s, full) - ratio
+
+    low, high = np.log(FAINTEST * k_per_s), np.log(STRONGEST * k_per_s)
+    if excess(low) >= 0:
+        return 0.0
+    if excess(high) <= 0:
+        return 1.0
+    return charged(float(np.exp(brentq(excess, low, high))), k_per_s, charges_s[1])
+
+
+def curve(series: Series, fit: FittedDecay) -> Curve:
+    """A series with its channels weighed as in `fit`, flicker in its σ."""
+    rows = series.usable
+    weights = np.array(fit.channel_weights)
+    y, s = series.values[rows], series.sigma[rows]
+    information = (weights / s**2) @ weights
+    value = (y / s**2) @ weights / information
+    sigma = np.hypot(1 / np.sqrt(information), fit.flicker * np.maximum(value, 0.0))
+    dark = np.nan_to_num(series.dark_sigma)
+    shares = np.mean(weights / s**2, axis=0) / np.mean(information)
+    return Curve(series.t_s[rows], series.exposure_s[rows], value, sigma, float(shares @ dark))
+
+
+def flicker_dof(fit: FittedDecay) -> float:
+    """Degrees of freedom from which a fit estimated its flicker; infinite if it was given."""
+    if not fit.flicker_sigma > 0:
+        return np.inf
+    return max(0.5 * (fit.flicker / fit.flicker_sigma) ** 2, 1.0)
+
+
+def compare_rates(
+    curves: Sequence[Curve], start_per_s: Sequence[float], noise_dof: float = np.inf
+) -> RatesTest:
+    """Fit all decays with shared rates, then each with its own, as many states each.
+
+    Parameters
+    ----------
+    start_per_s
+        Rates to start from; their number is that of the states.
+    noise_dof
+        Degrees of freedom from which the curves' σ was estimated; infinite if it is known.
+
+    Raises
+    ------
+    FitError
+        Too few frames, or some decay that has none of these states.
+    """
+    start = np.log(np.asarray(start_per_s, dtype=np.float64))
+    states = len(start)
+    dof = sum(len(one.t_s) for one in curves) - 2 * states * len(curves)
+    if dof < 1 or min(len(one.t_s) for one in curves) <= 2 * states:
+        raise FitError(
+            f"expected more than {2 * states} frames of each decay for {states} state(s); record "
+            "more, or ask for fewer states"
+        )
+    shared, shared_chi2, _ = _fit(curves, start)
+    alone = [_fit([one], shared) for one in curves]
+    own_chi2 = sum(chi2 for _, chi2, _ in alone)
+    amplitudes = [_amplitudes(one, np.exp(shared)) for one in curves]
+    added = states * (len(curves) - 1)
+    gain = max(shared_chi2 - own_chi2, 0.0) / added
+    # σ may be a little too large, never too small by less scatter than it says.
+    scatter = max(own_chi2 / dof, 1.0)
+    falling = np.argsort(-shared)
+    return RatesTest(
+        shared_per_s=np.exp(shared)[falling],
+        own_per_s=np.array([np.exp(found)[falling] for found, _, _ in alone]),
+        own_sigma_per_s=np.array([(np.exp(found) * sigma)[falling] for found, _, sigma in alone]),
+        amplitude=np.array([value[falling] for value, _ in amplitudes]),
+        amplitude_sigma=np.array([sigma[falling] for _, sigma in amplitudes]),
+        residuals=tuple(-_misfit(one, np.exp(shared)[falling])[0][:-1] for one in curves),
+        chi2_shared=shared_chi2,
+        chi2_own=own_chi2,
+        dof_own=dof,
+        noise_dof=noise_dof,
+        p_value=float(fdtrc(added, dof, gain / scatter)),
+    )
+
+
+def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float, FloatArray]:
+    """Log rates (s,), χ² and σ of the log rates."""
+
+    def residuals(log_rates: FloatArray) -> tuple[FloatArray, FloatArray]:
+        rest, slopes = zip(*(_misfit(one, np.exp(log_rates)) for one in curves), strict=True)
+        return np.concatenate(rest), np.concatenate(slopes)
+
+    found = least_squares(residuals, start)
+    return found.parameters, found.chi2, found.sigma
+
+
+def _misfit(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """(n + 1,) model − value of the best amplitudes, whitened; (n + 1, s) its slopes by log rates.
+
+    The slopes are Kaufman's (BIT 15, 1975): what other amplitudes explain as well is taken off.
+    """
+    means, by_log_rate = exponential_means_and_slopes(rates_per_s, one.t_s, one.exposure_s)
+    design, target = _design(one, means), _target(one)
+    solution, *_ = np.linalg.lstsq(design, target, rcond=None)
+    moved = np.zeros((len(target), len(rates_per_s)))
+    moved[:-1] = by_log_rate * solution[:-1] / one.sigma[:, np.newaxis]
+    known = np.linalg.qr(design)[0]
+    return np.asarray(design @ solution - target), moved - known @ (known.T @ moved)
+
+
+def _amplitudes(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    design = _design(one, exponential_means(rates_per_s, one.t_s, one.exposure_s))
+    covariance = np.linalg.pinv(design.T @ design, rcond=1e3 * EPSILON)
+    solution = covariance @ design.T @ _target(one)
+    return solution[:-1], np.sqrt(np.diag(covariance))[:-1]
+
+
+def _design(one: Curve, shapes: FloatArray) -> FloatArray:
+    """(n + 1, s + 1) of shapes (n, s), whitened; its last row the offset's prior."""
+    offset = np.full((len(one.t_s), 1), one.offset_sigma)
+    rows = np.hstack([shapes, offset]) / one.sigma[:, np.newaxis]
+    prior = np.zeros((1, rows.shape[1]))
+    prior[0, -1] = 1.0
+    return np.vstack([rows, prior])
+
+
+def _target(one: Curve) -> FloatArray:
+    """(n + 1,) whitened."""
+    return np.append(one.value / one.sigma, 0.0)
+
+
+def analyse(part: Part) -> SaturationResult:
+    """Compare plateaus, levels where there were two lights, and rates shared and not.
+
+    Raises
+    ------
+    DataError
+        Fewer than two decays under the full light, or frames are damaged.
+    FitError
+        The decays do not allow a fit.
+    """
+    protocol, run, camera = part.protocol, part.run, part.inputs.camera
+    frames, stray = cleaned(intact_frames(run, part.choices), part.inputs.blank)
+    insist_on_this_camera(camera, run, run.frames(FrameRole.DECAY))
+    regions = part.choices.patches(protocol)
+    series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
+    lasted_s, weaker = _charges_s(run), protocol.weaker
+    patches = {name: _patch(one, lasted_s, part) for name, one in series.items()}
+    return SaturationResult(
+        patches=patches,
+        weaker_light=weaker and Measured(weaker.share, weaker.share * weaker.share_sigma),
+        warnings=(
+            *timing_warnings(run),
+            *stray,
+            *(
+                f"{name}: {line}" if len(patches) > 1 else line
+                for name, patch in patches.items()
+                for line in _warnings(patch)
+            ),
+        ),
+    )
+
+
+def _charges_s(run: RunRecord) -> dict[str, float]:
+    """How long the lamp really shone before the decay of each unit."""
+    units = [
+        unit
+        for unit, attempt in run.completed().items()
+        if any(frame.purpose == FrameRole.DECAY for frame in attempt.frames)
+    ]
+    return dict(zip(units, charges_s(run), strict=True))
+
+
+def _patch(series: Series, lasted_s: Mapping[str, float], part: Part) -> PatchSaturation:
+    decays = {one.unit[0]: one for one in series.by_unit()}
+    units = list(decays)
+    light = tuple(unit.partition("-")[0] for unit in units)
+    full, weaker = ([row for row, one in enumerate(light) if one == kind] for kind in LIGHTS)
+    if len(full) < 2:
+        raise DataError(
+            "expected two or more complete decays under the full light, got "
+            f"{len(full)}; go on with labrig resume"
+        )
+    asked = part.choices.states or (
+        None if part.protocol.states == "auto" else part.protocol.states
+    )
+    longest = decays[units[full[-1]]]
+    fit = fit_series(longest, asked, fixed_rates_per_s=part.choices.fixed_rates_per_s)
+    curves = {unit: curve(one, fit) for unit, one in decays.items()}
+    start_per_s = [state.k_r_per_s for state in fit.states]
+    rates = compare_rates(list(curves.values()), start_per_s, flicker_dof(fit))
+    charge_s = np.array([lasted_s[unit] for unit in units])
+    levels: Iterable[ChargeLevel] = ()
+    if part.protocol.weaker is not None and weaker:
+        levels = _levels(rates, charge_s, weaker[-1], full[-1], part.protocol.weaker)
+    begin, end = _growths(*(curves[units[row]] for row in full[-2:]))
+    return PatchSaturation(fit, light, charge_s, curves, rates, begin, end, tuple(levels))
+
+
+def _levels(
+    rates: RatesTest, charge_s: FloatArray, dim: int, bright: int, weaker: WeakerLight
+) -> Iterator[ChargeLevel]:
+    """Of every state, by the decays after the longest charges under the weaker and full light."""
+    for state, k_per_s in enumerate(rates.shared_per_s):
+        a, b = rates.amplitude[[dim, bright], state]
+        of_a, of_b = rates.amplitude_sigma[[dim, bright], state]
+        if b <= 0:
+            yield ChargeLevel(0.0, 1.0)
+            continue
+        ratio = max(a / b, 1e-6)
+        sigma = float(np.hypot(of_a / b, a / b * of_b / b))
+        both_s = (charge_s[dim], charge_s[bright])
+        yield charge_level(ratio, sigma, weaker.share, weaker.share_sigma, float(k_per_s), both_s)
+
+
+def _growths(before: Curve, last: Curve) -> Iterator[Measured]:
+    """Of the glow from one decay to the next, as a share, at the begin and the end of both."""
+    count = min(len(before.value), len(last.value))
+    ratio = last.value[:count] / before.value[:count]
+    sigma = np.abs(ratio) * np.hypot(
+        last.sigma[:count] / last.value[:count], before.sigma[:count] / before.value[:count]
+    )
+    part = max(count // 4, 1)
+    for rows in (slice(None, part), slice(-part, None)):
+        weight = 1 / sigma[rows] ** 2
+        mean = float(weight @ ratio[rows] / weight.sum())
+        yield Measured(mean - 1, float(1 / np.sqrt(weight.sum())))
+
+
+def _warnings(patch: PatchSaturation) -> Iterator[str]:
+    if patch.in_time == "not saturated":
+        yield (
+            "the glow still grows at the longest charge: charge for longer before decays whose "
+            "amplitudes are to be compared"
+        )
+    if any(one.verdict == "no" for one in patch.levels):
+        levels = ", ".join(plus_minus(one.r, one.sigma) for one in patch.levels)
+        yield (
+            f"r(0) = 1 does not hold after the longest charge: r(0) = {levels}; Λ from the decay "
+            "alone would be too small by that factor, in each state by another: fit excitation "
+            "and decay jointly"
+        )
+    if patch.rates.differ:
+        yield (
+            f"the rates depend on the charge (p = {patch.rates.p_value:.2g}): the decay is no sum "
+            f"of {patch.fit.n_states} exponentials of fixed rates, as power laws are none; what "
+            "was found holds for the charge it was measured at"
+        )

@@ -1,0 +1,256 @@
+"""Protocols that charge a sample and photograph its glow: keys, resting before, darks, metering."""
+
+from abc import abstractmethod
+from collections.abc import Callable, Sequence
+from dataclasses import dataclass
+from itertools import pairwise
+from typing import Protocol
+
+import numpy as np
+from pydantic import Field
+
+from labrig.acquire import CAMERA, CameraOffers, ExposureSettings, ProtocolModel, Session, Shoot, at
+from labrig.quantity import DurationS, duration_text
+from labrig.record import FrameRole
+from labrig.region import Region
+
+from .afterglow import glow
+from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
+from .darkness import levels, range_dn
+from .metering import DecayMeter, Look, Schedule, look
+from .posing import charge, check_seen, face_camera, face_lamp, has_door, lights_out
+from .watching import Watcher
+
+#: Shutter times of a metering's first frames, as shares of the longest.
+LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
+#: Of the further ones, along the decay.
+LATER = (1 / 16, 1)
+
+
+class GlowSettings(ProtocolModel):
+    """The keys of such a protocol, and the exposures that follow."""
+
+    charge: DurationS = Field(600.0, gt=0)
+    longest: DurationS = Field(30.0, gt=0)
+    camera: CameraSettings = CameraSettings()
+
+    @property
+    @abstractmethod
+    def purpose(self) -> str:
+        """Of the frames of the glow."""
+
+    @abstractmethod
+    def times_s(self) -> Sequence[float]:
+        """Begin of each frame, seconds after lamp off, rising."""
+
+    @abstractmethod
+    def regions(self) -> Sequence[Region]:
+        """Where the glow is to be seen; the brightest decides."""
+
+    def settings(self, exposure_s: float) -> ExposureSettings:
+        """Camera settings with that shutter time."""
+        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
+
+    def longest_exposures_s(self, offers: CameraOffers) -> list[float]:
+        """Longest shutter time of each frame: it is over before the next one begins."""
+        free_s = [
+            min(later - earlier - offers.overhead_s - MARGIN_S, self.longest)
+            for earlier, later in pairwise(self.times_s())
+        ]
+        return [offers.exposure_at_most(limit_s) for limit_s in (*free_s, self.longest)]
+
+    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+        """Shutter time of each dark frame."""
+        return dark_exposures_s(max(self.longest_exposures_s(offers)), offers)
+
+    def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
+        """Begin after lamp off and shutter time of each metering frame, to the last of the glow."""
+        longest_s = max(self.longest_exposures_s(offers))
+        pause_s = offers.overhead_s + MARGIN_S
+        ladder: list[tuple[float, float]] = []
+        at_s, shares = self.times_s()[0], LADDER
+        while not ladder or at_s < self.times_s()[-1]:
+            for share in shares:
+                exposure_s = offers.exposure_at_most(longest_s * share)
+                ladder.append((at_s, exposure_s))
+                at_s += exposure_s + pause_s
+            at_s, shares = at_s * 1.5, LATER
+        return ladder
+
+    def schedule(
+        self, offers: CameraOffers, looks: Sequence[Look], warn: Callable[[str], None]
+    ) -> Schedule:
+        """Frames of the glow, as bright as a metering's `looks` let them be."""
+        limits_s = self.longest_exposures_s(offers)
+        times_s = self.times_s()
+        wished = DecayMeter(looks).schedule(times_s, offers, max(limits_s), float("inf"), warn)
+        exposures_s = map(min, wished.exposures_s, limits_s)
+        return Schedule(tuple(times_s), tuple(exposures_s))
+
+    def brightest_schedule(self, offers: CameraOffers) -> Schedule:
+        """The most that `schedule` can come to."""
+        return Schedule(tuple(self.times_s()), tuple(self.longest_exposures_s(offers)))
+
+    def short_settings(self, session: Session) -> list[ExposureSettings]:
+        """For a closer look at what clips."""
+        ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
+        return [self.settings(exposure_s) for _, exposure_s in ladder]
+
+    def watcher(self, session: Session, unit: str, metering: str = "meter") -> Watcher:
+        """Holds a unit's frames against what should have happened, and what `metering` saw."""
+        return Watcher(session, unit, self.regions(), None, self.purpose, metering)
+
+    def charge_sample(self, session: Session, duration_s: float) -> None:
+        """Lamp on for that long, for its own warm-up at the least."""
+        charge(session, max(duration_s, session.rig.warm_up_s("lamp")))
+
+
+def metered_schedule(session: Session, protocol: GlowSettings, metering: str) -> Schedule:
+    """Shutter times of the glow, from what the unit `metering` saw of it."""
+    offers = session.rig[CAMERA].offers()
+
+    def decide() -> Schedule:
+        frames = [frame for frame in session.frames(FrameRole.METER) if frame.unit == metering]
+        looks = [look(frame, protocol.regions()) for frame in frames]
+        return protocol.schedule(offers, looks, session.warn)
+
+    return session.choose("exposure", decide, protocol.brightest_schedule(offers))
+
+
+#: How often the sample is looked at, and for how long at most.
+CHECK_EVERY_S = 180.0
+AT_MOST_S = 3600.0
+#: A light that fades by less between two looks does not fade.
+FADES = 0.05
+#: Less light than this share of the range is none.
+LEAST = 5e-4
+
+
+def dark_frames(
+    session: Session, unit: str, regions: Sequence[Region], exposures: Sequence[ExposureSettings]
+) -> None:
+    """Dark frames as the sample is seen later; behind a door it rests before until it is dark.
+
+    Without a door the dark frames alone can tell. A plan assumes a sample that is dark.
+
+    Parameters
+    ----------
+    unit
+        That takes them.
+    regions
+        Where the sample lies.
+    """
+    if has_door(session):
+        longest = max(exposures, key=lambda settings: settings.exposure_s)
+        _rest_until_dark(session, unit, regions, longest)
+    for settings in exposures:
+        session.perform(Shoot(FrameRole.DARK, settings))
+
+
+def _rest_until_dark(
+    session: Session, unit: str, regions: Sequence[Region], longest: ExposureSettings
+) -> None:
+    """Ends with the door open. What the camera sees behind the closed one is what dark means."""
+    face_lamp(session)
+    session.perform(Shoot(FrameRole.REST, longest))
+    face_camera(session)
+    before, rested_s = np.inf, 0.0
+    while True:
+        session.perform(Shoot(FrameRole.REST, longest))
+        light = session.choose("light before", lambda: _light(session, unit, regions), worst=0.0)
+        fades = light < (1 - FADES) * before
+        if not light or not fades or rested_s >= AT_MOST_S:
+            break
+        before = light
+        session.wait(CHECK_EVERY_S, "the sample still glows, resting in the dark")
+        rested_s += CHECK_EVERY_S
+    if light:
+        what = (
+            "a light is on in the room, or leaks in; it is subtracted as long as it stays the same"
+            if not fades
+            else "the sample glows from earlier; longer in the dark before a run is better"
+        )
+        session.warn(
+            f"after {duration_text(rested_s)} in the dark the sample's place is not dark: "
+            f"{100 * light:.2g} % of the camera's range in {longest.exposure_s:.2g} s; {what}"
+        )
+
+
+def _light(session: Session, unit: str, regions: Sequence[Region]) -> float:
+    """Share of the range by which the last look is brighter than the closed door; 0 for noise."""
+    closed, *_, seen = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
+    dark = look(closed, regions)
+    found = glow(look(seen, regions), levels(dark), seen.start_time)
+    share = found.brightest * seen.exposure_s / range_dn(dark)
+    return share if found.clips or (found.seen and share > LEAST) else 0.0
+
+
+#: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.
+METER_CHARGE_S = 600.0
+
+
+class MeteredProtocol(Protocol):
+    """What a protocol says that photographs darkness, then meters a glow."""
+
+    def settings(self, exposure_s: float) -> ExposureSettings:
+        """Camera settings with that shutter time."""
+
+    def dark_exposures_s(self, offers: CameraOffers) -> Sequence[float]:
+        """Shutter time of each dark frame."""
+
+    def meter_ladder(self, offers: CameraOffers) -> Sequence[tuple[float, float]]:
+        """Begin after lamp off and shutter time of each metering frame."""
+
+    def short_settings(self, session: Session) -> list[ExposureSettings]:
+        """For a closer look at what clips."""
+
+    def charge_sample(self, session: Session, duration_s: float) -> None:
+        """Lamp on for that long, for its own warm-up at the least."""
+
+    def watcher(self, session: Session, unit: str) -> Watcher:
+        """Holds a unit's frames against what should have happened."""
+
+
+@dataclass(frozen=True)
+class DarkUnit:
+    """Dark frames at the exposures to come, before anything glows."""
+
+    protocol: MeteredProtocol
+    name: str = "dark"
+
+    def run(self, session: Session) -> None:
+        """Warm the camera up, then photograph darkness."""
+        session.wait_until_warm("camera")
+        exposures_s = self.protocol.dark_exposures_s(session.rig[CAMERA].offers())
+        exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
+        watcher = self.protocol.watcher(session, self.name)
+        dark_frames(session, self.name, watcher.patches, exposures)
+        watcher.insist_on_darkness(self.protocol.short_settings(session))
+
+
+@dataclass(frozen=True)
+class MeterUnit:
+    """A shorter charge whose glow says how long to expose."""
+
+    protocol: MeteredProtocol
+    charge_s: float
+    name: str = "meter"
+
+    def run(self, session: Session) -> None:
+        """Charge, lamp off, a ladder of exposures; for `grow`, then on along the decay."""
+        session.wait_until_warm("camera")
+        self.protocol.charge_sample(session, min(self.charge_s, METER_CHARGE_S))
+        ladder = self.protocol.meter_ladder(session.rig[CAMERA].offers())
+        check_seen(session, ladder[0][0])
+        session.run_sequence(
+            [
+                *lights_out(session),
+                *(
+                    at(time_s, Shoot(FrameRole.METER, self.protocol.settings(exposure_s)))
+                    for time_s, exposure_s in ladder
+                ),
+            ]
+        )
+        self.protocol.watcher(session, self.name).insist_on_glow(
+            self.protocol.short_settings(session)
+        )

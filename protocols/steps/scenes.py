@@ -1,0 +1,369 @@
+"""Still scenes: what lies where, put there by a person, photographed in a bracket of exposures."""
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+from typing import Literal
+
+import numpy as np
+
+from labrig.acquire import (
+    CAMERA,
+    LAMP,
+    LAMP_OFF,
+    LAMP_ON,
+    ByHand,
+    CameraOffers,
+    ExposureSettings,
+    Session,
+    Shoot,
+    Unit,
+)
+from labrig.errors import DeviceError
+from labrig.quantity import duration_text
+from labrig.record import FrameRecord, FrameRole
+from labrig.reduce import measure, read_raw
+from labrig.region import CENTRE
+
+from .camera_settings import DARKS_PER_EXPOSURE, CameraSettings
+from .metering import SEEN_DN, SEEN_SIGMA, TARGET
+from .posing import face_lamp
+from .watching import Watcher
+
+Stage = Literal["sample", "grey card"]
+LvfPlace = Literal["away", "before camera", "on sample"]
+LampKind = Literal["halogen", "mercury"]
+
+_STAGE = {
+    "sample": "take the card away, so that the sample lies in its place",
+    "grey card": "lay the grey card where lamp and camera both see it",
+}
+_LVF = {
+    "away": "take the variable filter out",
+    "before camera": "put the variable filter before the camera",
+    "on sample": "put the variable filter between lamp and sample",
+}
+
+
+@dataclass(frozen=True)
+class Arrangement:
+    """What lies where; as it stands here a bench is before and after every protocol.
+
+    Attributes
+    ----------
+    stage
+        What lamp and camera see.
+    lvf
+        Where the linear variable filter is.
+    filter
+        Name of the colour filter before the lamp.
+    lamp
+        Which one the relay switches.
+    """
+
+    stage: Stage = "sample"
+    lvf: LvfPlace = "away"
+    filter: str | None = None
+    lamp: LampKind = "halogen"
+
+    def set_up(self, session: Session, before: "Arrangement | None", why: str) -> None:
+        """Have done by hand what differs from `before`; another lamp is not exchanged while lit.
+
+        Parameters
+        ----------
+        before
+            What lies there; None if nobody can be sure, and all is asked for.
+        """
+        if before is None or self.lamp != before.lamp:
+            session.perform(LAMP_OFF)
+        for name in ("lamp", "stage", "lvf", "filter"):
+            if before is None or getattr(self, name) != getattr(before, name):
+                what, task = self._step(name)
+                session.ask(ByHand(what, why, task))
+
+    def _step(self, name: str) -> tuple[str, str]:
+        """As one says it to a person, and to hands."""
+        match name:
+            case "lamp":
+                return f"connect the {self.lamp} lamp to the relay", f"lamp {self.lamp}"
+            case "stage":
+                return _STAGE[self.stage], self.stage
+            case "lvf":
+                return _LVF[self.lvf], f"lvf {self.lvf}"
+            case _ if self.filter is None:
+                return "take the colour filter out", "no filter"
+            case _:
+                what = f"put the colour filter {self.filter} before the lamp"
+                return what, f"filter {self.filter}"
+
+
+def light(session: Session, warm_up_s: float) -> None:
+    """Lamp on, and steady; one that has been on since the unit before is."""
+    if not session.rig[LAMP].is_on():
+        face_lamp(session)
+        session.perform(LAMP_ON)
+        session.wait(warm_up_s, "the lamp warms up")
+
+
+def left_by(before: Arrangement, session: Session) -> Arrangement | None:
+    """How the unit before left the bench; None in a run that was resumed, when it may have been
+    put to another use meanwhile.
+    """
+
+    def decide() -> bool:
+        since = session.clock.wall(session.rig.connected_s)
+        frames = [*session.frames(FrameRole.DARK), *session.frames(FrameRole.LOOK)]
+        return any(frame.start_time >= since for frame in frames)
+
+    untouched = session.choose("bench as the unit before left it", decide, worst=True)
+    return before if untouched else None
+
+
+@dataclass(frozen=True)
+class Arranged:
+    """A unit that needs the bench otherwise than the unit before it left it."""
+
+    unit: Unit
+    now: Arrangement
+    before: Arrangement
+    why: str
+
+    @property
+    def name(self) -> str:
+        """Of the unit."""
+        return self.unit.name
+
+    def run(self, session: Session) -> None:
+        """Have it arranged, then do the unit."""
+        self.now.set_up(session, self.before, self.why)
+        self.unit.run(session)
+
+
+@dataclass(frozen=True)
+class Prepared:
+    """A unit before which something else is done by hand."""
+
+    unit: Unit
+    step: ByHand
+
+    @property
+    def name(self) -> str:
+        """Of the unit."""
+        return self.unit.name
+
+    def run(self, session: Session) -> None:
+        """Have it done, then do the unit."""
+        session.ask(self.step)
+        self.unit.run(session)
+
+
+@dataclass(frozen=True)
+class PutBackUnit:
+    """The bench as it was found; a unit of its own, so that nothing is measured again for it."""
+
+    before: Arrangement
+    name: str = "put-back"
+
+    def run(self, session: Session) -> None:
+        """Lamp off, filters and card away."""
+        session.perform(LAMP_OFF)
+        before = left_by(self.before, session)
+        Arrangement().set_up(session, before, "the next measurement finds the bench as usual")
+
+
+#: Shutter times to look with, as shares of the longest.
+LADDER = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
+#: A look that fills so much of the range is the last: its noise does not matter any more.
+ENOUGH = 0.05
+#: The second exposure of a bracket, for the dim parts, in which bright ones clip.
+LONGER = 8.0
+
+
+@dataclass(frozen=True)
+class StillLife:
+    """How to photograph a scene.
+
+    Attributes
+    ----------
+    camera
+        ISO and aperture.
+    longest_s
+        No exposure is longer.
+    repeats
+        Photographs at each exposure.
+    """
+
+    camera: CameraSettings
+    longest_s: float
+    repeats: int
+
+    def settings(self, exposure_s: float) -> ExposureSettings:
+        """Camera settings with that shutter time."""
+        return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
+
+    def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
+        """Shutter time of each dark frame."""
+        exposures_s = {
+            offers.exposure_at_most(self.longest_s * part) for part in (1 / 64, 1 / 8, 1)
+        }
+        return [exposure_s for exposure_s in sorted(exposures_s) for _ in range(DARKS_PER_EXPOSURE)]
+
+    def photograph(self, session: Session, unit: str, purpose: str, lamp: str) -> None:
+        """Meter, then take the bracket.
+
+        Parameters
+        ----------
+        unit, purpose
+            Of the frames.
+        lamp
+            What to call the light that should be there.
+
+        Raises
+        ------
+        DeviceError
+            It is dark.
+        """
+        offers = session.rig[CAMERA].offers()
+        for exposure_s in self._ladder(offers):
+            session.perform(Shoot(FrameRole.LOOK, self.settings(exposure_s)))
+            if session.choose("bright enough", lambda: self._enough(session, unit), worst=False):
+                break
+        # That takes longest: both exposures of a bracket, and the longer one as long as it may be.
+        worst_s = offers.exposure_at_most(self.longest_s / LONGER)
+        exposure_s = session.choose(
+            "exposure", lambda: self._exposure_s(session, unit, lamp), worst_s
+        )
+        longer_s = offers.exposure_at_most(min(exposure_s * LONGER, self.longest_s))
+        for bracket_s in sorted({exposure_s, longer_s}):
+            for _ in range(self.repeats):
+                session.perform(Shoot(purpose, self.settings(bracket_s)))
+
+    def _ladder(self, offers: CameraOffers) -> Sequence[float]:
+        return sorted({offers.exposure_at_most(self.longest_s * share) for share in LADDER})
+
+    def _enough(self, session: Session, unit: str) -> bool:
+        return _seen(_looks(session, unit)[-1]).share > ENOUGH
+
+    def _exposure_s(self, session: Session, unit: str, lamp: str) -> float:
+        """Shutter time at which the brightest fills as much of the range as it should."""
+        offers, looks = session.rig[CAMERA].offers(), _looks(session, unit)
+        seen = [_seen(frame) for frame in looks]
+        visible = [one for one in seen if one.visible]
+        if not visible:
+            raise DeviceError(
+                f"{unit}: dark even in {duration_text(looks[-1].exposure_s)}: the {lamp} lamp did "
+                "not light (check its bulb, its plug and the contact of its relay), or what should "
+                "be seen is not in its place"
+            )
+        open_ones = [one for one in visible if not one.clips]
+        if not open_ones:
+            session.warn(
+                f"{unit}: even the shortest exposure clips; lower camera.iso or close the aperture"
+            )
+            return offers.exposures_s[0]
+        best = open_ones[-1]
+        wanted_s = best.exposure_s * TARGET / best.share
+        return offers.exposure_at_most(min(wanted_s, self.longest_s))
+
+
+@dataclass(frozen=True)
+class _Seen:
+    """The brightest 0.5 % of a frame's pixels, as a share of the range."""
+
+    exposure_s: float
+    share: float
+    visible: bool
+    clips: bool
+
+
+def _seen(frame: FrameRecord) -> _Seen:
+    measured = measure(read_raw(frame.path))
+    channels = list(measured.channels.values())
+    brightest = max(channels, key=lambda channel: channel.peak)
+    noise_dn = SEEN_SIGMA * brightest.sigma * np.sqrt(brightest.n)
+    return _Seen(
+        exposure_s=frame.exposure_s,
+        share=brightest.peak / measured.range_dn,
+        visible=brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN)
+        or brightest.peak > max(noise_dn, SEEN_DN),
+        clips=measured.clipped,
+    )
+
+
+def _looks(session: Session, unit: str) -> list[FrameRecord]:
+    return [frame for frame in session.frames(FrameRole.LOOK) if frame.unit == unit]
+
+
+@dataclass(frozen=True)
+class StillDarkUnit:
+    """Dark frames at the exposures to come."""
+
+    still_life: StillLife
+    name: str = "dark"
+
+    def run(self, session: Session) -> None:
+        """Warm the camera up, then photograph darkness."""
+        session.wait_until_warm("camera")
+        scene = self.still_life
+        exposures_s = scene.dark_exposures_s(session.rig[CAMERA].offers())
+        for exposure_s in exposures_s:
+            session.perform(Shoot(FrameRole.DARK, scene.settings(exposure_s)))
+        Watcher(session, self.name, [CENTRE], None).insist_on_darkness(
+            [scene.settings(exposure_s) for exposure_s in sorted(set(exposures_s))]
+        )
+
+
+@dataclass(frozen=True)
+class SceneUnit:
+    """A lit scene.
+
+    Attributes
+    ----------
+    still_life
+        How it is photographed.
+    name, purpose
+        Of the unit, and of its frames.
+    wanted, before
+        What lies where now, and in the unit before.
+    why
+        To arrange it.
+    mercury_warm_up_s
+        Of the lamp that the rig file does not know.
+    """
+
+    still_life: StillLife
+    name: str
+    purpose: str
+    wanted: Arrangement
+    before: Arrangement
+    why: str
+    mercury_warm_up_s: float = 0.0
+
+    def run(self, session: Session) -> None:
+        """Arrange, light, photograph, and see whether it shows what it should."""
+        session.wait_until_warm("camera")
+        self.arrange(session)
+        light(session, self.warm_up_s(session))
+        self.still_life.photograph(session, self.name, self.purpose, self.wanted.lamp)
+        self.check(session)
+
+    def arrange(self, session: Session) -> None:
+        """Have everything put in its place."""
+        self.wanted.set_up(session, left_by(self.before, session), self.why)
+
+    def warm_up_s(self, session: Session) -> float:
+        """Until the lamp in use is steady."""
+        if self.wanted.lamp == "mercury":
+            return self.mercury_warm_up_s
+        return session.rig.warm_up_s("lamp")
+
+    def check(self, session: Session) -> None:
+        """Refuse pictures of something else; here none are."""
+
+    def own(self, session: Session) -> list[FrameRecord]:
+        """Its frames."""
+        return frames_of(session, self.purpose, self.name)
+
+
+def frames_of(session: Session, purpose: str, unit: str) -> list[FrameRecord]:
+    """Frames of one unit."""
+    return [frame for frame in session.frames(purpose) if frame.unit == unit]
