@@ -29,12 +29,11 @@ from labrig.record import FrameRecord, FrameRole
 from labrig.region import Region
 
 from .steps.afterglow import dark_level
-from .steps.album import Album
 from .steps.camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
 from .steps.charge_times import FloatArray, most_telling_s, still_grows
 from .steps.darkness import levels
 from .steps.glow import dark_frames
-from .steps.metering import DecayMeter, Look, Schedule
+from .steps.metering import Album, DecayMeter, Look, Schedule
 from .steps.patch_names import FilterPatches
 from .steps.posing import charge, check_seen, face_camera, face_lamp, lights_out
 from .steps.watching import Watcher

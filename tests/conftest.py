@@ -23,8 +23,7 @@ from matplotlib.figure import Figure
 
 from labrig import shipped
 from labrig.cli.ending import guarded
-from labrig.report.page import Shown, draw
-from labrig.report.plates import Plates
+from labrig.report.page import Plates, Shown, draw
 from labrig.report.sections import Picture, Section
 from labrig.signals import STOP_SIGNALS
 from tests.analyse import recorded

@@ -4,20 +4,236 @@ Base classes as in the NeXus manual (manual.nexusformat.org/classes/base_classes
 definition describes a decay.
 """
 
+import json
+import re
+from collections.abc import Iterator, Sequence
 from datetime import UTC, datetime
 from io import BytesIO
 from pathlib import Path
+from typing import Any
 
 import h5py
 import numpy as np
+from numpy.typing import ArrayLike, NDArray
 
 from labrig.acquire import CAMERA, DARK, LIGHTS
 from labrig.errors import DiskError
-from labrig.export.hdf5 import add_group, add_note, add_number, add_text
-from labrig.export.nexus_decay import add_decays, add_fit, valid_names
-from labrig.export.nexus_fields import add_fields
 from labrig.record import DeviceLine, RunDescription, RunRecord
-from labrig.results import DecayResult, PhosphorResult, RunResult
+from labrig.results import (
+    DecayPatch,
+    DecayResult,
+    FittedDecay,
+    Measured,
+    PhosphorResult,
+    RunResult,
+    Series,
+    leaves,
+    unit_of,
+)
+
+TEXT = h5py.string_dtype()
+
+
+def add_group(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
+    """A new group of that NeXus class."""
+    group = parent.create_group(name)
+    group.attrs["NX_class"] = nx_class
+    return group
+
+
+def add_number(
+    group: h5py.Group, name: str, value: ArrayLike, units: str = "", long_name: str = ""
+) -> h5py.Dataset:
+    """A new field of numbers, without units a pure one.
+
+    Parameters
+    ----------
+    long_name
+        What a plot writes at its axis.
+    """
+    field = group.create_dataset(name, data=np.asarray(value), track_times=False)
+    field.attrs["units"] = units
+    if long_name:
+        field.attrs["long_name"] = long_name
+    return field
+
+
+def add_text(group: h5py.Group, name: str, value: str | Sequence[str]) -> h5py.Dataset:
+    """A new field of one text or several."""
+    data = value if isinstance(value, str) else np.array(value, dtype=object)
+    return group.create_dataset(name, data=data, dtype=TEXT, track_times=False)
+
+
+def add_note(parent: h5py.Group, name: str, text: str, kind: str, file_name: str = "") -> None:
+    """A new NXnote: a text with its media type, and the file that it is."""
+    note = add_group(parent, name, "NXnote")
+    add_text(note, "type", kind)
+    if file_name:
+        add_text(note, "file_name", file_name)
+    add_text(note, "data", text)
+
+
+def add_fields(entry: h5py.Group, result: RunResult, name: str, version: str) -> None:
+    """An NXprocess `name` with the fields of a result; those of fields in groups of their own."""
+    (valid,) = valid_names([name])
+    process = add_group(entry, valid, "NXprocess")
+    add_text(process, "program", "labrig")
+    add_text(process, "version", version)
+    for path, value in leaves(result):
+        group = process
+        *groups, last = _valid("result", *path)
+        for one in groups:
+            group = group[one] if one in group else add_group(group, one, "NXcollection")
+        if value is not None:
+            _add(group, last, path[-1], value)
+
+
+def _valid(*names: str) -> list[str]:
+    """Each as NeXus allows it; names on one path may be the same."""
+    return [valid_names([name])[0] for name in names]
+
+
+def _add(group: h5py.Group, name: str, field: str, value: Any) -> None:
+    """Numbers or texts of any shape; what is neither is written as text."""
+    if isinstance(value, Measured):
+        add_number(group, name, value.value, value.unit)
+        add_number(group, f"{name}_errors", value.sigma, value.unit)
+        return
+    if isinstance(value, str):
+        add_text(group, name, value)
+        return
+    try:
+        numbers = np.asarray(value)
+    except ValueError:
+        numbers = np.asarray(None)
+    if numbers.dtype.kind in "iuf":
+        add_number(group, name, numbers, unit_of(field))
+    elif numbers.dtype.kind == "b":
+        add_number(group, name, numbers.astype(np.int8))
+    elif isinstance(value, tuple | list):
+        add_text(group, name, [str(one) for one in value])
+    else:
+        add_text(group, name, str(value))
+
+
+DN_PER_S = "DN/s"
+#: silx and h5web plot it so: a decay is looked at on a logarithmic scale.
+LOGARITHMIC = json.dumps({"signal_scale_type": "log"})
+
+
+def valid_names(names: Sequence[str]) -> list[str]:
+    """Names that NeXus allows (letters of ASCII, digits, underscores), each of them once."""
+    valid: list[str] = []
+    for name in names:
+        allowed = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "unnamed"
+        while allowed in valid:
+            allowed += "_"
+        valid.append(allowed)
+    return valid
+
+
+def add_decays(entry: h5py.Group, name: str, title: str, patch: DecayPatch) -> None:
+    """An NXdata `decay_1_<name>` for each decay of a patch; the first is the entry's default."""
+    for decay, rows in _decays(patch.series):
+        series = patch.series.take(rows)
+        data = _add_plot(entry, f"{decay}_{name}", title, patch, series)
+        data.attrs["SILX_style"] = LOGARITHMIC
+        _add_signals(data, series.channels, series.values)
+        for number, channel in enumerate(series.channels):
+            add_number(data, f"{channel}_errors", series.sigma[:, number], DN_PER_S)
+        add_number(data, "exposure_start", series.t_s, "s")
+        add_number(data, "exposure_time", series.exposure_s, "s")
+        add_number(data, "iso", series.iso)
+        add_number(data, "f_number", series.f_number)
+        add_text(data, "frame", series.frame)
+        add_text(data, "flag", series.flag)
+        if patch.region is not None:
+            meaning = "x, y, width, height: pixels, or fractions of the frame"
+            add_number(data, "region", patch.region, "", meaning)
+        entry.attrs.setdefault("default", f"{decay}_{name}")
+
+
+def add_fit(entry: h5py.Group, name: str, title: str, patch: DecayPatch, version: str) -> None:
+    """An NXprocess `fit_<name>`: parameters, curves, residuals, or why there is no fit."""
+    process, fit = add_group(entry, f"fit_{name}", "NXprocess"), patch.fit
+    add_text(process, "program", "labrig")
+    add_text(process, "version", version)
+    if fit is None or patch.normalised_residuals is None:
+        add_note(process, "not_fitted", patch.failure, "text/plain")
+        return
+    add_note(process, "fit", fit.to_json(), "application/json", "fit.json")
+    _add_parameters(process, fit)
+    residuals = np.full(patch.series.values.shape, np.nan)  # NaN where a frame was left out
+    residuals[patch.series.usable] = patch.normalised_residuals
+    for decay, rows in _decays(patch.series):
+        series = patch.series.take(rows)
+        curve = _add_plot(process, f"{decay}_curve", f"fit of {title}", patch, series)
+        curve.attrs["SILX_style"] = LOGARITHMIC
+        predicted = fit.predict(series.t_s, series.exposure_s)
+        _add_signals(curve, series.channels, predicted)
+        left = _add_plot(
+            process, f"{decay}_residuals", f"whitened residuals of {title}", patch, series
+        )
+        for number, channel in enumerate(series.channels):
+            add_number(left, channel, residuals[rows, number], "", f"{channel} / σ")
+        process.attrs.setdefault("default", f"{decay}_curve")
+
+
+def _decays(series: Series) -> Iterator[tuple[str, NDArray[np.intp]]]:
+    """Name and rows of each decay: repeats are plotted apart."""
+    units = list(dict.fromkeys(series.unit))
+    for unit, name in zip(units, valid_names(units), strict=True):
+        yield name, np.flatnonzero(np.array(series.unit) == unit)
+
+
+def _add_plot(
+    parent: h5py.Group, name: str, title: str, patch: DecayPatch, series: Series
+) -> h5py.Group:
+    """A new NXdata with its time axis, that shows the brightest channel first."""
+    data = add_group(parent, name, "NXdata")
+    add_text(data, "title", f"{title}, {series.unit[0]}")
+    data.attrs["axes"] = ["time"]
+    data.attrs["time_indices"] = [0]
+    middle_s = series.t_s + series.exposure_s / 2
+    add_number(data, "time", middle_s, "s", "middle of the exposure after lamp off / s")
+    brightest = series.channels[_brightest(patch)]
+    data.attrs["signal"] = brightest
+    others = [channel for channel in series.channels if channel != brightest]
+    if others:
+        data.attrs["auxiliary_signals"] = others
+    return data
+
+
+def _add_signals(data: h5py.Group, channels: Sequence[str], values: NDArray[np.float64]) -> None:
+    for number, channel in enumerate(channels):
+        add_number(data, channel, values[:, number], DN_PER_S, f"{channel} / ({DN_PER_S})")
+
+
+def _add_parameters(process: h5py.Group, fit: FittedDecay) -> None:
+    parameters = add_group(process, "parameters", "NXparameters")
+
+    def add(name: str, values: Sequence[float], errors: Sequence[float], units: str = "") -> None:
+        add_number(parameters, name, values, units)
+        add_number(parameters, f"{name}_errors", errors, units)
+
+    states = fit.states
+    add("rate", [s.k_r_per_s for s in states], [s.k_r_sigma_per_s for s in states], "1/s")
+    add("amplitude", [s.amplitude for s in states], [s.amplitude_sigma for s in states], DN_PER_S)
+    add_text(parameters, "channel", fit.channels)
+    add("channel_weight", fit.channel_weights, fit.channel_weights_sigma)
+    add("offset", fit.offsets, fit.offsets_sigma, DN_PER_S)
+    add("flicker", [fit.flicker], [fit.flicker_sigma])
+    add_number(parameters, "reduced_chi2", fit.reduced_chi2)
+    order = "of rate 1, amplitude 1, rate 2, …, offset of the brightest channel"
+    add_number(parameters, "covariance", fit.covariance, "", order)
+
+
+def _brightest(patch: DecayPatch) -> int:
+    """Number of the channel that a plot shows first."""
+    if patch.fit is not None:
+        return patch.fit.brightest
+    return int(np.argmax(patch.series.values.mean(axis=0)))
+
 
 YAML = "application/yaml"
 #: NeXus classes of the devices that have one.

@@ -7,8 +7,16 @@ from typing import Any
 
 from pydantic import BaseModel, ConfigDict
 
+from labrig.acquire import ProtocolModel, RigFile
 from labrig.analyse import Choices
-from labrig.record import RunRecord
+from labrig.record import (
+    DeviceLine,
+    RunDescription,
+    RunRecord,
+    interruptions,
+    read_notes,
+    written_time,
+)
 from labrig.region import Region
 
 _LIBRARIES = ("numpy", "scipy", "nlopt", "rawpy", "matplotlib", "colour-science", "h5py")
@@ -75,3 +83,32 @@ def library_versions() -> dict[str, str]:
     # OpenCV comes as one of several packages, LibRaw inside rawpy.
     libraw = ".".join(map(str, rawpy.libraw_version))
     return {**installed, "opencv": cv2.__version__, "libraw": libraw}
+
+
+def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDescription:
+    """Gather it from the run folder, and from what processes it."""
+    attempts = list(run.completed().values())
+    start = attempts[0].start if attempts else run.attempts[0].start
+    identities = start.get("devices", {})
+    sample = protocol.sample.model_dump(exclude={"name"}, exclude_none=True)
+    return RunDescription(
+        title=protocol.sample.name,
+        protocol=protocol.protocol,
+        run=run.name,
+        started=written_time(start["time"]),
+        ended=written_time(run.last_time),
+        rig=rig.name,
+        simulated=rig.simulation is not None,
+        labrig_version=version("labrig"),
+        libraries=tuple(library_versions().items()),
+        sample=tuple((key.replace("_", " "), str(value)) for key, value in sample.items()),
+        devices=tuple(
+            DeviceLine(role, entry.address, identities.get(role, ""))
+            for role, entry in rig.devices.items()
+        ),
+        guard=start.get("guard", ""),
+        protocol_text=(run.folder / "protocol.yaml").read_text(encoding="utf-8"),
+        rig_text=(run.folder / "rig.yaml").read_text(encoding="utf-8"),
+        interruptions=interruptions(run),
+        notes=read_notes(run.folder),
+    )

@@ -1,5 +1,6 @@
 """A run of any protocol, from its folder to its result, report and exports."""
 
+import shutil
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -11,9 +12,8 @@ from labrig.calibration import LvfFile
 from labrig.errors import FitError, UsageError
 from labrig.export import write_nexus
 from labrig.optics import CameraResponse
-from labrig.process.description import describe_run
-from labrig.process.provenance import provenance
-from labrig.process.result_folder import new_result, put_in_place, write_provenance
+from labrig.process.changes import changes
+from labrig.process.provenance import Provenance, describe_run, provenance
 from labrig.record import read_run
 from labrig.report import (
     Report,
@@ -24,6 +24,48 @@ from labrig.report import (
     write_report,
 )
 from labrig.results import RunResult, write_result
+from labrig.yaml_file import write_yaml
+
+_EARLIER = "result-"
+
+
+def new_result(run: Path) -> Path:
+    """An empty folder in `run` for `put_in_place`."""
+    made = run / "result.part"
+    if made.exists():
+        shutil.rmtree(made)
+    made.mkdir()
+    return made
+
+
+def put_in_place(made: Path) -> tuple[str, ...]:
+    """Make the folder `made` the run's `result`; returns what changed, in lines for people.
+
+    The result before it becomes `result-1`, `result-2`, …, from old to new. One that is the same
+    to the byte stays where it is, and `made` goes.
+    """
+    final = made.with_name("result")
+    if not final.exists():
+        made.rename(final)
+        return ()
+    told = changes(final, made)
+    if not told:
+        shutil.rmtree(made)
+        return ("the same result as before",)
+    numbers = [int(path.name[len(_EARLIER) :]) for path in _earlier(made.parent)]
+    earlier = made.with_name(f"{_EARLIER}{max(numbers, default=0) + 1}")
+    final.rename(earlier)
+    made.rename(final)
+    return (f"changed since the result before, which is kept as {earlier.name}:", *told)
+
+
+def _earlier(run: Path) -> list[Path]:
+    return [path for path in run.glob(f"{_EARLIER}*") if path.name[len(_EARLIER) :].isdecimal()]
+
+
+def write_provenance(made: Path, provenance: Provenance) -> None:
+    """Write provenance.yaml into `made`."""
+    write_yaml(made / "provenance.yaml", provenance)
 
 
 @dataclass(frozen=True)

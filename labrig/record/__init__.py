@@ -1,7 +1,6 @@
 """The run folder: written while it happens, read afterwards."""
 
 from labrig.record.attempt import AttemptWriter
-from labrig.record.durable import REAL_DISK, Disk, write_durably
 from labrig.record.frames import (
     PERSON,
     TAKEN_BACK,
@@ -12,20 +11,31 @@ from labrig.record.frames import (
     unit_in,
     unit_within,
 )
-from labrig.record.history import DeviceLine, RunDescription, charges_s, interruptions, written_time
-from labrig.record.journal import Document, read_journal
-from labrig.record.notes import add_note, read_notes
-from labrig.record.reading import Attempt, RunRecord, read_run
-from labrig.record.run_folder import RunFolder
-from labrig.record.temperature import (
+from labrig.record.history import (
     KNOWN_FOR_S,
     SMOOTHED_S,
     Course,
+    DeviceLine,
+    RunDescription,
+    charges_s,
     degrees_text,
     glow_temperature_c,
     in_roles,
+    interruptions,
     relative_rate_change,
+    written_time,
 )
+from labrig.record.journal import (
+    REAL_DISK,
+    Disk,
+    Document,
+    add_note,
+    read_journal,
+    read_notes,
+    write_durably,
+)
+from labrig.record.reading import Attempt, RunRecord, read_run
+from labrig.record.run_folder import RunFolder
 
 __all__ = [
     "KNOWN_FOR_S",

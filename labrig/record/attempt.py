@@ -8,9 +8,8 @@ from typing import Any
 
 import event_model
 
-from labrig.record.durable import Disk, write_durably
 from labrig.record.frames import ActionRecord, FrameRecord, TemperatureRecord
-from labrig.record.journal import Journal
+from labrig.record.journal import Disk, Journal, write_durably
 
 _ACTION_KEYS: dict[str, str] = {
     "device": "string",

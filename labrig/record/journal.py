@@ -5,12 +5,73 @@ import os
 from collections.abc import Mapping
 from contextlib import suppress
 from dataclasses import dataclass
+from datetime import UTC, datetime
 from pathlib import Path
 from types import TracebackType
-from typing import Any, BinaryIO, Self
+from typing import Any, BinaryIO, Protocol, Self
 
-from labrig.errors import DataError, DiskError
-from labrig.record.durable import REAL_DISK, Disk, write_durably
+from labrig.errors import DataError, DiskError, UsageError
+
+
+class Disk(Protocol):
+    """Takes what has to survive a power cut."""
+
+    def write(self, file: BinaryIO, data: bytes) -> None:
+        """Append to an unbuffered file and wait until the disk has it.
+
+        Raises
+        ------
+        OSError
+            Full, or gone; part of `data` may be in the file.
+        """
+
+
+class RealDisk:
+    """The disk of this PC."""
+
+    def write(self, file: BinaryIO, data: bytes) -> None:
+        """As `Disk.write`."""
+        left = memoryview(data)
+        while left:
+            left = left[file.write(left) :]
+        os.fsync(file.fileno())
+
+
+REAL_DISK: Disk = RealDisk()
+
+
+def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
+    """Write `data` to `path` by way of `.part`, on the disk before the name appears.
+
+    Raises
+    ------
+    DiskError
+        The disk is full or gone; `path` is as it was, or as it should be.
+    """
+    part = path.with_name(path.name + ".part")
+    try:
+        with part.open("wb", buffering=0) as file:
+            disk.write(file, data)
+        part.replace(path)
+        sync_folder(path.parent)
+    except OSError as error:
+        with suppress(OSError):
+            part.unlink(missing_ok=True)
+        raise DiskError(
+            f"{path}: {len(data) / 1e6:.2g} MB cannot be written ({error.strerror}); see that "
+            "the disk is there and has room"
+        ) from None
+
+
+def sync_folder(folder: Path) -> None:
+    """Make what was made or renamed in `folder` durable, where there is a way (not on Windows)."""
+    if hasattr(os, "O_DIRECTORY"):
+        handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
+        try:
+            os.fsync(handle)
+        finally:
+            os.close(handle)
+
 
 JOURNAL = "journal.jsonl"
 Document = tuple[str, dict[str, Any]]
@@ -126,3 +187,43 @@ def _parsed(path: Path, raw: bytes) -> JournalContent:
 def _refuse(constant: str) -> None:
     """NaN and infinity, which JSON does not have and a journal never holds."""
     raise ValueError(constant)
+
+
+_NAME = "notes.md"
+
+
+def add_note(run: Path, text: str, written_time: float) -> Path:
+    """Add a note to the run in `run`; returns the file.
+
+    Parameters
+    ----------
+    text
+        Markdown; its lines are kept as they are.
+    written_time
+        Seconds since 1970.
+
+    Raises
+    ------
+    UsageError
+        There is nothing to note.
+    DiskError
+        The file cannot be written.
+    """
+    if not text.strip():
+        raise UsageError("expected a text to note, got nothing; write: labrig note RUN 'the text'")
+    path = run / _NAME
+    written = datetime.fromtimestamp(written_time, UTC)
+    entry = f"## {written:%Y-%m-%d %H:%M} UTC\n\n{text.strip()}\n\n"
+    try:
+        with path.open("ab", buffering=0) as notes:
+            REAL_DISK.write(notes, entry.encode())
+        sync_folder(run)
+    except OSError as error:
+        raise DiskError(f"{path}: the note cannot be written ({error.strerror})") from None
+    return path
+
+
+def read_notes(run: Path) -> str:
+    """All that was noted, as written; empty if nothing was."""
+    path = run / _NAME
+    return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""

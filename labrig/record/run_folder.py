@@ -15,8 +15,7 @@ from filelock import FileLock, Timeout
 
 from labrig.errors import DiskError, UsageError
 from labrig.record.attempt import AttemptWriter
-from labrig.record.durable import REAL_DISK, Disk, sync_folder, write_durably
-from labrig.record.journal import JOURNAL, Journal
+from labrig.record.journal import JOURNAL, REAL_DISK, Disk, Journal, sync_folder, write_durably
 from labrig.record.reading import RunRecord, run_record
 
 #: What a run folder is known by.

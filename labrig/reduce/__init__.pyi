@@ -1,6 +1,7 @@
 from .channels import (
     ChannelStats as ChannelStats,
     FrameMeasurement as FrameMeasurement,
+    PixelMask as PixelMask,
     measure as measure,
 )
 from .dark import (
@@ -37,9 +38,6 @@ from .pictures import (
     is_grey as is_grey,
     jpeg as jpeg,
     small as small,
-)
-from .planes import (
-    PixelMask as PixelMask,
 )
 from .raw import (
     RawFrame as RawFrame,

@@ -11,9 +11,9 @@ import numpy as np
 import numpy.typing as npt
 
 from labrig.optics import Flat, rho_squared
+from labrig.reduce.channels import PixelMask
 from labrig.reduce.noise import Floats
 from labrig.reduce.photon_transfer import ROUNDING_VARIANCE, NoiseModel
-from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.saturation import is_clipped
 from labrig.region import Region, region_pixels

@@ -10,8 +10,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.errors import DataError
+from labrig.reduce.channels import PixelMask
 from labrig.reduce.frame import LinearFrame
-from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame, read_raw
 
 FloatArray = NDArray[np.float64]

@@ -19,10 +19,10 @@ from itertools import pairwise
 import numpy as np
 import numpy.typing as npt
 
+from labrig.reduce.channels import PixelMask
 from labrig.reduce.dark import same_exposure
 from labrig.reduce.noise import Floats
 from labrig.reduce.photon_transfer import NoiseModel, variance_terms
-from labrig.reduce.planes import PixelMask
 from labrig.reduce.raw import RawFrame
 from labrig.region import Region, region_pixels
 

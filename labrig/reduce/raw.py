@@ -16,8 +16,15 @@ import numpy as np
 
 from labrig.errors import FrameError
 from labrig.input_file import read_bytes
-from labrig.reduce.cfa import MONOCHROME, Letters, channels_of, side_of, smallest_square
-from labrig.reduce.dng import DngPattern, read_dng
+from labrig.reduce.dng import (
+    MONOCHROME,
+    DngPattern,
+    Letters,
+    channels_of,
+    read_dng,
+    side_of,
+    smallest_square,
+)
 from labrig.reduce.noise import Floats, Mosaic
 from labrig.reduce.saturation import clip_level
 

@@ -1,8 +1,7 @@
 """Setting up a bench: what is plugged into this PC, and whether a rig does what it should."""
 
-from labrig.setup.check import check_rig
+from labrig.setup.check import DeviceReport, RigReport, check_rig
 from labrig.setup.discover import Discovery, Found, discover
-from labrig.setup.report import DeviceReport, RigReport
 from labrig.setup.surroundings import Process, Surroundings
 from labrig.setup.view import view_rig
 

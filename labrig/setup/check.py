@@ -1,12 +1,170 @@
 """A rig's devices identified, looked over and exercised gently."""
 
-from dataclasses import replace
+import io
+import logging
+from collections.abc import Iterator
+from dataclasses import asdict, dataclass, replace
+from typing import Any
 
-from labrig.acquire import ROLES, Checkable, Device, Measured, Rig, Trial
+from labrig.acquire import (
+    ROLES,
+    Checkable,
+    Device,
+    Exercised,
+    Finding,
+    Frame,
+    Measured,
+    Rig,
+    Suggestion,
+    Trial,
+)
 from labrig.bench import Bench
 from labrig.errors import DeviceError, LabrigError
-from labrig.setup.photographs import Photographs
-from labrig.setup.report import DeviceReport, RigReport
+from labrig.reduce import FrameMeasurement, measure, read_raw
+from labrig.setup.picture_stats import decode
+
+#: Mean above black, as a part of the range, from which on a frame is not dark.
+LIGHT = 0.005
+#: EXIF orientation of a picture that was not turned.
+UPRIGHT = 1
+
+
+class Photographs:
+    """The eyes of a rig check: reads RAW frames and live pictures."""
+
+    def dark_frame(self, frame: Frame) -> Exercised:
+        """Its noise, whether it is dark, whether it is turned."""
+        reduced = measure(read_raw(frame.data, "the dark frame"))
+        return Exercised(
+            tuple(_noise(reduced, frame)), (_darkness(reduced), _orientation(frame.data))
+        )
+
+    def live_picture(self, jpeg: bytes) -> Measured:
+        """Its size."""
+        height, width, _ = decode(jpeg).shape
+        return Measured("live picture", f"{width} x {height} pixels, {len(jpeg) / 1e3:.1f} kB")
+
+
+def _noise(reduced: FrameMeasurement, frame: Frame) -> list[Measured]:
+    return [
+        Measured(
+            f"dark frame {frame.settings}, {name}",
+            f"mean {stats.mean:.2f} ± {stats.sigma:.3f} DN above black, std {stats.std:.2f} DN, "
+            f"{stats.hot} hot, {stats.saturated} clipped of {stats.n}",
+        )
+        for name, stats in reduced.channels.items()
+    ]
+
+
+def _darkness(reduced: FrameMeasurement) -> Finding:
+    limit_dn = LIGHT * (reduced.white - min(reduced.black))
+    brightest_dn = max(stats.mean for stats in reduced.channels.values())
+    if brightest_dn > limit_dn:
+        return Finding(
+            "warn",
+            f"with the lamp off a frame is not dark ({brightest_dn:.0f} DN above black)",
+            "darken the room, cover displays, and let the samples fade",
+        )
+    return Finding("fine", "with the lamp off a frame is dark")
+
+
+def _orientation(content: bytes) -> Finding:
+    """Auto rotate: no known property tells it, a turned frame does."""
+    import exifread
+
+    # it warns through logging of every odd tag
+    logging.getLogger("exifread").setLevel(logging.CRITICAL)
+    try:
+        tags: dict[str, Any] = exifread.process_file(io.BytesIO(content), details=False)
+    except Exception:  # damaged EXIF fails in any way
+        return Finding(
+            "warn",
+            "the frame's EXIF cannot be read, and so not whether it is turned",
+            "see that auto rotate is off",
+        )
+    tag = tags.get("Image Orientation")
+    if tag is None or list(tag.values) == [UPRIGHT]:
+        return Finding("fine", "frames are not marked as turned")
+    return Finding(
+        "refuse",
+        "auto rotate is on: it marks frames as turned, some this way and some that",
+        "Set-up 1 (yellow) → Auto rotate → Off",
+    )
+
+
+@dataclass(frozen=True)
+class DeviceReport:
+    """One device of the rig.
+
+    Attributes
+    ----------
+    failure
+        What it could not do, in one line; None if it did all that was asked.
+    """
+
+    key: str
+    identity: str
+    findings: tuple[Finding, ...] = ()
+    measured: tuple[Measured, ...] = ()
+    suggestions: tuple[Suggestion, ...] = ()
+    failure: str | None = None
+
+
+@dataclass(frozen=True)
+class RigReport:
+    """All devices of a rig, and whether it was left in its safe state.
+
+    Attributes
+    ----------
+    unsafe
+        Why the safe state is not confirmed; None if it is.
+    """
+
+    rig: str
+    devices: tuple[DeviceReport, ...]
+    unsafe: str | None = None
+
+    @property
+    def failures(self) -> tuple[str, ...]:
+        """What did not work, one line each."""
+        failed = [f"{d.key}: {d.failure}" for d in self.devices if d.failure is not None]
+        return (*failed, *([self.unsafe] if self.unsafe else []))
+
+    @property
+    def refusals(self) -> tuple[str, ...]:
+        """What would spoil a measurement, one line each."""
+        return tuple(
+            f"{device.key}: {finding}"
+            for device in self.devices
+            for finding in device.findings
+            if finding.severity == "refuse"
+        )
+
+    def rows(self) -> Iterator[tuple[str, str, str, str]]:
+        """Device, verdict, what, and what to do: the lines of a table."""
+        for device in self.devices:
+            yield device.key, "", device.identity, ""
+            for finding in device.findings:
+                yield "", finding.severity, finding.what, finding.remedy
+            for measured in device.measured:
+                yield "", "", measured.what, measured.value
+            for suggestion in device.suggestions:
+                yield (
+                    "",
+                    "",
+                    f"for the rig file, devices.{device.key}:",
+                    f"{suggestion.key}: {suggestion.value}",
+                )
+            if device.failure is not None:
+                yield "", "failed", device.failure, ""
+        if self.unsafe is not None:
+            yield "rig", "failed", self.unsafe, ""
+        else:
+            yield "rig", "fine", "left in its safe state", ""
+
+    def to_json(self) -> dict[str, Any]:
+        """What `labrig rig check --json` prints."""
+        return asdict(self) | {"failures": list(self.failures), "refusals": list(self.refusals)}
 
 
 def check_rig(stand: Bench) -> RigReport:

@@ -9,9 +9,7 @@ from labrig.acquire import CAMERA, VIEWFINDER, LiveView, Rig, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import Clock
 from labrig.errors import UsageError
-from labrig.setup.aimed_protocol import AimedProtocol
-from labrig.setup.live_pictures import LivePictures
-from labrig.setup.view_server import ViewServer
+from labrig.setup.view_server import AimedProtocol, LivePictures, ViewServer
 
 #: Ten pictures a second are enough for a hand on a focus ring, and leave the camera some rest.
 PICTURE_PERIOD_S = 0.1

@@ -1,17 +1,183 @@
 """The page of `labrig rig view`: live pictures, and regions drawn into a protocol."""
 
+import threading
 from collections.abc import Mapping
+from dataclasses import dataclass
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Annotated, Any, ClassVar
 
+from pydantic import BaseModel, ConfigDict, Field, StringConstraints
+
+from labrig.acquire import read_protocol
+from labrig.errors import UsageError
 from labrig.local_server import LocalConversation, LocalServer
-from labrig.region import parse_region
-from labrig.setup.aimed_protocol import AimedProtocol
-from labrig.setup.drawn_patches import DrawnPatches
-from labrig.setup.live_pictures import LivePictures
+from labrig.region import Region, parse_region
+from labrig.setup.patches_block import KEY, rounded, write_patches
 from labrig.setup.picture_stats import decode, picture_stats
 from labrig.yaml_file import validate
+
+
+@dataclass(frozen=True)
+class LivePicture:
+    """One picture and its number, which counts from 1."""
+
+    number: int
+    jpeg: bytes
+
+
+class LivePictures:
+    """At most one picture, and whether somebody wants the next.
+
+    A camera's live view warms its sensor, and a warm sensor is a noisy one: a picture is only
+    fetched when somebody waits for it.
+    """
+
+    def __init__(self) -> None:
+        self._latest: LivePicture | None = None
+        self._wanted = False
+        self._changed = threading.Condition()
+
+    @property
+    def latest(self) -> LivePicture | None:
+        """The last picture that was shown."""
+        with self._changed:
+            return self._latest
+
+    def wait_until_wanted(self, at_most_s: float) -> bool:
+        """Whether somebody wants a picture, now or within so many seconds of real time."""
+        with self._changed:
+            return self._changed.wait_for(lambda: self._wanted, at_most_s)
+
+    def show(self, jpeg: bytes) -> None:
+        """Hand a picture to everybody who waits."""
+        with self._changed:
+            number = 1 if self._latest is None else self._latest.number + 1
+            self._latest = LivePicture(number, jpeg)
+            self._wanted = False
+            self._changed.notify_all()
+
+    def after(self, number: int, at_most_s: float) -> LivePicture | None:
+        """A picture later than that number, waited for; None if none came in time."""
+        with self._changed:
+            if self._latest is None or self._latest.number <= number:
+                self._wanted = True
+                self._changed.notify_all()
+                self._changed.wait_for(
+                    lambda: self._latest is not None and self._latest.number > number, at_most_s
+                )
+            latest = self._latest
+        return latest if latest is not None and latest.number > number else None
+
+
+class AimedProtocol:
+    """A person's protocol file.
+
+    Parameters
+    ----------
+    path
+        Of the file.
+
+    Raises
+    ------
+    UsageError
+        Not a protocol, or one of a kind that has no regions.
+    """
+
+    def __init__(self, path: Path) -> None:
+        self.path = path
+        if not path.is_file():
+            raise UsageError(
+                f"{path}: no such protocol file; regions are written into a file of your own, so "
+                "copy a shipped one first (see labrig protocol list)"
+            )
+        self._regions = self._read()
+
+    def in_fractions(self) -> list[dict[str, Any]]:
+        """Regions that can be shown: name and fractions of the frame."""
+        return [
+            {"name": name, "region": list(region)}
+            for name, region in self._regions.items()
+            if max(region) <= 1
+        ]
+
+    def in_pixels(self) -> list[str]:
+        """Names of those that cannot: pixels of a RAW frame, whose size nobody knows here."""
+        return [name for name, region in self._regions.items() if max(region) > 1]
+
+    def write(self, patches: Mapping[str, Region]) -> list[dict[str, Any]]:
+        """Replace the regions in the file; returns them as they now stand in it.
+
+        Raises
+        ------
+        UsageError
+            The protocol would not be one any more; the file is as before.
+        DiskError
+            It cannot be written.
+        """
+        write_patches(self.path, {name: rounded(region) for name, region in patches.items()})
+        self._regions = self._read()
+        return self.in_fractions()
+
+    def _read(self) -> dict[str, Region]:
+        model = read_protocol(self.path)
+        regions = getattr(model, KEY, None)
+        if regions is None:
+            raise UsageError(
+                f"{self.path}: a protocol of the kind '{model.protocol}' has no '{KEY}:' to draw"
+            )
+        return dict(regions)
+
+
+MOST_PATCHES = 200
+#: A fraction as the page computes it may end beyond the frame by its last digits.
+ROUNDING = 1e-6
+#: No control characters and no line ends of any kind: a name is one line of YAML.
+_ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]+$"
+
+Name = Annotated[
+    str,
+    StringConstraints(strip_whitespace=True, min_length=1, max_length=60, pattern=_ONE_LINE),
+]
+
+
+class DrawnPatch(BaseModel):
+    """One region; fractions of the frame."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    name: Name
+    region: Region
+
+
+class DrawnPatches(BaseModel):
+    """All regions of the page."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    patches: tuple[DrawnPatch, ...] = Field(min_length=1, max_length=MOST_PATCHES)
+
+    def by_name(self) -> dict[str, Region]:
+        """Name → region.
+
+        Raises
+        ------
+        UsageError
+            A name stands twice, or a region is not within the frame.
+        """
+        found: dict[str, Region] = {}
+        for patch in self.patches:
+            x, y, width, height = patch.region
+            if max(x + width, y + height) > 1 + ROUNDING:
+                raise UsageError(
+                    f"'{patch.name}' leaves the frame; expected fractions of it, "
+                    f"got {list(patch.region)}"
+                )
+            if patch.name in found:
+                raise UsageError(f"two regions are called '{patch.name}'; rename one")
+            found[patch.name] = patch.region
+        return found
+
 
 #: How long a browser waits for a picture before it is told to ask again.
 PICTURE_TIMEOUT_S = 10.0

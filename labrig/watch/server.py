@@ -2,12 +2,14 @@
 
 import json
 import threading
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from http import HTTPStatus
 from pathlib import Path
-from typing import Any, ClassVar
+from typing import Any, ClassVar, Never
 
+from labrig.clock import Clock
 from labrig.local_server import KINDS, LocalConversation, LocalServer
+from labrig.watch.following import Following
 
 #: A browser that hears nothing for longer takes the connection for dead.
 HEARTBEAT_S = 5.0
@@ -178,3 +180,42 @@ class _Conversation(LocalConversation):
 def _message(news: tuple[int, Things] | None) -> str:
     number, things = news or (0, {})
     return json.dumps({"number": number, "things": things})
+
+
+#: Everything is on the page within a second; the folder is looked at more often than that.
+LOOK_PERIOD_S = 0.3
+
+
+def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -> Never:
+    """Show a run until somebody stops it; the run itself is not touched.
+
+    Parameters
+    ----------
+    port
+        On 127.0.0.1; 0 for any free one.
+    clock
+        The PC's.
+    tell
+        Called once with the page's address.
+
+    Raises
+    ------
+    Interrupted
+        How it ends.
+    UsageError
+        Not a run folder, or a port that is taken.
+    DataError
+        The run's journal is damaged.
+    """
+    following = Following(run)
+    following.look()
+    news = News(following.state(), following.picture)
+    with WatchServer(news, port) as server, server.running():
+        try:
+            tell(server.url)
+            while True:
+                if following.look():
+                    news.tell(following.state(), following.picture)
+                clock.sleep(LOOK_PERIOD_S)
+        finally:
+            news.end()

@@ -2,7 +2,7 @@
 
 import math
 from collections.abc import Callable, Iterator, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Self
 
@@ -159,3 +159,23 @@ class DecayMeter:
             rates[early] = log_rate[0] + slope * (times_s[early] - seen_s[0])
         fullest = max(self._readings, key=lambda reading: reading.mean_dn)
         return np.exp(rates) * fullest.peak_dn / fullest.mean_dn
+
+
+@dataclass(frozen=True)
+class Album:
+    """Looks at frames, always in the same regions.
+
+    Attributes
+    ----------
+    regions
+        Where to measure.
+    """
+
+    regions: Sequence[Region]
+    _looks: dict[Path, Look] = field(default_factory=dict, repr=False, compare=False)
+
+    def look(self, frame: FrameRecord) -> Look:
+        """What a frame shows."""
+        if frame.path not in self._looks:
+            self._looks[frame.path] = look(frame, self.regions)
+        return self._looks[frame.path]

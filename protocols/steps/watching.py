@@ -23,9 +23,8 @@ from .afterglow import (
     metered,
     went_out,
 )
-from .album import Album
 from .darkness import DARK, Darkness, darkness, levels
-from .metering import Look
+from .metering import Album, Look
 
 #: A lamp has gone dark by then; a halogen lamp takes a third of it.
 LAMP_GONE_S = 1.0

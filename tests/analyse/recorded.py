@@ -15,7 +15,7 @@ from labrig.analyse import Choices, Inputs, Part
 from labrig.analyse.choices import read_run_protocol
 from labrig.clock import Clock
 from labrig.filling import Watch
-from labrig.process.description import describe_run
+from labrig.process.provenance import describe_run
 from labrig.record import RunRecord, read_run
 from labrig.report import Source
 from labrig.run import Recording, resume_run

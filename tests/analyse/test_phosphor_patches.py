@@ -15,7 +15,7 @@ from labrig.analyse.emission_spectrum import analyse as analyse_spectra
 from labrig.analyse.part import Inputs, Part
 from labrig.analyse.strip import StripPatch, cut, for_each_patch, lean
 from labrig.calibration import write_irradiance_file, write_lvf_file
-from labrig.compare.result import read_patches
+from labrig.compare.run import read_patches
 from labrig.errors import DataError, FitError, UsageError
 from labrig.material import read_material
 from labrig.optics import Strip

@@ -8,8 +8,7 @@ from hypothesis import given, strategies as st
 from labrig.acquire import Guarded, LampShield, TrapDoor
 from labrig.clock import VirtualClock
 from labrig.drivers.maestro import MaestroDoor, MaestroShield
-from labrig.drivers.maestro.errors import ERRORS, told
-from labrig.drivers.maestro.servo import Wire, quarters, seven_bits
+from labrig.drivers.maestro.servo import ERRORS, Wire, quarters, seven_bits, told
 from labrig.errors import DeviceError, DeviceLostError
 from labrig.sim.boards import MaestroBoard
 from labrig.yaml_file import validate

@@ -13,7 +13,7 @@ from labrig.acquire import Plan, RunObserver, read_rig_file
 from labrig.analyse.choices import read_run_protocol
 from labrig.clock import Clock
 from labrig.process import process_run
-from labrig.process.description import describe_run
+from labrig.process.provenance import describe_run
 from labrig.record import read_run
 from labrig.record.history import RunDescription
 from labrig.results import read_result

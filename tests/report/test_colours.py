@@ -11,15 +11,16 @@ from numpy.typing import NDArray
 from labrig.optics import CameraResponse, read_camera
 from labrig.report.colours import (
     HALOGEN_K,
+    MOST_SWATCHES,
     camera_to_xyz,
     colour_matching,
     encoded,
     into_gamut,
     screen_for,
+    swatches,
 )
 from labrig.report.content import GlowPhotograph
 from labrig.report.photographs import daylight_picture, glow_pictures
-from labrig.report.swatches import MOST_SWATCHES, swatches
 
 from .made import decay_series, frame, patch, write_dng
 

@@ -20,7 +20,7 @@ from labrig.report.decay_figures import (
     values_below_axis,
 )
 from labrig.report.figure_style import figure_style
-from labrig.report.plates import Plates
+from labrig.report.page import Plates
 from labrig.report.timing import FrameTiming
 from labrig.results import Series
 

@@ -8,7 +8,7 @@ import pytest
 
 from labrig.report.decay_figures import linear_decay
 from labrig.report.figure_style import CHANNEL, INK, figure_style
-from labrig.report.plates import Plates
+from labrig.report.page import Plates
 
 from .made import decay_series
 

@@ -6,8 +6,8 @@ import numpy as np
 import pytest
 
 from labrig.fit import DecayFit
+from labrig.report.decay import repeats, steady
 from labrig.report.decay_figures import fitted_curve
-from labrig.report.stability import repeats, steady
 from labrig.report.timing import FrameTiming, lateness
 from labrig.results import Series
 

@@ -10,7 +10,7 @@ from labrig.acquire import CameraOffers, Exercised, ExposureSettings, Frame, Tri
 from labrig.acquire.roles.camera import exercise_camera
 from labrig.clock import VirtualClock
 from labrig.errors import FrameError
-from labrig.setup.photographs import Photographs
+from labrig.setup.check import Photographs
 from labrig.setup.picture_stats import decode, picture_stats
 from tests.reduce.conftest import _dng as write_dng
 

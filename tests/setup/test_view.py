@@ -21,11 +21,9 @@ from labrig.clock import Interrupted, SystemClock
 from labrig.errors import DeviceError, UsageError
 from labrig.local_server import KINDS
 from labrig.region import CENTRE
-from labrig.setup.aimed_protocol import AimedProtocol
-from labrig.setup.live_pictures import LivePictures
 from labrig.setup.picture_stats import decode, picture_stats, sharpness
 from labrig.setup.view import hand_over
-from labrig.setup.view_server import PAGES, ViewServer
+from labrig.setup.view_server import PAGES, AimedProtocol, LivePictures, ViewServer
 from tests.conftest import Ended
 
 BLUE = {"patches": [{"name": "blue paint", "region": [0.1, 0.2, 0.3, 0.4]}]}

@@ -16,10 +16,8 @@ from selenium.webdriver.support.wait import WebDriverWait
 from labrig.acquire import CAMERA, LiveView, read_protocol, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import Interrupted
-from labrig.setup.aimed_protocol import AimedProtocol
-from labrig.setup.live_pictures import LivePictures
 from labrig.setup.view import hand_over
-from labrig.setup.view_server import ViewServer
+from labrig.setup.view_server import AimedProtocol, LivePictures, ViewServer
 
 #: Where screenshots are kept for a person to look at.
 SCREENSHOTS = os.environ.get("LABRIG_SCREENSHOTS")

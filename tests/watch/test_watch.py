@@ -29,8 +29,7 @@ from labrig.record import TAKEN_BACK, ActionRecord, RunFolder, read_run
 from labrig.run import resume_run
 from labrig.watch.following import Following, State
 from labrig.watch.glances import Glances
-from labrig.watch.server import News, WatchServer
-from labrig.watch.watching import watch_run
+from labrig.watch.server import News, WatchServer, watch_run
 from labrig.yaml_file import read_yaml, yaml_text
 from tests.analyse.recorded import quietly
 from tests.recordings import runs as recordings

@@ -3,7 +3,7 @@
 import re
 from dataclasses import dataclass
 
-from ..datasets import DatasetReader
+from ..device_info import DatasetReader
 
 FOLDER = 0x3001
 _UNDEFINED, _TIFF_EP, _DNG = 0x3000, 0x3802, 0x3811

@@ -4,7 +4,7 @@ import struct
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
 
-from ..datasets import DatasetReader
+from ..device_info import DatasetReader
 from ..failures import MalformedError
 
 #: Letters of `struct` by data type code, for the whole numbers.

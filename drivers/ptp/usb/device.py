@@ -6,14 +6,136 @@ pyusb carries no types, so `Any` ends here.
 import errno
 from collections.abc import Iterator
 from contextlib import contextmanager, suppress
+from dataclasses import dataclass
 from typing import Any
 
 import usb.core
 import usb.util
 
-from ..failures import UnpluggedError
-from .errors import WAKE_UP, usb_errors_explained
-from .interface import claim_still_image
+from labrig.errors import DeviceError
+
+from ..failures import NoAnswerError, StallError, UnpluggedError
+
+WAKE_UP = "switch the camera on, its automatic switching-off to never, and check cable and battery"
+
+_GONE = {errno.ENODEV, errno.EIO, errno.ENXIO, errno.ESHUTDOWN}
+
+
+@contextmanager
+def usb_errors_explained(context: str) -> Iterator[None]:
+    """Turn pyusb's errors into `DeviceError`.
+
+    Parameters
+    ----------
+    context
+        Which device, and what was being done.
+
+    Raises
+    ------
+    DeviceError
+        In place of any error of pyusb: `NoAnswerError`, `StallError`, `UnpluggedError` or plain.
+    """
+    try:
+        yield
+    except usb.core.USBError as failure:
+        number = failure.errno
+        if isinstance(failure, usb.core.USBTimeoutError) or number == errno.ETIMEDOUT:
+            raise NoAnswerError(f"{context}: no answer: {WAKE_UP}") from failure
+        if number == errno.EPIPE:
+            raise StallError(f"{context}: it halted the transfer (stall): try again") from failure
+        if number in _GONE:
+            raise UnpluggedError(f"{context}: it is gone ({failure}): {WAKE_UP}") from failure
+        raise DeviceError(f"{context}: {failure}: {_remedy(number)}") from failure
+    except (usb.core.NoBackendError, NotImplementedError) as failure:
+        raise DeviceError(
+            f"{context}: this PC has no USB driver for it ({failure}): install libusb, "
+            "on Windows give the camera the WinUSB driver with Zadig"
+        ) from failure
+
+
+def _remedy(number: int | None) -> str:
+    if number == errno.EBUSY:
+        return (
+            "another program holds it: close the desktop's photo import (gvfs, PTPCamera), "
+            "gphoto2 and EOS Utility"
+        )
+    if number == errno.EACCES:
+        return "you may not use it: add a udev rule for the camera, or log in at the PC itself"
+    return "unplug it and plug it in again"
+
+
+STILL_IMAGE_CLASS = 6
+_DIRECTION, _IN, _OUT = 0x80, 0x80, 0x00
+_TRANSFER_TYPE, _BULK, _INTERRUPT = 0x03, 0x02, 0x03
+
+
+@dataclass(frozen=True)
+class StillImageInterface:
+    """Numbers of the interface and its endpoints, and the size of their packets in bytes.
+
+    The interrupt endpoint is the camera's for events; one without an endpoint has number `None`.
+    """
+
+    interface: int
+    bulk_in: int
+    bulk_out: int
+    packet_bytes: int
+    interrupt_in: int | None
+    event_packet_bytes: int
+
+
+def claim_still_image(device: Any, address: str) -> StillImageInterface:
+    """Claim the still image interface of a `usb.core.Device`.
+
+    Raises
+    ------
+    DeviceError
+        It has none, or none with bulk endpoints.
+    usb.core.USBError
+        It cannot be claimed.
+    """
+    configuration = _configuration(device)
+    interface = usb.util.find_descriptor(configuration, bInterfaceClass=STILL_IMAGE_CLASS)
+    if interface is None:
+        raise DeviceError(
+            f"camera {address}: expected a still image (PTP) interface, found none: "
+            "set the camera's USB mode to PTP or 'PC connection'"
+        )
+    bulk_in, bulk_out = (_endpoint(interface, direction, _BULK) for direction in (_IN, _OUT))
+    if bulk_in is None or bulk_out is None:
+        raise DeviceError(
+            f"camera {address}: expected two bulk endpoints on its PTP interface, found fewer: "
+            "unplug it and plug it in again"
+        )
+    interrupt_in = _endpoint(interface, _IN, _INTERRUPT)
+    usb.util.claim_interface(device, interface)
+    return StillImageInterface(
+        interface=int(interface.bInterfaceNumber),
+        bulk_in=int(bulk_in.bEndpointAddress),
+        bulk_out=int(bulk_out.bEndpointAddress),
+        packet_bytes=int(bulk_in.wMaxPacketSize),
+        interrupt_in=None if interrupt_in is None else int(interrupt_in.bEndpointAddress),
+        event_packet_bytes=0 if interrupt_in is None else int(interrupt_in.wMaxPacketSize),
+    )
+
+
+def _configuration(device: Any) -> Any:
+    try:
+        return device.get_active_configuration()
+    except usb.core.USBError as failure:
+        if failure.errno is not None:
+            raise
+        device.set_configuration()  # no error number is pyusb's way of saying that none is set
+        return device.get_active_configuration()
+
+
+def _endpoint(interface: Any, direction: int, transfer_type: int) -> Any:
+    def matches(endpoint: Any) -> bool:
+        address, attributes = int(endpoint.bEndpointAddress), int(endpoint.bmAttributes)
+        return address & _DIRECTION == direction and attributes & _TRANSFER_TYPE == transfer_type
+
+    return usb.util.find_descriptor(interface, custom_match=matches)
+
 
 HOST_TO_INTERFACE, INTERFACE_TO_HOST = 0x21, 0xA1
 MOST_CONTROL_BYTES = 32
