@@ -51,6 +51,11 @@ class BlankResult(RunResult):
         For the decays of the same bench; the file `blank.yaml`.
     stray_light
         All frames, also those after the first clean one.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> print(result.calibration.first_clean_s, result.stray_light.rate.max())
     """
 
     kind: ClassVar[str] = "blank"

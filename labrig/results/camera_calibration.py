@@ -109,6 +109,12 @@ class CameraCalibrationResult(RunResult):
         Relative scatter of frames of one exposure.
     flats
         By f-number, in the order of `calibration.flats`.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> for noise in result.calibration.noise:
+    ...     print(noise.iso, noise.gain_e_per_dn, noise.read_noise_e)
     """
 
     kind: ClassVar[str] = "camera_calibration"

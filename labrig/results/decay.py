@@ -103,6 +103,12 @@ class DecayResult(RunResult):
         How long the lamp shone before each decay, as measured.
     temperature_c
         Mean over the photographs of the glow; None where it is not known.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> for name, fit in result.fits.items():
+    ...     print(name, [f"{rate.value:.4f} ± {rate.sigma:.4f} /s" for rate in fit.rates])
     """
 
     kind: ClassVar[str] = "decay"

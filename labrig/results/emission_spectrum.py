@@ -299,6 +299,12 @@ class EmissionSpectrumResult(RunResult):
     ----------
     patches
         By the patch's name; under "" of the only one.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> for patch in result.patches.values():
+    ...     print(patch.spectrum.peak_nm, patch.spectrum.centroid)
     """
 
     kind: ClassVar[str] = "emission_spectrum"

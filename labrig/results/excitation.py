@@ -124,6 +124,13 @@ class ExcitationResult(RunResult):
         The lamp's light on the sample, as it was known.
     patches
         By name; under "" the only one.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> for patch in result.patches.values():
+    ...     for state in patch.fit.states:
+    ...         print(result.irradiance.bands_nm, state.k_e_per_s, state.k_e_sigma_per_s)
     """
 
     kind: ClassVar[str] = "excitation"

@@ -119,6 +119,11 @@ class FadeResult(RunResult):
         After switching off and on; None: not measured.
     warming
         The light with which `calibration.warming` was found; None: not measured.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> print(result.fade.best.name, result.fade.exponent.value, result.fade.lag.value)
     """
 
     kind: ClassVar[str] = "fade"

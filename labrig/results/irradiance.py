@@ -77,6 +77,11 @@ class IrradianceResult(RunResult):
         What the photographs of the grey card show.
     scale
         The same over what the filter's calibration lets expect.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> print(result.calibration.bands_nm, result.scale.value / result.scale.measured)
     """
 
     kind: ClassVar[str] = "irradiance"

@@ -67,6 +67,12 @@ class IsotropyResult(RunResult):
     around
         Whether the patches enclose the whole sample, so that its intensity was divided by the
         cosine of the angle; else they lie inside of it and show its radiance.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> for glow in result.patches.values():
+    ...     print(dict(zip(glow.angle_deg, glow.ratio)), glow.worst.value)
     """
 
     kind: ClassVar[str] = "isotropy"

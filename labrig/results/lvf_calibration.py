@@ -194,6 +194,11 @@ class LvfCalibrationResult(RunResult):
         (p,) root mean square of what the fit leaves, in σ; where it is above 1, σ was raised by it.
     camera_before
         The camera's curves as they were known; `calibration` has them as the filters tell them.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> print(result.map_rms_nm, result.calibration.lvf.bands.centre_nm)
     """
 
     kind: ClassVar[str] = "lvf_calibration"

@@ -21,6 +21,12 @@ class PhosphorResult(RunResult):
         Why a part could not be analysed, by its name.
     materials
         By patch; under "" the only one.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> for name, material in result.materials.items():
+    ...     print(name, [state.k_r_per_s for state in material.states])
     """
 
     kind: ClassVar[str] = "phosphor"

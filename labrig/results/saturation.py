@@ -165,6 +165,12 @@ class SaturationResult(RunResult):
         By name.
     weaker_light
         Over the full one; None if there was none.
+
+    Examples
+    --------
+    >>> result = labrig.read_result(run)  # doctest: +SKIP
+    >>> for patch in result.patches.values():
+    ...     print(patch.rates.shared_per_s, patch.rates.p_value, patch.growth_at_begin.value)
     """
 
     kind: ClassVar[str] = "saturation"

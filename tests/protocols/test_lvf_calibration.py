@@ -28,6 +28,7 @@ from tests.analyse.lvf_calibration.room_truth import (
     true_irradiance,
 )
 from tests.conftest import Ended
+from tests.results.made import assert_read_back
 
 Make = Callable[..., Path]
 Labrig = Callable[..., Ended]
@@ -167,6 +168,7 @@ def test_stopped_at_a_filter_resumed_and_one_taken_back_it_calibrates_the_strip(
     file = result.calibration
     assert read_lvf_file(folder / "result" / "lvf.yaml") == file
     assert read_result(folder).to_json() == result.to_json()
+    assert_read_back(result)
     assert result.filters == tuple(result.through_filters)[1:] == FEW
     assert not [one for one in result.filter_misfits if one.left_out]
     assert np.nanmax(np.abs(result.transmittance_residual)) < 0.1

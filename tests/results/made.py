@@ -3,13 +3,16 @@
 import json
 import math
 from collections.abc import Mapping
+from contextlib import redirect_stdout
 from dataclasses import fields, is_dataclass
+from doctest import DocTestParser
+from io import StringIO
 from typing import Any
 
 import numpy as np
 
 from labrig.export import tree_of
-from labrig.results import DecayState, FittedDecay, RunResult
+from labrig.results import DecayState, FittedDecay, PhosphorResult, RunResult
 
 
 def decay_result(
@@ -45,10 +48,20 @@ def decay_result(
 
 
 def assert_read_back(result: RunResult) -> None:
-    """What is written as `result.json` gives the same result, field by field, bit by bit."""
+    """What is written as `result.json` gives the same result, field by field, bit by bit.
+
+    With it the notebook cell in the type's documentation runs.
+    """
     again = type(result).from_dict(json.loads(result.to_json(), parse_constant=_no_number))
     _assert_same(result, again, result.kind)
     assert tree_of(again).to_dict()
+    cell = DocTestParser().get_examples(type(result).__doc__ or "")[1:]
+    with redirect_stdout(StringIO()) as printed:
+        exec("".join(example.source for example in cell), {"result": again})
+    assert printed.getvalue()
+    if isinstance(result, PhosphorResult):
+        for part in result.parts.values():
+            assert_read_back(part)
 
 
 def _no_number(text: str) -> float:

@@ -16,6 +16,7 @@ from labrig.errors import DataError
 from labrig.process import process_run
 from labrig.record import read_run
 from tests.analyse.recorded import cut_off_and_resumed, part_of, record
+from tests.results.made import assert_read_back
 
 PROTOCOL: dict[str, Any] = {
     "protocol": "blank",
@@ -48,6 +49,7 @@ def test_a_dark_bench_is_clean_as_soon_as_its_lamp_is(tmp_path: Path) -> None:
     assert blank.first_clean_s == pytest.approx(0.56, abs=0.02)
     assert blank.rate_dn_per_s[0][1] > 100 * blank.sigma_dn_per_s[0][1]
     assert result.warnings == ()
+    assert_read_back(result)
     constant = np.array(blank.constant_dn_per_s)
     assert np.all(np.abs(constant) < 4 * np.array(blank.constant_sigma_dn_per_s))
 
