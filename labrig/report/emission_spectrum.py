@@ -5,6 +5,7 @@ from dataclasses import replace
 from functools import partial
 
 import numpy as np
+from matplotlib.artist import Artist
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from matplotlib.ticker import NullLocator
@@ -99,7 +100,13 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
         (
             Picture(
                 "spectrum",
-                partial(_spectrum_figure, patch.spectrum),
+                partial(
+                    spectrum_figure,
+                    np.array(patch.spectrum.wavelength_nm),
+                    np.array(patch.spectrum.value),
+                    (np.array(patch.spectrum.low), np.array(patch.spectrum.high)),
+                    ("Λ*", "68 % credible"),
+                ),
                 "Emission spectrum Λ*, means over 10 nm; band: 68 % credible.",
             ),
         ),
@@ -187,14 +194,31 @@ def _table(what: str, comparisons: Sequence[SpectralComparison]) -> Table:
     )
 
 
-def _spectrum_figure(spectrum: EmissionSpectrum) -> Figure:
-    """Λ* with its credible band."""
-    figure, axes = _axes("Λ* (largest value 1)")
-    nm = np.array(spectrum.wavelength_nm)
-    axes.fill_between(nm, spectrum.low, spectrum.high, color=INK, alpha=BAND_OPACITY, linewidth=0)
-    axes.plot(nm, spectrum.value, color=INK, linewidth=1.4)
-    axes.set_ylim(0, 1.05 * max(spectrum.high))
-    legend_above(figure, [lined("Λ*", INK), shaded("68 % credible", INK)], COLUMNS)
+def spectrum_figure(
+    nm: FloatArray,
+    value: FloatArray,
+    band: tuple[FloatArray, FloatArray] | None,
+    names: tuple[str, str],
+) -> Figure:
+    """An emission spectrum, largest value 1.
+
+    Parameters
+    ----------
+    nm, value
+        (n,) wavelengths and the spectrum.
+    band
+        (n,) its lower and upper limits, if they are known.
+    names
+        Of the spectrum and of the band.
+    """
+    figure, axes = _axes(f"{names[0]} (largest value 1)")
+    entries: list[Artist] = [lined(names[0], INK)]
+    if band is not None:
+        axes.fill_between(nm, *band, color=INK, alpha=BAND_OPACITY, linewidth=0)
+        entries.append(shaded(names[1], INK))
+    axes.plot(nm, value, color=INK, linewidth=1.4)
+    axes.set_ylim(0, 1.05 * float(np.max(value if band is None else band[1])))
+    legend_above(figure, entries, COLUMNS)
     return figure
 
 

@@ -5,8 +5,6 @@ from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
-from matplotlib.artist import Artist
-from matplotlib.figure import Figure
 
 from labrig import shipped
 from labrig.material import Material, Spectrum, compare_materials, read_material
@@ -14,23 +12,15 @@ from labrig.record import FrameRecord, FrameRole
 from labrig.report.colours import Screen, screen_for, spectrum_colour
 from labrig.report.content import GlowPhotograph
 from labrig.report.decay_figures import logarithmic_decay
-from labrig.report.figure_style import (
-    BAND_OPACITY,
-    INK,
-    LEFT_PT,
-    legend_above,
-    lined,
-    new_figure,
-    place,
-    shaded,
-)
+from labrig.report.emission_spectrum import spectrum_figure
 from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
 from labrig.report.registered import render as render_result
 from labrig.report.sections import Picture, Rendered, Section, Source
-from labrig.results import DecayPatch, DecayResult, PhosphorResult
+from labrig.results import DecayPatch, DecayResult, FloatArray, PhosphorResult
 
-SPECTRUM_HEIGHT_PT = 256.0
+#: Of the emission spectrum and its band.
+NAMES = "Emission", "± 1 σ"
 
 
 @dataclass(frozen=True)
@@ -104,7 +94,7 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
             figures.append(
                 Picture(
                     f"spectrum-{name}",
-                    partial(_spectrum_figure, material.spectrum),
+                    partial(spectrum_figure, nm, value, _band(material.spectrum), NAMES),
                     f"Emission spectrum{_of(name, result)}, largest value 1.",
                 )
             )
@@ -158,24 +148,12 @@ def _of(patch: str, result: PhosphorResult) -> str:
     return f" of {patch}" if patch and len(result.materials) > 1 else ""
 
 
-def _spectrum_figure(spectrum: Spectrum) -> Figure:
-    figure = new_figure(SPECTRUM_HEIGHT_PT)
-    axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
-    nm, value = np.array(spectrum.wavelength_nm), np.array(spectrum.value)
-    entries: list[Artist] = [lined("emission", INK)]
-    if spectrum.sigma is not None:
-        sigma = np.array(spectrum.sigma)
-        axes.fill_between(
-            nm, value - sigma, value + sigma, color=INK, alpha=BAND_OPACITY, linewidth=0
-        )
-        entries.append(shaded("± 1 σ", INK))
-    axes.plot(nm, value, color=INK, linewidth=1.4)
-    axes.set_xlim(nm[0], nm[-1])
-    axes.set_ylim(bottom=0)
-    axes.set_xlabel("Wavelength / nm")
-    axes.set_ylabel("Emission (largest value 1)")
-    legend_above(figure, entries, columns=4)
-    return figure
+def _band(spectrum: Spectrum) -> tuple[FloatArray, FloatArray] | None:
+    """The spectrum less and plus 1 σ, if that is known."""
+    if spectrum.sigma is None:
+        return None
+    value, sigma = np.array(spectrum.value), np.array(spectrum.sigma)
+    return value - sigma, value + sigma
 
 
 def _comparison(patch: str, material: Material) -> tuple[Section, ...]:
