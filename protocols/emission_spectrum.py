@@ -23,6 +23,14 @@ from .steps.patch_names import FilterPatches
 from .steps.posing import check_seen, lights_out
 from .steps.scenes import Arranged, Arrangement, LampKind, PutBackUnit
 
+#: The units' names end with the lamp.
+_AFTER = "spectrum-"
+
+
+def lamp_of(unit: str) -> str:
+    """The lamp that charged in such a unit."""
+    return unit.removeprefix(_AFTER)
+
 
 class SpectrumFrames(StrEnum):
     """The glow through the filter, and the lit card."""
@@ -105,7 +113,7 @@ class SpectrumUnit:
     @property
     def name(self) -> str:
         """`spectrum-halogen`, `spectrum-mercury`."""
-        return f"spectrum-{self.lamp}"
+        return f"{_AFTER}{self.lamp}"
 
     def run(self, session: Session) -> None:
         """Charge, lamp off, a frame at every time."""

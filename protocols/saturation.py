@@ -5,6 +5,7 @@ in level: two irradiances tell the two apart. And the rates are to be the same w
 """
 
 from collections.abc import Sequence
+from enum import StrEnum
 from itertools import pairwise
 from typing import Annotated, Literal, Self
 
@@ -19,6 +20,23 @@ from .steps.camera_settings import CameraSettings
 from .steps.glow import DarkUnit, MeterUnit
 from .steps.patch_names import Patches
 from .steps.scenes import Arranged, Arrangement, Prepared
+
+
+class Light(StrEnum):
+    """What charged the sample: the lamp as it is, or weakened."""
+
+    FULL = "full"
+    WEAKER = "weaker"
+
+    def numbered(self, number: int) -> str:
+        """The unit of a charge under this light."""
+        return f"{self}-{number}"
+
+    @classmethod
+    def of(cls, unit: str) -> Self:
+        """The light of such a unit."""
+        return cls(unit.rpartition("-")[0])
+
 
 Charge = Annotated[DurationS, Field(gt=0)]
 
@@ -83,10 +101,10 @@ class Saturation(ProtocolModel):
 
     def units(self) -> Sequence[Unit]:
         """Darks, then metering and decays, weaker light first: each begins with less glow left."""
-        dark, full = DarkUnit(self._decay(self.charges[0])), self._decays("full")
+        dark, full = DarkUnit(self._decay(self.charges[0])), self._decays(Light.FULL)
         if self.weaker is None:
             return [dark, *full]
-        weaker = self._decays("weaker")
+        weaker = self._decays(Light.WEAKER)
         return [
             dark,
             self.weaker.begun(weaker[0]),
@@ -95,10 +113,10 @@ class Saturation(ProtocolModel):
             *full[1:],
         ]
 
-    def _decays(self, light: str) -> list[Unit]:
+    def _decays(self, light: Light) -> list[Unit]:
         metering = f"meter-{light}"
         decays: list[Unit] = [
-            DecayUnit(self._decay(charge_s), f"{light}-{number}", metering)
+            DecayUnit(self._decay(charge_s), light.numbered(number), metering)
             for number, charge_s in enumerate(self.charges, start=1)
         ]
         if isinstance(self.exposure, str):

@@ -23,11 +23,10 @@ from labrig.errors import DataError, FitError
 from labrig.fit import EPSILON, least_squares
 from labrig.fit.decay import exponential_means_and_slopes
 from labrig.material import exponential_means
-from labrig.protocols.saturation import WeakerLight
+from labrig.protocols.saturation import Light, WeakerLight
 from labrig.record import FrameRole, RunRecord, charges_s
 from labrig.reduce import reduce_patches
 from labrig.results import (
-    LIGHTS,
     ChargeLevel,
     Curve,
     FittedDecay,
@@ -254,8 +253,8 @@ def _charges_s(run: RunRecord) -> dict[str, float]:
 def _patch(series: Series, lasted_s: Mapping[str, float], part: Part) -> PatchSaturation:
     decays = {one.unit[0]: one for one in series.by_unit()}
     units = list(decays)
-    light = tuple(unit.partition("-")[0] for unit in units)
-    full, weaker = ([row for row, one in enumerate(light) if one == kind] for kind in LIGHTS)
+    light = tuple(Light.of(unit).value for unit in units)
+    full, weaker = ([row for row, one in enumerate(light) if one == kind] for kind in Light)
     if len(full) < 2:
         raise DataError(
             "expected two or more complete decays under the full light, got "

@@ -9,9 +9,10 @@ from labrig.errors import UsageError
 from labrig.material import Material
 from labrig.optics import CameraResponse
 from labrig.predict.camera import CameraFigures
-from labrig.predict.expectation import Bench, PredictableProtocol, expected_schedule
+from labrig.predict.expectation import Bench, expected_schedule
 from labrig.predict.glow import Glow, measured_amplitudes, radiated, rates
 from labrig.predict.reference import Reference
+from labrig.protocols.decay import Decay
 
 #: Range of brightness searched, DN/s, and how often it is halved.
 DIMMEST, BRIGHTEST = 1e-3, 1e9
@@ -36,7 +37,7 @@ def measured_glow(material: Material, reference: Reference | None) -> Glow | Non
 
 def relative_glow(
     material: Material,
-    protocol: PredictableProtocol,
+    protocol: Decay,
     camera: CameraFigures,
     response: CameraResponse | None,
 ) -> Glow:
@@ -69,7 +70,7 @@ def relative_glow(
 
 
 def brightness_metered_as(
-    metered: PredictableProtocol, offers: CameraOffers, bench: Bench, exposure_s: float
+    metered: Decay, offers: CameraOffers, bench: Bench, exposure_s: float
 ) -> float:
     """By what to multiply the glows of `bench` so that metering chooses `exposure_s` at first.
 

@@ -1,8 +1,7 @@
 """From a protocol to the fit that it will allow: schedule, frames, noise, information."""
 
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from dataclasses import dataclass
-from typing import Protocol, cast
 
 import numpy as np
 
@@ -13,54 +12,13 @@ from labrig.predict.frames import dark_frames, glow_frames
 from labrig.predict.glow import Glow
 from labrig.predict.information import Information, information
 from labrig.predict.series import ExpectedSeries, expected_series, repeated
+from labrig.protocols.decay import Decay
+from labrig.protocols.steps.camera_settings import CameraSettings
+from labrig.protocols.steps.metering import Schedule
 from labrig.reduce import FrameMeasurement, is_clipped
-from labrig.region import Region
 
 
-class Schedule(Protocol):
-    """When each frame of a decay begins after lamp off, and its shutter time."""
-
-    times_s: Sequence[float]
-    exposures_s: Sequence[float]
-
-
-class CameraSettings(Protocol):
-    """What a protocol sets the camera to."""
-
-    iso: int
-    f_number: float | None
-
-
-class PredictableProtocol(Protocol):
-    """What of a decay protocol decides what its fit will know."""
-
-    patches: dict[str, Region]
-    dark: str
-    background: Region | None
-    camera: CameraSettings
-    charge: float | str
-    exposure: float | str
-    every: float
-    duration: float
-    repeats: int
-    states: str | int
-
-    def longest_exposure_s(self, offers: CameraOffers) -> float:
-        """Longest shutter time that fits between two frames."""
-
-    def dark_exposures_s(self, offers: CameraOffers) -> Sequence[float]:
-        """Shutter time of each dark frame."""
-
-    def expected_schedule(
-        self,
-        offers: CameraOffers,
-        expected: Callable[[float, float], Sequence[FrameMeasurement]],
-        warn: Callable[[str], None],
-    ) -> Schedule:
-        """The frames of a decay as its metering will choose them."""
-
-
-def predictable(protocol: ProtocolModel) -> PredictableProtocol:
+def predictable(protocol: ProtocolModel) -> Decay:
     """`protocol` as one whose fit can be predicted.
 
     Raises
@@ -68,12 +26,12 @@ def predictable(protocol: ProtocolModel) -> PredictableProtocol:
     UsageError
         It records no decay.
     """
-    if protocol.protocol != "decay":
+    if not isinstance(protocol, Decay):
         raise UsageError(
             f"--predict: expected a protocol that records a decay, got '{protocol.protocol}', of "
             "which no rates are fitted"
         )
-    return cast(PredictableProtocol, protocol)
+    return protocol
 
 
 @dataclass(frozen=True, eq=False)
@@ -129,7 +87,7 @@ class Expectation:
     warnings: tuple[str, ...]
 
 
-def expect(protocol: PredictableProtocol, offers: CameraOffers, bench: Bench) -> Expectation:
+def expect(protocol: Decay, offers: CameraOffers, bench: Bench) -> Expectation:
     """Predict every patch of `bench`.
 
     Raises
@@ -159,7 +117,7 @@ def expect(protocol: PredictableProtocol, offers: CameraOffers, bench: Bench) ->
 
 
 def expected_schedule(
-    protocol: PredictableProtocol,
+    protocol: Decay,
     offers: CameraOffers,
     bench: Bench,
     warn: Callable[[str], None],
@@ -177,7 +135,7 @@ def expected_schedule(
 
 
 def _series(
-    protocol: PredictableProtocol,
+    protocol: Decay,
     offers: CameraOffers,
     bench: Bench,
     patch: str,

@@ -12,10 +12,11 @@ from labrig.material import Material, read_material
 from labrig.optics import CameraResponse
 from labrig.predict.brightness import brightness_metered_as, measured_glow, relative_glow
 from labrig.predict.camera import TYPICAL_FLICKER, CameraFigures, typical_camera
-from labrig.predict.expectation import Bench, PredictableProtocol, predictable
+from labrig.predict.expectation import Bench, predictable
 from labrig.predict.glow import Glow, check_states
 from labrig.predict.reference import Reference, read_reference, result_places, run_of
 from labrig.predict.variants import changed
+from labrig.protocols.decay import Decay
 from labrig.quantity import TIME_S, parse
 from labrig.yaml_file import did_you_mean
 
@@ -140,7 +141,7 @@ def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) 
     )
 
 
-def _by_patch(protocol: PredictableProtocol, materials: Mapping[str, str]) -> dict[str, str]:
+def _by_patch(protocol: Decay, materials: Mapping[str, str]) -> dict[str, str]:
     """Materials by the protocol's own patches."""
     patches = list(protocol.patches)
     found = {}

@@ -6,7 +6,7 @@ from itertools import pairwise
 from typing import Any
 
 from labrig.acquire import CameraOffers, ProtocolModel
-from labrig.predict.expectation import PredictableProtocol
+from labrig.protocols.decay import Decay
 from labrig.quantity import duration_text
 from labrig.region import Region
 
@@ -43,9 +43,7 @@ def changed(protocol: ProtocolModel, keys: Keys) -> ProtocolModel:
     return type(protocol).model_validate(content)
 
 
-def changes(
-    protocol: PredictableProtocol, offers: CameraOffers, patches: Iterable[str]
-) -> Iterator[Change]:
+def changes(protocol: Decay, offers: CameraOffers, patches: Iterable[str]) -> Iterator[Change]:
     """What one might do to know the rates of `patches` better, one thing at a time."""
     if isinstance(protocol.exposure, float):
         yield Change("exposure: auto", {"exposure": "auto"})

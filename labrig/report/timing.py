@@ -9,7 +9,6 @@ from labrig.record import ActionRecord, FrameRecord, FrameRole
 from labrig.report.content import PatchReport
 from labrig.written_numbers import rounded
 
-DECAY = "decay"
 #: Devices and what they do between a charge and its first frame.
 MOVES = (("lamp", "off"), ("shield", "cover"), ("door", "open"))
 #: Moves that began later than this are counted; a PC alone keeps within it.

@@ -31,7 +31,7 @@ from labrig.analyse.part import Part
 from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.errors import DataError
 from labrig.fit.spectrum import fit_spectrum
-from labrig.protocols.emission_spectrum import SpectrumFrames
+from labrig.protocols.emission_spectrum import SpectrumFrames, lamp_of
 from labrig.reduce import SeriesFrame
 from labrig.results import (
     ChargeSpectrum,
@@ -163,7 +163,7 @@ def _charges(
     charges: list[_Charge] = []
     dead: list[str] = []
     for unit in dict.fromkeys(frame.unit for frame in frames):
-        lamp = unit.removeprefix("spectrum-")
+        lamp = lamp_of(unit)
         try:
             seen = visible(reduction.of_unit(unit))
         except DataError:
