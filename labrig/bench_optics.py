@@ -5,7 +5,7 @@ from dataclasses import replace
 from pathlib import Path
 from typing import TypeVar
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import RigFile
 from labrig.calibration import CalibrationKind, LvfFile
 from labrig.errors import UsageError
@@ -97,4 +97,4 @@ def _path(named: str) -> Path:
     path = Path(named)
     if path.suffix or len(path.parts) > 1:
         return path
-    return shipped.folder("config/optics") / f"{named}{_SUFFIX}"
+    return resources.folder("config/optics") / f"{named}{_SUFFIX}"

@@ -8,7 +8,7 @@ from typing import Self
 from labrig.acquire import Plan, ProtocolModel, RigFile, plan, read_protocol, read_rig_file
 from labrig.bench import open_bench
 from labrig.errors import DiskError, UsageError
-from labrig.filling import Watch, fill
+from labrig.execution import Watch, fill
 from labrig.optics import read_camera
 from labrig.quantity import duration_text
 from labrig.record import RunFolder, read_run

@@ -27,9 +27,9 @@ from labrig.record import FrameRole
 from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, frame_times_s
-from .steps.posing import charge, face_camera, lights_out, seen_s
+from .steps.sample_pose import charge, face_camera, lights_out, seen_s
+from .steps.sanity_checks import Watcher
 from .steps.scenes import Arrangement, PutBackUnit
-from .steps.watching import Watcher
 
 BLANK = ByHand(
     "put a grey card in the sample's place (in the door, if there is one)",

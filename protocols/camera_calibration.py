@@ -27,9 +27,9 @@ from labrig.record import FrameRole
 from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import CameraSettings
-from .steps.lit_card import GREY_CARD, CardLight, CardMeterUnit, card_light, light_card
+from .steps.grey_card import GREY_CARD, CardLight, CardMeterUnit, card_light, light_card
+from .steps.sanity_checks import Watcher
 from .steps.scenes import Arrangement, PutBackUnit
-from .steps.watching import Watcher
 
 
 class CardFrames(StrEnum):

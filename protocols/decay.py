@@ -36,8 +36,8 @@ from .steps.camera_settings import (
 from .steps.glow import METER_CHARGE_S, DarkUnit, MeterUnit
 from .steps.metering import DecayMeter, Look, Schedule, glow, look
 from .steps.patch_names import Patches
-from .steps.posing import charge, check_seen, face_lamp, has_door, lights_out
-from .steps.watching import Watcher
+from .steps.sample_pose import charge, check_seen, face_lamp, has_door, lights_out
+from .steps.sanity_checks import Watcher
 
 
 class Plateau(BaseModel):

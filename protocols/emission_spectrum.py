@@ -18,9 +18,9 @@ from labrig.region import Region
 
 from .steps.camera_settings import CameraSettings
 from .steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
-from .steps.lit_card import light_card
+from .steps.grey_card import light_card
 from .steps.patch_names import FilterPatches
-from .steps.posing import check_seen, lights_out
+from .steps.sample_pose import check_seen, lights_out
 from .steps.scenes import Arranged, Arrangement, LampKind, PutBackUnit
 
 #: The units' names end with the lamp.

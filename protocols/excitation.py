@@ -35,8 +35,8 @@ from .steps.darkness import levels
 from .steps.glow import dark_frames
 from .steps.metering import Album, DecayMeter, Look, Schedule
 from .steps.patch_names import FilterPatches
-from .steps.posing import charge, check_seen, face_camera, face_lamp, lights_out
-from .steps.watching import Watcher
+from .steps.sample_pose import charge, check_seen, face_camera, face_lamp, lights_out
+from .steps.sanity_checks import Watcher
 
 
 class ExcitationFrames(StrEnum):

@@ -31,7 +31,7 @@ from labrig.region import CENTRE, Region
 
 from .camera_calibration import HALF, CardDarkUnit
 from .steps.camera_settings import CameraSettings, frame_times_s
-from .steps.lit_card import CardLight, CardMeterUnit, card_light, light_card
+from .steps.grey_card import CardLight, CardMeterUnit, card_light, light_card
 from .steps.scenes import Arrangement, PutBackUnit
 
 

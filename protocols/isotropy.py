@@ -15,7 +15,7 @@ from labrig.region import Region
 
 from .steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from .steps.patch_names import Patches
-from .steps.posing import lights_out
+from .steps.sample_pose import lights_out
 
 #: Time to turn the sample in the dark.
 TURNING_S = 20.0

@@ -14,7 +14,7 @@ from labrig.acquire import CAMERA, Optics, ProtocolModel, RigFile, Session, Shoo
 from labrig.quantity import Count, DurationS, WordOrDuration
 
 from .steps.camera_settings import MARGIN_S, CameraSettings
-from .steps.posing import charge, face_lamp, lights_out, seen_s
+from .steps.sample_pose import charge, face_lamp, lights_out, seen_s
 from .steps.scenes import (
     Arrangement,
     PutBackUnit,

@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline
 
-from labrig import shipped
+from labrig import resources
 from labrig.errors import UsageError
 from labrig.yaml_file import did_you_mean
 
@@ -42,7 +42,7 @@ class Filters:
     """
 
     def __init__(self, folder: str | None, bent: float, seed: int) -> None:
-        place = shipped.folder(SHIPPED) if folder is None else Path(folder)
+        place = resources.folder(SHIPPED) if folder is None else Path(folder)
         if not place.is_dir():
             raise UsageError(f"{place}: expected a folder of colour filters ({SUFFIX})")
         self._files = {path.stem: path for path in sorted(place.glob(f"*{SUFFIX}"))}

@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from scipy.interpolate import CubicSpline, PchipInterpolator
 from scipy.optimize import brentq
 
-from labrig import shipped
+from labrig import resources
 from labrig.errors import UsageError
 from labrig.material import Material
 
@@ -81,7 +81,7 @@ def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
     UsageError
         No such file, or not such a file.
     """
-    path = shipped.find("config/optics", "camera", name_or_path)
+    path = resources.find("config/optics", "camera", name_or_path)
     try:
         table = json.loads(path.read_text(encoding="utf-8"))["spectral_data"]["data"]["main"]
         wavelength_nm = np.array([float(key) for key in table])

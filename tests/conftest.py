@@ -21,8 +21,8 @@ import pytest
 from hypothesis import settings
 from matplotlib.figure import Figure
 
-from labrig import shipped
-from labrig.cli.ending import guarded
+from labrig import resources
+from labrig.cli.exit_codes import guarded
 from labrig.report.page import Plates, Shown, draw
 from labrig.report.sections import Picture, Section
 from labrig.signals import STOP_SIGNALS
@@ -142,7 +142,7 @@ def make_rig(tmp_path: Path) -> Callable[..., Path]:
     """Writes the shipped simulated rig with a small sensor, changed as told."""
 
     def write(name: str = "rig.yaml", base: str = "sim", **simulation: object) -> Path:
-        content = read_quickly((shipped.folder("config") / f"{base}.yaml").read_text())
+        content = read_quickly((resources.folder("config") / f"{base}.yaml").read_text())
         content["simulation"] |= {"sensor": {"width": 96, "height": 64}}
         # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
         content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}

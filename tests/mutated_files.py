@@ -13,8 +13,8 @@ from collections.abc import Callable, Sequence
 from dataclasses import dataclass
 from pathlib import Path
 
-from labrig import shipped
-from labrig.cli.ending import guarded
+from labrig import resources
+from labrig.cli.exit_codes import guarded
 from tests.forked import forked
 
 #: A refusal takes no longer, in seconds of computing; nor does anything hang for longer than this.
@@ -119,11 +119,11 @@ _MUTATIONS = [
 
 def victims(run: Path) -> list[Victim]:
     """All that is shipped, and a run folder of a short decay with its result."""
-    protocols = sorted(shipped.folder("protocols").glob("*.yaml"))
-    optics = shipped.folder("config/optics")
+    protocols = sorted(resources.folder("protocols").glob("*.yaml"))
+    optics = resources.folder("config/optics")
     curves = [path for kind in ("csv", "json") for path in sorted(optics.rglob(f"*.{kind}"))]
-    rigs = sorted(shipped.folder("config").glob("sim*.yaml"))
-    materials = sorted(shipped.folder("config/materials").glob("*.yaml"))
+    rigs = sorted(resources.folder("config").glob("sim*.yaml"))
+    materials = sorted(resources.folder("config/materials").glob("*.yaml"))
     predicting = ("plan", run / "protocol.yaml", "--rig", run / "rig.yaml", "--predict")
     return [
         *(

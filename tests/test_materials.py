@@ -11,13 +11,13 @@ from typing import Any
 
 import pytest
 
-from labrig import shipped
+from labrig import resources
 from labrig.material import read_material
 from tests.conftest import Ended
 
 Labrig = Callable[..., Ended]
 Make = Callable[..., Path]
-EXPONENTIAL = [name for name in shipped.names("config/materials") if name != "power-law"]
+EXPONENTIAL = [name for name in resources.names("config/materials") if name != "power-law"]
 #: Small, yet large enough that flicker and not the pixels' noise rules, as on a real sensor.
 SENSOR = {"width": 384, "height": 256}
 #: Of 20 comparisons with a σ that is right: at 3 σ every twentieth change of the room's random

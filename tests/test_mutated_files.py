@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import read_protocol, read_rig_file
 from labrig.errors import LabrigError
 from labrig.material import read_material
@@ -32,7 +32,7 @@ READERS: dict[str, Callable[[Path], object]] = {
 @pytest.mark.parametrize("name", READERS)
 def test_a_file_that_came_to_harm_is_read_or_refused_in_a_line(name: str, tmp_path: Path) -> None:
     place, _, file = name.rpartition("/")
-    sound = (shipped.folder(place) / file).read_bytes()
+    sound = (resources.folder(place) / file).read_bytes()
     harmed = tmp_path / file
     for number in range(TIMES):
         harmed.write_bytes(mutated(sound, random.Random(f"{name} {number}")))

@@ -18,7 +18,7 @@ from labrig.acquire import LAMP, Plan, RunObserver, plan, read_protocol, read_ri
 from labrig.bench import Bench, open_bench
 from labrig.clock import Clock, Interrupted, VirtualClock
 from labrig.errors import DeviceError
-from labrig.filling import fill
+from labrig.execution import fill
 from labrig.record import RunFolder, read_run
 from labrig.record.journal import read_journal
 from labrig.run import Recording

@@ -9,7 +9,7 @@ from typing import Any
 import pytest
 from jsonschema import Draft202012Validator
 
-from labrig import shipped
+from labrig import resources
 from labrig.schema import KINDS, schema
 from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
@@ -21,7 +21,7 @@ SHIPPED = [
         ("rig", "config"),
         ("material", "config/materials"),
     )
-    for path in shipped.names(place).values()
+    for path in resources.names(place).values()
 ]
 #: Mappings whose keys are names that a person chooses, and a chain's parts: those are checked by
 #: their own protocols when the file is read.
@@ -72,7 +72,7 @@ def test_what_labrig_refuses_an_editor_underlines(
         "rig": ("config", "sim"),
         "material": ("config/materials", "blue-paint"),
     }[kind]
-    content = read_yaml(shipped.find(place, kind, name))
+    content = read_yaml(resources.find(place, kind, name))
     assert not validators[kind].is_valid(content | changes)
 
 
@@ -82,7 +82,7 @@ def test_what_labrig_refuses_an_editor_underlines(
 def test_what_labrig_takes_an_editor_takes(
     faults: list[Any], validators: dict[str, Draft202012Validator]
 ) -> None:
-    rig = read_yaml(shipped.folder("config") / "sim.yaml")
+    rig = read_yaml(resources.folder("config") / "sim.yaml")
     rig["simulation"]["faults"] = faults
     validators["rig"].validate(rig)
 

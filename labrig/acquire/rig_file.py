@@ -6,7 +6,7 @@ from typing import Any, Literal, TypeVar
 
 from pydantic import BaseModel, ConfigDict, Field, create_model
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire.roles import ROLES
 from labrig.calibration import KINDS, CalibrationKind
 from labrig.errors import UsageError
@@ -62,14 +62,14 @@ class Optics(BaseModel):
     filters: str | None = None
 
     def filter_files(self) -> dict[str, Path]:
-        """Name → transmittance of every colour filter: in the rig's own folder, else the shipped.
+        """Name → transmittance of every colour filter: in the rig's own folder, else the resources.
 
         Raises
         ------
         UsageError
             The folder has none.
         """
-        shipped_ones = shipped.folder("config/optics/filters")
+        shipped_ones = resources.folder("config/optics/filters")
         folder = shipped_ones if self.filters is None else Path(self.filters)
         found = {path.stem: path for path in sorted(folder.glob("*.csv"))}
         if not found:

@@ -1,6 +1,6 @@
 """From the frames of a run to numbers: one file or package a protocol, each to its typed result."""
 
-from labrig.analyse.choices import Choices, read_run_protocol
+from labrig.analyse.overrides import Choices, read_run_protocol
 from labrig.analyse.part import Inputs, Part
 from labrig.analyse.series_fit import fit_series, fit_table
 from labrig.analyse.temperature import temperature_warnings

@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from labrig.analyse.choices import Choices
+from labrig.analyse.overrides import Choices
 from labrig.analyse.part import Part
 from labrig.calibration import BlankFile, CameraFile
 from labrig.errors import DataError, UsageError

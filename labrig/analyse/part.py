@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 from labrig.acquire import RigFile
-from labrig.analyse.choices import Choices
+from labrig.analyse.overrides import Choices
 from labrig.bench_optics import calibration
 from labrig.calibration import (
     KINDS,

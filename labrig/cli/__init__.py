@@ -1,5 +1,5 @@
 """The command line: thin, one file per noun."""
 
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 
 __all__ = ["guarded"]

@@ -11,10 +11,10 @@ app = typer.Typer(help="The protocols that can be run.")
 @app.command("list")
 def list_protocols() -> None:
     """Shipped protocol files and what each of them does."""
-    from labrig import shipped
+    from labrig import resources
     from labrig.acquire import read_protocol
 
-    for path in shipped.names("protocols").values():
+    for path in resources.names("protocols").values():
         model = read_protocol(path)
         said = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("#").strip()
         typer.echo(f"{path.stem:16} ({model.protocol})  {said}")
@@ -28,10 +28,10 @@ def new_protocol(
     ] = None,
 ) -> None:
     """Put a commented protocol file in place, to be changed; nothing is overwritten."""
-    from labrig import shipped
+    from labrig import resources
     from labrig.errors import DiskError, UsageError
 
-    text = shipped.find("protocols", "protocol", name).read_text(encoding="utf-8")
+    text = resources.find("protocols", "protocol", name).read_text(encoding="utf-8")
     path = file or Path(f"my-{name}.yaml")
     try:
         with path.open("x", encoding="utf-8", newline="\n") as new:

@@ -55,12 +55,12 @@ def check(
     """
     from json import dumps
 
-    from labrig import shipped
+    from labrig import resources
     from labrig.acquire import read_rig_file
     from labrig.bench import open_bench
     from labrig.setup import check_rig
 
-    path = shipped.find("config", "rig", rig)
+    path = resources.find("config", "rig", rig)
     with open_bench(read_rig_file(path), str(path)) as stand:
         report = check_rig(stand)
     if json:

@@ -39,7 +39,7 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
-    from labrig.cli.at_end import told_at_end
+    from labrig.cli.on_finish import told_at_end
     from labrig.cli.progress import progress
 
     recording = _prepared(protocol, rig, runs)
@@ -93,7 +93,7 @@ def resume(
     """Go on with a run that was interrupted: completed units are kept, the rest is done."""
     from labrig.acquire import read_rig_file
     from labrig.catalogue import find_run
-    from labrig.cli.at_end import told_at_end
+    from labrig.cli.on_finish import told_at_end
     from labrig.cli.progress import progress
     from labrig.run import resume_run
 
@@ -115,11 +115,13 @@ def resume(
 
 
 def _prepared(protocol: str, rig: str, runs: Path) -> "Recording":
-    from labrig import shipped
+    from labrig import resources
     from labrig.run import Recording
 
     recording = Recording.prepare(
-        shipped.find("protocols", "protocol", protocol), shipped.find("config", "rig", rig), runs
+        resources.find("protocols", "protocol", protocol),
+        resources.find("config", "rig", rig),
+        runs,
     )
     for note in recording.notes():
         typer.echo(f"note: {note}", err=True)

@@ -22,7 +22,7 @@ def view(
     ] = False,
 ) -> None:
     """Live view for aiming and focus, regions drawn into a protocol. Ctrl-C ends it."""
-    from labrig import shipped
+    from labrig import resources
     from labrig.setup import view_rig
 
     def tell(url: str) -> None:
@@ -32,4 +32,4 @@ def view(
 
             webbrowser.open(url)
 
-    view_rig(shipped.find("config", "rig", rig), protocol, port, tell)
+    view_rig(resources.find("config", "rig", rig), protocol, port, tell)

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.compare.colorimetry import FloatArray, Viewing, delta_e, lab
-from labrig.compare.paper import DELTA_E, emission
+from labrig.compare.nalbach2017 import DELTA_E, emission
 from labrig.errors import DataError, UsageError
 from labrig.material import Material, phi1
 from labrig.optics import CameraResponse, Spectrum

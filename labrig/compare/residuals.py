@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.compare.colorimetry import FloatArray
-from labrig.compare.paper import LAST_RESIDUALS, RESIDUALS
+from labrig.compare.nalbach2017 import LAST_RESIDUALS, RESIDUALS
 from labrig.errors import FitError
 from labrig.fit import DecayFit, fit_decay
 from labrig.report import Table

@@ -11,7 +11,7 @@ from labrig.bench_optics import calibration, camera_curves
 from labrig.calibration import LVF_KIND
 from labrig.compare.colorimetry import DEFAULT_WHITE, FloatArray, viewing
 from labrig.compare.glow import GlowComparison, compare_glow, glow_of, in_colour, predicted_by
-from labrig.compare.paper import TABLE_1, emission, emission_grid
+from labrig.compare.nalbach2017 import TABLE_1, emission, emission_grid
 from labrig.compare.residuals import (
     Refit,
     Residuals,

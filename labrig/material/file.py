@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labrig import shipped
+from labrig import resources
 from labrig.finite import NotNegative
 from labrig.yaml_file import read_model, write_yaml
 
@@ -165,7 +165,7 @@ def read_material(name_or_path: str | os.PathLike[str]) -> Material:
     UsageError
         No such material, or its file is malformed.
     """
-    return read_model(shipped.find("config/materials", "material", name_or_path), Material)
+    return read_model(resources.find("config/materials", "material", name_or_path), Material)
 
 
 def write_material(path: Path, material: Material) -> None:

@@ -8,7 +8,7 @@ from pathlib import Path
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig import shipped
+from labrig import resources
 from labrig.errors import UsageError
 from labrig.optics.curve_file import CurveFile, checked, read_curve_file
 from labrig.optics.piecewise import FloatArray, band_means
@@ -128,7 +128,7 @@ def camera_path(name_or_path: str | os.PathLike[str]) -> Path:
     path = Path(name_or_path)
     if path.suffix.lower() in _TABLES:
         return path
-    return shipped.find("config/optics", "camera", name_or_path)
+    return resources.find("config/optics", "camera", name_or_path)
 
 
 def _camera(file: CurveFile, names: tuple[str, ...]) -> CameraResponse:

@@ -1,6 +1,6 @@
 """What a protocol will know before it is run: uncertainties, and what would halve them."""
 
-from labrig.predict.known import Sources
+from labrig.predict.assumptions import Sources
 from labrig.predict.patch import PatchPrediction
 from labrig.predict.prediction import Prediction, predict
 from labrig.predict.remedies import Remedy

@@ -5,8 +5,8 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from labrig.acquire import Plan, ProtocolModel, RigFile
+from labrig.predict.assumptions import Sources, what_is_known
 from labrig.predict.expectation import expect, predictable
-from labrig.predict.known import Sources, what_is_known
 from labrig.predict.patch import PatchPrediction, predicted_patches
 from labrig.predict.remedies import Remedy, Trials
 from labrig.predict.variants import changes

@@ -19,7 +19,10 @@ from .hdr import (
     HdrFrame as HdrFrame,
     read_hdr_frame as read_hdr_frame,
 )
-from .pairs import (
+from .measured_frames import (
+    SeriesFrame as SeriesFrame,
+)
+from .pair_noise import (
     STRIPS as STRIPS,
 )
 from .patches import (
@@ -46,9 +49,6 @@ from .raw import (
 )
 from .saturation import (
     is_clipped as is_clipped,
-)
-from .shots import (
-    SeriesFrame as SeriesFrame,
 )
 from .strip import (
     FLICKER as FLICKER,

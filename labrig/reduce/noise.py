@@ -15,7 +15,7 @@ three:
 
 Two things one frame cannot tell. Structure as fine as a pixel all over the region counts as
 noise: the variance comes out too large. Noise shared by whole rows does not: too small. Pairs of
-frames tell both (`labrig.reduce.pairs`).
+frames tell both (`labrig.reduce.pair_noise`).
 """
 
 from collections.abc import Sequence

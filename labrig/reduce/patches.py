@@ -11,10 +11,10 @@ from labrig.errors import DataError
 from labrig.optics import CameraModel
 from labrig.reduce.channels import PixelMask
 from labrig.reduce.dark import HOT_FRAMES, SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
+from labrig.reduce.measured_frames import SeriesFrame, Shot, View, levels, read_shots, strips
 from labrig.reduce.noise import Floats
-from labrig.reduce.pairs import PatchFrames, PatchNoise, paired_dark_sigma, paired_noise
+from labrig.reduce.pair_noise import PatchFrames, PatchNoise, paired_dark_sigma, paired_noise
 from labrig.reduce.raw import RawFrame, read_raw
-from labrig.reduce.shots import SeriesFrame, Shot, View, levels, read_shots, strips
 from labrig.region import Region
 from labrig.results import Series, add_flag, is_usable
 

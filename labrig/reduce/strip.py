@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from labrig.errors import DataError
 from labrig.optics import SLICES, CameraModel, Strip
 from labrig.reduce.hdr import HdrFrame, Image
+from labrig.reduce.measured_frames import SeriesFrame
 from labrig.reduce.patches import reduce_patches
-from labrig.reduce.shots import SeriesFrame
 from labrig.results import FloatArray, SliceValues, StripProfile
 
 #: Lit is what is brighter than so many times the noise of the dark surroundings,

@@ -8,12 +8,6 @@ import numpy as np
 
 from labrig.record import FrameRecord, FrameRole
 from labrig.report.colours import Screen, Swatch, screen_for, swatches
-from labrig.report.content import (
-    DECAY_ASSUMPTIONS,
-    DecayReport,
-    GlowPhotograph,
-    PatchReport,
-)
 from labrig.report.decay_figures import (
     linear_decay,
     logarithmic_decay,
@@ -27,6 +21,12 @@ from labrig.report.decay_figures import (
 )
 from labrig.report.methods import REFERENCES, UNKNOWN, methods
 from labrig.report.photographs import daylight_picture, glow_pictures, sensor_of
+from labrig.report.report_model import (
+    DECAY_ASSUMPTIONS,
+    DecayReport,
+    GlowPhotograph,
+    PatchReport,
+)
 from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.report.timing import (
     FrameTiming,

@@ -12,7 +12,6 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import FuncFormatter, MaxNLocator
 
 from labrig.fit.decay import exponential_means_and_slopes
-from labrig.report.content import PatchReport
 from labrig.report.figure_style import (
     BAND_OPACITY,
     DASH_DOTTED,
@@ -38,6 +37,7 @@ from labrig.report.figure_style import (
     points,
     shaded,
 )
+from labrig.report.report_model import PatchReport
 from labrig.report.timing import FrameTiming
 from labrig.results import FittedDecay, FloatArray, NoiseBudget, Series
 from labrig.written_numbers import power_of_ten, rounded

@@ -10,8 +10,8 @@ from labrig.errors import UsageError
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord, FrameRole
 from labrig.region import region_pixels
-from labrig.report.content import DecayReport
 from labrig.report.photographs import Sensor
+from labrig.report.report_model import DecayReport
 from labrig.report.timing import ON_TIME_S, Lateness
 from labrig.results import FittedDecay
 from labrig.written_numbers import exposure_text, rounded

@@ -6,16 +6,16 @@ from functools import partial
 
 import numpy as np
 
-from labrig import shipped
+from labrig import resources
 from labrig.material import Material, Spectrum, compare_materials, read_material
 from labrig.record import FrameRecord, FrameRole
 from labrig.report.colours import Screen, screen_for, spectrum_colour
-from labrig.report.content import GlowPhotograph
 from labrig.report.decay_figures import logarithmic_decay
 from labrig.report.emission_spectrum import spectrum_figure
 from labrig.report.material_tables import comparison_table, measured_table
 from labrig.report.photographs import Daylight, GlowPicture, daylight_picture, glow_pictures
 from labrig.report.registered import render as render_result
+from labrig.report.report_model import GlowPhotograph
 from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.results import DecayPatch, DecayResult, FloatArray, PhosphorResult
 
@@ -158,7 +158,7 @@ def _band(spectrum: Spectrum) -> tuple[FloatArray, FloatArray] | None:
 
 def _comparison(patch: str, material: Material) -> tuple[Section, ...]:
     """The material beside the shipped one of its name, such as of Table 1, if there is one."""
-    known = shipped.names("config/materials")
+    known = resources.names("config/materials")
     if material.name not in known:
         return ()
     reference = read_material(known[material.name])

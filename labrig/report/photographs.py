@@ -23,7 +23,7 @@ from labrig.reduce import (
 )
 from labrig.region import region_pixels
 from labrig.report.colours import Screen, encoded, into_gamut
-from labrig.report.content import GlowPhotograph, PatchReport
+from labrig.report.report_model import GlowPhotograph, PatchReport
 from labrig.written_numbers import exposure_text, rounded
 
 DAYLIGHT_WIDTH = 1000

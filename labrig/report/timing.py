@@ -6,7 +6,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.record import ActionRecord, FrameRecord, FrameRole
-from labrig.report.content import PatchReport
+from labrig.report.report_model import PatchReport
 from labrig.written_numbers import rounded
 
 #: Devices and what they do between a charge and its first frame.

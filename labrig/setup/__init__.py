@@ -2,7 +2,7 @@
 
 from labrig.setup.check import DeviceReport, RigReport, check_rig
 from labrig.setup.discover import Discovery, Found, discover
-from labrig.setup.surroundings import Process, Surroundings
+from labrig.setup.host import Process, Surroundings
 from labrig.setup.view import view_rig
 
 __all__ = [

@@ -8,8 +8,8 @@ from typing import Any
 import usb.core
 import usb.util
 
-from labrig.setup.holders import holders, unreachable
-from labrig.setup.surroundings import Port, Surroundings
+from labrig.setup.host import Port, Surroundings
+from labrig.setup.port_users import holders, unreachable
 
 NO_LIBUSB = (
     "libusb is not installed, so USB cameras cannot be seen: install libusb-1.0 (Linux: "

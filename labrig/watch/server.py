@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Never
 
 from labrig.clock import Clock
 from labrig.local_server import KINDS, LocalConversation, LocalServer
-from labrig.watch.following import Following
+from labrig.watch.run_follower import Following
 
 #: A browser that hears nothing for longer takes the connection for dead.
 HEARTBEAT_S = 5.0

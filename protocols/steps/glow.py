@@ -18,8 +18,8 @@ from .afterglow import glow
 from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
 from .darkness import levels, range_dn
 from .metering import DecayMeter, Look, Schedule, look
-from .posing import charge, check_seen, face_camera, face_lamp, has_door, lights_out
-from .watching import Watcher
+from .sample_pose import charge, check_seen, face_camera, face_lamp, has_door, lights_out
+from .sanity_checks import Watcher
 
 #: Shutter times of a metering's first frames, as shares of the longest.
 LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)

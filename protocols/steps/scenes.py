@@ -26,8 +26,8 @@ from labrig.region import CENTRE
 
 from .camera_settings import DARKS_PER_EXPOSURE, CameraSettings
 from .metering import SEEN_DN, SEEN_SIGMA, TARGET
-from .posing import face_lamp
-from .watching import Watcher
+from .sample_pose import face_lamp
+from .sanity_checks import Watcher
 
 Stage = Literal["sample", "grey card"]
 LvfPlace = Literal["away", "before camera", "on sample"]

@@ -30,7 +30,7 @@ from numpy.typing import NDArray
 
 from labrig.analyse import Choices, fit_series
 from labrig.analyse.frames import intact_frames
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 from labrig.errors import FitError
 from labrig.fit import DecayFit
 from labrig.material import read_material

@@ -22,8 +22,8 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from labrig import shipped
-from labrig.cli.ending import guarded
+from labrig import resources
+from labrig.cli.exit_codes import guarded
 from labrig.material import read_material
 
 WITHOUT_TRUE_STATES = "power-law"
@@ -47,7 +47,7 @@ def fits(folder: Path, rig: dict[str, object], protocol: str) -> dict[str, dict[
 def shipped_rig(name: str, **simulation: object) -> dict[str, object]:
     """A shipped simulated rig, changed as told."""
     rig: dict[str, dict[str, object]] = yaml.safe_load(
-        (shipped.folder("config") / f"{name}.yaml").read_text()
+        (resources.folder("config") / f"{name}.yaml").read_text()
     )
     fixed = {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     rig["simulation"] |= fixed | simulation
@@ -73,7 +73,7 @@ def main() -> None:
     sensor = {"width": width, "height": height}
     of_material: dict[str, list[list[float]]] = defaultdict(list)
     for seed in range(1, asked.seeds + 1):
-        for name in asked.material or shipped.names("config/materials"):
+        for name in asked.material or resources.names("config/materials"):
             with tempfile.TemporaryDirectory() as folder:
                 rig = shipped_rig("sim", sample=name, seed=seed, sensor=sensor)
                 (fit,) = fits(Path(folder), rig, asked.protocol).values()

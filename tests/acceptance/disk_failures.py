@@ -28,8 +28,8 @@ from pathlib import Path
 
 import yaml
 
-from labrig import shipped
-from labrig.cli.ending import guarded
+from labrig import resources
+from labrig.cli.exit_codes import guarded
 from labrig.errors import LabrigError
 from labrig.record import read_run
 from tests.forked import forked
@@ -94,7 +94,7 @@ class Bench:
         folder.mkdir()
         protocol, rig = folder / "protocol.yaml", folder / "rig.yaml"
         protocol.write_text(yaml.safe_dump(PROTOCOL))
-        content = yaml.safe_load((shipped.folder("config") / "sim.yaml").read_text())
+        content = yaml.safe_load((resources.folder("config") / "sim.yaml").read_text())
         content["simulation"] |= {
             "sensor": {"width": 96, "height": 64},
             "epoch": "2026-01-01T00:00:00Z",

@@ -25,10 +25,10 @@ from typing import Any
 import event_model
 import yaml
 
-from labrig import run as labrig_run, shipped
+from labrig import resources, run as labrig_run
 from labrig.bench import Bench, open_bench
 from labrig.cli import app as _preloaded  # noqa: F401
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 from labrig.cli.progress import progress
 from labrig.clock import VirtualClock
 from labrig.record import read_run
@@ -251,7 +251,7 @@ def _scene(folder: Path, keys: dict[str, Any]) -> Scene:
     folder.mkdir()
     protocol = folder / "protocol.yaml"
     protocol.write_text(yaml.safe_dump(COMMON | keys))
-    rig = yaml.safe_load((shipped.folder("config") / "sim.yaml").read_text())
+    rig = yaml.safe_load((resources.folder("config") / "sim.yaml").read_text())
     rig["devices"]["lamp"]["warm_up"] = "20 s"
     rig["devices"]["camera"]["warm_up"] = "10 s"
     rig["simulation"] |= {

@@ -18,7 +18,7 @@ from typing import Any, BinaryIO
 
 from labrig import run as labrig_run
 from labrig.bench import Bench, open_bench
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 
 LOOK_S = 0.002
 

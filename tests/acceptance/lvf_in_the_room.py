@@ -19,9 +19,9 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from labrig import shipped
+from labrig import resources
 from labrig.calibration import read_irradiance_file, read_lvf_file
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 from labrig.fit.least_squares import FloatArray
 from labrig.optics import read_curve_file
 from tests.analyse.lvf_calibration.room_truth import (
@@ -62,7 +62,7 @@ def labrig(*arguments: object) -> Path:
 
 def measured(folder: Path, seed: int, width: int, filters: int, real: bool) -> tuple[Path, Path]:
     """Runs of both protocols."""
-    rig = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    rig = yaml.safe_load((resources.folder("config") / "sim-phosphor.yaml").read_text())
     rig["simulation"] |= {
         "seed": seed,
         "sensor": {"width": width, "height": width * 2 // 3},

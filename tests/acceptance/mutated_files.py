@@ -18,8 +18,8 @@ from pathlib import Path
 
 import yaml
 
-from labrig import shipped
-from labrig.cli.ending import guarded
+from labrig import resources
+from labrig.cli.exit_codes import guarded
 from tests.mutated_files import Outcome, try_one, victims
 
 PROTOCOL = {
@@ -36,7 +36,7 @@ def recorded(place: Path) -> Path:
     """A short decay with its result."""
     protocol, rig = place / "protocol.yaml", place / "rig.yaml"
     protocol.write_text(yaml.safe_dump(PROTOCOL))
-    text = (shipped.folder("config") / "sim.yaml").read_text()
+    text = (resources.folder("config") / "sim.yaml").read_text()
     rig.write_text(text.replace("1404", "96").replace("936", "64"))
     with redirect_stdout(StringIO()), redirect_stderr(StringIO()):
         code = guarded(["run", str(protocol), "--rig", str(rig), "--runs", str(place / "runs")])

@@ -23,10 +23,10 @@ from typing import Any
 import numpy as np
 import yaml
 
-from labrig.analyse.choices import Choices, read_run_protocol
 from labrig.analyse.frames import intact_frames
+from labrig.analyse.overrides import Choices, read_run_protocol
 from labrig.analyse.series_fit import fit_series
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 from labrig.errors import FitError
 from labrig.record import read_run
 from labrig.reduce import reduce_patches

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any, Self
 
-from labrig import shipped
+from labrig import resources
 from labrig.yaml_file import read_yaml, yaml_text
 
 FILTERS = [
@@ -58,10 +58,10 @@ class Case:
     def write(cls, folder: Path, name: str, known: Mapping[str, Path]) -> Self:
         """The protocol called `name`; `known` has the runs of those that it rests on."""
         folder.mkdir()
-        protocol = read_yaml(shipped.find("protocols", "protocol", name)) | SHORTER[name]
+        protocol = read_yaml(resources.find("protocols", "protocol", name)) | SHORTER[name]
         if name == "phosphor":
             protocol["parts"] = [part | SHORTER[part["protocol"]] for part in protocol["parts"]]
-        rig = read_yaml(shipped.find("config", "rig", RIGS.get(name, "sim-phosphor")))
+        rig = read_yaml(resources.find("config", "rig", RIGS.get(name, "sim-phosphor")))
         rig["simulation"]["sensor"] = {"width": 96, "height": 64}
         rig["optics"] |= {key: str(known[KNOWN[key]]) for key in NEEDED.get(name, ())}
         case = cls(folder, folder / "protocol.yaml", folder / "rig.yaml")

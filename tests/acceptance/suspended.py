@@ -32,7 +32,7 @@ from labrig.acquire import (
 )
 from labrig.bench import open_bench
 from labrig.cli.progress import progress
-from labrig.filling import fill
+from labrig.execution import fill
 from labrig.record import RunFolder, read_run
 from tests.acceptance.board_on_a_terminal import RIG, WatchedBoard
 from tests.terminal import on_a_terminal

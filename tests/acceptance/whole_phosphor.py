@@ -26,7 +26,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from labrig import shipped
+from labrig import resources
 from labrig.material import Material, read_material
 from labrig.process import process_run
 from labrig.record import read_run
@@ -44,7 +44,7 @@ MEASURABLE_PER_S = 0.002
 
 def rig_file(folder: Path, material: str, seed: int, width: int) -> Path:
     """The shipped rig for phosphors with another sample, seed and sensor."""
-    rig = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    rig = yaml.safe_load((resources.folder("config") / "sim-phosphor.yaml").read_text())
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
     rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     rig["simulation"]["sample"] = [{"material": material, "region": [0.03, 0.1, 0.94, 0.8]}]
@@ -56,7 +56,7 @@ def rig_file(folder: Path, material: str, seed: int, width: int) -> Path:
 
 def protocol_file(folder: Path, material: str) -> Path:
     """The shipped chain for another sample."""
-    protocol = yaml.safe_load((shipped.folder("protocols") / "phosphor.yaml").read_text())
+    protocol = yaml.safe_load((resources.folder("protocols") / "phosphor.yaml").read_text())
     path = folder / "phosphor.yaml"
     path.write_text(yaml.safe_dump(protocol | {"sample": {"name": material}}))
     return path

@@ -9,12 +9,12 @@ from typing import Any
 
 from filelock import FileLock
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import Plan, RunObserver
 from labrig.analyse import Choices, Inputs, Part
-from labrig.analyse.choices import read_run_protocol
+from labrig.analyse.overrides import read_run_protocol
 from labrig.clock import Clock
-from labrig.filling import Watch
+from labrig.execution import Watch
 from labrig.process.provenance import describe_run
 from labrig.record import RunRecord, read_run
 from labrig.report import Source
@@ -42,7 +42,7 @@ def record(
     In one run of the tests what is the same is recorded once, and copied.
     """
     folder.mkdir(parents=True, exist_ok=True)
-    rig = read_quickly((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    rig = read_quickly((resources.folder("config") / "sim-phosphor.yaml").read_text())
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
     rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     rig["simulation"]["sensor"] = {"width": 96, "height": 64}

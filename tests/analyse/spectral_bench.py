@@ -10,7 +10,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import Plan, RunObserver
 from labrig.calibration import LvfFile, write_lvf_file
 from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
@@ -36,7 +36,7 @@ WIDTH, HEIGHT = 96, 64
 
 def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path:
     """The shipped rig for phosphors, changed as told, with its true LVF beside it."""
-    content = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    content = yaml.safe_load((resources.folder("config") / "sim-phosphor.yaml").read_text())
     # PyYAML takes these two for a date and a truth value, as labrig's loader does not.
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     content["simulation"] |= simulation
@@ -52,7 +52,7 @@ def write_bench(folder: Path, name: str = "rig.yaml", **simulation: Any) -> Path
 @cache
 def true_lvf_file(width: int = WIDTH, height: int = HEIGHT) -> LvfFile:
     """What a calibration without error would find of the shipped rig's LVF before the camera."""
-    content = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    content = yaml.safe_load((resources.folder("config") / "sim-phosphor.yaml").read_text())
     settings = LvfSettings.model_validate(content["simulation"]["lvf"])
     x, y, wide, high = settings.before_camera.region
     strip = Strip(

@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 from hypothesis import given, settings, strategies as st
 
-from labrig.analyse.choices import Choices
 from labrig.analyse.frames import IntactFrames, intact_frames, timing_warnings
+from labrig.analyse.overrides import Choices
 from labrig.errors import DataError, LabrigError
 from labrig.record import read_run
 from tests.conftest import Ended

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from labrig.analyse.choices import Choices
+from labrig.analyse.overrides import Choices
 from labrig.calibration import write_blank_file
 from labrig.errors import UsageError
 from labrig.process import process_run

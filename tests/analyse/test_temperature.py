@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import plan, read_protocol, read_rig_file
 from labrig.material import read_material
 from labrig.process import process_run
@@ -73,7 +73,7 @@ def test_a_thermometer_that_fails_does_not_end_a_run(
 
 
 def test_no_plan_takes_longer_for_it(tmp_path: Path) -> None:
-    content = yaml.safe_load((shipped.folder("config") / "sim-phosphor.yaml").read_text())
+    content = yaml.safe_load((resources.folder("config") / "sim-phosphor.yaml").read_text())
     content["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     (tmp_path / "decay.yaml").write_text(yaml.safe_dump(DECAY))
     protocol = read_protocol(tmp_path / "decay.yaml")

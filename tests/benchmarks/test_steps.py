@@ -8,7 +8,7 @@ from typing import BinaryIO, TypeVar
 
 import pytest
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import (
     LAMP_OFF,
     LAMP_ON,
@@ -33,7 +33,7 @@ STEPS = 2000
 
 
 def test_planned_steps(against: Against) -> None:
-    path = shipped.folder("config") / "sim.yaml"
+    path = resources.folder("config") / "sim.yaml"
     rig = read_rig_file(path)
     protocol = Decay.model_validate(
         {

@@ -13,7 +13,7 @@ from filelock import FileLock
 
 from labrig.catalogue import compare_runs, list_runs, summarise
 from labrig.catalogue.listing import Wanted
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 from labrig.results import write_fitted_decay
 from tests.conftest import Ended
 from tests.results.made import decay_result

@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 from labrig.compare import three_channels
 from labrig.compare.colorimetry import CIE_1931, CIE_2015, observer, viewing, white_xyz
 from labrig.compare.glow import compare_glow
-from labrig.compare.paper import TABLE_1, emission
+from labrig.compare.nalbach2017 import TABLE_1, emission
 from labrig.compare.residuals import equally_weighted, fits_by_states, residuals
 from labrig.compare.spectra_figure import spectra_figure
 from labrig.errors import DataError, UsageError

@@ -12,10 +12,10 @@ from typing import Any, ClassVar
 import pytest
 import yaml
 
-from labrig import shipped
+from labrig import resources
 from labrig.calibration import LvfFile, write_lvf_file
 from labrig.calibration.lvf_file import CurveColumns
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 from labrig.optics import read_camera
 from labrig.results import RunResult
 from labrig.results.phosphor import PhosphorResult
@@ -40,7 +40,7 @@ class Calibrated(RunResult):
 def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A decay of a phosphor with two states, processed."""
     folder = tmp_path_factory.mktemp("compared")
-    rig = yaml.safe_load((shipped.folder("config") / "sim.yaml").read_text())
+    rig = yaml.safe_load((resources.folder("config") / "sim.yaml").read_text())
     rig["simulation"] |= {
         "sensor": {"width": 96, "height": 64},
         "epoch": "2026-01-01T00:00:00Z",

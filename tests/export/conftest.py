@@ -8,9 +8,9 @@ from pathlib import Path
 import pytest
 import yaml
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import Plan, RunObserver, read_rig_file
-from labrig.analyse.choices import read_run_protocol
+from labrig.analyse.overrides import read_run_protocol
 from labrig.clock import Clock
 from labrig.process import process_run
 from labrig.process.provenance import describe_run
@@ -49,7 +49,7 @@ def with_dark_patch(tmp_path_factory: pytest.TempPathFactory) -> Finished:
 
 def finish(folder: Path, **keys: object) -> Finished:
     """A short decay."""
-    rig = yaml.safe_load((shipped.folder("config") / "sim.yaml").read_text())
+    rig = yaml.safe_load((resources.folder("config") / "sim.yaml").read_text())
     rig["simulation"] |= {"sensor": {"width": 96, "height": 64}, "sample": SAMPLE}
     rig["simulation"] |= {"epoch": "2026-01-01T00:00:00Z", "initial": {"lamp": "off"}}
     protocol = {

@@ -5,7 +5,7 @@ from collections.abc import Callable
 import numpy as np
 import pytest
 
-from labrig.fit.decay.rivals import power_law_mean, stretched_mean
+from labrig.fit.decay.alternative_models import power_law_mean, stretched_mean
 from labrig.fit.decay.states import exponential_means_and_slopes
 from labrig.fit.least_squares import FloatArray
 from labrig.material.rates import exponential_means

@@ -5,12 +5,12 @@ from typing import Any
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig import shipped
-from labrig.compare.paper import TABLE_1
+from labrig import resources
+from labrig.compare.nalbach2017 import TABLE_1
 from labrig.material import IrradianceNorm, Material, State, compare_materials, read_material
 from labrig.report.material_tables import comparison_table
 
-NAMES = sorted(shipped.names("config/materials"))
+NAMES = sorted(resources.names("config/materials"))
 factors = st.floats(1e-3, 1e3)
 
 

@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 from hypothesis import HealthCheck, given, settings, strategies as st
 
-from labrig import shipped
+from labrig import resources
 from labrig.errors import UsageError
 from labrig.material.file import (
     IrradianceNorm,
@@ -77,7 +77,7 @@ def test_written_and_read_is_the_same(material: Material, tmp_path: Path) -> Non
     assert read_material(path) == material
 
 
-@pytest.mark.parametrize("name", list(shipped.names("config/materials")))
+@pytest.mark.parametrize("name", list(resources.names("config/materials")))
 def test_shipped_materials_are_complete(name: str) -> None:
     material = read_material(name)
     assert material.name == name
@@ -86,7 +86,7 @@ def test_shipped_materials_are_complete(name: str) -> None:
 
 
 def test_table_1_is_shipped() -> None:
-    assert set(TABLE_1.split()) <= set(shipped.names("config/materials"))
+    assert set(TABLE_1.split()) <= set(resources.names("config/materials"))
     blue = read_material("blue-paint")
     assert blue.bands_nm == pytest.approx([400 + 37.5 * i for i in range(9)])
     (state,) = blue.states
@@ -99,7 +99,7 @@ def test_table_1_is_shipped() -> None:
 
 def test_double_exponentials_span_the_ratios() -> None:
     doubles = [
-        read_material(n) for n in shipped.names("config/materials") if n.startswith("double-")
+        read_material(n) for n in resources.names("config/materials") if n.startswith("double-")
     ]
     rates = [[state.k_r_per_s for state in material.states] for material in doubles]
     assert sorted(round(fast / slow, 6) for fast, slow in rates) == [2.5, 2.5, 5, 5, 20, 20]

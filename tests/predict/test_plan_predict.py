@@ -10,8 +10,8 @@ from typing import Any
 import pytest
 import yaml
 
-from labrig import shipped
-from labrig.cli.ending import guarded
+from labrig import resources
+from labrig.cli.exit_codes import guarded
 from labrig.material import read_material
 from labrig.predict.reference import read_reference
 from labrig.record import read_run
@@ -25,7 +25,7 @@ Make = Callable[..., Path]
 def measured(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A folder with protocol.yaml, rig.yaml and a run of them."""
     folder = tmp_path_factory.mktemp("measured")
-    rig = yaml.safe_load((shipped.folder("config") / "sim.yaml").read_text())
+    rig = yaml.safe_load((resources.folder("config") / "sim.yaml").read_text())
     rig["simulation"] |= {
         "sensor": {"width": 96, "height": 64},
         "epoch": "2026-01-01T00:00:00Z",

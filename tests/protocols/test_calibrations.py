@@ -6,7 +6,7 @@ from typing import Any
 import pytest
 import yaml
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import Plan, plan, read_protocol, read_rig_file
 from labrig.errors import DeviceError, ProtocolError, UsageError
 from tests.analyse.recorded import record
@@ -20,8 +20,8 @@ def planned(protocol: Path, rig: Path) -> Plan:
 
 @pytest.mark.parametrize("name", ["blank", "camera_calibration", "fade"])
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed(name: str) -> None:
-    rig = shipped.find("config", "rig", "sim-phosphor")
-    laid_out = planned(shipped.find("protocols", "protocol", name), rig)
+    rig = resources.find("config", "rig", "sim-phosphor")
+    laid_out = planned(resources.find("protocols", "protocol", name), rig)
     golden = (FOLDER / f"{name}.timeline.txt").read_text()
     assert "\n".join(laid_out.lines()) + "\n" == golden
 
@@ -57,7 +57,7 @@ def test_a_blank_before_the_door_is_open_is_refused(tmp_path: Path) -> None:
     path = tmp_path / "protocol.yaml"
     path.write_text(yaml.safe_dump({"protocol": "blank", "first": "400 ms"}))
     with pytest.raises(ProtocolError, match="the door still moves; write first: auto"):
-        planned(path, shipped.find("config", "rig", "sim-phosphor"))
+        planned(path, resources.find("config", "rig", "sim-phosphor"))
 
 
 def test_a_lens_that_does_not_tell_its_aperture_has_one_flat_field(tmp_path: Path) -> None:

@@ -7,7 +7,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import Plan, plan, read_protocol, read_rig_file
 from labrig.errors import ProtocolError, UsageError
 from labrig.record import read_run
@@ -15,16 +15,16 @@ from labrig.yaml_file import read_yaml
 from tests.conftest import Ended
 
 GOLDEN = Path(__file__).parent / "decay.timeline.txt"
-PROTOCOLS = sorted(path.stem for path in shipped.folder("protocols").glob("*.yaml"))
+PROTOCOLS = sorted(path.stem for path in resources.folder("protocols").glob("*.yaml"))
 
 
 def planned(protocol: Path, rig: str | Path = "sim") -> Plan:
-    rig_path = shipped.find("config", "rig", rig)
+    rig_path = resources.find("config", "rig", rig)
     return plan(read_protocol(protocol), read_rig_file(rig_path), str(rig_path))
 
 
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
-    laid_out = planned(shipped.find("protocols", "protocol", "decay"))
+    laid_out = planned(resources.find("protocols", "protocol", "decay"))
     assert "\n".join(laid_out.lines()) + "\n" == GOLDEN.read_text()
 
 
@@ -33,9 +33,9 @@ def test_the_timeline_of_the_shipped_protocol_is_as_agreed() -> None:
 def test_every_shipped_protocol_can_be_planned(name: str, rig: str) -> None:
     if rig == "sim-phosphor" and name.startswith("decay"):
         with pytest.raises(ProtocolError, match="write first: 800 ms"):
-            planned(shipped.find("protocols", "protocol", name), rig)
+            planned(resources.find("protocols", "protocol", name), rig)
         return
-    laid_out = planned(shipped.find("protocols", "protocol", name), rig)
+    laid_out = planned(resources.find("protocols", "protocol", name), rig)
     assert laid_out.duration_s > 1800
     assert laid_out.frames > 20
 

@@ -6,9 +6,9 @@ from typing import Any
 import pytest
 import yaml
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import Plan, plan, read_protocol, read_rig_file
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 from labrig.errors import ProtocolError, UsageError
 from labrig.record import read_run
 from tests.analyse.spectral_bench import write_bench
@@ -17,7 +17,7 @@ PROTOCOLS = ("emission_spectrum", "isotropy", "saturation")
 
 
 def planned(protocol: Path, rig: str | Path = "sim-phosphor") -> Plan:
-    path = shipped.find("config", "rig", rig)
+    path = resources.find("config", "rig", rig)
     return plan(read_protocol(protocol), read_rig_file(path), str(path))
 
 
@@ -29,7 +29,7 @@ def written(folder: Path, **keys: Any) -> Path:
 
 @pytest.mark.parametrize("name", PROTOCOLS)
 def test_the_timeline_of_the_shipped_protocol_is_as_agreed(name: str) -> None:
-    laid_out = planned(shipped.find("protocols", "protocol", name))
+    laid_out = planned(resources.find("protocols", "protocol", name))
     golden = Path(__file__).parent / f"{name}.timeline.txt"
     assert "\n".join(laid_out.lines()) + "\n" == golden.read_text(encoding="utf-8")
 

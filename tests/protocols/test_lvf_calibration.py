@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 import yaml
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import ByHand, Plan, RunObserver, plan, read_protocol, read_rig_file
 from labrig.calibration import read_irradiance_file, read_lvf_file
 from labrig.clock import Clock, Interrupted
@@ -60,7 +60,7 @@ def write(tmp_path: Path) -> Make:
 @pytest.mark.parametrize("name", ["lvf_calibration", "irradiance"])
 def test_the_timeline_is_as_agreed(name: str, write: Make) -> None:
     filters = {"filters": list(FEW[:2])} if name == "lvf_calibration" else {}
-    rig = shipped.find("config", "rig", "sim-phosphor")
+    rig = resources.find("config", "rig", "sim-phosphor")
     laid_out = plan(read_protocol(write(name, **filters)), read_rig_file(rig), str(rig))
     golden = GOLDEN / f"{name}.timeline.txt"
     assert "\n".join(laid_out.lines()) + "\n" == golden.read_text(encoding="utf-8")
@@ -95,7 +95,7 @@ def test_all_filters_are_those_that_the_rig_has(
     own = tmp_path / "my filters"
     own.mkdir()
     for name in ("shortpass-585", "longpass-440"):
-        table = shipped.folder("config/optics/filters") / f"{name}.csv"
+        table = resources.folder("config/optics/filters") / f"{name}.csv"
         shutil.copy(table, own / f"mine-{name}.csv")
     rig = make_rig(base="sim-phosphor", filters=str(own))
     content = yaml.safe_load(rig.read_text())

@@ -14,8 +14,8 @@ from labrig.optics import read_camera
 from labrig.record.frames import FrameRecord
 from labrig.record.history import DeviceLine, RunDescription
 from labrig.report import Report
-from labrig.report.content import DecayReport, GlowPhotograph, PatchReport
 from labrig.report.decay import decay_sections
+from labrig.report.report_model import DecayReport, GlowPhotograph, PatchReport
 from labrig.results import Series
 
 FloatArray = NDArray[np.float64]

@@ -19,8 +19,8 @@ from labrig.report.colours import (
     screen_for,
     swatches,
 )
-from labrig.report.content import GlowPhotograph
 from labrig.report.photographs import daylight_picture, glow_pictures
+from labrig.report.report_model import GlowPhotograph
 
 from .made import decay_series, frame, patch, write_dng
 

@@ -12,7 +12,7 @@ import pytest
 
 from labrig.record.history import Interruption
 from labrig.report import Report, write_report
-from labrig.report.content import PatchReport
+from labrig.report.report_model import PatchReport
 
 from .made import decay_report, decay_series, page_of, patch
 

@@ -6,9 +6,9 @@ from pathlib import Path
 
 import pytest
 
-from labrig.report.content import DecayReport
 from labrig.report.methods import Methods, methods
 from labrig.report.photographs import Sensor
+from labrig.report.report_model import DecayReport
 from labrig.report.timing import Lateness
 from labrig.results import FittedDecay
 

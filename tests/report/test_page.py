@@ -13,8 +13,8 @@ from labrig.errors import DiskError
 from labrig.fit import DecayFit
 from labrig.record.history import Interruption
 from labrig.report import write_report
-from labrig.report.content import DecayReport, PatchReport
 from labrig.report.parameters import quality_rows
+from labrig.report.report_model import DecayReport, PatchReport
 from labrig.written_numbers import plus_minus
 
 from .made import decay_report, decay_series, page_of, patch

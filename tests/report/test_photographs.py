@@ -13,8 +13,8 @@ import pytest
 
 from labrig.optics import read_camera
 from labrig.report.colours import encoded, screen_for
-from labrig.report.content import GlowPhotograph
 from labrig.report.photographs import daylight_picture, glow_pictures
+from labrig.report.report_model import GlowPhotograph
 from tests.reduce.conftest import _dng as write_dng
 
 from .made import decay_series, frame, patch

@@ -12,7 +12,7 @@ import yaml
 from labrig import plugins
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
-from labrig.setup import Process, Surroundings, discover, surroundings as surroundings_module
+from labrig.setup import Process, Surroundings, discover, host as host_module
 from labrig.sim.camera import SimulatedCamera
 
 DRIVERS = ("numato_relay", "ptp_camera")
@@ -221,8 +221,8 @@ def test_programs_are_read_from_proc(tmp_path: Path, monkeypatch: pytest.MonkeyP
     except OSError:
         pytest.skip("this user may not make links")
     (tmp_path / "43").mkdir()
-    monkeypatch.setattr(surroundings_module, "PROCESSES", tmp_path)
-    assert list(surroundings_module._linux_processes()) == [
+    monkeypatch.setattr(host_module, "PROCESSES", tmp_path)
+    assert list(host_module._linux_processes()) == [
         Process(42, "gvfsd-gphoto2", frozenset({"/dev/bus/usb/001/004"}))
     ]
 

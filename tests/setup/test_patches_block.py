@@ -5,7 +5,7 @@ from pathlib import Path
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import read_protocol
 from labrig.errors import UsageError
 from labrig.setup.patches_block import rounded, with_patches, write_patches
@@ -118,7 +118,7 @@ def test_all_that_surrounds_the_patches_survives(
 
 def test_a_shipped_protocol_is_written_and_still_one(tmp_path: Path) -> None:
     path = tmp_path / "mine.yaml"
-    text = shipped.find("protocols", "protocol", "decay").read_text()
+    text = resources.find("protocols", "protocol", "decay").read_text()
     path.write_text(text)
     write_patches(path, TWO)
     assert path.read_text() == text.replace("  sample: [0.3, 0.3, 0.4, 0.4]\n", BLOCK)

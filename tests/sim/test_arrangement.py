@@ -2,7 +2,7 @@
 
 import pytest
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import Hands, read_rig_file
 from labrig.bench import open_bench
 from labrig.errors import DeviceError, UsageError
@@ -81,7 +81,7 @@ def test_the_bench_is_found_as_hands_had_left_it() -> None:
 
 
 def test_the_shipped_rig_has_hands_that_do_it() -> None:
-    path = shipped.folder("config") / "sim-phosphor.yaml"
+    path = resources.folder("config") / "sim-phosphor.yaml"
     with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as rig:
         hands = rig.devices["hands"]
         assert isinstance(hands, Hands)

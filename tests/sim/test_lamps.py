@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 from scipy.integrate import quad
 
-from labrig import shipped
+from labrig import resources
 from labrig.errors import UsageError
 from labrig.sim.faults import When
 from labrig.sim.filters import Filters, read_curve
@@ -149,7 +149,7 @@ def test_ambient_light_comes_and_goes_and_a_leak_stays() -> None:
 
 
 def test_shipped_filters_are_many_and_different() -> None:
-    names = sorted(path.stem for path in shipped.folder("config/optics/filters").glob("*.csv"))
+    names = sorted(path.stem for path in resources.folder("config/optics/filters").glob("*.csv"))
     curves = np.array([SHIPPED.transmission(name) for name in names])
     assert len(names) >= 40
     assert curves.min() >= 0
@@ -190,7 +190,7 @@ def test_filters_of_ones_own(tmp_path: Path) -> None:
 
 def test_the_lamp_and_card_that_are_shipped_are_those_of_the_room() -> None:
     """Written by hand from the same law; the card is not quite the simulated one."""
-    folder = shipped.folder("config/optics")
+    folder = resources.folder("config/optics")
     lamp = read_curve(folder / "halogen_3000k.csv")
     assert lamp == pytest.approx(filament_spectrum(BURNING_K), rel=2e-3)
     assert read_curve(folder / "grey_card_18.csv") == pytest.approx(0.18, rel=0.05)

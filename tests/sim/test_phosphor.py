@@ -6,7 +6,7 @@ from hypothesis import given, settings, strategies as st
 from numpy.typing import NDArray
 from scipy.special import hyp1f1
 
-from labrig import shipped
+from labrig import resources
 from labrig.material.file import read_material
 from labrig.sim.lamp import BURNING_K, WAVELENGTH_NM, Lamp, filament_spectrum
 from labrig.sim.phosphor import Phosphor, band_cells, phosphor
@@ -79,7 +79,7 @@ def test_dark_decay_over_ten_lifetimes() -> None:
 
 
 def test_table_1_is_neither_hardly_nor_fully_charged_by_the_default_lamp() -> None:
-    names = [n for n in shipped.names("config/materials") if n != "power-law"]
+    names = [n for n in resources.names("config/materials") if n != "power-law"]
     materials = [read_material(name) for name in names]
     states = phosphor(materials, [None] * len(names), STEADY.irradiance)
     lamp = Lamp.found(STEADY, on=True)

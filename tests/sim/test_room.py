@@ -12,7 +12,7 @@ import pytest
 import rawpy
 from numpy.typing import NDArray
 
-from labrig import shipped
+from labrig import resources
 from labrig.clock import VirtualClock
 from labrig.errors import UsageError
 from labrig.sim.room import Room
@@ -62,7 +62,7 @@ def test_blue_paint_fills_half_of_the_range() -> None:
 
 
 def test_no_shipped_material_is_hopeless_or_off_the_scale() -> None:
-    names = list(shipped.names("config/materials"))
+    names = list(resources.names("config/materials"))
     regions = [(0.05 + 0.15 * (i % 6), 0.05 + 0.3 * (i // 6), 0.1, 0.2) for i in range(len(names))]
     room, clock = make_room(
         sample=[{"material": n, "region": r} for n, r in zip(names, regions, strict=True)]

@@ -19,16 +19,16 @@ from selenium.webdriver import Chrome
 from selenium.webdriver.common.by import By
 from selenium.webdriver.support.wait import WebDriverWait
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import read_protocol
-from labrig.cli.ending import guarded
+from labrig.cli.exit_codes import guarded
 from labrig.cli.progress import thumbnail
 from labrig.clock import Interrupted, SystemClock
 from labrig.errors import UsageError
 from labrig.record import TAKEN_BACK, ActionRecord, RunFolder, read_run
 from labrig.run import resume_run
-from labrig.watch.following import Following, State
-from labrig.watch.glances import Glances
+from labrig.watch.previews import Glances
+from labrig.watch.run_follower import Following, State
 from labrig.watch.server import News, WatchServer, watch_run
 from labrig.yaml_file import read_yaml, yaml_text
 from tests.analyse.recorded import quietly
@@ -44,7 +44,7 @@ CHAIN_RUN = recordings.HERE / "chain" / recordings.RUN
 def finished(tmp_path_factory: pytest.TempPathFactory) -> Path:
     """A processed run with two patches."""
     folder = tmp_path_factory.mktemp("finished")
-    rig = read_yaml(shipped.folder("config") / "sim.yaml")
+    rig = read_yaml(resources.folder("config") / "sim.yaml")
     rig["simulation"] |= {"sensor": {"width": 192, "height": 128}}
     protocol = {
         "protocol": "decay",

@@ -4,8 +4,8 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from labrig.analyse.choices import Choices
 from labrig.analyse.frames import left_out_lines
+from labrig.analyse.overrides import Choices
 from labrig.calibration import BlankFile
 from labrig.errors import DataError
 from labrig.protocols.excitation import ExcitationFrames, UnitKind

@@ -1,7 +1,7 @@
 """Decay fits: rates and amplitudes of the states of a phosphor after lamp off."""
 
-from labrig.fit.decay.assembly import DecayFit
 from labrig.fit.decay.fit import fit_decay
+from labrig.fit.decay.result import DecayFit
 from labrig.fit.decay.selection import F_TEST_LEVEL
 from labrig.fit.decay.states import APART_SIGMAS, exponential_means_and_slopes
 

@@ -7,13 +7,13 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.fit.decay.assembly import DecayFit, assemble
+from labrig.fit.decay.alternative_models import RIVALS, fit_rival, fitted_rival
 from labrig.fit.decay.envelope import Envelope, envelope
-from labrig.fit.decay.rivals import RIVALS, fit_rival, fitted_rival
+from labrig.fit.decay.fit_warnings import Evidence, refuse_if_constant, refuse_if_rising
+from labrig.fit.decay.result import DecayFit, assemble
 from labrig.fit.decay.selection import CLEAR_BIC, bic, choose_states
 from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.states import StatesFit, refit
-from labrig.fit.decay.verdict import Evidence, refuse_if_constant, refuse_if_rising
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
 from labrig.results import Candidate, Rival

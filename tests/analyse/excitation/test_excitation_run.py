@@ -10,10 +10,10 @@ import numpy as np
 import pytest
 import yaml
 
-from labrig.analyse.choices import Choices
 from labrig.analyse.excitation.analysis import USUAL
 from labrig.analyse.excitation.charge_intervals import charge_frames
 from labrig.analyse.excitation.charging_series import patch_chargings
+from labrig.analyse.overrides import Choices
 from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IrradianceFile, write_irradiance_file
 from labrig.errors import DataError

@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 import yaml
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import ExposureSettings
 from labrig.clock import Interrupted
 from labrig.drivers.ptp import PtpCamera
@@ -134,7 +134,7 @@ def test_a_slow_decay_in_exposures_of_64_s(
     tmp_path: Path,
 ) -> None:
     k_r_per_s = 0.004
-    sample = yaml.safe_load((shipped.folder("config/materials") / "blue-paint.yaml").read_text())
+    sample = yaml.safe_load((resources.folder("config/materials") / "blue-paint.yaml").read_text())
     sample["states"][0]["k_r_per_s"] = k_r_per_s
     (tmp_path / "slow.yaml").write_text(yaml.safe_dump(sample))
     rig = make_rig(sample=str(tmp_path / "slow.yaml"))

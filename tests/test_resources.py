@@ -17,7 +17,7 @@ import sys
 sys.path.insert(0, {folder!r})
 {before}
 import labrig
-from labrig import bench, shipped
+from labrig import bench, resources
 from labrig import plugins
 import labrig.drivers.numato, labrig.protocols.decay, labrig.sim
 for module in (labrig.drivers, labrig.protocols, labrig.sim):
@@ -25,7 +25,7 @@ for module in (labrig.drivers, labrig.protocols, labrig.sim):
 for group in (plugins.DRIVERS, plugins.PROTOCOLS):
     for name in plugins.names(group):
         plugins.load(group, name, "test")
-path = shipped.find("config", "rig", "sim")
+path = resources.find("config", "rig", "sim")
 assert path.read_text().startswith("# The simulated rig"), path
 import sim, config
 assert sim.trap and config.trap, "the user's own modules stay importable"

@@ -20,7 +20,7 @@ from labrig.region import Region
 
 from .darkness import range_dn
 from .metering import SEEN_SIGMA, Look, look
-from .posing import face_lamp
+from .sample_pose import face_lamp
 
 GREY_CARD = ByHand(
     "put a grey card where lamp and camera both see it (on the outside of the closed door; without "

@@ -5,7 +5,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Self
 
-from labrig import shipped
+from labrig import resources
 from labrig.acquire import CameraOffers, ProtocolModel
 from labrig.errors import UsageError
 from labrig.material import Material, read_material
@@ -167,7 +167,7 @@ def _like(run: Path, patch: str) -> Reference:
 
 def _own_run(name: str, material: Material, like: Reference | None) -> Reference | None:
     """The run that measured a material: the one around its file, or the one given."""
-    place = shipped.find("config/materials", "material", name).parent
+    place = resources.find("config/materials", "material", name).parent
     if (place / "fit.json").is_file() and run_of(place) is not None:
         return read_reference(place)
     measured_in = None if material.provenance is None else material.provenance.run

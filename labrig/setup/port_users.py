@@ -9,7 +9,7 @@ from typing import Any
 import usb.core
 import usb.util
 
-from labrig.setup.surroundings import Process, Surroundings
+from labrig.setup.host import Process, Surroundings
 
 #: Programs that take every camera they see, and what to do about each.
 _KNOWN = {

@@ -5,10 +5,10 @@ from dataclasses import dataclass
 import numpy as np
 
 from labrig.fit.decay.envelope import Envelope
+from labrig.fit.decay.fit_warnings import Evidence, warnings_about
 from labrig.fit.decay.joint import weight_sigma
 from labrig.fit.decay.selection import bic
 from labrig.fit.decay.states import StatesFit
-from labrig.fit.decay.verdict import Evidence, warnings_about
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
 from labrig.results import DecayState, FittedDecay

@@ -14,7 +14,7 @@ from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
 from labrig.region import Region
 from labrig.results import read_fitted_decays
-from labrig.watch.glance import Glance, glance
+from labrig.watch.preview import Glance, glance
 from labrig.watch.standing import PlannedUnit, planned_units
 from labrig.written_numbers import plus_minus
 

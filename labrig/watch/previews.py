@@ -42,7 +42,7 @@ class Glances:
         # -P: nothing that lies in the working folder is taken for a module.
         # Ctrl-C on a terminal goes to all of a group: this one ends when it is told to.
         self._process = subprocess.Popen(
-            [sys.executable, "-P", "-m", "labrig.watch.glances", str(run), str(width)],
+            [sys.executable, "-P", "-m", "labrig.watch.previews", str(run), str(width)],
             stdin=subprocess.PIPE,
             stdout=subprocess.PIPE,
             stderr=subprocess.DEVNULL,
@@ -92,7 +92,7 @@ def answer(run: Path, width: int, questions: Iterable[str], out: TextIO) -> None
     """Look at the frames asked for, one JSON line each; what cannot be read is left out."""
     # only in the process that looks: the one that runs the rig starts without what this loads
     from labrig.acquire import read_protocol
-    from labrig.watch.glance import glance
+    from labrig.watch.preview import glance
 
     protocol = read_protocol(run / "protocol.yaml")
     for question in questions:
