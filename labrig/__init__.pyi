@@ -6,7 +6,7 @@ from .acquire import (
     read_rig_file as read_rig_file,
 )
 from .analyse import (
-    Choices as Choices,
+    Overrides as Overrides,
     fit_series as fit_series,
 )
 from .bench import open_bench as open_bench

@@ -53,7 +53,7 @@ class Watch(Protocol):
         """The observer of one run."""
 
 
-def fill(
+def execute(
     folder: RunFolder, protocol: ProtocolModel, stand: Bench, laid_out: Plan, watch: Watch
 ) -> None:
     """Do all units that `folder` lacks, with this PC kept awake.

@@ -8,7 +8,7 @@ from typing import Self
 from labrig.acquire import Plan, ProtocolModel, RigFile, plan, read_protocol, read_rig_file
 from labrig.bench import open_bench
 from labrig.errors import DiskError, UsageError
-from labrig.execution import Watch, fill
+from labrig.execution import Watch, execute
 from labrig.optics import read_camera
 from labrig.quantity import duration_text
 from labrig.record import RunFolder, read_run
@@ -93,7 +93,7 @@ class Recording:
             )
             try:
                 with folder:
-                    fill(folder, self.protocol, stand, self.plan, watch)
+                    execute(folder, self.protocol, stand, self.plan, watch)
             except BaseException:
                 if not folder.read().attempts:  # no device was reached, nothing happened
                     folder.discard()
@@ -119,7 +119,7 @@ def resume_run(path: Path, watch: Watch) -> Path:
         open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as stand,
         RunFolder(path, stand.seed, stand.disk) as folder,
     ):
-        fill(folder, protocol, stand, laid_out, watch)
+        execute(folder, protocol, stand, laid_out, watch)
     return path
 
 

@@ -207,7 +207,7 @@ class DecayUnit:
         )
         watcher = self.protocol.watcher(session, self.name, self.metering)
         watcher.tell_of_delays(schedule.times_s)
-        watcher.insist_on_decay(self.protocol.short_settings(session))
+        watcher.require_decay(self.protocol.short_settings(session))
 
     def _schedule(self, session: Session) -> Schedule:
         protocol, offers = self.protocol, session.rig[CAMERA].offers()

@@ -134,7 +134,7 @@ class SpectrumUnit:
         watcher = self.protocol.watcher(session, self.name, metering)
         watcher.tell_of_delays(schedule.times_s)
         if len(schedule.times_s) > 1:
-            watcher.insist_on_decay(self.protocol.short_settings(session))
+            watcher.require_decay(self.protocol.short_settings(session))
 
 
 @dataclass(frozen=True)

@@ -109,7 +109,7 @@ class AngleUnit:
         ]
         session.run_sequence([at(time_s + late_s, shoot) for time_s, shoot in glow])
         watcher = self.protocol.watcher(session, self.name)
-        watcher.insist_on_decay(self.protocol.short_settings(session))
+        watcher.require_decay(self.protocol.short_settings(session))
 
 
 def _turn(angle: int, why: str, takes_s: float) -> ByHand:

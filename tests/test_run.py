@@ -18,7 +18,7 @@ from labrig.acquire import LAMP, Plan, RunObserver, plan, read_protocol, read_ri
 from labrig.bench import Bench, open_bench
 from labrig.clock import Clock, Interrupted, VirtualClock
 from labrig.errors import DeviceError
-from labrig.execution import fill
+from labrig.execution import execute
 from labrig.record import RunFolder, read_run
 from labrig.record.journal import read_journal
 from labrig.run import Recording
@@ -43,7 +43,7 @@ def lamp_after(folder: Path, rig: Path, stop: Callable[[], None]) -> bool:
     with open_bench(rig_file, str(rig)) as stand, RunFolder(folder, stand.seed) as run:
         stop()
         try:
-            fill(run, protocol, stand, plan(protocol, rig_file, str(rig)), quietly)
+            execute(run, protocol, stand, plan(protocol, rig_file, str(rig)), quietly)
         except (Interrupted, DeviceError) as error:
             assert "\n" not in str(error)
             assert f"labrig resume {folder}" in str(error) or "nothing was" in str(error)

@@ -94,7 +94,7 @@ class Rig:
             self.devices[key] = open_device()
             self.devices[key].make_safe()
 
-        failures = insist(
+        failures = require(
             self.clock, {key: step}, unless=lambda error: not isinstance(error, UnclearAnswerError)
         )
         if key in failures:
@@ -116,7 +116,7 @@ class Rig:
             All of those are gone or do not answer clearly, and may come back.
         """
         with self.clock.shielded():
-            failures = insist(
+            failures = require(
                 self.clock,
                 {key: self.devices[key].make_safe for key in in_safe_order(self.devices)},
                 unless=_is_gone,
@@ -151,7 +151,7 @@ def device_errors(key: str) -> Iterator[None]:
         raise DeviceError(f"{key}: its driver failed ({error!r})") from error
 
 
-def insist(
+def require(
     clock: Clock,
     steps: Mapping[str, Callable[[], None]],
     unless: Callable[[Exception], bool],

@@ -1,13 +1,13 @@
 """From the frames of a run to numbers: one file or package a protocol, each to its typed result."""
 
-from labrig.analyse.overrides import Choices, read_run_protocol
+from labrig.analyse.overrides import Overrides, read_run_protocol
 from labrig.analyse.part import Inputs, Part
 from labrig.analyse.series_fit import fit_series, fit_table
 from labrig.analyse.temperature import temperature_warnings
 
 __all__ = [
-    "Choices",
     "Inputs",
+    "Overrides",
     "Part",
     "fit_series",
     "fit_table",

@@ -7,10 +7,10 @@ import numpy as np
 
 from labrig.analyse.frames import (
     hot_pixels_of,
-    insist_on_this_camera,
     intact_frames,
     part_frames,
     part_region,
+    require_calibrated_camera,
     timing_warnings,
 )
 from labrig.analyse.part import Part
@@ -104,8 +104,8 @@ def analyse(part: Part) -> BlankResult:
     """
     protocol, run, camera = part.protocol, part.run, part.inputs.camera
     region = part_region(part, protocol.region)
-    frames = intact_frames(run, part.choices, BLANK_FRAMES)
-    insist_on_this_camera(camera, run, part_frames(part, BLANK_FRAMES))
+    frames = intact_frames(run, part.overrides, BLANK_FRAMES)
+    require_calibrated_camera(camera, run, part_frames(part, BLANK_FRAMES))
     series = reduce_patches(frames.decay, {"blank": region}, frames.dark, camera=camera)["blank"]
     # Hot pixels are of one colour: left in, they look like light.
     hot = hot_pixels_of(frames.dark)

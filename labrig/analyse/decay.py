@@ -5,7 +5,12 @@ from importlib.metadata import version
 
 import numpy as np
 
-from labrig.analyse.frames import cleaned, insist_on_this_camera, intact_frames, timing_warnings
+from labrig.analyse.frames import (
+    intact_frames,
+    require_calibrated_camera,
+    timing_warnings,
+    without_stray_light,
+)
 from labrig.analyse.part import Part
 from labrig.analyse.series_fit import fit_series
 from labrig.errors import FitError
@@ -69,14 +74,14 @@ def analyse(part: Part) -> DecayResult:
         No decay is complete, a frame is missing or was changed after the run, or the camera file
         that is known is of another camera, lens or aperture.
     """
-    run, protocol, choices = part.run, part.protocol, part.choices
-    regions = choices.patches(protocol)
+    run, protocol, overrides = part.run, part.protocol, part.overrides
+    regions = overrides.patches(protocol)
     background = protocol.background if protocol.dark == "background" else None
-    frames, stray = cleaned(intact_frames(run, choices), part.inputs.blank)
-    insist_on_this_camera(part.inputs.camera, run, run.frames(FrameRole.DECAY))
+    frames, stray = without_stray_light(intact_frames(run, overrides), part.inputs.blank)
+    require_calibrated_camera(part.inputs.camera, run, run.frames(FrameRole.DECAY))
     series = reduce_patches(frames.decay, regions, frames.dark, background, part.inputs.camera)
-    states = choices.states or (None if protocol.states == "auto" else protocol.states)
-    fits = _fit_all(series, states, choices.fixed_rates_per_s)
+    states = overrides.states or (None if protocol.states == "auto" else protocol.states)
+    fits = _fit_all(series, states, overrides.fixed_rates_per_s)
     temperature_c = glow_temperature_c(run, part.protocol.rate_frames)
     only = protocol.sample.name if len(fits) == 1 else None
     return DecayResult(

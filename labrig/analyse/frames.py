@@ -3,7 +3,7 @@
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
-from labrig.analyse.overrides import Choices
+from labrig.analyse.overrides import Overrides
 from labrig.analyse.part import Part
 from labrig.calibration import BlankFile, CameraFile
 from labrig.errors import DataError, UsageError
@@ -26,7 +26,7 @@ def lens_of(frames: Sequence[FrameRecord]) -> str | None:
     return read_exif(frames[0].path.read_bytes()).lens if frames else None
 
 
-def insist_on_this_camera(
+def require_calibrated_camera(
     camera: CameraFile | None, run: RunRecord, frames: Sequence[FrameRecord]
 ) -> None:
     """Refuse a calibration that is not of these frames; nothing is done where there is none.
@@ -47,7 +47,7 @@ def insist_on_this_camera(
 MOST_NAMED = 4
 
 
-def insist_on_intact(run: RunRecord, purposes: Sequence[str], choices: Choices) -> None:
+def require_intact(run: RunRecord, purposes: Sequence[str], overrides: Overrides) -> None:
     """Refuse frames of completed units that are missing or were changed, and are not excluded.
 
     Raises
@@ -55,7 +55,7 @@ def insist_on_intact(run: RunRecord, purposes: Sequence[str], choices: Choices) 
     DataError
         Names them, and how to leave them out.
     """
-    insist(run, damaged_frames(run, purposes), choices)
+    require(run, damaged_frames(run, purposes), overrides)
 
 
 def damaged_frames(run: RunRecord, purposes: Sequence[str]) -> dict[FrameRecord, str]:
@@ -69,15 +69,15 @@ def damaged_frames(run: RunRecord, purposes: Sequence[str]) -> dict[FrameRecord,
     return {frame: damage for frame in frames if (damage := frame.damage())}
 
 
-def insist(run: RunRecord, damaged: Mapping[FrameRecord, str], choices: Choices) -> None:
+def require(run: RunRecord, damaged: Mapping[FrameRecord, str], overrides: Overrides) -> None:
     """Refuse those of the damaged frames that a person has not excluded.
 
     Raises
     ------
     DataError
-        As `insist_on_intact`.
+        As `require_intact`.
     """
-    refused = {f: damage for f, damage in damaged.items() if not choices.excludes(f)}
+    refused = {f: damage for f, damage in damaged.items() if not overrides.excludes(f)}
     if refused:
         raise DataError(f"{run.folder}: {_told(refused)}")
 
@@ -101,12 +101,12 @@ def part_frames(part: Part, *purposes: str) -> list[FrameRecord]:
     DataError
         A frame is missing or was changed after the run.
     """
-    insist_on_intact(part.run, purposes, part.choices)
+    require_intact(part.run, purposes, part.overrides)
     return [
         frame
         for attempt in part.run.completed().values()
         for frame in attempt.frames
-        if frame.purpose in purposes and not part.choices.excludes(frame)
+        if frame.purpose in purposes and not part.overrides.excludes(frame)
     ]
 
 
@@ -118,12 +118,12 @@ def part_region(part: Part, region: Region) -> Region:
     UsageError
         A region of another name is asked for.
     """
-    if named := [name for name in part.choices.regions if name]:
+    if named := [name for name in part.overrides.regions if name]:
         raise UsageError(
             f"--roi: expected x,y,width,height, since this run has one region only, got the name "
             f"'{named[0]}'"
         )
-    return part.choices.regions.get("", region)
+    return part.overrides.regions.get("", region)
 
 
 #: Of a frame that begins while something else than the glow still fades.
@@ -150,7 +150,9 @@ class IntactFrames:
     warnings: list[str]
 
 
-def cleaned(frames: IntactFrames, blank: BlankFile | None) -> tuple[IntactFrames, tuple[str, ...]]:
+def without_stray_light(
+    frames: IntactFrames, blank: BlankFile | None
+) -> tuple[IntactFrames, tuple[str, ...]]:
     """Frames that begin too early flagged, so that nothing is made of them; and what to say of it.
 
     How much of the lamp's afterglow a sample throws back is not what the blank does: it cannot be
@@ -211,7 +213,9 @@ def hot_pixels_of(darks: Sequence[SeriesFrame]) -> PixelMask | None:
 LATE_S = 0.05
 
 
-def intact_frames(run: RunRecord, choices: Choices, purpose: str = FrameRole.DECAY) -> IntactFrames:
+def intact_frames(
+    run: RunRecord, overrides: Overrides, purpose: str = FrameRole.DECAY
+) -> IntactFrames:
     """Every frame held against its checksum; those after lamp off timed from it.
 
     Parameters
@@ -224,9 +228,9 @@ def intact_frames(run: RunRecord, choices: Choices, purpose: str = FrameRole.DEC
     DataError
         No decay is complete, or a frame is missing or was changed and is not excluded.
     """
-    damaged = _damaged(run, choices, (purpose, FrameRole.DARK))
+    damaged = _damaged(run, overrides, (purpose, FrameRole.DARK))
     decay = [
-        _flagged(frame, attempt, choices)
+        _flagged(frame, attempt, overrides)
         for attempt in run.completed().values()
         for frame in attempt.frames
         if frame.purpose == purpose and frame not in damaged
@@ -241,7 +245,7 @@ def intact_frames(run: RunRecord, choices: Choices, purpose: str = FrameRole.DEC
         dark=[
             untimed(frame)
             for frame in run.frames(FrameRole.DARK)
-            if frame not in damaged and not choices.excludes(frame)
+            if frame not in damaged and not overrides.excludes(frame)
         ],
         daylight=[frame for frame in run.frames(FrameRole.DAYLIGHT) if frame not in damaged],
         warnings=[
@@ -252,7 +256,7 @@ def intact_frames(run: RunRecord, choices: Choices, purpose: str = FrameRole.DEC
     )
 
 
-def steady_frames(run: RunRecord, choices: Choices, purpose: str) -> list[SeriesFrame]:
+def steady_frames(run: RunRecord, overrides: Overrides, purpose: str) -> list[SeriesFrame]:
     """Frames of that purpose under a steady light, each held against its checksum.
 
     Raises
@@ -260,11 +264,11 @@ def steady_frames(run: RunRecord, choices: Choices, purpose: str) -> list[Series
     DataError
         A frame is missing or was changed and is not excluded.
     """
-    damaged = _damaged(run, choices, (purpose,))
+    damaged = _damaged(run, overrides, (purpose,))
     return [
         untimed(frame)
         for frame in run.frames(purpose)
-        if frame not in damaged and not choices.excludes(frame)
+        if frame not in damaged and not overrides.excludes(frame)
     ]
 
 
@@ -286,10 +290,12 @@ def timing_warnings(run: RunRecord, purpose: str = FrameRole.DECAY) -> list[str]
     return warnings
 
 
-def _damaged(run: RunRecord, choices: Choices, measured: tuple[str, ...]) -> dict[FrameRecord, str]:
+def _damaged(
+    run: RunRecord, overrides: Overrides, measured: tuple[str, ...]
+) -> dict[FrameRecord, str]:
     """What is wrong with frames, those that are `measured` only if they are excluded."""
     damaged = damaged_frames(run, (*measured, FrameRole.DAYLIGHT))
-    insist(run, {f: damage for f, damage in damaged.items() if f.purpose in measured}, choices)
+    require(run, {f: damage for f, damage in damaged.items() if f.purpose in measured}, overrides)
     return damaged
 
 
@@ -324,8 +330,8 @@ def switched_time(attempt: Attempt, frame: FrameRecord, state: str) -> float:
     return switches[-1]
 
 
-def _flagged(frame: FrameRecord, attempt: Attempt, choices: Choices) -> SeriesFrame:
+def _flagged(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> SeriesFrame:
     """Timed from lamp-off."""
     flag = "late" if frame.late_s > LATE_S else ""
-    flag = add_flag(flag, "excluded") if choices.excludes(frame) else flag
+    flag = add_flag(flag, "excluded") if overrides.excludes(frame) else flag
     return replace(timed(frame, switched_time(attempt, frame, "off")), flag=flag)

@@ -61,7 +61,7 @@ def analyse(part: Part) -> IrradianceResult:
     ratio = _card_ratio(part, frames, strip)
     position = np.array(strip.positions(*frames.size))
     lvf = calibrated.lvf.at(np.clip(position, calibrated.position[0], calibrated.position[-1]))
-    camera = camera_curves(part.rig, part.choices.camera, calibrated)
+    camera = camera_curves(part.rig, part.overrides.camera, calibrated)
     scale = strip_scale(ratio, lvf, lamp, card_reflectance(part.rig), camera)
     return IrradianceResult(
         calibration=_file(part, strip, lvf, lamp, ratio, scale),

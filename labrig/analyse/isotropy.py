@@ -4,7 +4,12 @@ from collections.abc import Iterator, Mapping
 
 import numpy as np
 
-from labrig.analyse.frames import cleaned, insist_on_this_camera, intact_frames, timing_warnings
+from labrig.analyse.frames import (
+    intact_frames,
+    require_calibrated_camera,
+    timing_warnings,
+    without_stray_light,
+)
 from labrig.analyse.part import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER
 from labrig.errors import DataError
@@ -32,9 +37,11 @@ def analyse(part: Part) -> IsotropyResult:
         A straight view or all others are missing, or frames are damaged.
     """
     protocol, run, camera = part.protocol, part.run, part.inputs.camera
-    frames, stray = cleaned(intact_frames(run, part.choices, protocol.purpose), part.inputs.blank)
-    insist_on_this_camera(camera, run, run.frames(protocol.purpose))
-    regions = part.choices.patches(protocol)
+    frames, stray = without_stray_light(
+        intact_frames(run, part.overrides, protocol.purpose), part.inputs.blank
+    )
+    require_calibrated_camera(camera, run, run.frames(protocol.purpose))
+    regions = part.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
     around = protocol.patch == "around"

@@ -28,7 +28,7 @@ def read_run_protocol(run: Path) -> ProtocolModel:
 
 
 @dataclass(frozen=True)
-class Choices:
+class Overrides:
     """What a person wants otherwise than the protocol says.
 
     Attributes

@@ -5,7 +5,7 @@ from dataclasses import dataclass, field, replace
 from typing import Any, Self
 
 from labrig.acquire import RigFile
-from labrig.analyse.overrides import Choices
+from labrig.analyse.overrides import Overrides
 from labrig.bench_optics import calibration
 from labrig.calibration import (
     KINDS,
@@ -88,5 +88,5 @@ class Part:
     run: RunRecord
     protocol: Any
     rig: RigFile
-    choices: Choices
+    overrides: Overrides
     inputs: Inputs

@@ -23,7 +23,7 @@ def analyse(part: Part) -> PhosphorResult:
     for link in part.protocol.chain():
         kind = link.protocol.protocol
         analyse_link = plugins.load(plugins.ANALYSES, kind, str(part.run.folder))
-        own = Part(part.run.part(link.name), link.protocol, part.rig, part.choices, inputs)
+        own = Part(part.run.part(link.name), link.protocol, part.rig, part.overrides, inputs)
         try:
             result: RunResult = analyse_link(own)
             if result.failures():

@@ -16,7 +16,12 @@ import numpy as np
 from scipy.optimize import brentq
 from scipy.special import fdtrc
 
-from labrig.analyse.frames import cleaned, insist_on_this_camera, intact_frames, timing_warnings
+from labrig.analyse.frames import (
+    intact_frames,
+    require_calibrated_camera,
+    timing_warnings,
+    without_stray_light,
+)
 from labrig.analyse.part import Part
 from labrig.analyse.series_fit import fit_series
 from labrig.errors import DataError, FitError
@@ -219,9 +224,9 @@ def analyse(part: Part) -> SaturationResult:
         The decays do not allow a fit.
     """
     protocol, run, camera = part.protocol, part.run, part.inputs.camera
-    frames, stray = cleaned(intact_frames(run, part.choices), part.inputs.blank)
-    insist_on_this_camera(camera, run, run.frames(FrameRole.DECAY))
-    regions = part.choices.patches(protocol)
+    frames, stray = without_stray_light(intact_frames(run, part.overrides), part.inputs.blank)
+    require_calibrated_camera(camera, run, run.frames(FrameRole.DECAY))
+    regions = part.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
     lasted_s, weaker = _charges_s(run), protocol.weaker
     patches = {name: _patch(one, lasted_s, part) for name, one in series.items()}
@@ -260,11 +265,11 @@ def _patch(series: Series, lasted_s: Mapping[str, float], part: Part) -> PatchSa
             "expected two or more complete decays under the full light, got "
             f"{len(full)}; go on with labrig resume"
         )
-    asked = part.choices.states or (
+    asked = part.overrides.states or (
         None if part.protocol.states == "auto" else part.protocol.states
     )
     longest = decays[units[full[-1]]]
-    fit = fit_series(longest, asked, fixed_rates_per_s=part.choices.fixed_rates_per_s)
+    fit = fit_series(longest, asked, fixed_rates_per_s=part.overrides.fixed_rates_per_s)
     curves = {unit: curve(one, fit) for unit, one in decays.items()}
     start_per_s = [state.k_r_per_s for state in fit.states]
     rates = compare_rates(list(curves.values()), start_per_s, flicker_dof(fit))

@@ -12,7 +12,7 @@ from typing import TypeVar
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.analyse.frames import hot_pixels_of, insist_on_this_camera, steady_frames
+from labrig.analyse.frames import hot_pixels_of, require_calibrated_camera, steady_frames
 from labrig.analyse.part import Part
 from labrig.errors import DataError
 from labrig.optics import SLICES, Strip
@@ -34,13 +34,13 @@ class StripFrames:
     def __init__(self, part: Part) -> None:
         self._part = part
         self.dark = self.of(FrameRole.DARK)
-        insist_on_this_camera(part.inputs.camera, part.run, part.run.frames(FrameRole.DARK))
+        require_calibrated_camera(part.inputs.camera, part.run, part.run.frames(FrameRole.DARK))
 
     def of(self, purpose: str, unit: str | None = None) -> list[SeriesFrame]:
         """Of a purpose, and of one unit where that matters."""
         frames = [
             frame
-            for frame in steady_frames(self._part.run, self._part.choices, purpose)
+            for frame in steady_frames(self._part.run, self._part.overrides, purpose)
             if unit is None or frame.unit == unit
         ]
         if not frames:
@@ -118,7 +118,7 @@ def strip_patches(part: Part) -> list[StripPatch]:
     protocol = part.protocol
     if not protocol.patches:
         return [StripPatch("", protocol.sample.name)]
-    regions = part.choices.patches(protocol)
+    regions = part.overrides.patches(protocol)
     alone = len(regions) == 1
     return [
         StripPatch(name, protocol.sample.name if alone else name, region, alone)
@@ -126,7 +126,7 @@ def strip_patches(part: Part) -> list[StripPatch]:
     ]
 
 
-def cut(
+def slice_strip(
     patches: Sequence[StripPatch], strip: Strip, raw: RawFrame, count: int = SLICES
 ) -> tuple[dict[StripPatch, Slices], tuple[str, ...]]:
     """The strip's slices in the rows of every patch, and why a patch has none, a line each.
@@ -177,7 +177,7 @@ def _rows(patch: StripPatch, strip: Strip, raw: RawFrame, count: int) -> Slices:
     raise DataError(f"{where}; move it: labrig process RUN --roi {patch.name}=x,y,width,height")
 
 
-def lean(strip: Strip, slices: Slices, raw: RawFrame) -> FloatArray:
+def tilt_offset(strip: Strip, slices: Slices, raw: RawFrame) -> FloatArray:
     """(P,) by how much further right along a tilted strip slices lie than their columns say.
 
     0 in its middle rows; rows above and below belong to other places of it, in shares of its

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 if TYPE_CHECKING:
-    from labrig.analyse import Choices
+    from labrig.analyse import Overrides
 
 
 def process(
@@ -46,20 +46,20 @@ def process(
 
     An earlier result that differs is kept as result-1, result-2, …
     """
-    from labrig.analyse import Choices
+    from labrig.analyse import Overrides
     from labrig.catalogue import find_run
 
-    choices = Choices.parse(roi or [], exclude or [], states, rate or [], camera, optics or [])
+    overrides = Overrides.parse(roi or [], exclude or [], states, rate or [], camera, optics or [])
     folder = find_run(run, runs)
-    process_and_tell(folder, choices, json=json)
+    process_and_tell(folder, overrides, json=json)
     typer.echo(folder)
 
 
-def process_and_tell(run: Path, choices: "Choices | None" = None, *, json: bool) -> None:
+def process_and_tell(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
     """Process the run in `run` and print what came out."""
     from labrig.process import process_and_report
 
-    done = process_and_report(run, choices)
+    done = process_and_report(run, overrides)
     if json:
         typer.echo(done.result.to_json())
         return

@@ -23,7 +23,7 @@ from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
-from labrig.watch import Glances, Seen
+from labrig.watch import Previews, Seen
 
 #: Of the last frame, in characters.
 THUMBNAIL_WIDTH = 48
@@ -187,7 +187,7 @@ class LiveProgress:
         self._console = console
         self._total = len(state.plan.units)
         self._run: Path | None = None
-        self._glances: Glances | None = None
+        self._glances: Previews | None = None
         live.update(self)
 
     def unit(self, name: str, number: int, total: int) -> None:
@@ -203,7 +203,7 @@ class LiveProgress:
         self._state.frames += 1
         if self._glances is None:
             self._run = record.path.parents[1]
-            self._glances = Glances(self._run, THUMBNAIL_WIDTH)
+            self._glances = Previews(self._run, THUMBNAIL_WIDTH)
         self._glances.ask(record.path.name, record.unit)
 
     def close(self) -> None:

@@ -33,9 +33,9 @@ def list_devices(
     from json import dumps
 
     from labrig import plugins
-    from labrig.setup import Surroundings, discover
+    from labrig.setup import Host, discover
 
-    found = discover(Surroundings.of_this_pc(), plugins.names(plugins.DRIVERS))
+    found = discover(Host.of_this_pc(), plugins.names(plugins.DRIVERS))
     if json:
         typer.echo(dumps(asdict(found), ensure_ascii=False))
     else:

@@ -77,7 +77,7 @@ class Sources:
 
 
 @dataclass(frozen=True, eq=False)
-class Known:
+class Assumptions:
     """The bench with its samples.
 
     Attributes
@@ -96,7 +96,7 @@ class Known:
     notes: tuple[str, ...]
 
 
-def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) -> Known:
+def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) -> Assumptions:
     """Camera, flicker and glows: from earlier runs, else what is typical.
 
     Raises
@@ -133,7 +133,7 @@ def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) 
         notes.append(note)
     else:
         notes.append("brightness: measured in that run")
-    return Known(
+    return Assumptions(
         bench,
         {patch: material.name for patch, material in materials.items()},
         frozenset(measured),

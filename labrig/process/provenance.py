@@ -8,7 +8,7 @@ from typing import Any
 from pydantic import BaseModel, ConfigDict
 
 from labrig.acquire import ProtocolModel, RigFile
-from labrig.analyse import Choices
+from labrig.analyse import Overrides
 from labrig.record import (
     DeviceLine,
     RunDescription,
@@ -56,20 +56,22 @@ class Provenance(BaseModel):
     optics: dict[str, str]
 
 
-def provenance(run: RunRecord, protocol: Any, choices: Choices, camera: str | None) -> Provenance:
+def provenance(
+    run: RunRecord, protocol: Any, overrides: Overrides, camera: str | None
+) -> Provenance:
     """Gather it; `camera` names the curves that coloured the pictures."""
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     patches = hasattr(protocol, "patches")
     return Provenance(
         labrig=version("labrig"),
         libraries=library_versions(),
-        regions=choices.patches(protocol) if patches else dict(choices.regions),
-        states=choices.states or getattr(protocol, "states", "auto"),
-        fixed_rates_per_s=choices.fixed_rates_per_s,
+        regions=overrides.patches(protocol) if patches else dict(overrides.regions),
+        states=overrides.states or getattr(protocol, "states", "auto"),
+        fixed_rates_per_s=overrides.fixed_rates_per_s,
         camera=camera,
-        frames=dict(Counter(frame.purpose for frame in frames if not choices.excludes(frame))),
-        excluded=tuple(frame.path.name for frame in frames if choices.excludes(frame)),
-        optics=dict(choices.optics),
+        frames=dict(Counter(frame.purpose for frame in frames if not overrides.excludes(frame))),
+        excluded=tuple(frame.path.name for frame in frames if overrides.excludes(frame)),
+        optics=dict(overrides.optics),
     )
 
 

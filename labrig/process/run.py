@@ -6,7 +6,7 @@ from pathlib import Path
 
 from labrig import plugins
 from labrig.acquire import RigFile
-from labrig.analyse import Choices, Inputs, Part, read_run_protocol, temperature_warnings
+from labrig.analyse import Inputs, Overrides, Part, read_run_protocol, temperature_warnings
 from labrig.bench_optics import camera_curves
 from labrig.calibration import LvfFile
 from labrig.errors import FitError, UsageError
@@ -90,7 +90,7 @@ class Processed:
     changes: tuple[str, ...]
 
 
-def process_run(folder: Path | str, choices: Choices | None = None) -> RunResult:
+def process_run(folder: Path | str, overrides: Overrides | None = None) -> RunResult:
     """Reduce and fit the run in `folder`, write `result/` and the report in it.
 
     A `result` that comes out any different from the one before takes its place; that one is kept
@@ -117,27 +117,27 @@ def process_run(folder: Path | str, choices: Choices | None = None) -> RunResult
     FitError
         Nothing could be fitted.
     """
-    return process_and_report(folder, choices).result
+    return process_and_report(folder, overrides).result
 
 
-def process_and_report(folder: Path | str, choices: Choices | None = None) -> Processed:
+def process_and_report(folder: Path | str, overrides: Overrides | None = None) -> Processed:
     """As `process_run`; with where the report is, and what a person is told."""
-    folder, choices = Path(folder), choices or Choices()
+    folder, overrides = Path(folder), overrides or Overrides()
     protocol = read_run_protocol(folder)
-    rig, run = choices.bench(folder), read_run(folder)
+    rig, run = overrides.bench(folder), read_run(folder)
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
-    choices.check(frames)
+    overrides.check(frames)
     analyse = plugins.load(plugins.ANALYSES, protocol.protocol, str(folder))
     inputs = Inputs.of(rig)
-    result: RunResult = analyse(Part(run, protocol, rig, choices, inputs))
+    result: RunResult = analyse(Part(run, protocol, rig, overrides, inputs))
     lvf = inputs.with_those_of(result).lvf
-    camera, unknown_camera = _camera_response(rig, choices.camera, lvf)
+    camera, unknown_camera = _camera_response(rig, overrides.camera, lvf)
     warnings = (*result.warnings, *unknown_camera, *temperature_warnings(run, protocol.rate_frames))
     result = replace(result, warnings=warnings)
 
     about = describe_run(run, protocol, rig)
     made = new_result(folder)
-    write_provenance(made, provenance(run, protocol, choices, camera.name if camera else None))
+    write_provenance(made, provenance(run, protocol, overrides, camera.name if camera else None))
     write_result(made, result)
     write_nexus(made / "run.nxs", run, about, result)
     rendered = render(result, Source(run, protocol, rig, about, camera))

@@ -42,7 +42,7 @@ class SeriesFrame:
 
 
 @dataclass(frozen=True, eq=False)
-class View:
+class RegionMeasurement:
     """A region of a frame: what is in it, and how its strips (C, strips) deviate from its mean."""
 
     measured: FrameMeasurement
@@ -56,12 +56,12 @@ class View:
 
 
 @dataclass(frozen=True)
-class Shot:
+class MeasuredFrame:
     """A frame, seen in every patch and in the background, if there is one."""
 
     frame: SeriesFrame
-    patches: Mapping[str, View]
-    background: View | None
+    patches: Mapping[str, RegionMeasurement]
+    background: RegionMeasurement | None
 
     @property
     def iso(self) -> float:
@@ -75,16 +75,16 @@ class Shot:
         return _first(self.frame.f_number, *(view.measured.f_number for view in views))
 
 
-def read_shots(
+def measure_frames(
     frames: Sequence[SeriesFrame],
     patches: Mapping[str, Region],
     background: Region | None,
     hot: PixelMask | None,
     read: Mapping[Path, RawFrame],
-) -> list[Shot]:
+) -> list[MeasuredFrame]:
     """All `frames` in order; one is decoded, unless it is `read`, while another is measured."""
 
-    def shot(frame: SeriesFrame) -> Shot:
+    def shot(frame: SeriesFrame) -> MeasuredFrame:
         raw = read.get(frame.path) or read_raw(frame.path)
         return _shot(frame, raw, patches, background, hot)
 
@@ -98,25 +98,25 @@ def _shot(
     patches: Mapping[str, Region],
     background: Region | None,
     hot: PixelMask | None,
-) -> Shot:
+) -> MeasuredFrame:
     if not frame.exposure_s > 0:
         raise DataError(f"{frame.path}: expected an exposure above 0 s, got {frame.exposure_s}")
     regions = [*patches.values(), *([background] if background else [])]
     try:
         views = [
-            View(measured, strip_deviations(raw, region, hot))
+            RegionMeasurement(measured, strip_deviations(raw, region, hot))
             for measured, region in zip(measure_regions(raw, regions, hot), regions, strict=True)
         ]
     except DataError as error:
         raise type(error)(f"{frame.path}: {error}") from None
-    return Shot(
+    return MeasuredFrame(
         frame,
         dict(zip(patches, views, strict=False)),
         views[-1] if background else None,
     )
 
 
-def levels(views: Sequence[View]) -> tuple[Floats, Floats]:
+def levels(views: Sequence[RegionMeasurement]) -> tuple[Floats, Floats]:
     """Means and what each frame by itself says of their sigma in DN, each of shape (n, C)."""
     kinds = {view.kind for view in views}
     if len(kinds) > 1:
@@ -126,7 +126,7 @@ def levels(views: Sequence[View]) -> tuple[Floats, Floats]:
     return mean, sigma
 
 
-def strips(views: Sequence[View]) -> Floats:
+def strips(views: Sequence[RegionMeasurement]) -> Floats:
     """Their strips' deviations in DN, shape (n, C, strips)."""
     return np.stack([view.strips for view in views])
 

@@ -11,7 +11,14 @@ from labrig.errors import DataError
 from labrig.optics import CameraModel
 from labrig.reduce.channels import PixelMask
 from labrig.reduce.dark import HOT_FRAMES, SAME_EXPOSURE, DarkModel, fit_dark, hot_pixels
-from labrig.reduce.measured_frames import SeriesFrame, Shot, View, levels, read_shots, strips
+from labrig.reduce.measured_frames import (
+    MeasuredFrame,
+    RegionMeasurement,
+    SeriesFrame,
+    levels,
+    measure_frames,
+    strips,
+)
 from labrig.reduce.noise import Floats
 from labrig.reduce.pair_noise import PatchFrames, PatchNoise, paired_dark_sigma, paired_noise
 from labrig.reduce.raw import RawFrame, read_raw
@@ -131,7 +138,7 @@ def reduce_patches(
     hot = hot_pixels(list(longest.values())) if longest else None
     dark = {} if background else _measured_darks(darks, patches, hot, longest)
     longest.clear()  # five frames of 42 MB that nobody needs any more
-    shots = read_shots(frames, patches, background, hot, {})
+    shots = measure_frames(frames, patches, background, hot, {})
     _check_settings(shots)
     series = {name: _patch_series(name, shots, dark) for name in patches}
     if camera is None:
@@ -158,8 +165,8 @@ def _measured_darks(
     read: Mapping[Path, RawFrame],
 ) -> dict[tuple[str, float], _Dark]:
     """The dark by patch and ISO."""
-    by_iso: dict[float, list[Shot]] = defaultdict(list)
-    for shot in read_shots(darks, patches, None, hot, read):
+    by_iso: dict[float, list[MeasuredFrame]] = defaultdict(list)
+    for shot in measure_frames(darks, patches, None, hot, read):
         by_iso[_key(shot.iso)].append(shot)
     return {
         (name, iso): _dark([shot.frame.exposure_s for shot in shots], _views(name, shots))
@@ -168,7 +175,7 @@ def _measured_darks(
     }
 
 
-def _dark(exposures_s: Sequence[float], views: Sequence[View]) -> _Dark:
+def _dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]) -> _Dark:
     exposure_s = np.array(exposures_s)
     level, sigma = levels(views)
     light = level - fit_dark(exposure_s, level, sigma).base
@@ -178,7 +185,7 @@ def _dark(exposures_s: Sequence[float], views: Sequence[View]) -> _Dark:
 
 
 def _patch_series(
-    name: str, shots: Sequence[Shot], darks: Mapping[tuple[str, float], _Dark]
+    name: str, shots: Sequence[MeasuredFrame], darks: Mapping[tuple[str, float], _Dark]
 ) -> Series:
     exposure_s = np.array([shot.frame.exposure_s for shot in shots])
     t_s = np.array([shot.frame.t_s for shot in shots])
@@ -186,7 +193,7 @@ def _patch_series(
     flags = tuple(_flag(shot, name) for shot in shots)
     dark_of_unit: dict[str, PatchFrames] = {}
 
-    def noise(views: Sequence[View], light: Floats, sigma: Floats) -> PatchNoise:
+    def noise(views: Sequence[RegionMeasurement], light: Floats, sigma: Floats) -> PatchNoise:
         frames = PatchFrames(exposure_s, strips(views), light, sigma)
         usable = np.array([is_usable(flag) for flag in flags])
         return paired_noise(frames, t_s, unit, usable, dark_of_unit)
@@ -251,23 +258,23 @@ def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | N
     return np.where(np.eye(len(sigma), dtype=np.bool_), 1.0, MOST_COMMON * correlation)
 
 
-def _size(shot: Shot) -> tuple[int, int]:
+def _size(shot: MeasuredFrame) -> tuple[int, int]:
     """Width and height of a frame in pixels."""
     width, height, _ = next(iter(shot.patches.values())).kind
     return width, height
 
 
-def _views(name: str, shots: Sequence[Shot]) -> list[View]:
+def _views(name: str, shots: Sequence[MeasuredFrame]) -> list[RegionMeasurement]:
     return [shot.patches[name] for shot in shots]
 
 
-def _flag(shot: Shot, name: str) -> str:
+def _flag(shot: MeasuredFrame, name: str) -> str:
     views = [shot.patches[name], *([shot.background] if shot.background else [])]
     clipped = any(view.measured.clipped for view in views)
     return add_flag(shot.frame.flag, "clipped") if clipped else shot.frame.flag
 
 
-def _check_settings(shots: Sequence[Shot]) -> None:
+def _check_settings(shots: Sequence[MeasuredFrame]) -> None:
     """DN/s compare only at one gain and one aperture."""
     for unit in {shot.frame.unit for shot in shots}:
         for what, found in (

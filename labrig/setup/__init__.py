@@ -2,16 +2,16 @@
 
 from labrig.setup.check import DeviceReport, RigReport, check_rig
 from labrig.setup.discover import Discovery, Found, discover
-from labrig.setup.host import Process, Surroundings
+from labrig.setup.host import Host, Process
 from labrig.setup.view import view_rig
 
 __all__ = [
     "DeviceReport",
     "Discovery",
     "Found",
+    "Host",
     "Process",
     "RigReport",
-    "Surroundings",
     "check_rig",
     "discover",
     "view_rig",

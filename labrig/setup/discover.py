@@ -8,7 +8,7 @@ from typing import Any
 import usb.core
 import usb.util
 
-from labrig.setup.host import Port, Surroundings
+from labrig.setup.host import Host, Port
 from labrig.setup.port_users import holders, unreachable
 
 NO_LIBUSB = (
@@ -102,7 +102,7 @@ class Discovery:
     notes: tuple[str, ...] = ()
 
 
-def discover(around: Surroundings, drivers: Collection[str]) -> Discovery:
+def discover(around: Host, drivers: Collection[str]) -> Discovery:
     """Look at every serial port and every USB camera; nothing is sent to any of them.
 
     Parameters
@@ -157,7 +157,7 @@ def _is_camera(device: Any) -> bool:
         return False  # a device that does not even show its descriptors is none of ours
 
 
-def _camera(device: Any, around: Surroundings, drivers: Collection[str], has_twin: bool) -> Found:
+def _camera(device: Any, around: Host, drivers: Collection[str], has_twin: bool) -> Found:
     address = f"usb://{device.idVendor:04x}:{device.idProduct:04x}"
     refused = unreachable(device, around.platform)
     hints = [refused] if refused else []

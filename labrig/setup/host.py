@@ -39,7 +39,7 @@ class Process:
 
 
 @dataclass(frozen=True)
-class Surroundings:
+class Host:
     """A PC.
 
     Attributes
@@ -60,7 +60,7 @@ class Surroundings:
     processes: Callable[[], Iterable[Process]]
 
     @classmethod
-    def of_this_pc(cls) -> "Surroundings":
+    def of_this_pc(cls) -> "Host":
         """The PC that this runs on."""
         listings: dict[str, Callable[[], Iterable[Process]]] = {
             "linux": _linux_processes,

@@ -9,7 +9,7 @@ from typing import Any
 import usb.core
 import usb.util
 
-from labrig.setup.host import Process, Surroundings
+from labrig.setup.host import Host, Process
 
 #: Programs that take every camera they see, and what to do about each.
 _KNOWN = {
@@ -34,7 +34,7 @@ _KNOWN = {
 _ZADIG = "give this camera the WinUSB driver with Zadig (https://zadig.akeo.ie)"
 
 
-def holders(device: Any, around: Surroundings) -> list[str]:
+def holders(device: Any, around: Host) -> list[str]:
     """Who may hold a `usb.core.Device`, each with what to do."""
     return [
         f"{process.name} (process {process.pid}): {remedy}"

@@ -18,7 +18,7 @@ GAMMA = 2.2
 
 
 @dataclass(frozen=True)
-class Glance:
+class Preview:
     """What a frame shows.
 
     Attributes
@@ -37,7 +37,7 @@ class Glance:
     brightened: float
 
 
-def glance(path: Path, patches: Mapping[str, Region], width: int) -> Glance:
+def glance(path: Path, patches: Mapping[str, Region], width: int) -> Preview:
     """Look at the frame at `path`; the picture is `width` pixels wide at most.
 
     Raises
@@ -53,7 +53,7 @@ def glance(path: Path, patches: Mapping[str, Region], width: int) -> Glance:
     level = float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE))
     brightened = min(1 / max(level, 1e-9), MOST_BRIGHTENED)
     shown = 255 * np.clip(linear * brightened, 0.0, 1.0) ** (1 / GAMMA)
-    return Glance(
+    return Preview(
         values={
             name: {channel: stats.mean for channel, stats in one.channels.items()}
             for name, one in measured.items()

@@ -18,7 +18,7 @@ from labrig.errors import LabrigError
 
 @dataclass(frozen=True)
 class Seen:
-    """A frame that was looked at: its values as in `Glance`, its picture (height, width, 3)."""
+    """A frame that was looked at: its values as in `Preview`, its picture (height, width, 3)."""
 
     name: str
     values: dict[str, dict[str, float]]
@@ -26,7 +26,7 @@ class Seen:
     picture: NDArray[np.uint8]
 
 
-class Glances:
+class Previews:
     """Asks for frames of one run to be looked at; the answer comes when it comes.
 
     Parameters

@@ -14,7 +14,7 @@ from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
 from labrig.region import Region
 from labrig.results import read_fitted_decays
-from labrig.watch.preview import Glance, glance
+from labrig.watch.preview import Preview, glance
 from labrig.watch.standing import PlannedUnit, planned_units
 from labrig.written_numbers import plus_minus
 
@@ -29,7 +29,7 @@ MOST_EARLIER = 4
 State = dict[str, dict[str, Any]]
 
 
-class Following:
+class RunFollower:
     """One run, seen from its folder alone; looking twice costs little if nothing has changed.
 
     Parameters
@@ -195,7 +195,7 @@ class Following:
             self._look_at(attempt, frame)
         return is_new or bool(earlier)
 
-    def _look_at(self, attempt: Attempt, frame: FrameRecord) -> Glance | None:
+    def _look_at(self, attempt: Attempt, frame: FrameRecord) -> Preview | None:
         """Look at a frame and keep its points; None if it cannot be read, which processing says."""
         name = frame.path.name
         self._points[name] = []
@@ -227,7 +227,7 @@ class Following:
         }
 
 
-def _points(frame: FrameRecord, seen: Glance, lamp_off_time: float) -> list[dict[str, Any]]:
+def _points(frame: FrameRecord, seen: Preview, lamp_off_time: float) -> list[dict[str, Any]]:
     """A frame of a decay in every patch: means above black per second; not the result."""
     return [
         {
@@ -244,7 +244,7 @@ def _points(frame: FrameRecord, seen: Glance, lamp_off_time: float) -> list[dict
     ]
 
 
-def _shown(frame: FrameRecord, seen: Glance) -> dict[str, Any]:
+def _shown(frame: FrameRecord, seen: Preview) -> dict[str, Any]:
     return {
         "name": frame.path.name,
         "unit": frame.unit,

@@ -9,7 +9,7 @@ from typing import Any, ClassVar, Never
 
 from labrig.clock import Clock
 from labrig.local_server import KINDS, LocalConversation, LocalServer
-from labrig.watch.run_follower import Following
+from labrig.watch.run_follower import RunFollower
 
 #: A browser that hears nothing for longer takes the connection for dead.
 HEARTBEAT_S = 5.0
@@ -207,7 +207,7 @@ def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -
     DataError
         The run's journal is damaged.
     """
-    following = Following(run)
+    following = RunFollower(run)
     following.look()
     news = News(following.state(), following.picture)
     with WatchServer(news, port) as server, server.running():

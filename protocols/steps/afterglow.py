@@ -54,7 +54,7 @@ class Afterglow(Enum):
     def __str__(self) -> str:
         return self.value
 
-    def insist(self, warn: Callable[[str], None]) -> None:
+    def require(self, warn: Callable[[str], None]) -> None:
         """Refuse what is no decay of a charged sample, and tell of what looks wrong.
 
         Raises

@@ -60,7 +60,7 @@ class Darkness:
         """Whether it may be a lamp, or a glow that fades too slowly for these frames."""
         return self.is_bright and not self.fades
 
-    def insist(self, warn: Callable[[str], None]) -> None:
+    def require(self, warn: Callable[[str], None]) -> None:
         """Refuse to go on where nothing could be measured, and tell of what is merely untidy.
 
         Raises

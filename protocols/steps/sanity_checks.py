@@ -81,7 +81,7 @@ class Watcher:
         found = self.session.choose("light before charging", decide, worst=DARK)
         if found.is_doubtful:
             found = replace(found, fades=self._closer_look(shorter) is Afterglow.FADING)
-        found.insist(self.session.warn)
+        found.require(self.session.warn)
 
     def insist_on_glow(self, shorter: Sequence[ExposureSettings]) -> None:
         """Refuse a metering after which nothing glows, or something does not fade.
@@ -91,9 +91,9 @@ class Watcher:
         DeviceError
             As `Afterglow.insist`.
         """
-        self._insist(lambda: metered(self._glows(self._own(FrameRole.METER))), shorter)
+        self._require(lambda: metered(self._glows(self._own(FrameRole.METER))), shorter)
 
-    def insist_on_decay(self, shorter: Sequence[ExposureSettings]) -> None:
+    def require_decay(self, shorter: Sequence[ExposureSettings]) -> None:
         """Refuse a decay that is none; as `insist_on_glow`."""
 
         def decide() -> Afterglow:
@@ -104,7 +104,7 @@ class Watcher:
             glows = self._glows(chosen)
             return decayed(glows[:some], glows[some], glows[some + 1 :], self._before())
 
-        self._insist(decide, shorter)
+        self._require(decide, shorter)
 
     def switch_off(self, under_lamp: Sequence[ExposureSettings]) -> None:
         """Switch the lamp off after photographs under it, and see that it has gone out.
@@ -167,11 +167,13 @@ class Watcher:
             )
         self.session.warn(f"{said}; all are kept, with the times at which they were taken")
 
-    def _insist(self, decide: Callable[[], Afterglow], shorter: Sequence[ExposureSettings]) -> None:
+    def _require(
+        self, decide: Callable[[], Afterglow], shorter: Sequence[ExposureSettings]
+    ) -> None:
         found = self.session.choose("after lamp off", decide, worst=Afterglow.FADING)
         if found is Afterglow.CLIPPED:
             found = self._closer_look(shorter)
-        found.insist(self.session.warn)
+        found.require(self.session.warn)
 
     def _closer_look(self, shorter: Sequence[ExposureSettings]) -> Afterglow:
         """Whether it fades: the same frames, and again after a while."""

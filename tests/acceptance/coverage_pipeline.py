@@ -28,7 +28,7 @@ import numpy as np
 import yaml
 from numpy.typing import NDArray
 
-from labrig.analyse import Choices, fit_series
+from labrig.analyse import Overrides, fit_series
 from labrig.analyse.frames import intact_frames
 from labrig.cli.exit_codes import guarded
 from labrig.errors import FitError
@@ -163,7 +163,7 @@ def _run(scenario: Scenario, seed: int, folder: Path) -> None:
 
 def fitted(scenario: Scenario, run: RunRecord) -> dict[str, Outcome]:
     """The run's fits, by sample."""
-    frames = intact_frames(run, Choices())
+    frames = intact_frames(run, Overrides())
     darks_s = [dark.exposure_s for dark in frames.dark]
     series = reduce_patches(frames.decay, scenario.patches, frames.dark)
     return {

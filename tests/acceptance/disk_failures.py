@@ -118,7 +118,7 @@ def record(bench: Bench, place: Path, kind: str, at: int, tally: Tally) -> None:
     """One run whose disk fails at one call, resumed on a sound one."""
     place.mkdir()
 
-    def insist(right: bool, what: str) -> None:
+    def require(right: bool, what: str) -> None:
         if not right:
             tally.wrong.append(f"{kind} at call {at} of a run: {what}")
 
@@ -128,25 +128,25 @@ def record(bench: Bench, place: Path, kind: str, at: int, tally: Tally) -> None:
     tally.trials += 1
     tally.codes[ended.code] += 1
     tally.acknowledged += ended.acknowledged
-    _judge(ended, insist)
+    _judge(ended, require)
     found = [path.parent for path in runs.glob("*/protocol.yaml")]
     kept = {}
     if found and (found[0] / "journal.jsonl").is_file():
         before = read_run(found[0])
         kept = {unit: attempt.uid for unit, attempt in before.completed().items()}
-        insist(_intact(found[0]) >= ended.acknowledged, "an acknowledged frame is lost")
+        require(_intact(found[0]) >= ended.acknowledged, "an acknowledged frame is lost")
     else:
-        insist(ended.acknowledged == 0, "acknowledged frames are lost with their run")
+        require(ended.acknowledged == 0, "acknowledged frames are lost with their run")
     again = labrig(["resume", found[0], "--no-process"] if found else command, place)
-    insist(again.code == 0, f"resume: exit code {again.code}, {again.complaints}")
+    require(again.code == 0, f"resume: exit code {again.code}, {again.complaints}")
     found = found or [path.parent for path in runs.glob("*/protocol.yaml")]
     record = read_run(found[0])
     now = {unit: attempt.uid for unit, attempt in record.completed().items()}
-    insist(list(now) == bench.units, f"completed {list(now)}")
-    insist(kept.items() <= now.items(), "a complete unit was not kept")
-    insist(_intact(found[0]) >= ended.acknowledged, "an acknowledged frame is lost at resume")
+    require(list(now) == bench.units, f"completed {list(now)}")
+    require(kept.items() <= now.items(), "a complete unit was not kept")
+    require(_intact(found[0]) >= ended.acknowledged, "an acknowledged frame is lost at resume")
     redone = len(record.attempts) - len(now)
-    insist(redone <= 1, f"{redone} units were done twice")
+    require(redone <= 1, f"{redone} units were done twice")
     tally.redone += redone
 
 
@@ -154,7 +154,7 @@ def process(bench: Bench, place: Path, kind: str, at: int, tally: Tally) -> None
     """A result worked out while the disk fails at one call, and again on a sound one."""
     place.mkdir()
 
-    def insist(right: bool, what: str) -> None:
+    def require(right: bool, what: str) -> None:
         if not right:
             tally.wrong.append(f"{kind} at call {at} of a result: {what}")
 
@@ -163,19 +163,19 @@ def process(bench: Bench, place: Path, kind: str, at: int, tally: Tally) -> None
     ended = labrig(["process", run], place, kind, at)
     tally.trials += 1
     tally.codes[ended.code] += 1
-    _judge(ended, insist)
+    _judge(ended, require)
     again = labrig(["process", run], place)
-    insist(again.code == 0, f"again: exit code {again.code}, {again.complaints}")
+    require(again.code == 0, f"again: exit code {again.code}, {again.complaints}")
     wanted = (bench.run / "result" / "fit.json").read_bytes()
-    insist((run / "result" / "fit.json").read_bytes() == wanted, "another result")
-    insist(_intact(run) == _intact(bench.run), "a frame is lost")
+    require((run / "result" / "fit.json").read_bytes() == wanted, "another result")
+    require(_intact(run) == _intact(bench.run), "a frame is lost")
 
 
-def _judge(ended: Ended, insist: Callable[[bool, str], None]) -> None:
+def _judge(ended: Ended, require: Callable[[bool, str], None]) -> None:
     said = ended.complaints
-    insist(ended.code in (0, 5), f"exit code {ended.code}, {said}")
+    require(ended.code in (0, 5), f"exit code {ended.code}, {said}")
     warnings = [line for line in said if line.startswith("warning:")]
-    insist(len(said) - len(warnings) == (ended.code != 0), f"exit code {ended.code}, {said}")
+    require(len(said) - len(warnings) == (ended.code != 0), f"exit code {ended.code}, {said}")
 
 
 def _intact(run: Path) -> int:

@@ -15,7 +15,7 @@ from pathlib import Path
 
 import numpy as np
 
-from labrig.analyse import Choices
+from labrig.analyse import Overrides
 from labrig.analyse.emission_spectrum import analyse
 from labrig.record import read_run
 from labrig.results.emission_spectrum import EmissionSpectrum
@@ -38,7 +38,7 @@ def measured(material: str, seed: int) -> list[tuple[EmissionSpectrum, bool]]:
         white = frozenset(frame.path.name for frame in read_run(run).frames("white"))
         found = []
         for excluded in (frozenset[str](), white):
-            result = analyse(replace(part, choices=Choices(excluded=excluded)))
+            result = analyse(replace(part, overrides=Overrides(excluded=excluded)))
             patch = result.patches[""]
             found.append((patch.spectrum, patch.changes_with_time))
         return found

@@ -149,7 +149,7 @@ def _try(rng: random.Random, fault: str, scene: Scene, folder: Path, tally: Tall
     tally.trials += 1
     told = f"{folder.name} {scene.protocol.parent.name} {items} {stop}"
 
-    def insist(right: bool, what: str) -> None:
+    def require(right: bool, what: str) -> None:
         if not right:
             tally.wrong.append(f"{told}: {what}")
 
@@ -159,7 +159,7 @@ def _try(rng: random.Random, fault: str, scene: Scene, folder: Path, tally: Tall
         stop,
     )
     tally.codes[ending.code] += 1
-    _judge(ending, faults, stop, insist)
+    _judge(ending, faults, stop, require)
     runs = list((folder / "runs").glob("*")) if (folder / "runs").exists() else []
     if not runs:
         return  # nothing was recorded, nothing is to be resumed
@@ -175,25 +175,25 @@ def _try(rng: random.Random, fault: str, scene: Scene, folder: Path, tally: Tall
         (run / "rig.yaml").write_text(yaml.safe_dump(rig | {"simulation": simulation}))
         ending = _child(["resume", run], folder)
         tally.resumes += 1
-        _judge(ending, faults if left else [], None, insist)
-        insist(kept.items() <= _completed(run).items(), "a complete unit was not kept")
-    insist(list(_completed(run)) == list(scene.units), f"not complete: {ending.complaints}")
+        _judge(ending, faults if left else [], None, require)
+        require(kept.items() <= _completed(run).items(), "a complete unit was not kept")
+    require(list(_completed(run)) == list(scene.units), f"not complete: {ending.complaints}")
     tally.redone += len(read_run(run).attempts) - len(_completed(run))
     for complaint in _damage(run):
-        insist(False, complaint)
+        require(False, complaint)
 
 
-def _judge(ending: Ending, faults: list[str], stop: Stop | None, insist: Any) -> None:
+def _judge(ending: Ending, faults: list[str], stop: Stop | None, require: Any) -> None:
     """Exit code, one line, lamp off."""
     allowed = {0}.union(*(CODES[fault] for fault in faults))
     if stop is not None:
         allowed.add(STOPS[stop.signum])
-    insist(ending.code in allowed, f"exit code {ending.code}: {ending.complaints}")
+    require(ending.code in allowed, f"exit code {ending.code}: {ending.complaints}")
     if ending.code < 0:
         return
-    insist(len(ending.complaints) == (ending.code != 0), f"said {ending.complaints}")
+    require(len(ending.complaints) == (ending.code != 0), f"said {ending.complaints}")
     said = " ".join(ending.complaints)
-    insist("Traceback" not in said and "fault in labrig" not in said, said)
+    require("Traceback" not in said and "fault in labrig" not in said, said)
     if not ending.lamp_on:
         return
     told = ("switch off by hand", "pull its plug", "cannot open the serial port")
@@ -204,7 +204,7 @@ def _judge(ending: Ending, faults: list[str], stop: Stop | None, insist: Any) ->
     out_of_reach = (
         not {*OUT_OF_REACH, "relay_welded"}.isdisjoint(faults) and ending.code == 3 and by_hand
     )
-    insist(unseen or out_of_reach, f"the lamp is on; code {ending.code}, {said}")
+    require(unseen or out_of_reach, f"the lamp is on; code {ending.code}, {said}")
 
 
 def _completed(run: Path) -> dict[str, str]:

@@ -125,13 +125,13 @@ class Trial:
         was_complete = self._complete
         labrig = Labrig(self.folder, self._arguments())
         code = labrig.code()
-        self._insist(code == 0, f"exit code {code}")
-        self._insist(not labrig.complaints, f"{labrig.complaints}")
+        self._require(code == 0, f"exit code {code}")
+        self._require(not labrig.complaints, f"{labrig.complaints}")
         self._look_at_what_is_kept()
         if code == 0:
             # A run that was complete had nothing to connect for.
             as_usual = was_complete or labrig.bench == self.peace.bench
-            self._insist(as_usual, f"the bench was left as {labrig.bench}")
+            self._require(as_usual, f"the bench was left as {labrig.bench}")
             self._compare()
 
     def _kill(self, kind: str, share: float) -> None:
@@ -153,12 +153,12 @@ class Trial:
             labrig.kill()
         code = labrig.code()
         self.tally.kills[kind] += code == -signal.SIGKILL
-        self._insist(code in (0, -signal.SIGKILL), f"exit code {code} before it was killed")
-        self._insist(not labrig.complaints, f"{labrig.complaints}")
+        self._require(code in (0, -signal.SIGKILL), f"exit code {code} before it was killed")
+        self._require(not labrig.complaints, f"{labrig.complaints}")
 
     def _look_at_what_is_kept(self) -> None:
         now = self._completed
-        self._insist(self.kept.items() <= now.items(), "a complete unit was not kept")
+        self._require(self.kept.items() <= now.items(), "a complete unit was not kept")
         self.kept = now
 
     def _compare(self) -> None:
@@ -166,11 +166,11 @@ class Trial:
         run, tally = self._recorded, self.tally
         assert run is not None
         for complaint in damage(run, self.peace):
-            self._insist(False, complaint)
+            self._require(False, complaint)
         tally.redone += sum(not attempt.completed for attempt in read_run(run).attempts)
         tally.compared, furthest, which = self.peace.furthest(run / "result")
         tally.furthest = max(tally.furthest, furthest)
-        self._insist(furthest < self.far, f"{which} is {furthest:.1f} σ off")
+        self._require(furthest < self.far, f"{which} is {furthest:.1f} σ off")
 
     def _arguments(self) -> list[object]:
         run = self._recorded
@@ -196,7 +196,7 @@ class Trial:
         journal = b"" if run is None else (run / "journal.jsonl").read_bytes()
         return journal.count(b'"exit_status": "success"') == len(self.peace.units)
 
-    def _insist(self, right: bool, what: str) -> None:
+    def _require(self, right: bool, what: str) -> None:
         if not right:
             self.tally.wrong.append(f"{self.folder}: {what}")
 

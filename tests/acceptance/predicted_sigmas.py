@@ -24,7 +24,7 @@ import numpy as np
 import yaml
 
 from labrig.analyse.frames import intact_frames
-from labrig.analyse.overrides import Choices, read_run_protocol
+from labrig.analyse.overrides import Overrides, read_run_protocol
 from labrig.analyse.series_fit import fit_series
 from labrig.cli.exit_codes import guarded
 from labrig.errors import FitError
@@ -109,8 +109,8 @@ def fitted(case: Case, day: int) -> Fitted:
     """What one day finds, with the true number of states; without the report's pictures."""
     with tempfile.TemporaryDirectory() as folder:
         made = run(Path(folder), case, day, "--no-process")
-        patches = Choices().patches(read_run_protocol(made))
-        frames = intact_frames(read_run(made), Choices())
+        patches = Overrides().patches(read_run_protocol(made))
+        frames = intact_frames(read_run(made), Overrides())
         (series,) = reduce_patches(frames.decay, patches, frames.dark).values()
     try:
         fit = fit_series(series, case.states)

@@ -32,7 +32,7 @@ from labrig.acquire import (
 )
 from labrig.bench import open_bench
 from labrig.cli.progress import progress
-from labrig.execution import fill
+from labrig.execution import execute
 from labrig.record import RunFolder, read_run
 from tests.acceptance.board_on_a_terminal import RIG, WatchedBoard
 from tests.terminal import on_a_terminal
@@ -144,7 +144,7 @@ def _child(folder: Path) -> None:
         open_bench(rig, str(path)) as bench,
         RunFolder.create(folder / "runs", "charges", bench.clock.wall(), {}, 1) as run,
     ):
-        fill(run, protocol, bench, plan(protocol, rig, str(path)), partial(progress))
+        execute(run, protocol, bench, plan(protocol, rig, str(path)), partial(progress))
 
 
 def main() -> None:

@@ -11,7 +11,7 @@ from filelock import FileLock
 
 from labrig import resources
 from labrig.acquire import Plan, RunObserver
-from labrig.analyse import Choices, Inputs, Part
+from labrig.analyse import Inputs, Overrides, Part
 from labrig.analyse.overrides import read_run_protocol
 from labrig.clock import Clock
 from labrig.execution import Watch
@@ -82,10 +82,10 @@ def cut_off_and_resumed(run: Path, unit: str) -> tuple[RunRecord, RunRecord]:
 
 def part_of(run: Path, inputs: Inputs | None = None) -> Part:
     """A whole run as what an analysis is given; with the calibrations of its rig unless told."""
-    choices = Choices()
-    rig = choices.bench(run)
+    overrides = Overrides()
+    rig = overrides.bench(run)
     inputs = Inputs.of(rig) if inputs is None else inputs
-    return Part(read_run(run), read_run_protocol(run), rig, choices, inputs)
+    return Part(read_run(run), read_run_protocol(run), rig, overrides, inputs)
 
 
 def source_of(part: Part) -> Source:

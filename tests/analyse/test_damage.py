@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings, strategies as st
 
 from labrig.analyse.frames import IntactFrames, intact_frames, timing_warnings
-from labrig.analyse.overrides import Choices
+from labrig.analyse.overrides import Overrides
 from labrig.errors import DataError, LabrigError
 from labrig.record import read_run
 from tests.conftest import Ended
@@ -64,7 +64,7 @@ def test_of_many_damaged_frames_some_are_named(labrig: Labrig, run: Path) -> Non
 def test_a_report_does_without_a_damaged_photograph(run: Path) -> None:
     photograph = read_run(run).frames("daylight")[1].path
     change(photograph)
-    frames = intact_frames(read_run(run), Choices())
+    frames = intact_frames(read_run(run), Overrides())
     assert photograph.name not in [frame.path.name for frame in frames.daylight]
     assert len(frames.daylight) >= 3
     assert frames.warnings[0].startswith(f"{photograph.name} was changed")
@@ -72,7 +72,7 @@ def test_a_report_does_without_a_damaged_photograph(run: Path) -> None:
 
 def frames_of(run: Path, lines: list[str], end: str = "\n") -> IntactFrames:
     (run / "journal.jsonl").write_text("\n".join(lines) + end, encoding="utf-8")
-    return intact_frames(read_run(run), Choices())
+    return intact_frames(read_run(run), Overrides())
 
 
 def test_a_torn_last_line_does_not_count_and_is_said(run: Path) -> None:

@@ -13,7 +13,7 @@ import pytest
 import tifffile
 import yaml
 
-from labrig.analyse import Choices
+from labrig.analyse import Overrides
 from labrig.analyse.emission_spectrum import analyse
 from labrig.analyse.emission_spectrum.comparison import (
     combined,
@@ -57,7 +57,7 @@ ANOTHER_LABORATORY = made.CAMERAS / "ampas_rawtoaces_2017" / "canon_eos_5d_mark_
 
 
 def analysed(run: Path, excluded: frozenset[str] = frozenset()) -> EmissionSpectrumResult:
-    return analyse(replace(part_of(run), choices=Choices(excluded=excluded)))
+    return analyse(replace(part_of(run), overrides=Overrides(excluded=excluded)))
 
 
 def on_the_grid(fit: SpectrumFit) -> EmissionSpectrum:
@@ -235,7 +235,7 @@ def test_a_monochrome_camera_will_do(blue: Path, tmp_path: Path) -> None:
     curve = tmp_path / "mono.csv"
     sensitivity = np.column_stack([[350, 400, 500, 600, 700, 800], [0.2, 0.5, 1, 0.9, 0.6, 0.3]])
     np.savetxt(curve, sensitivity, delimiter=",", header="wavelength_nm,L", comments="")
-    part = replace(part_of(blue), choices=Choices(camera=str(curve)))
+    part = replace(part_of(blue), overrides=Overrides(camera=str(curve)))
     light = Spectrum("green", np.arange(380.0, 721.0, 5.0),
                      np.exp(-(((np.arange(380.0, 721.0, 5.0) - 530) / 35) ** 2)))  # fmt: skip
     dark = np.full((HEIGHT, 10 * WIDTH), 4.0)

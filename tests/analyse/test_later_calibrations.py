@@ -6,7 +6,7 @@ from pathlib import Path
 import pytest
 import yaml
 
-from labrig.analyse.overrides import Choices
+from labrig.analyse.overrides import Overrides
 from labrig.calibration import write_blank_file
 from labrig.errors import UsageError
 from labrig.process import process_run
@@ -30,7 +30,7 @@ def test_one_that_came_later_is_used_and_recorded(tmp_path: Path) -> None:
     }
     write_blank_file(file, BLANK.model_copy(update=three | leaking))
     assert not any("falls on the blank" in said for said in process_run(run).warnings)
-    result = process_run(run, Choices.parse([], [], optics=[f"blank={file}"]))
+    result = process_run(run, Overrides.parse([], [], optics=[f"blank={file}"]))
     assert any("DN/s in G falls on the blank" in said for said in result.warnings)
     made_with = yaml.safe_load((run / "result" / "provenance.yaml").read_text())
     assert made_with["optics"] == {"blank": str(file)}
@@ -46,7 +46,7 @@ def test_one_that_came_later_is_used_and_recorded(tmp_path: Path) -> None:
 )
 def test_what_is_no_calibration_is_one_clear_line(text: str, said: str) -> None:
     with pytest.raises(UsageError, match=said):
-        Choices.parse([], [], optics=[text])
+        Overrides.parse([], [], optics=[text])
 
 
 @pytest.mark.parametrize(

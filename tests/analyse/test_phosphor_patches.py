@@ -10,10 +10,10 @@ import yaml
 from hypothesis import given, strategies as st
 
 from labrig.acquire import read_protocol, read_rig_file
-from labrig.analyse import Choices
+from labrig.analyse import Overrides
 from labrig.analyse.emission_spectrum import analyse as analyse_spectra
 from labrig.analyse.part import Inputs, Part
-from labrig.analyse.strip import StripPatch, cut, for_each_patch, lean
+from labrig.analyse.strip import StripPatch, for_each_patch, slice_strip, tilt_offset
 from labrig.calibration import write_irradiance_file, write_lvf_file
 from labrig.compare.run import read_patches
 from labrig.errors import DataError, FitError, UsageError
@@ -150,7 +150,7 @@ def test_a_patch_that_does_not_reach_along_the_filter_is_left_out(
     run: Path, tmp_path: Path
 ) -> None:
     part, rig = parts_of(run / "protocol.yaml")[0], read_rig_file(run / "rig.yaml")
-    short = Choices.parse(["orange-paint=0.03,0.5,0.5,0.4"], [])
+    short = Overrides.parse(["orange-paint=0.03,0.5,0.5,0.4"], [])
     own = read_run(run).part(part.name)
     found = analyse_spectra(Part(own, part.protocol, rig, short, Inputs.of(rig)))
     (said,) = (line for line in found.warnings if "expected patch orange-paint below" in line)
@@ -164,7 +164,7 @@ RAW = RawFrame(np.zeros((HEIGHT, WIDTH), np.uint16), "RGGB", (0.0,) * 4, 1000.0)
 
 
 def cut_of(region: Region) -> dict[str, Region]:
-    (slices,) = cut([StripPatch("a", "a", region, alone=False)], STRIP, RAW)[0].values()
+    (slices,) = slice_strip([StripPatch("a", "a", region, alone=False)], STRIP, RAW)[0].values()
     return slices
 
 
@@ -199,7 +199,7 @@ def test_rows_of_a_tilted_strip_lie_further_along(down: float, below: float) -> 
     }
     left, right = (np.array(end) * [WIDTH, HEIGHT] for end in (strip.left, strip.right))
     for (x, y, width, height), further in zip(
-        slices.values(), lean(strip, slices, RAW), strict=True
+        slices.values(), tilt_offset(strip, slices, RAW), strict=True
     ):
         middle = np.array([(x + width / 2) * WIDTH, (y + height / 2) * HEIGHT])
         along = (middle - left) @ (right - left) / np.sum((right - left) ** 2)

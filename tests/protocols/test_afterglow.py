@@ -53,7 +53,7 @@ def test_a_decay_is_accepted_however_dim_or_slow(rate: float, k_per_s: float, fo
         return
     found = decay(exponential(rate, k_per_s), exposure_s=0.5, for_s=for_s)
     assert found in (Afterglow.FADING, Afterglow.LINGERING)
-    found.insist(lambda _: None)
+    found.require(lambda _: None)
 
 
 @pytest.mark.parametrize("rate", [3000.0, 900.0, 50.0])
@@ -61,7 +61,7 @@ def test_what_does_not_fade_is_refused(rate: float) -> None:
     found = decay(lambda _: rate)
     assert found is Afterglow.STEADY
     with pytest.raises(DeviceError, match="pull its plug"):
-        found.insist(pytest.fail)
+        found.require(pytest.fail)
 
 
 def test_nothing_is_said_of_a_short_decay_or_of_noise() -> None:
@@ -74,14 +74,14 @@ def test_no_glow_is_refused(rate: float) -> None:
     found = decay(lambda _: rate)
     assert found is Afterglow.ABSENT
     with pytest.raises(DeviceError, match="the lamp did not light"):
-        found.insist(pytest.fail)
+        found.require(pytest.fail)
 
 
 def test_a_light_that_came_on_during_the_decay_is_told() -> None:
     said: list[str] = []
     found = decay(lambda t: 1000 * math.exp(-0.2 * t) + 500, for_s=180.0)
     assert found is Afterglow.LINGERING
-    found.insist(said.append)
+    found.require(said.append)
     assert "a light may have come on" in said[0]
     assert decay(lambda t: 1000.0 if t < 10 else 20_000.0) is Afterglow.CLIPPED
 

@@ -36,7 +36,7 @@ def taken(
 
 def told(found: Darkness) -> list[str]:
     said: list[str] = []
-    found.insist(said.append)
+    found.require(said.append)
     return said
 
 
@@ -71,7 +71,7 @@ def test_a_lamp_is_refused_whatever_its_flicker(seed: int, rate: float) -> None:
     found = taken(lambda _: rate, flicker=lambda: rng.gauss(1.0, 0.007))
     assert found.is_bright
     with pytest.raises((DeviceError, DataError)) as refusal:
-        found.insist(pytest.fail)
+        found.require(pytest.fail)
     assert found.fades or "the lamp burns although its relay reads off" in str(refusal.value)
 
 

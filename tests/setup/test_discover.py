@@ -12,7 +12,7 @@ import yaml
 from labrig import plugins
 from labrig.acquire.rig_file import DeviceEntry
 from labrig.clock import VirtualClock
-from labrig.setup import Process, Surroundings, discover, host as host_module
+from labrig.setup import Host, Process, discover, host as host_module
 from labrig.sim.camera import SimulatedCamera
 
 DRIVERS = ("numato_relay", "ptp_camera")
@@ -49,8 +49,8 @@ def pc(
     usb_devices: Iterable[Any] = (),
     processes: Iterable[Process] = (),
     platform: str = "linux",
-) -> Surroundings:
-    return Surroundings(platform, lambda: ports, lambda: usb_devices, lambda: processes)
+) -> Host:
+    return Host(platform, lambda: ports, lambda: usb_devices, lambda: processes)
 
 
 def no_libusb() -> Iterable[Any]:
@@ -63,7 +63,7 @@ def test_nothing_is_plugged_in() -> None:
 
 
 def test_without_libusb_serial_ports_are_still_listed() -> None:
-    found = discover(Surroundings("win32", lambda: [Plugged("COM3")], no_libusb, tuple), DRIVERS)
+    found = discover(Host("win32", lambda: [Plugged("COM3")], no_libusb, tuple), DRIVERS)
     assert [port.address for port in found.ports] == ["COM3"]
     assert "libusb is not installed" in found.notes[0]
 
@@ -228,5 +228,5 @@ def test_programs_are_read_from_proc(tmp_path: Path, monkeypatch: pytest.MonkeyP
 
 
 def test_this_pc_can_be_looked_at() -> None:
-    found = discover(Surroundings.of_this_pc(), DRIVERS)
+    found = discover(Host.of_this_pc(), DRIVERS)
     assert all(device.address for device in (*found.ports, *found.cameras))

@@ -21,11 +21,11 @@ from labrig.analyse.emission_spectrum.forward_model import (
 )
 from labrig.analyse.emission_spectrum.reduction import PatchReduction, reduce_places
 from labrig.analyse.frames import (
-    cleaned,
-    insist_on_this_camera,
     intact_frames,
+    require_calibrated_camera,
     steady_frames,
     timing_warnings,
+    without_stray_light,
 )
 from labrig.analyse.part import Part
 from labrig.analyse.strip import StripPatch, for_each_patch
@@ -70,11 +70,11 @@ def analyse(part: Part) -> EmissionSpectrumResult:
     FitError
         Too much clips.
     """
-    intact = intact_frames(part.run, part.choices, SpectrumFrames.GLOW)
-    frames, stray = cleaned(intact, part.inputs.blank)
-    insist_on_this_camera(part.inputs.camera, part.run, part.run.frames(SpectrumFrames.GLOW))
+    intact = intact_frames(part.run, part.overrides, SpectrumFrames.GLOW)
+    frames, stray = without_stray_light(intact, part.inputs.blank)
+    require_calibrated_camera(part.inputs.camera, part.run, part.run.frames(SpectrumFrames.GLOW))
     models, refused = forward_models(part, frames.decay[0])
-    white = steady_frames(part.run, part.choices, SpectrumFrames.WHITE)
+    white = steady_frames(part.run, part.overrides, SpectrumFrames.WHITE)
     reductions = reduce_places(
         [*frames.decay, *white],
         frames.dark,

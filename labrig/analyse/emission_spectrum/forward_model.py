@@ -12,7 +12,7 @@ import numpy as np
 
 from labrig.analyse.emission_spectrum.comparison import combined
 from labrig.analyse.part import Part
-from labrig.analyse.strip import Slices, StripPatch, cut, lean, strip_patches
+from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_patches, tilt_offset
 from labrig.bench_optics import camera_curves, card_reflectance, lamp_spectrum
 from labrig.errors import DataError, UsageError
 from labrig.fit.spectrum import CurveError, SpectralSystem, system_through_lvf
@@ -106,7 +106,7 @@ def forward_models(
         )
     raw, strip, lvf = read_raw(frame.path), known.before_camera, known.lvf
     camera, holder = _camera(part, raw.channels), _holder(strip)
-    patches, refused = cut(strip_patches(part), strip, raw)
+    patches, refused = slice_strip(strip_patches(part), strip, raw)
     models = {}
     for patch, slices in patches.items():
         # At either end pixels reach a little beyond the places that were calibrated.
@@ -203,7 +203,7 @@ def _positions(raw: RawFrame, strip: Strip, slices: Slices) -> FloatArray:
     linear = LinearFrame(raw)
     middles = np.array([linear.middle_columns(region) for region in slices.values()]).T
     across = (strip.right[0] - strip.left[0]) * raw.width
-    share = (middles - strip.left[0] * raw.width) / across + lean(strip, slices, raw)
+    share = (middles - strip.left[0] * raw.width) / across + tilt_offset(strip, slices, raw)
     return share if strip.rising else 1 - share
 
 
@@ -256,10 +256,10 @@ def _light(lamp: Spectrum, card: Transmittance) -> Spectrum:
 def _camera(part: Part, channels: tuple[str, ...]) -> CameraResponse:
     """Its curves, in the order of a frame's channels."""
     if len(channels) == 1:
-        name = part.choices.camera or part.rig.optics.camera
+        name = part.overrides.camera or part.rig.optics.camera
         if name is not None:
             return read_monochrome_camera(name)
-    camera = camera_curves(part.rig, part.choices.camera, part.inputs.lvf)
+    camera = camera_curves(part.rig, part.overrides.camera, part.inputs.lvf)
     if camera.channels != channels:
         raise DataError(
             f"expected frames with the channels {', '.join(camera.channels)} or one alone, got "

@@ -9,7 +9,7 @@ from labrig.analyse.excitation.charging_series import patch_chargings
 from labrig.analyse.excitation.closure import predicted_charging
 from labrig.analyse.excitation.lamp_light import band_sigma, scale_sigma
 from labrig.analyse.excitation.material import excited_material
-from labrig.analyse.frames import insist_on_intact
+from labrig.analyse.frames import require_intact
 from labrig.analyse.part import Part
 from labrig.analyse.series_fit import TYPICAL_FLICKER, fit_series
 from labrig.analyse.strip import StripPatch, for_each_patch
@@ -50,7 +50,7 @@ def analyse(part: Part) -> ExcitationResult:
             "expected the light on every place of the sample, got none; run irradiance and name "
             "its run in the rig file ('optics: {irradiance: …}') or to labrig process --optics"
         )
-    insist_on_intact(part.run, (*GLOWING, FrameRole.DARK), part.choices)
+    require_intact(part.run, (*GLOWING, FrameRole.DARK), part.overrides)
     warming = USUAL if fade is None or fade.warming is None else fade.warming
     chargings, left_out = patch_chargings(part, irradiance, warming)
     patches, warnings = for_each_patch(
@@ -111,7 +111,7 @@ def _of_patch(
 def _states(part: Part, patch: StripPatch) -> int | None:
     """As many as are asked for, or as a decay of this patch had; None chooses."""
     asked = part.protocol.states
-    states = part.choices.states or (None if asked == "auto" else asked)
+    states = part.overrides.states or (None if asked == "auto" else asked)
     if states is None and (known := patch.own(part.inputs.decays)) is not None:
         return known.n_states
     return states

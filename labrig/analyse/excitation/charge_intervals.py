@@ -5,7 +5,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 
 from labrig.analyse.frames import left_out_lines
-from labrig.analyse.overrides import Choices
+from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
 from labrig.errors import DataError
 from labrig.protocols.excitation import ExcitationFrames, UnitKind
@@ -69,7 +69,7 @@ class ChargeFrames:
 
 
 def charge_frames(
-    run: RunRecord, choices: Choices, warms_s: float, blank: BlankFile | None = None
+    run: RunRecord, overrides: Overrides, warms_s: float, blank: BlankFile | None = None
 ) -> ChargeFrames:
     """What a run says; photographs that begin before the bench is dark, by its blank, left out.
 
@@ -88,7 +88,10 @@ def charge_frames(
     lit = sorted((one for one in units if one is not None), key=lambda one: one.on_s)
     intervals = with_warmth(lit, warms_s)
     frames = [
-        frame for purpose in GLOWING for frame in run.frames(purpose) if not choices.excludes(frame)
+        frame
+        for purpose in GLOWING
+        for frame in run.frames(purpose)
+        if not overrides.excludes(frame)
     ]
     frames.sort(key=lambda frame: frame.start_time)
     of_frames = {frame: _interval_before(intervals, frame) for frame in frames}

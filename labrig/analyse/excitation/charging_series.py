@@ -6,9 +6,9 @@ import numpy as np
 
 from labrig.analyse.excitation.charge_intervals import ChargeFrames, ChargeInterval, charge_frames
 from labrig.analyse.excitation.lamp_light import across_sites, lamp_transients, site_modes
-from labrig.analyse.frames import insist_on_this_camera, timed, untimed
+from labrig.analyse.frames import require_calibrated_camera, timed, untimed
 from labrig.analyse.part import Part
-from labrig.analyse.strip import Slices, StripPatch, cut, lean, strip_patches
+from labrig.analyse.strip import Slices, StripPatch, slice_strip, strip_patches, tilt_offset
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
 from labrig.optics import Strip
@@ -41,11 +41,13 @@ def patch_chargings(
         Charges or frames are missing, no patch lies below the filter, or the camera was not this
         one.
     """
-    known, choices, protocol = part.inputs, part.choices, part.protocol
-    frames = charge_frames(part.run, choices, warming.warms_s, known.blank)
-    insist_on_this_camera(known.camera, part.run, list(frames.charge_of))
+    known, overrides, protocol = part.inputs, part.overrides, part.protocol
+    frames = charge_frames(part.run, overrides, warming.warms_s, known.blank)
+    require_calibrated_camera(known.camera, part.run, list(frames.charge_of))
     raw = read_raw(next(iter(frames.charge_of)).path)
-    sites, refused = cut(strip_patches(part), irradiance.strip, raw, len(irradiance.position))
+    sites, refused = slice_strip(
+        strip_patches(part), irradiance.strip, raw, len(irradiance.position)
+    )
     series = reduce_patches(
         [
             replace(timed(frame, frames.zero_s), unit=one.unit)
@@ -59,7 +61,7 @@ def patch_chargings(
         [
             untimed(frame)
             for frame in part.run.frames(FrameRole.DARK)
-            if not choices.excludes(frame)
+            if not overrides.excludes(frame)
         ],
         camera=known.camera,
     )
@@ -122,7 +124,7 @@ def _centred(
     """
     along = position if strip.rising else 1 - position
     left, right = strip.left[0] * raw.width, strip.right[0] * raw.width
-    wanted = left + (along - lean(strip, slices, raw)) * (right - left)
+    wanted = left + (along - tilt_offset(strip, slices, raw)) * (right - left)
     moved = values.copy()
     middles = np.array([LinearFrame(raw).middle_columns(region) for region in slices.values()])
     for number, x in enumerate(middles.T):

@@ -13,7 +13,7 @@ from labrig.analyse.fade.frames import (
     take_columns,
     warming,
 )
-from labrig.analyse.frames import insist_on_this_camera, part_frames, part_region
+from labrig.analyse.frames import part_frames, part_region, require_calibrated_camera
 from labrig.analyse.part import Part
 from labrig.bench_optics import camera_curves, lamp_spectrum
 from labrig.calibration import Change, FadeFile, Warming
@@ -51,10 +51,10 @@ def analyse(part: Part) -> FadeResult:
         The rig file does not name the curves of lamp and camera.
     """
     protocol, camera = part.protocol, part.inputs.camera
-    curves = camera_curves(part.rig, part.choices.camera, part.inputs.lvf)
+    curves = camera_curves(part.rig, part.overrides.camera, part.inputs.lvf)
     lamp = lamp_spectrum(part.rig)
     frames = part_frames(part, LampFrames.FADE, LampFrames.RISE, LampFrames.STEADY)
-    insist_on_this_camera(camera, part.run, frames)
+    require_calibrated_camera(camera, part.run, frames)
     darks = part_frames(part, FrameRole.DARK)
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
     edges = np.array(protocol.bands)

@@ -68,7 +68,7 @@ def analyse(part: Part) -> LvfCalibrationResult:
     bench = Bench(
         lamp_spectrum(part.rig),
         card_reflectance(part.rig),
-        camera_curves(part.rig, part.choices.camera),
+        camera_curves(part.rig, part.overrides.camera),
     )
     every = _scenes(part, frames, before_camera.strip)
     of_filters = tuple(misfits(every, bench, fit.map))

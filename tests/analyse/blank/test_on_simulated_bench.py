@@ -8,7 +8,7 @@ from typing import Any
 import numpy as np
 import pytest
 
-from labrig.analyse import Choices, decay as decay_analysis
+from labrig.analyse import Overrides, decay as decay_analysis
 from labrig.analyse.frames import intact_frames
 from labrig.analyse.part import Inputs
 from labrig.calibration import read_blank_file
@@ -93,7 +93,7 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
     with pytest.raises(DataError, match="never became clean"):
         decay_analysis.analyse(part_of(decayed, Inputs(blank=blank)))
     # One that is clean from the third frame on: the earlier ones are left out, and it is said.
-    third = sorted(frame.t_s for frame in intact_frames(read_run(decayed), Choices()).decay)[2]
+    third = sorted(frame.t_s for frame in intact_frames(read_run(decayed), Overrides()).decay)[2]
     ends = blank.model_copy(update={"first_clean_s": third, "ambient_dn_per_s": (0.0, 0.0, 0.0)})
     found = decay_analysis.analyse(part_of(decayed, Inputs(blank=ends)))
     (patch,) = found.patches.values()

@@ -13,7 +13,7 @@ import yaml
 from labrig.analyse.excitation.analysis import USUAL
 from labrig.analyse.excitation.charge_intervals import charge_frames
 from labrig.analyse.excitation.charging_series import patch_chargings
-from labrig.analyse.overrides import Choices
+from labrig.analyse.overrides import Overrides
 from labrig.calibration import BlankFile
 from labrig.calibration.irradiance_file import IrradianceFile, write_irradiance_file
 from labrig.errors import DataError
@@ -193,8 +193,8 @@ def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: P
         sigma_dn_per_s=((1.0,),), constant_dn_per_s=(0.0,), constant_sigma_dn_per_s=(1.0,),
         ambient_dn_per_s=(0.0,), ambient_sigma_dn_per_s=(1.0,), first_clean_s=10.0,
     )  # fmt: skip
-    whole = charge_frames(read_run(run), Choices(), 150.0)
-    clean = charge_frames(read_run(run), Choices(), 150.0, blank)
+    whole = charge_frames(read_run(run), Overrides(), 150.0)
+    clean = charge_frames(read_run(run), Overrides(), 150.0, blank)
     early = [frame for frame, one in whole.charge_of.items() if frame.start_time < one.off_s + 9.98]
     assert early
     assert set(clean.charge_of) == set(whole.charge_of) - set(early)
@@ -202,7 +202,7 @@ def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: P
     assert said.startswith(f"{len(early)} frames begin before the bench is dark and are left out")
     with pytest.raises(DataError, match="all frames begin before"):
         charge_frames(
-            read_run(run), Choices(), 150.0, blank.model_copy(update={"first_clean_s": 1e4})
+            read_run(run), Overrides(), 150.0, blank.model_copy(update={"first_clean_s": 1e4})
         )
 
 
