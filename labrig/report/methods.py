@@ -238,9 +238,9 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
             f"The number of states, {number}, was chosen by the Bayesian information criterion "
             "and an F-test."
         )
-    rivals = list(dict.fromkeys(rival.name for fit in fits for rival in fit.rivals))
-    if rivals:
-        yield f"For comparison, a {listed(rivals).replace(' and ', ' and a ')} were fitted."
+    others = list(dict.fromkeys(model.name for fit in fits for model in fit.alternative_models))
+    if others:
+        yield f"For comparison, a {listed(others).replace(' and ', ' and a ')} were fitted."
     yield "Uncertainties are standard uncertainties (1 σ) from the covariance of the fit."
 
 

@@ -94,8 +94,10 @@ def paper_rows(fit: FittedDecay) -> list[Row]:
 
 
 def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
-    """The numbers of states tried, and their rivals."""
-    bics = [candidate.bic for candidate in fit.candidates] + [rival.bic for rival in fit.rivals]
+    """The numbers of states tried, and the alternative models."""
+    bics = [candidate.bic for candidate in fit.candidates] + [
+        alternative.bic for alternative in fit.alternative_models
+    ]
     best = min(bics, default=math.inf)
     rows = [
         CandidateRow(
@@ -108,7 +110,8 @@ def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
         for candidate in fit.candidates
     ]
     rows += [
-        CandidateRow(rival.name, "–", _above(rival.bic, best), "–", False) for rival in fit.rivals
+        CandidateRow(alternative.name, "–", _above(alternative.bic, best), "–", False)
+        for alternative in fit.alternative_models
     ]
     return rows
 
@@ -132,11 +135,11 @@ def why_so_many_states(fit: FittedDecay) -> str:
         said.append("No other number of states was tried or supported by the data.")
     elif more is None:
         said.append("More were not asked for, or the data do not support them.")
-    if fit.better_rival is not None:
-        rival = fit.better_rival
-        exponent = plus_minus(rival.exponent, rival.exponent_sigma)
+    if fit.better_model is not None:
+        alternative = fit.better_model
+        exponent = plus_minus(alternative.exponent, alternative.exponent_sigma)
         said.append(
-            f"A {rival.name}, {rival.formula}, describes the data clearly better "
+            f"A {alternative.name}, {alternative.formula}, describes the data clearly better "
             f"(exponent {exponent})."
         )
     return " ".join(said)

@@ -41,10 +41,10 @@ from .fade import (
     WarmingLight as WarmingLight,
 )
 from .fitted_decay import (
+    AlternativeModel as AlternativeModel,
     Candidate as Candidate,
     DecayState as DecayState,
     FittedDecay as FittedDecay,
-    Rival as Rival,
     find_fitted_decays as find_fitted_decays,
     read_fitted_decay as read_fitted_decay,
     read_fitted_decays as read_fitted_decays,

@@ -61,8 +61,8 @@ class Candidate:
 
 
 @dataclass(frozen=True)
-class Rival:
-    """A rival fitted, in the brightest channel, in the values' units.
+class AlternativeModel:
+    """A alternative model fitted, in the brightest channel, in the values' units.
 
     Attributes
     ----------
@@ -110,9 +110,9 @@ class FittedDecay:
         What to distrust, and what to do about it.
     candidates
         The numbers of states tried.
-    rivals
+    alternative_models
         Power law and stretched exponential, fitted to the same series.
-    better_rival
+    better_model
         The one of them that does clearly better than exponentials, if one does.
     """
 
@@ -132,8 +132,8 @@ class FittedDecay:
     covariance: FloatArray
     warnings: tuple[str, ...]
     candidates: tuple[Candidate, ...]
-    rivals: tuple[Rival, ...]
-    better_rival: Rival | None
+    alternative_models: tuple[AlternativeModel, ...]
+    better_model: AlternativeModel | None
 
     @property
     def covariance_parameters(self) -> tuple[str, ...]:
@@ -250,8 +250,8 @@ class FittedDecay:
             "covariance": self.covariance.tolist(),
             "warnings": list(self.warnings),
             "candidates": [asdict(candidate) for candidate in self.candidates],
-            "rivals": [asdict(rival) for rival in self.rivals],
-            "better_rival": self.better_rival.name if self.better_rival else None,
+            "alternative_models": [asdict(alternative) for alternative in self.alternative_models],
+            "better_model": self.better_model.name if self.better_model else None,
         }
         content: dict[str, Any] = finite(fields)
         return content
@@ -349,11 +349,11 @@ def _from_dict(content: Any) -> FittedDecay:
     if content["schema_version"] != SCHEMA_VERSION:
         raise ValueError(f"schema_version {content['schema_version']}, not {SCHEMA_VERSION}")
     weights: Mapping[str, float] = content["channel_weights"]
-    rivals = tuple(
-        Rival(**one | {"exponent_sigma": _known(one["exponent_sigma"])})
-        for one in content["rivals"]
+    alternative_models = tuple(
+        AlternativeModel(**one | {"exponent_sigma": _known(one["exponent_sigma"])})
+        for one in content["alternative_models"]
     )
-    better = content["better_rival"]
+    better = content["better_model"]
     return FittedDecay(
         states=tuple(
             DecayState(
@@ -384,8 +384,8 @@ def _from_dict(content: Any) -> FittedDecay:
             Candidate(**one | {"reduced_chi2": _known(one["reduced_chi2"], math.nan)})
             for one in content["candidates"]
         ),
-        rivals=rivals,
-        better_rival=next((one for one in rivals if one.name == better), None),
+        alternative_models=alternative_models,
+        better_model=next((one for one in alternative_models if one.name == better), None),
     )
 
 

@@ -111,7 +111,7 @@ def verdict(fit: dict[str, object], material: str) -> str:
     """What came out, in a line."""
     said = f"χ² {fit['reduced_chi2']:.2f}  ρ {fit['flicker']:.4f}  n {fit['n_states']}"
     if material == WITHOUT_TRUE_STATES:
-        return f"{said}  {'flagged' if fit['better_rival'] else 'NOT FLAGGED'}  {fit['warnings']}"
+        return f"{said}  {'flagged' if fit['better_model'] else 'NOT FLAGGED'}  {fit['warnings']}"
     if not has_true_number_of_states(fit, material):
         true = len(read_material(material).states)
         return f"{said}  WRONG n (true {true})  {fit['states']} {fit['warnings']}"

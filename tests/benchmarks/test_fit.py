@@ -132,7 +132,7 @@ def best_of_starts(fit: Callable[[Floats], tuple[Floats, float]], y: Floats) -> 
 
 
 def test_cold(data: tuple[Floats, Floats], against: Against) -> None:
-    """Nothing is known but the data; labrig fits its two rival laws of decay as well."""
+    """Nothing is known but the data; labrig fits two alternative models of decay as well."""
     y, sigma = data
     n = len(T_S)
     series = Series(
@@ -166,7 +166,7 @@ def test_cold(data: tuple[Floats, Floats], against: Against) -> None:
             "lmfit leastsq, one good start": lambda: lmfit_leastsq(y, sigma),
         },
         rounds=15,
-        what="2 states, 60 frames: start, fit, rivals, diagnosis",
+        what="2 states, 60 frames: start, fit, alternative models, diagnosis",
     )
 
 

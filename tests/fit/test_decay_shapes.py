@@ -57,7 +57,7 @@ Mean = Callable[[float, float, FloatArray, FloatArray], tuple[FloatArray, FloatA
     ],
 )
 @pytest.mark.parametrize("tau_s", [3.0, 100.0])
-def test_rivals(
+def test_alternative_models(
     mean: Mean,
     truth: Callable[[float, float], truths.Decay],
     exponent: float,

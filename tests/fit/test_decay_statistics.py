@@ -143,7 +143,7 @@ def test_flicker_from_the_data_whatever_the_law(decay: truths.Decay, true_flicke
 @pytest.mark.parametrize("flicker", [0.007, pytest.param(None, marks=CAMPAIGN)])
 def test_other_laws_are_named(decay: truths.Decay, name: str, flicker: float | None) -> None:
     fits = _fits(decay, range(15), flicker)
-    named = [fit.better_rival is not None and fit.better_rival.name == name for fit in fits]
+    named = [fit.better_model is not None and fit.better_model.name == name for fit in fits]
     assert np.mean(named) >= 0.8
     assert all(
         any(name in line and "descriptive only" in line for line in fit.warnings)

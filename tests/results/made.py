@@ -42,8 +42,8 @@ def decay_result(
         covariance=np.eye(2 * len(states) + 1),
         warnings=(),
         candidates=(),
-        rivals=(),
-        better_rival=None,
+        alternative_models=(),
+        better_model=None,
     )
 
 

@@ -1,4 +1,4 @@
-"""The rivals of a sum of exponentials: a power law A (1 + t/τ)^(−p), a stretched A exp(−(t/τ)^β).
+"""Other models than exponentials: a power law A (1 + t/τ)^(−p), a stretched A exp(−(t/τ)^β).
 
 Traps of many depths, or electrons and holes that must meet, decay so (Nalbach et al. sec. 4.4,
 after Jonscher and de Polignac 1984 and Lee et al. 2001). They are fitted to the same series with
@@ -16,7 +16,7 @@ from labrig.fit.decay.series import DecaySeries
 from labrig.fit.decay.states import SERIES_BELOW
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
-from labrig.results import Rival
+from labrig.results import AlternativeModel
 
 #: Gauss–Legendre on [0, 1] for what has no elementary integral.
 _NODES, _SHARES = np.polynomial.legendre.leggauss(8)
@@ -111,7 +111,7 @@ Mean = Callable[[float, float, FloatArray, FloatArray], tuple[FloatArray, FloatA
 
 
 @dataclass(frozen=True)
-class RivalShape:
+class AlternativeShape:
     """A decay of τ and one exponent.
 
     Attributes
@@ -123,7 +123,7 @@ class RivalShape:
     mean
         (τ, exponent, t, T) → mean over the exposures, and derivatives by log τ and the exponent.
     exponents
-        Least and largest considered: with an exponential as its limit a rival must end somewhere.
+        Least and largest considered: with an exponential as its limit it must end somewhere.
     """
 
     name: str
@@ -133,15 +133,15 @@ class RivalShape:
     exponents: tuple[float, float]
 
 
-RIVALS = (
-    RivalShape(
+ALTERNATIVES = (
+    AlternativeShape(
         name="power law",
         formula="(1 + t/{tau:.3g} s)^−{exponent:.3g}",
         value=lambda ratio, exponent: (1 + ratio) ** -exponent,
         mean=power_law_mean,
         exponents=(0.1, 10.0),
     ),
-    RivalShape(
+    AlternativeShape(
         name="stretched exponential",
         formula="exp(−(t/{tau:.3g} s)^{exponent:.3g})",
         value=lambda ratio, exponent: np.exp(-(ratio**exponent)),
@@ -151,8 +151,8 @@ RIVALS = (
 )
 
 
-def fit_rival(
-    data: WhitenedSeries, rival: RivalShape, weights: FloatArray, offsets: FloatArray
+def fit_alternative(
+    data: WhitenedSeries, alternative: AlternativeShape, weights: FloatArray, offsets: FloatArray
 ) -> JointFit:
     """Least squares from the best of a grid of τ and exponent; `shape` is [A, log τ, exponent]."""
     series = data.series
@@ -162,25 +162,30 @@ def fit_rival(
     high = np.log(LONGEST_SPANS)
 
     def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        mean, slopes = rival.mean(float(np.exp(theta[1])), float(theta[2]), time, series.exposure)
+        mean, slopes = alternative.mean(
+            float(np.exp(theta[1])), float(theta[2]), time, series.exposure
+        )
         return theta[0] * mean, np.column_stack([mean, theta[0] * slopes])
 
-    start = _best_on_grid(data, rival, weights, (low, high))
+    start = _best_on_grid(data, alternative, weights, (low, high))
     return fit_jointly(
         data,
         shape,
         start,
         weights,
         offsets,
-        np.array([0.0, low, rival.exponents[0]]),
-        np.array([np.inf, high, rival.exponents[1]]),
+        np.array([0.0, low, alternative.exponents[0]]),
+        np.array([np.inf, high, alternative.exponents[1]]),
         MAX_ITERATIONS,
         TOLERANCE,
     )
 
 
 def _best_on_grid(
-    data: WhitenedSeries, rival: RivalShape, weights: FloatArray, log_taus: tuple[float, float]
+    data: WhitenedSeries,
+    alternative: AlternativeShape,
+    weights: FloatArray,
+    log_taus: tuple[float, float],
 ) -> FloatArray:
     """[A, log τ, exponent] of the grid's best, exposures taken for points in their middle."""
     series = data.series
@@ -188,9 +193,9 @@ def _best_on_grid(
     middle = series.t + series.start + series.exposure / 2
     taus = np.linspace(*log_taus, GRID[0])
     log_tau, exponents = (
-        grid.ravel() for grid in np.meshgrid(taus, np.geomspace(*rival.exponents, GRID[1]))
+        grid.ravel() for grid in np.meshgrid(taus, np.geomspace(*alternative.exponents, GRID[1]))
     )
-    means = rival.value(np.multiply.outer(middle, np.exp(-log_tau)), exponents)
+    means = alternative.value(np.multiply.outer(middle, np.exp(-log_tau)), exponents)
     columns = problem.columns(means)
     moments = problem.target @ columns
     norms2 = np.einsum("ij,ij->j", columns, columns)
@@ -200,13 +205,15 @@ def _best_on_grid(
     return np.array([amplitude, log_tau[best], exponents[best]])
 
 
-def fitted_rival(rival: RivalShape, fit: JointFit, series: DecaySeries, bic: float) -> Rival:
+def fitted_alternative(
+    alternative: AlternativeShape, fit: JointFit, series: DecaySeries, bic: float
+) -> AlternativeModel:
     """The fit in the user's units."""
     amplitude, log_tau, exponent = (float(x) for x in fit.shape)
     tau_s = float(np.exp(log_tau)) * series.span_s
-    return Rival(
-        name=rival.name,
-        formula=rival.formula.format(tau=tau_s, exponent=exponent),
+    return AlternativeModel(
+        name=alternative.name,
+        formula=alternative.formula.format(tau=tau_s, exponent=exponent),
         amplitude=amplitude * series.peak,
         tau_s=tau_s,
         exponent=exponent,

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
-from labrig.fit.decay.alternative_models import RIVALS, fit_rival, fitted_rival
+from labrig.fit.decay.alternative_models import ALTERNATIVES, fit_alternative, fitted_alternative
 from labrig.fit.decay.envelope import Envelope, envelope
 from labrig.fit.decay.fit_warnings import Evidence, refuse_if_constant, refuse_if_rising
 from labrig.fit.decay.result import DecayFit, assemble
@@ -16,7 +16,7 @@ from labrig.fit.decay.series import NO_DECAY, DecaySeries, decay_series
 from labrig.fit.decay.states import StatesFit, refit
 from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
-from labrig.results import Candidate, Rival
+from labrig.results import AlternativeModel, Candidate
 
 #: Rounds in which the flicker's weights follow the model; each gains two digits or more.
 REWEIGHTINGS = 8
@@ -111,8 +111,8 @@ def fit_decay(
     noise_estimated = flicker is None or not series.sigma_given
     noise_dof = smooth.dof if noise_estimated else np.inf
     chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
-    rivals = _rivals(data, chosen)
-    best = min(rivals, key=lambda rival: rival.bic)
+    alternative_models = _alternatives(data, chosen)
+    best = min(alternative_models, key=lambda alternative: alternative.bic)
     best_wins = best.bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
     data, chosen = _reweighted(data, chosen, smooth.flicker)
     refuse_if_constant(chosen, data)
@@ -123,8 +123,8 @@ def fit_decay(
             noise=smooth,
             noise_dof=noise_dof,
             candidates=tuple(tried),
-            rivals=rivals,
-            better_rival=best if best_wins else None,
+            alternative_models=alternative_models,
+            better_model=best if best_wins else None,
             asked=n_states,
             max_states=max_states,
             n_fixed=len(fixed),
@@ -198,11 +198,14 @@ def _supported_states(
     raise FitError(NO_DECAY)
 
 
-def _rivals(data: WhitenedSeries, chosen: StatesFit) -> tuple[Rival, ...]:
+def _alternatives(data: WhitenedSeries, chosen: StatesFit) -> tuple[AlternativeModel, ...]:
     """What is no sum of exponentials, fitted under the candidates' weights."""
     joint = chosen.joint
-    fits = [(shape, fit_rival(data, shape, joint.weights, joint.offsets)) for shape in RIVALS]
-    return tuple(fitted_rival(shape, fit, data.series, bic(data, fit)) for shape, fit in fits)
+    fits = [
+        (shape, fit_alternative(data, shape, joint.weights, joint.offsets))
+        for shape in ALTERNATIVES
+    ]
+    return tuple(fitted_alternative(shape, fit, data.series, bic(data, fit)) for shape, fit in fits)
 
 
 def _reweighted(

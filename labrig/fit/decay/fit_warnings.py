@@ -17,7 +17,7 @@ from labrig.fit.decay.envelope import FEWEST_NOISE_DOF, Envelope
 from labrig.fit.decay.states import StatesFit
 from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
-from labrig.results import Candidate, DecayState, Rival
+from labrig.results import AlternativeModel, Candidate, DecayState
 
 RISING_SIGMAS = 5.0
 #: A rate this close to the slowest one searched, in log k, has come to rest there.
@@ -32,10 +32,10 @@ class Evidence:
     ----------
     noise, noise_dof
         The envelope; its degrees of freedom if σ or flicker come from it, else inf.
-    candidates, rivals
+    candidates, alternative models
         What was tried.
-    better_rival
-        The rival that does clearly better than exponentials, if one does.
+    better_model
+        The alternative model that does clearly better than exponentials, if one does.
     asked, max_states, n_fixed
         As the user had it.
     """
@@ -43,8 +43,8 @@ class Evidence:
     noise: Envelope
     noise_dof: float
     candidates: tuple[Candidate, ...]
-    rivals: tuple[Rival, ...]
-    better_rival: Rival | None
+    alternative_models: tuple[AlternativeModel, ...]
+    better_model: AlternativeModel | None
     asked: int | None
     max_states: int
     n_fixed: int
@@ -128,11 +128,11 @@ def warnings_about(
             f"{wanted} states were asked for, the data support {fit.n_states}: "
             "the others' amplitude is zero; ask for fewer or take more light"
         )
-    rival = evidence.better_rival
-    if rival is not None:
+    alternative = evidence.better_model
+    if alternative is not None:
         n = evidence.candidates[-1].n_states
         warnings.append(
-            f"a {rival.name} {rival.formula} fits better than {n} exponential"
+            f"a {alternative.name} {alternative.formula} fits better than {n} exponential"
             f"{'s' if n > 1 else ''}: the rates are descriptive only, "
             "do not extrapolate them beyond the times recorded"
         )

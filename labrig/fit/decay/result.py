@@ -75,8 +75,8 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
             warnings_about(data, fit, states, log_rate_covariance[np.ix_(order, order)], evidence)
         ),
         candidates=evidence.candidates,
-        rivals=evidence.rivals,
-        better_rival=evidence.better_rival,
+        alternative_models=evidence.alternative_models,
+        better_model=evidence.better_model,
         residuals=residuals * series.peak,
         normalised_residuals=normalised,
     )

@@ -102,7 +102,7 @@ def _once_each(found: list[Peak]) -> list[Peak]:
 TOLERANCE = 0.4
 #: Assignments whose scores differ by less took the same peaks for lines; so many are fitted.
 AMBIGUOUS = 1.0
-MOST_RIVALS = 4
+MOST_CANDIDATES = 4
 #: Strips are bent by some nm, in their middle against their ends.
 MOST_BEND_NM = 20.0
 #: Of such two, one is right if the other leaves this many times as much unexplained.
@@ -151,8 +151,10 @@ def locate_lines(
             "lamp is lit and the whole strip in the picture"
         )
     found.sort(key=lambda trial: -trial.score)
-    rivals = [trial for trial in found[:MOST_RIVALS] if found[0].score - trial.score < AMBIGUOUS]
-    located = _best_each_way([LineModel(u, values, lines, trial) for trial in rivals])
+    candidates = [
+        trial for trial in found[:MOST_CANDIDATES] if found[0].score - trial.score < AMBIGUOUS
+    ]
+    located = _best_each_way([LineModel(u, values, lines, trial) for trial in candidates])
     if len(located) == 2:
         located.sort(key=lambda way: -way.explained)
         left = [1 - way.explained for way in located]
