@@ -43,7 +43,7 @@ class ExcitationFrames(StrEnum):
     """The glow after a charge through the filter, and after one by the lamp itself."""
 
     STRIP = "strip"
-    BARE = "bare"
+    DIRECT = "direct"
 
 
 class UnitKind(StrEnum):
@@ -51,7 +51,7 @@ class UnitKind(StrEnum):
 
     STRIP = "strip"
     REFINE = "refine"
-    BARE = "bare"
+    DIRECT = "direct"
 
     def numbered(self, number: int) -> str:
         """The name of a unit of this kind."""
@@ -96,7 +96,7 @@ class ExcitationSettings(ProtocolModel):
     growth: Fraction = Field(0.03, gt=0, lt=1)
     at_most: Count = Field(9, ge=2)
     refine: Count = Field(3, ge=0)
-    bare: tuple[DurationS, ...] = Field((3.0, 10.0, 60.0, 900.0), min_length=1)
+    direct: tuple[DurationS, ...] = Field((3.0, 10.0, 60.0, 900.0), min_length=1)
     first: DurationS = Field(1.0, ge=0)
     every: DurationS = Field(4.0, gt=0)
     duration: DurationS = Field(90.0, gt=0, alias="for")
@@ -111,8 +111,8 @@ class ExcitationSettings(ProtocolModel):
 
     @model_validator(mode="after")
     def _rising_charges(self) -> Self:
-        if any(later <= earlier for earlier, later in pairwise(self.bare)):
-            raise ValueError("expected charges in 'bare' that become longer and longer")
+        if any(later <= earlier for earlier, later in pairwise(self.direct)):
+            raise ValueError("expected charges in 'direct' that become longer and longer")
         if self.first + self.every > self.duration:
             raise ValueError(
                 f"for: {duration_text(self.duration)} leaves no two frames "
@@ -235,7 +235,7 @@ class ExcitationUnit:
         """Whether the glow of every patch is low against that just after the last charge."""
         frames = [
             *session.frames(ExcitationFrames.STRIP),
-            *session.frames(ExcitationFrames.BARE),
+            *session.frames(ExcitationFrames.DIRECT),
             *session.frames(FrameRole.METER),
         ]
         darks = self.darks(session)
@@ -298,15 +298,15 @@ class StripMeter(_Meter):
 
 
 @dataclass(frozen=True)
-class BareMeter(_Meter):
+class DirectMeter(_Meter):
     """Without the filter."""
 
-    name: str = "bare-meter"
+    name: str = "direct-meter"
 
     def run(self, session: Session) -> None:
         """Take the filter away, charge, a ladder of exposures."""
         self.rest(session)
-        self._meter(session, self.name, LVF_AWAY, self.protocol.bare[0])
+        self._meter(session, self.name, LVF_AWAY, self.protocol.direct[0])
 
 
 #: Frames of a charge are made for it to glow at most this much brighter than the one looked at.
@@ -443,23 +443,23 @@ class RefiningUnit(_Charged):
 
 
 @dataclass(frozen=True)
-class BareUnit(_Charged):
+class DirectUnit(_Charged):
     """Under the lamp itself; after the last one, a longer decay."""
 
     number: int
 
     @property
     def name(self) -> str:
-        """`bare-1`, `bare-2`, …"""
-        return UnitKind.BARE.numbered(self.number)
+        """`direct-1`, `direct-2`, …"""
+        return UnitKind.DIRECT.numbered(self.number)
 
     def run(self, session: Session) -> None:
         """Charge and photograph."""
         session.wait_until_warm("camera")
         protocol = self.protocol
-        last = self.number == len(protocol.bare)
+        last = self.number == len(protocol.direct)
         lasting_s = protocol.last_decay if last else protocol.duration
-        self._charge(session, ExcitationFrames.BARE, protocol.bare[self.number - 1], lasting_s)
+        self._charge(session, ExcitationFrames.DIRECT, protocol.direct[self.number - 1], lasting_s)
 
 
 class Excitation(ExcitationSettings):
@@ -473,6 +473,6 @@ class Excitation(ExcitationSettings):
             StripMeter(self, album),
             *(DoublingUnit(self, album, number) for number in range(1, self.at_most + 1)),
             *(RefiningUnit(self, album, number) for number in range(1, self.refine + 1)),
-            BareMeter(self, album),
-            *(BareUnit(self, album, number) for number in range(1, len(self.bare) + 1)),
+            DirectMeter(self, album),
+            *(DirectUnit(self, album, number) for number in range(1, len(self.direct) + 1)),
         ]

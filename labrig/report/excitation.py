@@ -70,7 +70,7 @@ def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
 
 def _closure_line(closure: Closure | None) -> str:
     if closure is None:
-        return "not tested; give three charges or more in 'bare'"
+        return "not tested; give three charges or more in 'direct'"
     return (
         f"charging by the lamp itself is predicted within {rounded(closure.rms_percent, 2)} % "
         f"({rounded(closure.rms_sigma, 2)} σ) rms"

@@ -1,7 +1,7 @@
 """What is measured of an excitation: charges of a sample, and photographs of its glow after each.
 
 One photograph shows many sites at once: places under the linear variable filter that were charged
-by different wavelengths, or samples under the bare lamp.
+by different wavelengths, or samples under the lamp itself.
 """
 
 from dataclasses import dataclass, replace

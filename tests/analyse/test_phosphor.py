@@ -24,7 +24,7 @@ DECAY = {
     "daylight": False,
 }  # fmt: skip
 SHORT = {key: value for key, value in QUICK.items() if key != "sample"} | {
-    "at_most": 2, "refine": 0, "bare": ["10 s", "4 min"]
+    "at_most": 2, "refine": 0, "direct": ["10 s", "4 min"]
 }  # fmt: skip
 
 
@@ -41,7 +41,7 @@ def run(tmp_path_factory: pytest.TempPathFactory) -> Path:
     made = record(folder, chain, change)
     cut, resumed = cut_off_and_resumed(made, "excitation/strip-1")
     assert list(cut.completed())[-1] == "excitation/strip-meter"
-    assert list(resumed.completed())[-1] == "excitation/bare-2"
+    assert list(resumed.completed())[-1] == "excitation/direct-2"
     return made
 
 

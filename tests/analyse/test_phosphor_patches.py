@@ -35,7 +35,7 @@ PAINTS: dict[str, Region] = {
     "orange-paint": (0.03, 0.5, 0.94, 0.4),
 }
 SHORT = {key: value for key, value in QUICK.items() if key != "sample"} | {
-    "first_charge": "20 s", "at_most": 2, "refine": 0, "bare": ["5 min"], "for": "10 s",
+    "first_charge": "20 s", "at_most": 2, "refine": 0, "direct": ["5 min"], "for": "10 s",
     "last_decay": "90 s",
 }  # fmt: skip
 PARTS = [

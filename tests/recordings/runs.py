@@ -32,7 +32,7 @@ CHAIN: dict[str, Any] = {
         },
         DECAY,
         {key: value for key, value in QUICK.items() if key != "sample"} | {
-            "first_charge": "20 s", "at_most": 2, "refine": 0, "bare": ["5 min"], "for": "10 s",
+            "first_charge": "20 s", "at_most": 2, "refine": 0, "direct": ["5 min"], "for": "10 s",
             "last_decay": "90 s",
         },
     ],

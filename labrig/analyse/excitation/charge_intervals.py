@@ -37,7 +37,7 @@ class ChargeInterval:
     @property
     def is_direct(self) -> bool:
         """Whether it charged by the lamp itself."""
-        return UnitKind.BARE.has(self.unit)
+        return UnitKind.DIRECT.has(self.unit)
 
 
 @dataclass(frozen=True)
@@ -143,6 +143,6 @@ def _interval_before(
 ) -> ChargeInterval | None:
     """The last one; None if there was none in the same arrangement of filter and lamp."""
     before = [one for one in intervals if one.off_s < frame.start_time]
-    if not before or before[-1].is_direct is not UnitKind.BARE.has(frame.unit):
+    if not before or before[-1].is_direct is not UnitKind.DIRECT.has(frame.unit):
         return None
     return before[-1]

@@ -39,7 +39,7 @@ QUICK: dict[str, Any] = {
     "growth": "30 %",
     "at_most": 4,
     "refine": 1,
-    "bare": ["10 s", "1 min", "4 min"],
+    "direct": ["10 s", "1 min", "4 min"],
     "for": "40 s",
     "last_decay": "60 s",
     "rest": {"at_least": "1 min", "check_every": "3 min", "at_most": "4 min"},
@@ -143,7 +143,7 @@ def test_charges_double_until_the_glow_stops_growing(run: Path) -> None:
         for action in attempt.actions
         if action.is_by_hand
     ]
-    assert asked == [("strip-meter", "lvf on sample"), ("bare-meter", "lvf away")]
+    assert asked == [("strip-meter", "lvf on sample"), ("direct-meter", "lvf away")]
 
 
 @pytest.mark.campaign
@@ -208,7 +208,7 @@ def test_photographs_before_the_bench_is_dark_are_left_out_and_it_is_said(run: P
 
 def test_charges_are_missing(run: Path) -> None:
     part = part_of(run)
-    some = [one for one in part.run.attempts if not one.unit.startswith("bare")]
+    some = [one for one in part.run.attempts if not one.unit.startswith("direct")]
     with pytest.raises(DataError, match="through the filter and without it"):
         patch_chargings(
             replace(part, run=replace(part.run, attempts=some)), true_irradiance(), USUAL
