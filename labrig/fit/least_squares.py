@@ -145,6 +145,12 @@ def least_squares(
             residuals, point, low, high, max_iterations, max(tolerance, SEARCH_STEP)
         )
         point, step = _polish(residuals, point, low, high, tolerance)
+        if step >= CONVERGED_STEP > tolerance and iterations < max_iterations:
+            # Along a flat, curved valley damped steps are short long before its lowest place.
+            left = max_iterations - iterations
+            point, more = _damped_search(residuals, point, low, high, left, 0.0)
+            point, step = _polish(residuals, point, low, high, tolerance)
+            iterations += more
         return _result(point, low, high, iterations, step < CONVERGED_STEP)
 
 
