@@ -41,7 +41,7 @@ _FLOAT = re.compile(
 if TYPE_CHECKING:
     from yaml import SafeLoader
 else:
-    # libyaml is ten times faster; a PyYAML built without it lacks its loader.
+    # libyaml is several times faster; a PyYAML built without it lacks its loader.
     SafeLoader = getattr(yaml, "CSafeLoader", yaml.SafeLoader)
 
 
