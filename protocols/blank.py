@@ -114,7 +114,7 @@ class BlankDarkUnit:
             for _ in range(DARKS_PER_EXPOSURE):
                 session.perform(Shoot(FrameRole.DARK, self.protocol.settings(exposure_s)))
         shorter = [self.protocol.settings(time_s) for time_s in offers.exposures_s[:3]]
-        Watcher(session, self.name, [self.protocol.region], None).insist_on_darkness(shorter)
+        Watcher(session, self.name, [self.protocol.region], None).require_darkness(shorter)
 
 
 @dataclass(frozen=True)

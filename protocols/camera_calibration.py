@@ -88,7 +88,7 @@ class CardDarkUnit:
             for _ in range(DARKS_EACH):
                 session.perform(Shoot(FrameRole.DARK, shot))
         shorter = [replace(shot, exposure_s=time_s) for time_s in offers.exposures_s[:3]]
-        Watcher(session, self.name, [self.card], None).insist_on_darkness(shorter)
+        Watcher(session, self.name, [self.card], None).require_darkness(shorter)
 
 
 @dataclass(frozen=True)

@@ -260,7 +260,7 @@ class DarkUnit(ExcitationUnit):
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
         dark_frames(session, self.name, regions, exposures)
         shorter = [self.protocol.settings(time_s) for _, time_s in self.protocol.ladder(offers)[:3]]
-        Watcher(session, self.name, regions, None).insist_on_darkness(shorter)
+        Watcher(session, self.name, regions, None).require_darkness(shorter)
 
 
 @dataclass(frozen=True)
@@ -283,7 +283,7 @@ class _Meter(ExcitationUnit):
             ]
         )
         shorter = [self.protocol.settings(exposure_s) for _, exposure_s in ladder[:3]]
-        Watcher(session, unit, self.protocol.regions(), None).insist_on_glow(shorter)
+        Watcher(session, unit, self.protocol.regions(), None).require_glow(shorter)
 
 
 @dataclass(frozen=True)

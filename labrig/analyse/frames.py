@@ -40,7 +40,7 @@ def require_calibrated_camera(
         return
     lens = lens_of(frames)
     for f_number in {frame.f_number for frame in frames}:
-        camera.insist_on(camera_identity(run), lens, f_number)
+        camera.require_match(camera_identity(run), lens, f_number)
 
 
 #: Damaged frames named in a message.

@@ -85,7 +85,7 @@ class CameraFile(CameraModel):
     source: str = ""
     run: str | None = None
 
-    def insist_on(self, camera: str, lens: str | None, f_number: float | None) -> None:
+    def require_match(self, camera: str, lens: str | None, f_number: float | None) -> None:
         """Refuse frames that this calibration is not about.
 
         Parameters

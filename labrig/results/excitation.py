@@ -15,7 +15,7 @@ from labrig.results.fitted_excitation import FittedExcitation
 from labrig.results.measured import FloatArray
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
-from labrig.results.text_files import write_json
+from labrig.results.text_files import finite, write_json
 
 #: Charges whose longest is so many times the shortest go along a logarithmic axis.
 MANY_TIMES = 20.0
@@ -157,7 +157,7 @@ class ExcitationResult(RunResult):
             place = folder / name
             place.mkdir(exist_ok=True)
             write_material(place / "material.yaml", patch.material)
-            write_json(place / "excitation.json", self._fit_content(patch.fit))
+            write_json(place / "excitation.json", finite(self._fit_content(patch.fit)))
 
     def _fit_content(self, fit: FittedExcitation) -> dict[str, Any]:
         off = fit.at_off[-1]

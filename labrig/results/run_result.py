@@ -11,7 +11,7 @@ from pydantic import ConfigDict, PlainSerializer, PlainValidator, TypeAdapter, V
 
 from labrig.errors import DataError, UsageError
 from labrig.plugins import RESULTS, load
-from labrig.results.text_files import write_text
+from labrig.results.text_files import finite, write_text
 
 FILE = "result.json"
 
@@ -63,8 +63,8 @@ class RunResult:
     def to_dict(self) -> dict[str, Any]:
         """The content of `result.json`; what is not finite is the text `Infinity` or `NaN`."""
         fields = TypeAdapter(type(self)).dump_python(self, mode="json")
-        content: dict[str, Any] = _finite(
-            {"kind": self.kind, "schema_version": self.schema_version} | fields
+        content: dict[str, Any] = finite(
+            {"kind": self.kind, "schema_version": self.schema_version} | fields, _spelled
         )
         return content
 
@@ -166,12 +166,6 @@ def _first(error: Exception) -> str:
     return " ".join(str(error).split())
 
 
-def _finite(item: Any) -> Any:
-    """`item` without numbers that JSON does not know."""
-    if isinstance(item, dict):
-        return {key: _finite(value) for key, value in item.items()}
-    if isinstance(item, list | tuple):
-        return [_finite(value) for value in item]
-    if isinstance(item, float) and not math.isfinite(item):
-        return "NaN" if math.isnan(item) else "Infinity" if item > 0 else "-Infinity"
-    return item
+def _spelled(number: float) -> str:
+    """As pydantic spells what JSON has no number for."""
+    return "NaN" if math.isnan(number) else "Infinity" if number > 0 else "-Infinity"

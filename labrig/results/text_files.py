@@ -4,7 +4,7 @@ import csv
 import io
 import json
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
@@ -41,7 +41,7 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) ->
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write an object, a key a line; null for what is not finite, which JSON does not know.
+    """Write an object, a key a line, all its numbers `finite`.
 
     Raises
     ------
@@ -53,15 +53,15 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 def json_text(content: Mapping[str, Any]) -> str:
     """The text of such a file."""
-    return json.dumps(finite(content), indent=2, ensure_ascii=False, allow_nan=False)
+    return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
-def finite(item: Any) -> Any:
-    """`item` with None for numbers that are not finite."""
+def finite(item: Any, spelled: Callable[[float], str | None] = lambda number: None) -> Any:
+    """`item` as JSON knows it: numbers that are not finite are None, or as they are `spelled`."""
     if isinstance(item, Mapping):
-        return {key: finite(value) for key, value in item.items()}
+        return {key: finite(value, spelled) for key, value in item.items()}
     if isinstance(item, list | tuple):
-        return [finite(value) for value in item]
+        return [finite(value, spelled) for value in item]
     if isinstance(item, float) and not math.isfinite(item):
-        return None
+        return spelled(item)
     return item

@@ -225,7 +225,7 @@ class DarkUnit:
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
         watcher = self.protocol.watcher(session, self.name)
         dark_frames(session, self.name, watcher.patches, exposures)
-        watcher.insist_on_darkness(self.protocol.short_settings(session))
+        watcher.require_darkness(self.protocol.short_settings(session))
 
 
 @dataclass(frozen=True)
@@ -251,6 +251,6 @@ class MeterUnit:
                 ),
             ]
         )
-        self.protocol.watcher(session, self.name).insist_on_glow(
+        self.protocol.watcher(session, self.name).require_glow(
             self.protocol.short_settings(session)
         )

@@ -57,7 +57,7 @@ class Watcher:
     purpose: str = FrameRole.DECAY
     metering: str = "meter"
 
-    def insist_on_darkness(self, shorter: Sequence[ExposureSettings]) -> None:
+    def require_darkness(self, shorter: Sequence[ExposureSettings]) -> None:
         """Refuse to charge where the dark frames of this unit show that a light is on.
 
         Parameters
@@ -83,7 +83,7 @@ class Watcher:
             found = replace(found, fades=self._closer_look(shorter) is Afterglow.FADING)
         found.require(self.session.warn)
 
-    def insist_on_glow(self, shorter: Sequence[ExposureSettings]) -> None:
+    def require_glow(self, shorter: Sequence[ExposureSettings]) -> None:
         """Refuse a metering after which nothing glows, or something does not fade.
 
         Raises
@@ -94,7 +94,7 @@ class Watcher:
         self._require(lambda: metered(self._glows(self._own(FrameRole.METER))), shorter)
 
     def require_decay(self, shorter: Sequence[ExposureSettings]) -> None:
-        """Refuse a decay that is none; as `insist_on_glow`."""
+        """Refuse a decay that is none; as `require_glow`."""
 
         def decide() -> Afterglow:
             frames = self._own(self.purpose)

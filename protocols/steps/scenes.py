@@ -307,7 +307,7 @@ class StillDarkUnit:
         exposures_s = scene.dark_exposures_s(session.rig[CAMERA].offers())
         for exposure_s in exposures_s:
             session.perform(Shoot(FrameRole.DARK, scene.settings(exposure_s)))
-        Watcher(session, self.name, [CENTRE], None).insist_on_darkness(
+        Watcher(session, self.name, [CENTRE], None).require_darkness(
             [scene.settings(exposure_s) for exposure_s in sorted(set(exposures_s))]
         )
 

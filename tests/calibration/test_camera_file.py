@@ -96,7 +96,7 @@ def test_frames_of_another_camera_lens_or_aperture_are_refused(
     identity: str, lens: str | None, f_number: float | None, said: str
 ) -> None:
     with pytest.raises(DataError) as caught:
-        camera(lens="50 mm").insist_on(identity, lens, f_number)
+        camera(lens="50 mm").require_match(identity, lens, f_number)
     assert said in str(caught.value)
     assert "\n" not in str(caught.value)
 
@@ -104,7 +104,7 @@ def test_frames_of_another_camera_lens_or_aperture_are_refused(
 @pytest.mark.parametrize("lens", [None, "50 mm"])
 def test_its_own_frames_are_accepted_with_newer_firmware_too(lens: str | None) -> None:
     identity = "Canon EOS 5D Mark II, serial 7, firmware 2.1.3"
-    camera(lens="50 mm").insist_on(identity, lens, 4.0)
+    camera(lens="50 mm").require_match(identity, lens, 4.0)
 
 
 def test_shutter_times_are_put_right_between_and_beyond_those_measured() -> None:

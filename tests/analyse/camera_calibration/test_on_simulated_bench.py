@@ -136,9 +136,9 @@ def test_the_flat_field_is_the_lenss(camera: CameraFile) -> None:
 def test_the_body_is_noted_and_known_again(run: Path, camera: CameraFile) -> None:
     identity = read_run(run).attempts[0].start["devices"]["camera"]
     assert camera.camera == identity
-    camera.insist_on(identity, None, 4.0)
+    camera.require_match(identity, None, 4.0)
     with pytest.raises(DataError, match="another lens or aperture"):
-        camera.insist_on(identity, None, 5.6)
+        camera.require_match(identity, None, 5.6)
 
 
 def test_killed_within_a_bracket_it_goes_on_there(
