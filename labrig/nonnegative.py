@@ -77,9 +77,9 @@ def _by_active_sets(columns: FloatArray, target: FloatArray, least_gain: float) 
             continue
         while (falling := np.flatnonzero(used & (trial <= 0))).size:
             # Go towards the trial until the first coefficient reaches zero; do without that one.
-            shares = solution[falling] / (solution[falling] - trial[falling])
-            solution = solution + shares.min() * (trial - solution)
-            used[falling[np.argmin(shares)]] = False
+            fractions = solution[falling] / (solution[falling] - trial[falling])
+            solution = solution + fractions.min() * (trial - solution)
+            used[falling[np.argmin(fractions)]] = False
             used &= solution > 0
             solution[~used] = 0.0
             trial = _solve(columns, target, used)

@@ -43,14 +43,14 @@ EARLIEST_S = 0.1
 
 
 class Clean(BaseModel):
-    """From when on a blank counts as clean: less than so many σ, or than that share of the range
+    """From when on a blank counts as clean: less than so many σ, or than that fraction of the range
     from black to white.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     sigmas: float = Field(4.0, gt=0)
-    share: Fraction = Field(1e-5, ge=0, lt=1)
+    fraction: Fraction = Field(1e-5, ge=0, lt=1)
 
 
 class Blank(ProtocolModel):

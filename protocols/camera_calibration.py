@@ -44,14 +44,15 @@ class CardFrames(StrEnum):
 #: The unit whose bracket tells the deviation from linearity.
 LINEARITY = "linearity"
 
-#: Shares of the range that the lit card fills: the reference exposure of brackets, flats, repeats.
+#: Fractions of the range that the lit card fills: the reference exposure of brackets, flats,
+#: repeats.
 HALF = 0.4
 #: … of a bracket: less is noise, more may clip where the lens is brightest.
 LEAST, MOST = 0.012, 0.7
 #: … of the photon transfer.
-PHOTON_SHARES = (0.03, 0.75)
+PHOTON_FRACTIONS = (0.03, 0.75)
 #: … of the linearity, into saturation.
-LINEARITY_SHARES = (0.015, 2.0)
+LINEARITY_FRACTIONS = (0.015, 2.0)
 #: After so many exposures of a bracket comes its reference again.
 REFERENCE_EVERY = 3
 DARKS_EACH = 4
@@ -110,8 +111,8 @@ class PhotonUnit:
         light_card(session)
         light, offers = card_light(session, self.reference, self.card), session.rig[CAMERA].offers()
         settings = replace(self.reference, iso=self.iso)
-        shares = np.linspace(*PHOTON_SHARES, self.levels)
-        wanted = [light.exposed(float(share), settings, offers) for share in shares]
+        fractions = np.linspace(*PHOTON_FRACTIONS, self.levels)
+        wanted = [light.exposed(float(fraction), settings, offers) for fraction in fractions]
         for shot in dict.fromkeys(wanted):
             session.perform(Shoot(CardFrames.PHOTON, shot))
             session.perform(Shoot(CardFrames.PHOTON, shot))
@@ -183,7 +184,7 @@ def linearity_bracket(
     light: CardLight, offers: CameraOffers, reference: ExposureSettings
 ) -> Sequence[ExposureSettings]:
     """Shutter times from next to nothing to what is too long."""
-    low, high = (light.exposure_s(share, reference) for share in LINEARITY_SHARES)
+    low, high = (light.exposure_s(fraction, reference) for fraction in LINEARITY_FRACTIONS)
     return [
         light.exposed(HALF, reference, offers),
         *(replace(reference, exposure_s=time_s) for time_s in _between(offers, low, high)),
@@ -200,7 +201,7 @@ def shutter_bracket(every_nth: int, f_numbers: Sequence[float | None]) -> Bracke
         shots = [light.exposed(HALF, reference, offers)]
         stopped_down = replace(reference, f_number=smallest) if smallest else reference
         for settings in dict.fromkeys([reference, stopped_down]):
-            low, high = (light.exposure_s(share, settings) for share in (LEAST, MOST))
+            low, high = (light.exposure_s(fraction, settings) for fraction in (LEAST, MOST))
             times_s = _between(offers, low, high)[::-1][::every_nth]
             shots += [replace(settings, exposure_s=time_s) for time_s in times_s]
         return shots

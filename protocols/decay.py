@@ -111,14 +111,14 @@ class DecaySettings(ProtocolModel):
         longest_s = self.longest_exposure_s(offers)
         pause_s = offers.overhead_s + MARGIN_S
         ladder, at_s = [], self.first
-        for share in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
-            exposure_s = offers.exposure_at_most(longest_s * share)
+        for fraction in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
+            exposure_s = offers.exposure_at_most(longest_s * fraction)
             ladder.append((at_s, exposure_s))
             at_s += exposure_s + pause_s
         if self.exposure == "grow":
             while at_s < self.duration:
-                for share in (1 / 16, 1):
-                    exposure_s = offers.exposure_at_most(longest_s * share)
+                for fraction in (1 / 16, 1):
+                    exposure_s = offers.exposure_at_most(longest_s * fraction)
                     ladder.append((at_s, exposure_s))
                     at_s += exposure_s + pause_s
                 at_s *= 1.5

@@ -77,7 +77,7 @@ class EmissionSpectrum(GlowSettings):
         return self
 
     @property
-    def purpose(self) -> str:
+    def role(self) -> str:
         """Of the frames of the glow."""
         return SpectrumFrames.GLOW
 
@@ -126,7 +126,7 @@ class SpectrumUnit:
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot(self.protocol.purpose, self.protocol.settings(exposure_s)))
+                    at(time_s, Shoot(self.protocol.role, self.protocol.settings(exposure_s)))
                     for time_s, exposure_s in schedule.frames()
                 ),
             ]

@@ -154,8 +154,8 @@ class ExcitationSettings(ProtocolModel):
         """Begin after lamp off and shutter time of each metering frame."""
         longest_s = max(self.longest_exposures_s(offers, self.duration))
         at_s, ladder = self.first, []
-        for share in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
-            exposure_s = offers.exposure_at_most(longest_s * share)
+        for fraction in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
+            exposure_s = offers.exposure_at_most(longest_s * fraction)
             ladder.append((at_s, exposure_s))
             at_s += exposure_s + offers.overhead_s + MARGIN_S
         return ladder
@@ -319,10 +319,10 @@ EXPOSURES_GROW = 16.0
 class _Charged(ExcitationUnit):
     """One charge and the decay after it."""
 
-    def _charge(self, session: Session, purpose: str, charge_s: float, lasting_s: float) -> None:
+    def _charge(self, session: Session, role: str, charge_s: float, lasting_s: float) -> None:
         self.rest(session)
         offers = session.rig[CAMERA].offers()
-        schedule = self._schedule(session, purpose, charge_s, lasting_s)
+        schedule = self._schedule(session, role, charge_s, lasting_s)
         longest_s = self.protocol.longest_exposures_s(offers, lasting_s)
         check_seen(session, self.protocol.first)
         charge(session, charge_s)
@@ -330,7 +330,7 @@ class _Charged(ExcitationUnit):
             [
                 *lights_out(session),
                 *(
-                    at(time_s, Shoot(purpose, self.protocol.settings(min(exposure_s, most_s))))
+                    at(time_s, Shoot(role, self.protocol.settings(min(exposure_s, most_s))))
                     for (time_s, exposure_s), most_s in zip(
                         schedule.frames(), longest_s, strict=True
                     )
@@ -338,16 +338,14 @@ class _Charged(ExcitationUnit):
             ]
         )
 
-    def _schedule(
-        self, session: Session, purpose: str, charge_s: float, lasting_s: float
-    ) -> Schedule:
+    def _schedule(self, session: Session, role: str, charge_s: float, lasting_s: float) -> Schedule:
         """Exposures by what was seen after the longest charge like this one, else by the meter."""
         protocol, offers = self.protocol, session.rig[CAMERA].offers()
         times_s = protocol.frame_times_s(lasting_s)
         longest_s = max(protocol.longest_exposures_s(offers, lasting_s))
 
         def decide() -> Schedule:
-            looked_s, frames = self._looked_at(session, purpose)
+            looked_s, frames = self._looked_at(session, role)
             found = DecayMeter([self.album.look(frame) for frame in frames]).schedule(
                 times_s, offers, longest_s, EXPOSURES_GROW, session.warn
             )
@@ -357,20 +355,20 @@ class _Charged(ExcitationUnit):
 
         return session.choose("exposure", decide, Schedule.constant(times_s, longest_s))
 
-    def _looked_at(self, session: Session, purpose: str) -> tuple[float, list[FrameRecord]]:
+    def _looked_at(self, session: Session, role: str) -> tuple[float, list[FrameRecord]]:
         """Charge time and frames of the longest charge of the kind."""
-        done = self._done(session, purpose)
+        done = self._done(session, role)
         if done:
             return max(done, key=lambda one: one[0])
-        meter = f"{purpose}-meter"
+        meter = f"{role}-meter"
         return _lit_s(session, meter), [
             f for f in session.frames(FrameRole.METER) if f.unit == meter
         ]
 
-    def _done(self, session: Session, purpose: str) -> list[tuple[float, list[FrameRecord]]]:
+    def _done(self, session: Session, role: str) -> list[tuple[float, list[FrameRecord]]]:
         """Charge time and frames of every charge of the kind so far."""
         units: dict[str, list[FrameRecord]] = {}
-        for frame in session.frames(purpose):
+        for frame in session.frames(role):
             units.setdefault(frame.unit, []).append(frame)
         return [(_lit_s(session, unit), frames) for unit, frames in units.items()]
 

@@ -44,7 +44,7 @@ class Isotropy(GlowSettings):
         return self
 
     @property
-    def purpose(self) -> str:
+    def role(self) -> str:
         """Of the frames of the glow."""
         return "isotropy"
 
@@ -104,7 +104,7 @@ class AngleUnit:
             )
         late_s = max(first_s, 0.0) - self.protocol.first
         glow = [
-            (time_s, Shoot(self.protocol.purpose, self.protocol.settings(exposure_s)))
+            (time_s, Shoot(self.protocol.role, self.protocol.settings(exposure_s)))
             for time_s, exposure_s in schedule.frames()
         ]
         session.run_sequence([at(time_s + late_s, shoot) for time_s, shoot in glow])

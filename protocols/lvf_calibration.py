@@ -39,7 +39,7 @@ class LvfFrames(StrEnum):
 
 #: What the unit without a colour filter is called by.
 NO_FILTER = "none"
-#: Shutter times of the stripes' photographs, as shares of the longest.
+#: Shutter times of the stripes' photographs, as fractions of the longest.
 STRIPES_LADDER = (1 / 512, 1 / 64, 1 / 8, 1)
 
 
@@ -108,8 +108,8 @@ class FilterUnit(SceneUnit):
     def _same(self, session: Session) -> bool:
         from .steps.strip_checks import look_alike
 
-        before = frames_of(session, self.purpose, self._unit_before)
-        strip = frames_of(session, self.purpose, filter_unit(None))
+        before = frames_of(session, self.role, self._unit_before)
+        strip = frames_of(session, self.role, filter_unit(None))
         return look_alike(self.own(session), before, strip)
 
 
@@ -134,9 +134,9 @@ class StripesUnit(SceneUnit):
         charge(session, self.charge_s)
         offers, scene = session.rig[CAMERA].offers(), self.still_life
         at_s, steps = seen_s(session) + MARGIN_S, list[Timed]()
-        for share in STRIPES_LADDER:
-            exposure_s = offers.exposure_at_most(scene.longest_s * share)
-            steps.append(at(at_s, Shoot(self.purpose, scene.settings(exposure_s))))
+        for fraction in STRIPES_LADDER:
+            exposure_s = offers.exposure_at_most(scene.longest_s * fraction)
+            steps.append(at(at_s, Shoot(self.role, scene.settings(exposure_s))))
             at_s += exposure_s + offers.overhead_s + MARGIN_S
         session.run_sequence([*lights_out(session), *steps])
         face_lamp(session)
@@ -148,7 +148,7 @@ _CARD = Arrangement("grey card")
 _ON_SAMPLE = Arrangement("grey card", "on sample")
 _BEFORE_CAMERA = Arrangement("grey card", "before camera")
 
-#: Why a scene is arranged, by the purpose of its frames.
+#: Why a scene is arranged, by the role of its frames.
 _WHY: dict[str, str] = {
     LvfFrames.CARD: "how bright the card is at every place by itself",
     LvfFrames.STRIP_ON_SAMPLE: "where the filter's strip falls on the sample",
@@ -157,7 +157,7 @@ _WHY: dict[str, str] = {
     LvfFrames.LINES_ON_SAMPLE: "mercury lines tell the wavelength of every place on the sample",
     LvfFrames.STRIPES: "the stripes glow where the camera will see the sample",
 }
-#: Kind and name of a unit, purpose of its frames, what lies where, and the kind's own keys.
+#: Kind and name of a unit, role of its frames, what lies where, and the kind's own keys.
 _Scene = tuple[type[SceneUnit], str, str, Arrangement, dict[str, Any]]
 
 
@@ -201,12 +201,10 @@ class LvfCalibration(ProtocolModel):
     def units(self) -> Sequence[Unit]:
         """All that can go wrong first: the strip and its lines; then filter by filter."""
         units: list[SceneUnit] = []
-        for kind, name, purpose, wanted, more in self._scenes():
+        for kind, name, role, wanted, more in self._scenes():
             before = units[-1].wanted if units else Arrangement()
-            why, mercury_s = _WHY[purpose], self.mercury_warm_up
-            units.append(
-                kind(self.still_life, name, purpose, wanted, before, why, mercury_s, **more)
-            )
+            why, mercury_s = _WHY[role], self.mercury_warm_up
+            units.append(kind(self.still_life, name, role, wanted, before, why, mercury_s, **more))
         return [StillDarkUnit(self.still_life), *units, PutBackUnit(units[-1].wanted)]
 
     def _scenes(self) -> Iterator[_Scene]:

@@ -51,8 +51,8 @@ class WeakerLight(BaseModel):
 
     filter: str | None = Field(None, min_length=1)
     distance: str | None = Field(None, min_length=1)
-    share: Fraction = Field(gt=0, lt=1)
-    share_sigma: Fraction = Field(0.02, ge=0, lt=1)
+    fraction: Fraction = Field(gt=0, lt=1)
+    fraction_sigma: Fraction = Field(0.02, ge=0, lt=1)
 
     @model_validator(mode="after")
     def _one_way(self) -> Self:

@@ -19,7 +19,7 @@ from .lamps import FilteredLamps
 
 FloatArray = NDArray[np.float64]
 #: Part of a light at a time.
-Share = Callable[[float], float]
+UnitFraction = Callable[[float], float]
 
 #: The room light's irradiance at the sample over the warm lamp's.
 ROOM_LIGHT = 8e-3
@@ -158,22 +158,22 @@ class Lights:
     def _unshielded(self, time_s: float) -> float:
         return 1.0 if self.shield is None else self.shield.openness(time_s)
 
-    def _lamp(self, start_s: float, end_s: float, shares: Sequence[Share]) -> FloatArray:
+    def _lamp(self, start_s: float, end_s: float, fractions: Sequence[UnitFraction]) -> FloatArray:
         """∫ shares of the lamp dt, shape (shares, 160)."""
-        total = np.zeros((len(shares), len(WAVELENGTH_NM)))
+        total = np.zeros((len(fractions), len(WAVELENGTH_NM)))
         for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
             if self.lamp.dark(left, right):
                 continue
             if self._is_still(left, right):
-                parts = [share((left + right) / 2) for share in shares]
+                parts = [fraction((left + right) / 2) for fraction in fractions]
                 total += np.outer(parts, self.lamp.exposure(left, right))
                 continue
             times_s, part_s = nodes(left, right, PANEL_FADING_S)
-            parts_s = part_s * np.array([_at(times_s, share) for share in shares])
+            parts_s = part_s * np.array([_at(times_s, fraction) for fraction in fractions])
             total += parts_s @ self.lamp.irradiance(times_s)
         return total
 
-    def _stray(self, start_s: float, end_s: float, share: Share) -> FloatArray:
+    def _stray(self, start_s: float, end_s: float, fraction: UnitFraction) -> FloatArray:
         """∫ share of what comes from everywhere dt, shape (160,)."""
         total = np.zeros_like(WAVELENGTH_NM)
         strays = self._strays
@@ -183,10 +183,10 @@ class Lights:
             middle_s = (left + right) / 2
             light = sum(stray.spectrum for stray in strays if stray.is_on(middle_s))
             if self._is_still(left, right):
-                seen_s = share(middle_s) * (right - left)
+                seen_s = fraction(middle_s) * (right - left)
             else:
                 times_s, part_s = nodes(left, right, PANEL_FADING_S)
-                seen_s = float(part_s @ _at(times_s, share))
+                seen_s = float(part_s @ _at(times_s, fraction))
             total += light * seen_s
         return total
 
@@ -194,10 +194,10 @@ class Lights:
         return all(door.is_still(start_s, end_s) for door in self._doors)
 
 
-def _at(time_s: float | FloatArray, share: Share) -> FloatArray:
+def _at(time_s: float | FloatArray, fraction: UnitFraction) -> FloatArray:
     """A share at every time."""
     times_s = np.asarray(time_s)
-    return np.array([share(at_s) for at_s in times_s.ravel().tolist()]).reshape(times_s.shape)
+    return np.array([fraction(at_s) for at_s in times_s.ravel().tolist()]).reshape(times_s.shape)
 
 
 def room_light_spectrum() -> FloatArray:

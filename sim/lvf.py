@@ -29,7 +29,7 @@ SHOULDER, SHOULDER_AWAY, SHOULDER_WIDE = 0.03, 0.8, 1.2
 WIDTHS = (0.92, 1.08)
 #: Transmission of the pass band at blue end, in the middle and at the red end.
 PEAKS = (0.42, 0.58, 0.52)
-#: Share of the bend that has one turn more.
+#: Fraction of the bend that has one turn more.
 WIGGLE = 0.15
 
 

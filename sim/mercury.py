@@ -41,10 +41,10 @@ def line_spectrum() -> FloatArray:
     spectrum = np.full_like(WAVELENGTH_NM, CONTINUUM * STRONGEST)
     for line_nm, strength in LINES:
         left = int((line_nm - WAVELENGTH_NM[0]) // CELL_NM)
-        right_share = (line_nm - WAVELENGTH_NM[left]) / CELL_NM
+        right_fraction = (line_nm - WAVELENGTH_NM[left]) / CELL_NM
         light = STRONGEST * strength / CELL_NM
-        spectrum[left] += (1 - right_share) * light
-        spectrum[left + 1] += right_share * light
+        spectrum[left] += (1 - right_fraction) * light
+        spectrum[left + 1] += right_fraction * light
     return spectrum
 
 

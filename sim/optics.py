@@ -28,7 +28,7 @@ CHANNELS = ("R", "G", "B")
 DISAGREEMENT_RMS = (0.022, 0.058)
 #: Distance of the random knots of that difference: smooth like a wrong reference diode.
 KNOTS_NM: FloatArray = np.arange(340.0, 840.0, 40.0)
-#: Share of it that is stray light and dark error, added where the curve itself is nearly zero.
+#: Fraction of it that is stray light and dark error, added where the curve itself is nearly zero.
 ADDED = 0.05
 
 #: Strengths of the random difference to look up to: one of them reaches the disagreement.

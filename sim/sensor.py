@@ -93,7 +93,7 @@ class Sensor:
     flicker
         1 σ scatter of all light between frames: shutter, aperture, lamp.
     crosstalk
-        Share of a pixel's charge that shows in each of its four neighbours instead: capacitance
+        Fraction of a pixel's charge that shows in each of its four neighbours instead: capacitance
         between pixels, which blurs the noise with the picture (A. C. Moore, Z. Ninkov, W. J.
         Forrest, Optical Engineering 45, 2006).
     row_noise
@@ -173,11 +173,11 @@ class Sensor:
         return np.clip(electrons, 0, MAX_DN).astype(np.uint16)
 
 
-def _shared_with_neighbours(electrons: Float32Array, share: float) -> Float32Array:
-    """Each pixel less `share` for each of its four neighbours; beyond the border lies its like."""
+def _shared_with_neighbours(electrons: Float32Array, fraction: float) -> Float32Array:
+    """Each pixel less `fraction` for each of its four neighbours; the border repeats."""
     bordered = np.pad(electrons, 1, mode="edge")
     around = bordered[:-2, 1:-1] + bordered[2:, 1:-1] + bordered[1:-1, :-2] + bordered[1:-1, 2:]
-    shared: Float32Array = electrons * np.float32(1 - 4 * share) + np.float32(share) * around
+    shared: Float32Array = electrons * np.float32(1 - 4 * fraction) + np.float32(fraction) * around
     return shared
 
 

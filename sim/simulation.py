@@ -72,7 +72,7 @@ class SensorSettings(Part):
     flicker
         1 σ scatter of all light between frames.
     crosstalk
-        Share of a pixel's charge that shows in each of its four neighbours instead.
+        Fraction of a pixel's charge that shows in each of its four neighbours instead.
     row_noise
         1 σ of what reading a row adds to all of its pixels, in multiples of a pixel's read noise.
     curves

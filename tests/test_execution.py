@@ -60,19 +60,19 @@ def quietly(plan: Plan, done: Sequence[str], clock: Clock) -> Iterator[RunObserv
     yield Watching()
 
 
-@pytest.mark.parametrize("share", [pytest.param(0.3, marks=pytest.mark.campaign), 0.97])
+@pytest.mark.parametrize("fraction", [pytest.param(0.3, marks=pytest.mark.campaign), 0.97])
 def test_unplugged_at_each_phase_of_a_transfer_the_decay_completes(
     quick: Path,
     make_rig: Make,
     tmp_path: Path,
     labrig: Labrig,
     monkeypatch: pytest.MonkeyPatch,
-    share: float,
+    fraction: float,
 ) -> None:
     phases = transfers(make_rig(), quick, tmp_path / "undisturbed", monkeypatch)
     assert {"command out", "data in", "middle of data in", "response in"} <= set(phases)
     for kind, places in phases.items():
-        fault = {"after_bytes": places[int(share * len(places))], "for": CAMERA_BACK}
+        fault = {"after_bytes": places[int(fraction * len(places))], "for": CAMERA_BACK}
         rig = make_rig(faults=[{"camera_unplugged": fault}])
         ended = labrig("run", quick, "--rig", rig, "--runs", tmp_path / kind, "--no-process")
         assert ended.code == 0, (kind, ended.err)

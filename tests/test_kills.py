@@ -44,7 +44,7 @@ def test_it_is_resumed_with_all_that_was_complete(
 
 
 def killed(arguments: Sequence[object], at: str) -> None:
-    """Kill it once it has told of a photograph for the purpose `at`."""
+    """Kill it once it has told of a photograph for the role `at`."""
     process = labrig(arguments)
     assert process.stderr is not None
     with process.stderr as told:

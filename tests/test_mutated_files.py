@@ -47,7 +47,7 @@ def test_a_journal_that_came_to_harm_is_read_or_refused_in_a_line(tmp_path: Path
         for unit in ("dark", "decay-1"):
             writer = folder.attempt(unit, lambda: 1.8e9, {"devices": {"camera": "a camera"}})
             writer.frame(
-                b"x", ".dng", purpose=unit, exposure_s=1.0, iso=400, f_number=4.0,
+                b"x", ".dng", role=unit, exposure_s=1.0, iso=400, f_number=4.0,
                 start_time=1.8e9, end_time=1.8e9, late_s=0.0,
             )  # fmt: skip
             writer.stop("success")

@@ -138,9 +138,9 @@ class _PlanRecorder:
     ) -> None:
         self._note(start_s, device, action, late_s)
 
-    def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
+    def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         self.frame_count += 1
-        self._note(frame.start_s, CAMERA.key, f"{purpose} frame, {frame.settings}", late_s)
+        self._note(frame.start_s, CAMERA.key, f"{role} frame, {frame.settings}", late_s)
 
     def temperature(self, celsius: float, at_s: float) -> None:
         pass
@@ -152,7 +152,7 @@ class _PlanRecorder:
         self.clock.spend(step.takes_s)
         return ""
 
-    def frames(self, purpose: str) -> Sequence[FrameRecord]:
+    def frames(self, role: str) -> Sequence[FrameRecord]:
         return ()
 
     def actions(self, device: str) -> Sequence[ActionRecord]:

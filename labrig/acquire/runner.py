@@ -141,11 +141,11 @@ class _Recorder:
         self.acted(TAKEN_BACK, last.unit, now_s, now_s, 0.0)
         self._writer.stop("abort", f"taken back: '{last.action}'; {last.unit} is done again")
 
-    def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
+    def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         record = self._writer.frame(
             frame.data,
             frame.suffix,
-            purpose=purpose,
+            role=role,
             exposure_s=frame.settings.exposure_s,
             iso=frame.settings.iso,
             f_number=frame.settings.f_number,
@@ -156,8 +156,8 @@ class _Recorder:
         self.kept.append(record)
         self._observer.frame(record)
 
-    def frames(self, purpose: str) -> Sequence[FrameRecord]:
-        return [frame for frame in self.kept if frame.purpose == purpose]
+    def frames(self, role: str) -> Sequence[FrameRecord]:
+        return [frame for frame in self.kept if frame.role == role]
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
         return [action for action in self.done if action.device == device]

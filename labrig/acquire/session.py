@@ -45,7 +45,7 @@ class Recorder(Protocol):
     ) -> None:
         """Something was switched, moved or decided; `task` as in `ActionRecord`."""
 
-    def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
+    def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         """A frame is to be kept."""
 
     def temperature(self, celsius: float, at_s: float) -> None:
@@ -54,8 +54,8 @@ class Recorder(Protocol):
     def last_by_hand(self) -> str | None:
         """What a person did last, in this unit or a completed one."""
 
-    def frames(self, purpose: str) -> Sequence[FrameRecord]:
-        """Frames with that purpose: of completed units, then of this one."""
+    def frames(self, role: str) -> Sequence[FrameRecord]:
+        """Frames with that role: of completed units, then of this one."""
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
         """What that device did, in the same units."""
@@ -198,9 +198,9 @@ class Session:
         self._recorder.acted(PERSON, said, start_s, self.clock.now(), 0.0, step.task)
         return remark
 
-    def frames(self, purpose: str) -> Sequence[FrameRecord]:
-        """Frames taken for that purpose, by completed units and by this one so far."""
-        return self._recorder.frames(purpose)
+    def frames(self, role: str) -> Sequence[FrameRecord]:
+        """Frames taken for that role, by completed units and by this one so far."""
+        return self._recorder.frames(role)
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
         """What that device did, in completed units and in this one so far."""
@@ -302,7 +302,7 @@ class Session:
             self._observer.doing(str(action))
             with device_errors(CAMERA.key):
                 frame = self.rig[CAMERA].shoot()
-            self._recorder.photographed(action.purpose, frame, late_s)
+            self._recorder.photographed(action.role, frame, late_s)
             return
         self._observer.doing(f"{action.device} {action}")
         start_s = self.clock.now()
@@ -324,8 +324,8 @@ class _PartRecorder:
         self._whole = whole
         self._part = part
 
-    def frames(self, purpose: str) -> Sequence[FrameRecord]:
-        return self._own(self._whole.frames(purpose))
+    def frames(self, role: str) -> Sequence[FrameRecord]:
+        return self._own(self._whole.frames(role))
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
         return self._own(self._whole.actions(device))

@@ -20,7 +20,7 @@ from labrig.protocols.blank import BLANK_FRAMES
 from labrig.reduce import FrameMeasurement, fit_dark, measure, read_raw, reduce_patches
 from labrig.results import BlankResult, FloatArray, Series, StrayLight
 
-#: Share of the frames, the latest ones, that tell the constant level.
+#: Fraction of the frames, the latest ones, that tell the constant level.
 LATE = 1 / 2
 #: Fewer frames tell nothing about what stays.
 FEWEST = 4
@@ -113,7 +113,7 @@ def analyse(part: Part) -> BlankResult:
         replace(measure(read_raw(frame.path), region, hot), exposure_s=frame.exposure_s)
         for frame in frames.dark
     ]
-    least_dn = protocol.clean.share * darks[0].range_dn
+    least_dn = protocol.clean.fraction * darks[0].range_dn
     found = stray_light(series, protocol.clean.sigmas, least_dn)
     leak, leak_sigma = ambient(darks)
     rows = _rows_worth_keeping(found)

@@ -60,9 +60,9 @@ def noise_parts(series: Series, channel: int, signal: FloatArray) -> FloatArray:
     variance = np.square(series.sigma[:, channel] * exposure_s)
     terms = variance_terms(series.values[:, channel] * exposure_s)
     line = NoiseModel.fit(terms, variance, sigma_dn2=variance)
-    shares = line.parts_dn2(signal * exposure_s)
-    shares /= shares.sum(axis=1, keepdims=True)
-    return np.asarray(shares * np.square(series.sigma[:, channel, np.newaxis]))
+    fractions = line.parts_dn2(signal * exposure_s)
+    fractions /= fractions.sum(axis=1, keepdims=True)
+    return np.asarray(fractions * np.square(series.sigma[:, channel, np.newaxis]))
 
 
 def analyse(part: Part) -> DecayResult:

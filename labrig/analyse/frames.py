@@ -47,7 +47,7 @@ def require_calibrated_camera(
 MOST_NAMED = 4
 
 
-def require_intact(run: RunRecord, purposes: Sequence[str], overrides: Overrides) -> None:
+def require_intact(run: RunRecord, roles: Sequence[str], overrides: Overrides) -> None:
     """Refuse frames of completed units that are missing or were changed, and are not excluded.
 
     Raises
@@ -55,16 +55,16 @@ def require_intact(run: RunRecord, purposes: Sequence[str], overrides: Overrides
     DataError
         Names them, and how to leave them out.
     """
-    require(run, damaged_frames(run, purposes), overrides)
+    require(run, damaged_frames(run, roles), overrides)
 
 
-def damaged_frames(run: RunRecord, purposes: Sequence[str]) -> dict[FrameRecord, str]:
+def damaged_frames(run: RunRecord, roles: Sequence[str]) -> dict[FrameRecord, str]:
     """Frames of completed units that are not what their checksums say, and what is wrong."""
     frames = [
         frame
         for attempt in run.completed().values()
         for frame in attempt.frames
-        if frame.purpose in purposes
+        if frame.role in roles
     ]
     return {frame: damage for frame in frames if (damage := frame.damage())}
 
@@ -93,20 +93,20 @@ def _told(damaged: Mapping[FrameRecord, str]) -> str:
     )
 
 
-def part_frames(part: Part, *purposes: str) -> list[FrameRecord]:
-    """Frames of completed units with one of the purposes, those a person excludes left out.
+def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
+    """Frames of completed units with one of the roles, those a person excludes left out.
 
     Raises
     ------
     DataError
         A frame is missing or was changed after the run.
     """
-    require_intact(part.run, purposes, part.overrides)
+    require_intact(part.run, roles, part.overrides)
     return [
         frame
         for attempt in part.run.completed().values()
         for frame in attempt.frames
-        if frame.purpose in purposes and not part.overrides.excludes(frame)
+        if frame.role in roles and not part.overrides.excludes(frame)
     ]
 
 
@@ -214,13 +214,13 @@ LATE_S = 0.05
 
 
 def intact_frames(
-    run: RunRecord, overrides: Overrides, purpose: str = FrameRole.DECAY
+    run: RunRecord, overrides: Overrides, role: str = FrameRole.DECAY
 ) -> IntactFrames:
     """Every frame held against its checksum; those after lamp off timed from it.
 
     Parameters
     ----------
-    purpose
+    role
         Of the frames of the glow.
 
     Raises
@@ -228,16 +228,16 @@ def intact_frames(
     DataError
         No decay is complete, or a frame is missing or was changed and is not excluded.
     """
-    damaged = _damaged(run, overrides, (purpose, FrameRole.DARK))
+    damaged = _damaged(run, overrides, (role, FrameRole.DARK))
     decay = [
         _flagged(frame, attempt, overrides)
         for attempt in run.completed().values()
         for frame in attempt.frames
-        if frame.purpose == purpose and frame not in damaged
+        if frame.role == role and frame not in damaged
     ]
     if not decay:
         raise DataError(
-            f"{run.folder}: no {purpose} is complete, so there is nothing to fit; go on with: "
+            f"{run.folder}: no {role} is complete, so there is nothing to fit; go on with: "
             f"labrig resume {run.folder}"
         )
     return IntactFrames(
@@ -251,28 +251,28 @@ def intact_frames(
         warnings=[
             f"{frame.path.name} {damage}; the report does without it"
             for frame, damage in damaged.items()
-            if frame.purpose == FrameRole.DAYLIGHT
+            if frame.role == FrameRole.DAYLIGHT
         ],
     )
 
 
-def steady_frames(run: RunRecord, overrides: Overrides, purpose: str) -> list[SeriesFrame]:
-    """Frames of that purpose under a steady light, each held against its checksum.
+def steady_frames(run: RunRecord, overrides: Overrides, role: str) -> list[SeriesFrame]:
+    """Frames of that role under a steady light, each held against its checksum.
 
     Raises
     ------
     DataError
         A frame is missing or was changed and is not excluded.
     """
-    damaged = _damaged(run, overrides, (purpose,))
+    damaged = _damaged(run, overrides, (role,))
     return [
         untimed(frame)
-        for frame in run.frames(purpose)
+        for frame in run.frames(role)
         if frame not in damaged and not overrides.excludes(frame)
     ]
 
 
-def timing_warnings(run: RunRecord, purpose: str = FrameRole.DECAY) -> list[str]:
+def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[str]:
     """What is odd about the times in the journal."""
     warnings = []
     if run.torn:
@@ -280,7 +280,7 @@ def timing_warnings(run: RunRecord, purpose: str = FrameRole.DECAY) -> list[str]
             "the journal's last line is torn: labrig was cut off while writing it; what it would "
             "have said does not count"
         )
-    late = [frame for frame in run.frames(purpose) if frame.late_s > LATE_S]
+    late = [frame for frame in run.frames(role) if frame.late_s > LATE_S]
     if late:
         worst = max(late, key=lambda frame: frame.late_s)
         warnings.append(
@@ -295,7 +295,7 @@ def _damaged(
 ) -> dict[FrameRecord, str]:
     """What is wrong with frames, those that are `measured` only if they are excluded."""
     damaged = damaged_frames(run, (*measured, FrameRole.DAYLIGHT))
-    require(run, {f: damage for f, damage in damaged.items() if f.purpose in measured}, overrides)
+    require(run, {f: damage for f, damage in damaged.items() if f.role in measured}, overrides)
     return damaged
 
 

@@ -38,9 +38,9 @@ def analyse(part: Part) -> IsotropyResult:
     """
     protocol, run, camera = part.protocol, part.run, part.inputs.camera
     frames, stray = without_stray_light(
-        intact_frames(run, part.overrides, protocol.purpose), part.inputs.blank
+        intact_frames(run, part.overrides, protocol.role), part.inputs.blank
     )
-    require_calibrated_camera(camera, run, run.frames(protocol.purpose))
+    require_calibrated_camera(camera, run, run.frames(protocol.role))
     regions = part.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
     flicker = TYPICAL_FLICKER if camera is None else camera.flicker
@@ -53,7 +53,7 @@ def analyse(part: Part) -> IsotropyResult:
         patches=patches,
         around=around,
         warnings=(
-            *timing_warnings(run, protocol.purpose),
+            *timing_warnings(run, protocol.role),
             *stray,
             *(
                 f"{name}: {line}" if len(patches) > 1 else line
@@ -81,9 +81,9 @@ def _angular_glow(
             continue
         log_ratio, sigma = _log_ratio(one, units[BEFORE], flicker)
         # What lamp and sample drifted by comes evenly between the two straight views.
-        share = number / (len(units) - 1)
-        log_ratio -= share * np.log(drift)
-        sigma = np.hypot(sigma, np.hypot(share * drift_sigma, abs(drift - 1) / np.sqrt(12)))
+        fraction = number / (len(units) - 1)
+        log_ratio -= fraction * np.log(drift)
+        sigma = np.hypot(sigma, np.hypot(fraction * drift_sigma, abs(drift - 1) / np.sqrt(12)))
         ratio = float(np.exp(log_ratio))
         if around:
             ratio /= float(np.cos(np.radians(angles_deg[unit])))

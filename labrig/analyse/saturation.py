@@ -59,8 +59,8 @@ def charged(kappa_per_s: float, k_per_s: float, charge_s: float) -> float:
 def charge_level(
     ratio: float,
     ratio_sigma: float,
-    share: float,
-    share_sigma: float,
+    fraction: float,
+    fraction_sigma: float,
     k_per_s: float,
     charges_s: tuple[float, float],
 ) -> ChargeLevel:
@@ -70,25 +70,25 @@ def charge_level(
     ----------
     ratio, ratio_sigma
         Amplitude after the weaker light over that after the full one.
-    share, share_sigma
+    fraction, fraction_sigma
         What is left of the light, q; its σ relative.
     charges_s
         Under the weaker and under the full light.
     """
-    r = _level(ratio, share, k_per_s, charges_s)
-    by_ratio = (_level(ratio * (1 + STEP), share, k_per_s, charges_s) - r) / STEP
-    by_share = (_level(ratio, share * (1 + STEP), k_per_s, charges_s) - r) / STEP
-    sigma = np.hypot(by_ratio * ratio_sigma / ratio, by_share * share_sigma)
+    r = _level(ratio, fraction, k_per_s, charges_s)
+    by_ratio = (_level(ratio * (1 + STEP), fraction, k_per_s, charges_s) - r) / STEP
+    by_fraction = (_level(ratio, fraction * (1 + STEP), k_per_s, charges_s) - r) / STEP
+    sigma = np.hypot(by_ratio * ratio_sigma / ratio, by_fraction * fraction_sigma)
     # At an end of the range, where nothing changes any more, the σ is that just inside.
-    least = ratio_sigma / ratio * share / (1 - share)
+    least = ratio_sigma / ratio * fraction / (1 - fraction)
     return ChargeLevel(r, float(max(sigma, least)))
 
 
-def _level(ratio: float, share: float, k_per_s: float, charges_s: tuple[float, float]) -> float:
+def _level(ratio: float, fraction: float, k_per_s: float, charges_s: tuple[float, float]) -> float:
     def excess(log_kappa: float) -> float:
         kappa = float(np.exp(log_kappa))
         weaker, full = charges_s
-        return charged(share * kappa, k_per_s, weaker) / charged(kappa, k_per_s, full) - ratio
+        return charged(fraction * kappa, k_per_s, weaker) / charged(kappa, k_per_s, full) - ratio
 
     low, high = np.log(FAINTEST * k_per_s), np.log(STRONGEST * k_per_s)
     if excess(low) >= 0:
@@ -107,8 +107,8 @@ def curve(series: Series, fit: FittedDecay) -> Curve:
     value = (y / s**2) @ weights / information
     sigma = np.hypot(1 / np.sqrt(information), fit.flicker * np.maximum(value, 0.0))
     dark = np.nan_to_num(series.dark_sigma)
-    shares = np.mean(weights / s**2, axis=0) / np.mean(information)
-    return Curve(series.t_s[rows], series.exposure_s[rows], value, sigma, float(shares @ dark))
+    fractions = np.mean(weights / s**2, axis=0) / np.mean(information)
+    return Curve(series.t_s[rows], series.exposure_s[rows], value, sigma, float(fractions @ dark))
 
 
 def flicker_dof(fit: FittedDecay) -> float:
@@ -232,7 +232,7 @@ def analyse(part: Part) -> SaturationResult:
     patches = {name: _patch(one, lasted_s, part) for name, one in series.items()}
     return SaturationResult(
         patches=patches,
-        weaker_light=weaker and Measured(weaker.share, weaker.share * weaker.share_sigma),
+        weaker_light=weaker and Measured(weaker.fraction, weaker.fraction * weaker.fraction_sigma),
         warnings=(
             *timing_warnings(run),
             *stray,
@@ -250,7 +250,7 @@ def _charges_s(run: RunRecord) -> dict[str, float]:
     units = [
         unit
         for unit, attempt in run.completed().items()
-        if any(frame.purpose == FrameRole.DECAY for frame in attempt.frames)
+        if any(frame.role == FrameRole.DECAY for frame in attempt.frames)
     ]
     return dict(zip(units, charges_s(run), strict=True))
 
@@ -294,11 +294,13 @@ def _levels(
         ratio = max(a / b, 1e-6)
         sigma = float(np.hypot(of_a / b, a / b * of_b / b))
         both_s = (charge_s[dim], charge_s[bright])
-        yield charge_level(ratio, sigma, weaker.share, weaker.share_sigma, float(k_per_s), both_s)
+        yield charge_level(
+            ratio, sigma, weaker.fraction, weaker.fraction_sigma, float(k_per_s), both_s
+        )
 
 
 def _growths(before: Curve, last: Curve) -> Iterator[Measured]:
-    """Of the glow from one decay to the next, as a share, at the begin and the end of both."""
+    """Of the glow from one decay to the next, as a fraction, at the begin and the end of both."""
     count = min(len(before.value), len(last.value))
     ratio = last.value[:count] / before.value[:count]
     sigma = np.abs(ratio) * np.hypot(

@@ -22,12 +22,12 @@ from labrig.region import Region, region_pixels
 
 
 class StripFrames:
-    """By purpose; those of completed units, as they were recorded.
+    """By role; those of completed units, as they were recorded.
 
     Raises
     ------
     DataError
-        None with a purpose that is asked for, or they are damaged, or of another camera than the
+        None with a role that is asked for, or they are damaged, or of another camera than the
         one that is known.
     """
 
@@ -36,23 +36,23 @@ class StripFrames:
         self.dark = self.of(FrameRole.DARK)
         require_calibrated_camera(part.inputs.camera, part.run, part.run.frames(FrameRole.DARK))
 
-    def of(self, purpose: str, unit: str | None = None) -> list[SeriesFrame]:
-        """Of a purpose, and of one unit where that matters."""
+    def of(self, role: str, unit: str | None = None) -> list[SeriesFrame]:
+        """Of a role, and of one unit where that matters."""
         frames = [
             frame
-            for frame in steady_frames(self._part.run, self._part.overrides, purpose)
+            for frame in steady_frames(self._part.run, self._part.overrides, role)
             if unit is None or frame.unit == unit
         ]
         if not frames:
             raise DataError(
-                f"{self._part.run.folder}: the unit {unit or purpose} is not complete; go on "
+                f"{self._part.run.folder}: the unit {unit or role} is not complete; go on "
                 f"with: labrig resume {self._part.run.folder}"
             )
         return frames
 
-    def hdr(self, purpose: str, unit: str | None = None) -> HdrFrame:
+    def hdr(self, role: str, unit: str | None = None) -> HdrFrame:
         """All of them together."""
-        return read_hdr_frame(self.of(purpose, unit), self.hot)
+        return read_hdr_frame(self.of(role, unit), self.hot)
 
     @cached_property
     def size(self) -> tuple[int, int]:
@@ -180,7 +180,7 @@ def _rows(patch: StripPatch, strip: Strip, raw: RawFrame, count: int) -> Slices:
 def tilt_offset(strip: Strip, slices: Slices, raw: RawFrame) -> FloatArray:
     """(P,) by how much further right along a tilted strip slices lie than their columns say.
 
-    0 in its middle rows; rows above and below belong to other places of it, in shares of its
+    0 in its middle rows; rows above and below belong to other places of it, in fractions of its
     length.
     """
     size = np.array([raw.width, raw.height])

@@ -27,45 +27,45 @@ class Change(_Part):
     ----------
     t_s
         From the switch, 0 first, rising.
-    share, sigma
+    fraction, sigma
         A row for each time, a number for each band; straight in between.
     """
 
     t_s: Annotated[tuple[NotNegative, ...], Field(min_length=2)]
-    share: tuple[Row, ...]
+    fraction: tuple[Row, ...]
     sigma: tuple[Row, ...]
 
     @model_validator(mode="after")
     def _fits_together(self) -> Self:
         if self.t_s[0] != 0 or any(right <= left for left, right in pairwise(self.t_s)):
             raise ValueError("expected times in 't_s' that rise from 0")
-        if len(self.share) != len(self.t_s) or len(self.sigma) != len(self.t_s):
-            raise ValueError("expected a row of 'share' and of 'sigma' for every time in 't_s'")
-        if len({len(row) for row in (*self.share, *self.sigma)}) != 1:
+        if len(self.fraction) != len(self.t_s) or len(self.sigma) != len(self.t_s):
+            raise ValueError("expected a row of 'fraction' and of 'sigma' for every time in 't_s'")
+        if len({len(row) for row in (*self.fraction, *self.sigma)}) != 1:
             raise ValueError("expected as many numbers in each row as there are bands")
         return self
 
     def missing_s(self) -> FloatArray:
-        """∫ share dt of each band, (bands,): for how long the steady lamp would give as much."""
-        steps, share = np.diff(self.t_s), np.array(self.share)
-        total: FloatArray = steps @ (share[1:] + share[:-1]) / 2
+        """∫ fraction dt of each band, (bands,): for how long the steady lamp would give as much."""
+        steps, fraction = np.diff(self.t_s), np.array(self.fraction)
+        total: FloatArray = steps @ (fraction[1:] + fraction[:-1]) / 2
         return total
 
 
 class Warming(_Part):
-    """Light of a lamp whose housing is cold: 1 − `lacks` e^(−t/`warms_s`) of the warm one's.
+    """Light of a lamp whose housing is cold, over the warm one's: 1 − d e^(−t/τ).
 
     Attributes
     ----------
     lacks, lacks_sigma
-        Share of the warm lamp's light, all wavelengths alike.
+        Fraction of the warm lamp's light, all wavelengths alike.
     warms_s
         Time constant of the housing.
     """
 
-    lacks: Annotated[float, Field(ge=0, lt=1)]
-    lacks_sigma: NotNegative
-    warms_s: Positive
+    deficit: Annotated[float, Field(ge=0, lt=1)]
+    deficit_sigma: NotNegative
+    time_constant_s: Positive
 
 
 class FadeFile(_Part):
@@ -95,16 +95,16 @@ class FadeFile(_Part):
         if any(right <= left for left, right in pairwise(self.bands_nm)):
             raise ValueError("expected rising edges in 'bands_nm'")
         bands = len(self.bands_nm) - 1
-        if any(len(one.share[0]) != bands for one in (self.fade, self.rise) if one is not None):
-            raise ValueError(f"expected {bands} numbers in each row of 'share', one a band")
+        if any(len(one.fraction[0]) != bands for one in (self.fade, self.rise) if one is not None):
+            raise ValueError(f"expected {bands} numbers in each row of 'fraction', one a band")
         return self
 
     def in_bands(self, change: Change, edges_nm: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Times (n,) and shares (n, bands) of a change in other bands, by their middles."""
+        """Times (n,) and fractions (n, bands) of a change in other bands, by their middles."""
         edges, own = np.asarray(edges_nm, dtype=np.float64), np.array(self.bands_nm)
         middles, measured = (edges[1:] + edges[:-1]) / 2, (own[1:] + own[:-1]) / 2
-        share = [np.interp(middles, measured, row) for row in change.share]
-        return np.array(change.t_s), np.array(share)
+        fraction = [np.interp(middles, measured, row) for row in change.fraction]
+        return np.array(change.t_s), np.array(fraction)
 
 
 def read_fade_file(path: Path) -> FadeFile:

@@ -33,11 +33,11 @@ MeteredOption = Annotated[
     ),
 ]
 
-#: Shares of the variance that are worth a word.
+#: Fractions of the variance that are worth a word.
 WORTH_SAYING = 0.1
 #: σ of a rate or an amplitude beyond which it is hardly known.
 HARDLY_KNOWN = 0.5
-#: Differences in lab time below this share of it are none.
+#: Differences in lab time below this fraction of it are none.
 SAME_TIME = 0.005
 
 
@@ -117,12 +117,12 @@ def _title(prediction: "Prediction", patch: str) -> str:
 
 
 def _noise(found: "PatchPrediction", state: int) -> str:
-    shares = {source: part[state] for source, part in found.budget.items()}
-    largest = sorted(shares, key=lambda source: -shares[source])
+    fractions = {source: part[state] for source, part in found.budget.items()}
+    largest = sorted(fractions, key=lambda source: -fractions[source])
     return ", ".join(
-        f"{source} {100 * shares[source]:.0f} %"
+        f"{source} {100 * fractions[source]:.0f} %"
         for source in largest
-        if shares[source] >= WORTH_SAYING
+        if fractions[source] >= WORTH_SAYING
     )
 
 
@@ -189,8 +189,8 @@ def _extra_time(remedy: "Remedy", duration_s: float) -> str:
     return f"{sign} {duration_text(abs(remedy.extra_time_s))}"
 
 
-def _percent(share: float) -> str:
-    if not share < 10:
+def _percent(fraction: float) -> str:
+    if not fraction < 10:
         return "> 1000 %"
-    percent = 100 * share
+    percent = 100 * fraction
     return f"{percent:.0f} %" if percent >= 100 else f"{percent:.2g} %"

@@ -162,7 +162,7 @@ class PlainProgress:
         self._state.frames += 1
         settings = ExposureSettings(record.exposure_s, record.iso, record.f_number)
         number = f"frame {self._state.frames} of {self._state.plan.frames}"
-        self._say(f"{number}: {record.purpose}, {settings}")
+        self._say(f"{number}: {record.role}, {settings}")
 
     def warn(self, text: str) -> None:
         """Say a warning."""

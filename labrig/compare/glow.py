@@ -25,7 +25,7 @@ def in_colour(values: FloatArray, spectrum: Spectrum, camera: CameraResponse) ->
 def glow_of(material: Material, series: Series, camera: CameraResponse | None) -> FloatArray:
     """Mean over each exposure, (n, 3), on the scale of `series`.
 
-    Rates and shares of the states are the material's: its amplitudes, else Λ_i k_r,i r_i(0) with
+    Rates and fractions of the states are the material's: its amplitudes, else Λ_i k_r,i r_i(0) with
     r_i(0) = 1 where it is not known. All states have one colour, that of its spectrum or, where
     spectrum or camera are not known, the mean colour of the photographs. One factor is found by
     least squares.

@@ -56,8 +56,8 @@ def shown_rows(glow: GlowComparison) -> NDArray[np.intp]:
     rows = np.flatnonzero(glow.first)
     if len(rows) <= COLUMNS:
         return rows
-    shares = np.linspace(0, 1, COLUMNS) ** SPREAD
-    return np.asarray(rows[np.unique(np.rint(shares * (len(rows) - 1)).astype(int))])
+    fractions = np.linspace(0, 1, COLUMNS) ** SPREAD
+    return np.asarray(rows[np.unique(np.rint(fractions * (len(rows) - 1)).astype(int))])
 
 
 def screen_colours(glow: GlowComparison) -> dict[str, FloatArray]:

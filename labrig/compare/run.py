@@ -257,7 +257,7 @@ def _whence(
         yield "The predicted colour is the one fitted to all photographs: no spectrum was measured."
     if with_material:
         yield (
-            f"Prediction '{MATERIAL}': rates, shares of the states and spectrum as in the file "
+            f"Prediction '{MATERIAL}': rates, fractions of the states and spectrum as in the file "
             "given, one factor by least squares."
         )
 

@@ -349,7 +349,7 @@ def _add_frames(camera: h5py.Group, run: RunRecord, start_time: float) -> None:
     add_text(kept, "file_name", [f"frames/{frame.path.name}" for frame in frames])
     add_text(kept, "sha256", [frame.sha256 for frame in frames])
     add_number(kept, "size", [frame.size_bytes for frame in frames], "byte")
-    add_text(kept, "purpose", [frame.purpose for frame in frames])
+    add_text(kept, "role", [frame.role for frame in frames])
     add_text(kept, "unit", [frame.unit for frame in frames])
     add_number(kept, "iso", [frame.iso for frame in frames])
     add_number(

@@ -34,7 +34,7 @@ SEARCH_STEP = 1e-7
 #: Relative step above which a stopped search has not converged.
 CONVERGED_STEP = 1e-6
 INITIAL_DAMPING = 1e-3
-#: The damping falls to this share at most after a step that does what it promised; Nielsen's 1/3
+#: The damping falls to this fraction at most after a step that does what it promised; Nielsen's 1/3
 #: takes half as many steps again.
 LEAST_RELIEF = 1 / 10
 #: Entries of the Jacobian from which the search goes by the normal equations.

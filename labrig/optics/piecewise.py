@@ -89,10 +89,10 @@ def hats(knots_nm: FloatArray, wavelength_nm: FloatArray) -> FloatArray:
     They span all piecewise-linear curves on the grid; outside of it they are zero.
     """
     left = np.clip(np.searchsorted(knots_nm, wavelength_nm, side="right") - 1, 0, len(knots_nm) - 2)
-    share = (wavelength_nm - knots_nm[left]) / (knots_nm[left + 1] - knots_nm[left])
-    inside = (share >= 0) & (share <= 1)
+    fraction = (wavelength_nm - knots_nm[left]) / (knots_nm[left + 1] - knots_nm[left])
+    inside = (fraction >= 0) & (fraction <= 1)
     values = np.zeros((len(wavelength_nm), len(knots_nm)))
     rows = np.flatnonzero(inside)
-    values[rows, left[rows]] = 1 - share[rows]
-    values[rows, left[rows] + 1] += share[rows]
+    values[rows, left[rows]] = 1 - fraction[rows]
+    values[rows, left[rows] + 1] += fraction[rows]
     return values

@@ -7,7 +7,7 @@ from typing import Annotated, Self
 import numpy as np
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labrig.finite import Share
+from labrig.finite import UnitFraction
 from labrig.region import Region, region_pixels
 
 #: Places along a strip at which pictures through it are read (paper, section 4.2).
@@ -29,8 +29,8 @@ class Strip(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    left: tuple[Share, Share]
-    right: tuple[Share, Share]
+    left: tuple[UnitFraction, UnitFraction]
+    right: tuple[UnitFraction, UnitFraction]
     height: Annotated[float, Field(gt=0, le=1)]
     rising: bool
 
@@ -71,8 +71,8 @@ class Strip(BaseModel):
         found = []
         for region in self.slices(count).values():
             x, _, wide, _ = region_pixels(region, width, height)
-            share = ((x + wide / 2) / width - self.left[0]) / (self.right[0] - self.left[0])
-            found.append(share if self.rising else 1 - share)
+            fraction = ((x + wide / 2) / width - self.left[0]) / (self.right[0] - self.left[0])
+            found.append(fraction if self.rising else 1 - fraction)
         return tuple(found)
 
     def tilt_degrees(self, width: int, height: int) -> float:

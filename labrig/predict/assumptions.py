@@ -20,8 +20,8 @@ from labrig.protocols.decay import Decay
 from labrig.quantity import TIME_S, parse
 from labrig.yaml_file import did_you_mean
 
-#: Where the first exposure has to be assumed: this share of the longest, so that it may grow.
-FIRST_EXPOSURE_SHARE = 1 / 8
+#: Where the first exposure has to be assumed: this fraction of the longest, so that it may grow.
+FIRST_EXPOSURE_FRACTION = 1 / 8
 
 
 @dataclass(frozen=True)
@@ -192,7 +192,7 @@ def _brightness(
         exposure_s, said = protocol.exposure, "assumed, as suits the protocol's exposure"
     elif exposure_s is None:
         longest_s = protocol.longest_exposure_s(offers)
-        exposure_s = offers.exposure_at_most(longest_s * FIRST_EXPOSURE_SHARE)
+        exposure_s = offers.exposure_at_most(longest_s * FIRST_EXPOSURE_FRACTION)
         said = "assumed; say --metered"
     metered = predictable(changed(model, {"exposure": "auto"}))
     factor = brightness_metered_as(metered, offers, bench, exposure_s)

@@ -60,9 +60,11 @@ def relative_glow(
             f"{material.name}: expected 'amplitude' or 'reradiation' of every state, to know how "
             "strong they are relative to each other, got neither"
         )
-    if set(weights) != set(camera.channel_shares):
+    if set(weights) != set(camera.channel_fractions):
         # Of an unknown colour only the channel with most pixels is counted on.
-        weights = {max(camera.channel_shares, key=lambda name: camera.channel_shares[name]): 1.0}
+        weights = {
+            max(camera.channel_fractions, key=lambda name: camera.channel_fractions[name]): 1.0
+        }
     settings = protocol.camera
     return Glow(
         rates(material), amplitude / amplitude.sum(), weights, settings.iso, settings.f_number

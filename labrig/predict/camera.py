@@ -23,7 +23,7 @@ TYPICAL_PIXELS = 20e6
 TYPICAL_UNEVENNESS = 1.1
 #: Shutters and apertures scatter by 0.5 to 1 % from frame to frame.
 TYPICAL_FLICKER = 0.007
-BAYER_SHARES = {"R": 0.25, "G": 0.5, "B": 0.25}
+BAYER_FRACTIONS = {"R": 0.25, "G": 0.5, "B": 0.25}
 
 
 @dataclass(frozen=True)
@@ -45,7 +45,7 @@ class CameraFigures:
     unevenness
         Brightest over mean of a patch, without noise.
     channel_shares
-        Share of the pixels that each channel has.
+        Fraction of the pixels that each channel has.
     """
 
     width: int
@@ -56,7 +56,7 @@ class CameraFigures:
     dark_electrons_per_s: float = TYPICAL_DARK_ELECTRONS_PER_S
     range_dn: float = TYPICAL_RANGE_DN
     unevenness: float = TYPICAL_UNEVENNESS
-    channel_shares: Mapping[str, float] = field(default_factory=lambda: dict(BAYER_SHARES))
+    channel_fractions: Mapping[str, float] = field(default_factory=lambda: dict(BAYER_FRACTIONS))
 
     @property
     def read_noise_dn(self) -> float:
@@ -71,7 +71,7 @@ class CameraFigures:
     def pixels(self, region: Region, channel: str) -> float:
         """Pixels of `channel` in `region`."""
         _, _, width, height = region_pixels(region, self.width, self.height)
-        return width * height * self.channel_shares[channel]
+        return width * height * self.channel_fractions[channel]
 
     def at_iso(self, iso: float) -> "CameraFigures":
         """The camera at another ISO; how its read noise changes is taken from the typical one."""

@@ -47,7 +47,7 @@ class ExpectedFrames:
 
     @property
     def photon_variance(self) -> FloatArray:
-        """(n, C) of the mean, DN²: the light's share."""
+        """(n, C) of the mean, DN²: the light's part."""
         return self.light_dn / self.camera.electrons_per_dn / self.pixels
 
     @property
@@ -68,7 +68,7 @@ class ExpectedFrames:
 
     @property
     def saturated(self) -> FloatArray:
-        """(n, C) share of the pixels that clip."""
+        """(n, C) fraction of the pixels that clip."""
         brightest = self.light_dn * self.camera.unevenness + self.dark_dn
         deviation = np.sqrt(self.variance * self.pixels)
         return np.asarray(ndtr((brightest - self.camera.range_dn) / deviation))

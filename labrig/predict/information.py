@@ -26,7 +26,7 @@ class Information:
     covariance
         (2m, 2m); infinite variances where the frames say nothing.
     budget
-        By source, (2m,) its share of each variance; they add up to 1.
+        By source, (2m,) its fraction of each variance; they add up to 1.
     """
 
     covariance: FloatArray

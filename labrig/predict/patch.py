@@ -63,7 +63,7 @@ class PatchPrediction:
     k_r_sigma_per_s, amplitude_sigma_dn_per_s
         (m,) standard uncertainties; infinite where the frames say nothing.
     budget
-        By source of noise, (m,) share of each rate's variance.
+        By source of noise, (m,) fraction of each rate's variance.
     chance_of_all_states
         That the fit tells as many states as there are; 1 if the protocol gives their number.
     least_apart

@@ -109,7 +109,7 @@ def read_reference(place: Path) -> Reference:
             ),
             range_dn=seen.range_dn,
             unevenness=float(max((brightest.peak - noise_dn) / brightest.mean, 1.0)),
-            channel_shares={name: stats.n / pixels for name, stats in seen.channels.items()},
+            channel_fractions={name: stats.n / pixels for name, stats in seen.channels.items()},
         ),
         f_number=frame.f_number,
         flicker=fit.flicker if fit.flicker_sigma < FLICKER_KNOWN * fit.flicker else None,

@@ -12,7 +12,8 @@ from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
 from labrig.written_numbers import plus_minus, rounded
 from labrig.yaml_file import read_yaml
 
-#: Moves of less than this share of a parameter's σ, and changes of σ by less, are not worth a word.
+#: Moves of less than this fraction of a parameter's σ, and changes of σ by less, are not worth a
+#: word.
 WORTH_SAYING = 0.01
 
 Parameters = dict[str, tuple[float, float]]

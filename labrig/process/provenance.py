@@ -36,7 +36,7 @@ class Provenance(BaseModel):
     camera
         Name of the curves that coloured the report's pictures.
     frames
-        How many went in, by purpose.
+        How many went in, by role.
     excluded
         Names of the frames a person left out.
     optics
@@ -69,7 +69,7 @@ def provenance(
         states=overrides.states or getattr(protocol, "states", "auto"),
         fixed_rates_per_s=overrides.fixed_rates_per_s,
         camera=camera,
-        frames=dict(Counter(frame.purpose for frame in frames if not overrides.excludes(frame))),
+        frames=dict(Counter(frame.role for frame in frames if not overrides.excludes(frame))),
         excluded=tuple(frame.path.name for frame in frames if overrides.excludes(frame)),
         optics=dict(overrides.optics),
     )

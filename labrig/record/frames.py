@@ -30,7 +30,7 @@ class FrameRecord:
     ----------
     path
         The file, as the camera delivered it.
-    unit, purpose
+    unit, role
         Which unit took it, and what for: a `FrameRole`, or one of its protocol's own.
     start_time, end_time
         Measured begin and end of the exposure.
@@ -44,7 +44,7 @@ class FrameRecord:
     sha256: str
     size_bytes: int
     unit: str
-    purpose: str
+    role: str
     exposure_s: float
     iso: int
     f_number: float | None

@@ -67,7 +67,7 @@ def in_roles(run: RunRecord, roles: Collection[str]) -> list[FrameRecord]:
         frame
         for attempt in run.completed().values()
         for frame in attempt.frames
-        if frame.purpose in roles
+        if frame.role in roles
     ]
 
 
@@ -95,7 +95,7 @@ def charges_s(run: RunRecord) -> tuple[float, ...]:
     return tuple(
         sum(_shining_s(attempt, decay[0].start_time))
         for attempt in run.completed().values()
-        if (decay := [frame for frame in attempt.frames if frame.purpose == FrameRole.DECAY])
+        if (decay := [frame for frame in attempt.frames if frame.role == FrameRole.DECAY])
     )
 
 

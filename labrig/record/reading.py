@@ -86,13 +86,13 @@ class RunRecord:
         own = [_within(name, attempt) for attempt in self.completed().values()]
         return replace(self, attempts=[attempt for attempt in own if attempt is not None])
 
-    def frames(self, purpose: str) -> list[FrameRecord]:
-        """Frames with that purpose, of completed units only."""
+    def frames(self, role: str) -> list[FrameRecord]:
+        """Frames with that role, of completed units only."""
         return [
             frame
             for attempt in self.completed().values()
             for frame in attempt.frames
-            if frame.purpose == purpose
+            if frame.role == role
         ]
 
     def temperatures(self) -> list[TemperatureRecord]:

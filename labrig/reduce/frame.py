@@ -189,9 +189,9 @@ def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
     for y, x in np.ndindex(side, side):
         position = raw.cfa_side * (y % raw.cfa_side) + x % raw.cfa_side
         letter, black = raw.cfa[position], np.float32(raw.black[position])
-        share = np.float32(len(raw.cfa) / side**2 / raw.cfa.count(letter))
+        fraction = np.float32(len(raw.cfa) / side**2 / raw.cfa.count(letter))
         plane = raw.mosaic[y : side * rows : side, x : side * columns : side]
-        picture[..., raw.channels.index(letter)] += (plane - black) * share
+        picture[..., raw.channels.index(letter)] += (plane - black) * fraction
     return picture
 
 

@@ -47,10 +47,10 @@ _SIGNIFICANT = 4.0
 #: Correlation with some neighbour below which there is none worth a correction.
 _CLEAR = 0.05
 #: Spread over the tiles of ln(C(0)/variance by differences). Shared noise raises it alike in all
-#: (0.2 to 0.6 with noise made for the purpose), detail of a scene does not (1.6 to 2.9 in photos).
+#: (0.2 to 0.6 with noise made for the role), detail of a scene does not (1.6 to 2.9 in photos).
 _UNIFORM = 1.0
-#: Share of the nearest neighbours' correlation that may remain at the far lags.
-_FAR_SHARE = 0.15
+#: Fraction of the nearest neighbours' correlation that may remain at the far lags.
+_FAR_FRACTION = 0.15
 #: Chance scatters the variance of a tile by a quarter: at this multiple it has structure in it.
 _ROUGH = 2.0
 #: |ln| of a tile's variance over the line's beyond which it says nothing about the line.
@@ -265,7 +265,7 @@ def _correlation(autocovariance: Floats, line: Floats) -> float:
     scatter = np.sqrt(np.pi / 2 / len(noisy)) / TILE
     excess = 2 * float(near.sum())
     significant = excess > _SIGNIFICANT * 2 * scatter * np.sqrt(len(near)) and near.max() > _CLEAR
-    reaches_far = np.abs(far).max() > max(_FAR_SHARE * near.max(), 3 * scatter)
+    reaches_far = np.abs(far).max() > max(_FAR_FRACTION * near.max(), 3 * scatter)
     return 1 + excess if significant and not reaches_far else 1.0
 
 

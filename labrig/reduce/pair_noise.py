@@ -33,8 +33,9 @@ FEWEST_DOF = 50
 #: Brightness in σ of the mean from which the frames of a pair are brought to the same; what does
 #: not stand out of the noise has no structure that does.
 SCALED_SIGMAS = 5.0
-#: Least share of the σ that a frame by itself says: frames without noise are no measurement of it.
-LEAST_SHARE = 0.1
+#: Least fraction of the σ that a frame by itself says: frames without noise are no measurement of
+#: it.
+LEAST_FRACTION = 0.1
 #: Rounds in which the weights follow the noise found.
 REWEIGHTINGS = 4
 #: Keeps a correlation from being 1 to the last digit.
@@ -235,7 +236,7 @@ def _sigma_of_means(
     terms = variance_terms(light)
     of_pair = terms[other] + np.square(scale)[:, np.newaxis] * terms[one]
     variance = np.square(sigma)
-    least = LEAST_SHARE**2 * variance
+    least = LEAST_FRACTION**2 * variance
     for _ in range(REWEIGHTINGS):
         expected = variance[other] + np.square(scale) * variance[one]
         noise = NoiseModel.fit(of_pair, scatter, sigma_dn2=expected)

@@ -67,7 +67,7 @@ def calibrated(
     )
 
 
-#: Share by which the dark current changes when the sensor is two degrees warmer than in the dark
+#: Fraction by which the dark current changes when the sensor is two degrees warmer than in the dark
 #: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before
 #: the decay, and 20 min of warming up leave a camera a degree or two to go.
 TWO_DEGREES = 2 ** (2 / 6) - 1

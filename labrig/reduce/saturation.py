@@ -43,13 +43,13 @@ def counted(
     return occur, counts[occur]
 
 
-#: Share of a region's pixels, of one colour, that may be saturated; see `is_clipped`.
-CLIPPED_SHARE = 0.001
+#: Fraction of a region's pixels, of one colour, that may be saturated; see `is_clipped`.
+CLIPPED_FRACTION = 0.001
 
-#: Share of the range above black below which no sensor is full, whatever piles up there.
+#: Fraction of the range above black below which no sensor is full, whatever piles up there.
 _LEAST_FULL = 0.5
-#: A plateau holds this share of the frame's pixels, and so many of them, …
-_LEAST_SHARE = 1e-4
+#: A plateau holds this fraction of the frame's pixels, and so many of them, …
+_LEAST_FRACTION = 1e-4
 _LEAST_PIXELS = 50
 #: … that many times as many as any of the levels next below it,
 _STANDS_OUT = 10
@@ -72,7 +72,7 @@ def is_clipped(saturated: npt.ArrayLike, pixels: npt.ArrayLike) -> npt.NDArray[n
     saturated, pixels
         How many pixels of one colour are at white or above, of how many.
     """
-    return np.asarray(np.asarray(saturated) > CLIPPED_SHARE * np.asarray(pixels))
+    return np.asarray(np.asarray(saturated) > CLIPPED_FRACTION * np.asarray(pixels))
 
 
 def clip_level(mosaic: Mosaic, black: float, white: float) -> float:
@@ -87,7 +87,7 @@ def clip_level(mosaic: Mosaic, black: float, white: float) -> float:
     """
     highest = int(mosaic.max())
     lowest = black + _LEAST_FULL * (white - black)
-    least = max(_LEAST_SHARE * mosaic.size, _LEAST_PIXELS)
+    least = max(_LEAST_FRACTION * mosaic.size, _LEAST_PIXELS)
     if not lowest < highest < white or np.count_nonzero(mosaic == highest) < least:
         return white  # nearly every frame: the histogram would take ten times as long
     counts = histogram(mosaic)

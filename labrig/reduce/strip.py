@@ -17,20 +17,21 @@ from labrig.results import FloatArray, SliceValues, StripProfile
 
 #: Lit is what is brighter than so many times the noise of the dark surroundings,
 SEEN_SIGMA = 6.0
-#: than this share of the brightest light near by,
+#: than this fraction of the brightest light near by,
 EDGE = 0.4
-#: and than this share of the brightest of all: less is stray light.
+#: and than this fraction of the brightest of all: less is stray light.
 FAINTEST = 3e-4
-#: How near, as a share of the frame's width. Along the strip the light may double within it.
+#: How near, as a fraction of the frame's width. Along the strip the light may double within it.
 NEAR = 0.01
 #: Regions read upright along a strip that is tilted more would be of too many wavelengths.
 MOST_TILT_DEGREES = 5.0
-#: A strip is so many times as long as it is high, and fills this share of the frame at the least.
+#: A strip is so many times as long as it is high, and fills this fraction of the frame at the
+#: least.
 LEAST_ELONGATION = 2.0
-LEAST_SHARE = 0.005
+LEAST_FRACTION = 0.005
 #: How much of the rectangle is lit; more than all is rounding.
 FULL = (0.9, 1.1)
-#: Left out at each long side and at each end, as shares of the strip's height and length.
+#: Left out at each long side and at each end, as fractions of the strip's height and length.
 LONG_MARGIN, END_MARGIN = 0.12, 0.01
 #: A slice is two pixels wide at the least: a cell of the colour filter.
 _LEAST_SLICE = 2
@@ -98,7 +99,7 @@ def find_strip(frame: HdrFrame) -> FoundStrip:
             "the frames are too short"
         )
     (middle_x, middle_y), across, down, angle = _rectangle(lit)
-    if across * down < LEAST_SHARE * width * height or across < LEAST_ELONGATION * down:
+    if across * down < LEAST_FRACTION * width * height or across < LEAST_ELONGATION * down:
         raise DataError(
             f"expected a long strip on a dark ground, found {across:.0f} x {down:.0f} pixels that "
             "are lit; keep other light away and the holder round the filter dark"

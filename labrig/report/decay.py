@@ -131,7 +131,7 @@ def steady(series: Series) -> Steady | None:
 #: With more patches than this, photographs show their numbers and not their names.
 NAMES_ON_PHOTOGRAPH = 3
 #: Photographs of the glow: dense where it changes most.
-GLOW_SHARES = (0.0, 0.03, 0.09, 0.22, 0.5, 1.0)
+GLOW_FRACTIONS = (0.0, 0.03, 0.09, 0.22, 0.5, 1.0)
 
 
 @dataclass(frozen=True)
@@ -174,7 +174,7 @@ def render(result: DecayResult, source: Source) -> Rendered:
         about=source.about,
         patches=tuple(_reported(name, one) for name, one in result.patches.items()),
         frames=tuple(frames),
-        daylight=tuple(frame for frame in frames if frame.purpose == FrameRole.DAYLIGHT),
+        daylight=tuple(frame for frame in frames if frame.role == FrameRole.DAYLIGHT),
         glow=_glow(frames, first),
         camera=source.camera,
         charges_s=result.charges_s,
@@ -235,7 +235,7 @@ def _glow(frames: Sequence[FrameRecord], series: Series) -> tuple[GlowPhotograph
     by_name = {frame.path.name: frame for frame in frames}
     first = series.by_unit()[0]
     last = len(first.frame) - 1
-    chosen = sorted({round(share * last) for share in GLOW_SHARES})
+    chosen = sorted({round(fraction * last) for fraction in GLOW_FRACTIONS})
     return tuple(GlowPhotograph(by_name[first.frame[row]], float(first.t_s[row])) for row in chosen)
 
 

@@ -110,9 +110,9 @@ def _sigma(fit: FittedDecay, t_s: FloatArray, exposure_s: FloatArray) -> FloatAr
 TIME_LABEL = "Time after lamp off / s"
 SIGNAL_LABEL = "Signal / (DN/s)"
 HEIGHT_PT = 256.0
-#: A logarithmic axis begins at this share of the noise at the end of the decay, and spans no more
-#: than so many decades: below is nothing but the noise's chance zeros.
-SHARE_OF_NOISE = 0.5
+#: A logarithmic axis begins at this fraction of the noise at the end of the decay, and spans no
+#: more than so many decades: below is nothing but the noise's chance zeros.
+FRACTION_OF_NOISE = 0.5
 MOST_DECADES = 6.0
 #: Highest values from here to there are written without a power of ten.
 PLAIN_FROM, PLAIN_TO = 0.02, 1e5
@@ -174,7 +174,7 @@ def log_axis_ends(series: Series) -> tuple[float, float]:
     positive = float(series.values[series.values > 0].min())
     late = np.argsort(series.t_s, kind="stable")[-max(1, len(series.t_s) // 4) :]
     noise = series.sigma[late][np.isfinite(series.sigma[late])]
-    floor = SHARE_OF_NOISE * float(np.median(noise)) if noise.size else 0.0
+    floor = FRACTION_OF_NOISE * float(np.median(noise)) if noise.size else 0.0
     low = max(positive * 0.7, floor, highest * 10.0**-MOST_DECADES)
     return min(low, highest / 10), highest * 1.6
 
@@ -356,8 +356,8 @@ def _residual_legend(figure: Figure, series: Series) -> None:
 
 
 NOISE_HEIGHT_PT = 268.0
-#: Parts below this share of the whole are not worth their line.
-LEAST_SHARE = 0.03
+#: Parts below this fraction of the whole are not worth their line.
+LEAST_FRACTION = 0.03
 _LINES: dict[str, tuple[str, LineStyle]] = {
     "photons": (OTHER_CHANNELS[1], "-"),
     "reading": (OTHER_CHANNELS[2], DASHED),
@@ -378,7 +378,7 @@ def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
         "flicker": budget.flicker,
         "dark level": budget.dark_level,
     }
-    worth = LEAST_SHARE * budget.together
+    worth = LEAST_FRACTION * budget.together
     return {name: part for name, part in parts.items() if (part > worth).any()}
 
 
@@ -396,7 +396,7 @@ def noise_figure(budget: NoiseBudget) -> Figure:
         percent, (colour, style) = 100 * part, _LINES[name]
         axes.plot(budget.t_s, percent, color=colour, linewidth=1.2, linestyle=style)
         entries.append(lined(name, colour, style))
-        shown.append(percent[percent > LEAST_SHARE * together])
+        shown.append(percent[percent > LEAST_FRACTION * together])
     low, high = min(part.min() for part in shown), max(part.max() for part in shown)
     axes.set_ylim(0.8 * low, 1.3 * max(min(high, MOST_PERCENT), together.min()))
     mark_decades(axes)

@@ -224,7 +224,7 @@ def spectrum_figure(
 
 def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
     """Several spectra, each of its own integral, so that only their shapes differ."""
-    figure, axes = _axes("Share of the emission per 10 nm / %")
+    figure, axes = _axes("Fraction of the emission per 10 nm / %")
     entries = []
     for number, (name, spectrum) in enumerate(spectra.items()):
         colour, marker = _colour_and_marker(number)

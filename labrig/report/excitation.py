@@ -270,11 +270,11 @@ def closure_figure(closure: Closure) -> Figure:
         upper.xaxis.set_minor_locator(NullLocator())
     upper.xaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
     full = float(np.sqrt(np.mean(predicted**2))) or 1.0
-    share, share_sigma = 100 * (measured - predicted) / full, 100 * closure.sigma / full
+    fraction, fraction_sigma = 100 * (measured - predicted) / full, 100 * closure.sigma / full
     lower.axhline(0, color=MUTED, linewidth=1.2)
-    error_bars(lower, charge_s, share, share_sigma, INK)
-    points(lower, charge_s, share, "o", INK, INK, size=3.0)
-    reach = 1.15 * float(np.max(np.abs(share) + share_sigma))
+    error_bars(lower, charge_s, fraction, fraction_sigma, INK)
+    points(lower, charge_s, fraction, "o", INK, INK, size=3.0)
+    reach = 1.15 * float(np.max(np.abs(fraction) + fraction_sigma))
     lower.set_ylim(-reach, reach)
     lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
     lower.set_ylabel("Deviation / %")

@@ -28,7 +28,7 @@ COLOURS = (CHANNEL["B"], OTHER_CHANNELS[2], CHANNEL["G"], OTHER_CHANNELS[1], CHA
 
 
 def render(result: FadeResult, source: Source) -> Rendered:
-    """Show the shares over time, how they were fitted, and the light while the housing warms."""
+    """Show the fractions over time, how they were fitted, and the light while the housing warms."""
     file = result.calibration
     changes = [("fade", file.fade, result.fade)]
     if file.rise is not None and result.rise is not None:
@@ -44,7 +44,7 @@ def _changes(file: FadeFile, changes: list[tuple[str, Change, LampChange]]) -> S
     figures = tuple(
         Picture(
             name,
-            partial(_shares, file, table),
+            partial(_fractions, file, table),
             f"The lamp's light over that of the steady lamp during its {name}, in some bands; "
             "pale: ± 1 σ.",
         )
@@ -65,43 +65,43 @@ def _changes(file: FadeFile, changes: list[tuple[str, Change, LampChange]]) -> S
     return Section(
         "How the lamp goes dark and comes on",
         (
-            "ln share = −u(t) (550 nm/λ)^p for all wavelengths, u(t) smooth; p is 1 for a glowing "
-            "body. What happens before the first shutter opens follows from the share of 1 (or 0) "
-            "at the switch and from what comes after.",
+            "ln fraction = −u(t) (550 nm/λ)^p for all wavelengths, with u(t) smooth; p is 1 for a "
+            "black-body emitter. What happens before the first shutter opens is constrained by the "
+            "fraction of 1 (or 0) at the switch and by the later frames.",
         ),
         figures,
         (Table(head, rows, "Lag: by how much shutters opened later than recorded."),),
     )
 
 
-def _shares(file: FadeFile, table: Change) -> Figure:
+def _fractions(file: FadeFile, table: Change) -> Figure:
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
-    share, sigma = np.array(table.share), np.array(table.sigma)
+    fraction, sigma = np.array(table.fraction), np.array(table.sigma)
     time_ms = 1e3 * np.array(table.t_s)
-    bands = share.shape[1]
+    bands = fraction.shape[1]
     shown = sorted(set(np.linspace(0, bands - 1, min(bands, len(COLOURS))).round().astype(int)))
     entries = []
     for band, colour in zip(shown, COLOURS, strict=False):
         low, high = file.bands_nm[band], file.bands_nm[band + 1]
         axes.fill_between(
-            time_ms, share[:, band] - sigma[:, band], share[:, band] + sigma[:, band],
+            time_ms, fraction[:, band] - sigma[:, band], fraction[:, band] + sigma[:, band],
             color=colour, alpha=0.3, linewidth=0,
         )  # fmt: skip
-        axes.plot(time_ms, share[:, band], color=colour, linewidth=1.2)
+        axes.plot(time_ms, fraction[:, band], color=colour, linewidth=1.2)
         entries.append(lined(f"{low:g}–{high:g} nm", colour))
     axes.set_xlabel("Time after the switch / ms")
-    axes.set_ylabel("Share of the steady lamp")
+    axes.set_ylabel("Fraction of the steady lamp")
     legend_above(figure, entries, columns=3)
     return figure
 
 
 def _warming(warm: Warming, seen: WarmingLight) -> Section:
-    lacks = plus_minus(100 * warm.lacks, 100 * warm.lacks_sigma)
+    deficit = plus_minus(100 * warm.deficit, 100 * warm.deficit_sigma)
     text = (
-        f"After ten minutes in the dark the lamp lacks {lacks} % of its light; that comes as its "
-        f"housing warms, with a time constant of {warm.warms_s:.0f} s. Short charges are that much "
-        "weaker."
+        f"After ten minutes in the dark the lamp has {deficit} % less light than when warm. The "
+        f"deficit decays with a time constant of {warm.time_constant_s:.0f} s as the housing "
+        "warms, and weakens short charges."
     )
     caption = "Light on the card, by photograph; line: 1 − d e^(−t/τ)."
     return Section(
@@ -115,7 +115,7 @@ def _warming_figure(warm: Warming, seen: WarmingLight) -> Figure:
     figure = new_figure(180)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
     grid = np.linspace(0, float(seen.t_s.max()), 201)
-    axes.plot(grid, 100 * (1 - warm.lacks * np.exp(-grid / warm.warms_s)), color=INK)
+    axes.plot(grid, 100 * (1 - warm.deficit * np.exp(-grid / warm.time_constant_s)), color=INK)
     points(axes, seen.t_s, 100 * seen.light, "o", INK, INK, size=3.0)
     axes.set_xlabel("Time after switching on / s")
     axes.set_ylabel("Light / % of warm")
@@ -139,6 +139,6 @@ def _lines(changes: list[tuple[str, Change, LampChange]]) -> Iterator[str]:
 
 def _warming_line(warm: Warming) -> str:
     return (
-        f"a cold lamp lacks {plus_minus(100 * warm.lacks, 100 * warm.lacks_sigma)} % of its "
-        f"light, which comes with a time constant of {warm.warms_s:.0f} s"
+        f"a cold lamp lacks {plus_minus(100 * warm.deficit, 100 * warm.deficit_sigma)} % of its "
+        f"light, which comes with a time constant of {warm.time_constant_s:.0f} s"
     )

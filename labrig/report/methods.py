@@ -24,7 +24,7 @@ def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None)
     """From the charge to the values, a sentence each."""
     how = "simulated" if report.about.simulated else "measured"
     yield f"The decay of the phosphorescence of {report.about.title} was {how} with labrig."
-    decays = [frame for frame in report.frames if frame.purpose == FrameRole.DECAY]
+    decays = [frame for frame in report.frames if frame.role == FrameRole.DECAY]
     if decays:
         yield from _charge(report, decays)
         yield from _frames(report, sensor, decays)
@@ -117,8 +117,8 @@ def _sizes(report: DecayReport, sensor: Sensor | None) -> str:
 
 
 def _dark(report: DecayReport) -> Iterator[str]:
-    darks = [frame for frame in report.frames if frame.purpose == FrameRole.DARK]
-    decays = [frame for frame in report.frames if frame.purpose == FrameRole.DECAY]
+    darks = [frame for frame in report.frames if frame.role == FrameRole.DARK]
+    decays = [frame for frame in report.frames if frame.role == FrameRole.DECAY]
     if report.background is not None:
         yield "The level of a dark region of the same frame was subtracted from each."
     elif darks and decays:
@@ -136,8 +136,8 @@ def _left_out(report: DecayReport) -> Iterator[str]:
     out = len(flags) - sum(int(patch.series.usable.sum()) for patch in report.patches)
     clipped = sum("clipped" in flag for flag in flags)
     if out:
-        share = "" if clipped == out else f", {clipped} of them"
-        why = f"{share} because pixels were saturated" if clipped else ""
+        fraction = "" if clipped == out else f", {clipped} of them"
+        why = f"{fraction} because pixels were saturated" if clipped else ""
         yield f"{out} of {len(flags)} {all_of} were left out{why}."
 
 

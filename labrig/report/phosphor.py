@@ -101,7 +101,7 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
     frames = [frame for attempt in source.run.completed().values() for frame in attempt.frames]
     screen = screen_for(source.camera)
     daylight = daylight_picture(
-        [one for one in frames if one.purpose == FrameRole.DAYLIGHT], (), screen
+        [one for one in frames if one.role == FrameRole.DAYLIGHT], (), screen
     )
     return Section(
         "The material as measured",

@@ -28,10 +28,10 @@ from labrig.written_numbers import exposure_text, rounded
 
 DAYLIGHT_WIDTH = 1000
 GLOW_WIDTH = 420
-#: Share of all pixels that may be saturated in a daylight photograph that counts as well exposed;
-#: for display only.
-BLOWN_SHARE = 0.002
-#: Share of saturated pixels from which a spot is shown as saturated; for display only.
+#: Fraction of all pixels that may be saturated in a daylight photograph that counts as well
+#: exposed; for display only.
+CLIPPED_FRACTION = 0.002
+#: Fraction of saturated pixels from which a spot is shown as saturated; for display only.
 BLOWN_LOOKS = 0.5
 #: What is shown at full brightness: this quantile of the pixels, so that hot ones do not decide.
 BRIGHT_QUANTILE = 0.995
@@ -110,7 +110,7 @@ def daylight_picture(
         if raw is None:
             continue
         blown = float(LinearFrame(raw).is_saturated().mean())
-        if best is not None and blown > BLOWN_SHARE:
+        if best is not None and blown > CLIPPED_FRACTION:
             break
         best = frame, raw
     if best is None:

@@ -75,7 +75,7 @@ class DecayReport:
     patches
         One or more.
     frames
-        All of them; those of the purpose `decay` tell the timing.
+        All of them; those of the role `decay` tell the timing.
     daylight
         Photographs under the lamp, of different exposures: the best exposed one is shown.
     glow

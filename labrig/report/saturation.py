@@ -120,8 +120,8 @@ def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Sect
     )
 
 
-def _percent(share: float) -> str:
-    return f"{share:.1%}".replace("-", "−")
+def _percent(fraction: float) -> str:
+    return f"{fraction:.1%}".replace("-", "−")
 
 
 def _rates_table(test: RatesTest, units: tuple[str, ...]) -> Table:

@@ -50,7 +50,7 @@ def frame_timings(
     return tuple(
         FrameTiming(frame.path.name, frame.unit, t_s[frame.path.name], frame.late_s)
         for frame in frames
-        if frame.purpose == FrameRole.DECAY and frame.path.name in t_s
+        if frame.role == FrameRole.DECAY and frame.path.name in t_s
     )
 
 

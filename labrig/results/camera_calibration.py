@@ -68,7 +68,7 @@ class PhotonTransfer:
     reduced_chi2: float
 
     @property
-    def shares(self) -> bool:
+    def neighbours_share_noise(self) -> bool:
         """Whether neighbours evidently share noise."""
         return self.shared > EVIDENT_SIGMAS * self.shared_sigma
 

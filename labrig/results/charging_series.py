@@ -27,15 +27,15 @@ class Transient:
     ----------
     duration_s
         (m,) of steps from the switch on.
-    share
+    fraction
         (m, B) mean irradiance during each over the steady lamp's.
     """
 
     duration_s: FloatArray
-    share: FloatArray
+    fraction: FloatArray
 
     @classmethod
-    def sampled(cls, t_s: ArrayLike, share: ArrayLike) -> Self:
+    def sampled(cls, t_s: ArrayLike, fraction: ArrayLike) -> Self:
         """From samples: (m + 1,) rising times from the switch, 0 first, and (m + 1, B) values.
 
         Raises
@@ -43,7 +43,7 @@ class Transient:
         FitError
             Times that do not rise from 0, or shapes that do not go together.
         """
-        times, values = np.asarray(t_s, dtype=np.float64), np.asarray(share, dtype=np.float64)
+        times, values = np.asarray(t_s, dtype=np.float64), np.asarray(fraction, dtype=np.float64)
         rising = times.ndim == 1 and len(times) > 1 and times[0] == 0 and (np.diff(times) > 0).all()
         if not rising or values.ndim != 2 or len(values) != len(times):
             raise FitError(
@@ -165,7 +165,7 @@ class ChargingSeries:
         """
         shots = sum(len(charge.start_s) for charge in self.charges)
         sites, bands = self.irradiance.shape
-        lamp = (self.rise.share.shape[1], self.fade.share.shape[1])
+        lamp = (self.rise.fraction.shape[1], self.fade.fraction.shape[1])
         if (
             self.values.shape != self.sigma.shape
             or self.values.shape[:2] != (shots, sites)

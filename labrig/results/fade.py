@@ -19,7 +19,7 @@ class SwitchedFrames:
     start_s, exposure_s
         (n,) begins after the switch as recorded, and shutter times.
     light_s, light_sigma_s
-        (n, S) ∫ of the share of the steady lamp over the exposure, in s; NaN where it clips.
+        (n, S) ∫ of the fraction of the steady lamp over the exposure, in s; NaN where it clips.
     steady_dn_per_s
         (S,) signal of the steady lamp.
     clipped
@@ -36,7 +36,7 @@ class SwitchedFrames:
 
 @dataclass(frozen=True, eq=False)
 class FittedShape:
-    """One course of u(t) in ln share = −u(t) (550 nm/λ)^p that may explain the frames.
+    """One course of u(t) in ln fraction = −u(t) (550 nm/λ)^p that may explain the frames.
 
     Attributes
     ----------

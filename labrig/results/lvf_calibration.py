@@ -59,7 +59,7 @@ class LocatedLines:
     rising
         Whether the wavelength grows with the position, from left to right.
     explained
-        Share of the profile's variance that the lines and a straight background explain.
+        Fraction of the profile's variance that the lines and a straight background explain.
     """
 
     wavelength_nm: FloatArray

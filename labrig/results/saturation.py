@@ -125,8 +125,8 @@ class PatchSaturation:
     rates
         What sharing the rates costs them.
     growth_at_begin, growth_at_end
-        Of the glow between the last two charges under the full light, as a share, at the begin and
-        at the end of their decays, where slow states show.
+        Of the glow between the last two charges under the full light, as a fraction, at the begin
+        and at the end of their decays, where slow states show.
     levels
         Of every state by falling rate; none without a weaker light.
     """

@@ -32,9 +32,9 @@ class PictureStats:
     width, height
         In pixels of the live picture.
     histogram
-        Red, green, blue: share of the pixels in each bin; the bins span 0 to 255.
+        Red, green, blue: fraction of the pixels in each bin; the bins span 0 to 255.
     clipped
-        Red, green, blue: share of the pixels at `CLIPPED_FROM` or above.
+        Red, green, blue: fraction of the pixels at `CLIPPED_FROM` or above.
     focus
         Of the whole picture, see `sharpness`.
     region_focus, region_clipped

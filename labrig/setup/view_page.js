@@ -135,8 +135,8 @@ function drawHistogram(histogram) {
   histogram.forEach((channel, index) => {
     to.beginPath();
     to.moveTo(0, height);
-    channel.forEach((share, bin) => {
-      const y = height - (Math.sqrt(share) / most) * (height - 6);
+    channel.forEach((fraction, bin) => {
+      const y = height - (Math.sqrt(fraction) / most) * (height - 6);
       to.lineTo((bin / channel.length) * width, y);
       to.lineTo(((bin + 1) / channel.length) * width, y);
     });
@@ -148,11 +148,11 @@ function drawHistogram(histogram) {
   to.globalAlpha = 1;
 }
 
-function showClipped(shares, inRegion, region) {
-  const parts = shares.map((share, index) => {
+function showClipped(fractions, inRegion, region) {
+  const parts = fractions.map((fraction, index) => {
     const part = document.createElement("span");
-    part.className = CHANNELS[index] + (share > MUCH_CLIPPED ? " much" : "");
-    part.append(document.createElement("i"), `${CHANNELS[index]} ${(100 * share).toFixed(1)} %`);
+    part.className = CHANNELS[index] + (fraction > MUCH_CLIPPED ? " much" : "");
+    part.append(document.createElement("i"), `${CHANNELS[index]} ${(100 * fraction).toFixed(1)} %`);
     return part;
   });
   if (inRegion !== null) {

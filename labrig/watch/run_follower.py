@@ -189,7 +189,7 @@ class RunFollower:
             (attempt, frame)
             for attempt in self._counting()
             for frame in attempt.frames
-            if frame.purpose == FrameRole.DECAY and frame.path.name not in self._points
+            if frame.role == FrameRole.DECAY and frame.path.name not in self._points
         ]
         for attempt, frame in earlier[:MOST_EARLIER]:
             self._look_at(attempt, frame)
@@ -210,7 +210,7 @@ class RunFollower:
             if (action.device, action.action) == ("lamp", "off")
             and action.middle_time <= frame.start_time
         ]
-        if frame.purpose == FrameRole.DECAY and off_times:
+        if frame.role == FrameRole.DECAY and off_times:
             self._points[name] = _points(frame, seen, off_times[-1])
         return seen
 
@@ -248,7 +248,7 @@ def _shown(frame: FrameRecord, seen: Preview) -> dict[str, Any]:
     return {
         "name": frame.path.name,
         "unit": frame.unit,
-        "purpose": frame.purpose,
+        "role": frame.role,
         "exposure_s": frame.exposure_s,
         "iso": frame.iso,
         "late_s": frame.late_s,

@@ -95,7 +95,7 @@ def said(device: str, action: str) -> str:
 
 
 def _key(device: str, action: str) -> _Key:
-    """Of frames only the purpose, of findings only the question, of a person nothing else.
+    """Of frames only the role, of findings only the question, of a person nothing else.
 
     Exposures are settled while a unit runs, findings are what they are, a person remarks on things.
     """
@@ -107,7 +107,7 @@ def _key(device: str, action: str) -> _Key:
 
 
 def _key_of(one: ActionRecord | FrameRecord) -> _Key:
-    return ("camera", one.purpose) if isinstance(one, FrameRecord) else _key(one.device, one.action)
+    return ("camera", one.role) if isinstance(one, FrameRecord) else _key(one.device, one.action)
 
 
 def _device(one: ActionRecord | FrameRecord) -> str:
@@ -118,4 +118,4 @@ def _said_of(one: ActionRecord | FrameRecord) -> str:
     if isinstance(one, ActionRecord):
         return said(one.device, one.action)
     settings = ExposureSettings(one.exposure_s, one.iso, one.f_number)
-    return said("camera", f"{one.purpose} frame, {settings}")
+    return said("camera", f"{one.role} frame, {settings}")

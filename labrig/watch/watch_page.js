@@ -88,7 +88,7 @@ function showFrame() {
   $("frame-name").textContent = frame.name;
   const late = frame.late_s > 0.02 ? `, ${(1000 * frame.late_s).toFixed(0)} ms late` : "";
   $("frame-said").textContent =
-    `${frame.unit}: ${frame.purpose}, ${exposure(frame.exposure_s)}, ISO ${frame.iso}${late}; `
+    `${frame.unit}: ${frame.role}, ${exposure(frame.exposure_s)}, ISO ${frame.iso}${late}; `
     + `brightened ${frame.brightened} ×`;
   const channels = Object.keys(Object.values(frame.values)[0] ?? {});
   const head = tag("tr");

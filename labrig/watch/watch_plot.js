@@ -84,10 +84,10 @@ export function draw(svg, series, logarithmic) {
   const high = Math.max(...values) * (logarithmic ? 1.4 : 1.05) || 1;
   const low = logarithmic ? Math.min(...values) / 1.4 : Math.min(0, ...values);
   const across = (t) => MARGIN.left + (inner[0] * t) / lastS;
-  const share = logarithmic
+  const fraction = logarithmic
     ? (v) => Math.log(v / low) / Math.log(high / low)
     : (v) => (v - low) / (high - low);
-  const down = (v) => MARGIN.top + inner[1] * (1 - share(v));
+  const down = (v) => MARGIN.top + inner[1] * (1 - fraction(v));
 
   for (const t of ticks(0, lastS, width / 75)) {
     svg.append(

@@ -31,12 +31,12 @@ LOOK_AGAIN_S = 60.0
 MOST_NOISE = 0.01
 #: So many shutter times at the begin of the metering's ladder are too short for any glow to clip.
 SHORT = 3
-#: A glow that stays level in the second half of a decay at more than this share of its first frame
-#: may be another light.
+#: A glow that stays level in the second half of a decay at more than this fraction of its first
+#: frame may be another light.
 LINGERING = 0.2
 #: Flicker and noise do not make a second frame brighter than the first by so much.
 RISEN = 0.1
-#: A glow below this share of what it was before was not charged like that.
+#: A glow below this fraction of what it was before was not charged like that.
 WEAK = 0.5
 
 

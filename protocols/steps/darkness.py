@@ -14,12 +14,12 @@ from .metering import Look
 
 FloatArray = npt.NDArray[np.float64]
 
-#: No camera's black level is off by more, as a share of the range between black and white.
+#: No camera's black level is off by more, as a fraction of the range between black and white.
 BLACK_ERROR = 0.005
-#: No sensor makes more in the dark, per second at ISO 100, as a share of the range: 10 electrons
+#: No sensor makes more in the dark, per second at ISO 100, as a fraction of the range: 10 electrons
 #: of some 60 000. A 5D Mark II comes to that at 50 °C.
 DARK_CURRENT_PER_S = 2e-4
-#: From this share of the range on it is no leak or last glow that a dark frame takes care of.
+#: From this fraction of the range on it is no leak or last glow that a dark frame takes care of.
 BRIGHT = 0.25
 #: A glow is known by fading by so much along the dark frames; shutters flicker by a third of it.
 FADED = 0.03
@@ -32,8 +32,8 @@ class Darkness:
     Attributes
     ----------
     light
-        Share of the range that it fills in `exposure_s` seconds, beyond what a sensor makes in the
-        dark: 0 is dark, 1 clips.
+        Fraction of the range that it fills in `exposure_s` seconds, beyond what a sensor makes in
+        the dark: 0 is dark, 1 clips.
     exposure_s
         Longest shutter time of the dark frames.
     fades

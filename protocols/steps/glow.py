@@ -21,7 +21,7 @@ from .metering import DecayMeter, Look, Schedule, look
 from .sample_pose import charge, check_seen, face_camera, face_lamp, has_door, lights_out
 from .sanity_checks import Watcher
 
-#: Shutter times of a metering's first frames, as shares of the longest.
+#: Shutter times of a metering's first frames, as fractions of the longest.
 LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
 #: Of the further ones, along the decay.
 LATER = (1 / 16, 1)
@@ -36,7 +36,7 @@ class GlowSettings(ProtocolModel):
 
     @property
     @abstractmethod
-    def purpose(self) -> str:
+    def role(self) -> str:
         """Of the frames of the glow."""
 
     @abstractmethod
@@ -68,13 +68,13 @@ class GlowSettings(ProtocolModel):
         longest_s = max(self.longest_exposures_s(offers))
         pause_s = offers.overhead_s + MARGIN_S
         ladder: list[tuple[float, float]] = []
-        at_s, shares = self.times_s()[0], LADDER
+        at_s, fractions = self.times_s()[0], LADDER
         while not ladder or at_s < self.times_s()[-1]:
-            for share in shares:
-                exposure_s = offers.exposure_at_most(longest_s * share)
+            for fraction in fractions:
+                exposure_s = offers.exposure_at_most(longest_s * fraction)
                 ladder.append((at_s, exposure_s))
                 at_s += exposure_s + pause_s
-            at_s, shares = at_s * 1.5, LATER
+            at_s, fractions = at_s * 1.5, LATER
         return ladder
 
     def schedule(
@@ -98,7 +98,7 @@ class GlowSettings(ProtocolModel):
 
     def watcher(self, session: Session, unit: str, metering: str = "meter") -> Watcher:
         """Holds a unit's frames against what should have happened, and what `metering` saw."""
-        return Watcher(session, unit, self.regions(), None, self.purpose, metering)
+        return Watcher(session, unit, self.regions(), None, self.role, metering)
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
         """Lamp on for that long, for its own warm-up at the least."""
@@ -122,7 +122,7 @@ CHECK_EVERY_S = 180.0
 AT_MOST_S = 3600.0
 #: A light that fades by less between two looks does not fade.
 FADES = 0.05
-#: Less light than this share of the range is none.
+#: Less light than this fraction of the range is none.
 LEAST = 5e-4
 
 
@@ -177,12 +177,12 @@ def _rest_until_dark(
 
 
 def _light(session: Session, unit: str, regions: Sequence[Region]) -> float:
-    """Share of the range by which the last look is brighter than the closed door; 0 for noise."""
+    """Fraction of the range by which the last frame exceeds the closed door; 0 for noise."""
     closed, *_, seen = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
     dark = look(closed, regions)
     found = glow(look(seen, regions), levels(dark), seen.start_time)
-    share = found.brightest * seen.exposure_s / range_dn(dark)
-    return share if found.clips or (found.seen and share > LEAST) else 0.0
+    fraction = found.brightest * seen.exposure_s / range_dn(dark)
+    return fraction if found.clips or (found.seen and fraction > LEAST) else 0.0
 
 
 #: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.

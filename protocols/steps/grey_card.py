@@ -44,7 +44,7 @@ class CardLight:
     Attributes
     ----------
     per_s
-        Share of the range in a second.
+        Fraction of the range in a second.
     settings
         At which that is so; their shutter time means nothing.
     """
@@ -55,18 +55,18 @@ class CardLight:
     def __str__(self) -> str:
         return f"fills the range in {duration_text(1 / self.per_s)}"
 
-    def exposure_s(self, share: float, settings: ExposureSettings) -> float:
-        """Shutter time in which it fills that share of the range at an ISO and f-number."""
+    def exposure_s(self, fraction: float, settings: ExposureSettings) -> float:
+        """Shutter time in which it fills that fraction of the range at an ISO and f-number."""
         gain = settings.iso / self.settings.iso
         if settings.f_number is not None and self.settings.f_number is not None:
             gain *= (self.settings.f_number / settings.f_number) ** 2
-        return share / (self.per_s * gain)
+        return fraction / (self.per_s * gain)
 
     def exposed(
-        self, share: float, settings: ExposureSettings, offers: CameraOffers
+        self, fraction: float, settings: ExposureSettings, offers: CameraOffers
     ) -> ExposureSettings:
         """`settings` with the longest offered shutter time that fills no more than that share."""
-        exposure_s = offers.exposure_at_most(self.exposure_s(share, settings))
+        exposure_s = offers.exposure_at_most(self.exposure_s(fraction, settings))
         return ExposureSettings(exposure_s, settings.iso, settings.f_number)
 
 

@@ -17,13 +17,13 @@ from labrig.region import Region
 
 FloatArray = npt.NDArray[np.float64]
 
-#: Share of the range between black and white that the brightest frame may fill. The rest is room
+#: Fraction of the range between black and white that the brightest frame may fill. The rest is room
 #: for a longer charge, the lamp's drift and the shutter's flicker.
 TARGET = 0.4
 #: A glow is seen when its mean is this many standard uncertainties and at least this many counts.
 SEEN_SIGMA = 5.0
 SEEN_DN = 2.0
-#: Below this share of the range the longest exposure still leaves a picture that is all noise.
+#: Below this fraction of the range the longest exposure still leaves a picture that is all noise.
 DIM = 0.002
 
 

@@ -44,7 +44,7 @@ class Watcher:
         Where the samples lie.
     background
         A region that never glows, where it takes the place of dark frames.
-    purpose
+    role
         Of the frames after lamp off.
     metering
         The unit that metered the same glow.
@@ -54,7 +54,7 @@ class Watcher:
     unit: str
     patches: Sequence[Region]
     background: Region | None
-    purpose: str = FrameRole.DECAY
+    role: str = FrameRole.DECAY
     metering: str = "meter"
 
     def require_darkness(self, shorter: Sequence[ExposureSettings]) -> None:
@@ -97,7 +97,7 @@ class Watcher:
         """Refuse a decay that is none; as `require_glow`."""
 
         def decide() -> Afterglow:
-            frames = self._own(self.purpose)
+            frames = self._own(self.role)
             middle = len(frames) // 2
             some = min(2, middle)
             chosen = [*frames[:some], frames[middle], *frames[-some:]]
@@ -146,7 +146,7 @@ class Watcher:
         times_s
             When each was to begin after lamp off.
         """
-        frames = self._own(self.purpose)
+        frames = self._own(self.role)
         if not frames:
             return  # the plan takes none
         # A busy camera releases late, though it was asked in time: the begins themselves count.
@@ -191,12 +191,12 @@ class Watcher:
         for one in settings:
             self.session.perform(Shoot(FrameRole.LOOK, one))
 
-    def _own(self, purpose: str) -> list[FrameRecord]:
-        return [frame for frame in self.session.frames(purpose) if frame.unit == self.unit]
+    def _own(self, role: str) -> list[FrameRecord]:
+        return [frame for frame in self.session.frames(role) if frame.unit == self.unit]
 
     def _before(self) -> list[Glow]:
         """Of the metering, else the begin of the first decay that is complete."""
-        decays = self.session.frames(self.purpose)
+        decays = self.session.frames(self.role)
         metering = [
             one for one in self.session.frames(FrameRole.METER) if one.unit == self.metering
         ]

@@ -170,7 +170,7 @@ class PutBackUnit:
         Arrangement().set_up(session, before, "the next measurement finds the bench as usual")
 
 
-#: Shutter times to look with, as shares of the longest.
+#: Shutter times to look with, as fractions of the longest.
 LADDER = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
 #: A look that fills so much of the range is the last: its noise does not matter any more.
 ENOUGH = 0.05
@@ -207,12 +207,12 @@ class StillLife:
         }
         return [exposure_s for exposure_s in sorted(exposures_s) for _ in range(DARKS_PER_EXPOSURE)]
 
-    def photograph(self, session: Session, unit: str, purpose: str, lamp: str) -> None:
+    def photograph(self, session: Session, unit: str, role: str, lamp: str) -> None:
         """Meter, then take the bracket.
 
         Parameters
         ----------
-        unit, purpose
+        unit, role
             Of the frames.
         lamp
             What to call the light that should be there.
@@ -235,13 +235,13 @@ class StillLife:
         longer_s = offers.exposure_at_most(min(exposure_s * LONGER, self.longest_s))
         for bracket_s in sorted({exposure_s, longer_s}):
             for _ in range(self.repeats):
-                session.perform(Shoot(purpose, self.settings(bracket_s)))
+                session.perform(Shoot(role, self.settings(bracket_s)))
 
     def _ladder(self, offers: CameraOffers) -> Sequence[float]:
-        return sorted({offers.exposure_at_most(self.longest_s * share) for share in LADDER})
+        return sorted({offers.exposure_at_most(self.longest_s * fraction) for fraction in LADDER})
 
     def _enough(self, session: Session, unit: str) -> bool:
-        return _seen(_looks(session, unit)[-1]).share > ENOUGH
+        return _seen(_looks(session, unit)[-1]).fraction > ENOUGH
 
     def _exposure_s(self, session: Session, unit: str, lamp: str) -> float:
         """Shutter time at which the brightest fills as much of the range as it should."""
@@ -261,16 +261,16 @@ class StillLife:
             )
             return offers.exposures_s[0]
         best = open_ones[-1]
-        wanted_s = best.exposure_s * TARGET / best.share
+        wanted_s = best.exposure_s * TARGET / best.fraction
         return offers.exposure_at_most(min(wanted_s, self.longest_s))
 
 
 @dataclass(frozen=True)
 class _Seen:
-    """The brightest 0.5 % of a frame's pixels, as a share of the range."""
+    """The brightest 0.5 % of a frame's pixels, as a fraction of the range."""
 
     exposure_s: float
-    share: float
+    fraction: float
     visible: bool
     clips: bool
 
@@ -282,7 +282,7 @@ def _seen(frame: FrameRecord) -> _Seen:
     noise_dn = SEEN_SIGMA * brightest.sigma * np.sqrt(brightest.n)
     return _Seen(
         exposure_s=frame.exposure_s,
-        share=brightest.peak / measured.range_dn,
+        fraction=brightest.peak / measured.range_dn,
         visible=brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN)
         or brightest.peak > max(noise_dn, SEEN_DN),
         clips=measured.clipped,
@@ -320,7 +320,7 @@ class SceneUnit:
     ----------
     still_life
         How it is photographed.
-    name, purpose
+    name, role
         Of the unit, and of its frames.
     wanted, before
         What lies where now, and in the unit before.
@@ -332,7 +332,7 @@ class SceneUnit:
 
     still_life: StillLife
     name: str
-    purpose: str
+    role: str
     wanted: Arrangement
     before: Arrangement
     why: str
@@ -343,7 +343,7 @@ class SceneUnit:
         session.wait_until_warm("camera")
         self.arrange(session)
         light(session, self.warm_up_s(session))
-        self.still_life.photograph(session, self.name, self.purpose, self.wanted.lamp)
+        self.still_life.photograph(session, self.name, self.role, self.wanted.lamp)
         self.check(session)
 
     def arrange(self, session: Session) -> None:
@@ -361,9 +361,9 @@ class SceneUnit:
 
     def own(self, session: Session) -> list[FrameRecord]:
         """Its frames."""
-        return frames_of(session, self.purpose, self.name)
+        return frames_of(session, self.role, self.name)
 
 
-def frames_of(session: Session, purpose: str, unit: str) -> list[FrameRecord]:
+def frames_of(session: Session, role: str, unit: str) -> list[FrameRecord]:
     """Frames of one unit."""
-    return [frame for frame in session.frames(purpose) if frame.unit == unit]
+    return [frame for frame in session.frames(role) if frame.unit == unit]

@@ -136,9 +136,9 @@ def report(case: Case, fits: list[tuple[DecayFit, truths.Observed]]) -> str:
     power_law = np.mean([name == "power law" for name in alternative_models])
     stretched = np.mean([name == "stretched exponential" for name in alternative_models])
     warned = np.mean([bool(fit.warnings) for fit, _ in fits])
-    shares = [100 * np.mean(found == n) for n in (1, 2, 3)]
+    fractions = [100 * np.mean(found == n) for n in (1, 2, 3)]
     text = (
-        f"{case.name:42s} n = 1, 2, 3: {shares[0]:5.1f} {shares[1]:5.1f} {shares[2]:5.1f} %  "
+        f"{case.name:42s} n = 1, 2, 3: {' '.join(f'{fraction:5.1f}' for fraction in fractions)} %  "
         f"power law {100 * power_law:.1f} %  stretched {100 * stretched:.1f} %  "
         f"warned {100 * warned:5.1f} %  ρ {100 * np.mean([fit.flicker for fit, _ in fits]):.2f} %"
     )

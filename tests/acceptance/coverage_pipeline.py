@@ -203,14 +203,14 @@ def lines(sample: str, outcomes: Sequence[Outcome]) -> Iterator[str]:
     pull = error / sigma
     n = len(fits)
 
-    def share(k: int, sigmas: float) -> str:
+    def fraction(k: int, sigmas: float) -> str:
         inside = float(np.mean(np.abs(pull[:, k]) < sigmas))
         return f"{100 * inside:5.1f} ± {100 * np.sqrt(inside * (1 - inside) / n):.1f}"
 
     for k, rate in enumerate(true):
         rms = float(np.sqrt(np.mean(error[:, k] ** 2)))
         yield (
-            f"{sample:21} {rate:<6g} {wrong:4d}  {share(k, 1)}  {share(k, 2)}  "
+            f"{sample:21} {rate:<6g} {wrong:4d}  {fraction(k, 1)}  {fraction(k, 2)}  "
             f"{pull[:, k].mean():+.2f} ± {pull[:, k].std() / np.sqrt(n):.2f}  "
             f"{100 * error[:, k].mean() / rate:+6.3f}  {100 * rms / rate:6.2f}  "
             f"{np.sqrt(np.mean(sigma[:, k] ** 2)) / rms:5.2f}  "

@@ -18,7 +18,7 @@ from labrig.sim.sensor import BAYER_RGGB, gain_electrons_per_dn, read_noise_elec
 
 FloatArray = NDArray[np.float64]
 
-NODES, SHARES = np.polynomial.legendre.leggauss(24)
+NODES, FRACTIONS = np.polynomial.legendre.leggauss(24)
 
 
 @dataclass(frozen=True)
@@ -103,8 +103,8 @@ def rate_bound(
     rates = np.array(rates_per_s)
     middle = (series.t_s + exposure_s / 2)[:, None] + exposure_s[:, None] / 2 * NODES
     decayed = np.exp(-np.multiply.outer(rates, middle))
-    means = np.einsum("kfq,q->fk", decayed, SHARES / 2) * exposure_s[:, None]
-    slopes = np.einsum("kfq,fq,q->fk", decayed, -middle, SHARES / 2) * exposure_s[:, None]
+    means = np.einsum("kfq,q->fk", decayed, FRACTIONS / 2) * exposure_s[:, None]
+    slopes = np.einsum("kfq,fq,q->fk", decayed, -middle, FRACTIONS / 2) * exposure_s[:, None]
     values = series.values * exposure_s[:, None]
     amplitudes = np.linalg.lstsq(means, values)[0]
     u, s, vt = np.linalg.svd(amplitudes, full_matrices=False)
@@ -122,7 +122,7 @@ def rate_bound(
     jacobian[:, :, -3:] = np.eye(3)
     information = np.einsum("fci,fcj->ij", jacobian, np.linalg.solve(covariance, jacobian))
     information[-3:, -3:] += np.linalg.inv(
-        patch.dark * _dark_share(np.array(dark_exposure_s), float(exposure_s[0]))
+        patch.dark * _dark_fraction(np.array(dark_exposure_s), float(exposure_s[0]))
     )
     # Columns of like size: amplitudes in DN stand beside rates of a hundredth.
     scale = 1 / np.sqrt(np.diag(information))
@@ -130,7 +130,7 @@ def rate_bound(
     return np.asarray(bound[:n_states])
 
 
-def _dark_share(dark_exposure_s: FloatArray, exposure_s: float) -> float:
+def _dark_fraction(dark_exposure_s: FloatArray, exposure_s: float) -> float:
     """Variance of the dark level at `exposure_s`, of a line through dark frames, over a frame's."""
     design = np.stack([np.ones_like(dark_exposure_s), dark_exposure_s], axis=1)
     at = np.array([1.0, exposure_s])

@@ -14,7 +14,7 @@ Figures = dict[str, tuple[float, float]]
 #: Tables of single frames, and what a run is called by: no figures.
 NO_FIGURES = ("series.csv", "provenance.yaml")
 #: Whose σ a key is that does not say so itself.
-OF_SIGMA = {"sigma_dn_per_s": ("rate_dn_per_s",), "sigma": ("value", "bands", "share", "factor")}
+OF_SIGMA = {"sigma_dn_per_s": ("rate_dn_per_s",), "sigma": ("value", "bands", "fraction", "factor")}
 
 
 def figures(result: Path) -> Figures:

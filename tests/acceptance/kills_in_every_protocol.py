@@ -38,7 +38,7 @@ AGLOW = 0.02
 NIGHT_S = 8 * 3600.0
 #: Outside, at a size of the journal; inside, in the middle of a write; while results are made.
 KINDS = ("outside", "writing", "result")
-#: Shares of work beyond this may be over before anybody kills.
+#: Fractions of work beyond this may be over before anybody kills.
 MOST = 0.9
 #: At most so long after the journal has that size: a frame takes about as long.
 LATER_S = 0.1
@@ -114,11 +114,11 @@ class Trial:
     def run(self, kills: int) -> None:
         """Kill it so many times, then let it end."""
         self.folder.mkdir()
-        shares = [0.0, *sorted(self.rng.uniform(0.0, MOST) for _ in range(kills))]
-        for number, (before, share) in enumerate(pairwise(shares), start=1):
+        fractions = [0.0, *sorted(self.rng.uniform(0.0, MOST) for _ in range(kills))]
+        for number, (before, fraction) in enumerate(pairwise(fractions), start=1):
             # Before its result is worked out a run is complete: that is the last to befall it.
             kind = self.rng.choice(KINDS if number == kills else KINDS[:2])
-            self._kill(kind, share - before)
+            self._kill(kind, fraction - before)
             self._look_at_what_is_kept()
             if not self._complete and (run := self._recorded) is not None:
                 leave_bench(run, morning=self.rng.random() < 0.5)
@@ -134,15 +134,15 @@ class Trial:
             self._require(as_usual, f"the bench was left as {labrig.bench}")
             self._compare()
 
-    def _kill(self, kind: str, share: float) -> None:
-        """One process, killed when it has done about that share of the work."""
+    def _kill(self, kind: str, fraction: float) -> None:
+        """One process, killed when it has done about that fraction of the work."""
         run = self._recorded
         had = 0 if run is None else (run / "journal.jsonl").stat().st_size
-        dies_at = int(share * self.peace.written_bytes) if kind == "writing" else None
+        dies_at = int(fraction * self.peace.written_bytes) if kind == "writing" else None
         labrig = Labrig(self.folder, self._arguments(), dies_at)
 
         def journal_has_grown() -> bool:
-            run, more = self._recorded, share * self.peace.journal_bytes
+            run, more = self._recorded, fraction * self.peace.journal_bytes
             return run is not None and (run / "journal.jsonl").stat().st_size >= had + more
 
         if kind == "outside" and labrig.runs_until(journal_has_grown):

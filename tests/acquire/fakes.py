@@ -146,7 +146,7 @@ class Watching:
         self.told.append(what)
 
     def frame(self, record: FrameRecord) -> None:
-        self.told.append(f"kept {record.purpose}")
+        self.told.append(f"kept {record.role}")
 
     def warn(self, text: str) -> None:
         self.told.append(f"warning: {text}")

@@ -29,7 +29,7 @@ from tests.acquire.fakes import Watching
 
 FloatArray = NDArray[np.float64]
 
-#: Left out at the strip's long sides, as a share of its height.
+#: Left out at the strip's long sides, as a fraction of its height.
 MARGIN = 0.12
 WIDTH, HEIGHT = 96, 64
 

@@ -81,8 +81,8 @@ def two_colours(path: Path) -> Path:
         "irradiance_norm": {"kind": "vector_length", "value": 1.0},
         "states": [
             {"k_r_per_s": k, "k_e_per_s": [k, k, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0],
-             "reradiation": [share / k for share in shares]}
-            for k, shares in (
+             "reradiation": [fraction / k for fraction in fractions]}
+            for k, fractions in (
                 (0.08, (0.0, 1.0, 0.5, 0.0, 0.0, 0.0, 0.0, 0.0)),
                 (0.01, (0.0, 0.0, 0.5, 1.0, 0.0, 0.0, 0.0, 0.0)),
             )

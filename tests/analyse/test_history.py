@@ -20,9 +20,9 @@ def lamp(action: str, time: float) -> ActionRecord:
     return ActionRecord("decay-1", "lamp", action, time - 0.01, time + 0.01, 0.0)
 
 
-def taken(purpose: str, time: float) -> FrameRecord:
+def taken(role: str, time: float) -> FrameRecord:
     return FrameRecord(
-        Path(f"{time}.dng"), "", 1, "decay-1", purpose, 1.0, 400, 4.0, time, time + 1, 0.0
+        Path(f"{time}.dng"), "", 1, "decay-1", role, 1.0, 400, 4.0, time, time + 1, 0.0
     )
 
 

@@ -22,7 +22,7 @@ QUICK: dict[str, Any] = {
     "protocol": "saturation", "charges": ["30 s", "10 min", "20 min"], "first": "800 ms",
     "for": "60 s",
 }  # fmt: skip
-HALF = {"weaker": {"filter": "neutral-50", "share": "50 %"}}
+HALF = {"weaker": {"filter": "neutral-50", "fraction": "50 %"}}
 
 
 def true_level(rig: Path, charge_s: float) -> float:
@@ -83,15 +83,15 @@ def test_a_power_laws_rates_depend_on_the_charge(tmp_path: Path) -> None:
 @given(
     k=st.floats(1e-3, 0.3),
     times=st.floats(0.02, 20.0),
-    share=st.floats(0.1, 0.8),
+    fraction=st.floats(0.1, 0.8),
     charge_s=st.floats(60.0, 7200.0),
 )
 def test_the_level_is_what_was_charged(
-    k: float, times: float, share: float, charge_s: float
+    k: float, times: float, fraction: float, charge_s: float
 ) -> None:
     kappa = times * k
-    full, weak = charged(kappa, k, charge_s), charged(share * kappa, k, charge_s)
-    found = charge_level(weak / full, 1e-4, share, 0.0, k, (charge_s, charge_s))
+    full, weak = charged(kappa, k, charge_s), charged(fraction * kappa, k, charge_s)
+    found = charge_level(weak / full, 1e-4, fraction, 0.0, k, (charge_s, charge_s))
     assert found.r == pytest.approx(full, rel=1e-6)
     assert found.sigma > 0
 
@@ -124,7 +124,7 @@ def test_p_values_of_rates_that_are_the_same_are_even() -> None:
 
 
 def test_rates_are_not_judged_where_exponentials_do_not_fit() -> None:
-    curves = [decay([0.1, 0.01], [1.0, share], seed) for seed, share in ((0, 0.3), (1, 0.28))]
+    curves = [decay([0.1, 0.01], [1.0, fraction], seed) for seed, fraction in ((0, 0.3), (1, 0.28))]
     test = compare_rates(curves, [0.05])
     assert test.misfit
     assert not compare_rates(curves, [0.1, 0.01]).misfit

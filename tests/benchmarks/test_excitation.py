@@ -52,9 +52,9 @@ def integrated(series: ChargingSeries, k_r: Floats, k_e: Floats) -> Floats:
             level = passed(level, dark, np.array([charge.on_s - since_s]))[0][-1]
         steady_s = charge.off_s - charge.on_s - series.rise.total_s
         steps_s = [*series.rise.duration_s, steady_s, *series.fade.duration_s]
-        shares = [*series.rise.share, np.ones(len(dark)), *series.fade.share]
-        for seconds, share in zip(steps_s, shares, strict=True):
-            level = passed(level, charge.brightness * share, np.array([seconds]))[0][-1]
+        fractions = [*series.rise.fraction, np.ones(len(dark)), *series.fade.fraction]
+        for seconds, fraction in zip(steps_s, fractions, strict=True):
+            level = passed(level, charge.brightness * fraction, np.array([seconds]))[0][-1]
         dark_s = charge.off_s + series.fade.total_s
         switched_s = np.stack([charge.start_s, charge.start_s + charge.exposure_s], axis=1)
         levels_then, collected = passed(level, dark, switched_s.ravel() - dark_s)

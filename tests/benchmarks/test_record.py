@@ -36,7 +36,7 @@ def test_frames_kept(folder: RunFolder, tmp_path: Path, against: Against) -> Non
         record = attempt.frame(
             data,
             ".cr2",
-            purpose="decay",
+            role="decay",
             exposure_s=1.0,
             iso=400,
             f_number=4.0,

@@ -96,7 +96,7 @@ class NothingRecorded:
     ) -> None:
         pass
 
-    def photographed(self, purpose: str, frame: Frame, late_s: float) -> None:
+    def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         pass
 
     def temperature(self, celsius: float, at_s: float) -> None:
@@ -105,7 +105,7 @@ class NothingRecorded:
     def last_by_hand(self) -> None:
         return None
 
-    def frames(self, purpose: str) -> Sequence[FrameRecord]:
+    def frames(self, role: str) -> Sequence[FrameRecord]:
         return ()
 
     def actions(self, device: str) -> Sequence[ActionRecord]:

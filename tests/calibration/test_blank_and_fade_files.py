@@ -65,18 +65,18 @@ def test_when_a_blank_is_clean_and_what_leaks() -> None:
 
 
 def fade(**changes: object) -> FadeFile:
-    fading = Change(t_s=(0.0, 0.1, 0.3), share=((1, 1), (0.2, 0.4), (0, 0)), sigma=((0, 0),) * 3)
+    fading = Change(t_s=(0.0, 0.1, 0.3), fraction=((1, 1), (0.2, 0.4), (0, 0)), sigma=((0, 0),) * 3)
     return FadeFile.model_validate({"bands_nm": (400, 500, 600), "fade": fading} | changes)
 
 
 @settings(max_examples=20)
 @given(st.lists(st.floats(1e-3, 1.0), min_size=1, max_size=6), st.floats(0, 2))
 def test_a_written_fade_reads_back_as_itself(
-    tmp_path_factory: pytest.TempPathFactory, steps: list[float], share: float
+    tmp_path_factory: pytest.TempPathFactory, steps: list[float], fraction: float
 ) -> None:
     times = [0.0, *np.cumsum(steps).tolist()]
-    rows = [(share, share / 3)] * len(times)
-    file = fade(rise={"t_s": times, "share": rows, "sigma": rows})
+    rows = [(fraction, fraction / 3)] * len(times)
+    file = fade(rise={"t_s": times, "fraction": rows, "sigma": rows})
     path = tmp_path_factory.mktemp("fade") / "fade.yaml"
     write_fade_file(path, file)
     assert read_fade_file(path) == file
@@ -85,10 +85,10 @@ def test_a_written_fade_reads_back_as_itself(
 def test_a_fade_is_what_the_excitation_fit_takes() -> None:
     file = fade()
     transient = Transient.sampled(*file.in_bands(file.fade, file.bands_nm))
-    assert transient.duration_s @ transient.share == pytest.approx(file.fade.missing_s())
+    assert transient.duration_s @ transient.fraction == pytest.approx(file.fade.missing_s())
     assert file.fade.missing_s() == pytest.approx([0.08, 0.11])
-    _, share = file.in_bands(file.fade, [450, 550])  # one band, about 500 nm
-    assert share[1] == pytest.approx([0.3])
+    _, fraction = file.in_bands(file.fade, [450, 550])  # one band, about 500 nm
+    assert fraction[1] == pytest.approx([0.3])
 
 
 @pytest.mark.parametrize(
@@ -96,8 +96,8 @@ def test_a_fade_is_what_the_excitation_fit_takes() -> None:
     [
         ({"bands_nm": (500, 400, 600)}, "rising edges"),
         ({"bands_nm": (400, 500)}, "expected 1 numbers"),
-        ({"fade": {"t_s": (0.1, 0.2), "share": [[1]] * 2, "sigma": [[0]] * 2}}, "rise from 0"),
-        ({"fade": {"t_s": (0, 0.2), "share": [[1]], "sigma": [[0]] * 2}}, "for every time"),
+        ({"fade": {"t_s": (0.1, 0.2), "fraction": [[1]] * 2, "sigma": [[0]] * 2}}, "rise from 0"),
+        ({"fade": {"t_s": (0, 0.2), "fraction": [[1]], "sigma": [[0]] * 2}}, "for every time"),
     ],
 )
 def test_a_malformed_fade_is_one_clear_line(

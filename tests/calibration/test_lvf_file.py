@@ -40,12 +40,12 @@ def lvf_file(**changed: Any) -> LvfFile:
 @st.composite
 def strips(draw: st.DrawFn) -> Strip:
     height = draw(st.floats(0.05, 0.5))
-    share = st.floats(height / 2, 1 - height / 2)
+    fraction = st.floats(height / 2, 1 - height / 2)
     left = draw(st.floats(0, 0.4))
     right = draw(st.floats(left + 0.2, 1))
     return Strip(
-        left=(left, draw(share)),
-        right=(right, draw(share)),
+        left=(left, draw(fraction)),
+        right=(right, draw(fraction)),
         height=height,
         rising=draw(st.booleans()),
     )

@@ -120,7 +120,7 @@ def test_it_tells_the_frames_and_where_they_come_from(finished: Finished, writte
         assert switched["value"][()].tolist() == [1, 0, 1, 0]
         on_s, off_s = switched["time"][:2]
         assert off_s - on_s > 600, "the charge of ten minutes"
-        first = list(camera["frames/purpose"].asstr()[()]).index("decay")
+        first = list(camera["frames/role"].asstr()[()]).index("decay")
         begin_s = entry["decay_1_sample/exposure_start"][0]
         assert camera["start_time"][first] - off_s == pytest.approx(begin_s, abs=1e-5)
 

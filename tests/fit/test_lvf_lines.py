@@ -69,7 +69,7 @@ def test_what_is_not_known_of_a_blend_is_in_its_sigma() -> None:
     pixels_per_nm = 2.9
     for line, sigma in zip(MERCURY, found.sigma, strict=True):
         apart_nm = float(np.ptp(line.wavelength_nm))
-        assert sigma > pixels_per_nm * apart_nm * line.second_share[1]
+        assert sigma > pixels_per_nm * apart_nm * line.second_fraction[1]
 
 
 def test_pictures_without_lines() -> None:

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 FloatArray = NDArray[np.float64]
 
 #: Gauss–Legendre on [0, 1]: exact to rounding for any decay that varies less than e^10 in a frame.
-_NODES, _SHARES = np.polynomial.legendre.leggauss(24)
-NODES, SHARES = (_NODES + 1) / 2, _SHARES / 2
+_NODES, _FRACTIONS = np.polynomial.legendre.leggauss(24)
+NODES, FRACTIONS = (_NODES + 1) / 2, _FRACTIONS / 2
 
 #: A frame every 5 s for 180 s, as in Nalbach et al. sec. 4.4.
 TIMES_S: FloatArray = 0.3 + 5.0 * np.arange(37, dtype=np.float64)
@@ -47,7 +47,7 @@ def stretched(tau_s: float, beta: float) -> Decay:
 def exposed(decay: Decay, t_s: FloatArray, exposure_s: FloatArray) -> FloatArray:
     """Mean of the decay over each exposure (n,)."""
     inside = t_s[:, None] + exposure_s[:, None] * NODES
-    return np.asarray(decay(inside) @ SHARES)
+    return np.asarray(decay(inside) @ FRACTIONS)
 
 
 def observe(

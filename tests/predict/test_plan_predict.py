@@ -87,7 +87,7 @@ def test_a_run_tells_gain_and_read_noise_of_its_camera(measured: Path) -> None:
     assert camera.electrons_per_dn == pytest.approx(1.05, rel=0.1)
     assert camera.read_noise_electrons == pytest.approx(8.1, rel=0.1)
     assert (camera.width, camera.height) == (96, 64)
-    assert camera.channel_shares == {"R": 0.25, "G": 0.5, "B": 0.25}
+    assert camera.channel_fractions == {"R": 0.25, "G": 0.5, "B": 0.25}
 
 
 def test_remedies_are_what_the_changed_protocol_itself_is_predicted_to_know(

@@ -20,7 +20,7 @@ def look(
     Parameters
     ----------
     hot
-        Share of pixels that clip whatever the light.
+        Fraction of pixels that clip whatever the light.
     """
     n, full = 10_000, WHITE - black
     mean = (1 - hot) * min(level_dn, full) + hot * full

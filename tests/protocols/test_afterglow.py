@@ -106,10 +106,10 @@ def test_metering_doubts_a_lamp_and_a_closer_look_tells() -> None:
     assert looks(exponential(LAMP_DN_PER_S, 0.002)) is Afterglow.FADING
 
 
-@pytest.mark.parametrize(("share", "found"), [(0.3, Afterglow.WEAK), (0.8, Afterglow.FADING)])
-def test_a_glow_is_held_against_the_metering(share: float, found: Afterglow) -> None:
+@pytest.mark.parametrize(("fraction", "found"), [(0.3, Afterglow.WEAK), (0.8, Afterglow.FADING)])
+def test_a_glow_is_held_against_the_metering(fraction: float, found: Afterglow) -> None:
     before = seen(exponential(5000, 0.03), [0.5, 2.2, 3.9, 5.6, 7.7], LADDER_S)
-    now = seen(exponential(share * 5000, 0.03), [0.5, 5.5, 30, 55, 60], [0.8] * 5)
+    now = seen(exponential(fraction * 5000, 0.03), [0.5, 5.5, 30, 55, 60], [0.8] * 5)
     assert decayed(now[:2], now[2], now[3:], before) is found
 
 

@@ -48,8 +48,8 @@ def test_the_timeline_of_the_shipped_protocol_is_as_agreed(name: str) -> None:
         ({"protocol": "isotropy", "patch": "beside"}, "patch"),
         ({"protocol": "saturation", "charges": ["5 min"]}, "charges"),
         ({"protocol": "saturation", "charges": ["5 min", "2 min"]}, "expected rising charges"),
-        ({"protocol": "saturation", "weaker": {"share": "50 %"}}, "either 'filter: NAME'"),
-        ({"protocol": "saturation", "weaker": {"filter": "nd", "share": 2}}, "share"),
+        ({"protocol": "saturation", "weaker": {"fraction": "50 %"}}, "either 'filter: NAME'"),
+        ({"protocol": "saturation", "weaker": {"filter": "nd", "fraction": 2}}, "fraction"),
         ({"protocol": "saturation", "exposure": "8 s"}, "does not fit between frames"),
     ],
 )
@@ -84,7 +84,7 @@ def test_a_written_protocol_reads_back_as_itself(tmp_path: Path) -> None:
     for keys in (
         {"protocol": "emission_spectrum", "lamps": ["mercury", "halogen"], "times": ["1 s", "9 s"]},
         {"protocol": "isotropy", "patch": "around", "angles": [-60, 60]},
-        {"protocol": "saturation", "weaker": {"distance": "1.4 m", "share": "50 %"},
+        {"protocol": "saturation", "weaker": {"distance": "1.4 m", "fraction": "50 %"},
          "exposure": "2 s"},
     ):  # fmt: skip
         protocol = read_protocol(written(tmp_path, **keys))
@@ -110,7 +110,7 @@ def test_hands_move_as_little_as_they_can_and_put_all_back(tmp_path: Path) -> No
     steps = by_hand(tmp_path, protocol="isotropy", angles=[20, 40])
     turns = [action.split(" by ")[1].split("°")[0] for _, action in steps]
     assert turns == ["20", "0", "40", "0"]
-    weaker = {"filter": "neutral-50", "share": "50 %"}
+    weaker = {"filter": "neutral-50", "fraction": "50 %"}
     steps = by_hand(tmp_path, protocol="saturation", weaker=weaker)
     assert [unit for unit, _ in steps] == ["meter-weaker", "meter-full"]
 

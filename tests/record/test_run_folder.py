@@ -29,11 +29,11 @@ def make(runs: Path, seed: int | None = 1) -> RunFolder:
     )
 
 
-def photograph(writer: AttemptWriter, data: bytes, purpose: str = "decay") -> FrameRecord:
+def photograph(writer: AttemptWriter, data: bytes, role: str = "decay") -> FrameRecord:
     return writer.frame(
         data,
         ".cr2",
-        purpose=purpose,
+        role=role,
         exposure_s=1.0,
         iso=400,
         f_number=4.0,

@@ -36,7 +36,7 @@ def recorded(
 ) -> list[SeriesFrame]:
     """A decay of `scene`, relative brightness of every pixel, with photon, read and row noise.
 
-    `crosstalk` is the share of a pixel's charge that each of its four neighbours shows instead.
+    `crosstalk` is the fraction of a pixel's charge that each of its four neighbours shows instead.
     """
     rng = np.random.default_rng(seed)
     frames = []
@@ -52,9 +52,9 @@ def recorded(
     return frames
 
 
-def shared_with_neighbours(charge: Floats, share: float) -> Floats:
+def shared_with_neighbours(charge: Floats, fraction: float) -> Floats:
     around = sum(np.roll(charge, step, axis) for axis in (0, 1) for step in (-1, 1))
-    return np.asarray((1 - 4 * share) * charge + share * around)
+    return np.asarray((1 - 4 * fraction) * charge + fraction * around)
 
 
 def expected_sigma(
@@ -66,8 +66,8 @@ def expected_sigma(
     inside[y : y + h, x : x + w] = 1
     photons = []  # of R, G and B at a brightness of 1
     for level, pixels in zip(WEIGHTS, PIXELS, strict=True):
-        share = shared_with_neighbours(inside * (level == COLOURS) / pixels, crosstalk)
-        photons.append(np.sum(np.square(share) * COLOURS))
+        fraction = shared_with_neighbours(inside * (level == COLOURS) / pixels, crosstalk)
+        photons.append(np.sum(np.square(fraction) * COLOURS))
     light = BRIGHT_DN * np.exp(-RATE_PER_S * series.t_s) * scene
     variance = np.multiply.outer(light, photons) + (READ_DN**2 + 1 / 12) / PIXELS
     return np.asarray(np.sqrt(variance + row_dn**2 / ROWS))
@@ -93,11 +93,11 @@ def expected_correlation(crosstalk: float) -> Floats:
     x, y, w, h = PATCH
     inside = np.zeros((HEIGHT, WIDTH))
     inside[y : y + h, x : x + w] = 1
-    shares = [
+    fractions = [
         shared_with_neighbours(inside * (level == COLOURS) / pixels, crosstalk)
         for level, pixels in zip(WEIGHTS, PIXELS, strict=True)
     ]
-    covariance = np.array([[np.sum(a * b * COLOURS) for b in shares] for a in shares])
+    covariance = np.array([[np.sum(a * b * COLOURS) for b in fractions] for a in fractions])
     length = np.sqrt(np.diag(covariance))
     return np.asarray(covariance / np.outer(length, length))
 

@@ -29,8 +29,8 @@ HOT = (slice(20, 66, 10), slice(20, 60, 10))
 def _light(t_s: float) -> Floats:
     """Glow in DN/s: the paint decays, the card is a third as bright, the wall is dark."""
     glow = np.zeros((HEIGHT, WIDTH))
-    for (x, y, w, h), share in ((PAINT, 1.0), (CARD, 1 / 3)):
-        glow[y : y + h, x : x + w] = share * np.exp(-RATE_PER_S * t_s)
+    for (x, y, w, h), fraction in ((PAINT, 1.0), (CARD, 1 / 3)):
+        glow[y : y + h, x : x + w] = fraction * np.exp(-RATE_PER_S * t_s)
     red, green, blue = LIGHT_PER_S
     return np.asarray(glow * np.tile([[red, green], [green, blue]], (HEIGHT // 2, WIDTH // 2)))
 
@@ -59,8 +59,8 @@ def take(tmp_path: Path, write_dng: WriteDng) -> Take:
     return shot
 
 
-def _pulls(series: Series, share: float) -> Floats:
-    truth = share * np.exp(-RATE_PER_S * series.t_s)[:, np.newaxis] * np.array(LIGHT_PER_S)
+def _pulls(series: Series, fraction: float) -> Floats:
+    truth = fraction * np.exp(-RATE_PER_S * series.t_s)[:, np.newaxis] * np.array(LIGHT_PER_S)
     drift = TWO_DEGREES * DARK_PER_S  # allowed for, but this sensor keeps its temperature
     of_dark = np.sqrt(np.maximum(np.nan_to_num(series.dark_sigma) ** 2 - drift**2, 0))
     return np.asarray((series.values - truth) / np.hypot(series.sigma, of_dark))
@@ -70,15 +70,15 @@ def test_a_decay_is_recovered_with_darks_of_two_exposures(take: Take) -> None:
     frames = [take(t_s, exposure_s) for t_s in (1, 10, 40, 80) for exposure_s in (1.0, 4.0)]
     darks = [take(0, exposure_s, lit=False) for exposure_s in (1.0, 1.0, 4.0, 4.0)]
     found = reduce_patches(frames, PATCHES, darks)
-    for name, share in (("paint", 1.0), ("card", 1 / 3)):
+    for name, fraction in (("paint", 1.0), ("card", 1 / 3)):
         series = found[name]
         assert (series.region, series.channels) == (name, ("R", "G", "B"))
         assert series.t_s.tolist() == [frame.t_s for frame in frames]
         assert series.frame == tuple(frame.path.name for frame in frames)
         assert series.iso.tolist() == [100] * 8
         assert set(series.flag) == {""}
-        assert np.abs(_pulls(series, share)).max() < 4
-        assert 0.6 < _pulls(series, share).std() < 1.4
+        assert np.abs(_pulls(series, fraction)).max() < 4
+        assert 0.6 < _pulls(series, fraction).std() < 1.4
         assert (series.dark_sigma > TWO_DEGREES * DARK_PER_S * 0.9).all()
         assert (series.dark_sigma < 1.3).all()
 

@@ -103,15 +103,13 @@ def write_dng(path: Path, signal_dn: FloatArray, size: tuple[int, int] = (48, 64
     return path
 
 
-def frame(
-    path: Path, number: int = 1, purpose: str = "decay", exposure_s: float = 1.0
-) -> FrameRecord:
+def frame(path: Path, number: int = 1, role: str = "decay", exposure_s: float = 1.0) -> FrameRecord:
     return FrameRecord(
         path=path,
         sha256=f"{number:064x}",
         size_bytes=1000,
         unit="decay-1",
-        purpose=purpose,
+        role=role,
         exposure_s=exposure_s,
         iso=400,
         f_number=4.0,

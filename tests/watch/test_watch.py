@@ -109,7 +109,7 @@ def test_what_is_done_and_what_comes(growing: Growing) -> None:
     following = RunFollower(growing.path)
     assert settled(following)["run"]["state"] == "unfinished"
     growing.grow_until(b'"unit": "decay-1"')
-    growing.grow_until(b'"purpose": "decay"')
+    growing.grow_until(b'"role": "decay"')
     with FileLock(growing.path / ".lock"):
         assert following.look()
         state = settled(following)
@@ -125,7 +125,7 @@ def test_what_is_done_and_what_comes(growing: Growing) -> None:
         "left",
         "right",
     ]
-    assert state["frame"]["purpose"] == "decay"
+    assert state["frame"]["role"] == "decay"
     assert state["results"] == {}
 
 
@@ -194,9 +194,9 @@ def test_what_was_cut_off_counts_no_more_until_it_is_done_again(
     run = Path(shutil.copytree(finished, tmp_path / finished.name))
     shutil.rmtree(run / "result")
     lines = (run / "journal.jsonl").read_bytes().splitlines(keepends=True)
-    cut_at = 3 + next(n for n, line in enumerate(lines) if b'"purpose": "decay"' in line)
+    cut_at = 3 + next(n for n, line in enumerate(lines) if b'"role": "decay"' in line)
     (run / "journal.jsonl").write_bytes(b"".join(lines[:cut_at]))
-    of_frames = [line for line in lines[:cut_at] if b'"purpose"' in line]
+    of_frames = [line for line in lines[:cut_at] if b'"role"' in line]
     for path in sorted((run / "frames").iterdir())[len(of_frames) :]:
         path.unlink()
     following = RunFollower(run)
@@ -412,15 +412,15 @@ class Written:
             )
         self._event("actions", device="lamp", action="off", **self._happens())
 
-    def shoot(self, purpose: str = "decay") -> None:
+    def shoot(self, role: str = "decay") -> None:
         """One frame more."""
         if self._in_unit == self.FRAMES_EACH:
             self._next_unit()
         self.frames, self._in_unit = self.frames + 1, self._in_unit + 1
-        self.of_decays += purpose == "decay"
+        self.of_decays += role == "decay"
         name = f"frames/{self.frames:06d}.dng"
         (self.path / name).hardlink_to(self._frame)
-        settings = {"exposure_s": 1.0, "iso": 100, "f_number": 4.0, "purpose": purpose}
+        settings = {"exposure_s": 1.0, "iso": 100, "f_number": 4.0, "role": role}
         kept = {"frame": name, "sha256": "", "size_bytes": 1}
         self._event("frames", **kept, **settings, **self._happens())
 
@@ -511,7 +511,7 @@ def test_the_page_follows_the_run_and_finds_back(
         wait.until(lambda _: text(chromium, "state") == "running")
         assert dots(chromium) == 0
         for frames in (1, 2, 3):
-            growing.grow_until(b'"purpose": "decay"')
+            growing.grow_until(b'"role": "decay"')
             began = time.monotonic()
             watching.look()
             wait.until(lambda _: dots(chromium) == 2 * frames)  # noqa: B023
@@ -522,7 +522,7 @@ def test_the_page_follows_the_run_and_finds_back(
         # every stream breaks, as when the PC was asleep; the page asks again by itself
         watching.news.end()
         wait.until(lambda _: "lost" in text(chromium, "state"))
-        growing.grow_until(b'"purpose": "decay"')
+        growing.grow_until(b'"role": "decay"')
         watching.news = watching.server.news = News(
             settled(watching.following), watching.following.picture
         )

@@ -85,16 +85,16 @@ class PlannedCamera(PlannedDevice):
 
 @dataclass(frozen=True)
 class Shoot:
-    """One photograph, for a purpose: `dark`, `meter`, `decay`, `daylight`.
+    """One photograph, in a role: `dark`, `meter`, `decay`, `daylight`.
 
     The session takes it: it sets the camera beforehand, and keeps the frame.
     """
 
-    purpose: str
+    role: str
     settings: ExposureSettings
 
     def __str__(self) -> str:
-        return f"{self.purpose} frame, {self.settings}"
+        return f"{self.role} frame, {self.settings}"
 
 
 def exercise_camera(camera: Camera, trial: Trial) -> Exercised:

@@ -51,7 +51,7 @@ def analyse(part: Part) -> CameraCalibrationResult:
     darks = part_frames(part, FrameRole.DARK)
     lit = part_frames(part, *LIT)
     card = card_levels(lit, darks, region)
-    photon = [frame for frame in lit if frame.purpose == CardFrames.PHOTON]
+    photon = [frame for frame in lit if frame.role == CardFrames.PHOTON]
     transfers = tuple(_transfer(one, photon, darks, region) for one in protocol.isos)
     bracket = [frame for frame in lit if frame.unit == LINEARITY]
     if not bracket:
@@ -112,7 +112,7 @@ class CardLevels:
     def clipped(self) -> int:
         """How many frames clip that are not meant to."""
         rows = zip(self.frames, self.series.usable, strict=True)
-        return sum(frame.purpose != CardFrames.BRACKET and not usable for frame, usable in rows)
+        return sum(frame.role != CardFrames.BRACKET and not usable for frame, usable in rows)
 
     def linearity(
         self, iso: float, range_dn: float, saturation_dn: float | None
@@ -125,7 +125,7 @@ class CardLevels:
         level = np.where(rows[:, np.newaxis], self.level_dn, np.nan)
         return fit_linearity(level, self.sigma_dn, group, range_dn, saturation_dn)
 
-    def card_frames(self, purposes: Sequence[str], linearity: Linearity | None) -> list[CardFrame]:
+    def card_frames(self, roles: Sequence[str], linearity: Linearity | None) -> list[CardFrame]:
         """What brackets and repeats show, put right for what is not linear."""
         bent = deviation(linearity, self.level_dn)
         straight = self.level_dn * np.exp(-bent)
@@ -133,11 +133,11 @@ class CardLevels:
         light, noise = straight.sum(axis=1), np.sqrt(np.square(self.sigma_dn).sum(axis=1))
         return [
             CardFrame(
-                frame.unit, frame.purpose, frame.start_time, frame.exposure_s, frame.iso,
+                frame.unit, frame.role, frame.start_time, frame.exposure_s, frame.iso,
                 frame.f_number, float(np.log(light[row])), float(noise[row] / light[row]),
             )
             for row, frame in enumerate(self.frames)
-            if frame.purpose in purposes and used[row] and light[row] > 0
+            if frame.role in roles and used[row] and light[row] > 0
         ]  # fmt: skip
 
 
@@ -214,7 +214,7 @@ def _flats(
 ) -> tuple[FittedFlat, ...]:
     card, reference = part_region(part, part.protocol.card), part.protocol.camera.iso
     dark_dn = _dark_levels([frame for frame in darks if frame.iso == reference], card)
-    of_flats = [frame for frame in lit if frame.purpose == CardFrames.FLAT]
+    of_flats = [frame for frame in lit if frame.role == CardFrames.FLAT]
     return tuple(
         fit_flat(
             [read_raw(frame.path) for frame in of_flats if frame.f_number == f_number],
@@ -239,7 +239,7 @@ def _warnings(
                 f"{one.reduced_chi2:.1f} a degree of freedom): does the camera filter its RAW "
                 "frames, or did something move?"
             )
-    evident = [one for one in transfers if one.shares]
+    evident = [one for one in transfers if one.neighbours_share_noise]
     if evident:
         most = max(evident, key=lambda one: one.shared)
         yield (

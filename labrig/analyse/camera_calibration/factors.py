@@ -30,7 +30,7 @@ class CardFrame:
 
     Attributes
     ----------
-    unit, purpose
+    unit, role
         Of the run.
     time_s
         On any clock.
@@ -39,7 +39,7 @@ class CardFrame:
     """
 
     unit: str
-    purpose: str
+    role: str
     time_s: float
     exposure_s: float
     iso: float
@@ -72,7 +72,7 @@ def fit_factors(frames: Sequence[CardFrame], iso: float, f_number: Setting) -> F
     DataError
         Too few frames.
     """
-    repeats = [frame for frame in frames if frame.purpose == CardFrames.REPEAT]
+    repeats = [frame for frame in frames if frame.role == CardFrames.REPEAT]
     if len(repeats) < 4 or len(frames) < 8:
         raise DataError(
             f"expected repeats and brackets of the lit card that do not clip, got {len(frames)} "

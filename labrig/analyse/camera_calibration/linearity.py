@@ -18,10 +18,10 @@ from labrig.calibration import Linearity
 from labrig.optics import hats
 from labrig.results import FloatArray
 
-#: Knots of D, as shares of the range up to saturation.
+#: Knots of D, as fractions of the range up to saturation.
 KNOTS = (0.15, 0.35, 0.55, 0.75, 0.95)
-#: Below this share noise of reading is most of a value.
-LEAST_SHARE = 0.005
+#: Below this fraction noise of reading is most of a value.
+LEAST_FRACTION = 0.005
 
 
 def fit_linearity(
@@ -44,14 +44,14 @@ def fit_linearity(
     saturation_dn
         To be noted.
     """
-    used = np.isfinite(level_dn) & (level_dn > LEAST_SHARE * range_dn)
+    used = np.isfinite(level_dn) & (level_dn > LEAST_FRACTION * range_dn)
     used &= (used.sum(axis=1) > 1)[:, np.newaxis]
     if not used.any():
         return None
     frame, channel = np.nonzero(used)
     level, relative = level_dn[used], sigma_dn[used] / level_dn[used]
     highest = float(level.max())
-    between = [share * range_dn for share in KNOTS if share * range_dn < highest]
+    between = [fraction * range_dn for fraction in KNOTS if fraction * range_dn < highest]
     knots = np.array([0.0, *between, highest])
     frames, channels = level_dn.shape
     groups = int(group.max()) + 1

@@ -19,7 +19,7 @@ COMBINING_ROUNDS = 20
 SEEN_SIGMA = 5.0
 #: Chance, over all comparisons of a kind, at which spectra that do not differ are said to.
 LEVEL = 1e-3
-#: Share of the highest value above which a place tells the centroid: elsewhere is noise.
+#: Fraction of the highest value above which a place tells the centroid: elsewhere is noise.
 BRIGHT = 0.02
 #: Rounds in which the noise of the reference follows the brightness.
 COMPARING_ROUNDS = 5

@@ -186,7 +186,7 @@ def _holder(strip: Strip) -> dict[str, Region]:
     """Dark stripes above and below the strip, as far as the frame reaches."""
     (left, left_y), (right, right_y) = strip.left, strip.right
     upper, lower = min(left_y, right_y), max(left_y, right_y)
-    near, far = (share * strip.height for share in HOLDER)
+    near, far = (fraction * strip.height for fraction in HOLDER)
     stripes = {"above": (upper - far, upper - near), "below": (lower + near, lower + far)}
     return {
         name: (left, top, right - left, bottom - top)
@@ -203,8 +203,8 @@ def _positions(raw: RawFrame, strip: Strip, slices: Slices) -> FloatArray:
     linear = LinearFrame(raw)
     middles = np.array([linear.middle_columns(region) for region in slices.values()]).T
     across = (strip.right[0] - strip.left[0]) * raw.width
-    share = (middles - strip.left[0] * raw.width) / across + tilt_offset(strip, slices, raw)
-    return share if strip.rising else 1 - share
+    fraction = (middles - strip.left[0] * raw.width) / across + tilt_offset(strip, slices, raw)
+    return fraction if strip.rising else 1 - fraction
 
 
 def _system(lvfs: Sequence[Lvf], camera: CameraResponse) -> SpectralSystem:

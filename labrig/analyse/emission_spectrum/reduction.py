@@ -123,10 +123,10 @@ class PatchReduction:
         common = TWO_DEGREES * np.abs(np.array([m.current(exposure_s) for m in self.dark]))
         count = len(self.slices)
         if self.holder:
-            share = one.pixels[count:] / one.pixels[count:].sum(axis=0)
-            light = light - np.sum(share * light[count:], axis=0)
+            fraction = one.pixels[count:] / one.pixels[count:].sum(axis=0)
+            light = light - np.sum(fraction * light[count:], axis=0)
             common = np.broadcast_to(
-                np.sqrt(np.sum((share * sigma[count:]) ** 2, axis=0)), light.shape
+                np.sqrt(np.sum((fraction * sigma[count:]) ** 2, axis=0)), light.shape
             )
         sigma = np.where(np.isnan(light), np.nan, np.hypot(sigma, known))
         per_dn = np.full(
@@ -251,9 +251,9 @@ def _pairs(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray, FloatA
         scatter = np.nansum(np.square(difference), axis=2) / np.maximum((strips - 1) * strips, 1)
         scatter = np.where(few, np.nan, scatter * one.pixels)
         # a + b L of the one times scale², of the other times 1.
-        share = 1 + scale**2
-        level = (b + scale**2 * a) / share
-        yield np.where(both, level, np.nan), np.where(both, scatter / share, np.nan)
+        fraction = 1 + scale**2
+        level = (b + scale**2 * a) / fraction
+        yield np.where(both, level, np.nan), np.where(both, scatter / fraction, np.nan)
 
 
 def _line(level: FloatArray, scatter: FloatArray) -> NoiseModel:

@@ -29,7 +29,7 @@ from labrig.results import (
 #: Of a lamp's brightness from charge to charge.
 LAMP = 0.01
 #: What a lamp lacks that was just switched on, where nobody has measured it.
-USUAL = Warming(lacks=0.02, lacks_sigma=0.02, warms_s=150.0)
+USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
 #: No dark level is known better, in DN/s.
 LEAST_DARK = 1e-3
 
@@ -79,7 +79,7 @@ def _of_patch(
     uncertain = Uncertain(
         flicker=_flicker(part, decay),
         lamp=LAMP,
-        cold=warming.lacks_sigma,
+        cold=warming.deficit_sigma,
         offset=dark,
         # The sensor warms and cools over hours of long exposures, more than dark frames tell.
         wander=dark,
@@ -92,7 +92,7 @@ def _of_patch(
     )
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
-    frames = tuple(frame.path.name for purpose in GLOWING for frame in run.frames(purpose))
+    frames = tuple(frame.path.name for role in GLOWING for frame in run.frames(role))
     material = excited_material(
         fit, irradiance, spectrum, patch.material, run.folder.resolve().name, frames
     )
@@ -125,8 +125,8 @@ def _fit(
 ) -> FittedExcitation:
     rates = [state.k_r_per_s for state in decay.states]
     amplitudes = np.array([state.amplitude for state in decay.states])
-    shares = np.maximum(amplitudes / amplitudes.sum(), 1e-3)
-    return fit_excitation([charging.through, charging.direct], rates, shares, uncertain, near)
+    fractions = np.maximum(amplitudes / amplitudes.sum(), 1e-3)
+    return fit_excitation([charging.through, charging.direct], rates, fractions, uncertain, near)
 
 
 def _flicker(part: Part, decay: FittedDecay) -> float:

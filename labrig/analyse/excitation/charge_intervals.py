@@ -69,7 +69,7 @@ class ChargeFrames:
 
 
 def charge_frames(
-    run: RunRecord, overrides: Overrides, warms_s: float, blank: BlankFile | None = None
+    run: RunRecord, overrides: Overrides, time_constant_s: float, blank: BlankFile | None = None
 ) -> ChargeFrames:
     """What a run says; photographs that begin before the bench is dark, by its blank, left out.
 
@@ -86,12 +86,9 @@ def charge_frames(
     """
     units = (_interval(attempt) for attempt in run.completed().values())
     lit = sorted((one for one in units if one is not None), key=lambda one: one.on_s)
-    intervals = with_warmth(lit, warms_s)
+    intervals = with_warmth(lit, time_constant_s)
     frames = [
-        frame
-        for purpose in GLOWING
-        for frame in run.frames(purpose)
-        if not overrides.excludes(frame)
+        frame for role in GLOWING for frame in run.frames(role) if not overrides.excludes(frame)
     ]
     frames.sort(key=lambda frame: frame.start_time)
     of_frames = {frame: _interval_before(intervals, frame) for frame in frames}
@@ -115,17 +112,19 @@ def _cleaned(
     return {frame: charge[frame] for frame, t in after_s.items() if blank.is_clean(t)}, left_out
 
 
-def with_warmth(intervals: Sequence[ChargeInterval], warms_s: float) -> list[ChargeInterval]:
+def with_warmth(
+    intervals: Sequence[ChargeInterval], time_constant_s: float
+) -> list[ChargeInterval]:
     """By Newton's law: cold before the first charge, warmer in each one, cooler after it."""
     found: list[ChargeInterval] = []
     lacking, since_s = 1.0, 0.0
     for one in intervals:
         if found:
-            lacking = 1 - (1 - lacking) * math.exp(-(one.on_s - since_s) / warms_s)
+            lacking = 1 - (1 - lacking) * math.exp(-(one.on_s - since_s) / time_constant_s)
         charge_s = one.off_s - one.on_s
-        mean = -math.expm1(-charge_s / warms_s) * warms_s / charge_s
+        mean = -math.expm1(-charge_s / time_constant_s) * time_constant_s / charge_s
         found.append(replace(one, cold=lacking * mean))
-        lacking, since_s = lacking * math.exp(-charge_s / warms_s), one.off_s
+        lacking, since_s = lacking * math.exp(-charge_s / time_constant_s), one.off_s
     return found
 
 

@@ -42,7 +42,7 @@ def patch_chargings(
         one.
     """
     known, overrides, protocol = part.inputs, part.overrides, part.protocol
-    frames = charge_frames(part.run, overrides, warming.warms_s, known.blank)
+    frames = charge_frames(part.run, overrides, warming.time_constant_s, known.blank)
     require_calibrated_camera(known.camera, part.run, list(frames.charge_of))
     raw = read_raw(next(iter(frames.charge_of)).path)
     sites, refused = slice_strip(
@@ -75,7 +75,7 @@ def patch_chargings(
             _charge(
                 one,
                 frames,
-                warming.lacks,
+                warming.deficit,
                 fresh=protocol.samples > 1,
                 saturated=protocol.saturated and one is longest,
             )
@@ -155,7 +155,7 @@ def _evened(
 
 
 def _charge(
-    one: ChargeInterval, frames: ChargeFrames, lacks: float, *, fresh: bool, saturated: bool
+    one: ChargeInterval, frames: ChargeFrames, deficit: float, *, fresh: bool, saturated: bool
 ) -> Charge:
     after = frames.after(one)
     return Charge(
@@ -163,7 +163,7 @@ def _charge(
         off_s=one.off_s - frames.zero_s,
         start_s=np.array([frame.start_time - frames.zero_s for frame in after]),
         exposure_s=np.array([frame.exposure_s for frame in after]),
-        brightness=1 - lacks * one.cold,
+        brightness=1 - deficit * one.cold,
         cold=one.cold,
         fresh=fresh,
         saturated=saturated,

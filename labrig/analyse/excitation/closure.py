@@ -97,8 +97,8 @@ def _at_full_light(direct: ChargingSeries, fit: FittedExcitation, steady: FloatA
     """(K,) s: how long the charges would have lasted by the steady lamp, for what they charge."""
     weight = fit.k_e().sum(axis=0) * steady
     weight /= weight.sum()
-    lost_s = direct.rise.duration_s @ (1 - direct.rise.share @ weight)
-    gained_s = direct.fade.duration_s @ (direct.fade.share @ weight)
+    lost_s = direct.rise.duration_s @ (1 - direct.rise.fraction @ weight)
+    gained_s = direct.fade.duration_s @ (direct.fade.fraction @ weight)
     return np.array(
         [one.brightness * (one.off_s - one.on_s - lost_s + gained_s) for one in direct.charges]
     )

@@ -19,7 +19,7 @@ WAVELENGTH_SIGMA_NM = 1.0
 SMOOTH_MODES = 9
 #: Light of which less is known than this is taken for known so well: logarithms are to be linear.
 WORST = 1.0
-#: Less light than this share of the most has no logarithm worth the name.
+#: Less light than this fraction of the most has no logarithm worth the name.
 LEAST_LIGHT = 1e-6
 #: A halogen lamp falls to 1/e in so long at these wavelengths (physics.md: measured by others),
 #: and is dark after `DARK_S` (Nalbach et al., section 4.4).
@@ -40,8 +40,8 @@ def site_modes(irradiance: IrradianceFile) -> FloatArray:
     light_sigma = _relative_sigma(irradiance)[:, None]
     position = np.array(irradiance.position)
     knots = np.linspace(position[0], position[-1], SMOOTH_MODES)
-    share = np.clip(1 - np.abs(position - knots[:, None]) / (knots[1] - knots[0]), 0.0, None)
-    smooth = np.sin(np.pi / 2 * share)[..., None]
+    fraction = np.clip(1 - np.abs(position - knots[:, None]) / (knots[1] - knots[0]), 0.0, None)
+    smooth = np.sin(np.pi / 2 * fraction)[..., None]
     nm = np.ptp(irradiance.bands_nm) * (position - position[0]) / np.ptp(position)
     by_nm = np.gradient(np.log(_some(through)), nm, axis=0)
     beyond = np.sqrt(np.clip((sigma / _some(through)) ** 2 - light_sigma**2, 0.0, WORST**2))
@@ -119,9 +119,9 @@ def _some(light: FloatArray) -> FloatArray:
 
 def _transient(file: FadeFile, change: Change, bands_nm: FloatArray, end: float) -> Transient:
     """In steps short enough, until the lamp has arrived."""
-    times_s, share = file.in_bands(change, bands_nm)
+    times_s, fraction = file.in_bands(change, bands_nm)
     fine_s = np.linspace(0.0, times_s[-1], STEPS + 1)
-    fine = np.column_stack([np.interp(fine_s, times_s, column) for column in share.T])
+    fine = np.column_stack([np.interp(fine_s, times_s, column) for column in fraction.T])
     fine[-1] = end
     return Transient.sampled(fine_s, fine)
 
@@ -130,10 +130,10 @@ def _usual(bands_nm: FloatArray) -> Transient:
     middles_nm = (bands_nm[1:] + bands_nm[:-1]) / 2
     tau_s = np.interp(middles_nm, USUAL_NM, USUAL_1_E_S)
     times_s = np.linspace(0.0, DARK_S, STEPS + 1)
-    share = np.exp(-times_s[:, None] / tau_s)
-    share[-1] = 0.0
-    return Transient.sampled(times_s, share)
+    fraction = np.exp(-times_s[:, None] / tau_s)
+    fraction[-1] = 0.0
+    return Transient.sampled(times_s, fraction)
 
 
 def _upside_down(fade: Transient) -> Transient:
-    return Transient(fade.duration_s, 1 - fade.share)
+    return Transient(fade.duration_s, 1 - fade.fraction)

@@ -64,18 +64,18 @@ def analyse(part: Part) -> FadeResult:
     changes: dict[str, LampChange] = {}
     tables: dict[str, Change] = {}
     lag = ANY_LAG
-    for purpose in SWITCHED if protocol.rise else SWITCHED[:1]:
-        switched = frames_after_switch(part.run, frames, darks, places, camera, purpose)
+    for role in SWITCHED if protocol.rise else SWITCHED[:1]:
+        switched = frames_after_switch(part.run, frames, darks, places, camera, role)
         seen = weights
         if protocol.through_lvf:
             # All channels of a place see the same band: one of them is enough.
             columns = brightest_channels(switched, len(curves.channels))
             switched, seen = take_columns(switched, columns), weights[columns]
-        rises = purpose == LampFrames.RISE
+        rises = role == LampFrames.RISE
         change = fit_change(switched, seen, nm, flicker, rises=rises, lag=lag)
         lag = replace(change.lag, sigma=float(np.hypot(change.lag.sigma, RELAY_S)))
-        changes[purpose] = change.result(switched)
-        tables[purpose] = _table(change, bands, nm)
+        changes[role] = change.result(switched)
+        tables[role] = _table(change, bands, nm)
     warm, warming_light = _warming(part, darks, flicker)
     file = FadeFile(
         lamp=lamp.name,
@@ -148,12 +148,12 @@ def _band_weights(edges_nm: FloatArray, lamp: Spectrum, nm: FloatArray) -> Float
 def _table(change: FittedChange, bands: FloatArray, nm: FloatArray) -> Change:
     last_s = _over_at(change, bands, nm)
     t_s = last_s * np.linspace(0, 1, TIMES) ** DENSER
-    share, sigma = change.in_bands(bands, nm, t_s)
+    fraction, sigma = change.in_bands(bands, nm, t_s)
     first = 0.0 if change.rises else 1.0
-    share[0], sigma[0] = first, 0.0
+    fraction[0], sigma[0] = first, 0.0
     return Change(
         t_s=tuple(_short(value) for value in t_s),
-        share=tuple(tuple(_short(value) for value in row) for row in share),
+        fraction=tuple(tuple(_short(value) for value in row) for row in fraction),
         sigma=tuple(tuple(_short(value) for value in row) for row in sigma),
     )
 
@@ -161,8 +161,8 @@ def _table(change: FittedChange, bands: FloatArray, nm: FloatArray) -> Change:
 def _over_at(change: FittedChange, bands: FloatArray, nm: FloatArray) -> float:
     """When all bands are as good as at their end."""
     t_s = np.linspace(0, LONGEST_S, 2001)
-    share, _ = change.in_bands(bands, nm, t_s)
-    left = 1 - share if change.rises else share
+    fraction, _ = change.in_bands(bands, nm, t_s)
+    left = 1 - fraction if change.rises else fraction
     over = np.flatnonzero((left < GONE).all(axis=1))
     return float(t_s[over[0]]) if len(over) else LONGEST_S
 
@@ -172,19 +172,19 @@ def _short(value: float) -> float:
 
 
 def _warnings(changes: Mapping[str, LampChange]) -> Iterator[str]:
-    for purpose, change in changes.items():
+    for role, change in changes.items():
         if change.best.reduced_chi2 > BAD_CHI2:
             yield (
-                f"the {purpose} is not that of a glowing body (χ² {change.best.reduced_chi2:.1f} a "
+                f"the {role} is not that of a glowing body (χ² {change.best.reduced_chi2:.1f} a "
                 "degree of freedom): is it a halogen lamp, and are its spectrum and the camera's "
                 "curves those of this bench?"
             )
         exponent, sigma = change.exponent.value, change.exponent.sigma
         if abs(exponent - 1) > max(0.1, 4 * sigma):
             yield (
-                f"the {purpose} follows the wavelength with an exponent of "
+                f"the {role} follows the wavelength with an exponent of "
                 f"{plus_minus(exponent, sigma)}, a glowing body has 1: see optics.lamp and "
                 "optics.camera in the rig file"
             )
         if clipped := change.frames.clipped:
-            yield f"{clipped} photographs of the {purpose} clip and are left out; lower camera.iso"
+            yield f"{clipped} photographs of the {role} clip and are left out; lower camera.iso"

@@ -1,8 +1,8 @@
-"""How a lamp may go dark or come on: the share of its steady light as a function of a few numbers.
+"""How a lamp may go dark or come on: the fraction of its steady light, in a few numbers.
 
-By Wien's law a body at the temperature T(t) has, of its light at T₀, the share
+By Wien's law a body at the temperature T(t) has, of its light at T₀, the fraction
 
-    ln share(λ, t) = −(hc/k) (1/T − 1/T₀) / λ = −u(t) (550 nm / λ)^p,   p = 1.
+    ln fraction(λ, t) = −(hc/k) (1/T − 1/T₀) / λ = −u(t) (550 nm / λ)^p,   p = 1.
 
 Parameters θ of all shapes end with p and with the lag of the shutter in s.
 """
@@ -14,7 +14,7 @@ import numpy as np
 
 from labrig.results import FittedShape, FloatArray, LampChange, Measured, SwitchedFrames
 
-#: Wavelength at which u is minus the logarithm of the share.
+#: Wavelength at which u is minus the logarithm of the fraction.
 REFERENCE_NM = 550.0
 #: Unit of time of the polynomials.
 SCALE_S = 0.3
@@ -138,11 +138,11 @@ class Smooth:
         return np.zeros(self.free), np.full(self.free, np.inf)
 
 
-def share_of(shape: Shape, theta: FloatArray, nm: FloatArray, t_s: FloatArray) -> FloatArray:
-    """Share of the steady lamp's light at (m,) times after the switch, (m, wavelengths)."""
+def fraction_of(shape: Shape, theta: FloatArray, nm: FloatArray, t_s: FloatArray) -> FloatArray:
+    """Fraction of the steady lamp's light at (m,) times after the switch, (m, wavelengths)."""
     u = shape.u(theta[:-2], np.maximum(t_s, 0.0))
-    share: FloatArray = np.exp(-np.outer(u, (REFERENCE_NM / nm) ** theta[-2]))
-    return share
+    fraction: FloatArray = np.exp(-np.outer(u, (REFERENCE_NM / nm) ** theta[-2]))
+    return fraction
 
 
 @dataclass(frozen=True, eq=False)
@@ -176,15 +176,15 @@ class Fit:
         self, weights: FloatArray, nm: FloatArray, t_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
         """As `FittedChange.in_bands`, of this shape alone."""
-        share = share_of(self.shape, self.parameters, nm, t_s) @ weights.T
+        fraction = fraction_of(self.shape, self.parameters, nm, t_s) @ weights.T
         slopes = []
         for number, step in enumerate(STEP * np.sqrt(np.diag(self.covariance))):
             moved = self.parameters.copy()
             moved[number] += step
-            slopes.append((share_of(self.shape, moved, nm, t_s) @ weights.T - share) / step)
+            slopes.append((fraction_of(self.shape, moved, nm, t_s) @ weights.T - fraction) / step)
         slope = np.array(slopes)
         variance = np.einsum("ktb,kl,ltb->tb", slope, self.covariance, slope)
-        return share, np.sqrt(np.maximum(variance, 0.0))
+        return fraction, np.sqrt(np.maximum(variance, 0.0))
 
 
 @dataclass(frozen=True, eq=False)
@@ -225,15 +225,15 @@ class FittedChange:
     def in_bands(
         self, weights: FloatArray, nm: FloatArray, t_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Share of the steady lamp's light after the switch, and σ, each (times, bands).
+        """Fraction of the steady lamp's light after the switch, and σ, each (times, bands).
 
         Parameters
         ----------
         weights
             (bands, wavelengths) of the light at `nm` in every band; sums to 1.
         """
-        shares, sigmas = zip(*(fit.in_bands(weights, nm, t_s) for fit in self.fits), strict=True)
-        return self._averaged(np.array(shares), np.array(sigmas))
+        fractions, sigmas = zip(*(fit.in_bands(weights, nm, t_s) for fit in self.fits), strict=True)
+        return self._averaged(np.array(fractions), np.array(sigmas))
 
     def _mean(self, parameter: int, unit: str = "") -> Measured:
         values = np.array([fit.parameters[parameter] for fit in self.fits])

@@ -14,13 +14,13 @@ from labrig.analyse.fade.change import (
     FittedChange,
     Shape,
     Smooth,
-    share_of,
+    fraction_of,
 )
 from labrig.errors import FitError
 from labrig.fit import least_squares
 from labrig.results import FloatArray, Measured, SwitchedFrames
 
-#: On which shares are integrated.
+#: On which fractions are integrated.
 STEP_S = 2e-3
 DEGREES = (2, 3, 4)
 #: What is known of p beforehand, and of the lag if nothing else is; one standard deviation.
@@ -140,9 +140,9 @@ class _Problem:
         middle_nm = float(self._weights[column] @ self._nm)
         used = self._used[:, column] & (value > 5 * frames.light_sigma_s[:, column])
         if self._shape.rises:
-            share = np.clip(value / frames.exposure_s, 1e-6, 1 - 1e-6)
-            used &= (share > 0.02) & (share < 0.95)
-            target = np.log(-np.log(share[used]) * middle_nm / REFERENCE_NM)
+            fraction = np.clip(value / frames.exposure_s, 1e-6, 1 - 1e-6)
+            used &= (fraction > 0.02) & (fraction < 0.95)
+            target = np.log(-np.log(fraction[used]) * middle_nm / REFERENCE_NM)
         else:
             target = np.log(value[used])
         if np.count_nonzero(used) < 3:
@@ -158,13 +158,13 @@ class _Problem:
         return np.array([*first, 1.0, self._expected[-1]])
 
     def model(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """∫ share dt of every photograph, and its slope by its begin; (n, S) each."""
-        share = share_of(self._shape, theta, self._nm, self._grid_s) @ self._weights.T
-        steps = STEP_S * (share[1:] + share[:-1]) / 2
-        integral = np.vstack([np.zeros(share.shape[1]), np.cumsum(steps, axis=0)])
+        """∫ fraction dt of every photograph, and its slope by its begin; (n, S) each."""
+        fraction = fraction_of(self._shape, theta, self._nm, self._grid_s) @ self._weights.T
+        steps = STEP_S * (fraction[1:] + fraction[:-1]) / 2
+        integral = np.vstack([np.zeros(fraction.shape[1]), np.cumsum(steps, axis=0)])
         begin_s = self._frames.start_s + theta[-1]
-        first, before = _until(begin_s, integral, share)
-        last, after = _until(begin_s + self._frames.exposure_s, integral, share)
+        first, before = _until(begin_s, integral, fraction)
+        last, after = _until(begin_s + self._frames.exposure_s, integral, fraction)
         return last - first, after - before
 
     def whiten(self, theta: FloatArray, jitter_s: float) -> None:
@@ -228,10 +228,10 @@ class _Problem:
 
 
 def _until(
-    at_s: FloatArray, integral: FloatArray, share: FloatArray
+    at_s: FloatArray, integral: FloatArray, fraction: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Integral of a share that is straight between the times of the grid, and the share there."""
-    left = np.clip((at_s / STEP_S).astype(np.intp), 0, len(share) - 2)
+    """Integral and value of a fraction that is straight between the times of the grid."""
+    left = np.clip((at_s / STEP_S).astype(np.intp), 0, len(fraction) - 2)
     x = (at_s - left * STEP_S)[:, np.newaxis]
-    slope = (share[left + 1] - share[left]) / STEP_S
-    return integral[left] + (share[left] + slope * x / 2) * x, share[left] + slope * x
+    slope = (fraction[left + 1] - fraction[left]) / STEP_S
+    return integral[left] + (fraction[left] + slope * x / 2) * x, fraction[left] + slope * x

@@ -27,14 +27,14 @@ def frames_after_switch(
     darks: Sequence[FrameRecord],
     places: Mapping[str, Region],
     camera: CameraFile | None,
-    purpose: str,
+    role: str,
 ) -> SwitchedFrames:
-    """Photographs of a `purpose`, `fade` or `rise`, over those of the steady lamp in their pass.
+    """Photographs of a `role`, `fade` or `rise`, over those of the steady lamp in their pass.
 
     Parameters
     ----------
     frames
-        Of that purpose, and those called `steady`.
+        Of that role, and those called `steady`.
     places
         Regions that are seen, by name.
 
@@ -43,17 +43,17 @@ def frames_after_switch(
     DataError
         Too few of them are of any use.
     """
-    state = "on" if purpose == LampFrames.RISE else "off"
+    state = "on" if role == LampFrames.RISE else "off"
     attempts = run.completed()
     taken = [
         timed(frame, switched_time(attempts[frame.unit], frame, state))
         for frame in frames
-        if frame.purpose == purpose
+        if frame.role == role
     ]
-    steady = [untimed(frame) for frame in frames if frame.purpose == LampFrames.STEADY]
+    steady = [untimed(frame) for frame in frames if frame.role == LampFrames.STEADY]
     if len(taken) < FEWEST or not steady:
         raise DataError(
-            f"expected {FEWEST} photographs of the {purpose} or more, and of the steady lamp, got "
+            f"expected {FEWEST} photographs of the {role} or more, and of the steady lamp, got "
             f"{len(taken)} and {len(steady)}; resume the run"
         )
     dark = [untimed(frame) for frame in darks]
@@ -65,7 +65,7 @@ def frames_after_switch(
     seen = np.isfinite(light_s).any(axis=1)
     if np.count_nonzero(seen) < FEWEST:
         raise DataError(
-            f"expected {FEWEST} photographs of the {purpose} that do not clip, got "
+            f"expected {FEWEST} photographs of the {role} that do not clip, got "
             f"{np.count_nonzero(seen)}; lower camera.iso"
         )
     clips = ~np.all([one.usable[: len(taken)] for one in series.values()], axis=0)
@@ -146,12 +146,12 @@ def warming(
     chi2 = np.array([one[2] for one in found])
     weight = np.exp(-(chi2 - chi2.min()) / 2)
     weight /= weight.sum()
-    lacks = np.array([one[0] for one in found])
+    deficit = np.array([one[0] for one in found])
     own = np.array([one[1] for one in found])
-    mean = float(weight @ lacks)
-    spread = float(np.sqrt(weight @ (own**2 + (lacks - mean) ** 2)))
+    mean = float(weight @ deficit)
+    spread = float(np.sqrt(weight @ (own**2 + (deficit - mean) ** 2)))
     at = int(np.argmin(chi2))
-    file = Warming(lacks=max(mean, 0.0), lacks_sigma=spread, warms_s=float(TAU_S[at]))
+    file = Warming(deficit=max(mean, 0.0), deficit_sigma=spread, time_constant_s=float(TAU_S[at]))
     return file, WarmingLight(t_s, level / found[at][3])
 
 
@@ -162,8 +162,8 @@ def _fit_warming(
     rows = np.stack([one, -one * np.exp(-t_s / tau_s)], axis=1)
     covariance = np.linalg.inv(rows.T @ rows)
     warm, less = covariance @ (rows.T @ level)
-    lacks = less / warm
-    slope = np.array([-lacks, 1.0]) / warm
+    deficit = less / warm
+    slope = np.array([-deficit, 1.0]) / warm
     left = level - rows @ [warm, less]
     sigma = float(np.sqrt(slope @ covariance @ slope))
-    return float(lacks), sigma, float(left @ left), float(warm)
+    return float(deficit), sigma, float(left @ left), float(warm)

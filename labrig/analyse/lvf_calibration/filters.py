@@ -26,7 +26,7 @@ EXPECTED = 0.05
 BETTER = 3.0
 #: Beyond this it is of none that is known.
 FAR_OFF = 0.15
-#: Places say what filter is in if they see this share of what the brightest one sees.
+#: Places say what filter is in if they see this fraction of what the brightest one sees.
 BRIGHT = 0.25
 #: What a gel differs from its table by, and a table of few points from the curve, relative.
 TABLE = 0.02
@@ -111,9 +111,9 @@ def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> l
     expected = bench.relative(lvf, scenes.filters)
     bare = scenes.values[0].value
     # In its brightest colour a place sees its band, in the others and at dim ends what leaks.
-    share = np.nan_to_num(bare / scenes.card.value)
-    own = np.argmax(share, axis=1)
-    bright = share.max(axis=1) > BRIGHT * share.max()
+    fraction = np.nan_to_num(bare / scenes.card.value)
+    own = np.argmax(fraction, axis=1)
+    bright = fraction.max(axis=1) > BRIGHT * fraction.max()
     at = np.flatnonzero(bright), own[bright]
     found = []
     for number, seen in enumerate(scenes.values[1:], start=1):

@@ -16,9 +16,9 @@ from labrig.results import PlacedStrip, Stripes, StripLines
 WHOLE = (0.0, 1.0)
 #: Lines that excite phosphors, in nm; those of longer wavelength seldom do.
 EXCITING_NM = (365.02, 404.6565, 407.7837, 435.8335, 546.0750)
-#: Doors let the sample shift by no more, as a share of the strip's length.
+#: Doors let the sample shift by no more, as a fraction of the strip's length.
 MOST_SHIFT = 0.08
-#: Stripes are seen if they explain this share of what varies along the strip.
+#: Stripes are seen if they explain this fraction of what varies along the strip.
 LEAST_EXPLAINED = 0.7
 
 
@@ -84,7 +84,7 @@ def _moved(strip: Strip, blue: float, red: float) -> Strip:
     """The strip whose blue and red ends are at these positions along the old one."""
     start, end = (blue, red) if strip.rising else (1 - red, 1 - blue)
     left, right = np.array(strip.left), np.array(strip.right)
-    ends = [left + share * (right - left) for share in (start, end)]
+    ends = [left + fraction * (right - left) for fraction in (start, end)]
     # What leaves the frame at an end does so by a pixel or two of a strip that fills it.
     (x0, y0), (x1, y1) = (np.clip(point, 0.0, 1.0).tolist() for point in ends)
     try:

@@ -19,8 +19,8 @@ from labrig.fit.least_squares import FloatArray
 from labrig.results import AlternativeModel
 
 #: Gauss–Legendre on [0, 1] for what has no elementary integral.
-_NODES, _SHARES = np.polynomial.legendre.leggauss(8)
-NODES, SHARES = (_NODES + 1) / 2, _SHARES / 2
+_NODES, _FRACTIONS = np.polynomial.legendre.leggauss(8)
+NODES, FRACTIONS = (_NODES + 1) / 2, _FRACTIONS / 2
 
 
 def power_law_mean(
@@ -82,7 +82,7 @@ def stretched_mean(
     # t^β log t → 0 as t → 0.
     log_ratio = np.log(np.maximum(time / tau_s, 1e-300))
     power = np.exp(exponent * log_ratio)
-    falling = np.exp(-power) * SHARES
+    falling = np.exp(-power) * FRACTIONS
     by_log_tau = exponent * (falling * power).sum(axis=1)
     by_exponent = -(falling * power * log_ratio).sum(axis=1)
     return falling.sum(axis=1), np.stack([by_log_tau, by_exponent], axis=1)
@@ -99,7 +99,7 @@ def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     return psi, slope
 
 
-#: τ from this share of the shortest step between frames …
+#: τ from this fraction of the shortest step between frames …
 SHORTEST_STEPS = 0.01
 #: … to this many spans.
 LONGEST_SPANS = 100.0

@@ -33,7 +33,7 @@ ALTERNATIONS_IF_GIVEN = 2
 FLICKER_ITERATIONS = 12
 #: All frames' signal in σ below which it is nothing but noise.
 LEAST_BRIGHTNESS = 4.0
-#: Share of the bright frames' information that the curve must leave to the flicker.
+#: Fraction of the bright frames' information that the curve must leave to the flicker.
 LEAST_SPARE = 1e-6
 #: Scale of what is known of any flicker beforehand, a half-Cauchy distribution (A. Gelman, Bayesian
 #: Analysis 1, 2006): shutters, apertures and lamps scatter by 0.5-1 %, some by a multiple of it.
@@ -193,7 +193,7 @@ def _flicker(
     """ρ, its σ, its degrees of freedom and likely values, from the frames' common scatter.
 
     Along the signal's direction a frame scatters with variance V = 1 + ρ² B, B = |s/σ|², of which
-    the curve followed the share `leverage` (n,). ρ² is the restricted maximum of the likelihood
+    the curve followed the fraction `leverage` (n,). ρ² is the restricted maximum of the likelihood
     (REML; Patterson and Thompson 1971), by its fixed-point form.
     """
     u = np.einsum("fcd,fd->fc", series.whiteners, signal)
@@ -236,7 +236,7 @@ def _likely_flickers(brightness2: FloatArray, along2: FloatArray, spare: FloatAr
     variance = 1 + np.multiply.outer(rho**2, brightness2)
     log_likelihood = -0.5 * (np.log(variance) @ spare + (along2 / variance).sum(axis=1))
     density = np.exp(log_likelihood - log_likelihood.max()) / (1 + (rho / USUAL_FLICKER) ** 2)
-    share = density * np.gradient(rho)
-    below = np.cumsum(share) - share / 2
+    fraction = density * np.gradient(rho)
+    below = np.cumsum(fraction) - fraction / 2
     steps = (np.arange(LIKELY_FLICKERS) + 0.5) / LIKELY_FLICKERS
-    return np.interp(steps, below / share.sum(), rho)
+    return np.interp(steps, below / fraction.sum(), rho)

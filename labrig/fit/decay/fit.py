@@ -211,7 +211,7 @@ def _alternatives(data: WhitenedSeries, chosen: StatesFit) -> tuple[AlternativeM
 def _reweighted(
     data: WhitenedSeries, fit: StatesFit, flicker: float
 ) -> tuple[WhitenedSeries, StatesFit]:
-    """The fit whose flicker is a share of its own signal, and the data so whitened."""
+    """The fit whose flicker is a fraction of its own signal, and the data so whitened."""
     if flicker == 0:
         return data, refit(data, fit)
     for _ in range(REWEIGHTINGS):

@@ -38,7 +38,7 @@ def _mean_slope(x: FloatArray, mean: FloatArray) -> FloatArray:
     return np.where(x < SERIES_BELOW, series, np.exp(-x) - mean)
 
 
-#: A state dimmer than this share of the brightest at the first frame is none.
+#: A state dimmer than this fraction of the brightest at the first frame is none.
 NEGLIGIBLE_AMPLITUDE = 1e-9
 #: Two rates closer than this in log k are one.
 MERGED_LOG_RATE = 1e-2

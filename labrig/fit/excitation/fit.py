@@ -32,7 +32,7 @@ LARGE_CHI2 = 1.5
 def fit_excitation(
     series: Sequence[ChargingSeries],
     k_r_per_s: ArrayLike,
-    shares: ArrayLike,
+    fractions: ArrayLike,
     uncertain: Uncertain | None = None,
     near: FittedExcitation | None = None,
 ) -> FittedExcitation:
@@ -42,7 +42,7 @@ def fit_excitation(
     ----------
     series
         The first one's irradiance is the E to which k_e belongs.
-    k_r_per_s, shares
+    k_r_per_s, fractions
         (N,) rates to start from and each state's part of the glow, such as a decay fit found.
     uncertain
         What else scatters; nothing by default.
@@ -62,7 +62,7 @@ def fit_excitation(
     reference = _brightest(series)
     problem = ExcitationProblem(series, len(rates), reference, uncertain)
     if near is None:
-        begin = starts(problem, rates, np.asarray(shares, dtype=np.float64), reference)
+        begin = starts(problem, rates, np.asarray(fractions, dtype=np.float64), reference)
     else:
         begin = iter([_as_fitted(problem, near, reference)])
     found = min((_least(problem, start, ROUGH) for start in begin), key=_chi2)

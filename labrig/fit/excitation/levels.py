@@ -131,14 +131,14 @@ def _ended(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
 
 def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> _Charges:
     """Every charge for itself."""
-    duration_s, share = _steps(series)
+    duration_s, fraction = _steps(series)
     brightness = np.array([charge.brightness for charge in series.charges])
     sites, bands = series.irradiance.shape
     shape = (len(brightness), sites, len(k_r_per_s))
     # Sites and states in one axis, and all charges' steps side by side: long rows for numpy.
     k_r = np.tile(k_r_per_s, sites)
     of_steady = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
-    kappa = brightness[:, None] * (share @ of_steady.T)[:, None, :]
+    kappa = brightness[:, None] * (fraction @ of_steady.T)[:, None, :]
     tau = duration_s[:, :, None]
     step, slopes = relaxation_with_slopes(kappa, k_r, tau)
     before = np.zeros((len(tau) + 1, *kappa.shape[1:]))
@@ -150,16 +150,16 @@ def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
     np.cumprod(step.kept[::-1], axis=0, out=after[-2::-1])
     by_kappa = after[1:] * (slopes.kept * before[:-1] + slopes.gained_by_kappa)
     by_k_r = (after[1:] * (slopes.kept * before[:-1] + slopes.gained_by_k_r)).sum(axis=0)
-    by_share = (by_kappa.reshape(len(tau), -1).T @ share).reshape(*shape, bands)
+    by_fraction = (by_kappa.reshape(len(tau), -1).T @ fraction).reshape(*shape, bands)
     light = brightness[:, None, None] * series.irradiance
     return _Charges(
         duration_s.sum(axis=0),
-        light * (duration_s.T @ share)[:, None, :],
+        light * (duration_s.T @ fraction)[:, None, :],
         after[0].reshape(shape),
         Levels(
             before[-1].reshape(shape),
             by_k_r.reshape(shape),
-            by_share * light[:, :, None, :],
+            by_fraction * light[:, :, None, :],
         ),
     )
 
@@ -173,4 +173,4 @@ def _steps(series: ChargingSeries) -> tuple[FloatArray, FloatArray]:
     duration_s[: changes[0]] = rise.duration_s[:, None]
     duration_s[changes[0]] = steady_s
     duration_s[changes[0] + 1 :] = fade.duration_s[:, None]
-    return duration_s, np.vstack([rise.share, np.ones(rise.share.shape[1]), fade.share])
+    return duration_s, np.vstack([rise.fraction, np.ones(rise.fraction.shape[1]), fade.fraction])

@@ -16,20 +16,20 @@ KAPPA_OVER_K_R = np.geomspace(1e-5, 1e3, 65)
 
 
 def starts(
-    problem: ExcitationProblem, k_r_per_s: FloatArray, shares: FloatArray, reference: int
+    problem: ExcitationProblem, k_r_per_s: FloatArray, fractions: FloatArray, reference: int
 ) -> Iterator[FloatArray]:
     """θ to start from, one per guessed level.
 
     Parameters
     ----------
-    k_r_per_s, shares
+    k_r_per_s, fractions
         (N,) rates and what each state contributes to the glow, as a decay shows them.
     reference
         The brightest channel.
     """
-    shares = shares / shares.sum()
+    fractions = fractions / fractions.sum()
     peak = max(float(np.nanmax(one.values[..., reference])) for one in problem.series)
-    mean_rate = float(shares @ k_r_per_s)
+    mean_rate = float(fractions @ k_r_per_s)
     for guess in GUESSED_LEVELS:
         total = peak / guess
         found = [_kappa(one, mean_rate, total, reference) for one in problem.series]
@@ -38,7 +38,7 @@ def starts(
         # A state that decays faster charges no further by the same light.
         yield problem.parameters.as_stated(
             k_r_per_s,
-            total * shares,
+            total * fractions,
             np.outer(k_r_per_s / mean_rate, np.maximum(k_e, 1e-3 * k_e.max())),
             _weights(problem, reference),
         )

@@ -10,14 +10,14 @@ from labrig.optics import peak_shape
 from labrig.results import LocatedLines
 
 FEWEST_LINES = 3
-#: Share of the profile's variance that lines and background explain, if there are lines.
+#: Fraction of the profile's variance that lines and background explain, if there are lines.
 LEAST_EXPLAINED = 0.9
-#: Shares of a blend stay this near to what is known of them: a shape that is not quite the filter's
-#: would otherwise pull them along.
-SHARE_SIGMAS = 2.0
+#: Fractions of a blend stay this near to what is known of them: a shape that is not quite the
+#: filter's would otherwise pull them along.
+FRACTION_SIGMAS = 2.0
 #: A line is there if its height is this many of its σ.
 SIGNIFICANT = 6.0
-#: A line is located if its σ is below this share of its width.
+#: A line is located if its σ is below this fraction of its width.
 LOCATED = 0.2
 #: A line is no farther from where the assignment has it, in widths: 405 and 436 nm are 1.2 apart,
 #: and one must not take the other's place.
@@ -34,24 +34,24 @@ class Line:
     wavelength_nm
         In air; of the two, the shorter one first.
     second_share
-        Share of the second one in the light of both, and how well that is known; it depends on the
-        lamp and on the camera.
+        Fraction of the second one in the light of both, and how well that is known; it depends on
+        the lamp and on the camera.
     """
 
     wavelength_nm: tuple[float, ...]
-    second_share: tuple[float, float] = (0.0, 0.0)
+    second_fraction: tuple[float, float] = (0.0, 0.0)
 
     @property
     def centre_nm(self) -> float:
-        """Mean of the two by their share."""
+        """Mean of the two by their fractions."""
         if len(self.wavelength_nm) == 1:
             return self.wavelength_nm[0]
-        share = self.second_share[0]
-        return (1 - share) * self.wavelength_nm[0] + share * self.wavelength_nm[1]
+        fraction = self.second_fraction[0]
+        return (1 - fraction) * self.wavelength_nm[0] + fraction * self.wavelength_nm[1]
 
 
 #: Mercury in air (Sansonetti, Salit and Reader, *Wavelengths of spectral lines in mercury pencil
-#: lamps*, Appl. Opt. 35, 1996), as far as cameras see it. Shares: lamps and cameras differ.
+#: lamps*, Appl. Opt. 35, 1996), as far as cameras see it. Fractions: lamps and cameras differ.
 MERCURY = (
     Line((404.6565, 407.7837), (0.12, 0.08)),
     Line((435.8335,)),
@@ -113,20 +113,20 @@ class LineModel:
         )
 
     def _fitted(self) -> tuple[FloatArray, FloatArray, float]:
-        """Positions, log width and its change, skew, shares; their σ; the noise."""
-        shares = [line.second_share for line in self.lines if len(line.wavelength_nm) == 2]
+        """Positions, log width and its change, skew, fractions; their σ; the noise."""
+        fractions = [line.second_fraction for line in self.lines if len(line.wavelength_nm) == 2]
         start = np.array(
-            [*self.start, np.log(self.way.fwhm), 0.0, 0.0, *(share for share, _ in shares)]
+            [*self.start, np.log(self.way.fwhm), 0.0, 0.0, *(fraction for fraction, _ in fractions)]
         )
-        prior = np.array([known for _, known in shares])
+        prior = np.array([known for _, known in fractions])
         low, high = np.full(len(start), -np.inf), np.full(len(start), np.inf)
         n = len(self.lines)
         near = NEAR * self.way.fwhm
         low[:n], high[:n] = start[:n] - near, start[:n] + near
         low[n], high[n] = start[n] - 1, start[n] + 1
         low[n + 1 : n + 3], high[n + 1 : n + 3] = -0.5, 0.5
-        low[n + 3 :] = np.maximum(start[n + 3 :] - SHARE_SIGMAS * prior, 0.0)
-        high[n + 3 :] = np.minimum(start[n + 3 :] + SHARE_SIGMAS * prior, 1.0)
+        low[n + 3 :] = np.maximum(start[n + 3 :] - FRACTION_SIGMAS * prior, 0.0)
+        high[n + 3 :] = np.minimum(start[n + 3 :] + FRACTION_SIGMAS * prior, 1.0)
         noise = 1.0
         for _ in range(2):
 
@@ -142,10 +142,10 @@ class LineModel:
         return fit.parameters, np.sqrt(variance), noise
 
     def _blend_variance(self, x: FloatArray) -> FloatArray:
-        """(lines,) of the positions, by the shares of blends that are not resolved."""
+        """(lines,) of the positions, by the fractions of blends that are not resolved."""
         per_nm, fwhm = abs(self._per_nm(x[: len(self.lines)])), np.exp(x[len(self.lines)])
         apart = np.array([per_nm * np.ptp(line.wavelength_nm) for line in self.lines])
-        unsure = np.array([line.second_share[1] for line in self.lines])
+        unsure = np.array([line.second_fraction[1] for line in self.lines])
         variance: FloatArray = np.where(apart < fwhm, (apart * unsure) ** 2, 0.0)
         return variance
 
@@ -163,8 +163,8 @@ class LineModel:
     def _residuals(self, x: FloatArray, noise: float, prior: FloatArray) -> FloatArray:
         """(..., residuals) of parameters of shape (..., parameters)."""
         left = (self.values - self._fit_values(x)) / noise
-        shares = [line.second_share[0] for line in self.lines if len(line.wavelength_nm) == 2]
-        pulled = (x[..., len(self.lines) + 3 :] - shares) / prior
+        fractions = [line.second_fraction[0] for line in self.lines if len(line.wavelength_nm) == 2]
+        pulled = (x[..., len(self.lines) + 3 :] - fractions) / prior
         return np.concatenate([left.reshape(*x.shape[:-1], -1), pulled], axis=-1)
 
     def _shapes(self, x: FloatArray) -> FloatArray:
@@ -181,11 +181,11 @@ class LineModel:
         lines = peaks(positions, width)
         blends = [k for k, line in enumerate(self.lines) if len(line.wavelength_nm) == 2]
         if blends:
-            share = x[..., np.newaxis, n + 3 :]
+            fraction = x[..., np.newaxis, n + 3 :]
             apart_nm = np.array([np.ptp(self.lines[k].wavelength_nm) for k in blends])
             second_at = positions[..., blends] + apart_nm * self._per_nm(positions)[..., np.newaxis]
             second = peaks(second_at, width[..., blends])
-            lines[..., blends] = (1 - share) * lines[..., blends] + share * second
+            lines[..., blends] = (1 - fraction) * lines[..., blends] + fraction * second
         slope = (self.u - self.middle) / self.reach
         background = np.stack([np.ones_like(slope), slope], axis=-1)
         return np.concatenate([lines, np.broadcast_to(background, (*lines.shape[:-1], 2))], axis=-1)

@@ -22,13 +22,13 @@ from labrig.results import LocatedLines
 
 #: Prominence in units of the noise that is left after smoothing.
 LEAST_PROMINENCE = 10.0
-#: And as a share of the channel's highest peak, and of the highest of all.
-LEAST_SHARE, LEAST_OF_ALL = 0.03, 0.003
+#: And as a fraction of the channel's highest peak, and of the highest of all.
+LEAST_FRACTION, LEAST_OF_ALL = 0.03, 0.003
 MOST_PEAKS = 8
 MOST_SAMPLES = 20_000
-#: Peaks of two channels this share of their width apart are one.
+#: Peaks of two channels this fraction of their width apart are one.
 SAME = 0.5
-#: Share of the strip over which noise is smoothed away.
+#: Fraction of the strip over which noise is smoothed away.
 SMOOTHING = 0.002
 #: Median absolute third difference over σ, for normal noise; a smooth profile has hardly any, even
 #: if a line is but a few samples wide.
@@ -46,7 +46,7 @@ class Peak:
     prominence
         In units of the noise.
     blueness
-        Share of blue in blue and red; 0 without colours.
+        Fraction of blue in blue and red; 0 without colours.
     """
 
     position: float
@@ -71,7 +71,7 @@ def find_line_peaks(position: FloatArray, values: FloatArray) -> list[Peak]:
     for channel, own_noise in zip(smooth.T, noise, strict=True):
         unit = max(float(own_noise), 1e-6 * height)
         own = float(np.ptp(channel))
-        least = max(LEAST_PROMINENCE * unit, LEAST_SHARE * own, LEAST_OF_ALL * height)
+        least = max(LEAST_PROMINENCE * unit, LEAST_FRACTION * own, LEAST_OF_ALL * height)
         if not height:
             continue
         indices, properties = find_peaks(channel, prominence=least)
@@ -98,7 +98,7 @@ def _once_each(found: list[Peak]) -> list[Peak]:
     return sorted(kept[:MOST_PEAKS], key=lambda peak: peak.position)
 
 
-#: Lines of the model agree with what was found to this share of their width.
+#: Lines of the model agree with what was found to this fraction of their width.
 TOLERANCE = 0.4
 #: Assignments whose scores differ by less took the same peaks for lines; so many are fitted.
 AMBIGUOUS = 1.0

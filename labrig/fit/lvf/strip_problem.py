@@ -93,8 +93,8 @@ class StripProblem:
         modes = np.array(curve_modes(curve_error, nodes, sensitivity, peaks))
         modes = modes.reshape(-1, *sensitivity.shape)
         # The card by itself is as bright in every channel as was measured, however curves are bent.
-        share = np.einsum("q,mqc->mc", lit, modes) / (lit @ sensitivity)
-        self._modes = modes - share[:, np.newaxis] * sensitivity
+        fraction = np.einsum("q,mqc->mc", lit, modes) / (lit @ sensitivity)
+        self._modes = modes - fraction[:, np.newaxis] * sensitivity
         self._camera, self._nodes = camera, nodes
         onto_grid = hats(self.grid_nm, nodes)
         light = np.stack([lit * f.at(nodes) for f in filters])

@@ -24,9 +24,9 @@ class CurveError:
     Attributes
     ----------
     relative
-        Share of the curve itself.
+        Fraction of the curve itself.
     added
-        Share of the channel's peak, added to the curve: stray light, other infrared filters.
+        Fraction of the channel's peak, added to the curve: stray light, other infrared filters.
     correlation_nm
         Errors this far apart are independent.
     """
@@ -124,10 +124,10 @@ def curve_modes(
     smooth = _smooth_modes(nodes, error.correlation_nm)
     modes = []
     for channel, peak in enumerate(peaks):
-        for share, of in ((error.relative, sensitivity[:, channel]), (error.added * peak, 1.0)):
-            for mode in smooth if share > 0 else ():
+        for fraction, of in ((error.relative, sensitivity[:, channel]), (error.added * peak, 1.0)):
+            for mode in smooth if fraction > 0 else ():
                 change = np.zeros_like(sensitivity)
-                change[:, channel] = share * mode * of
+                change[:, channel] = fraction * mode * of
                 modes.append(change)
     return modes
 
@@ -135,8 +135,8 @@ def curve_modes(
 def _smooth_modes(nodes: FloatArray, distance_nm: float) -> FloatArray:
     """(k, q) functions whose sum with unit normal weights is smooth and of unit variance."""
     knots = np.arange(nodes[0] - distance_nm, nodes[-1] + 2 * distance_nm, distance_nm)
-    share = np.clip(hats(knots, nodes), 0.0, 1.0)
-    modes: FloatArray = np.sin(np.pi / 2 * share).T
+    fraction = np.clip(hats(knots, nodes), 0.0, 1.0)
+    modes: FloatArray = np.sin(np.pi / 2 * fraction).T
     return modes[modes.any(axis=1)]
 
 

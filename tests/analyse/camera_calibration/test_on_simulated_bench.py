@@ -82,7 +82,7 @@ def test_gain_and_read_noise_are_the_sensors(camera: CameraFile) -> None:
 
 
 def test_shared_charge_is_seen(result: CameraCalibrationResult) -> None:
-    assert any(one.shares for one in result.photon_transfers)
+    assert any(one.neighbours_share_noise for one in result.photon_transfers)
     assert any("neighbouring pixels share noise" in warning for warning in result.warnings)
 
 

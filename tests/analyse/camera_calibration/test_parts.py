@@ -16,29 +16,31 @@ GAIN, READ_E, BLACK = 2.0, 8.0, 1000.0
 WHOLE = (0.0, 0.0, 1.0, 1.0)
 
 
-def frame(rng: np.random.Generator, electrons: float, share: float = 0.0) -> RawFrame:
+def frame(rng: np.random.Generator, electrons: float, fraction: float = 0.0) -> RawFrame:
     """Photons, charge shared with four neighbours, reading; a shaded card that flickers."""
     shape = (80, 96)
     shading = 1 - 0.2 * np.linspace(-1, 1, shape[1]) ** 2
     light = rng.poisson(electrons * shading * (1 + 0.01 * rng.standard_normal()), shape)
     around = sum(np.roll(light, step, axis) for axis in (0, 1) for step in (-1, 1))
-    kept = (1 - 4 * share) * light + share * around + READ_E * rng.standard_normal(shape)
+    kept = (1 - 4 * fraction) * light + fraction * around + READ_E * rng.standard_normal(shape)
     mosaic = np.rint(kept / GAIN + BLACK).astype(np.uint16)
     return RawFrame(mosaic, "RGGB", (BLACK,) * 4, 60_000.0)
 
 
-@pytest.mark.parametrize("share", [0.0, 0.03])
-def test_gain_is_right_and_as_uncertain_as_it_says(share: float) -> None:
+@pytest.mark.parametrize("fraction", [0.0, 0.03])
+def test_gain_is_right_and_as_uncertain_as_it_says(fraction: float) -> None:
     pulls, read = [], []
     for seed in range(12):
         rng = np.random.default_rng(seed)
         lit = [
-            scatter(frame(rng, level, share), frame(rng, level, share), WHOLE, 0.0)
+            scatter(frame(rng, level, fraction), frame(rng, level, fraction), WHOLE, 0.0)
             for level in (500, 2000, 8000, 20000)
         ]
-        dark = [scatter(frame(rng, 0, share), frame(rng, 0, share), WHOLE, 0.0) for _ in range(2)]
+        dark = [
+            scatter(frame(rng, 0, fraction), frame(rng, 0, fraction), WHOLE, 0.0) for _ in range(2)
+        ]
         found = photon_transfer(100, lit, dark)
-        assert found.shares == (share > 0)
+        assert found.neighbours_share_noise == (fraction > 0)
         pulls.append((found.noise.gain_e_per_dn - GAIN) / found.noise.gain_e_per_dn_sigma)
         read.append(found.noise.read_noise_e)
     assert abs(np.mean(pulls)) < 1.0
@@ -61,11 +63,11 @@ def bracket(rng: np.random.Generator, flicker: float) -> list[CardFrame]:
     """A lamp that loses 2 % in a unit; 10 ms are really 10.3 ms, ISO 200 is really 196."""
     frames = []
 
-    def add(unit: str, purpose: str, number: int, exposure_s: float, iso: float) -> None:
+    def add(unit: str, role: str, number: int, exposure_s: float, iso: float) -> None:
         true = exposure_s * (1.03 if exposure_s == 0.01 else 1.0) * (0.98 if iso == 200 else 1.0)
         light = np.log(true * iso) - 0.001 * number + flicker * rng.standard_normal()
         frames.append(
-            CardFrame(unit, purpose, 10.0 * number, exposure_s, iso, None, float(light), 1e-4)
+            CardFrame(unit, role, 10.0 * number, exposure_s, iso, None, float(light), 1e-4)
         )
 
     for number in range(20):

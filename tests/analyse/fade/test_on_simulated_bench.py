@@ -53,22 +53,22 @@ def fade(result: FadeResult) -> FadeFile:
     return result.calibration
 
 
-def true_shares(file: FadeFile, change: Change, *, rises: bool) -> FloatArray:
+def true_fractions(file: FadeFile, change: Change, *, rises: bool) -> FloatArray:
     lamp = Lamp.found(LampSettings(warm_up_deficit=0, drift_per_hour=0), on=not rises)
     steady = Lamp.found(lamp.settings, on=True).irradiance(0.0)
     switched = lamp.switched(rises, 10.0)
     light = np.array([switched.irradiance(10.0 + t_s) for t_s in change.t_s])
     edges = np.array(file.bands_nm)
     inside = (edges[:-1, None] < WAVELENGTH_NM) & (edges[1:, None] > WAVELENGTH_NM)
-    shares: FloatArray = (light @ inside.T) / (inside @ steady)
-    return shares
+    fractions: FloatArray = (light @ inside.T) / (inside @ steady)
+    return fractions
 
 
 def test_the_fade_is_the_lamps_in_every_band(fade: FadeFile) -> None:
-    true = true_shares(fade, fade.fade, rises=False)
-    share, sigma = np.array(fade.fade.share), np.array(fade.fade.sigma)
-    assert np.abs(share - true).max() < 0.06
-    assert np.all(np.abs(share - true) < 3 * sigma + 1e-3)
+    true = true_fractions(fade, fade.fade, rises=False)
+    fraction, sigma = np.array(fade.fade.fraction), np.array(fade.fade.sigma)
+    assert np.abs(fraction - true).max() < 0.06
+    assert np.all(np.abs(fraction - true) < 3 * sigma + 1e-3)
     steps = np.diff(fade.fade.t_s)
     missing = steps @ (true[1:] + true[:-1]) / 2
     assert fade.fade.missing_s() == pytest.approx(missing, abs=5e-3)
@@ -78,10 +78,10 @@ def test_the_fade_is_the_lamps_in_every_band(fade: FadeFile) -> None:
 
 def test_the_rise_is_the_lamps_in_every_band(fade: FadeFile) -> None:
     assert fade.rise is not None
-    true = true_shares(fade, fade.rise, rises=True)
-    share, sigma = np.array(fade.rise.share), np.array(fade.rise.sigma)
-    assert np.all(np.abs(share - true) < 3 * sigma + 0.02)
-    assert np.abs(share - true).max() < 0.08
+    true = true_fractions(fade, fade.rise, rises=True)
+    fraction, sigma = np.array(fade.rise.fraction), np.array(fade.rise.sigma)
+    assert np.all(np.abs(fraction - true) < 3 * sigma + 0.02)
+    assert np.abs(fraction - true).max() < 0.08
 
 
 def test_it_is_a_glowing_bodys(result: FadeResult) -> None:
@@ -123,9 +123,9 @@ def test_without_the_lamps_spectrum_it_says_what_is_missing(run: Path, result: F
 def test_what_a_cold_lamp_lacks_is_the_rooms(fade: FadeFile, result: FadeResult) -> None:
     """The room's lamp lacks 3 % and warms in 150 s."""
     assert fade.warming is not None
-    assert abs(fade.warming.lacks - 0.03) < 3 * fade.warming.lacks_sigma
-    assert fade.warming.lacks_sigma < 0.006
-    assert 50 < fade.warming.warms_s < 450
+    assert abs(fade.warming.deficit - 0.03) < 3 * fade.warming.deficit_sigma
+    assert fade.warming.deficit_sigma < 0.006
+    assert 50 < fade.warming.time_constant_s < 450
     assert result.warming is not None
     assert result.warming.light[-1] == pytest.approx(1, abs=0.03)
 

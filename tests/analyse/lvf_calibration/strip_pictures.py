@@ -23,7 +23,7 @@ TRUE_MAP = WavelengthMap(np.array([550.0, 155.0, 5.0]), (0.0, 1.0))
 
 @dataclass(frozen=True)
 class Scene:
-    """A strip `length` × `height` (shares of the frame) in its middle."""
+    """A strip `length` × `height` (fractions of the frame) in its middle."""
 
     width: int = 480
     height: int = 320

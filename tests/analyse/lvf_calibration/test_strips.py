@@ -30,9 +30,9 @@ MIDDLE = Scene(240, 160)
 
 def true_nm(scene: Scene, strip: Strip, position: FloatArray) -> FloatArray:
     """Wavelength that the scene really has at positions of a strip, from its blue end."""
-    share = position if strip.rising else 1 - position
+    fraction = position if strip.rising else 1 - position
     left, right = np.array(strip.left), np.array(strip.right)
-    x, y = ((left + np.outer(share, right - left)) * [scene.width, scene.height]).T
+    x, y = ((left + np.outer(fraction, right - left)) * [scene.width, scene.height]).T
     angle = np.radians(scene.tilt_degrees)
     across = (x - scene.width / 2) * np.cos(angle) + (y - scene.height / 2) * np.sin(angle)
     along = across / (scene.length * scene.width) + 0.5

@@ -83,13 +83,13 @@ class Mutator:
     ----------
     rng
         Decides all.
-    share
+    fraction
         Of the containers that come to harm; long ones, which are datasets, twice as often.
     """
 
-    def __init__(self, rng: random.Random, share: float) -> None:
+    def __init__(self, rng: random.Random, fraction: float) -> None:
         self._rng = rng
-        self._share = share
+        self._fraction = fraction
         self._before: deque[bytes] = deque(maxlen=KEPT)
         self._held: bytes | None = None
         self.is_on = True
@@ -109,8 +109,8 @@ class Mutator:
         self._held = None
 
     def _one(self, whole: bytes) -> list[bytes]:
-        share = self._share * (2 if len(whole) > 100 else 1)
-        if not self.is_on or self._rng.random() >= share:
+        fraction = self._fraction * (2 if len(whole) > 100 else 1)
+        if not self.is_on or self._rng.random() >= fraction:
             return [whole]
         choice = self._rng.randrange(len(MUTATIONS) + 2)
         if choice == len(MUTATIONS) and self._held is None:

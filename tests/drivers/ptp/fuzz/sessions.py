@@ -37,7 +37,7 @@ MOST_SESSION_S = 1200.0
 PAUSE_S = 120.0
 MOST_ATTEMPTS = 3
 #: Of the containers of a session that come to harm.
-SHARES = (0.03, 0.1, 0.3)
+FRACTIONS = (0.03, 0.1, 0.3)
 #: With which act harm begins; 0 is connecting, 6 a photograph, 9 one at bulb.
 BEGINNINGS = (0, 0, 1, 2, 4, 6, 6, 7, 9)
 SIZES = (500, 3000, 3 * 512 - 12, 70_000)
@@ -145,7 +145,7 @@ def session(name: str, seed: int, number: int, tally: Tally) -> None:
     way, rng = WAYS[name], random.Random(f"{seed}/{name}/{number}")
     clock, film = VirtualClock(EPOCH_S), LiveFilm(size=rng.choice(SIZES))
     body = rng.choice((EOS, EOS, STANDARD))
-    harming, harmless = Mutator(rng, rng.choice(SHARES)), Mutator(rng, 0.0)
+    harming, harmless = Mutator(rng, rng.choice(FRACTIONS)), Mutator(rng, 0.0)
     mutators = (harming, harmless) if way.harms_camera else (harmless, harming)
     responder = camera_on(clock, film, body).responder
     tally.sessions[body.body] += 1
