@@ -8,7 +8,7 @@ from importlib.metadata import version
 from typing import Any, Protocol, TypeVar
 
 from labrig.acquire import (
-    HANDS,
+    CHANGER,
     LIGHTS,
     Checkable,
     Plan,
@@ -97,7 +97,7 @@ def execute(
             _refuse_what_spoils(rig)
             devices = rig.identities()
             _arrange_again(left, rig, observer)
-            _tell_what_was_exchanged(folder, devices, observer)
+            _report_exchanged_camera(folder, devices, observer)
             told = {"rig": rig.name, "devices": devices} | {
                 f"{key}_reads_back": tells for key, tells in lights_that_read_back(rig).items()
             }
@@ -224,9 +224,9 @@ def _arrange_again(left: Sequence[ActionRecord], rig: Rig, observer: RunObserver
 
     Hands that are a device do it all once more; a person is told what was last.
     """
-    if left and HANDS in rig:
+    if left and CHANGER in rig:
         for action in left:
-            rig[HANDS].do(action.task)
+            rig[CHANGER].do(action.task)
     elif left:
         observer.warn(
             f"the bench has to be as it was left; last done by hand: {left[-1].action} "
@@ -234,7 +234,7 @@ def _arrange_again(left: Sequence[ActionRecord], rig: Rig, observer: RunObserver
         )
 
 
-def _tell_what_was_exchanged(
+def _report_exchanged_camera(
     folder: RunFolder, devices: dict[str, str], observer: RunObserver
 ) -> None:
     """Dark frames of one camera are none for another."""

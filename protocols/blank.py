@@ -12,9 +12,9 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
-    ByHand,
     CameraOffers,
     ExposureSettings,
+    ManualStep,
     ProtocolModel,
     Session,
     Shoot,
@@ -28,10 +28,10 @@ from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import DARKS_PER_EXPOSURE, MARGIN_S, CameraSettings, frame_times_s
 from .steps.sample_pose import charge, face_camera, lights_out, seen_s
-from .steps.sanity_checks import Watcher
+from .steps.sanity_checks import SanityChecks
 from .steps.scenes import Arrangement, PutBackUnit
 
-BLANK = ByHand(
+BLANK = ManualStep(
     "put a grey card in the sample's place (in the door, if there is one)",
     "what the sequence shows without a glow is measured",
     "blank",
@@ -114,7 +114,7 @@ class BlankDarkUnit:
             for _ in range(DARKS_PER_EXPOSURE):
                 session.perform(Shoot(FrameRole.DARK, self.protocol.settings(exposure_s)))
         shorter = [self.protocol.settings(time_s) for time_s in offers.exposures_s[:3]]
-        Watcher(session, self.name, [self.protocol.region], None).require_darkness(shorter)
+        SanityChecks(session, self.name, [self.protocol.region], None).require_darkness(shorter)
 
 
 @dataclass(frozen=True)

@@ -28,7 +28,7 @@ from labrig.region import CENTRE, Region
 
 from .steps.camera_settings import CameraSettings
 from .steps.grey_card import GREY_CARD, CardLight, CardMeterUnit, card_light, light_card
-from .steps.sanity_checks import Watcher
+from .steps.sanity_checks import SanityChecks
 from .steps.scenes import Arrangement, PutBackUnit
 
 
@@ -89,7 +89,7 @@ class CardDarkUnit:
             for _ in range(DARKS_EACH):
                 session.perform(Shoot(FrameRole.DARK, shot))
         shorter = [replace(shot, exposure_s=time_s) for time_s in offers.exposures_s[:3]]
-        Watcher(session, self.name, [self.card], None).require_darkness(shorter)
+        SanityChecks(session, self.name, [self.card], None).require_darkness(shorter)
 
 
 @dataclass(frozen=True)

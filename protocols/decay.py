@@ -34,10 +34,10 @@ from .steps.camera_settings import (
     frame_times_s,
 )
 from .steps.glow import METER_CHARGE_S, DarkUnit, MeterUnit
-from .steps.metering import DecayMeter, Look, Schedule, glow, look
+from .steps.metering import DecayMeter, MeteringFrame, Schedule, glow, measure_frame
 from .steps.patch_names import Patches
-from .steps.sample_pose import charge, check_seen, face_lamp, has_door, lights_out
-from .steps.sanity_checks import Watcher
+from .steps.sample_pose import charge, check_visible, face_lamp, has_door, lights_out
+from .steps.sanity_checks import SanityChecks
 
 
 class Plateau(BaseModel):
@@ -127,7 +127,7 @@ class DecaySettings(ProtocolModel):
     def schedule(
         self,
         offers: CameraOffers,
-        looks: Sequence[Look],
+        metering: Sequence[MeteringFrame],
         warn: Callable[[str], None],
     ) -> Schedule:
         """Frames of a decay; their shutter times rest on the metering's, unless they are given."""
@@ -136,7 +136,7 @@ class DecaySettings(ProtocolModel):
             return Schedule.constant(times_s, offers.exposure_near(self.exposure))
         growth = self.grow_at_most if self.exposure == "grow" else 1.0
         longest_s = self.longest_exposure_s(offers)
-        return DecayMeter(looks).schedule(times_s, offers, longest_s, growth, warn)
+        return DecayMeter(metering).schedule(times_s, offers, longest_s, growth, warn)
 
     def expected_schedule(
         self,
@@ -152,19 +152,19 @@ class DecaySettings(ProtocolModel):
             What a frame of the glow will show in each patch, from its begin after lamp off and its
             shutter time in seconds.
         """
-        looks = [Look(*at, expected(*at)) for at in self.meter_ladder(offers)]
-        return self.schedule(offers, looks, warn)
+        metering = [MeteringFrame(*at, expected(*at)) for at in self.meter_ladder(offers)]
+        return self.schedule(offers, metering, warn)
 
     def short_settings(self, session: Session) -> list[ExposureSettings]:
         """For a closer look at what clips."""
         ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
         return [self.settings(exposure_s) for _, exposure_s in ladder]
 
-    def watcher(self, session: Session, unit: str, metering: str = "meter") -> Watcher:
+    def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
         """Holds a unit's frames against what should have happened, and what `metering` saw."""
         background = self.background if self.dark == "background" else None
         regions = list(self.patches.values())
-        return Watcher(session, unit, regions, background, metering=metering)
+        return SanityChecks(session, unit, regions, background, metering=metering)
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
         """Lamp on for that long, for its own warm-up at the least."""
@@ -194,7 +194,7 @@ class DecayUnit:
         """Charge, lamp off, one frame every `every` seconds."""
         session.wait_until_warm("camera")
         schedule = self._schedule(session)
-        check_seen(session, self.protocol.first)
+        check_visible(session, self.protocol.first)
         self._charge(session, schedule.exposures_s[0])
         session.run_sequence(
             [
@@ -205,9 +205,9 @@ class DecayUnit:
                 ),
             ]
         )
-        watcher = self.protocol.watcher(session, self.name, self.metering)
-        watcher.tell_of_delays(schedule.times_s)
-        watcher.require_decay(self.protocol.short_settings(session))
+        checks = self.protocol.checks(session, self.name, self.metering)
+        checks.report_delays(schedule.times_s)
+        checks.require_decay(self.protocol.short_settings(session))
 
     def _schedule(self, session: Session) -> Schedule:
         protocol, offers = self.protocol, session.rig[CAMERA].offers()
@@ -215,8 +215,8 @@ class DecayUnit:
 
         def decide() -> Schedule:
             frames = [one for one in session.frames(FrameRole.METER) if one.unit == self.metering]
-            looks = [look(frame, regions) for frame in frames]
-            return protocol.schedule(offers, looks, session.warn)
+            metering = [measure_frame(frame, regions) for frame in frames]
+            return protocol.schedule(offers, metering, session.warn)
 
         if isinstance(protocol.exposure, float):
             return protocol.schedule(offers, [], session.warn)
@@ -232,8 +232,8 @@ class DecayUnit:
         self.protocol.charge_sample(session, rule.check_every)
         charged_s = rule.check_every
         while charged_s < rule.at_most:
-            look = Shoot(DecayFrames.PLATEAU, self.protocol.settings(exposure_s))
-            session.run_sequence([*lights_out(session), at(self.protocol.first, look)])
+            shoot = Shoot(DecayFrames.PLATEAU, self.protocol.settings(exposure_s))
+            session.run_sequence([*lights_out(session), at(self.protocol.first, shoot)])
             face_lamp(session)
             session.perform(LAMP_ON)
             if session.choose("plateau reached", lambda: self._level(session), worst=False):
@@ -248,12 +248,14 @@ class DecayUnit:
 
     def _level(self, session: Session) -> bool:
         """Whether every patch grew by less than the rule allows since the last look."""
-        looks = [frame for frame in session.frames(DecayFrames.PLATEAU) if frame.unit == self.name]
-        if len(looks) < 2:
+        metering = [
+            frame for frame in session.frames(DecayFrames.PLATEAU) if frame.unit == self.name
+        ]
+        if len(metering) < 2:
             return False
         before, now = (
             [glow(frame.path, region) for region in self.protocol.patches.values()]
-            for frame in looks[-2:]
+            for frame in metering[-2:]
         )
         limit = 1 + self.protocol.plateau.growth
         return all(new <= old * limit for old, new in zip(before, now, strict=True))
@@ -280,7 +282,7 @@ class DaylightUnit:
         ]
         for settings in under_lamp:
             session.perform(Shoot(FrameRole.DAYLIGHT, settings))
-        self.protocol.watcher(session, self.name).switch_off(under_lamp)
+        self.protocol.checks(session, self.name).switch_off(under_lamp)
 
 
 class Decay(DecaySettings):

@@ -20,7 +20,7 @@ from .steps.camera_settings import CameraSettings
 from .steps.glow import DarkUnit, GlowSettings, MeterUnit, metered_schedule
 from .steps.grey_card import light_card
 from .steps.patch_names import FilterPatches
-from .steps.sample_pose import check_seen, lights_out
+from .steps.sample_pose import check_visible, lights_out
 from .steps.scenes import Arranged, Arrangement, LampKind, PutBackUnit
 
 #: The units' names end with the lamp.
@@ -120,7 +120,7 @@ class SpectrumUnit:
         session.wait_until_warm("camera")
         metering = f"meter-{self.lamp}"
         schedule = metered_schedule(session, self.protocol, metering)
-        check_seen(session, schedule.times_s[0])
+        check_visible(session, schedule.times_s[0])
         self.protocol.charge_sample(session, self.protocol.charge)
         session.run_sequence(
             [
@@ -131,10 +131,10 @@ class SpectrumUnit:
                 ),
             ]
         )
-        watcher = self.protocol.watcher(session, self.name, metering)
-        watcher.tell_of_delays(schedule.times_s)
+        checks = self.protocol.checks(session, self.name, metering)
+        checks.report_delays(schedule.times_s)
         if len(schedule.times_s) > 1:
-            watcher.require_decay(self.protocol.short_settings(session))
+            checks.require_decay(self.protocol.short_settings(session))
 
 
 @dataclass(frozen=True)

@@ -14,9 +14,9 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 
 from labrig.acquire import (
     CAMERA,
-    ByHand,
     CameraOffers,
     ExposureSettings,
+    ManualStep,
     ProtocolModel,
     Session,
     Shoot,
@@ -30,13 +30,13 @@ from labrig.region import Region
 
 from .steps.afterglow import dark_level
 from .steps.camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
-from .steps.charge_times import FloatArray, most_telling_s, still_grows
+from .steps.charge_times import FloatArray, most_informative_s, still_grows
 from .steps.darkness import levels
 from .steps.glow import dark_frames
-from .steps.metering import Album, DecayMeter, Look, Schedule
+from .steps.metering import DecayMeter, FrameCache, MeteringFrame, Schedule
 from .steps.patch_names import FilterPatches
-from .steps.sample_pose import charge, check_seen, face_camera, face_lamp, lights_out
-from .steps.sanity_checks import Watcher
+from .steps.sample_pose import charge, check_visible, face_camera, face_lamp, lights_out
+from .steps.sanity_checks import SanityChecks
 
 
 class ExcitationFrames(StrEnum):
@@ -173,17 +173,17 @@ class ExcitationSettings(ProtocolModel):
         ]
 
 
-LVF_ON = ByHand(
+LVF_ON = ManualStep(
     "lay the variable filter on the sample, between it and the lamp",
     "every place is then charged by light of another wavelength",
     "lvf on sample",
 )
-LVF_AWAY = ByHand(
+LVF_AWAY = ManualStep(
     "take the variable filter away",
     "the lamp by itself charges the sample now",
     "lvf away",
 )
-FRESH = ByHand(
+FRESH = ManualStep(
     "put in a fresh sample, one that has been in the dark for hours",
     "it takes the place of waiting until the glow is gone",
     "fresh sample",
@@ -195,16 +195,16 @@ class ExcitationUnit:
     """What all units share."""
 
     protocol: ExcitationSettings
-    album: Album
+    frame_cache: FrameCache
 
-    def darks(self, session: Session) -> list[Look]:
+    def darks(self, session: Session) -> list[MeteringFrame]:
         """One dark frame of each shutter time."""
         frames = {frame.exposure_s: frame for frame in session.frames(FrameRole.DARK)}
-        return [self.album.look(frame) for frame in frames.values()]
+        return [self.frame_cache.measure_frame(frame) for frame in frames.values()]
 
-    def rates(self, frame: FrameRecord, darks: Sequence[Look]) -> FloatArray:
+    def rates(self, frame: FrameRecord, darks: Sequence[MeteringFrame]) -> FloatArray:
         """(patches, places) along the strip, brightest channel above darkness, DN/s."""
-        seen = self.album.look(frame)
+        seen = self.frame_cache.measure_frame(frame)
         above = levels(seen) - dark_level(darks, frame.exposure_s)
         return np.asarray(above.max(axis=1) / frame.exposure_s).reshape(-1, PLACES)
 
@@ -260,18 +260,18 @@ class DarkUnit(ExcitationUnit):
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
         dark_frames(session, self.name, regions, exposures)
         shorter = [self.protocol.settings(time_s) for _, time_s in self.protocol.ladder(offers)[:3]]
-        Watcher(session, self.name, regions, None).require_darkness(shorter)
+        SanityChecks(session, self.name, regions, None).require_darkness(shorter)
 
 
 @dataclass(frozen=True)
 class _Meter(ExcitationUnit):
     """A charge whose glow says how long to expose."""
 
-    def _meter(self, session: Session, unit: str, hand: ByHand, charge_s: float) -> None:
+    def _meter(self, session: Session, unit: str, hand: ManualStep, charge_s: float) -> None:
         session.wait_until_warm("camera")
         session.ask(hand)
         ladder = self.protocol.ladder(session.rig[CAMERA].offers())
-        check_seen(session, ladder[0][0])
+        check_visible(session, ladder[0][0])
         charge(session, charge_s)
         session.run_sequence(
             [
@@ -283,7 +283,7 @@ class _Meter(ExcitationUnit):
             ]
         )
         shorter = [self.protocol.settings(exposure_s) for _, exposure_s in ladder[:3]]
-        Watcher(session, unit, self.protocol.regions(), None).require_glow(shorter)
+        SanityChecks(session, unit, self.protocol.regions(), None).require_glow(shorter)
 
 
 @dataclass(frozen=True)
@@ -324,7 +324,7 @@ class _Charged(ExcitationUnit):
         offers = session.rig[CAMERA].offers()
         schedule = self._schedule(session, role, charge_s, lasting_s)
         longest_s = self.protocol.longest_exposures_s(offers, lasting_s)
-        check_seen(session, self.protocol.first)
+        check_visible(session, self.protocol.first)
         charge(session, charge_s)
         session.run_sequence(
             [
@@ -346,9 +346,9 @@ class _Charged(ExcitationUnit):
 
         def decide() -> Schedule:
             looked_s, frames = self._looked_at(session, role)
-            found = DecayMeter([self.album.look(frame) for frame in frames]).schedule(
-                times_s, offers, longest_s, EXPOSURES_GROW, session.warn
-            )
+            found = DecayMeter(
+                [self.frame_cache.measure_frame(frame) for frame in frames]
+            ).schedule(times_s, offers, longest_s, EXPOSURES_GROW, session.warn)
             shorter = max(charge_s / looked_s / HEADROOM, 1.0)
             exposures_s = [offers.exposure_at_most(one_s / shorter) for one_s in found.exposures_s]
             return Schedule(found.times_s, tuple(exposures_s))
@@ -431,7 +431,7 @@ class RefiningUnit(_Charged):
         session.wait_until_warm("camera")
 
         def decide() -> float:
-            return most_telling_s(
+            return most_informative_s(
                 *self._grown(session, self._done(session, ExcitationFrames.STRIP))
             )
 
@@ -465,12 +465,12 @@ class Excitation(ExcitationSettings):
 
     def units(self) -> Sequence[Unit]:
         """Darks; a metered charge and all others through the filter; the same without it."""
-        album = Album(self.strip())
+        frame_cache = FrameCache(self.strip())
         return [
-            DarkUnit(self, album),
-            StripMeter(self, album),
-            *(DoublingUnit(self, album, number) for number in range(1, self.at_most + 1)),
-            *(RefiningUnit(self, album, number) for number in range(1, self.refine + 1)),
-            DirectMeter(self, album),
-            *(DirectUnit(self, album, number) for number in range(1, len(self.direct) + 1)),
+            DarkUnit(self, frame_cache),
+            StripMeter(self, frame_cache),
+            *(DoublingUnit(self, frame_cache, number) for number in range(1, self.at_most + 1)),
+            *(RefiningUnit(self, frame_cache, number) for number in range(1, self.refine + 1)),
+            DirectMeter(self, frame_cache),
+            *(DirectUnit(self, frame_cache, number) for number in range(1, len(self.direct) + 1)),
         ]

@@ -17,9 +17,9 @@ from labrig.acquire import (
     CAMERA,
     LAMP_OFF,
     LAMP_ON,
-    ByHand,
     CameraOffers,
     ExposureSettings,
+    ManualStep,
     ProtocolModel,
     Session,
     Shoot,
@@ -47,11 +47,11 @@ class LampFrames(StrEnum):
 #: What is photographed after a switch.
 SWITCHED = LampFrames.FADE, LampFrames.RISE
 
-LVF = ByHand(
+LVF = ManualStep(
     "put the variable filter before the camera", "the fade is measured band by band",
     "lvf before camera",
 )  # fmt: skip
-LVF_AWAY = ByHand("take the variable filter away", "it is not needed any more", "lvf away")
+LVF_AWAY = ManualStep("take the variable filter away", "it is not needed any more", "lvf away")
 #: No lamp fades more slowly than to 1/e in this: photographs of the fade clip at no delay.
 SLOWEST_S = 0.09
 #: A filament is steady, or cold, after this.
@@ -129,7 +129,7 @@ class ByHandUnit:
     """One thing that is done by hand."""
 
     name: str
-    step: ByHand
+    step: ManualStep
 
     def run(self, session: Session) -> None:
         """Have it done."""

@@ -17,7 +17,7 @@ from labrig.quantity import Count, DurationS
 
 from .lvf_calibration import StripUnit
 from .steps.camera_settings import CameraSettings
-from .steps.scenes import Arrangement, PutBackUnit, SceneUnit, StillDarkUnit, StillLife
+from .steps.scenes import Arrangement, Bracketing, PutBackUnit, SceneUnit, StillDarkUnit
 
 
 class CardFrames(StrEnum):
@@ -57,9 +57,9 @@ class Irradiance(ProtocolModel):
         return self
 
     @property
-    def still_life(self) -> StillLife:
+    def bracketing(self) -> Bracketing:
         """How the card is photographed."""
-        return StillLife(self.camera, self.longest, self.repeats)
+        return Bracketing(self.camera, self.longest, self.repeats)
 
     def units(self) -> Sequence[Unit]:
         """Darks, then the card by itself and through the LVF in turn: the lamp drifts."""
@@ -69,13 +69,13 @@ class Irradiance(ProtocolModel):
             why = "how bright the lamp is by itself"
             units.append(
                 SceneUnit(
-                    self.still_life, f"direct-{number}", CardFrames.DIRECT, _DIRECT, before, why
+                    self.bracketing, f"direct-{number}", CardFrames.DIRECT, _DIRECT, before, why
                 )
             )
             why = "how much of it the variable filter leaves"
             units.append(
                 StripUnit(
-                    self.still_life,
+                    self.bracketing,
                     f"through-{number}",
                     CardFrames.THROUGH,
                     _THROUGH,
@@ -83,4 +83,4 @@ class Irradiance(ProtocolModel):
                     why,
                 )
             )
-        return [StillDarkUnit(self.still_life), *units, PutBackUnit(units[-1].wanted)]
+        return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]

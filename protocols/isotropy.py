@@ -9,7 +9,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import ByHand, Session, Shoot, Unit, at
+from labrig.acquire import ManualStep, Session, Shoot, Unit, at
 from labrig.quantity import Count, DurationS, duration_text
 from labrig.region import Region
 
@@ -108,9 +108,11 @@ class AngleUnit:
             for time_s, exposure_s in schedule.frames()
         ]
         session.run_sequence([at(time_s + late_s, shoot) for time_s, shoot in glow])
-        watcher = self.protocol.watcher(session, self.name)
-        watcher.require_decay(self.protocol.short_settings(session))
+        checks = self.protocol.checks(session, self.name)
+        checks.require_decay(self.protocol.short_settings(session))
 
 
-def _turn(angle: int, why: str, takes_s: float) -> ByHand:
-    return ByHand(f"turn the sample by {angle}° against the camera", why, f"tilt {angle}", takes_s)
+def _turn(angle: int, why: str, takes_s: float) -> ManualStep:
+    return ManualStep(
+        f"turn the sample by {angle}° against the camera", why, f"tilt {angle}", takes_s
+    )

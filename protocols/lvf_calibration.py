@@ -10,17 +10,27 @@ from typing import Annotated, Any, Literal, Self
 
 from pydantic import Field, model_validator
 
-from labrig.acquire import CAMERA, Optics, ProtocolModel, RigFile, Session, Shoot, Timed, Unit, at
+from labrig.acquire import (
+    CAMERA,
+    Optics,
+    ProtocolModel,
+    RigFile,
+    Session,
+    Shoot,
+    TimedAction,
+    Unit,
+    at,
+)
 from labrig.quantity import Count, DurationS, WordOrDuration
 
 from .steps.camera_settings import MARGIN_S, CameraSettings
 from .steps.sample_pose import charge, face_lamp, lights_out, seen_s
 from .steps.scenes import (
     Arrangement,
+    Bracketing,
     PutBackUnit,
     SceneUnit,
     StillDarkUnit,
-    StillLife,
     frames_of,
     light,
 )
@@ -132,8 +142,8 @@ class StripesUnit(SceneUnit):
         self.arrange(session)
         light(session, self.warm_up_s(session))
         charge(session, self.charge_s)
-        offers, scene = session.rig[CAMERA].offers(), self.still_life
-        at_s, steps = seen_s(session) + MARGIN_S, list[Timed]()
+        offers, scene = session.rig[CAMERA].offers(), self.bracketing
+        at_s, steps = seen_s(session) + MARGIN_S, list[TimedAction]()
         for fraction in STRIPES_LADDER:
             exposure_s = offers.exposure_at_most(scene.longest_s * fraction)
             steps.append(at(at_s, Shoot(self.role, scene.settings(exposure_s))))
@@ -184,9 +194,9 @@ class LvfCalibration(ProtocolModel):
         return self
 
     @property
-    def still_life(self) -> StillLife:
+    def bracketing(self) -> Bracketing:
         """How everything but the stripes is photographed."""
-        return StillLife(self.camera, self.longest, self.repeats)
+        return Bracketing(self.camera, self.longest, self.repeats)
 
     def filter_names(self) -> tuple[str, ...]:
         """The colour filters, one after the other; `suited_to` no rig, all are the shipped ones."""
@@ -204,8 +214,8 @@ class LvfCalibration(ProtocolModel):
         for kind, name, role, wanted, more in self._scenes():
             before = units[-1].wanted if units else Arrangement()
             why, mercury_s = _WHY[role], self.mercury_warm_up
-            units.append(kind(self.still_life, name, role, wanted, before, why, mercury_s, **more))
-        return [StillDarkUnit(self.still_life), *units, PutBackUnit(units[-1].wanted)]
+            units.append(kind(self.bracketing, name, role, wanted, before, why, mercury_s, **more))
+        return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]
 
     def _scenes(self) -> Iterator[_Scene]:
         none, strip = filter_unit(None), LvfFrames.STRIP_ON_SAMPLE

@@ -11,7 +11,7 @@ from typing import Annotated, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, model_validator
 
-from labrig.acquire import ByHand, ProtocolModel, Unit
+from labrig.acquire import ManualStep, ProtocolModel, Unit
 from labrig.quantity import DurationS, Fraction, WordOrDuration, duration_text
 from labrig.region import CENTRE
 
@@ -65,13 +65,13 @@ class WeakerLight(BaseModel):
         if self.filter is not None:
             return Arranged(unit, Arrangement(filter=self.filter), Arrangement(), WHY)
         what = f"move the lamp to a distance of {self.distance} from the sample"
-        return Prepared(unit, ByHand(what, WHY, f"lamp at {self.distance}"))
+        return Prepared(unit, ManualStep(what, WHY, f"lamp at {self.distance}"))
 
     def ended(self, unit: Unit) -> Unit:
         """`unit`, the light as it was before it."""
         if self.filter is not None:
             return Arranged(unit, Arrangement(), Arrangement(filter=self.filter), WHY)
-        return Prepared(unit, ByHand("move the lamp back", WHY, "lamp back"))
+        return Prepared(unit, ManualStep("move the lamp back", WHY, "lamp back"))
 
 
 class Saturation(ProtocolModel):

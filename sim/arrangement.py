@@ -1,4 +1,4 @@
-"""What hands have arranged on the bench, and since when."""
+"""What the changer has arranged on the bench, and since when."""
 
 from bisect import bisect_right
 from collections.abc import Iterator
@@ -10,7 +10,7 @@ Card = Literal["sample", "grey card", "colorchecker", "blank"]
 LvfPlace = Literal["away", "before camera", "on sample"]
 LampKind = Literal["halogen", "mercury"]
 
-#: Where the lamp stands unless hands move it.
+#: Where the lamp stands unless the changer moves it.
 USUAL_LAMP_M = 1.0
 
 

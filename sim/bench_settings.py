@@ -101,7 +101,7 @@ class StripSettings(Part):
 
 
 class LvfSettings(Part):
-    """The linear variable filter, and where it lies when hands put it in.
+    """The linear variable filter, and where it lies when the changer puts it in.
 
     Attributes
     ----------

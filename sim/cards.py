@@ -1,4 +1,4 @@
-"""What hands lay before lamp and camera: a grey card, a ColorChecker."""
+"""What the changer lays before lamp and camera: a grey card, a ColorChecker."""
 
 import numpy as np
 from numpy.typing import NDArray

@@ -5,7 +5,7 @@ from collections.abc import Sequence
 from labrig.clock import VirtualClock
 
 from .arrangement import LampKind
-from .faults import Fault, When, given
+from .faults import Fault, FaultTime, given
 from .lamp import Lamp
 from .mercury import Mercury
 from .simulation import LampSettings
@@ -98,5 +98,5 @@ class LampCircuit:
         return stuck or (self._asked_on and not _any(self._dead, time_s))
 
 
-def _any(whens: Sequence[When], time_s: float) -> bool:
+def _any(whens: Sequence[FaultTime], time_s: float) -> bool:
     return any(when.is_on(time_s) for when in whens)

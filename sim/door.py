@@ -16,7 +16,7 @@ from labrig.clock import VirtualClock
 
 from .bench_settings import DoorSettings
 from .boards import Pulse
-from .faults import Slowness, When
+from .faults import FaultTime, Slowness
 
 #: A servo takes over a new pulse with its next frame.
 FRAME_S = 0.02
@@ -129,7 +129,7 @@ class DoorDrive:
         clock: VirtualClock,
         *,
         is_open: bool,
-        stuck: Sequence[When] = (),
+        stuck: Sequence[FaultTime] = (),
         slow: Sequence[Slowness] = (),
     ) -> None:
         self._settings = settings

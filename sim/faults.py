@@ -13,7 +13,7 @@ class _Part(BaseModel):
     model_config = ConfigDict(frozen=True, extra="forbid")
 
 
-class When(_Part):
+class FaultTime(_Part):
     """When a fault is there.
 
     Attributes
@@ -42,7 +42,7 @@ class When(_Part):
         return self.model_copy(update={"at": self.at - opening_s})
 
 
-class AfterBytes(When):
+class AfterBytes(FaultTime):
     """A fault that may also come when `after_bytes` have passed since the room was opened."""
 
     after_bytes: Annotated[int, Field(ge=0)] | None = None
@@ -54,37 +54,37 @@ class AfterBytes(When):
         return self
 
 
-class Slowness(When):
+class Slowness(FaultTime):
     """`takes`: seconds for each write, or for the whole way of a door."""
 
     takes: DurationS = 2.0
 
 
-class Nap(When):
+class Nap(FaultTime):
     """`for`: how long the PC sleeps, an hour if that is not said."""
 
     lasting: DurationS = Field(3600.0, alias="for")
 
 
-class Step(When):
+class Step(FaultTime):
     """`by`: how far a clock is stepped."""
 
     by: DurationS = 3600.0
 
 
-class Leak(When):
+class Leak(FaultTime):
     """`level`: light from the surroundings, of the warm lamp's at the sample."""
 
     level: Annotated[Fraction, Field(ge=0, le=0.1)] = 1e-5
 
 
-class Skipped(When):
+class Skipped(FaultTime):
     """`name`: of the filter; none: whichever."""
 
     name: str | None = None
 
 
-WhenT = TypeVar("WhenT", bound=When)
+WhenT = TypeVar("WhenT", bound=FaultTime)
 
 
 def _or_its_name(schema: dict[str, Any]) -> None:
@@ -126,9 +126,9 @@ class Fault(_Part):
     ambient_light
         Light leaks into the room, of `level` times the warm lamp's at the sample.
     lvf_turned
-        Hands put the LVF in the wrong way round.
+        The changer puts the LVF in the wrong way round.
     filter_skipped
-        Hands say that they have changed the filter, but leave the one before in.
+        The changer reports a change of filter, but leaves the one before in.
     light_left_on
         Somebody has left the room's light on.
     thermometer_off
@@ -146,23 +146,23 @@ class Fault(_Part):
 
     model_config = ConfigDict(json_schema_extra=_or_its_name)
 
-    lamp_dead: When | None = None
-    relay_dead: When | None = None
-    relay_welded: When | None = None
-    relays_unplugged: When | None = None
-    relays_silent: When | None = None
-    relays_echo_lost: When | None = None
-    door_stuck: When | None = None
+    lamp_dead: FaultTime | None = None
+    relay_dead: FaultTime | None = None
+    relay_welded: FaultTime | None = None
+    relays_unplugged: FaultTime | None = None
+    relays_silent: FaultTime | None = None
+    relays_echo_lost: FaultTime | None = None
+    door_stuck: FaultTime | None = None
     door_slow: Slowness | None = None
     camera_unplugged: AfterBytes | None = None
-    camera_busy: When | None = None
-    camera_full: When | None = None
-    mercury_dead: When | None = None
+    camera_busy: FaultTime | None = None
+    camera_full: FaultTime | None = None
+    mercury_dead: FaultTime | None = None
     ambient_light: Leak | None = None
-    lvf_turned: When | None = None
+    lvf_turned: FaultTime | None = None
     filter_skipped: Skipped | None = None
-    light_left_on: When | None = None
-    thermometer_off: When | None = None
+    light_left_on: FaultTime | None = None
+    thermometer_off: FaultTime | None = None
     disk_full: AfterBytes | None = None
     disk_slow: Slowness | None = None
     clock_ahead: Step | None = None

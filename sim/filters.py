@@ -24,7 +24,7 @@ KNOTS_NM: FloatArray = np.arange(360.0, 820.0, 50.0)
 
 
 class Filters:
-    """The filters that hands find.
+    """The filters that the changer has.
 
     Parameters
     ----------

@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .door import Door
-from .faults import When
+from .faults import FaultTime
 from .lamp import BURNING_K, PANEL_FADING_S, WAVELENGTH_NM, Lamp, filament_spectrum, nodes
 from .lamps import FilteredLamps
 
@@ -28,7 +28,7 @@ LEAK_PEAKS = ((452.0, 10.0, 1.0), (560.0, 52.0, 0.9))
 
 
 @dataclass(frozen=True)
-class Seen:
+class VisibleLight:
     """∫ irradiance × visible part dt of what the camera sees by reflection, each shape (160,).
 
     Attributes
@@ -61,7 +61,7 @@ class Stray:
         On `WAVELENGTH_NM`, relative as a `Lamp`'s irradiance.
     """
 
-    whens: Sequence[When]
+    whens: Sequence[FaultTime]
     spectrum: FloatArray
 
     def is_on(self, time_s: float) -> bool:
@@ -78,7 +78,7 @@ class Lights:
     """
 
     lamp: Lamp | FilteredLamps
-    room_light: Sequence[When] = ()
+    room_light: Sequence[FaultTime] = ()
     door: Door | None = None
     shield: Door | None = None
     leaks: Sequence[Stray] = ()
@@ -118,11 +118,11 @@ class Lights:
         lamp = self.lamp.exposure(start_s, end_s)
         return lamp + self._stray(start_s, end_s, lambda _: 1.0)
 
-    def seen(self, start_s: float, end_s: float) -> Seen:
+    def seen(self, start_s: float, end_s: float) -> VisibleLight:
         """What the camera sees by reflection in an interval."""
         if not self._doors:
             light, none = self.exposure(start_s, end_s), np.zeros_like(WAVELENGTH_NM)
-            return Seen(light, none, none, light)
+            return VisibleLight(light, none, none, light)
         shield, opened = self._unshielded, self.openness
 
         def closed(time_s: float) -> float:
@@ -135,7 +135,7 @@ class Lights:
             return shield(time_s) * closed(time_s)
 
         sample, door, cloth = self._lamp(start_s, end_s, (on_sample, on_door, shield))
-        return Seen(
+        return VisibleLight(
             sample=sample,
             sample_stray=self._stray(start_s, end_s, opened),
             door=door + self._stray(start_s, end_s, closed),
@@ -206,7 +206,7 @@ def room_light_spectrum() -> FloatArray:
     return spectrum
 
 
-def leak(level: float, whens: Sequence[When]) -> Stray:
+def leak(level: float, whens: Sequence[FaultTime]) -> Stray:
     """Light from a screen or a crack, of `level` times the warm lamp's over all wavelengths."""
     peaks = [
         height * np.exp(-(((WAVELENGTH_NM - at_nm) / wide_nm) ** 2) / 2)

@@ -12,18 +12,18 @@ from labrig.clock import VirtualClock
 from labrig.yaml_file import validate
 
 from . import protocol_sim
-from .boards import HandsBoard, LcusBoard, MaestroBoard, NumatoBoard, SerialCable
+from .boards import ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard, SerialCable
 from .camera import SimulatedCamera
 from .camera.faults import CameraFaults
 from .clock import RoomClock
 from .disk import SimulatedDisk
-from .faults import Fault, When, given
+from .faults import Fault, FaultTime, given
 from .room import Room
 from .simulation import Simulation
 from .temperature import TemperatureSensor
 
 #: The address of the room: `sim://room/relays`, `sim://room/lcus`, `sim://room/servo`,
-#: `sim://room/hands`, `sim://room/camera`.
+#: `sim://room/changer`, `sim://room/camera`.
 NAME = "room"
 #: Relay that carries the lamp, of either relay board; an LCUS board counts from 1.
 LAMP_RELAY = 0
@@ -61,10 +61,13 @@ class OpenRoom:
         self._lamp_board = simulation.lamp.board
         carrier = relays if self._lamp_board == "relays" else lcus
         carrier.states[LAMP_RELAY] = simulation.initial.lamp == "on"
-        hands = HandsBoard(self.room.tasks)
-        for task in simulation.initial.by_hand:
-            hands.do(task)
-        self.boards = {"servo": SerialCable(servo, clock), "hands": SerialCable(hands, clock)} | {
+        changer = ChangerBoard(self.room.tasks)
+        for task in simulation.initial.manual_steps:
+            changer.do(task)
+        self.boards = {
+            "servo": SerialCable(servo, clock),
+            "changer": SerialCable(changer, clock),
+        } | {
             name: SerialCable(
                 board,
                 clock,
@@ -157,5 +160,5 @@ def _camera_faults(faults: Sequence[Fault]) -> CameraFaults:
     return found
 
 
-def _spans_s(whens: Sequence[When]) -> tuple[tuple[float, float], ...]:
+def _spans_s(whens: Sequence[FaultTime]) -> tuple[tuple[float, float], ...]:
     return tuple((when.at, when.until) for when in whens)

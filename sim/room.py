@@ -15,18 +15,18 @@ from .aiming import (
     live_stride,
 )
 from .arrangement import Arrangement, Arrangements
+from .changer import Changer
 from .circuit import LampCircuit
 from .dng import Shot, encode_dng
 from .door import Door
 from .doors import Doors, Pulses, no_pulses
-from .faults import When, given
+from .faults import FaultTime, given
 from .filters import Filters
-from .hands import Hands
 from .lamp import BURNING_K, SETTLED_S, WAVELENGTH_NM, filament_spectrum
 from .lamps import FilteredLamps
 from .layout import Layout
 from .leds import Leds
-from .lights import Lights, Seen, leak, room_light_spectrum
+from .lights import Lights, VisibleLight, leak, room_light_spectrum
 from .optics import FOCAL_MM, bent_curves, measured_curves, vignetting
 from .samples import Samples
 from .sensor import BAYER_RGGB, Sensor, SensorTemperature, gain_electrons_per_dn
@@ -74,11 +74,11 @@ class Room:
         self._leds = Leds(simulation.leds)
         self._left_on = given(fault.light_left_on for fault in faults)
         leaks = [leak(one.level, [one]) for one in given(fault.ambient_light for fault in faults)]
-        always = [leak(simulation.ambient, [When()])] if simulation.ambient else []
+        always = [leak(simulation.ambient, [FaultTime()])] if simulation.ambient else []
         self._leaks = (*always, *leaks)
         self._doors = Doors(simulation, clock, pulses)
         self._filters = Filters(simulation.filters, simulation.filters_bent, simulation.seed)
-        self._hands = Hands(
+        self._changer = Changer(
             simulation, self._filters, clock, freshen=self._freshen, plug=self._circuit.plug
         )
         sensor = simulation.sensor
@@ -113,13 +113,13 @@ class Room:
 
     @property
     def tasks(self) -> Mapping[str, Callable[..., None]]:
-        """What hands can do in the room, by the line that tells it."""
-        return self._hands.tasks
+        """What the changer can do in the room, by the line that tells it."""
+        return self._changer.tasks
 
     @property
     def arrangements(self) -> Arrangements:
-        """What hands have arranged, up to now."""
-        return self._hands.arrangements
+        """What the changer has arranged, up to now."""
+        return self._changer.arrangements
 
     def switch_lamp(self, on: bool) -> None:
         """Ask the lamp's relay to switch now."""
@@ -152,7 +152,7 @@ class Room:
             )
         lights = self._lights()
         light: NDArray[np.float32] | None = None
-        for left, right, arrangement in self._hands.arrangements.spans(start_s, end_s):
+        for left, right, arrangement in self._changer.arrangements.spans(start_s, end_s):
             seen = lights.seen(left, right)
             rgb = self._electrons(left, right, arrangement, lights, seen, f_number)
             painted = self._layout.places(arrangement).painted
@@ -175,13 +175,13 @@ class Room:
 
         That light is for the eye only: it does not charge the samples.
         """
-        arrangement = self._hands.arrangements.at(at_s)
+        arrangement = self._changer.arrangements.at(at_s)
         start_s = max(at_s - LIVE_EXPOSURE_S, 0.0)
         lights = self._lights()
         seen = lights.seen(start_s, at_s)
         if self._simulation.room_light:
             light, opened = (at_s - start_s) * room_light_spectrum(), lights.openness(at_s)
-            seen = Seen(
+            seen = VisibleLight(
                 seen.sample,
                 seen.sample_stray + opened * light,
                 seen.door + (1 - opened) * light,
@@ -204,7 +204,7 @@ class Room:
         cells = self._samples.cells
         faster = cells.quickening(self._clock.now() if off_s is None else off_s)
         if off_s is not None:
-            arrangements = self._hands.arrangements
+            arrangements = self._changer.arrangements
             found = self._samples.level_at(off_s, self._lights(), arrangements)
             after, _ = self._samples.evolve(
                 found, off_s, off_s + SETTLED_S, arrangements.at(off_s), lamps.until(off_s)
@@ -240,7 +240,7 @@ class Room:
         return FilteredLamps(
             self._circuit.lamp,
             self._circuit.mercury,
-            self._filters.history(self._hands.arrangements),
+            self._filters.history(self._changer.arrangements),
             self._leds,
         )
 
@@ -256,7 +256,7 @@ class Room:
         return np.random.default_rng([self._simulation.seed, *stream])
 
     def _freshen(self) -> None:
-        self._samples.freshen(self._clock.now(), self._lights(), self._hands.arrangements)
+        self._samples.freshen(self._clock.now(), self._lights(), self._changer.arrangements)
 
     def _electrons(
         self,
@@ -264,11 +264,11 @@ class Room:
         end_s: float,
         arrangement: Arrangement,
         lights: Lights,
-        seen: Seen,
+        seen: VisibleLight,
         f_number: float,
     ) -> NDArray[np.float32]:
         """Expected electrons in the middle of the lens, shape (places, 3)."""
-        level = self._samples.level_at(start_s, lights, self._hands.arrangements)
+        level = self._samples.level_at(start_s, lights, self._changer.arrangements)
         glow_s = self._samples.glow(level, start_s, end_s, arrangement, lights)
         radiance_s = self._view.radiance_s(arrangement, glow_s, seen)
         return self._curves.glow_electrons_per_s(radiance_s, f_number).astype(np.float32)

@@ -125,14 +125,14 @@ class InitialState(Part):
 
     Attributes
     ----------
-    by_hand
-        What hands had been told before, such as `lvf on sample`.
+    manual_steps
+        What the changer has done before, such as `lvf on sample`.
     """
 
     lamp: Literal["off", "on"] = "off"
     door: Literal["closed", "open"] = "closed"
     concentration: Annotated[float, Field(ge=0, le=1)] = 0.0
-    by_hand: tuple[str, ...] = ()
+    manual_steps: tuple[str, ...] = ()
 
 
 def _alone(sample: Any) -> Any:
@@ -179,7 +179,7 @@ class Simulation(Part):
     grey_card
         Reflectance of the grey card, nearly the same at all wavelengths.
     chart
-        Where the camera sees a ColorChecker that hands lay down.
+        Where the camera sees a ColorChecker that the changer lays down.
     ambient
         Light that leaks into the room, of the warm lamp's at the sample.
     temperature

@@ -8,7 +8,7 @@ import numpy as np
 from labrig.clock import VirtualClock
 
 from .bench_settings import TemperatureSettings
-from .faults import When
+from .faults import FaultTime
 from .sensor import AMBIENT_C
 
 #: Depth of the traps over Boltzmann's constant, K: 0.65 eV.
@@ -62,7 +62,7 @@ class TemperatureSensor:
         settings: TemperatureSettings | None,
         clock: VirtualClock,
         rng: np.random.Generator,
-        off: Sequence[When] = (),
+        off: Sequence[FaultTime] = (),
     ) -> None:
         self._settings = settings
         self._clock = clock

@@ -6,7 +6,7 @@ from numpy.typing import NDArray
 from .arrangement import Arrangement, LvfPlace
 from .cards import reflectances
 from .layout import Layout, Places
-from .lights import Seen
+from .lights import VisibleLight
 from .lvf import Lvf
 from .optics import CLOTH_REFLECTANCE, REFLECTED, SAMPLE_REFLECTANCE
 from .simulation import Simulation
@@ -31,7 +31,9 @@ class View:
         self._reflected = REFLECTED * simulation.lamp.irradiance
         self._lvf = None if simulation.lvf is None else Lvf(simulation.lvf)
 
-    def radiance_s(self, arrangement: Arrangement, glow_s: FloatArray, seen: Seen) -> FloatArray:
+    def radiance_s(
+        self, arrangement: Arrangement, glow_s: FloatArray, seen: VisibleLight
+    ) -> FloatArray:
         """∫ radiance dt of all places of an arrangement, shape (places, wavelengths).
 
         Parameters
@@ -53,7 +55,9 @@ class View:
         radiance *= passed
         return radiance
 
-    def _samples(self, arrangement: Arrangement, glow_s: FloatArray, seen: Seen) -> FloatArray:
+    def _samples(
+        self, arrangement: Arrangement, glow_s: FloatArray, seen: VisibleLight
+    ) -> FloatArray:
         """Of all cells with nothing before them, shape (cells, wavelengths); cell 0 is cloth."""
         light = seen.sample + seen.sample_stray
         if arrangement.lvf == "on sample":
@@ -71,7 +75,7 @@ class View:
         return radiance
 
     def _cover(
-        self, radiance: FloatArray, arrangement: Arrangement, places: Places, seen: Seen
+        self, radiance: FloatArray, arrangement: Arrangement, places: Places, seen: VisibleLight
     ) -> None:
         """Lay a card on the door's outside, or without a door on everything."""
         covered = places.surface > 0

@@ -23,7 +23,7 @@ from matplotlib.figure import Figure
 
 from labrig import resources
 from labrig.cli.exit_codes import guarded
-from labrig.report.page import Plates, Shown, draw
+from labrig.report.page import FigureFiles, RenderedSection, draw
 from labrig.report.sections import Picture, Section
 from labrig.signals import STOP_SIGNALS
 from tests.analyse import recorded
@@ -128,9 +128,9 @@ def _leave_blank(figure: object, file: object, format: str = "", **_: object) ->
         file.write(b'<svg viewBox="0 0 1 1"></svg>')
 
 
-def _draw_blank(sections: Sequence[Section], plates: Plates) -> list[Shown]:
+def _draw_blank(sections: Sequence[Section], figure_files: FigureFiles) -> list[RenderedSection]:
     blank = [replace(one, figures=tuple(map(_blank, one.figures))) for one in sections]
-    return draw(blank, plates)
+    return draw(blank, figure_files)
 
 
 def _blank(picture: Picture) -> Picture:

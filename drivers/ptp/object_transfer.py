@@ -5,13 +5,13 @@ from enum import IntEnum
 from labrig.clock import Clock
 from labrig.errors import DeviceError
 
-from .session import Patience, Session
+from .session import Session, Timeouts
 
 PIECE_BYTES = 1024 * 1024
 #: Some times the largest RAW file there is: what announces more is damaged.
 MOST_FILE_BYTES = 512 * 1024 * 1024
 #: A camera that still develops or writes is busy for seconds.
-PATIENT = Patience(answer_s=10.0, busy_s=10.0)
+PATIENT = Timeouts(answer_s=10.0, busy_s=10.0)
 
 
 class ObjectTransfer:
@@ -70,4 +70,4 @@ class ObjectTransfer:
             asked: tuple[IntEnum, *tuple[int, ...]] = (self._whole, handle)
         else:
             asked = (self._part, handle, offset, size)
-        return self._session.transact(*asked, patience=PATIENT, most_bytes=size).data
+        return self._session.transact(*asked, timeouts=PATIENT, most_bytes=size).data

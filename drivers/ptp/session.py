@@ -32,7 +32,7 @@ MOST_ANSWER_BYTES = 4 * 1024 * 1024
 
 
 @dataclass(frozen=True)
-class Patience:
+class Timeouts:
     """How long a transaction may take.
 
     Attributes
@@ -48,9 +48,9 @@ class Patience:
 
 
 #: For what a camera does at once.
-USUAL = Patience(answer_s=5.0, busy_s=3.0)
+USUAL = Timeouts(answer_s=5.0, busy_s=3.0)
 #: For taking leave: nothing waits for it.
-CURT = Patience(answer_s=2.0, busy_s=0.0)
+CURT = Timeouts(answer_s=2.0, busy_s=0.0)
 
 
 @dataclass(frozen=True)
@@ -114,14 +114,14 @@ class Session:
         DeviceError
             The camera did not take it.
         """
-        self.transact(Standard.CloseSession, patience=CURT)
+        self.transact(Standard.CloseSession, timeouts=CURT)
 
     def transact(
         self,
         operation: IntEnum,
         *params: int,
         data: bytes | None = None,
-        patience: Patience = USUAL,
+        timeouts: Timeouts = USUAL,
         most_bytes: int = MOST_ANSWER_BYTES,
     ) -> Reply:
         """One operation, asked again while the camera is busy.
@@ -134,7 +134,7 @@ class Session:
             Its u32 parameters.
         data
             What is sent in the data phase, if it has one outwards.
-        patience
+        timeouts
             How long it may take.
         most_bytes
             Longest data phase that is accepted.
@@ -146,12 +146,12 @@ class Session:
         DeviceError
             It did not answer, or not in the protocol's terms.
         """
-        deadline_s = self._clock.now() + patience.busy_s
+        deadline_s = self._clock.now() + timeouts.busy_s
         back_off_s = FIRST_BACK_OFF_S
         while True:
             self.resynchronise()
             sent_s = self._clock.now()
-            response, incoming = self._exchange(operation, params, data, patience, most_bytes)
+            response, incoming = self._exchange(operation, params, data, timeouts, most_bytes)
             answered_s = self._clock.now()
             if response.code == OK:
                 return Reply(response.params, incoming, sent_s, answered_s)
@@ -215,7 +215,7 @@ class Session:
         operation: IntEnum,
         params: tuple[int, ...],
         data: bytes | None,
-        patience: Patience,
+        timeouts: Timeouts,
         most_bytes: int,
     ) -> tuple[Container, bytes]:
         transaction_id = self._next_id
@@ -225,7 +225,7 @@ class Session:
         self._link.send(command(operation, transaction_id, params), data, doing)
         incoming: bytes | None = None
         for _ in range(MOST_STALE):
-            container = self._link.receive(doing, patience.answer_s, most_bytes)
+            container = self._link.receive(doing, timeouts.answer_s, most_bytes)
             if container.kind is Kind.EVENT or container.transaction_id != transaction_id:
                 continue  # left over from a program that died, or out of order
             if container.kind is Kind.RESPONSE:

@@ -1,7 +1,7 @@
 """Devices by role, the rig file, protocols as units, the plan and the runner."""
 
 from labrig.acquire import roles
-from labrig.acquire.actions import ByHand, Missed, TakenBack, Timed, at
+from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at
 from labrig.acquire.connections import Connections, SerialPort
 from labrig.acquire.planner import MOST_STEPS, Plan, Step, plan
 from labrig.acquire.protocol import PartUnit, ProtocolModel, Sample, Unit
@@ -17,14 +17,14 @@ from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
 
 __all__ = [
     "MOST_STEPS",
-    "ByHand",
     "CameraOffers",
     "Connections",
     "DeviceEntry",
     "ExposureSettings",
     "Finding",
     "Frame",
-    "Missed",
+    "LateAction",
+    "ManualStep",
     "Optics",
     "PartUnit",
     "Plan",
@@ -37,8 +37,8 @@ __all__ = [
     "Session",
     "Severity",
     "Step",
-    "TakenBack",
-    "Timed",
+    "TimedAction",
+    "UndoManualStep",
     "Unit",
     "at",
     "in_safe_order",

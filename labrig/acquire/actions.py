@@ -7,7 +7,7 @@ from labrig.quantity import duration_text
 
 
 @dataclass(frozen=True)
-class ByHand:
+class ManualStep:
     """One thing to do by hand.
 
     Attributes
@@ -19,7 +19,7 @@ class ByHand:
     takes_s
         For the plan.
     task
-        The same for hands that are a device, a sample changer or the simulated room's: `filter 37`.
+        The same for a changer, a sample changer or the simulated room's: `filter 37`.
     """
 
     what: str
@@ -28,7 +28,7 @@ class ByHand:
     takes_s: float = 60.0
 
 
-class TakenBack(Exception):  # noqa: N818, a wish and no error
+class UndoManualStep(Exception):  # noqa: N818, a wish and no error
     """A person takes back what was done by hand last: its unit is done again."""
 
 
@@ -36,23 +36,23 @@ Action = DeviceAction | Shoot
 
 
 @dataclass(frozen=True)
-class Timed:
+class TimedAction:
     """An action and when it begins, in seconds after the start of its sequence."""
 
     at_s: float
     action: Action
 
 
-def at(at_s: float, action: Action) -> Timed:
+def at(at_s: float, action: Action) -> TimedAction:
     """`action`, to begin `at_s` seconds after the start of the sequence."""
-    return Timed(at_s, action)
+    return TimedAction(at_s, action)
 
 
 @dataclass(frozen=True)
-class Missed:
+class LateAction:
     """An action that began later than its tolerance allows."""
 
-    timed: Timed
+    timed: TimedAction
     late_s: float
 
     def __str__(self) -> str:

@@ -5,7 +5,7 @@ from collections.abc import Callable, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import TypeVar
 
-from labrig.acquire.actions import ByHand
+from labrig.acquire.actions import ManualStep
 from labrig.acquire.protocol import ProtocolModel
 from labrig.acquire.registered import load_driver
 from labrig.acquire.rig import Rig
@@ -56,7 +56,7 @@ class Plan:
         return self.frames * self.offers.frame_bytes
 
     @property
-    def by_hand(self) -> tuple[str, ...]:
+    def manual_steps(self) -> tuple[str, ...]:
         """What a person does."""
         return tuple(step.action for step in self.steps if step.device == PERSON)
 
@@ -145,10 +145,10 @@ class _PlanRecorder:
     def temperature(self, celsius: float, at_s: float) -> None:
         pass
 
-    def last_by_hand(self) -> None:
+    def last_manual_step(self) -> None:
         return None
 
-    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str:
+    def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str:
         self.clock.spend(step.takes_s)
         return ""
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
 
-from labrig.acquire.actions import TakenBack
+from labrig.acquire.actions import UndoManualStep
 from labrig.acquire.protocol import Unit
 from labrig.acquire.readback import LightReadback
 from labrig.acquire.rig import Rig
@@ -56,7 +56,7 @@ def run_units(
     while True:
         try:
             _run_what_is_left(units, rig, folder, observer, metadata, temperature)
-        except TakenBack:
+        except UndoManualStep:
             rig.make_safe()
         else:
             return
@@ -87,7 +87,7 @@ def _run_what_is_left(
                 session.read_temperature()
                 unit.run(session)
                 session.read_temperature()
-        except TakenBack:
+        except UndoManualStep:
             recorder.take_back()
             raise
         writer.stop("success")
@@ -130,13 +130,13 @@ class _Recorder:
             TemperatureRecord(self._writer.unit, self._clock.wall(at_s), celsius)
         )
 
-    def last_by_hand(self) -> str | None:
-        last = self._last_by_hand()
+    def last_manual_step(self) -> str | None:
+        last = self._last_manual_step()
         return None if last is None else last.action
 
     def take_back(self) -> None:
         """The unit of what was done by hand last does not count; this attempt ends."""
-        last, now_s = self._last_by_hand(), self._clock.now()
+        last, now_s = self._last_manual_step(), self._clock.now()
         assert last is not None, "only what was done is taken back"
         self.acted(TAKEN_BACK, last.unit, now_s, now_s, 0.0)
         self._writer.stop("abort", f"taken back: '{last.action}'; {last.unit} is done again")
@@ -165,5 +165,5 @@ class _Recorder:
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         return decide()
 
-    def _last_by_hand(self) -> ActionRecord | None:
-        return next((action for action in reversed(self.done) if action.is_by_hand), None)
+    def _last_manual_step(self) -> ActionRecord | None:
+        return next((action for action in reversed(self.done) if action.is_manual), None)

@@ -8,10 +8,10 @@ from dataclasses import replace
 from functools import cached_property
 from typing import Protocol, TypeVar
 
-from labrig.acquire.actions import Action, ByHand, Missed, TakenBack, Timed
+from labrig.acquire.actions import Action, LateAction, ManualStep, TimedAction, UndoManualStep
 from labrig.acquire.readback import LightReadback
 from labrig.acquire.rig import Rig, device_errors
-from labrig.acquire.roles import CAMERA, HANDS, Guarded, KeptAwake, Shoot
+from labrig.acquire.roles import CAMERA, CHANGER, Guarded, KeptAwake, Shoot
 from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import ExposureSettings, Frame
 from labrig.clock import Clock
@@ -51,7 +51,7 @@ class Recorder(Protocol):
     def temperature(self, celsius: float, at_s: float) -> None:
         """The thermometer was read."""
 
-    def last_by_hand(self) -> str | None:
+    def last_manual_step(self) -> str | None:
         """What a person did last, in this unit or a completed one."""
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
@@ -73,7 +73,7 @@ class Observer(Protocol):
     def warn(self, text: str) -> None:
         """Something a person should know."""
 
-    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+    def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         """Have a person do something, and wait until it is done.
 
         Parameters
@@ -142,8 +142,8 @@ class Session:
         self._execute(action, late_s=0.0)
 
     def run_sequence(
-        self, sequence: Sequence[Timed], tolerance_s: float = TOLERANCE_S
-    ) -> Sequence[Missed]:
+        self, sequence: Sequence[TimedAction], tolerance_s: float = TOLERANCE_S
+    ) -> Sequence[LateAction]:
         """Do things at their times after now, against absolute deadlines.
 
         The camera is set and half-pressed for its next photograph as soon as the previous one is
@@ -168,7 +168,7 @@ class Session:
             late_s = self.clock.now() - deadline_s
             self._execute(timed.action, late_s)
             if late_s > tolerance_s:
-                missed.append(Missed(timed, late_s))
+                missed.append(LateAction(timed, late_s))
             if isinstance(timed.action, Shoot) and photographs:
                 self._prepare(photographs.pop(0))
         if moves := [str(one) for one in missed if not isinstance(one.timed.action, Shoot)]:
@@ -178,22 +178,22 @@ class Session:
             )
         return missed
 
-    def ask(self, step: ByHand) -> str:
+    def ask(self, step: ManualStep) -> str:
         """Have something done by hand; returns the remark that came with it, mostly empty.
 
         Raises
         ------
-        TakenBack
+        UndoManualStep
             What was done by hand last is to be done again. The runner does its unit again.
         """
         start_s = self.clock.now()
         self._beat_if_due()
-        remark = self._observer.ask(step, self._recorder.last_by_hand(), self._meanwhile())
+        remark = self._observer.ask(step, self._recorder.last_manual_step(), self._meanwhile())
         if remark is None:
-            raise TakenBack
-        if HANDS in self.rig:
-            with device_errors(HANDS.key):
-                self.rig[HANDS].do(step.task)
+            raise UndoManualStep
+        if CHANGER in self.rig:
+            with device_errors(CHANGER.key):
+                self.rig[CHANGER].do(step.task)
         said = f"{step.what} ({remark})" if remark else step.what
         self._recorder.acted(PERSON, said, start_s, self.clock.now(), 0.0, step.task)
         return remark
@@ -319,7 +319,7 @@ class _PartRecorder:
         self.acted = whole.acted
         self.photographed = whole.photographed
         self.temperature = whole.temperature
-        self.last_by_hand = whole.last_by_hand
+        self.last_manual_step = whole.last_manual_step
         self.choose = whole.choose
         self._whole = whole
         self._part = part

@@ -319,7 +319,7 @@ def _warnings(patch: PatchSaturation) -> Iterator[str]:
             "the glow still grows at the longest charge: charge for longer before decays whose "
             "amplitudes are to be compared"
         )
-    if any(one.verdict == "no" for one in patch.levels):
+    if any(one.assessment == "no" for one in patch.levels):
         levels = ", ".join(plus_minus(one.r, one.sigma) for one in patch.levels)
         yield (
             f"r(0) = 1 does not hold after the longest charge: r(0) = {levels}; Λ from the decay "

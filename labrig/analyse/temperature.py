@@ -8,8 +8,8 @@ import numpy as np
 from labrig.material import Material, Provenance
 from labrig.record import (
     KNOWN_FOR_S,
-    Course,
     RunRecord,
+    TemperatureHistory,
     degrees_text,
     glow_temperature_c,
     in_roles,
@@ -29,7 +29,7 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
         return ()
     if not run.temperatures():
         return (f"the thermometer told nothing: {CHECK_IT}",)
-    course, warnings = Course(run), []
+    course, warnings = TemperatureHistory(run), []
     for part, group in groupby(photographs, key=lambda frame: frame.unit.rpartition("/")[0]):
         known = course.during(list(group))
         if known.size and np.ptp(known) >= MOVED_K:

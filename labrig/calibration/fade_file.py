@@ -57,9 +57,9 @@ class Warming(_Part):
 
     Attributes
     ----------
-    lacks, lacks_sigma
+    deficit, deficit_sigma
         Fraction of the warm lamp's light, all wavelengths alike.
-    warms_s
+    time_constant_s
         Time constant of the housing.
     """
 

@@ -2,9 +2,9 @@
 
 from labrig.catalogue.compare import Comparison, Difference, PatchComparison, compare_runs
 from labrig.catalogue.listing import (
+    RunFilter,
     RunState,
     RunSummary,
-    Wanted,
     find_run,
     list_runs,
     state_of,
@@ -15,9 +15,9 @@ __all__ = [
     "Comparison",
     "Difference",
     "PatchComparison",
+    "RunFilter",
     "RunState",
     "RunSummary",
-    "Wanted",
     "compare_runs",
     "find_run",
     "list_runs",

@@ -56,7 +56,7 @@ class PatchComparison:
     gain: Measured
 
     @property
-    def verdict(self) -> str:
+    def assessment(self) -> str:
         """In words."""
         if self.states[0] != self.states[1]:
             return f"{self.states[0]} and {self.states[1]} states: fit both with the same --states"

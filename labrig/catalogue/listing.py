@@ -49,7 +49,7 @@ class RunSummary:
 
 
 @dataclass(frozen=True)
-class Wanted:
+class RunFilter:
     """Which runs: sample and protocol by a pattern such as `blue*`, days inclusive and in UTC."""
 
     sample: str = "*"
@@ -74,7 +74,7 @@ class Wanted:
         )
 
 
-def list_runs(runs: Path, wanted: Wanted) -> list[RunSummary]:
+def list_runs(runs: Path, wanted: RunFilter) -> list[RunSummary]:
     """The wanted runs in a folder, oldest first.
 
     Raises

@@ -4,7 +4,7 @@ import os
 from typing import Any, TextIO
 
 
-class ToWhoeverIsThere:
+class ReaderMayLeave:
     """A stream that can be written to even when its reader has gone: the run goes on."""
 
     def __init__(self, stream: TextIO) -> None:

@@ -6,7 +6,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from labrig.cli.closed_pipe import ToWhoeverIsThere
+from labrig.cli.closed_pipe import ReaderMayLeave
 from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError, UsageError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
@@ -24,7 +24,7 @@ def guarded(arguments: Sequence[str]) -> int:
     except BrokenPipeError:
         code = 0  # whoever read it has what it wanted: head, less
     finally:
-        ToWhoeverIsThere(sys.stdout).flush()
+        ReaderMayLeave(sys.stdout).flush()
         for signum in STOP_SIGNALS:
             signal.signal(signum, signal.SIG_IGN)
     return code
@@ -76,5 +76,5 @@ def _fault(error: Exception) -> str:
 
 
 def _complain(text: str, code: int) -> int:
-    print(f"labrig: {' '.join(text.split())}", file=ToWhoeverIsThere(sys.stderr), flush=True)
+    print(f"labrig: {' '.join(text.split())}", file=ReaderMayLeave(sys.stderr), flush=True)
     return code

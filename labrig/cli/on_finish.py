@@ -22,7 +22,7 @@ class Ending:
 
 
 @contextmanager
-def told_at_end(on_finish: str | Sequence[str] | None) -> Iterator[Ending]:
+def printed_at_end(on_finish: str | Sequence[str] | None) -> Iterator[Ending]:
     """Tell whoever waits, when what is inside has ended; devices are safe by then.
 
     Parameters

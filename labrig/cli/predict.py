@@ -41,7 +41,7 @@ HARDLY_KNOWN = 0.5
 SAME_TIME = 0.005
 
 
-def predict_and_tell(
+def predict_and_print(
     recording: "Recording",
     materials: list[str],
     like: Path | None,
@@ -129,8 +129,10 @@ def _noise(found: "PatchPrediction", state: int) -> str:
 def _doubts(prediction: "Prediction", patch: str) -> list[str]:
     """What the fit will not tell, and which change makes it."""
     found, said = prediction.patches[patch], []
-    if not found.tells_all_states:
-        able = [remedy for remedy in prediction.remedies if remedy.patches[patch].tells_all_states]
+    if not found.resolves_all_states:
+        able = [
+            remedy for remedy in prediction.remedies if remedy.patches[patch].resolves_all_states
+        ]
         cheapest = min(able, key=lambda remedy: remedy.extra_time_s, default=None)
         would = f"'{cheapest.change.says}' would" if cheapest else "nothing below is enough"
         said.append(
@@ -159,7 +161,7 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table
     for heading in ("σ",) if count == 1 else [f"σ {i + 1}" for i in range(count)]:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("σ ×", justify="right", no_wrap=True)
-    if not found.tells_all_states:
+    if not found.resolves_all_states:
         table.add_column("tells all", justify="right", no_wrap=True)
     table.add_column("lab time", justify="right", no_wrap=True)
     for remedy in prediction.remedies:
@@ -173,7 +175,7 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table
                 for sigma, rate in zip(after.k_r_sigma_per_s, after.k_r_per_s, strict=True)
             ),
             f"{remedy.gain:.2f}",
-            *([] if found.tells_all_states else ["yes" if after.tells_all_states else "no"]),
+            *([] if found.resolves_all_states else ["yes" if after.resolves_all_states else "no"]),
             _extra_time(remedy, duration_s),
             style="bold" if remedy.halves else "",
         )

@@ -51,11 +51,11 @@ def process(
 
     overrides = Overrides.parse(roi or [], exclude or [], states, rate or [], camera, optics or [])
     folder = find_run(run, runs)
-    process_and_tell(folder, overrides, json=json)
+    process_and_print(folder, overrides, json=json)
     typer.echo(folder)
 
 
-def process_and_tell(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
+def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
     """Process the run in `run` and print what came out."""
     from labrig.process import process_and_report
 

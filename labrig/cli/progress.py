@@ -16,14 +16,14 @@ from rich.style import Style
 from rich.table import Table
 from rich.text import Text
 
-from labrig.acquire import ByHand, ExposureSettings, Plan, RunObserver
-from labrig.cli.closed_pipe import ToWhoeverIsThere
+from labrig.acquire import ExposureSettings, ManualStep, Plan, RunObserver
+from labrig.cli.closed_pipe import ReaderMayLeave
 from labrig.cli.prompt import Terminal
 from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
 from labrig.record import FrameRecord
-from labrig.watch import Previews, Seen
+from labrig.watch import Previews, RenderedPreview
 
 #: Of the last frame, in characters.
 THUMBNAIL_WIDTH = 48
@@ -36,7 +36,7 @@ def progress(
     clock: Clock,
     *,
     yes: bool = False,
-    has_hands: bool = False,
+    has_changer: bool = False,
 ) -> Iterator[RunObserver]:
     """An observer that tells the person at the terminal, or a log, on standard error.
 
@@ -49,8 +49,8 @@ def progress(
     clock
         The rig's clock.
     yes
-        What is to be done by hand, the rig's own hands do: nobody is asked.
-    has_hands
+        What is to be done by hand, the rig's changer does; nobody is asked.
+    has_changer
         Whether it has any.
 
     Raises
@@ -58,17 +58,17 @@ def progress(
     UsageError
         `yes` for what only a person can do.
     """
-    if yes and plan.by_hand and not has_hands:
+    if yes and plan.manual_steps and not has_changer:
         raise UsageError(
-            f"--yes: {len(plan.by_hand)} steps are done by hand, such as '{plan.by_hand[0]}', and "
-            "the rig has no 'hands' to do them; run it without --yes, or on the simulated rig that "
-            "has: --rig sim-phosphor"
+            f"--yes: {len(plan.manual_steps)} steps are done by hand, such as "
+            f"'{plan.manual_steps[0]}', and the rig has no 'changer' to do them; run without "
+            "--yes, or on a simulated rig that has one: --rig sim-phosphor"
         )
     state = _State(plan, done, clock, yes=yes)
     if not sys.stderr.isatty():
         yield PlainProgress(state)
         return
-    console = Console(file=cast(TextIO, ToWhoeverIsThere(sys.stderr)))
+    console = Console(file=cast(TextIO, ReaderMayLeave(sys.stderr)))
     with Live(console=console, refresh_per_second=4, transient=True) as live:
         shown = LiveProgress(state, live, console)
         try:
@@ -109,7 +109,7 @@ class _State:
                 left_s += ends_s - begins_s
         return left_s
 
-    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+    def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         """The person at the terminal; without one, only the time that it takes passes."""
         if self._person is None:
             self.clock.sleep(step.takes_s)
@@ -168,14 +168,14 @@ class PlainProgress:
         """Say a warning."""
         self._say(f"warning: {text}")
 
-    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+    def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         """Have something done by hand."""
         self._say(f"by hand: {step.what}")
         return self._state.ask(step, last, meanwhile)
 
     def _say(self, text: str) -> None:
         left = _countdown(self._state.left_s())
-        print(f"[{left} left] {text}", file=ToWhoeverIsThere(sys.stderr), flush=True)
+        print(f"[{left} left] {text}", file=ReaderMayLeave(sys.stderr), flush=True)
 
 
 class LiveProgress:
@@ -215,7 +215,7 @@ class LiveProgress:
         """A warning stays on the screen above the table."""
         self._console.print(Text(f"warning: {text}", style="yellow"))
 
-    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+    def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         """Have something done by hand; the table makes room for question and answer."""
         self._live.stop()
         try:
@@ -230,7 +230,7 @@ class LiveProgress:
             return Group(self._table(None))
         return Group(self._table(seen), thumbnail(seen.picture))
 
-    def _table(self, seen: Seen | None) -> Table:
+    def _table(self, seen: RenderedPreview | None) -> Table:
         state = self._state
         table = Table.grid(padding=(0, 2))
         table.add_row(_dim("unit"), f"{state.unit}  ({state.number} of {self._total})")

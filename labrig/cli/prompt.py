@@ -7,7 +7,7 @@ from collections.abc import Callable
 from contextlib import suppress
 from typing import TextIO
 
-from labrig.acquire import ByHand
+from labrig.acquire import ManualStep
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
 
@@ -26,7 +26,7 @@ class Terminal:
         self._reading = False
 
     def ask(
-        self, step: ByHand, last: str | None, left_s: float, meanwhile: Callable[[], None]
+        self, step: ManualStep, last: str | None, left_s: float, meanwhile: Callable[[], None]
     ) -> str | None:
         """A remark, mostly empty; None to take back `last`.
 

@@ -94,11 +94,11 @@ def _print_table(report: "RigReport") -> None:
     from rich.text import Text
 
     table = Table(title=report.rig, title_justify="left", show_header=False)
-    for device, verdict, what, value in report.rows():
+    for device, assessment, what, value in report.rows():
         if device:
             table.add_section()
         table.add_row(
-            Text(device, style="bold"), Text(verdict, style=_STYLES.get(verdict, "")),
+            Text(device, style="bold"), Text(assessment, style=_STYLES.get(assessment, "")),
             Text(what), Text(value),
         )  # fmt: skip
     Console().print(table)

@@ -6,7 +6,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
-from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_tell
+from labrig.cli.predict import LikeOption, MeteredOption, PredictOption, predict_and_print
 from labrig.clock import Interrupted
 from labrig.errors import UsageError
 
@@ -26,7 +26,7 @@ NoProcess = Annotated[
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Yes = Annotated[
     bool,
-    typer.Option("--yes", help="Ask nobody: the rig's 'hands' do what is to be done by hand."),
+    typer.Option("--yes", help="Ask nobody: the rig's 'changer' do what is to be done by hand."),
 ]
 
 
@@ -39,13 +39,13 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
-    from labrig.cli.on_finish import told_at_end
+    from labrig.cli.on_finish import printed_at_end
     from labrig.cli.progress import progress
 
     recording = _prepared(protocol, rig, runs)
-    with told_at_end(recording.rig.on_finish) as ending:
-        has_hands = "hands" in recording.rig.devices
-        folder = recording.record(partial(progress, yes=yes, has_hands=has_hands))
+    with printed_at_end(recording.rig.on_finish) as ending:
+        has_changer = "changer" in recording.rig.devices
+        folder = recording.record(partial(progress, yes=yes, has_changer=has_changer))
         _finish(folder, no_process, json)
         ending.message = str(folder)
 
@@ -65,7 +65,7 @@ def plan(
     """
     recording = _prepared(protocol, rig, runs)
     if predict:
-        predict_and_tell(recording, predict, like, metered, json=json)
+        predict_and_print(recording, predict, like, metered, json=json)
     elif like or metered:
         raise UsageError("--like and --metered go with --predict MATERIAL; name the material, too")
     elif json:
@@ -93,14 +93,14 @@ def resume(
     """Go on with a run that was interrupted: completed units are kept, the rest is done."""
     from labrig.acquire import read_rig_file
     from labrig.catalogue import find_run
-    from labrig.cli.on_finish import told_at_end
+    from labrig.cli.on_finish import printed_at_end
     from labrig.cli.progress import progress
     from labrig.run import resume_run
 
     folder = find_run(run, runs)
     path = folder / "rig.yaml"
     rig = read_rig_file(path) if path.is_file() else None
-    watch = partial(progress, yes=yes, has_hands=rig is not None and "hands" in rig.devices)
+    watch = partial(progress, yes=yes, has_changer=rig is not None and "changer" in rig.devices)
     wanted = None if rig is None else rig.on_finish
     if isinstance(wanted, tuple) and not on_finish:
         typer.echo(
@@ -109,7 +109,7 @@ def resume(
             err=True,
         )
         wanted = None
-    with told_at_end(wanted) as ending:
+    with printed_at_end(wanted) as ending:
         _finish(resume_run(folder, watch), no_process, json)
         ending.message = str(folder)
 
@@ -130,10 +130,10 @@ def _prepared(protocol: str, rig: str, runs: Path) -> "Recording":
 
 def _finish(folder: Path, no_process: bool, json: bool) -> None:
     if not no_process:
-        from labrig.cli.process import process_and_tell
+        from labrig.cli.process import process_and_print
 
         try:
-            process_and_tell(folder, json=json)
+            process_and_print(folder, json=json)
         except Interrupted as stop:
             raise Interrupted(
                 stop.signum, f"stopped; the run is recorded, go on with: labrig process {folder}"

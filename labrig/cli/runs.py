@@ -59,9 +59,9 @@ def list_them(
     """One line a run: when, which sample, how far it came, which rates."""
     from datetime import date
 
-    from labrig.catalogue import Wanted, list_runs
+    from labrig.catalogue import RunFilter, list_runs
 
-    wanted = Wanted(
+    wanted = RunFilter(
         sample,
         protocol,
         since.date() if since else date.min,
@@ -91,7 +91,7 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
     typer.echo(f"{folder}")
     typer.echo(f"  {summary.protocol} of {summary.sample}, {_when(summary)} UTC, {summary.state}")
     typer.echo(f"  {_progress(summary)} units, {summary.frames} frames")
-    _tell_results(folder)
+    _print_results(folder)
     report = folder / "result" / "report.html"
     if report.is_file():
         typer.echo(f"  report: {report}")
@@ -117,7 +117,9 @@ def compare(
 
     comparison = compare_runs(find_run(a, runs), find_run(b, runs), reference)
     if json:
-        patches = [{**asdict(patch), "verdict": patch.verdict} for patch in comparison.patches]
+        patches = [
+            {**asdict(patch), "assessment": patch.assessment} for patch in comparison.patches
+        ]
         _print_json({**asdict(comparison), "patches": patches})
     else:
         _print_comparison(comparison)
@@ -168,7 +170,7 @@ def _print_comparison(comparison: "Comparison") -> None:
     if not comparison.patches:
         typer.echo("no patch is fitted in both")
     for patch in comparison.patches:
-        typer.echo(f"{patch.patch}: {patch.verdict}")
+        typer.echo(f"{patch.patch}: {patch.assessment}")
         table = Table(box=None, pad_edge=False)
         for title in ("", "run A", "run B", "B − A in σ"):
             table.add_column(title)
@@ -188,7 +190,7 @@ def _print_comparison(comparison: "Comparison") -> None:
         typer.echo("a is in each day's own DN/s; a source that stays, as --reference, ties them")
 
 
-def _tell_results(folder: Path) -> None:
+def _print_results(folder: Path) -> None:
     """Each result and what it was made with otherwise than the one before it."""
     from labrig.process import other_settings
     from labrig.results import read_fitted_decays

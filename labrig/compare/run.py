@@ -188,7 +188,9 @@ def compare_run(
     return RunComparison(
         camera=curves,
         white=white,
-        words=" ".join([seen.words, *_whence(list(patches.values()), curves, bool(references))]),
+        words=" ".join(
+            [seen.words, *_curves_source(list(patches.values()), curves, bool(references))]
+        ),
         glows=tuple(glows),
         residuals=tuple(ratios),
         beside=tuple(
@@ -247,7 +249,7 @@ def _expected(
     return expected
 
 
-def _whence(
+def _curves_source(
     patches: Sequence[MeasuredPatch], camera: CameraResponse | None, with_material: bool
 ) -> Iterator[str]:
     """Where the colours of the predictions come from."""

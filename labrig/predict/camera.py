@@ -44,7 +44,7 @@ class CameraFigures:
         From black to white.
     unevenness
         Brightest over mean of a patch, without noise.
-    channel_shares
+    channel_fractions
         Fraction of the pixels that each channel has.
     """
 

@@ -82,7 +82,7 @@ class PatchPrediction:
     clipped: int
 
     @property
-    def tells_all_states(self) -> bool:
+    def resolves_all_states(self) -> bool:
         """Whether the fit will see every state, and know it from the others."""
         return self.chance_of_all_states >= SURE and self.least_apart >= APART_SIGMAS
 

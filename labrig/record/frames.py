@@ -105,7 +105,7 @@ class ActionRecord:
         return (self.start_time + self.end_time) / 2
 
     @property
-    def is_by_hand(self) -> bool:
+    def is_manual(self) -> bool:
         """Whether a person did it."""
         return self.device == PERSON
 

@@ -21,7 +21,7 @@ SMOOTHED_S = 300.0
 KNOWN_FOR_S = 600.0
 
 
-class Course:
+class TemperatureHistory:
     """The temperature over a run.
 
     Parameters
@@ -57,7 +57,9 @@ class Course:
 def glow_temperature_c(run: RunRecord, roles: Collection[str]) -> float | None:
     """Mean over the frames of these roles, to a hundredth; None where nothing is known."""
     frames = in_roles(run, roles)
-    known = Course(run).during(frames) if run.temperatures() and frames else np.array([])
+    known = (
+        TemperatureHistory(run).during(frames) if run.temperatures() and frames else np.array([])
+    )
     return round(float(known.mean()), 2) if known.size else None
 
 

@@ -77,7 +77,7 @@ def repeats(series: Series, fit: FittedDecay) -> tuple[Repeat, ...]:
 
 
 @dataclass(frozen=True)
-class Steady:
+class SteadySource:
     """A patch that shone steadily, such as a reference diode: what it says of lamp and camera.
 
     Parameters
@@ -98,7 +98,7 @@ class Steady:
     drift_sigma: float
 
 
-def steady(series: Series) -> Steady | None:
+def steady(series: Series) -> SteadySource | None:
     """For a patch without a fit; None if it is dark or has fewer than three usable frames.
 
     The scatter of the frames about the line tells σ, flicker included.
@@ -119,7 +119,7 @@ def steady(series: Series) -> Steady | None:
     if not level > SEEN_SIGMA * level_sigma:
         return None
     slope_sigma = scatter / np.sqrt(away_s @ away_s)
-    return Steady(
+    return SteadySource(
         channel=series.channels[brightest],
         level=level,
         level_sigma=float(level_sigma),
@@ -147,7 +147,7 @@ class _Patch:
     swatches: tuple[Swatch, ...]
     repeats: tuple[Repeat, ...]
     #: Without a fit, if it shone.
-    steady: Steady | None
+    steady: SteadySource | None
     figures: tuple[Picture, ...] = ()
     noise_parts: tuple[str, ...] = ()
     below_axis: int = 0

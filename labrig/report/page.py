@@ -47,7 +47,7 @@ _LONGEST_SLUG = 40
 
 
 @dataclass(frozen=True)
-class Plate:
+class FigureFile:
     """A figure of the report.
 
     Parameters
@@ -63,7 +63,7 @@ class Plate:
     pdf_link: str
 
 
-class Plates:
+class FigureFiles:
     """Collects the figures of one report; within `figure_style`.
 
     Parameters
@@ -90,7 +90,7 @@ class Plates:
     ) -> None:
         self._pdf.close()  # type: ignore[no-untyped-call]
 
-    def add(self, figure: Figure, name: str, described: str) -> Plate:
+    def add(self, figure: Figure, name: str, described: str) -> FigureFile:
         """Draw `figure`.
 
         Parameters
@@ -105,7 +105,7 @@ class Plates:
         self._files[f"{name}.svg"] = _file(drawn)
         figure.patch.set(visible=True, facecolor="white")
         self._pdf.savefig(figure)  # type: ignore[no-untyped-call]
-        return Plate(
+        return FigureFile(
             element=Markup(_element(drawn, figure, name, described)),
             svg_link=f"{FOLDER}/{name}.svg",
             pdf_link=f"{FOLDER}/{PDF}#page={len(self._files)}",
@@ -236,33 +236,37 @@ def _titled(name: str) -> str:
 
 
 @dataclass(frozen=True)
-class Shown:
+class RenderedSection:
     """A section whose figures are drawn; captions stand beside them.
 
     Attributes
     ----------
-    plates
+    figures
         The figures with their captions, in order.
-    plate
+    by_name
         The same by name.
     """
 
     section: Section
-    plates: tuple[tuple[Plate, str], ...]
-    plate: Mapping[str, Plate]
+    figures: tuple[tuple[FigureFile, str], ...]
+    by_name: Mapping[str, FigureFile]
 
 
-def draw(sections: Sequence[Section], plates: Plates) -> list[Shown]:
-    """Add all figures of the sections to the page's `plates`."""
-    return [_drawn(number, section, plates) for number, section in enumerate(sections, 1)]
+def draw(sections: Sequence[Section], figure_files: FigureFiles) -> list[RenderedSection]:
+    """Add all figures of the sections to the page's `figure_files`."""
+    return [_drawn(number, section, figure_files) for number, section in enumerate(sections, 1)]
 
 
-def _drawn(number: int, section: Section, plates: Plates) -> Shown:
-    plate = {
-        one.name: plates.add(one.draw(), f"{number}-{one.name}", f"{section.title}: {one.name}")
+def _drawn(number: int, section: Section, figure_files: FigureFiles) -> RenderedSection:
+    by_name = {
+        one.name: figure_files.add(
+            one.draw(), f"{number}-{one.name}", f"{section.title}: {one.name}"
+        )
         for one in section.figures
     }
-    return Shown(section, tuple((plate[one.name], one.caption) for one in section.figures), plate)
+    return RenderedSection(
+        section, tuple((by_name[one.name], one.caption) for one in section.figures), by_name
+    )
 
 
 TEMPLATE = "report.html.j2"
@@ -306,8 +310,8 @@ def write_report(path: Path, report: Report) -> None:
     DiskError
         `path` cannot be written.
     """
-    with figure_style(), Plates(f"{report.about.title}, {report.about.run}") as plates:
-        shown = draw((*report.sections, *report.methods), plates)
+    with figure_style(), FigureFiles(f"{report.about.title}, {report.about.run}") as figure_files:
+        shown = draw((*report.sections, *report.methods), figure_files)
     text = (
         environment()
         .get_template(TEMPLATE)
@@ -324,6 +328,6 @@ def write_report(path: Path, report: Report) -> None:
     )
     try:
         path.write_text(text, encoding="utf-8", newline="\n")
-        plates.write(path.parent)
+        figure_files.write(path.parent)
     except OSError as error:
         raise DiskError(f"{path}: cannot be written ({error.strerror})") from None

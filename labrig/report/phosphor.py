@@ -24,7 +24,7 @@ NAMES = "Emission", "± 1 σ"
 
 
 @dataclass(frozen=True)
-class _Glance:
+class _Overview:
     """What the template needs besides figures and tables.
 
     Attributes
@@ -112,7 +112,7 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
         ),
         anchor="material",
         template="phosphor.html.j2",
-        content=_Glance(
+        content=_Overview(
             daylight,
             None if daylight else _first_glow(frames, result, screen),
             colours,

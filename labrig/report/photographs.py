@@ -51,7 +51,7 @@ class Sensor:
 
 
 @dataclass(frozen=True)
-class Marked:
+class RegionMark:
     """A rectangle over a picture, in its pixels; `number` counts the patches from 1."""
 
     number: int
@@ -69,7 +69,7 @@ class Daylight:
     source: str
     width: int
     height: int
-    marks: tuple[Marked, ...]
+    marks: tuple[RegionMark, ...]
     caption: str
 
 
@@ -187,7 +187,7 @@ def _data_uri(rgb: NDArray[np.uint8]) -> str:
 
 def _marks(
     patches: Sequence[PatchReport], raw: RawFrame, width: int, height: int
-) -> tuple[Marked, ...]:
+) -> tuple[RegionMark, ...]:
     """Where the patches lie that have a place in the photograph."""
     marks = []
     across, down = width / raw.width, height / raw.height
@@ -199,5 +199,5 @@ def _marks(
         except UsageError:
             continue  # photographs of another size than the measured frames
         place = (x * across, y * down, wide * across, high * down)
-        marks.append(Marked(number, patch.name, *(round(value, 1) for value in place)))
+        marks.append(RegionMark(number, patch.name, *(round(value, 1) for value in place)))
     return tuple(marks)

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 from labrig.quantity import duration_text
 from labrig.record import (
     SMOOTHED_S,
-    Course,
     RunRecord,
+    TemperatureHistory,
     degrees_text,
     glow_temperature_c,
     in_roles,
@@ -86,7 +86,7 @@ def temperature_sections(run: RunRecord, roles: Collection[str]) -> tuple[Sectio
     """Picture and words; nothing without a thermometer. Rates rest on frames of these roles."""
     if not run.temperatures():
         return ()
-    course, photographs = Course(run), in_roles(run, roles)
+    course, photographs = TemperatureHistory(run), in_roles(run, roles)
     units = [list(group) for _, group in groupby(photographs, key=lambda frame: frame.unit)]
     began = run.attempts[0].start["time"]
     spans = [(one[0].start_time, one[-1].end_time) for one in units]

@@ -64,7 +64,7 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
     for number, (level, k_per_s) in enumerate(of_states, start=1):
         yield (
             f"state {number} (k = {rounded(float(k_per_s), 3)} s⁻¹): r(0) = "
-            f"{plus_minus(level.r, level.sigma)}; r(0) = 1 may be believed: {level.verdict}"
+            f"{plus_minus(level.r, level.sigma)}; r(0) = 1 may be believed: {level.assessment}"
         )
     if not patch.levels:
         yield (

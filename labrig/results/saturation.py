@@ -34,7 +34,7 @@ class ChargeLevel:
     sigma: float
 
     @property
-    def verdict(self) -> Literal["yes", "no", "not decided"]:
+    def assessment(self) -> Literal["yes", "no", "not decided"]:
         """Whether r(0) = 1 may be believed."""
         if self.r + SIGMAS * self.sigma < NEARLY_ONE:
             return "no"

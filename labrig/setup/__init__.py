@@ -1,14 +1,14 @@
 """Setting up a bench: what is plugged into this PC, and whether a rig does what it should."""
 
 from labrig.setup.check import DeviceReport, RigReport, check_rig
-from labrig.setup.discover import Discovery, Found, discover
+from labrig.setup.discover import Discovery, FoundDevice, discover
 from labrig.setup.host import Host, Process
 from labrig.setup.view import view_rig
 
 __all__ = [
     "DeviceReport",
     "Discovery",
-    "Found",
+    "FoundDevice",
     "Host",
     "Process",
     "RigReport",

@@ -10,13 +10,13 @@ from labrig.acquire import (
     ROLES,
     Checkable,
     Device,
+    ExerciseContext,
     Exercised,
     Finding,
     Frame,
     Measured,
     Rig,
     Suggestion,
-    Trial,
 )
 from labrig.bench import Bench
 from labrig.errors import DeviceError, LabrigError
@@ -189,13 +189,13 @@ def check_rig(stand: Bench) -> RigReport:
 
 
 def _look_at(rig: Rig) -> RigReport:
-    trial = Trial(rig.clock, Photographs())
+    trial = ExerciseContext(rig.clock, Photographs())
     return RigReport(
         rig.name, tuple(_checked(key, device, trial) for key, device in rig.devices.items())
     )
 
 
-def _checked(key: str, device: Device, trial: Trial) -> DeviceReport:
+def _checked(key: str, device: Device, trial: ExerciseContext) -> DeviceReport:
     """Everything that can be told of one device, up to where it failed."""
     report = DeviceReport(key, "did not answer")
     try:

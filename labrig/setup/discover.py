@@ -74,7 +74,7 @@ _OWN_COMMANDS = {
 
 
 @dataclass(frozen=True)
-class Found:
+class FoundDevice:
     """One device that is plugged in.
 
     Attributes
@@ -97,8 +97,8 @@ class Found:
 class Discovery:
     """All that is plugged in; `notes` say what could not be looked for."""
 
-    ports: tuple[Found, ...]
-    cameras: tuple[Found, ...]
+    ports: tuple[FoundDevice, ...]
+    cameras: tuple[FoundDevice, ...]
     notes: tuple[str, ...] = ()
 
 
@@ -127,18 +127,18 @@ def discover(around: Host, drivers: Collection[str]) -> Discovery:
     )
 
 
-def _serial(port: Port, drivers: Collection[str]) -> Found:
+def _serial(port: Port, drivers: Collection[str]) -> FoundDevice:
     if port.vid is None or port.pid is None:
-        return Found(port.device, "not on USB")
+        return FoundDevice(port.device, "not on USB")
     ids = f"{port.vid:04x}:{port.pid:04x}"
     board = _BOARDS.get((port.vid, port.pid)) or _BOARDS.get((port.vid, None))
     if board is None:
-        return Found(port.device, f"{port.description} ({ids}), unknown to labrig")
+        return FoundDevice(port.device, f"{port.description} ({ids}), unknown to labrig")
     serial = f", serial {port.serial_number}" if port.serial_number else ""
     name = f"{board.name} ({ids}{serial})"
     if board.driver not in drivers:
-        return Found(port.device, name)
-    return Found(
+        return FoundDevice(port.device, name)
+    return FoundDevice(
         port.device,
         name,
         f'{board.role}: {{driver: {board.driver}, address: "{port.device}"{board.keys}}}',
@@ -157,7 +157,7 @@ def _is_camera(device: Any) -> bool:
         return False  # a device that does not even show its descriptors is none of ours
 
 
-def _camera(device: Any, around: Host, drivers: Collection[str], has_twin: bool) -> Found:
+def _camera(device: Any, around: Host, drivers: Collection[str], has_twin: bool) -> FoundDevice:
     address = f"usb://{device.idVendor:04x}:{device.idProduct:04x}"
     refused = unreachable(device, around.platform)
     hints = [refused] if refused else []
@@ -177,7 +177,7 @@ def _camera(device: Any, around: Host, drivers: Collection[str], has_twin: bool)
             "pip install 'labrig[gphoto2]'"
         )
     snippet = f'camera: {{driver: {driver}, address: "{address}", warm_up: 30 min}}'
-    return Found(
+    return FoundDevice(
         address,
         " ".join(word for word in words if word) or "camera",
         snippet if driver in drivers else "",

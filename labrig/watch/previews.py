@@ -17,7 +17,7 @@ from labrig.errors import LabrigError
 
 
 @dataclass(frozen=True)
-class Seen:
+class RenderedPreview:
     """A frame that was looked at: its values as in `Preview`, its picture (height, width, 3)."""
 
     name: str
@@ -38,7 +38,7 @@ class Previews:
     """
 
     def __init__(self, run: Path, width: int) -> None:
-        self.latest: Seen | None = None
+        self.latest: RenderedPreview | None = None
         # -P: nothing that lies in the working folder is taken for a module.
         # Ctrl-C on a terminal goes to all of a group: this one ends when it is told to.
         self._process = subprocess.Popen(
@@ -80,7 +80,7 @@ class Previews:
         for line in self._answers:
             said = json.loads(line)
             picture = np.frombuffer(bytes.fromhex(said.pop("pixels")), np.uint8)
-            self.latest = Seen(
+            self.latest = RenderedPreview(
                 name=said["name"],
                 values=said["values"],
                 clipped=tuple(said["clipped"]),

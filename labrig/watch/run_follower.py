@@ -14,8 +14,8 @@ from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
 from labrig.region import Region
 from labrig.results import read_fitted_decays
+from labrig.watch.planned_unit import PlannedUnit, planned_units
 from labrig.watch.preview import Preview, glance
-from labrig.watch.standing import PlannedUnit, planned_units
 from labrig.written_numbers import plus_minus
 
 PICTURE_WIDTH = 720
@@ -132,7 +132,7 @@ class RunFollower:
     def _standing(self, attempt: Attempt) -> dict[str, Any] | None:
         for number, unit in enumerate(self._units):
             if unit.name == attempt.unit:
-                return {"unit": number, **unit.standing(attempt)}
+                return {"unit": number, **unit.status_of_unit(attempt)}
         return None
 
     def _unit_states(

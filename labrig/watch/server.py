@@ -35,7 +35,7 @@ PAGES: Mapping[str, Path] = {
 Things = Mapping[str, Mapping[str, Any]]
 
 
-class News:
+class UpdateFeed:
     """What there is to tell of a run, handed from the thread that follows it to the browsers.
 
     Everything is kept with the number of the telling that changed it last. So a browser that names
@@ -117,7 +117,7 @@ class WatchServer(LocalServer):
         The port is taken.
     """
 
-    def __init__(self, news: News, port: int = 0) -> None:
+    def __init__(self, news: UpdateFeed, port: int = 0) -> None:
         self.news = news
         super().__init__(port, _Conversation)
 
@@ -209,7 +209,7 @@ def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -
     """
     following = RunFollower(run)
     following.look()
-    news = News(following.state(), following.picture)
+    news = UpdateFeed(following.state(), following.picture)
     with WatchServer(news, port) as server, server.running():
         try:
             tell(server.url)

@@ -14,7 +14,7 @@ import numpy.typing as npt
 from labrig.errors import DeviceError
 
 from .darkness import clips, levels
-from .metering import Look
+from .metering import MeteringFrame
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -118,7 +118,7 @@ class Glow:
         return self.clips or bool(np.any(self.rate > least))
 
 
-def glow(seen: Look, dark: FloatArray, zero_s: float) -> Glow:
+def glow(seen: MeteringFrame, dark: FloatArray, zero_s: float) -> Glow:
     """What `seen` shows above the level `dark`, of shape (patches, channels), in DN."""
     sigma = np.array([[c.sigma for c in patch.channels.values()] for patch in seen.patches])
     return Glow(
@@ -130,12 +130,15 @@ def glow(seen: Look, dark: FloatArray, zero_s: float) -> Glow:
     )
 
 
-def dark_level(darks: Sequence[Look], exposure_s: float) -> FloatArray:
+def dark_level(darks: Sequence[MeteringFrame], exposure_s: float) -> FloatArray:
     """Level of dark frames of that shutter time, straight between those that were taken."""
-    times_s = sorted({look.exposure_s for look in darks})
+    times_s = sorted({frame.exposure_s for frame in darks})
     mean = np.array(
         [
-            np.mean([levels(look) for look in darks if look.exposure_s == time_s], axis=0)
+            np.mean(
+                [levels(frame) for frame in darks if frame.exposure_s == time_s],
+                axis=0,
+            )
             for time_s in times_s
         ]
     )

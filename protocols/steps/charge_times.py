@@ -33,7 +33,7 @@ def still_grows(glows: FloatArray, growth: float) -> bool:
     return bool((last > (1 + growth) * before).any())
 
 
-def most_telling_s(charges_s: Sequence[float], glows: FloatArray) -> float:
+def most_informative_s(charges_s: Sequence[float], glows: FloatArray) -> float:
     """The charge time, among those between the shortest and the longest, that adds most.
 
     D-optimal for a and s of every bright place (Fedorov, *Theory of Optimal Experiments*, 1972):

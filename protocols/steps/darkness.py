@@ -10,7 +10,7 @@ from labrig.errors import DataError, DeviceError
 from labrig.quantity import duration_text
 from labrig.reduce import is_clipped
 
-from .metering import Look
+from .metering import MeteringFrame
 
 FloatArray = npt.NDArray[np.float64]
 
@@ -96,22 +96,25 @@ class Darkness:
 DARK = Darkness(0.0, 0.0, fades=False)
 
 
-def darkness(looks: Sequence[Look], iso: int) -> Darkness:
+def darkness(frames: Sequence[MeteringFrame], iso: int) -> Darkness:
     """What dark frames show beyond what a sensor makes without light.
 
     The level of the shortest exposure is taken as black, so that no wrong black level in a file
-    and no hot pixel looks like light; with one exposure, what the file calls black.
+    and no hot pixel frames like light; with one exposure, what the file calls black.
     """
-    shortest_s = min(look.exposure_s for look in looks)
-    longest_s = max(look.exposure_s for look in looks)
-    open_s = max((look.exposure_s for look in looks if not clips(look)), default=0.0)
+    shortest_s = min(frame.exposure_s for frame in frames)
+    longest_s = max(frame.exposure_s for frame in frames)
+    open_s = max(
+        (frame.exposure_s for frame in frames if not clips(frame)),
+        default=0.0,
+    )
     if not open_s:
         return Darkness(1.0, longest_s, fades=False)
-    shortest = [look for look in looks if look.exposure_s == shortest_s]
+    shortest = [frame for frame in frames if frame.exposure_s == shortest_s]
     black = _black(shortest, others=shortest_s < open_s)
-    series = [levels(look) - black for look in looks if look.exposure_s == open_s]
+    series = [levels(frame) - black for frame in frames if frame.exposure_s == open_s]
     brightest = np.argmax(series[0])
-    level = np.array([each.flat[brightest] for each in series]) / range_dn(looks[0])
+    level = np.array([each.flat[brightest] for each in series]) / range_dn(frames[0])
     half = max(len(level) // 2, 1)
     fades = bool(level[-half:].mean() < (1 - FADED) * level[:half].mean())
     light = float(level.mean()) if open_s == longest_s else 1.0
@@ -120,19 +123,19 @@ def darkness(looks: Sequence[Look], iso: int) -> Darkness:
     return Darkness(light, longest_s, fades)
 
 
-def _black(shortest: Sequence[Look], others: bool) -> FloatArray:
+def _black(shortest: Sequence[MeteringFrame], others: bool) -> FloatArray:
     """Level without light, in DN above what the file calls black."""
-    mean: FloatArray = np.mean([levels(look) for look in shortest], axis=0)
+    mean: FloatArray = np.mean([levels(frame) for frame in shortest], axis=0)
     told = max(shortest[0].patches[0].black) > 0
     return mean if others or not told else np.zeros_like(mean)
 
 
-def levels(look: Look) -> FloatArray:
+def levels(frame: MeteringFrame) -> FloatArray:
     """Means in DN above black, shape (patches, channels)."""
-    return np.array([[c.mean for c in patch.channels.values()] for patch in look.patches])
+    return np.array([[c.mean for c in patch.channels.values()] for patch in frame.patches])
 
 
-def clips(look: Look) -> bool:
+def clips(frame: MeteringFrame) -> bool:
     """Whether some channel of some patch is too bright for its shutter time.
 
     Pixels that stand out alone are hot: of a small patch one is more than may clip, and it is full
@@ -140,11 +143,11 @@ def clips(look: Look) -> bool:
     """
     return any(
         is_clipped(max(channel.saturated - channel.hot, 0), channel.n)
-        for patch in look.patches
+        for patch in frame.patches
         for channel in patch.channels.values()
     )
 
 
-def range_dn(look: Look) -> float:
+def range_dn(frame: MeteringFrame) -> float:
     """From black to white."""
-    return look.patches[0].range_dn
+    return frame.patches[0].range_dn

@@ -17,9 +17,9 @@ from labrig.region import Region
 from .afterglow import glow
 from .camera_settings import MARGIN_S, CameraSettings, dark_exposures_s
 from .darkness import levels, range_dn
-from .metering import DecayMeter, Look, Schedule, look
-from .sample_pose import charge, check_seen, face_camera, face_lamp, has_door, lights_out
-from .sanity_checks import Watcher
+from .metering import DecayMeter, MeteringFrame, Schedule, measure_frame
+from .sample_pose import charge, check_visible, face_camera, face_lamp, has_door, lights_out
+from .sanity_checks import SanityChecks
 
 #: Shutter times of a metering's first frames, as fractions of the longest.
 LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
@@ -78,12 +78,12 @@ class GlowSettings(ProtocolModel):
         return ladder
 
     def schedule(
-        self, offers: CameraOffers, looks: Sequence[Look], warn: Callable[[str], None]
+        self, offers: CameraOffers, measured: Sequence[MeteringFrame], warn: Callable[[str], None]
     ) -> Schedule:
-        """Frames of the glow, as bright as a metering's `looks` let them be."""
+        """Frames of the glow, as bright as the metering frames let them be."""
         limits_s = self.longest_exposures_s(offers)
         times_s = self.times_s()
-        wished = DecayMeter(looks).schedule(times_s, offers, max(limits_s), float("inf"), warn)
+        wished = DecayMeter(measured).schedule(times_s, offers, max(limits_s), float("inf"), warn)
         exposures_s = map(min, wished.exposures_s, limits_s)
         return Schedule(tuple(times_s), tuple(exposures_s))
 
@@ -96,9 +96,9 @@ class GlowSettings(ProtocolModel):
         ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
         return [self.settings(exposure_s) for _, exposure_s in ladder]
 
-    def watcher(self, session: Session, unit: str, metering: str = "meter") -> Watcher:
+    def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
         """Holds a unit's frames against what should have happened, and what `metering` saw."""
-        return Watcher(session, unit, self.regions(), None, self.role, metering)
+        return SanityChecks(session, unit, self.regions(), None, self.role, metering)
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
         """Lamp on for that long, for its own warm-up at the least."""
@@ -111,8 +111,8 @@ def metered_schedule(session: Session, protocol: GlowSettings, metering: str) ->
 
     def decide() -> Schedule:
         frames = [frame for frame in session.frames(FrameRole.METER) if frame.unit == metering]
-        looks = [look(frame, protocol.regions()) for frame in frames]
-        return protocol.schedule(offers, looks, session.warn)
+        measured = [measure_frame(frame, protocol.regions()) for frame in frames]
+        return protocol.schedule(offers, measured, session.warn)
 
     return session.choose("exposure", decide, protocol.brightest_schedule(offers))
 
@@ -179,8 +179,8 @@ def _rest_until_dark(
 def _light(session: Session, unit: str, regions: Sequence[Region]) -> float:
     """Fraction of the range by which the last frame exceeds the closed door; 0 for noise."""
     closed, *_, seen = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
-    dark = look(closed, regions)
-    found = glow(look(seen, regions), levels(dark), seen.start_time)
+    dark = measure_frame(closed, regions)
+    found = glow(measure_frame(seen, regions), levels(dark), seen.start_time)
     fraction = found.brightest * seen.exposure_s / range_dn(dark)
     return fraction if found.clips or (found.seen and fraction > LEAST) else 0.0
 
@@ -207,7 +207,7 @@ class MeteredProtocol(Protocol):
     def charge_sample(self, session: Session, duration_s: float) -> None:
         """Lamp on for that long, for its own warm-up at the least."""
 
-    def watcher(self, session: Session, unit: str) -> Watcher:
+    def checks(self, session: Session, unit: str) -> SanityChecks:
         """Holds a unit's frames against what should have happened."""
 
 
@@ -223,9 +223,9 @@ class DarkUnit:
         session.wait_until_warm("camera")
         exposures_s = self.protocol.dark_exposures_s(session.rig[CAMERA].offers())
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
-        watcher = self.protocol.watcher(session, self.name)
-        dark_frames(session, self.name, watcher.patches, exposures)
-        watcher.require_darkness(self.protocol.short_settings(session))
+        checks = self.protocol.checks(session, self.name)
+        dark_frames(session, self.name, checks.patches, exposures)
+        checks.require_darkness(self.protocol.short_settings(session))
 
 
 @dataclass(frozen=True)
@@ -241,7 +241,7 @@ class MeterUnit:
         session.wait_until_warm("camera")
         self.protocol.charge_sample(session, min(self.charge_s, METER_CHARGE_S))
         ladder = self.protocol.meter_ladder(session.rig[CAMERA].offers())
-        check_seen(session, ladder[0][0])
+        check_visible(session, ladder[0][0])
         session.run_sequence(
             [
                 *lights_out(session),
@@ -251,6 +251,4 @@ class MeterUnit:
                 ),
             ]
         )
-        self.protocol.watcher(session, self.name).require_glow(
-            self.protocol.short_settings(session)
-        )
+        self.protocol.checks(session, self.name).require_glow(self.protocol.short_settings(session))

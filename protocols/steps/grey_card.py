@@ -7,9 +7,9 @@ from labrig.acquire import (
     CAMERA,
     LAMP,
     LAMP_ON,
-    ByHand,
     CameraOffers,
     ExposureSettings,
+    ManualStep,
     Session,
     Shoot,
 )
@@ -19,10 +19,10 @@ from labrig.record import FrameRole
 from labrig.region import Region
 
 from .darkness import range_dn
-from .metering import SEEN_SIGMA, Look, look
+from .metering import SEEN_SIGMA, MeteringFrame, measure_frame
 from .sample_pose import face_lamp
 
-GREY_CARD = ByHand(
+GREY_CARD = ManualStep(
     "put a grey card where lamp and camera both see it (on the outside of the closed door; without "
     "a door over the sample)",
     "what is measured next is its light",
@@ -108,13 +108,13 @@ def card_light(session: Session, settings: ExposureSettings, card: Region) -> Ca
     """
 
     def decide() -> CardLight:
-        looks = [look(frame, [card]) for frame in session.frames(FrameRole.METER)]
+        looks = [measure_frame(frame, [card]) for frame in session.frames(FrameRole.METER)]
         return CardLight(_per_s(looks), settings)
 
     return session.choose("light of the card", decide, CardLight(DIM_PER_S, settings))
 
 
-def _per_s(looks: Sequence[Look]) -> float:
+def _per_s(looks: Sequence[MeteringFrame]) -> float:
     """From the fullest look that does not clip."""
     fitting = []
     for seen in looks:

@@ -54,7 +54,7 @@ class Schedule:
 
 
 @dataclass(frozen=True)
-class Look:
+class MeteringFrame:
     """A frame of a metering unit, measured in every patch; `start_s` has any zero they share."""
 
     start_s: float
@@ -62,10 +62,12 @@ class Look:
     patches: Sequence[FrameMeasurement]
 
 
-def look(frame: FrameRecord, regions: Sequence[Region]) -> Look:
+def measure_frame(frame: FrameRecord, regions: Sequence[Region]) -> MeteringFrame:
     """Measure a frame that was taken."""
     raw = read_raw(frame.path)
-    return Look(frame.start_time, frame.exposure_s, [measure(raw, region) for region in regions])
+    return MeteringFrame(
+        frame.start_time, frame.exposure_s, [measure(raw, region) for region in regions]
+    )
 
 
 @dataclass(frozen=True)
@@ -83,19 +85,19 @@ class DecayMeter:
 
     Parameters
     ----------
-    looks
+    metering
         Frames of the unit, in order; the first one begins when a decay's first one does. In each
         the brightest patch decides.
     """
 
-    def __init__(self, looks: Sequence[Look]) -> None:
+    def __init__(self, metering: Sequence[MeteringFrame]) -> None:
         self._range_dn = math.inf
         self._readings: list[_Reading] = []
         self._shortest_clipped = False
-        for seen in looks:
+        for seen in metering:
             self._range_dn = min(self._range_dn, seen.patches[0].range_dn)
             channels = [channel for patch in seen.patches for channel in patch.channels.values()]
-            self._take(seen.start_s - looks[0].start_s, seen.exposure_s, channels)
+            self._take(seen.start_s - metering[0].start_s, seen.exposure_s, channels)
 
     def _take(self, time_s: float, exposure_s: float, channels: list[ChannelStats]) -> None:
         if any(channel.clipped for channel in channels):
@@ -162,7 +164,7 @@ class DecayMeter:
 
 
 @dataclass(frozen=True)
-class Album:
+class FrameCache:
     """Looks at frames, always in the same regions.
 
     Attributes
@@ -172,10 +174,10 @@ class Album:
     """
 
     regions: Sequence[Region]
-    _looks: dict[Path, Look] = field(default_factory=dict, repr=False, compare=False)
+    _measured: dict[Path, MeteringFrame] = field(default_factory=dict, repr=False, compare=False)
 
-    def look(self, frame: FrameRecord) -> Look:
+    def measure_frame(self, frame: FrameRecord) -> MeteringFrame:
         """What a frame shows."""
-        if frame.path not in self._looks:
-            self._looks[frame.path] = look(frame, self.regions)
-        return self._looks[frame.path]
+        if frame.path not in self._measured:
+            self._measured[frame.path] = measure_frame(frame, self.regions)
+        return self._measured[frame.path]

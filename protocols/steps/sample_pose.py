@@ -15,7 +15,7 @@ from labrig.acquire import (
     SHIELD_COVER,
     SHIELD_UNCOVER,
     Session,
-    Timed,
+    TimedAction,
     at,
 )
 from labrig.errors import ProtocolError
@@ -59,7 +59,7 @@ def charge(session: Session, duration_s: float) -> None:
     session.wait(duration_s, "charging")
 
 
-def lights_out(session: Session) -> Sequence[Timed]:
+def lights_out(session: Session) -> Sequence[TimedAction]:
     """The begin of a timed sequence: lamp off, shield before it, then the door opens."""
     steps = [at(0.0, LAMP_OFF)]
     dark_s = LAMP_DARK_S
@@ -78,7 +78,7 @@ def seen_s(session: Session) -> float:
     return lights_out(session)[-1].at_s + session.rig[DOOR].travel_s() + SETTLES_S
 
 
-def check_seen(session: Session, first_s: float) -> None:
+def check_visible(session: Session, first_s: float) -> None:
     """Refuse a first photograph before the door is open.
 
     Raises

@@ -24,7 +24,7 @@ from .afterglow import (
     went_out,
 )
 from .darkness import DARK, Darkness, darkness, levels
-from .metering import Album, Look
+from .metering import FrameCache, MeteringFrame
 
 #: A lamp has gone dark by then; a halogen lamp takes a third of it.
 LAMP_GONE_S = 1.0
@@ -33,7 +33,7 @@ LATE_S = 0.1
 
 
 @dataclass(frozen=True)
-class Watcher:
+class SanityChecks:
     """Judges by what was recorded and nothing else, so that a resumed run judges alike.
 
     Attributes
@@ -138,7 +138,7 @@ class Watcher:
                 "reads off (pull its plug, the contact may be welded), or it did not light at all"
             )
 
-    def tell_of_delays(self, times_s: Sequence[float]) -> None:
+    def report_delays(self, times_s: Sequence[float]) -> None:
         """Say if frames of the decay began late, and whether the disk was why.
 
         Parameters
@@ -212,22 +212,22 @@ class Watcher:
             darks = []  # they hold an earlier glow
         return [self._glow(frame, darks, zero_s) for frame in frames]
 
-    def _glow(self, frame: FrameRecord, darks: Sequence[Look], zero_s: float) -> Glow:
+    def _glow(self, frame: FrameRecord, darks: Sequence[MeteringFrame], zero_s: float) -> Glow:
         seen = self._look(frame)
         if self.background is not None:
-            without = Look(seen.start_s, seen.exposure_s, seen.patches[:-1])
+            without = MeteringFrame(seen.start_s, seen.exposure_s, seen.patches[:-1])
             return glow(without, levels(seen)[-1], zero_s)
         dark = dark_level(darks, frame.exposure_s) if darks else np.zeros(levels(seen).shape)
         return glow(seen, dark, zero_s)
 
-    def _look(self, frame: FrameRecord) -> Look:
+    def _look(self, frame: FrameRecord) -> MeteringFrame:
         """At a frame, the background last if there is one."""
-        return self._album.look(frame)
+        return self._frame_cache.measure_frame(frame)
 
     @cached_property
-    def _album(self) -> Album:
+    def _frame_cache(self) -> FrameCache:
         background = [] if self.background is None else [self.background]
-        return Album([*self.patches, *background])
+        return FrameCache([*self.patches, *background])
 
 
 def _one_each(frames: Sequence[FrameRecord]) -> list[FrameRecord]:

@@ -11,9 +11,9 @@ from labrig.acquire import (
     LAMP,
     LAMP_OFF,
     LAMP_ON,
-    ByHand,
     CameraOffers,
     ExposureSettings,
+    ManualStep,
     Session,
     Shoot,
     Unit,
@@ -27,7 +27,7 @@ from labrig.region import CENTRE
 from .camera_settings import DARKS_PER_EXPOSURE, CameraSettings
 from .metering import SEEN_DN, SEEN_SIGMA, TARGET
 from .sample_pose import face_lamp
-from .sanity_checks import Watcher
+from .sanity_checks import SanityChecks
 
 Stage = Literal["sample", "grey card"]
 LvfPlace = Literal["away", "before camera", "on sample"]
@@ -78,10 +78,10 @@ class Arrangement:
         for name in ("lamp", "stage", "lvf", "filter"):
             if before is None or getattr(self, name) != getattr(before, name):
                 what, task = self._step(name)
-                session.ask(ByHand(what, why, task))
+                session.ask(ManualStep(what, why, task))
 
     def _step(self, name: str) -> tuple[str, str]:
-        """As one says it to a person, and to hands."""
+        """As one says it to a person, and to a changer."""
         match name:
             case "lamp":
                 return f"connect the {self.lamp} lamp to the relay", f"lamp {self.lamp}"
@@ -143,7 +143,7 @@ class Prepared:
     """A unit before which something else is done by hand."""
 
     unit: Unit
-    step: ByHand
+    step: ManualStep
 
     @property
     def name(self) -> str:
@@ -179,7 +179,7 @@ LONGER = 8.0
 
 
 @dataclass(frozen=True)
-class StillLife:
+class Bracketing:
     """How to photograph a scene.
 
     Attributes
@@ -297,17 +297,17 @@ def _looks(session: Session, unit: str) -> list[FrameRecord]:
 class StillDarkUnit:
     """Dark frames at the exposures to come."""
 
-    still_life: StillLife
+    bracketing: Bracketing
     name: str = "dark"
 
     def run(self, session: Session) -> None:
         """Warm the camera up, then photograph darkness."""
         session.wait_until_warm("camera")
-        scene = self.still_life
+        scene = self.bracketing
         exposures_s = scene.dark_exposures_s(session.rig[CAMERA].offers())
         for exposure_s in exposures_s:
             session.perform(Shoot(FrameRole.DARK, scene.settings(exposure_s)))
-        Watcher(session, self.name, [CENTRE], None).require_darkness(
+        SanityChecks(session, self.name, [CENTRE], None).require_darkness(
             [scene.settings(exposure_s) for exposure_s in sorted(set(exposures_s))]
         )
 
@@ -318,7 +318,7 @@ class SceneUnit:
 
     Attributes
     ----------
-    still_life
+    bracketing
         How it is photographed.
     name, role
         Of the unit, and of its frames.
@@ -330,7 +330,7 @@ class SceneUnit:
         Of the lamp that the rig file does not know.
     """
 
-    still_life: StillLife
+    bracketing: Bracketing
     name: str
     role: str
     wanted: Arrangement
@@ -343,7 +343,7 @@ class SceneUnit:
         session.wait_until_warm("camera")
         self.arrange(session)
         light(session, self.warm_up_s(session))
-        self.still_life.photograph(session, self.name, self.role, self.wanted.lamp)
+        self.bracketing.photograph(session, self.name, self.role, self.wanted.lamp)
         self.check(session)
 
     def arrange(self, session: Session) -> None:

@@ -5,7 +5,7 @@ from typing import Protocol
 
 from labrig.clock import VirtualClock
 
-from ..faults import When
+from ..faults import FaultTime
 
 
 class Board(Protocol):
@@ -37,9 +37,9 @@ class SerialCable:
         board: Board,
         clock: VirtualClock,
         *,
-        unplugged: Sequence[When] = (),
-        silent: Sequence[When] = (),
-        echo_lost: Sequence[When] = (),
+        unplugged: Sequence[FaultTime] = (),
+        silent: Sequence[FaultTime] = (),
+        echo_lost: Sequence[FaultTime] = (),
     ) -> None:
         self._board = board
         self._clock = clock
@@ -69,6 +69,6 @@ class SerialCable:
         answer = self._board.receive(data)
         return answer.removeprefix(data.rstrip(b"\r")) if self._now(self._echo_lost) else answer
 
-    def _now(self, whens: Sequence[When]) -> bool:
+    def _now(self, whens: Sequence[FaultTime]) -> bool:
         now_s = self._clock.now()
         return any(when.is_on(now_s) for when in whens)

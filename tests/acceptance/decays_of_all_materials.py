@@ -77,7 +77,7 @@ def main() -> None:
             with tempfile.TemporaryDirectory() as folder:
                 rig = shipped_rig("sim", sample=name, seed=seed, sensor=sensor)
                 (fit,) = fits(Path(folder), rig, asked.protocol).values()
-            print(f"{name:22} seed {seed}: {verdict(fit, name)}", flush=True)
+            print(f"{name:22} seed {seed}: {assessment(fit, name)}", flush=True)
             if name != WITHOUT_TRUE_STATES and has_true_number_of_states(fit, name):
                 of_material[name].append(list(pulls(fit, name)))
         if asked.material:
@@ -86,7 +86,7 @@ def main() -> None:
             rig = shipped_rig("sim-eleven", seed=seed, sensor=sensor)
             together = fits(Path(folder), rig, "decay-eleven")
         for name, fit in together.items():
-            print(f"eleven: {name:14} seed {seed}: {verdict(fit, name)}", flush=True)
+            print(f"eleven: {name:14} seed {seed}: {assessment(fit, name)}", flush=True)
     if asked.seeds > 1:
         for name, errors in of_material.items():
             print(summary(name, np.array(errors), asked.seeds))
@@ -107,7 +107,7 @@ def has_true_number_of_states(fit: dict[str, object], material: str) -> bool:
     return fit["n_states"] == len(read_material(material).states)
 
 
-def verdict(fit: dict[str, object], material: str) -> str:
+def assessment(fit: dict[str, object], material: str) -> str:
     """What came out, in a line."""
     said = f"χ² {fit['reduced_chi2']:.2f}  ρ {fit['flicker']:.4f}  n {fit['n_states']}"
     if material == WITHOUT_TRUE_STATES:

@@ -14,7 +14,7 @@ import argparse
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.fit.excitation import Uncertain, fit_excitation
+from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.material import Material, read_material
 from labrig.results import FittedExcitation
 from tests.fit.charged_samples import Bench, lvf_windows, two_states
@@ -34,7 +34,7 @@ def run(material: Material, seed: int) -> tuple[FittedExcitation, Bench]:
     bare = bench.series("bare lamp", np.ones((1, 160)), [5400.0], shots=30, every_s=6.0)
     lvf = bench.series("through LVF", LVF, CHARGES_S)
     rates = np.array([state.k_r_per_s for state in material.states])
-    uncertain = Uncertain(bench.flicker, LAMP)
+    uncertain = RelativeSigmas(bench.flicker, LAMP)
     return fit_excitation([bare, lvf], 1.1 * rates, bench.amplitudes(), uncertain), bench
 
 

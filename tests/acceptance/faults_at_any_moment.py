@@ -197,12 +197,12 @@ def _judge(ending: Ending, faults: list[str], stop: Stop | None, require: Any) -
     if not ending.lamp_on:
         return
     told = ("switch off by hand", "pull its plug", "cannot open the serial port")
-    by_hand = any(text in said for text in told)
+    manual_steps = any(text in said for text in told)
     # That a relay is welded is only seen once a unit has been photographed to its end.
     cut_short = ending.code in (130, 143) or (ending.code != 0 and len(faults) > 1)
     unseen = "relay_welded" in faults and cut_short
     out_of_reach = (
-        not {*OUT_OF_REACH, "relay_welded"}.isdisjoint(faults) and ending.code == 3 and by_hand
+        not {*OUT_OF_REACH, "relay_welded"}.isdisjoint(faults) and ending.code == 3 and manual_steps
     )
     require(unseen or out_of_reach, f"the lamp is on; code {ending.code}, {said}")
 

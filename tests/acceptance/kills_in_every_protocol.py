@@ -100,7 +100,7 @@ class Tally:
 
 
 @dataclass
-class Trial:
+class ExerciseContext:
     """One run, killed and resumed until it is complete; what is wrong goes into the tally."""
 
     case: Case
@@ -215,7 +215,7 @@ def leave_bench(run: Path, *, morning: bool) -> None:
         "lamp": "off" if morning else last.get("lamp", "off"),
         "door": "closed" if morning or last.get("door") != "open" else "open",
         "concentration": 0.0 if morning or "lamp" not in last else AGLOW,
-        "by_hand": [action.task for action in actions if action.task],
+        "manual_steps": [action.task for action in actions if action.task],
     }
     if morning and record.last_time:
         epoch = datetime.fromtimestamp(record.last_time + NIGHT_S, UTC)
@@ -274,7 +274,7 @@ def main() -> None:
             for number in range(asked.rounds):
                 rng = random.Random(f"{asked.seed} {number} {name}")
                 folder = case.folder / f"killed-{number}"
-                Trial(case, peace, far, folder, rng, tally).run(asked.kills)
+                ExerciseContext(case, peace, far, folder, rng, tally).run(asked.kills)
             kills = ", ".join(f"{kind} {tally.kills[kind]}" for kind in KINDS)
             print(
                 f"{name:19}{len(peace.units):6}"

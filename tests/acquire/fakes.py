@@ -2,7 +2,7 @@
 
 from collections.abc import Callable
 
-from labrig.acquire import ByHand, CameraOffers, ExposureSettings, Frame
+from labrig.acquire import CameraOffers, ExposureSettings, Frame, ManualStep
 from labrig.clock import VirtualClock
 from labrig.record import FrameRecord
 
@@ -151,7 +151,7 @@ class Watching:
     def warn(self, text: str) -> None:
         self.told.append(f"warning: {text}")
 
-    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+    def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         """Answers from `answers`, then `done` without a remark."""
         self.told.append(f"by hand: {step.what}; before: {last}")
         meanwhile()

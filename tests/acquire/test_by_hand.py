@@ -10,8 +10,8 @@ import pytest
 
 from labrig.acquire import (
     LAMP_ON,
-    ByHand,
     ExposureSettings,
+    ManualStep,
     Rig,
     Session,
     Shoot,
@@ -35,19 +35,19 @@ class Filter:
         return f"filter-{self.number}"
 
     def run(self, session: Session) -> None:
-        step = ByHand(f"put filter {self.number} in", "it is next", f"filter {self.number}")
+        step = ManualStep(f"put filter {self.number} in", "it is next", f"filter {self.number}")
         session.ask(step)
         session.perform(LAMP_ON)
         session.perform(Shoot(self.name, ExposureSettings(1.0, 100, 4.0)))
 
 
-class Hands:
+class Changer:
     def __init__(self) -> None:
         self.did: list[str] = []
         self.fail: Exception | None = None
 
     def identity(self) -> str:
-        return "hands"
+        return "changer"
 
     def do(self, task: str) -> None:
         if self.fail:
@@ -95,7 +95,7 @@ def test_each_step_and_its_remark_are_in_the_journal(bench: Bench) -> None:
         action.action
         for attempt in record.completed().values()
         for action in attempt.actions
-        if action.is_by_hand
+        if action.is_manual
     ]
     assert said == ["put filter 1 in", "put filter 2 in (scratched)", "put filter 3 in"]
     assert bench.asked == [
@@ -131,7 +131,7 @@ def test_the_lamp_is_off_while_somebody_takes_a_step_back(bench: Bench) -> None:
     lit = []
     ask = bench.watching.ask
 
-    def look(step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+    def look(step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         lit.append(bench.lamp.lit)
         return ask(step, last, meanwhile)
 
@@ -144,13 +144,13 @@ def test_a_process_that_dies_after_a_step_was_taken_back_does_not_count_it(bench
     class DiedError(Exception):
         pass
 
-    def die(step: ByHand, last: str | None, meanwhile: object) -> NoReturn:
+    def die(step: ManualStep, last: str | None, meanwhile: object) -> NoReturn:
         raise DiedError
 
     asked = bench.watching.ask
     answers: list[str | None] = ["", "", None]
 
-    def answer(step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+    def answer(step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         return answers.pop(0) if answers else die(step, last, meanwhile)
 
     bench.watching.ask = answer  # type: ignore[method-assign]
@@ -184,7 +184,7 @@ def test_what_would_fall_asleep_is_kept_awake_while_nobody_answers(bench: Bench)
     camera = bench.rig.devices["camera"]
     camera.keep_awake = lambda: awake.append(bench.clock.now())  # type: ignore[attr-defined]
 
-    def away(step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str:
+    def away(step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str:
         for _ in range(1000):
             bench.clock.spend(0.1)
             meanwhile()
@@ -196,10 +196,10 @@ def test_what_would_fall_asleep_is_kept_awake_while_nobody_answers(bench: Bench)
 
 
 def test_hands_do_it_after_the_answer_and_their_failure_names_them(bench: Bench) -> None:
-    hands = Hands()
-    bench.rig.devices["hands"] = hands
+    changer = Changer()
+    bench.rig.devices["changer"] = changer
     bench.run([], count=2)
-    assert hands.did == ["filter 1", "filter 2"]
-    hands.fail = RuntimeError("jammed")
-    with pytest.raises(DeviceError, match="hands: its driver failed"):
+    assert changer.did == ["filter 1", "filter 2"]
+    changer.fail = RuntimeError("jammed")
+    with pytest.raises(DeviceError, match="changer: its driver failed"):
         bench.run([], count=3)

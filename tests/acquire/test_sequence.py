@@ -11,7 +11,7 @@ from labrig.acquire import (
     SHIELD_UNCOVER,
     Device,
     ExposureSettings,
-    Missed,
+    LateAction,
     Rig,
     Session,
     Shoot,
@@ -58,7 +58,7 @@ class Shot:
 
     def __init__(self, door_s: float = 0.32) -> None:
         self.door_s = door_s
-        self.missed: list[Missed] = []
+        self.missed: list[LateAction] = []
 
     def run(self, session: Session) -> None:
         session.perform(LAMP_ON)

@@ -9,9 +9,9 @@ import pytest
 from labrig.acquire import (
     LAMP_OFF,
     LAMP_ON,
-    ByHand,
     Device,
     ExposureSettings,
+    ManualStep,
     PartUnit,
     Rig,
     Session,
@@ -74,10 +74,10 @@ class ChargeAndDecay:
 class ByHandFirst:
     """Something is done by hand."""
 
-    name = "hands"
+    name = "changer"
 
     def run(self, session: Session) -> None:
-        session.ask(ByHand("put the sample in", "it is to be measured", "sample in"))
+        session.ask(ManualStep("put the sample in", "it is to be measured", "sample in"))
 
 
 def do(
@@ -165,7 +165,7 @@ def test_while_a_person_takes_their_time_it_is_read_too(tmp_path: Path) -> None:
     thermometer = NotingThermometer(clock)
 
     class Slow(Watching):
-        def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str:
+        def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str:
             for _ in range(600):
                 clock.spend(0.5)
                 meanwhile()

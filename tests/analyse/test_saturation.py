@@ -46,7 +46,7 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
     (level,) = patch.levels
     assert abs(level.r - true_level(tmp_path / "rig.yaml", 1200.0)) < 3 * level.sigma
     assert level.sigma < 0.05
-    assert level.verdict == "no"
+    assert level.assessment == "no"
     assert len(patch.curves) == 6
     assert not patch.rates.differ
     assert any("r(0) = 1 does not hold" in warning for warning in done.result.warnings)
@@ -97,12 +97,12 @@ def test_the_level_is_what_was_charged(
 
 
 @pytest.mark.parametrize(
-    ("ratio", "r", "verdict"), [(0.5, 0.0, "no"), (0.999, 1.0, "yes"), (0.4, 0.0, "no")]
+    ("ratio", "r", "assessment"), [(0.5, 0.0, "no"), (0.999, 1.0, "yes"), (0.4, 0.0, "no")]
 )
-def test_ends_of_the_range_are_levels_too(ratio: float, r: float, verdict: str) -> None:
+def test_ends_of_the_range_are_levels_too(ratio: float, r: float, assessment: str) -> None:
     found = charge_level(ratio, 0.002, 0.5, 0.01, 0.03, (5400.0, 5400.0))
     assert found.r == pytest.approx(r, abs=0.01)
-    assert found.verdict == verdict
+    assert found.assessment == assessment
 
 
 def decay(rates: list[float], amplitudes: list[float], seed: int) -> Curve:

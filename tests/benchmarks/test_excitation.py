@@ -6,7 +6,7 @@ import numpy as np
 import numpy.typing as npt
 from scipy.integrate import solve_ivp
 
-from labrig.fit.excitation import Uncertain, fit_excitation
+from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.results import ChargingSeries
@@ -72,7 +72,7 @@ def test_excitation(against: Against) -> None:
     k_e = np.array([state.k_e_per_s for state in bench.material.states])
     exact = levels(series, k_r, k_e).value
     assert np.abs(integrated(series, k_r, k_e) / exact - 1).max() < 1e-5
-    problem = ExcitationProblem([series], 2, 1, Uncertain())
+    problem = ExcitationProblem([series], 2, 1, RelativeSigmas())
     theta = problem.parameters.as_stated(k_r, bench.amplitudes(), k_e, np.ones(3))
 
     def ours() -> None:
@@ -90,5 +90,5 @@ def test_excitation(against: Against) -> None:
         each=STEPS,
         what="excitation, 31 sites, 3 charges: residuals and Jacobian",
     )
-    fitted = fit_excitation([series], k_r, bench.amplitudes(), Uncertain(bench.flicker, 0.01))
+    fitted = fit_excitation([series], k_r, bench.amplitudes(), RelativeSigmas(bench.flicker, 0.01))
     assert fitted.reduced_chi2 < 1.2

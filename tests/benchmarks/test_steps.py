@@ -14,7 +14,7 @@ from labrig.acquire import (
     LAMP_ON,
     Rig,
     Session,
-    Timed,
+    TimedAction,
     at,
     plan,
     read_rig_file,
@@ -102,7 +102,7 @@ class NothingRecorded:
     def temperature(self, celsius: float, at_s: float) -> None:
         pass
 
-    def last_by_hand(self) -> None:
+    def last_manual_step(self) -> None:
         return None
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
@@ -125,7 +125,7 @@ class NoDisk:
 SEQUENCE = [at(0.01 * n, LAMP_ON if n % 2 else LAMP_OFF) for n in range(STEPS)]
 
 
-def bare_loop(lamp: NothingLamp, sequence: Sequence[Timed]) -> None:
+def bare_loop(lamp: NothingLamp, sequence: Sequence[TimedAction]) -> None:
     clock = VirtualClock()
     for timed in sequence:
         clock.sleep_until(timed.at_s)

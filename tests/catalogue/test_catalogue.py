@@ -12,7 +12,7 @@ import yaml
 from filelock import FileLock
 
 from labrig.catalogue import compare_runs, list_runs, summarise
-from labrig.catalogue.listing import Wanted
+from labrig.catalogue.listing import RunFilter
 from labrig.cli.exit_codes import guarded
 from labrig.results import write_fitted_decay
 from tests.conftest import Ended
@@ -88,7 +88,7 @@ def test_a_person_reads_one_line_a_run(week: Path, labrig: Labrig) -> None:
 
 
 def test_a_run_that_is_being_written_or_damaged_says_so(week: Path, tmp_path: Path) -> None:
-    (folder, *_) = (run.folder for run in list_runs(week, Wanted(sample="blue-paint")))
+    (folder, *_) = (run.folder for run in list_runs(week, RunFilter(sample="blue-paint")))
     with FileLock(folder / ".lock"):
         assert summarise(folder).state == "running"
     assert summarise(folder).state == "processed"
@@ -122,7 +122,7 @@ def test_notes_are_added_and_shown(week: Path, labrig: Labrig) -> None:
 def test_the_same_paint_on_two_days_agrees_and_another_one_differs(
     week: Path, labrig: Labrig
 ) -> None:
-    first, again, other, _ = (run.folder for run in list_runs(week, Wanted()))
+    first, again, other, _ = (run.folder for run in list_runs(week, RunFilter()))
     same = compare_runs(first, again)
     assert same.asked == (("repeats", 1, 2),)
     assert same.patches[0].p_value > 0.01
@@ -203,7 +203,7 @@ def test_what_is_no_reference_is_said_in_a_line(
 def test_one_patch_is_compared_with_one_patch_whatever_it_is_called(
     week: Path, tmp_path: Path
 ) -> None:
-    first, again, *_ = (run.folder for run in list_runs(week, Wanted()))
+    first, again, *_ = (run.folder for run in list_runs(week, RunFilter()))
     renamed = shutil.copytree(again, tmp_path / "renamed")
     protocol = yaml.safe_load((renamed / "protocol.yaml").read_text())
     protocol["patches"] = {"paint": protocol["patches"]["sample"]}
@@ -227,7 +227,7 @@ def test_results_are_shown_with_what_they_were_made_with(
 
 
 def test_what_cannot_be_compared_is_said_in_a_line(week: Path, labrig: Labrig) -> None:
-    first, *_, cut = (run.folder for run in list_runs(week, Wanted()))
+    first, *_, cut = (run.folder for run in list_runs(week, RunFilter()))
     ended = labrig("runs", "compare", first, cut)
     assert (ended.code, len(ended.err.splitlines())) == (4, 1)
     assert "labrig process" in ended.err

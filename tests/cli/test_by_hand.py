@@ -1,4 +1,4 @@
-"""The question at the terminal, and `--yes` where the simulated room's hands do the work."""
+"""The question at the terminal, and `--yes` where the simulated room's changer does the work."""
 
 import os
 from collections.abc import Callable, Iterator, Sequence
@@ -12,8 +12,8 @@ import yaml
 from labrig.acquire import (
     LAMP_OFF,
     LAMP_ON,
-    ByHand,
     ExposureSettings,
+    ManualStep,
     ProtocolModel,
     Session,
     Shoot,
@@ -29,7 +29,7 @@ from labrig.record import read_run
 from labrig.run import Recording
 from tests.test_doors import middle
 
-STEP = ByHand("put filter 37 in", "its transmission is measured", "filter 37")
+STEP = ManualStep("put filter 37 in", "its transmission is measured", "filter 37")
 
 
 def nothing() -> None:
@@ -95,7 +95,7 @@ class Piece:
         self.frame = ExposureSettings(1.0, 400, 4.0)
 
     def run(self, session: Session) -> None:
-        session.ask(ByHand("put a fresh sample in", "it must not glow", "fresh sample", 40.0))
+        session.ask(ManualStep("put a fresh sample in", "it must not glow", "fresh sample", 40.0))
         session.perform(Shoot("before", self.frame))
         session.perform(LAMP_ON)
         session.wait(60.0, "charging")
@@ -127,14 +127,14 @@ def recording(make_rig: Callable[..., Path], tmp_path: Path) -> Callable[..., Re
 
 
 def test_simulated_hands_change_the_sample(recording: Callable[..., Recording]) -> None:
-    prepared = recording({"hands": {"driver": "text_hands", "address": "sim://room/hands"}})
-    assert prepared.plan.by_hand == ("put a fresh sample in",) * 2
-    folder = prepared.record(partial(progress, yes=True, has_hands=True))
+    prepared = recording({"changer": {"driver": "text_changer", "address": "sim://room/changer"}})
+    assert prepared.plan.manual_steps == ("put a fresh sample in",) * 2
+    folder = prepared.record(partial(progress, yes=True, has_changer=True))
     record = read_run(folder)
     before, after = record.frames("before"), record.frames("after")
     assert [middle(frame.path) for frame in before] == pytest.approx([0, 0], abs=3)
     assert all(middle(frame.path) > 300 for frame in after)
-    (asked,) = [a for a in record.completed()["sample-2"].actions if a.is_by_hand]
+    (asked,) = [a for a in record.completed()["sample-2"].actions if a.is_manual]
     assert asked.end_time - asked.start_time == pytest.approx(40.0, abs=0.1)
 
 
@@ -143,7 +143,7 @@ def test_yes_without_hands_is_refused_before_anything_moves(
 ) -> None:
     prepared = recording({})
     with pytest.raises(UsageError) as refusal:
-        prepared.record(partial(progress, yes=True, has_hands=False))
+        prepared.record(partial(progress, yes=True, has_changer=False))
     assert "2 steps are done by hand, such as 'put a fresh sample in'" in str(refusal.value)
     assert list(prepared.runs.iterdir()) == []
 

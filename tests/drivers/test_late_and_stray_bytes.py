@@ -9,9 +9,9 @@ from labrig.clock import VirtualClock
 from labrig.drivers.lcus import LcusRelay
 from labrig.drivers.maestro import MaestroDoor
 from labrig.drivers.numato import NumatoRelay
-from labrig.drivers.text_hands import TextHands
+from labrig.drivers.text_changer import TextChanger
 from labrig.errors import UnclearAnswerError
-from labrig.sim.boards import HandsBoard, LcusBoard, MaestroBoard, NumatoBoard
+from labrig.sim.boards import ChangerBoard, LcusBoard, MaestroBoard, NumatoBoard
 from labrig.yaml_file import validate
 from tests.drivers.serial_wire import Board, BoardPort, InterruptingClock, Wired
 
@@ -102,10 +102,10 @@ def test_stray_bytes_are_an_unclear_answer_and_the_next_one_is_clear(stray: byte
 
 def test_hands_that_babble_are_asked_again_and_hands_that_cannot_are_not() -> None:
     clock = VirtualClock()
-    board = Straying(HandsBoard({"fresh sample": lambda: None}))
-    hands = TextHands("COM7", TextHands.Settings(), Wired(clock, BoardPort(clock, board)))
+    board = Straying(ChangerBoard({"fresh sample": lambda: None}))
+    changer = TextChanger("COM7", TextChanger.Settings(), Wired(clock, BoardPort(clock, board)))
     board.stray = b"\xff"
     with pytest.raises(UnclearAnswerError):
-        hands.do("fresh sample")
-    hands.make_safe()
-    hands.do("fresh sample")
+        changer.do("fresh sample")
+    changer.make_safe()
+    changer.do("fresh sample")

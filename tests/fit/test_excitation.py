@@ -6,7 +6,7 @@ import numpy as np
 import pytest
 
 from labrig.errors import FitError
-from labrig.fit.excitation import Uncertain, fit_excitation as fit, levels_at_off
+from labrig.fit.excitation import RelativeSigmas, fit_excitation as fit, levels_at_off
 from labrig.fit.excitation.levels import levels
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.material import Material, read_material
@@ -27,7 +27,7 @@ def measured(bench: Bench) -> list[ChargingSeries]:
 
 def fitted(bench: Bench, series: list[ChargingSeries]) -> FittedExcitation:
     rates = 1.1 * np.array([state.k_r_per_s for state in bench.material.states])
-    return fit(series, rates, bench.amplitudes(), Uncertain(bench.flicker, LAMP))
+    return fit(series, rates, bench.amplitudes(), RelativeSigmas(bench.flicker, LAMP))
 
 
 @pytest.mark.parametrize(
@@ -103,7 +103,7 @@ def test_weak_light_leaves_the_level_unknown_and_says_so() -> None:
 def test_a_sample_that_is_no_phosphor_of_these_states_is_told() -> None:
     bench = Bench(two_states())
     series = measured(bench)
-    found = fit(series, [0.03], [1.0], Uncertain(bench.flicker, LAMP))
+    found = fit(series, [0.03], [1.0], RelativeSigmas(bench.flicker, LAMP))
     assert found.reduced_chi2 > 2
     assert any("reduced χ²" in said for said in found.warnings)
 
@@ -112,7 +112,9 @@ def test_irradiance_known_badly_goes_into_every_rate() -> None:
     bench = Bench(read_material("blue-paint"))
     series = measured(bench)
     alone = fitted(bench, series).states[0]
-    rough = fit(series, [0.03], [1.0], Uncertain(bench.flicker, LAMP, irradiance=0.05)).states[0]
+    rough = fit(series, [0.03], [1.0], RelativeSigmas(bench.flicker, LAMP, irradiance=0.05)).states[
+        0
+    ]
     expected = np.hypot(alone.k_e_sigma_per_s, 0.05 * alone.k_e_per_s)
     assert rough.k_e_sigma_per_s == pytest.approx(expected, rel=1e-3)
     assert rough.k_r_sigma_per_s == pytest.approx(alone.k_r_sigma_per_s, rel=1e-3)
@@ -129,7 +131,9 @@ def test_a_dark_level_that_wanders_counts_for_no_more_than_it_tells(seed: int) -
         replace(one, values=one.values + random.normal(0.0, 0.3, (len(one.values), 1, 1)))
         for one in measured(bench)
     ]
-    found = fit(series, [0.02], [1.0], Uncertain(bench.flicker, LAMP, wander=(0.3, 0.3, 0.3)))
+    found = fit(
+        series, [0.02], [1.0], RelativeSigmas(bench.flicker, LAMP, common_mode=(0.3, 0.3, 0.3))
+    )
     (state,), (truth,) = found.states, bench.material.states
     assert 0.95 < found.reduced_chi2 < 1.05
     assert abs(state.k_r_per_s - truth.k_r_per_s) < 3 * state.k_r_sigma_per_s
@@ -158,8 +162,8 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
         series,
         2,
         1,
-        Uncertain(
-            0.005, 0.01, cold=0.03, scale=0.02, offset=(0.1, 0.2, 0.3), wander=(0.2, 0.1, 0.3)
+        RelativeSigmas(
+            0.005, 0.01, cold=0.03, scale=0.02, offset=(0.1, 0.2, 0.3), common_mode=(0.2, 0.1, 0.3)
         ),
     )
     random = np.random.default_rng(3)

@@ -46,8 +46,8 @@ def test_products_of_four_curves_are_exact(seed: int) -> None:
 def test_tents_span_the_curves_of_their_grid() -> None:
     curve = made(3)
     wavelength_nm = np.linspace(380.0, 720.0, 341)
-    tents = hats(curve.wavelength_nm, wavelength_nm)
-    np.testing.assert_allclose(tents @ curve.value, curve.at(wavelength_nm), atol=1e-14)
+    hat_functions = hats(curve.wavelength_nm, wavelength_nm)
+    np.testing.assert_allclose(hat_functions @ curve.value, curve.at(wavelength_nm), atol=1e-14)
 
 
 def test_a_filter_goes_on_beyond_its_table() -> None:

@@ -18,7 +18,7 @@ from labrig.protocols.steps.afterglow import (
     metered,
     went_out,
 )
-from tests.protocols.looks import look
+from tests.protocols.metering import measure_frame
 
 LADDER_S = (1 / 1290, 1 / 161, 1 / 20, 0.4, 3.2)
 DARK = np.zeros((1, 2))
@@ -30,7 +30,7 @@ def seen(
     rate_dn_per_s: Callable[[float], float], times_s: Sequence[float], exposures_s: Sequence[float]
 ) -> list[Glow]:
     return [
-        glow(look(time_s, exposure_s, rate_dn_per_s(time_s) * exposure_s), DARK, 0.0)
+        glow(measure_frame(time_s, exposure_s, rate_dn_per_s(time_s) * exposure_s), DARK, 0.0)
         for time_s, exposure_s in zip(times_s, exposures_s, strict=True)
     ]
 
@@ -97,13 +97,13 @@ def test_metering_doubts_a_lamp_and_a_closer_look_tells() -> None:
     assert metered(seen(lambda _: LAMP_DN_PER_S, times_s, LADDER_S)) is Afterglow.CLIPPED
     assert metered(seen(lambda _: 0.0, times_s, LADDER_S)) is Afterglow.ABSENT
 
-    def looks(rate: Callable[[float], float]) -> Afterglow:
+    def metering(rate: Callable[[float], float]) -> Afterglow:
         first, again = (seen(rate, [at_s] * 3, LADDER_S[:3]) for at_s in (12.0, 75.0))
         return looked_at(first, again)
 
-    assert looks(lambda _: LAMP_DN_PER_S) is Afterglow.STEADY
-    assert looks(lambda _: 100 * LAMP_DN_PER_S) is Afterglow.STEADY
-    assert looks(exponential(LAMP_DN_PER_S, 0.002)) is Afterglow.FADING
+    assert metering(lambda _: LAMP_DN_PER_S) is Afterglow.STEADY
+    assert metering(lambda _: 100 * LAMP_DN_PER_S) is Afterglow.STEADY
+    assert metering(exponential(LAMP_DN_PER_S, 0.002)) is Afterglow.FADING
 
 
 @pytest.mark.parametrize(("fraction", "found"), [(0.3, Afterglow.WEAK), (0.8, Afterglow.FADING)])
@@ -124,6 +124,6 @@ def test_a_lamp_that_has_gone_out_is_darker() -> None:
 
 
 def test_dark_levels_lie_straight_between_those_taken() -> None:
-    darks = [look(0.0, 0.05, 1.0), look(2.0, 3.25, 9.0)]
+    darks = [measure_frame(0.0, 0.05, 1.0), measure_frame(2.0, 3.25, 9.0)]
     assert dark_level(darks, 1.65)[0, 1] == pytest.approx(5.0)
     assert dark_level(darks, 1e-3)[0, 1] == 1.0

@@ -4,7 +4,12 @@ import numpy as np
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.protocols.steps.charge_times import CANDIDATES, FloatArray, most_telling_s, still_grows
+from labrig.protocols.steps.charge_times import (
+    CANDIDATES,
+    FloatArray,
+    most_informative_s,
+    still_grows,
+)
 
 DOUBLED_S: FloatArray = np.geomspace(8.0, 256.0, 6)
 
@@ -24,15 +29,15 @@ def test_the_slowest_patch_decides_when_it_has_stopped_however_dim_it_is() -> No
     quick, slow = glow(DOUBLED_S, np.full(9, 0.05)), 0.01 * glow(DOUBLED_S, np.full(9, 0.005))
     assert not still_grows(quick, 0.03)
     assert still_grows(np.concatenate([quick, slow], axis=1), 0.03)
-    chosen_s = most_telling_s(list(DOUBLED_S), np.concatenate([slow, quick], axis=1))
-    alone_s = [most_telling_s(list(DOUBLED_S), patch) for patch in (quick, slow)]
+    chosen_s = most_informative_s(list(DOUBLED_S), np.concatenate([slow, quick], axis=1))
+    alone_s = [most_informative_s(list(DOUBLED_S), patch) for patch in (quick, slow)]
     assert min(alone_s) <= chosen_s <= max(alone_s)
 
 
 @given(st.floats(0.005, 0.1), st.floats(1.0, 1.5))
 def test_the_next_charge_is_the_one_that_tells_most(rate_per_s: float, spread: float) -> None:
     rates: FloatArray = np.array([rate_per_s, rate_per_s * spread, rate_per_s * spread**2])
-    chosen_s = most_telling_s(list(DOUBLED_S), glow(DOUBLED_S, rates))
+    chosen_s = most_informative_s(list(DOUBLED_S), glow(DOUBLED_S, rates))
     candidates_s = np.geomspace(DOUBLED_S[0], DOUBLED_S[-1], CANDIDATES)
     determinants = [_log_determinants(np.append(DOUBLED_S, one_s), rates) for one_s in candidates_s]
     best_s = candidates_s[int(np.argmax(determinants))]
@@ -54,4 +59,4 @@ def test_dim_places_have_no_say() -> None:
     bright = glow(DOUBLED_S, np.full(6, 0.02))
     noise = np.random.default_rng(1).normal(0.0, 0.1, (len(DOUBLED_S), 1, 20))
     both = np.concatenate([noise, bright], axis=2)
-    assert most_telling_s(list(DOUBLED_S), both) == most_telling_s(list(DOUBLED_S), bright)
+    assert most_informative_s(list(DOUBLED_S), both) == most_informative_s(list(DOUBLED_S), bright)

@@ -10,7 +10,7 @@ from hypothesis import given, strategies as st
 
 from labrig.errors import DataError, DeviceError
 from labrig.protocols.steps.darkness import DARK, Darkness, darkness
-from tests.protocols.looks import RANGE_DN, look
+from tests.protocols.metering import RANGE_DN, measure_frame
 
 EXPOSURES_S = (0.05, 0.8, 3.2)
 #: From the end of one exposure to the begin of the next.
@@ -25,13 +25,13 @@ def taken(
     **seen: float,
 ) -> Darkness:
     """What four frames at each exposure show of that light over time."""
-    looks, now_s = [], 0.0
+    metering, now_s = [], 0.0
     for exposure_s in exposures_s:
         for _ in range(4):
             light = rate_dn_per_s(now_s + exposure_s / 2) * exposure_s * flicker()
-            looks.append(look(now_s, exposure_s, offset_dn + light, **seen))
+            metering.append(measure_frame(now_s, exposure_s, offset_dn + light, **seen))
             now_s += exposure_s + PAUSE_S
-    return darkness(looks, 400)
+    return darkness(metering, 400)
 
 
 def told(found: Darkness) -> list[str]:

@@ -1,4 +1,4 @@
-"""Emission spectrum, isotropy, saturation: timelines, what they refuse, what hands do, resume."""
+"""Emission spectrum, isotropy, saturation: timelines, refusals, the changer, resume."""
 
 from pathlib import Path
 from typing import Any
@@ -93,25 +93,25 @@ def test_a_written_protocol_reads_back_as_itself(tmp_path: Path) -> None:
         assert read_protocol(tmp_path / "again.yaml") == protocol
 
 
-def by_hand(tmp_path: Path, **keys: Any) -> list[tuple[str, str]]:
+def manual_steps(tmp_path: Path, **keys: Any) -> list[tuple[str, str]]:
     laid_out = planned(written(tmp_path, **keys))
     return [(step.unit, step.action) for step in laid_out.steps if step.device == "person"]
 
 
 def test_hands_move_as_little_as_they_can_and_put_all_back(tmp_path: Path) -> None:
-    steps = by_hand(tmp_path, protocol="emission_spectrum", lamps=["halogen", "mercury"])
+    steps = manual_steps(tmp_path, protocol="emission_spectrum", lamps=["halogen", "mercury"])
     assert [unit for unit, _ in steps] == [
         "dark", "meter-mercury", "white", "white", "put-back", "put-back",
     ]  # fmt: skip
     assert "mercury lamp" in steps[1][1]
     assert "halogen lamp" in steps[2][1]
-    steps = by_hand(tmp_path, protocol="emission_spectrum", lamps=["mercury"], white=False)
+    steps = manual_steps(tmp_path, protocol="emission_spectrum", lamps=["mercury"], white=False)
     assert [unit for unit, _ in steps] == ["dark", "meter-mercury", "put-back", "put-back"]
-    steps = by_hand(tmp_path, protocol="isotropy", angles=[20, 40])
+    steps = manual_steps(tmp_path, protocol="isotropy", angles=[20, 40])
     turns = [action.split(" by ")[1].split("°")[0] for _, action in steps]
     assert turns == ["20", "0", "40", "0"]
     weaker = {"filter": "neutral-50", "fraction": "50 %"}
-    steps = by_hand(tmp_path, protocol="saturation", weaker=weaker)
+    steps = manual_steps(tmp_path, protocol="saturation", weaker=weaker)
     assert [unit for unit, _ in steps] == ["meter-weaker", "meter-full"]
 
 
@@ -122,7 +122,7 @@ def test_a_run_that_had_no_disk_left_goes_on_where_it_was(tmp_path: Path) -> Non
     protocol = written(tmp_path, **keys)
     laid_out = planned(protocol, write_bench(tmp_path))
     first = next(step for step in laid_out.steps if step.action.startswith("spectrum frame"))
-    # Simulated hands take no time.
+    # The simulated changer takes no time.
     at_s = first.at_s - sum(step.device == "person" and step.at_s < first.at_s
                             for step in laid_out.steps) * 60.0 + 3.0  # fmt: skip
     rig = write_bench(tmp_path, faults=[{"disk_full": {"at": f"{at_s} s"}}])
@@ -134,7 +134,7 @@ def test_a_run_that_had_no_disk_left_goes_on_where_it_was(tmp_path: Path) -> Non
     assert list(before) == ["dark", "meter-halogen"]
     content = yaml.safe_load((folder / "rig.yaml").read_text())
     content["simulation"] |= {"faults": []}
-    content["simulation"]["initial"] |= {"by_hand": ["lvf before camera"]}
+    content["simulation"]["initial"] |= {"manual_steps": ["lvf before camera"]}
     (folder / "rig.yaml").write_text(yaml.safe_dump(content))
     assert guarded(["resume", str(folder), "--yes", "--no-process"]) == 0
     after = read_run(folder).completed()

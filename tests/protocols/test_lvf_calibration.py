@@ -10,7 +10,7 @@ import pytest
 import yaml
 
 from labrig import resources
-from labrig.acquire import ByHand, Plan, RunObserver, plan, read_protocol, read_rig_file
+from labrig.acquire import ManualStep, Plan, RunObserver, plan, read_protocol, read_rig_file
 from labrig.calibration import read_irradiance_file, read_lvf_file
 from labrig.clock import Clock, Interrupted
 from labrig.errors import UsageError
@@ -127,7 +127,7 @@ class Person(Watching):
         super().__init__()
         self._leaves, self._regrets = leaves, regrets
 
-    def ask(self, step: ByHand, last: str | None, meanwhile: Callable[[], None]) -> str | None:
+    def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         self.told.append(f"by hand: {step.what}")
         if self._leaves and self._leaves in step.what:
             raise Interrupted(2)

@@ -20,7 +20,7 @@ from labrig.report.decay_figures import (
     values_below_axis,
 )
 from labrig.report.figure_style import figure_style
-from labrig.report.page import Plates
+from labrig.report.page import FigureFiles
 from labrig.report.timing import FrameTiming
 from labrig.results import Series
 
@@ -141,8 +141,8 @@ def test_overviews_share_their_axes() -> None:
 
 def test_svg_follows_the_page_and_not_the_users_settings() -> None:
     def drawn() -> str:
-        with figure_style(), Plates("test") as plates:
-            return plates.add(linear_decay(SERIES, FIT), "a", 'Decay of "x" <b>').element
+        with figure_style(), FigureFiles("test") as figure_files:
+            return figure_files.add(linear_decay(SERIES, FIT), "a", 'Decay of "x" <b>').element
 
     plain = drawn()
     with mpl.rc_context({"font.size": 30, "svg.fonttype": "path", "axes.grid": False}):

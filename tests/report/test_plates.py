@@ -8,7 +8,7 @@ import pytest
 
 from labrig.report.decay_figures import linear_decay
 from labrig.report.figure_style import CHANNEL, INK, figure_style
-from labrig.report.page import Plates
+from labrig.report.page import FigureFiles
 
 from .made import decay_series
 
@@ -19,14 +19,14 @@ SVG = "{http://www.w3.org/2000/svg}"
 
 def written(folder: Path) -> Path:
     series = decay_series()
-    with figure_style(), Plates("Öl & co") as plates:
-        first = plates.add(linear_decay(series, None), "linear-1-Öl & co", "first")
-        second = plates.add(linear_decay(series, None), "linear-2-Öl & co", "second")
+    with figure_style(), FigureFiles("Öl & co") as figure_files:
+        first = figure_files.add(linear_decay(series, None), "linear-1-Öl & co", "first")
+        second = figure_files.add(linear_decay(series, None), "linear-2-Öl & co", "second")
     assert first.svg_link == "figures/linear-1-l-co.svg"
     assert first.pdf_link == "figures/figures.pdf#page=1"
     assert second.pdf_link == "figures/figures.pdf#page=2"
     folder.mkdir()
-    plates.write(folder)
+    figure_files.write(folder)
     return folder / "figures"
 
 
@@ -52,12 +52,12 @@ def test_an_svg_file_stands_alone(figures: Path) -> None:
 
 def test_numbers_on_axes_keep_their_digits(figures: Path) -> None:
     series = decay_series()
-    with figure_style(), Plates("small") as plates:
+    with figure_style(), FigureFiles("small") as figure_files:
         figure = linear_decay(series, None)
         figure.axes[0].set_ylabel("0.12345")
-        plate = plates.add(figure, "a", "b")
-    assert ">0.12345<" in plate.element
-    assert not re.search(r'="[^"<>]*\d\.\d{3,}', plate.element)
+        figure_file = figure_files.add(figure, "a", "b")
+    assert ">0.12345<" in figure_file.element
+    assert not re.search(r'="[^"<>]*\d\.\d{3,}', figure_file.element)
 
 
 def test_the_pdf_has_a_page_a_figure_and_fonts_that_publishers_take(figures: Path) -> None:

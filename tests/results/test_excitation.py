@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from labrig.errors import DiskError
-from labrig.fit.excitation import Uncertain, closure, fit_excitation
+from labrig.fit.excitation import RelativeSigmas, closure, fit_excitation
 from labrig.material import read_material
 from labrig.results import Series
 from labrig.results.excitation import ExcitationResult, PatchCharging, PatchExcitation
@@ -27,7 +27,7 @@ def result() -> ExcitationResult:
     direct = bench.series("by the lamp itself", np.ones_like(windows), (256.0,), shots=3)
     through.values[0, 0, 0] = math.nan
     (state,) = material.states
-    fit = fit_excitation([through, direct], [state.k_r_per_s], [1.0], Uncertain(bench.flicker))
+    fit = fit_excitation([through, direct], [state.k_r_per_s], [1.0], RelativeSigmas(bench.flicker))
     unknown = replace(fit.states[0], k_r_sigma_per_s=math.inf)
     fit = replace(fit, states=(unknown,))
     whole = Series(

@@ -6,7 +6,7 @@ import cv2
 import numpy as np
 import pytest
 
-from labrig.acquire import CameraOffers, Exercised, ExposureSettings, Frame, Trial
+from labrig.acquire import CameraOffers, ExerciseContext, Exercised, ExposureSettings, Frame
 from labrig.acquire.roles.camera import exercise_camera
 from labrig.clock import VirtualClock
 from labrig.errors import FrameError
@@ -64,7 +64,7 @@ class StillCamera:
 
 def exercised(data: bytes) -> Exercised:
     clock = VirtualClock()
-    return exercise_camera(StillCamera(clock, data), Trial(clock, Photographs()))
+    return exercise_camera(StillCamera(clock, data), ExerciseContext(clock, Photographs()))
 
 
 @every_sensor

@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from labrig.clock import VirtualClock
 from labrig.sim.arrangement import Arrangement
 from labrig.sim.bench_settings import DoorSettings
-from labrig.sim.boards import HandsBoard, Pulse
+from labrig.sim.boards import ChangerBoard, Pulse
 from labrig.sim.room import Room
 from labrig.sim.simulation import Simulation
 
@@ -28,19 +28,19 @@ DOOR = DoorSettings()
 
 
 class Darkroom:
-    """A room, its clock, hands and servo."""
+    """A room, its clock, changer and servo."""
 
     def __init__(self, **changed: Any) -> None:
         self.simulation = Simulation.model_validate({**SMALL, **changed})
         self.clock = VirtualClock(self.simulation.epoch.timestamp())
         self._pulses = [Pulse(0.0, DOOR.closed, 0.0)]
         self.room = Room(self.simulation, self.clock, lambda channel: self._pulses)
-        self._hands = HandsBoard(self.room.tasks)
+        self._changer = ChangerBoard(self.room.tasks)
 
     def do(self, *tasks: str) -> None:
-        """Hands do one thing after the other."""
+        """The changer does one thing after the other."""
         for task in tasks:
-            self._hands.do(task)
+            self._changer.do(task)
 
     def swing(self, width_s: float) -> None:
         """The servo is sent other pulses; the door comes to rest."""

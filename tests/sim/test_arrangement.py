@@ -1,14 +1,14 @@
-"""Hands arrange the bench line by line; what was once so stays so."""
+"""The changer arranges the bench line by line; what was once so stays so."""
 
 import pytest
 
 from labrig import resources
-from labrig.acquire import Hands, read_rig_file
+from labrig.acquire import Changer, read_rig_file
 from labrig.bench import open_bench
 from labrig.errors import DeviceError, UsageError
 from labrig.sim import open_room
 from labrig.sim.arrangement import Arrangement, Arrangements
-from labrig.sim.boards import HandsBoard
+from labrig.sim.boards import ChangerBoard
 from tests.sim.darkroom import LVF, SMALL, Darkroom
 
 
@@ -65,17 +65,18 @@ def test_what_hands_cannot(task: str, said: str) -> None:
     with pytest.raises(UsageError) as refusal:
         bench.do(task)
     assert said in str(refusal.value)
-    assert HandsBoard(bench.room.tasks).receive(f"{task}\n".encode()).startswith(b"cannot ")
+    assert ChangerBoard(bench.room.tasks).receive(f"{task}\n".encode()).startswith(b"cannot ")
     assert bench.arranged == Arrangement()
 
 
 def test_the_bench_is_found_as_hands_had_left_it() -> None:
-    content = {**SMALL, "lvf": LVF, "initial": {"by_hand": ["lvf on sample", "filter minus-505"]}}
+    initial = {"manual_steps": ["lvf on sample", "filter minus-505"]}
+    content = {**SMALL, "lvf": LVF, "initial": initial}
     with open_room(content, "rig.yaml") as opened:
         assert opened.room.arrangements.at(0.0) == Arrangement(lvf="on sample", filter="minus-505")
     with (
         pytest.raises(UsageError, match="known: fresh sample"),
-        open_room({**SMALL, "initial": {"by_hand": ["dance"]}}, "rig.yaml"),
+        open_room({**SMALL, "initial": {"manual_steps": ["dance"]}}, "rig.yaml"),
     ):
         pass
 
@@ -83,14 +84,14 @@ def test_the_bench_is_found_as_hands_had_left_it() -> None:
 def test_the_shipped_rig_has_hands_that_do_it() -> None:
     path = resources.folder("config") / "sim-phosphor.yaml"
     with open_bench(read_rig_file(path), str(path)) as bench, bench.devices() as rig:
-        hands = rig.devices["hands"]
-        assert isinstance(hands, Hands)
-        hands.do("lvf on sample")
-        hands.do("filter longpass-570")
+        changer = rig.devices["changer"]
+        assert isinstance(changer, Changer)
+        changer.do("lvf on sample")
+        changer.do("filter longpass-570")
         assert bench.room is not None
         arranged = bench.room.room.arrangements.last
         with pytest.raises(DeviceError, match="cannot tilt a bit; expected whole degrees"):
-            hands.do("tilt a bit")
+            changer.do("tilt a bit")
     assert (arranged.lvf, arranged.filter) == ("on sample", "longpass-570")
 
 

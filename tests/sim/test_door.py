@@ -20,7 +20,7 @@ from labrig.sim import open_room
 from labrig.sim.bench_settings import DoorSettings
 from labrig.sim.boards import Pulse
 from labrig.sim.door import FRAME_S, Door, DoorDrive
-from labrig.sim.faults import Slowness, When
+from labrig.sim.faults import FaultTime, Slowness
 from labrig.sim.lamp import Lamp
 from labrig.sim.lights import Lights
 from labrig.sim.phosphor import phosphor
@@ -54,8 +54,8 @@ def moved(until_s: float, pulses: Sequence[Pulse], **keys: Any) -> Door:
     return made.door
 
 
-def when(at: str, lasting: str | None = None) -> When:
-    return When.model_validate({"at": at, "for": lasting})
+def when(at: str, lasting: str | None = None) -> FaultTime:
+    return FaultTime.model_validate({"at": at, "for": lasting})
 
 
 def to_open(at_s: float) -> Pulse:
@@ -131,7 +131,7 @@ def test_a_stuck_door_stays_and_swings_on_when_it_is_free() -> None:
     assert door.angle(3.1) == pytest.approx(0.5)
     assert door.angle(1.2) == pytest.approx(0.5)
     assert door.angle(4.0) == 1.0
-    assert moved(5.0, [to_open(1.0)], stuck=[When()]).angle(5.0) == 0.0
+    assert moved(5.0, [to_open(1.0)], stuck=[FaultTime()]).angle(5.0) == 0.0
 
 
 def test_a_slow_door_takes_its_time() -> None:
@@ -140,7 +140,7 @@ def test_a_slow_door_takes_its_time() -> None:
     assert door.angle(2.5) == 1.0
 
 
-def lights(pulses: Sequence[Pulse], room_light: Sequence[When] = ()) -> Lights:
+def lights(pulses: Sequence[Pulse], room_light: Sequence[FaultTime] = ()) -> Lights:
     lamp = Lamp.found(LampSettings(), on=True).switched(False, 0.9)
     return Lights(lamp, room_light, moved(9.0, pulses), Door.found(DOOR, is_open=True))
 
@@ -158,7 +158,7 @@ def test_what_is_seen_is_integrated_exactly() -> None:
     door, lamp = both.door, both.lamp
     assert door is not None
     band = 100
-    room = lights([], [When()]).irradiance(8.0)[band]
+    room = lights([], [FaultTime()]).irradiance(8.0)[band]
     seen = both.seen(0.8, 2.0)
 
     def openness(t: float) -> float:

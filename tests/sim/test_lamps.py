@@ -9,7 +9,7 @@ from scipy.integrate import quad
 
 from labrig import resources
 from labrig.errors import UsageError
-from labrig.sim.faults import When
+from labrig.sim.faults import FaultTime
 from labrig.sim.filters import Filters, read_curve
 from labrig.sim.lamp import BURNING_K, CELL_NM, SETTLED_S, WAVELENGTH_NM, Lamp, filament_spectrum
 from labrig.sim.lamps import FilteredLamps
@@ -123,7 +123,9 @@ def test_the_shield_keeps_afterglow_away() -> None:
 
 
 def test_what_leaks_in_is_there_while_it_lasts() -> None:
-    lights = Lights(COLD, leaks=[leak(1e-5, [When.model_validate({"at": "5 s", "for": "10 s"})])])
+    lights = Lights(
+        COLD, leaks=[leak(1e-5, [FaultTime.model_validate({"at": "5 s", "for": "10 s"})])]
+    )
     assert lights.corners(4.0, 20.0) == [5.0, 15.0]
     assert [lights.irradiance(t).any() for t in (4.0, 6.0, 16.0)] == [False, True, False]
     assert lights.irradiance(6.0).sum() == pytest.approx(1e-5 * filament_spectrum(BURNING_K).sum())

@@ -6,7 +6,7 @@ import pytest
 from labrig.clock import VirtualClock
 from labrig.sim.bench_settings import TemperatureSettings
 from labrig.sim.boards import NumatoBoard
-from labrig.sim.faults import When
+from labrig.sim.faults import FaultTime
 from labrig.sim.temperature import SENSOR_SIGMA_K, TemperatureSensor
 
 
@@ -18,7 +18,7 @@ def shown(board: NumatoBoard, number: int = 0) -> float:
 
 
 def make(
-    clock: VirtualClock, settings: TemperatureSettings | None, seed: int = 1, *off: When
+    clock: VirtualClock, settings: TemperatureSettings | None, seed: int = 1, *off: FaultTime
 ) -> NumatoBoard:
     sensor = TemperatureSensor(settings, clock, np.random.default_rng(seed), off)
     return NumatoBoard(8, lambda relay, on: None, {0: sensor.volts})
@@ -43,7 +43,7 @@ def test_the_sensor_follows_the_room(drift: float) -> None:
 
 def test_a_wire_that_has_come_off_shows_at_the_end_of_the_range() -> None:
     clock = VirtualClock()
-    board = make(clock, None, 1, When.model_validate({"at": "10 s", "for": "10 s"}))
+    board = make(clock, None, 1, FaultTime.model_validate({"at": "10 s", "for": "10 s"}))
     said = []
     for _ in range(3):
         said.append(board.receive(b"adc read 0\r") == b"adc read 0\n\r1023\n\r>")

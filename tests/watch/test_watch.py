@@ -29,7 +29,7 @@ from labrig.record import TAKEN_BACK, ActionRecord, RunFolder, read_run
 from labrig.run import resume_run
 from labrig.watch.previews import Previews
 from labrig.watch.run_follower import RunFollower, State
-from labrig.watch.server import News, WatchServer, watch_run
+from labrig.watch.server import UpdateFeed, WatchServer, watch_run
 from labrig.yaml_file import read_yaml, yaml_text
 from tests.analyse.recorded import quietly
 from tests.recordings import runs as recordings
@@ -275,7 +275,7 @@ class Watching:
 
     def __init__(self, run: Path) -> None:
         self.following = RunFollower(run)
-        self.news = News(settled(self.following), self.following.picture)
+        self.news = UpdateFeed(settled(self.following), self.following.picture)
         self.server = WatchServer(self.news)
 
     def look(self) -> None:
@@ -523,7 +523,7 @@ def test_the_page_follows_the_run_and_finds_back(
         watching.news.end()
         wait.until(lambda _: "lost" in text(chromium, "state"))
         growing.grow_until(b'"role": "decay"')
-        watching.news = watching.server.news = News(
+        watching.news = watching.server.news = UpdateFeed(
             settled(watching.following), watching.following.picture
         )
         wait.until(lambda _: dots(chromium) == 8)

@@ -8,7 +8,7 @@ the release button held instead, with the shutter time at bulb. Sources: libgpho
 from ..codes import OK, response_text
 from ..device_info import DeviceInfo
 from ..failures import RefusedError
-from ..session import Patience, Reply, Session
+from ..session import Reply, Session, Timeouts
 from .protocol import Eos
 from .release import FOCUS_S, LATE_PRESS_S, Held, Release, TwoStageRelease
 
@@ -45,7 +45,7 @@ class EosBulb:
             Nobody knows whether one has.
         """
         try:
-            reply = self._held.press(Patience(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
+            reply = self._held.press(Timeouts(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
         except RefusedError as refusal:
             if refusal.code == _GENERAL_ERROR:
                 raise _refused(refusal.code) from None

@@ -109,7 +109,7 @@ class EosCamera:
         """
         for step in (Eos.SetEventMode, Eos.SetRemoteMode):
             with suppress(RefusedError):
-                self._session.transact(step, 0, patience=CURT)
+                self._session.transact(step, 0, timeouts=CURT)
 
     def offers(self) -> CameraOffers:
         """What it can be set to, as it is now.

@@ -6,7 +6,7 @@ from enum import Enum, auto
 from ..codes import DEVICE_BUSY
 from ..device_info import DeviceInfo
 from ..failures import RefusedError
-from ..session import Patience, Reply, Session
+from ..session import Reply, Session, Timeouts
 from .protocol import Eos
 
 HALF, FULL = 1, 2
@@ -56,7 +56,7 @@ class Held:
         """Whether it is certainly held."""
         return self._stage is Stage.DOWN
 
-    def press(self, patience: Patience) -> Reply:
+    def press(self, timeouts: Timeouts) -> Reply:
         """Press it.
 
         Raises
@@ -65,7 +65,7 @@ class Held:
             The camera did not say that it is down.
         """
         self._stage = Stage.UNKNOWN
-        reply = self._session.transact(*self._press, patience=patience)
+        reply = self._session.transact(*self._press, timeouts=timeouts)
         self._stage = Stage.DOWN
         return reply
 
@@ -88,7 +88,7 @@ class Held:
         self._stage = Stage.UNKNOWN
         reply = None
         try:
-            reply = self._session.transact(*self._let_go, patience=Patience(FOCUS_S, busy_s))
+            reply = self._session.transact(*self._let_go, timeouts=Timeouts(FOCUS_S, busy_s))
         except RefusedError as refusal:
             if refusal.code == DEVICE_BUSY:
                 self._stage = before
@@ -158,11 +158,11 @@ class TwoStageRelease(Release):
 
     def press_half(self) -> None:
         if not self._half.is_down:
-            self._half.press(Patience(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
+            self._half.press(Timeouts(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
 
     def press_full(self, exposure_s: float) -> Reply:
         # some cameras answer when the shutter has closed
-        return self.full.press(Patience(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S))
+        return self.full.press(Timeouts(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S))
 
     def let_go_full(self, busy_s: float) -> None:
         self.full.let_go(busy_s)
@@ -185,8 +185,8 @@ class OneStageRelease(Release):
         pass
 
     def press_full(self, exposure_s: float) -> Reply:
-        patience = Patience(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S)
-        reply = self._session.transact(Eos.RemoteRelease, patience=patience)
+        timeouts = Timeouts(answer_s=exposure_s + FOCUS_S, busy_s=LATE_PRESS_S)
+        reply = self._session.transact(Eos.RemoteRelease, timeouts=timeouts)
         result = reply.params[0] if reply.params else 0
         if result != 0:
             remedy = _RESULTS.get(result, "leave its menus and try again")

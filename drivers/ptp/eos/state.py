@@ -7,7 +7,7 @@ from labrig.clock import Clock
 from labrig.errors import DeviceError
 
 from ..failures import RefusedError
-from ..session import USUAL, Patience, Session
+from ..session import USUAL, Session, Timeouts
 from .custom_functions import CustomFunctions
 from .events import ChoicesChanged, Event, ObjectOffered, ValueChanged, parse_events
 from .protocol import Eos, Property, property_dataset, value_text
@@ -89,7 +89,7 @@ class EosState:
         DeviceError
             The camera does not answer, or not in the protocol's terms.
         """
-        events = self._events(Patience(USUAL.answer_s, busy_s))
+        events = self._events(Timeouts(USUAL.answer_s, busy_s))
         for event in events:
             match event:
                 case ValueChanged(prop, value) if prop in _KNOWN:
@@ -146,9 +146,9 @@ class EosState:
                 ask_s = deadline_s
             self.refresh()
 
-    def _events(self, patience: Patience) -> tuple[Event, ...]:
+    def _events(self, timeouts: Timeouts) -> tuple[Event, ...]:
         try:
-            return parse_events(self._session.transact(Eos.GetEvent, patience=patience).data)
+            return parse_events(self._session.transact(Eos.GetEvent, timeouts=timeouts).data)
         except RefusedError:
             raise
         except DeviceError:

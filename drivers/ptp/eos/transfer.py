@@ -40,7 +40,7 @@ class EosTransfer:
             The camera did not take it.
         """
         try:
-            self._session.transact(Eos.TransferComplete, offered.handle, patience=PATIENT)
+            self._session.transact(Eos.TransferComplete, offered.handle, timeouts=PATIENT)
         except RefusedError as refusal:
             # it has forgotten it: it heard an earlier attempt, whose answer was lost
             if refusal.code != INVALID_OBJECT_HANDLE:

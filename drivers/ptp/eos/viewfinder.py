@@ -66,7 +66,7 @@ class EosViewfinder:
         while True:
             try:
                 data = self._session.transact(
-                    Eos.GetViewFinderData, WHOLE_PICTURE, patience=CURT
+                    Eos.GetViewFinderData, WHOLE_PICTURE, timeouts=CURT
                 ).data
             except RefusedError as refusal:
                 if refusal.code not in (NOT_READY, DEVICE_BUSY):

@@ -10,7 +10,7 @@ from ..codes import Standard, StandardProperty
 from ..device_info import DeviceInfo
 from ..failures import RefusedError
 from ..opening import identify
-from ..session import Patience, Reply, Session
+from ..session import Reply, Session, Timeouts
 from ..settings import PtpCameraSettings
 from .checks import MANUAL_PROGRAM, findings, prepare
 from .exposure import StandardExposure
@@ -198,9 +198,9 @@ class StandardCamera:
         """Clock time at which the exposure began."""
         # should it be broken off, nobody knows whether it has begun: assume so
         self._frames.expect(self._clock.now() + LATE_RELEASE_S + exposure_s)
-        patience = Patience(answer_s=exposure_s + FOCUS_S, busy_s=LATE_RELEASE_S)
+        timeouts = Timeouts(answer_s=exposure_s + FOCUS_S, busy_s=LATE_RELEASE_S)
         try:
-            reply = self._session.transact(Standard.InitiateCapture, 0, 0, patience=patience)
+            reply = self._session.transact(Standard.InitiateCapture, 0, 0, timeouts=timeouts)
         except RefusedError:
             self._frames.expect_none()
             raise

@@ -166,7 +166,7 @@ class StandardFrames:
 
     def _look_at(self, handle: int) -> None:
         try:
-            reply = self._session.transact(Standard.GetObjectInfo, handle, patience=PATIENT)
+            reply = self._session.transact(Standard.GetObjectInfo, handle, timeouts=PATIENT)
         except RefusedError as refusal:
             if refusal.code != INVALID_OBJECT_HANDLE:
                 raise
@@ -192,7 +192,7 @@ class StandardFrames:
         if not self._can_delete:
             return
         try:
-            self._session.transact(Standard.DeleteObject, stored.handle, 0, patience=PATIENT)
+            self._session.transact(Standard.DeleteObject, stored.handle, 0, timeouts=PATIENT)
         except RefusedError:
             return  # a card that fills up ends a run later, and says so; no reason to end it now
 

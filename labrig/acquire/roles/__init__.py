@@ -8,7 +8,7 @@ write its module and list it in `ROLES`, and what protocols and drivers need of 
 from typing import Any
 
 from labrig.acquire.roles.camera import CAMERA, Camera, Shoot
-from labrig.acquire.roles.hands import HANDS, Hands
+from labrig.acquire.roles.changer import CHANGER, Changer
 from labrig.acquire.roles.lamp import LAMP, LAMP_OFF, LAMP_ON, Lamp, Switch
 from labrig.acquire.roles.leds import LEDS, LEDS_OFF, LedBank, LedSwitch
 from labrig.acquire.roles.role import (
@@ -16,8 +16,9 @@ from labrig.acquire.roles.role import (
     Checkable,
     Device,
     DeviceAction,
+    ExerciseContext,
     Exercised,
-    Eyes,
+    FrameReader,
     Guarded,
     KeptAwake,
     Light,
@@ -25,7 +26,6 @@ from labrig.acquire.roles.role import (
     PlannedDevice,
     Role,
     Suggestion,
-    Trial,
 )
 from labrig.acquire.roles.spectrometer import SPECTROMETER, Spectrometer
 from labrig.acquire.roles.swings import (
@@ -52,7 +52,7 @@ ROLES: dict[str, Role[Any]] = {
         LEDS,
         SHIELD,
         DOOR,
-        HANDS,
+        CHANGER,
         CAMERA,
         VIEWFINDER,
         SPECTROMETER,
@@ -65,11 +65,11 @@ LIGHTS = frozenset(key for key, role in ROLES.items() if role.state is not None)
 
 __all__ = [
     "CAMERA",
+    "CHANGER",
     "DARK",
     "DOOR",
     "DOOR_CLOSE",
     "DOOR_OPEN",
-    "HANDS",
     "LAMP",
     "LAMP_OFF",
     "LAMP_ON",
@@ -84,14 +84,15 @@ __all__ = [
     "THERMOMETER",
     "VIEWFINDER",
     "Camera",
+    "Changer",
     "Checkable",
     "Device",
     "DeviceAction",
     "Door",
+    "ExerciseContext",
     "Exercised",
-    "Eyes",
+    "FrameReader",
     "Guarded",
-    "Hands",
     "KeptAwake",
     "Lamp",
     "LampShield",
@@ -109,5 +110,4 @@ __all__ = [
     "Switch",
     "Thermometer",
     "TrapDoor",
-    "Trial",
 ]

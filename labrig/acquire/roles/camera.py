@@ -6,12 +6,12 @@ from typing import Protocol, runtime_checkable
 
 from labrig.acquire.roles.role import (
     Device,
+    ExerciseContext,
     Exercised,
     Measured,
     PlannedDevice,
     Role,
     Suggestion,
-    Trial,
     spread_ms,
 )
 from labrig.acquire.values import CameraOffers, ExposureSettings, Frame
@@ -97,7 +97,7 @@ class Shoot:
         return f"{self.role} frame, {self.settings}"
 
 
-def exercise_camera(camera: Camera, trial: Trial) -> Exercised:
+def exercise_camera(camera: Camera, trial: ExerciseContext) -> Exercised:
     """Three short frames for their timing, a longer one for noise.
 
     Raises
@@ -117,7 +117,7 @@ def exercise_camera(camera: Camera, trial: Trial) -> Exercised:
 
 
 def _timing(
-    camera: Camera, offers: CameraOffers, trial: Trial
+    camera: Camera, offers: CameraOffers, trial: ExerciseContext
 ) -> tuple[list[Measured], Suggestion]:
     settings = _settings(offers, SHORT_S)
     lags_s, cycles_s = [], []
@@ -135,7 +135,9 @@ def _timing(
     ], Suggestion("frame_time", duration_text(frame_time_s))
 
 
-def _shoot(camera: Camera, settings: ExposureSettings, trial: Trial) -> tuple[Frame, float]:
+def _shoot(
+    camera: Camera, settings: ExposureSettings, trial: ExerciseContext
+) -> tuple[Frame, float]:
     """The frame, and when it was asked for."""
     camera.configure(settings)
     camera.arm()

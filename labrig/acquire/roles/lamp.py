@@ -5,12 +5,12 @@ from typing import ClassVar, Protocol, runtime_checkable
 
 from labrig.acquire.roles.role import (
     DARK,
+    ExerciseContext,
     Exercised,
     Light,
     Measured,
     PlannedDevice,
     Role,
-    Trial,
     spread_ms,
 )
 from labrig.errors import DeviceError
@@ -78,7 +78,7 @@ LAMP_ON = Switch(on=True)
 LAMP_OFF = Switch(on=False)
 
 
-def _exercise(lamp: Lamp, trial: Trial) -> Exercised:
+def _exercise(lamp: Lamp, trial: ExerciseContext) -> Exercised:
     """Light it for some hundredths of a second, some times."""
     on_s, off_s = [], []
     try:

@@ -7,12 +7,12 @@ from typing import ClassVar, Protocol, runtime_checkable
 
 from labrig.acquire.roles.role import (
     DARK,
+    ExerciseContext,
     Exercised,
     Light,
     Measured,
     PlannedDevice,
     Role,
-    Trial,
     spread_ms,
 )
 from labrig.errors import DeviceError, ProtocolError
@@ -102,7 +102,7 @@ class LedSwitch:
 LEDS_OFF = LedSwitch(None)
 
 
-def _exercise(leds: LedBank, trial: Trial) -> Exercised:
+def _exercise(leds: LedBank, trial: ExerciseContext) -> Exercised:
     """Light each for some hundredths of a second."""
     measured, off_s = [], []
     try:

@@ -128,7 +128,7 @@ class Exercised:
     suggestions: tuple[Suggestion, ...] = ()
 
 
-class Eyes(Protocol):
+class FrameReader(Protocol):
     """Somebody who can read what a camera delivers."""
 
     def dark_frame(self, frame: Frame) -> Exercised:
@@ -151,11 +151,11 @@ class Eyes(Protocol):
 
 
 @dataclass(frozen=True)
-class Trial:
+class ExerciseContext:
     """What there is to exercise a device with."""
 
     clock: Clock
-    eyes: Eyes
+    eyes: FrameReader
 
     def timed_s(self, act: Callable[[], object]) -> float:
         """Do it; returns how long it took."""
@@ -204,7 +204,7 @@ class Role(Generic[DeviceT]):
     does: type
     name: str
     planned: Callable[[Any, Any, VirtualClock], DeviceT] | None = None
-    exercise: Callable[[DeviceT, Trial], Exercised] | None = None
+    exercise: Callable[[DeviceT, ExerciseContext], Exercised] | None = None
     state: Callable[[DeviceT], str] | None = None
     safe_first: bool = False
 

@@ -6,11 +6,11 @@ from typing import ClassVar, Protocol, runtime_checkable
 
 from labrig.acquire.roles.role import (
     Device,
+    ExerciseContext,
     Exercised,
     Measured,
     PlannedDevice,
     Role,
-    Trial,
 )
 from labrig.quantity import duration_text
 
@@ -111,7 +111,9 @@ SHIELD_COVER = Shield(cover=True)
 SHIELD_UNCOVER = Shield(cover=False)
 
 
-def _swing(ways: Mapping[str, Callable[[], None]], travel_s: float, trial: Trial) -> Exercised:
+def _swing(
+    ways: Mapping[str, Callable[[], None]], travel_s: float, trial: ExerciseContext
+) -> Exercised:
     """There and back, the full travel each; the last way is the safe one."""
     measured = []
     for what, go in ways.items():
@@ -124,12 +126,12 @@ def _swing(ways: Mapping[str, Callable[[], None]], travel_s: float, trial: Trial
     return Exercised((*measured, travelled))
 
 
-def _exercise_door(door: TrapDoor, trial: Trial) -> Exercised:
+def _exercise_door(door: TrapDoor, trial: ExerciseContext) -> Exercised:
     ways = {"open, read back": door.open, "close, read back": door.close}
     return _swing(ways, door.travel_s(), trial)
 
 
-def _exercise_shield(shield: LampShield, trial: Trial) -> Exercised:
+def _exercise_shield(shield: LampShield, trial: ExerciseContext) -> Exercised:
     ways = {"cover, read back": shield.cover, "uncover, read back": shield.uncover}
     return _swing(ways, shield.travel_s(), trial)
 

@@ -2,7 +2,7 @@
 
 from typing import Protocol, runtime_checkable
 
-from labrig.acquire.roles.role import Device, Exercised, Measured, Role, Trial
+from labrig.acquire.roles.role import Device, ExerciseContext, Exercised, Measured, Role
 
 
 @runtime_checkable
@@ -13,7 +13,7 @@ class Thermometer(Device, Protocol):
         """Temperature now, in degrees Celsius; takes seconds at most, even when it fails."""
 
 
-def _exercise(thermometer: Thermometer, trial: Trial) -> Exercised:
+def _exercise(thermometer: Thermometer, trial: ExerciseContext) -> Exercised:
     """Read it once."""
     asked_s = trial.clock.now()
     celsius = thermometer.celsius()

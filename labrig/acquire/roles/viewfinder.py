@@ -2,7 +2,7 @@
 
 from typing import Protocol, runtime_checkable
 
-from labrig.acquire.roles.role import Device, Exercised, Measured, Role, Trial
+from labrig.acquire.roles.role import Device, ExerciseContext, Exercised, Measured, Role
 
 
 @runtime_checkable
@@ -19,7 +19,7 @@ class LiveView(Device, Protocol):
         """
 
 
-def _exercise(viewfinder: LiveView, trial: Trial) -> Exercised:
+def _exercise(viewfinder: LiveView, trial: ExerciseContext) -> Exercised:
     """Have it show one picture; a camera in its place takes no photographs."""
     asked_s = trial.clock.now()
     jpeg = viewfinder.preview()

@@ -16,7 +16,7 @@ from labrig.analyse.strip import StripPatch, for_each_patch
 from labrig.analyse.temperature import at_temperature
 from labrig.calibration import IrradianceFile, Warming
 from labrig.errors import DataError
-from labrig.fit.excitation import Uncertain, fit_excitation
+from labrig.fit.excitation import RelativeSigmas, fit_excitation
 from labrig.record import FrameRole
 from labrig.results import (
     ExcitationResult,
@@ -76,13 +76,13 @@ def _of_patch(
     """The patch's excitation, and warnings."""
     decay = fit_series(charging.whole, _states(part, patch))
     dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), LEAST_DARK).tolist())
-    uncertain = Uncertain(
+    uncertain = RelativeSigmas(
         flicker=_flicker(part, decay),
         lamp=LAMP,
         cold=warming.deficit_sigma,
         offset=dark,
         # The sensor warms and cools over hours of long exposures, more than dark frames tell.
-        wander=dark,
+        common_mode=dark,
         scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
     )
@@ -120,7 +120,7 @@ def _states(part: Part, patch: StripPatch) -> int | None:
 def _fit(
     charging: PatchCharging,
     decay: FittedDecay,
-    uncertain: Uncertain,
+    uncertain: RelativeSigmas,
     near: FittedExcitation | None = None,
 ) -> FittedExcitation:
     rates = [state.k_r_per_s for state in decay.states]

@@ -75,7 +75,7 @@ def charge_frames(
 
     Parameters
     ----------
-    warms_s
+    time_constant_s
         Time constant with which the lamp's housing warms and cools.
 
     Raises

@@ -6,7 +6,7 @@ from dataclasses import replace
 import numpy as np
 
 from labrig.calibration import IrradianceFile
-from labrig.fit.excitation import Charging, Uncertain, closure, levels_at_off
+from labrig.fit.excitation import Charging, RelativeSigmas, closure, levels_at_off
 from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray, PatchCharging
 
 #: Of σ, for derivatives.
@@ -16,7 +16,7 @@ STEP = 0.01
 def predicted_charging(
     charging: PatchCharging,
     irradiance: IrradianceFile,
-    uncertain: Uncertain,
+    uncertain: RelativeSigmas,
     fit_of: Callable[[PatchCharging], FittedExcitation],
 ) -> Closure | None:
     """Charging by the lamp itself as predicted from charges through the filter.

@@ -3,6 +3,6 @@
 from labrig.fit.excitation.charging import Charging, closure
 from labrig.fit.excitation.fit import fit_excitation
 from labrig.fit.excitation.levels import levels_at_off
-from labrig.fit.excitation.parameters import Uncertain
+from labrig.fit.excitation.parameters import RelativeSigmas
 
-__all__ = ["Charging", "Uncertain", "closure", "fit_excitation", "levels_at_off"]
+__all__ = ["Charging", "RelativeSigmas", "closure", "fit_excitation", "levels_at_off"]

@@ -12,7 +12,7 @@ from numpy.typing import ArrayLike, NDArray
 
 from labrig.errors import FitError
 from labrig.fit.excitation.levels import levels_at_off
-from labrig.fit.excitation.parameters import Rates, Uncertain, bands_of
+from labrig.fit.excitation.parameters import Rates, RelativeSigmas, bands_of
 from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.fit.excitation.start import starts
 from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
@@ -33,7 +33,7 @@ def fit_excitation(
     series: Sequence[ChargingSeries],
     k_r_per_s: ArrayLike,
     fractions: ArrayLike,
-    uncertain: Uncertain | None = None,
+    uncertain: RelativeSigmas | None = None,
     near: FittedExcitation | None = None,
 ) -> FittedExcitation:
     """Fit all series together.
@@ -57,7 +57,7 @@ def fit_excitation(
     """
     series = [one.checked() for one in series]
     bands_of(series)
-    uncertain = uncertain or Uncertain()
+    uncertain = uncertain or RelativeSigmas()
     rates = np.asarray(k_r_per_s, dtype=np.float64)
     reference = _brightest(series)
     problem = ExcitationProblem(series, len(rates), reference, uncertain)
@@ -108,7 +108,7 @@ def _chi2(fit: LeastSquaresFit) -> float:
 
 
 def _result(
-    problem: ExcitationProblem, found: LeastSquaresFit, reference: int, uncertain: Uncertain
+    problem: ExcitationProblem, found: LeastSquaresFit, reference: int, uncertain: RelativeSigmas
 ) -> FittedExcitation:
     n, bands = problem.parameters.states, problem.parameters.bands
     rates, theta = problem.parameters.unpack(found.parameters), found.parameters

@@ -44,7 +44,7 @@ class Rates(NamedTuple):
 
 
 @dataclass(frozen=True)
-class Uncertain:
+class RelativeSigmas:
     """What else scatters, relative standard uncertainties.
 
     Attributes
@@ -59,7 +59,7 @@ class Uncertain:
         Of the irradiance of every series but the first over that of the first.
     offset
         (C,) of the dark level that was subtracted, in the values' unit; the same in all of them.
-    wander
+    common_mode
         (C,) by which the dark level scatters from photograph to photograph, in the values' unit:
         a sensor that exposes warms.
     irradiance
@@ -71,11 +71,11 @@ class Uncertain:
     cold: float = 0.0
     scale: float = 0.0
     offset: tuple[float, ...] = ()
-    wander: tuple[float, ...] = ()
+    common_mode: tuple[float, ...] = ()
     irradiance: float | tuple[float, ...] = 0.0
 
 
-class Columns(NamedTuple):
+class ParameterLayout(NamedTuple):
     """Where in θ = [ln k_r, A, k_e, weights, and what is half known] each stands.
 
     What is not fitted has no place: its slice is empty.
@@ -124,7 +124,11 @@ class Parameters:
     """
 
     def __init__(
-        self, series: Sequence[ChargingSeries], states: int, reference: int, uncertain: Uncertain
+        self,
+        series: Sequence[ChargingSeries],
+        states: int,
+        reference: int,
+        uncertain: RelativeSigmas,
     ) -> None:
         self.states, self.bands, self._series = states, bands_of(series), len(series)
         channels = series[0].values.shape[2]
@@ -143,7 +147,7 @@ class Parameters:
         self.prior_sigma: FloatArray = np.concatenate([np.repeat(each, counts), uncertain.offset])
         known = [states, states, states * self.bands, len(self.others)]
         ends = _begins([*known, *counts, len(uncertain.offset)])
-        self.columns = Columns(*(slice(*both) for both in pairwise(ends)))
+        self.columns = ParameterLayout(*(slice(*both) for both in pairwise(ends)))
         self.count = ends[-1]
 
     def charges(self, number: int) -> slice:

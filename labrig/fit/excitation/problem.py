@@ -11,7 +11,7 @@ from typing import NamedTuple, Self
 import numpy as np
 
 from labrig.fit.excitation.levels import levels
-from labrig.fit.excitation.parameters import Parameters, Rates, Uncertain, is_fitted
+from labrig.fit.excitation.parameters import Parameters, Rates, RelativeSigmas, is_fitted
 from labrig.results import ChargingSeries, FloatArray
 
 
@@ -31,7 +31,11 @@ class ExcitationProblem:
     """
 
     def __init__(
-        self, series: Sequence[ChargingSeries], states: int, reference: int, uncertain: Uncertain
+        self,
+        series: Sequence[ChargingSeries],
+        states: int,
+        reference: int,
+        uncertain: RelativeSigmas,
     ) -> None:
         self.series = tuple(series)
         self.parameters = Parameters(series, states, reference, uncertain)
@@ -41,12 +45,13 @@ class ExcitationProblem:
             for one in self.series
         ]
         self._values = [np.nan_to_num(one.values) for one in self.series]
-        wander = np.array(uncertain.wander)
-        self._wander = [
-            [_flat(wander * inverse)] if len(wander) else [] for inverse in self._inverse_sigma
+        common_mode = np.array(uncertain.common_mode)
+        self._common_mode = [
+            [_flat(common_mode * inverse)] if len(common_mode) else []
+            for inverse in self._inverse_sigma
         ]
         #: Along which all values of a photograph scatter together, by series.
-        self._common = [_one_by_one(vectors) for vectors in self._wander]
+        self._common = [_one_by_one(vectors) for vectors in self._common_mode]
 
     @property
     def n_values(self) -> int:
@@ -74,9 +79,9 @@ class ExcitationProblem:
         """Take the flicker's covariance from the signal at θ."""
         if self._flicker > 0:
             self._common = [
-                _one_by_one([_flat(self._flicker * signal * inverse), *wander])
-                for signal, inverse, wander in zip(
-                    self.signal(theta), self._inverse_sigma, self._wander, strict=True
+                _one_by_one([_flat(self._flicker * signal * inverse), *common_mode])
+                for signal, inverse, common_mode in zip(
+                    self.signal(theta), self._inverse_sigma, self._common_mode, strict=True
                 )
             ]
 

@@ -16,7 +16,7 @@ from numpy.typing import ArrayLike
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import strip_problem as of
-from labrig.fit.lvf.strip_problem import Expected, Found, StripProblem
+from labrig.fit.lvf.strip_problem import Expected, StripProblem, StripSolution
 from labrig.fit.spectrum.system import CurveError
 from labrig.optics import (
     NOMINAL_FWHM_NM,
@@ -157,7 +157,7 @@ def _before(centre_nm: FloatArray, sigma_nm: FloatArray, knots_nm: FloatArray) -
     return Expected(mean, sigma)
 
 
-def _begin(problem: StripProblem, first: Expected, places: FloatArray) -> Found:
+def _begin(problem: StripProblem, first: Expected, places: FloatArray) -> StripSolution:
     """The bands that are expected, as high as they are seen.
 
     Raises
@@ -175,11 +175,11 @@ def _begin(problem: StripProblem, first: Expected, places: FloatArray) -> Found:
         raise FitError(f"position {places[dark][0]:g}: no light above the noise; expose longer")
     figures = first.mean.copy()
     figures[:, of.LOG_PEAK] = np.log(scale)
-    return Found(figures, np.zeros(problem.modes))
+    return StripSolution(figures, np.zeros(problem.modes))
 
 
 def _from_the_others(
-    places: FloatArray, found: Found, sigmas: FloatArray, first: Expected
+    places: FloatArray, found: StripSolution, sigmas: FloatArray, first: Expected
 ) -> Expected:
     """What all other positions let expect of each one, by polynomials along the strip, and σ.
 

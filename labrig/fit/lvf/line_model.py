@@ -33,7 +33,7 @@ class Line:
     ----------
     wavelength_nm
         In air; of the two, the shorter one first.
-    second_share
+    second_fraction
         Fraction of the second one in the light of both, and how well that is known; it depends on
         the lamp and on the camera.
     """

@@ -38,7 +38,7 @@ class Expected:
 
 
 @dataclass(frozen=True, eq=False)
-class Found:
+class StripSolution:
     """Figures (p, figures) and z of the curves' modes (modes,), where χ² is least."""
 
     figures: FloatArray
@@ -86,7 +86,7 @@ class StripProblem:
         nodes, weights = quadrature(low, high, *knots, *(f.wavelength_nm for f in filters))
         self.grid_nm = np.append(np.arange(low, high, GRID_NM), high)
         self.knots_nm = np.arange(low, high + REMAINDER_STEP_NM / 2, REMAINDER_STEP_NM)
-        self._tents = hats(self.knots_nm, self.grid_nm)
+        self._hat_functions = hats(self.knots_nm, self.grid_nm)
         sensitivity = camera.at(nodes)
         lit = weights * lamp.at(nodes) * card.at(nodes)
         peaks = camera.sensitivity.max(axis=0)
@@ -131,13 +131,13 @@ class StripProblem:
         sensitivity = np.maximum(self._camera.sensitivity + np.stack(columns, axis=1), 0.0)
         return replace(self._camera, sensitivity=sensitivity / sensitivity.max())
 
-    def misfit(self, found: Found) -> FloatArray:
+    def misfit(self, found: StripSolution) -> FloatArray:
         """(p,) root mean square of what is left, in σ."""
         left, _ = self._left(found)
         rms: FloatArray = np.sqrt((left**2).sum(axis=1) / self.used.sum(axis=1))
         return rms
 
-    def solve(self, begin: Found, expected: Expected, iterations: int) -> Found:
+    def solve(self, begin: StripSolution, expected: Expected, iterations: int) -> StripSolution:
         """Levenberg–Marquardt from `begin` on; at most so many steps."""
         found, chi2, damping = begin, self._chi2(begin, expected), _DAMPING
         for _ in range(iterations):
@@ -152,7 +152,7 @@ class StripProblem:
                 break
         return found
 
-    def sigmas(self, found: Found, expected: Expected) -> FloatArray:
+    def sigmas(self, found: StripSolution, expected: Expected) -> FloatArray:
         """(p, figures) standard uncertainties, those of the curves included."""
         step = self._step(found, expected, 0.0)
         curves = np.linalg.inv(step.information)
@@ -164,29 +164,29 @@ class StripProblem:
         return np.array(rows)
 
     def _better(
-        self, found: Found, chi2: float, expected: Expected, damping: float
-    ) -> tuple[Found, float]:
+        self, found: StripSolution, chi2: float, expected: Expected, damping: float
+    ) -> tuple[StripSolution, float]:
         step = self._step(found, expected, damping)
         figures = found.figures + step.figures
         figures[:, SKEW] = np.clip(figures[:, SKEW], -MOST_SKEW, MOST_SKEW)
         figures[:, LEAKAGE] = np.maximum(figures[:, LEAKAGE], 0.0)
-        moved = Found(figures, found.curves + step.curves)
+        moved = StripSolution(figures, found.curves + step.curves)
         if not np.isfinite(figures).all():
             return found, chi2
         return moved, self._chi2(moved, expected)
 
-    def _chi2(self, found: Found, expected: Expected) -> float:
+    def _chi2(self, found: StripSolution, expected: Expected) -> float:
         left, _ = self._left(found)
         prior = (found.figures - expected.mean) / expected.sigma
         return float((left**2).sum() + (prior**2).sum() + found.curves @ found.curves)
 
-    def _left(self, found: Found) -> tuple[FloatArray, FloatArray]:
+    def _left(self, found: StripSolution) -> tuple[FloatArray, FloatArray]:
         """(p, values) measured − expected in σ, and the design (values, grid) with its curves."""
         design = self._design + np.tensordot(found.curves, self._bent, axes=1)
         expected = self._transmission(found.figures) @ design.T
         return (self._value - expected) * self._inverse, design
 
-    def _step(self, found: Found, expected: Expected, damping: float) -> _Step:
+    def _step(self, found: StripSolution, expected: Expected, damping: float) -> _Step:
         left, design = self._left(found)
         shape = self._transmission(found.figures)
         slopes = self._derivatives(found.figures) @ design.T
@@ -216,7 +216,7 @@ class StripProblem:
     def _transmission(self, figures: FloatArray) -> FloatArray:
         """(p, grid)."""
         relative = _shapes(self.grid_nm, figures) + figures[:, [LEAKAGE]]
-        relative = relative + figures[:, FIGURES:] @ self._tents.T
+        relative = relative + figures[:, FIGURES:] @ self._hat_functions.T
         transmission: FloatArray = np.exp(figures[:, [LOG_PEAK]]) * relative
         return transmission
 
@@ -230,8 +230,8 @@ class StripProblem:
             apart = _shapes(self.grid_nm, figures + step) - _shapes(self.grid_nm, figures - step)
             columns.append(peak * apart / (2 * _STEP))
         columns += [self._transmission(figures), peak * np.ones_like(self.grid_nm)]
-        tents = peak[:, np.newaxis] * self._tents.T
-        return np.concatenate([np.stack(columns, axis=1), tents], axis=1)
+        hat_functions = peak[:, np.newaxis] * self._hat_functions.T
+        return np.concatenate([np.stack(columns, axis=1), hat_functions], axis=1)
 
 
 def _on_grid(light: FloatArray, sensitivity: FloatArray, onto_grid: FloatArray) -> FloatArray:

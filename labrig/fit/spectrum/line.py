@@ -73,13 +73,13 @@ def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm
     step = float(knots[1] - knots[0])
 
     def line_at(wavelength_nm: float) -> _LineAt:
-        return _line_at(part, y, s, _tents(knots, wavelength_nm, fwhm_nm))
+        return _line_at(part, y, s, _hat_functions(knots, wavelength_nm, fwhm_nm))
 
-    def surprise(wavelength_nm: float) -> float:
-        return line_at(wavelength_nm).surprise
+    def minus_two_log_likelihood(wavelength_nm: float) -> float:
+        return line_at(wavelength_nm).minus_two_log_likelihood
 
     tried = np.linspace(knots[0], knots[-1], TRIED_PER_KNOT * (len(knots) - 1) + 1)
-    best = int(np.argmin([surprise(wavelength) for wavelength in tried]))
+    best = int(np.argmin([minus_two_log_likelihood(wavelength) for wavelength in tried]))
     if best in (0, len(tried) - 1) or not line_at(tried[best]).strength > 0:
         raise FitError(
             f"expected a line between {knots[0]:g} and {knots[-1]:g} nm, got values that none "
@@ -88,7 +88,9 @@ def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm
     between = (float(tried[best - 1]), float(tried[best + 1]))
     h = TOLERANCE * step
     # Not least squares: the covariance, and its determinant with it, changes along the search.
-    centre_nm = float(minimize_scalar(surprise, bounds=between, options={"xatol": h}).x)
+    centre_nm = float(
+        minimize_scalar(minus_two_log_likelihood, bounds=between, options={"xatol": h}).x
+    )
     at = line_at(centre_nm)
     shift = (line_at(centre_nm + h).shape - line_at(centre_nm - h).shape) / (2 * h)
     by_wavelength = at.strength * solve_triangular(at.lower, shift, lower=True)
@@ -109,7 +111,7 @@ class _LineAt:
         (m,) values of a line of strength 1, and over all that may be wrong.
     lower
         (m, m) root of the values' covariance.
-    strength, chi2, surprise
+    strength, chi2, minus_two_log_likelihood
         Likeliest strength, χ² and −2 ln likelihood but for a constant.
     """
 
@@ -118,12 +120,14 @@ class _LineAt:
     lower: FloatArray
     strength: float
     chi2: float
-    surprise: float
+    minus_two_log_likelihood: float
 
 
-def _line_at(system: SpectralSystem, y: FloatArray, s: FloatArray, tents: FloatArray) -> _LineAt:
-    shape, noise, strength = system.design @ tents, np.diag(s**2), 0.0
-    wrong = system.covariance(tents)
+def _line_at(
+    system: SpectralSystem, y: FloatArray, s: FloatArray, hat_functions: FloatArray
+) -> _LineAt:
+    shape, noise, strength = system.design @ hat_functions, np.diag(s**2), 0.0
+    wrong = system.covariance(hat_functions)
     for _ in range(ROUNDS if wrong.any() else 1):
         lower = cholesky(noise + strength**2 * wrong, lower=True)
         both = solve_triangular(lower, np.column_stack([shape, y]), lower=True)
@@ -132,11 +136,11 @@ def _line_at(system: SpectralSystem, y: FloatArray, s: FloatArray, tents: FloatA
         strength = max(float(whitened @ target) / seen, 0.0) if seen > 0 else 0.0
     residual = target - strength * whitened
     chi2 = float(residual @ residual)
-    surprise = chi2 + 2 * float(np.log(np.diag(lower)).sum())
-    return _LineAt(shape, whitened, lower, strength, chi2, surprise)
+    minus_two_log_likelihood = chi2 + 2 * float(np.log(np.diag(lower)).sum())
+    return _LineAt(shape, whitened, lower, strength, chi2, minus_two_log_likelihood)
 
 
-def _tents(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -> FloatArray:
+def _hat_functions(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -> FloatArray:
     """(n,) values at the knots of a line of integral 1, with its centre and its width.
 
     The straight lines between the knots make it wider by h²/3 in its variance, h the distance of
@@ -149,5 +153,5 @@ def _tents(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -> FloatA
     from_line = (knots - wavelength_nm) / width
     density = np.exp(-(from_line**2) / 2) / np.sqrt(2 * np.pi)
     ramp = width * (from_line * ndtr(from_line) + density)
-    tents: FloatArray = np.diff(ramp, n=2) / h**2
-    return tents
+    hat_functions: FloatArray = np.diff(ramp, n=2) / h**2
+    return hat_functions

@@ -85,12 +85,12 @@ def system_through_lvf(
     nodes, weights = quadrature(
         float(knots_nm[0]), float(knots_nm[-1]), camera.wavelength_nm, knots_nm
     )
-    tents = weights[:, np.newaxis] * hats(knots_nm, nodes)
+    hat_functions = weights[:, np.newaxis] * hats(knots_nm, nodes)
     sensitivity = camera.at(nodes)
 
     def design(transmission: FloatArray, curves: FloatArray) -> FloatArray:
         """(positions · channels, n)."""
-        values = np.stack([(transmission * curve) @ tents for curve in curves.T], axis=1)
+        values = np.stack([(transmission * curve) @ hat_functions for curve in curves.T], axis=1)
         return values.reshape(-1, len(knots_nm))
 
     transmission = lvf.transmission(nodes)
@@ -101,7 +101,7 @@ def system_through_lvf(
     ]
     for position, change in _filter_changes(lvf, nodes):
         mode = np.zeros((len(transmission), sensitivity.shape[1], len(knots_nm)))
-        mode[position] = (change[:, np.newaxis] * sensitivity).T @ tents
+        mode[position] = (change[:, np.newaxis] * sensitivity).T @ hat_functions
         modes.append(mode.reshape(exact.shape))
     stacked = np.array(modes) if modes else np.empty((0, 0, 0))
     return SpectralSystem(knots_nm, exact, stacked)

@@ -141,7 +141,7 @@ def test_charges_double_until_the_glow_stops_growing(run: Path) -> None:
         (action.unit, action.task)
         for attempt in record_.completed().values()
         for action in attempt.actions
-        if action.is_by_hand
+        if action.is_manual
     ]
     assert asked == [("strip-meter", "lvf on sample"), ("direct-meter", "lvf away")]
 
@@ -155,7 +155,7 @@ def test_killed_in_the_middle_it_goes_on_with_the_filter_where_it_was(
     cut, resumed = cut_off_and_resumed(again, "strip-3")
     assert list(cut.completed())[-1] == "strip-2"
     assert list(resumed.completed()) == list(read_run(run).completed())
-    # The room is opened anew; had its hands not put the filter back, all places would glow alike.
+    # The room is opened anew; had its changer not put the filter back, all places would glow alike.
     last = resumed.frames("strip")[-1]
     places = [
         measure(read_raw(last.path), region)

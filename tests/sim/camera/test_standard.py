@@ -22,9 +22,9 @@ ADDED, COMPLETE = 0x4002, 0x400D
 
 
 def bench(
-    habits: StandardHabits | None = None, faults: CameraFaults | None = None, **by_hand: Any
+    habits: StandardHabits | None = None, faults: CameraFaults | None = None, **manual_steps: Any
 ) -> Bench:
-    return Bench(body=BodySettings(body="standard", **by_hand), habits=habits, faults=faults)
+    return Bench(body=BodySettings(body="standard", **manual_steps), habits=habits, faults=faults)
 
 
 def ready(b: Bench) -> Host:
@@ -158,7 +158,7 @@ def test_descriptions_are_read_as_the_standard_writes_them() -> None:
 
 
 @pytest.mark.parametrize(
-    ("by_hand", "prop", "said"),
+    ("set_by_hand", "prop", "expected"),
     [
         ({"exposure_mode": "Av"}, PROGRAM, 3),
         ({"exposure_mode": "B"}, PROGRAM, 0),
@@ -167,8 +167,8 @@ def test_descriptions_are_read_as_the_standard_writes_them() -> None:
         ({"autofocus": True}, 0x500A, 2),
     ],
 )
-def test_what_is_set_by_hand_is_told(by_hand: dict[str, Any], prop: int, said: int) -> None:
-    assert value(ready(bench(**by_hand)), prop) == said
+def test_what_is_set_by_hand_is_told(set_by_hand: dict[str, Any], prop: int, expected: int) -> None:
+    assert value(ready(bench(**set_by_hand)), prop) == expected
 
 
 def test_faults_of_the_body() -> None:

@@ -93,10 +93,10 @@ def test_any_number_of_bytes_is_taken(size: int) -> None:
 def test_a_camera_that_tells_little_is_looked_at_by_hand() -> None:
     found = bench().connect().findings()
     assert [finding.what for finding in found if finding.severity == "refuse"] == []
-    by_hand = [str(finding) for finding in found if finding.severity == "warn"]
-    assert len(by_hand) == 6
+    manual_steps = [str(finding) for finding in found if finding.severity == "warn"]
+    assert len(manual_steps) == 6
     for place in ("lens to MF", "Auto power off", "C.Fn II (Image) → 1", "C.Fn III"):
-        assert any(place in text for text in by_hand)
+        assert any(place in text for text in manual_steps)
 
 
 @pytest.mark.parametrize(

@@ -17,7 +17,7 @@ from labrig.drivers.ptp.containers import Container, Kind, command
 from labrig.drivers.ptp.failures import MalformedError, NoAnswerError, UnpluggedError
 from labrig.drivers.ptp.ip import link as ip_link
 from labrig.drivers.ptp.ip.packets import PacketKind, encode
-from labrig.drivers.ptp.session import Patience, Session
+from labrig.drivers.ptp.session import Session, Timeouts
 from labrig.errors import DeviceError, DeviceLostError, UsageError
 from tests.counterparts import transcript
 from tests.counterparts.served import STANDARD, Film, Taken, served
@@ -322,7 +322,7 @@ ANSWERS = b"".join(
     for line in transcript.read(transcript.FOLDER / "connect.jsonl")
     if line.sender == transcript.CAMERA and line.connection == transcript.COMMAND and line.kind > 4
 )
-IN_A_HURRY = Patience(answer_s=0.005, busy_s=0.0)
+IN_A_HURRY = Timeouts(answer_s=0.005, busy_s=0.0)
 
 
 @given(
@@ -344,6 +344,6 @@ def test_mutated_answers_are_device_errors_and_never_hang(
                 session = Session(camera.link(), SystemClock())
                 for operation in (0x1001, 0x1002, 0x1001, 0x9114, 0x9115, 0x9116, 0x9116):
                     named = Standard(operation) if operation < 0x9000 else Standard.GetDeviceInfo
-                    session.transact(named, patience=IN_A_HURRY)
+                    session.transact(named, timeouts=IN_A_HURRY)
             except DeviceError as error:
                 assert "\n" not in str(error)

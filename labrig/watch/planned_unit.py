@@ -34,7 +34,7 @@ class PlannedUnit:
     duration_s: float
     steps: tuple[Step, ...]
 
-    def standing(self, attempt: Attempt) -> dict[str, Any]:
+    def status_of_unit(self, attempt: Attempt) -> dict[str, Any]:
         """What an attempt that is under way has done last, and what is to come.
 
         The journal decides how far it is: nobody knows how long a person takes, and the plan has
@@ -67,9 +67,9 @@ class PlannedUnit:
             "time": time,
             "at_s": at_s,
             "until_s": self.duration_s if due is None else due - self.begins_s,
-            "done": [{"time": one.start_time, "what": _said_of(one)} for one in told[-MOST_DONE:]],
+            "done": [{"time": one.start_time, "what": _text_of(one)} for one in told[-MOST_DONE:]],
             "next": [
-                {"at_s": step.at_s - self.begins_s, "what": said(step.device, step.action)}
+                {"at_s": step.at_s - self.begins_s, "what": step_text(step.device, step.action)}
                 for step in coming[:MOST_NEXT]
             ],
         }
@@ -87,7 +87,7 @@ def planned_units(plan: Plan) -> tuple[PlannedUnit, ...]:
     )
 
 
-def said(device: str, action: str) -> str:
+def step_text(device: str, action: str) -> str:
     """A step in words."""
     if device == PERSON:
         return f"by hand: {action}"
@@ -114,8 +114,8 @@ def _device(one: ActionRecord | FrameRecord) -> str:
     return "camera" if isinstance(one, FrameRecord) else one.device
 
 
-def _said_of(one: ActionRecord | FrameRecord) -> str:
+def _text_of(one: ActionRecord | FrameRecord) -> str:
     if isinstance(one, ActionRecord):
-        return said(one.device, one.action)
+        return step_text(one.device, one.action)
     settings = ExposureSettings(one.exposure_s, one.iso, one.f_number)
-    return said("camera", f"{one.role} frame, {settings}")
+    return step_text("camera", f"{one.role} frame, {settings}")

@@ -1,4 +1,4 @@
-"""What hands can do in the simulated room: cards, filters, lamps, the LVF."""
+"""What the changer can do in the simulated room: cards, filters, lamps, the LVF."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -17,7 +17,7 @@ MOST_TILT_DEG = 85
 LEAST_LAMP_M = 0.2
 
 
-class Hands:
+class Changer:
     """They arrange the bench, and sometimes make mistakes.
 
     Parameters

@@ -1,20 +1,20 @@
 """Looks at a scene that is written down instead of photographed."""
 
-from labrig.protocols.steps.metering import Look
+from labrig.protocols.steps.metering import MeteringFrame
 from labrig.reduce import ChannelStats, FrameMeasurement
 
 BLACK, WHITE = 1024.0, 15_600.0
 RANGE_DN = WHITE - BLACK
 
 
-def look(
+def measure_frame(
     start_s: float,
     exposure_s: float,
     level_dn: float,
     black: float = BLACK,
     hot: float = 0.0,
     sigma: float = 0.05,
-) -> Look:
+) -> MeteringFrame:
     """One patch whose green has this level above the file's black, clipped where it must.
 
     Parameters
@@ -27,7 +27,7 @@ def look(
     saturated = n if level_dn >= full else round(hot * n)
     green = ChannelStats(mean, sigma, 10.0, mean, n, saturated, round(hot * n))
     red = ChannelStats(mean / 3, sigma, 10.0, mean / 3, n, 0, 0)
-    return Look(
+    return MeteringFrame(
         start_s,
         exposure_s,
         [

@@ -1,17 +1,17 @@
-"""Hands in the simulated room, told what to do line by line."""
+"""The changer of the simulated room, instructed line by line."""
 
 from collections.abc import Callable, Mapping
 
 from labrig.errors import UsageError
 
 
-class HandsBoard:
+class ChangerBoard:
     """Answers `done`, or `cannot …`, to every line.
 
     Parameters
     ----------
     tasks
-        What the hands can do, by the line that tells them. Of `filter NAME` they are given what
+        What the changer can do, by its command line. Of `filter NAME` it is given what
         stands for the word in capitals; a UsageError says what they cannot.
     """
 

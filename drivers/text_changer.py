@@ -1,7 +1,7 @@
-r"""Hands that obey lines of text: a sample changer or filter wheel of one's own.
+r"""A changer that obeys lines of text: a sample changer or filter wheel of one's own.
 
 Any microcontroller will do: it reads `fresh sample\n` or `filter 37\n`, moves, and answers `done\n`
-or `cannot`, the reason and `\n`. The simulated room's hands speak the same.
+or `cannot`, the reason and `\n`. The simulated room's changer speaks the same.
 """
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -15,8 +15,8 @@ from .serial_line import SerialLine
 BAUDRATE = 115_200
 
 
-class TextHands:
-    """Hands on a serial line.
+class TextChanger:
+    """A changer on a serial line.
 
     Parameters
     ----------
@@ -46,7 +46,7 @@ class TextHands:
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._settings = settings
-        self._name = f"the hands at {address}"
+        self._name = f"the changer at {address}"
         port = connections.serial(address, settings.baud)
         self._line = SerialLine(port, connections.clock, self._name)
 
@@ -71,11 +71,11 @@ class TextHands:
             kind = DeviceError if said.startswith("cannot") else UnclearAnswerError
             raise kind(
                 f"{self._name} were told '{task}': expected 'done', got '{said}'; do it by hand, "
-                "without 'hands:' in the rig file, or teach them"
+                "without 'changer:' in the rig file, or teach them"
             )
 
     def make_safe(self) -> None:
-        """End a half-written line and forget old answers; hands that move come to their end."""
+        """End a half-written line and forget old answers; a changer that moves comes to its end."""
         self._line.write(b"\n")
         self._line.drain()
 

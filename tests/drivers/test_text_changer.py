@@ -1,26 +1,26 @@
-"""Hands that obey lines of text, against transcripts and against the simulated room's."""
+"""A changer that obeys lines of text, against transcripts and against the simulated room's."""
 
 import pytest
 from hypothesis import given, strategies as st
 
-from labrig.acquire import Hands
+from labrig.acquire import Changer
 from labrig.clock import VirtualClock
-from labrig.drivers.text_hands import TextHands
+from labrig.drivers.text_changer import TextChanger
 from labrig.errors import DeviceError, DeviceLostError
-from labrig.sim.boards import HandsBoard
+from labrig.sim.boards import ChangerBoard
 from tests.drivers.serial_wire import BoardPort, Script, ScriptedPort, Wired
 
 
-def hands(script: Script) -> tuple[TextHands, ScriptedPort]:
+def changer(script: Script) -> tuple[TextChanger, ScriptedPort]:
     clock = VirtualClock()
     port = ScriptedPort(clock, script)
-    return TextHands("COM7", TextHands.Settings(), Wired(clock, port)), port
+    return TextChanger("COM7", TextChanger.Settings(), Wired(clock, port)), port
 
 
 def test_a_line_there_and_a_line_back() -> None:
-    driver, port = hands([(b"filter 37\n", b"done\r\n"), (b"\n", b"")])
-    assert isinstance(driver, Hands)
-    assert driver.identity() == "hands at COM7"
+    driver, port = changer([(b"filter 37\n", b"done\r\n"), (b"\n", b"")])
+    assert isinstance(driver, Changer)
+    assert driver.identity() == "changer at COM7"
     driver.do("filter 37")
     driver.make_safe()
     assert port.script == []
@@ -35,17 +35,17 @@ def test_a_line_there_and_a_line_back() -> None:
     ],
 )
 def test_what_they_cannot_do(answer: bytes, error: type[DeviceError], said: str) -> None:
-    driver, _ = hands([(b"filter 37\n", answer)])
+    driver, _ = changer([(b"filter 37\n", answer)])
     with pytest.raises(error) as refusal:
         driver.do("filter 37")
     assert said in str(refusal.value)
 
 
-def test_the_simulated_rooms_hands() -> None:
+def test_the_simulated_rooms_changer() -> None:
     clock = VirtualClock()
     did: list[str] = []
-    board = HandsBoard({"fresh sample": lambda: did.append("fresh sample")})
-    driver = TextHands("COM7", TextHands.Settings(), Wired(clock, BoardPort(clock, board)))
+    board = ChangerBoard({"fresh sample": lambda: did.append("fresh sample")})
+    driver = TextChanger("COM7", TextChanger.Settings(), Wired(clock, BoardPort(clock, board)))
     board.receive(b"half a li")
     driver.make_safe()
     driver.do("fresh sample")
@@ -56,4 +56,4 @@ def test_the_simulated_rooms_hands() -> None:
 
 @given(st.binary(max_size=40))
 def test_the_board_answers_any_bytes(data: bytes) -> None:
-    HandsBoard({}).receive(data)
+    ChangerBoard({}).receive(data)

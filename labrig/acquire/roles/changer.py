@@ -1,4 +1,4 @@
-"""Hands: what does at the bench what protocols would ask a person to do."""
+"""The changer: it does at the bench what protocols would ask a person to do."""
 
 from typing import Protocol, runtime_checkable
 
@@ -6,7 +6,7 @@ from labrig.acquire.roles.role import Device, Role
 
 
 @runtime_checkable
-class Hands(Device, Protocol):
+class Changer(Device, Protocol):
     """Do what a person would do at the bench: a sample changer, a filter wheel. Safe: still."""
 
     def do(self, task: str) -> None:
@@ -20,4 +20,4 @@ class Hands(Device, Protocol):
 
 
 #: In a plan everything is done by a person.
-HANDS: Role[Hands] = Role(key="hands", does=Hands, name="hands")
+CHANGER: Role[Changer] = Role(key="changer", does=Changer, name="changer")
