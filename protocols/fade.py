@@ -2,7 +2,7 @@
 
 A shutter opens a while after the switch, another while in every photograph. What it still sees of
 the fade is over in a second, so that every photograph holds all that is left of it. The steady lamp
-is photographed before each. (Nalbach et al., section 4.4, give 320 ms until the lamp is dark.)
+is photographed before each. (Nalbach et al., section 4.6, give 320 ms until the lamp is dark.)
 """
 
 import math

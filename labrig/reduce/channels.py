@@ -269,7 +269,7 @@ class FrameMeasurement:
         return self.white - max(self.black)
 
     def to_json(self) -> dict[str, Any]:
-        """What `labrig frame --json` prints (contracts.md)."""
+        """What `labrig frame --json` prints."""
         return {
             "channels": {
                 name: {

@@ -11,7 +11,7 @@ from labrig.errors import DataError
 from labrig.results.measured import FloatArray
 from labrig.results.text_files import write_csv
 
-#: Columns of series.csv that are not channels (contracts.md).
+#: Columns of series.csv that are not channels.
 TIME, EXPOSURE, SIGMA_SUFFIX = "t_s", "exposure_s", "_sigma"
 RESERVED = ("iso", "f_number", "frame", "unit", "region", "flag")
 #: Flags of rows that a fit must leave out, and what joins the flags of one row.
@@ -104,7 +104,7 @@ class Series:
         return [self.take(np.flatnonzero(units == unit)) for unit in dict.fromkeys(self.unit)]
 
     def write_csv(self, path: Path) -> None:
-        """Write series.csv (contracts.md); `read_series` gives the same numbers back."""
+        """Write series.csv; `read_series` gives the same numbers back."""
         write_series(path, [self])
 
 

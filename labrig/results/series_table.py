@@ -52,7 +52,7 @@ def read_series(path: str | os.PathLike[str]) -> list[Series]:
     """The series in a table, one for each region and unit in it, in order of appearance.
 
     The header may be missing: then the columns are time, value and perhaps sigma. `#` begins a
-    comment. Every column that is not reserved (contracts.md) is a channel, except one that only
+    comment. Every column that is not reserved (`RESERVED`) is a channel, except one that only
     the first row fills: some programs put the settings of a measurement there.
 
     Raises

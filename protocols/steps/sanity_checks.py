@@ -68,7 +68,7 @@ class SanityChecks:
         Raises
         ------
         DeviceError, DataError
-            As `Darkness.insist`.
+            As `Darkness.require`.
         """
 
         def decide() -> Darkness:
@@ -89,7 +89,7 @@ class SanityChecks:
         Raises
         ------
         DeviceError
-            As `Afterglow.insist`.
+            As `Afterglow.require`.
         """
         self._require(lambda: metered(self._glows(self._own(FrameRole.METER))), shorter)
 

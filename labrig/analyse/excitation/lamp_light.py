@@ -21,8 +21,8 @@ SMOOTH_MODES = 9
 WORST = 1.0
 #: Less light than this fraction of the most has no logarithm worth the name.
 LEAST_LIGHT = 1e-6
-#: A halogen lamp falls to 1/e in so long at these wavelengths (physics.md: measured by others),
-#: and is dark after `DARK_S` (Nalbach et al., section 4.4).
+#: A halogen lamp falls to 1/e in so long at these wavelengths (measured by others),
+#: and is dark after `DARK_S` (Nalbach et al., section 4.6).
 USUAL_NM = (419.0, 650.0)
 USUAL_1_E_S = (0.031, 0.051)
 DARK_S = 0.32
