@@ -1,6 +1,7 @@
 """The command line. Each command is thin, and imports what it needs when it is called."""
 
 import typer
+from typer.core import TyperGroup
 
 from labrig.cli import (
     compare,
@@ -51,3 +52,19 @@ def main(
 
         typer.echo(f"labrig {installed('labrig')}")
         raise typer.Exit
+
+
+def command() -> TyperGroup:
+    """Return the command line; its lists show each command's first sentence in full."""
+    whole = typer.main.get_command(app)
+    assert isinstance(whole, TyperGroup)
+    _show_first_sentences(whole)
+    return whole
+
+
+def _show_first_sentences(group: TyperGroup) -> None:
+    for member in group.commands.values():
+        sentence, stop, _ = " ".join((member.help or "").split()).partition(". ")
+        member.short_help = sentence + stop.strip()
+        if isinstance(member, TyperGroup):
+            _show_first_sentences(member)

@@ -34,14 +34,14 @@ def _run(arguments: Sequence[str]) -> int:
     import typer
     from typer.exceptions import TyperException
 
-    from labrig.cli.app import app
+    from labrig.cli.app import command
 
     if any(_NO_TEXT.search(argument) for argument in arguments):
         return _complain(f"expected arguments in UTF-8, got {' '.join(map(ascii, arguments))}", 2)
     for signum in STOP_SIGNALS:
         signal.signal(signum, raise_interrupted)
     try:
-        app(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
+        command()(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
     except Interrupted as interrupted:
         return _complain(str(interrupted), 128 + interrupted.signum)
     except LabrigError as error:
