@@ -12,11 +12,11 @@ copyright = "the labrig authors; BSD-3-Clause"
 version = release = version_of("labrig")
 
 extensions = [
+    "mathml",
     "myst_parser",
     "numpydoc",
     "sphinx.ext.autodoc",
     "sphinx.ext.autosummary",
-    "sphinx.ext.mathjax",
     "sphinx_copybutton",
     "sphinx_design",
     "typer_commands",
@@ -30,9 +30,13 @@ myst_enable_extensions = ["amsmath", "attrs_block", "colon_fence", "deflist", "d
 myst_heading_anchors = 3
 
 autodoc_typehints = "none"
+default_role = "code"
 autosummary_generate = True
 numpydoc_show_class_members = False
 
+html_math_renderer = "mathml"
+html_static_path = ["static"]
+html_css_files = ["labrig.css"]
 html_theme = "pydata_sphinx_theme"
 html_title = "labrig"
 html_show_sourcelink = False

@@ -1,0 +1,86 @@
+"""Make the pictures of the manual anew, in `docs/pictures`, from the pages that labrig makes.
+
+    python docs/pictures.py RUNS
+
+RUNS is the folder `runs` that the tutorial leaves. Needs chromium, and the development tools.
+"""
+
+import argparse
+import shutil
+import subprocess
+import sys
+import tempfile
+import time
+from collections.abc import Iterator
+from contextlib import contextmanager
+from pathlib import Path
+
+from selenium.webdriver import Chrome
+
+sys.path.insert(0, str(Path(__file__).parents[1]))
+from tests.chromium import browser
+
+PICTURES = Path(__file__).parent / "pictures"
+WIDTH = 1280
+#: Frames of the decay that the watched run has when its picture is taken.
+FRAMES_WATCHED = 40
+#: Until a live page has drawn what it is sent.
+SETTLE_S = 4.0
+
+
+def main() -> None:
+    """Draw all pictures."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("runs", type=Path)
+    runs: Path = parser.parse_args().runs.resolve()
+    PICTURES.mkdir(exist_ok=True)
+    decay, phosphor = (next(iter(sorted(runs.glob(f"*_{name}_*")))) for name in ("decay", "phosphor"))
+    with tempfile.TemporaryDirectory() as scratch, browser(Path(scratch, "profile")) as chrome:
+        page(chrome, (decay / "result/report.html").as_uri(), "report_decay", 1250)
+        page(chrome, (phosphor / "result/report.html").as_uri(), "report_phosphor", 1500)
+        half = half_done(decay, Path(scratch, "runs"))
+        with served("watch", str(half), "--no-browser") as address:
+            page(chrome, address, "watch", 900, SETTLE_S)
+        protocol = Path(scratch, "my-decay.yaml")
+        subprocess.run([*LABRIG, "protocol", "new", "decay", str(protocol)], check=True)
+        with served("rig", "view", "sim", "--protocol", str(protocol), "--no-browser") as address:
+            page(chrome, address, "view", 900, SETTLE_S)
+
+
+LABRIG = (sys.executable, "-m", "labrig")
+
+
+def page(chrome: Chrome, address: str, name: str, height: int, settle_s: float = 0.5) -> None:
+    """The top of a page, `height` pixels high."""
+    chrome.set_window_size(WIDTH, height)
+    chrome.get(address)
+    time.sleep(settle_s)
+    chrome.save_screenshot(str(PICTURES / f"{name}.png"))
+
+
+def half_done(run: Path, runs: Path) -> Path:
+    """A copy of a run as it was in the middle of its decay."""
+    copy = runs / run.name
+    shutil.copytree(run, copy, ignore=shutil.ignore_patterns("result*", "comparison"))
+    lines = (run / "journal.jsonl").read_text(encoding="utf-8").splitlines(keepends=True)
+    decay = [number for number, line in enumerate(lines) if '"role": "decay"' in line]
+    kept = "".join(lines[: decay[min(FRAMES_WATCHED, len(decay) - 1)] + 1])
+    (copy / "journal.jsonl").write_text(kept, encoding="utf-8")
+    return copy
+
+
+@contextmanager
+def served(*arguments: str) -> Iterator[str]:
+    """The address of a page that a command of labrig serves."""
+    with subprocess.Popen([*LABRIG, *arguments], stdout=subprocess.PIPE, text=True) as process:
+        assert process.stdout is not None
+        try:
+            yield next(
+                word for line in process.stdout for word in line.split() if word.startswith("http")
+            )
+        finally:
+            process.terminate()
+
+
+if __name__ == "__main__":
+    main()
