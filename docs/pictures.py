@@ -15,6 +15,7 @@ from collections.abc import Iterator
 from contextlib import contextmanager
 from pathlib import Path
 
+from filelock import FileLock
 from selenium.webdriver import Chrome
 
 sys.path.insert(0, str(Path(__file__).parents[1]))
@@ -23,7 +24,7 @@ from tests.chromium import browser
 PICTURES = Path(__file__).parent / "pictures"
 WIDTH = 1280
 #: Frames of the decay that the watched run has when its picture is taken.
-FRAMES_WATCHED = 40
+FRAMES_WATCHED = 22
 #: Until a live page has drawn what it is sent.
 SETTLE_S = 4.0
 
@@ -36,11 +37,12 @@ def main() -> None:
     PICTURES.mkdir(exist_ok=True)
     decay, phosphor = (next(iter(sorted(runs.glob(f"*_{name}_*")))) for name in ("decay", "phosphor"))
     with tempfile.TemporaryDirectory() as scratch, browser(Path(scratch, "profile")) as chrome:
-        page(chrome, (decay / "result/report.html").as_uri(), "report_decay", 1250)
+        page(chrome, (decay / "result/report.html").as_uri(), "report_decay", 2000)
         page(chrome, (phosphor / "result/report.html").as_uri(), "report_phosphor", 1500)
         half = half_done(decay, Path(scratch, "runs"))
-        with served("watch", str(half), "--no-browser") as address:
-            page(chrome, address, "watch", 900, SETTLE_S)
+        # A run whose folder is locked is under way.
+        with FileLock(half / ".lock"), served("watch", str(half), "--no-browser") as address:
+            page(chrome, address, "watch", 860, SETTLE_S)
         protocol = Path(scratch, "my-decay.yaml")
         subprocess.run([*LABRIG, "protocol", "new", "decay", str(protocol)], check=True)
         with served("rig", "view", "sim", "--protocol", str(protocol), "--no-browser") as address:
@@ -55,6 +57,7 @@ def page(chrome: Chrome, address: str, name: str, height: int, settle_s: float =
     chrome.set_window_size(WIDTH, height)
     chrome.get(address)
     time.sleep(settle_s)
+    chrome.execute_script("document.documentElement.style.overflow = 'hidden'")
     chrome.save_screenshot(str(PICTURES / f"{name}.png"))
 
 
