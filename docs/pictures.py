@@ -35,7 +35,7 @@ def main() -> None:
     parser.add_argument("runs", type=Path)
     runs: Path = parser.parse_args().runs.resolve()
     PICTURES.mkdir(exist_ok=True)
-    decay, phosphor = (next(iter(sorted(runs.glob(f"*_{name}_*")))) for name in ("decay", "phosphor"))
+    decay, phosphor = (min(runs.glob(f"*_{name}_*")) for name in ("decay", "phosphor"))
     with tempfile.TemporaryDirectory() as scratch, browser(Path(scratch, "profile")) as chrome:
         page(chrome, (decay / "result/report.html").as_uri(), "report_decay", 2000)
         page(chrome, (phosphor / "result/report.html").as_uri(), "report_phosphor", 1500)

@@ -3,7 +3,7 @@
 A package adds its own by entry points: a driver in `labrig.drivers`; a protocol in
 `labrig.protocols`, and under the same name its analysis in `labrig.analyses`, the type of its
 result in `labrig.results` and, unless plain tables will do, its part of a report in
-`labrig.reports`.
+`labrig.reports`; a kind of calibration, which a protocol measures, in `labrig.calibrations`.
 """
 
 from functools import cache
@@ -18,12 +18,14 @@ PROTOCOLS = "labrig.protocols"
 ANALYSES = "labrig.analyses"
 RESULTS = "labrig.results"
 REPORTS = "labrig.reports"
+CALIBRATIONS = "labrig.calibrations"
 _KINDS = {
     DRIVERS: "driver",
     PROTOCOLS: "protocol",
     ANALYSES: "analysis of protocol",
     RESULTS: "result of protocol",
     REPORTS: "report of protocol",
+    CALIBRATIONS: "kind of calibration",
 }
 
 

@@ -3,6 +3,8 @@
 Typer brings its own copy of click, which sphinx-click does not know; Typer's own Markdown serves.
 """
 
+from typing import Any, cast
+
 from docutils import nodes
 from sphinx.application import Sphinx
 from sphinx.util.docutils import SphinxDirective
@@ -18,7 +20,8 @@ class TyperCommands(SphinxDirective):
         """Parse Typer's Markdown in place of the directive."""
         whole = command()
         with whole.make_context("labrig", [], resilient_parsing=True) as context:
-            text = get_docs_for_click(obj=whole, ctx=context, name="labrig")
+            # Typer declares its own subclass of this context and asks for nothing that only that has.
+            text = get_docs_for_click(obj=whole, ctx=cast(Any, context), name="labrig")
         _, _, sections = text.partition("\n")
         return self.parse_text_to_nodes(sections, allow_section_headings=True)
 

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, Field, create_model
 
 from labrig import resources
 from labrig.acquire.roles import ROLES
-from labrig.calibration import KINDS, CalibrationKind
+from labrig.calibration import CalibrationKind, kinds
 from labrig.errors import UsageError
 from labrig.quantity import DurationS
 from labrig.yaml_file import did_you_mean, read_yaml, validate
@@ -37,7 +37,7 @@ def _with_calibrations(model: type[ModelT]) -> type[ModelT]:
             str | None,
             Field(None, description=f"What {kind.protocol} found: a file, or the folder of a run."),
         )
-        for kind in KINDS
+        for kind in kinds()
     }
     return create_model(model.__name__, __base__=model, __doc__=model.__doc__, **keys)
 

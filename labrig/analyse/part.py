@@ -1,23 +1,26 @@
 """What the analysis of one protocol is given."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, field, replace
-from typing import Any, Self
+from dataclasses import dataclass, field, fields, replace
+from typing import Any, Self, TypeVar
 
 from labrig.acquire import RigFile
 from labrig.analyse.overrides import Overrides
 from labrig.bench_optics import calibration
 from labrig.calibration import (
-    KINDS,
     BlankFile,
+    CalibrationKind,
     CameraFile,
     FadeFile,
     IrradianceFile,
     LvfFile,
+    kinds,
 )
 from labrig.material import Material
 from labrig.record import RunRecord
 from labrig.results import EmissionSpectrum, FittedDecay, RunResult
+
+FileT = TypeVar("FileT")
 
 
 @dataclass(frozen=True)
@@ -29,6 +32,8 @@ class Inputs:
     camera, blank, fade, lvf, irradiance
         Calibrations, by the names of their kinds: from a rig file's `optics:`, or measured earlier
         in the same run.
+    others
+        Calibrations of kinds that packages add, by the names of their kinds.
     spectra
         By patch; under "" of the only one.
     decays
@@ -42,6 +47,7 @@ class Inputs:
     fade: FadeFile | None = None
     lvf: LvfFile | None = None
     irradiance: IrradianceFile | None = None
+    others: Mapping[str, Any] = field(default_factory=dict)
     spectra: Mapping[str, EmissionSpectrum] = field(default_factory=dict)
     decays: Mapping[str, FittedDecay] = field(default_factory=dict)
     materials: Mapping[str, Material] = field(default_factory=dict)
@@ -55,16 +61,31 @@ class Inputs:
         UsageError
             One is missing or malformed.
         """
-        named: dict[str, Any] = {kind.name: calibration(rig, kind) for kind in KINDS}
-        return cls(**named)
+        named = {kind.name: calibration(rig, kind) for kind in kinds()}
+        return cls()._with(named)
+
+    def calibration(self, kind: CalibrationKind[FileT]) -> FileT | None:
+        """What is known of a kind of calibration; None if nothing is."""
+        found: FileT | None = getattr(self, kind.name, None) or self.others.get(kind.name)
+        return found
 
     def with_those_of(self, result: RunResult) -> Self:
         """These, and what a result provides; of mappings by patch, the other patches stay."""
         provided: dict[str, Any] = {
-            name: {**getattr(self, name), **value} if isinstance(value, Mapping) else value
+            name: {**getattr(self, name, {}), **value} if isinstance(value, Mapping) else value
             for name, value in result.provides().items()
         }
-        return replace(self, **provided)
+        return self._with(provided)
+
+    def _with(self, values: Mapping[str, Any]) -> Self:
+        """These, with values by the names of fields, or of further kinds of calibration."""
+        own = {item.name for item in fields(self)}
+        others = {name: value for name, value in values.items() if name not in own}
+        return replace(
+            self,
+            **{name: value for name, value in values.items() if name in own},
+            others={**self.others, **others},
+        )
 
 
 @dataclass(frozen=True)

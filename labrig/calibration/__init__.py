@@ -1,11 +1,9 @@
 """Calibrations of a bench as files: what its own protocols measure and later ones use.
 
-To add a kind, write its file's module with its `CalibrationKind` and list that in `KINDS`: rig
-files then have its key. Analyses find it in the field of `labrig.analyse.part.Inputs` that has
-its name.
+To add a kind, write its file's module with its `CalibrationKind` and register that by an entry
+point in `labrig.calibrations`: rig files then have its key, and analyses find it by
+`Inputs.calibration`.
 """
-
-from typing import Any
 
 from labrig.calibration.blank_file import BLANK_KIND, BlankFile, read_blank_file, write_blank_file
 from labrig.calibration.camera_file import (
@@ -30,7 +28,7 @@ from labrig.calibration.irradiance_file import (
     read_irradiance_file,
     write_irradiance_file,
 )
-from labrig.calibration.kind import CalibrationKind
+from labrig.calibration.kind import CalibrationKind, kinds
 from labrig.calibration.lvf_file import (
     LVF_KIND,
     BandColumns,
@@ -41,21 +39,11 @@ from labrig.calibration.lvf_file import (
     write_lvf_file,
 )
 
-#: Every kind, in the order of their keys in a rig file.
-KINDS: tuple[CalibrationKind[Any], ...] = (
-    CAMERA_KIND,
-    LVF_KIND,
-    IRRADIANCE_KIND,
-    FADE_KIND,
-    BLANK_KIND,
-)
-
 __all__ = [
     "BLANK_KIND",
     "CAMERA_KIND",
     "FADE_KIND",
     "IRRADIANCE_KIND",
-    "KINDS",
     "LVF_KIND",
     "BandColumns",
     "BlankFile",
@@ -70,6 +58,7 @@ __all__ = [
     "Noise",
     "Warming",
     "WavelengthColumns",
+    "kinds",
     "read_blank_file",
     "read_camera_file",
     "read_fade_file",

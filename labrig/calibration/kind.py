@@ -2,9 +2,11 @@
 
 from collections.abc import Callable
 from dataclasses import dataclass
+from functools import cache
 from pathlib import Path
-from typing import Generic, TypeVar
+from typing import Any, Generic, TypeVar
 
+from labrig import plugins
 from labrig.errors import UsageError
 
 FileT = TypeVar("FileT")
@@ -56,3 +58,27 @@ class CalibrationKind(Generic[FileT]):
     def write_into(self, folder: Path, file: FileT) -> None:
         """Write `file` into a result's folder, by the kind's name for it."""
         self.write(folder / self.file_name, file)
+
+
+@cache
+def kinds() -> tuple[CalibrationKind[Any], ...]:
+    """Return every kind of calibration, the shipped ones and those of installed packages.
+
+    Returns
+    -------
+    tuple of CalibrationKind
+        Sorted by name. Rig files have the key of each under `optics:`.
+
+    Raises
+    ------
+    UsageError
+        A package's kind cannot be imported.
+
+    Examples
+    --------
+    >>> from labrig.calibration import kinds
+    >>> [kind.name for kind in kinds()]
+    ['blank', 'camera', 'fade', 'irradiance', 'lvf']
+    """
+    names = plugins.names(plugins.CALIBRATIONS)
+    return tuple(plugins.load(plugins.CALIBRATIONS, name, "calibrations") for name in names)

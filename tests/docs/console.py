@@ -45,6 +45,6 @@ def run_commands(page: Path, folder: Path, environment: dict[str, str]) -> None:
         )  # fmt: skip
         assert ended.returncode == 0, f"{page.name}: {command.text}\n{ended.stdout}"
         if command.shown:
-            example = doctest.Example(command.text, command.shown)
             matches = doctest.OutputChecker().check_output(command.shown, ended.stdout, OPTIONS)
-            assert matches, f"{page.name}: {example.source}\nshown:\n{command.shown}\ngot:\n{ended.stdout}"
+            difference = f"shown:\n{command.shown}\ngot:\n{ended.stdout}"
+            assert matches, f"{page.name}: {command.text}\n{difference}"

@@ -1,6 +1,7 @@
 """What the manual tells its readers to type does what the manual shows."""
 
 import os
+import re
 import sys
 from pathlib import Path
 
@@ -35,3 +36,14 @@ def test_the_cells_of_a_notebook_run(examples: Path, environment: dict[str, str]
     namespace: dict[str, object] = {}
     for cell in cells:
         exec(compile(cell.text, "notebook.md", "exec"), namespace)
+
+
+def test_the_worked_example_is_the_package_that_ci_runs() -> None:
+    package = DOCS.parent / "tests/third_party"
+    files = [*package.glob("lamp_drift/*.py"), package / "pyproject.toml"]
+    texts = [path.read_text(encoding="utf-8") for path in files]
+    page = (DOCS.parent / "CONTRIBUTING.md").read_text(encoding="utf-8")
+    blocks = re.findall(r"^```(?:python|toml)\n(.*?)^```$", page, re.M | re.S)
+    assert len(blocks) > 8
+    for block in blocks:
+        assert any(block in text for text in texts), block

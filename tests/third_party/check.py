@@ -1,16 +1,26 @@
-"""Run the package's protocol with its driver, and compute with its result: `python check.py`."""
+"""Compute with the results of two runs, the second with the first one's calibration.
+
+python check.py FIRST SECOND
+"""
 
 import sys
 from pathlib import Path
 
+from lamp_drift.calibration import DRIFT_KIND
 from lamp_drift.result import LampDriftResult
 
 import labrig
 
-(run,) = Path(sys.argv[1]).iterdir()
-result = labrig.read_result(run)
+first, second = map(Path, sys.argv[1:])
+result = labrig.read_result(first)
 assert isinstance(result, LampDriftResult)
 assert len(result.time_s) == 12
 assert abs(result.drift.value) < 1e-3, result.drift
-assert "plain relay 0" in (run / "result" / "report.html").read_text(encoding="utf-8")
-print(result.drift)
+assert result.change_sigmas is None
+assert "plain relay 0" in (first / "result" / "report.html").read_text(encoding="utf-8")
+assert DRIFT_KIND.read_named(first).drift_per_s == result.drift.value
+later = labrig.read_result(second)
+assert isinstance(later, LampDriftResult)
+assert later.change_sigmas is not None
+assert abs(later.change_sigmas) < 5, later.change_sigmas
+print(result.drift, later.change_sigmas)

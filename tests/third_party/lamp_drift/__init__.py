@@ -1,1 +1,1 @@
-"""How steady a lamp is: driver, protocol, analysis and result in a package of one's own."""
+"""The drift of a lamp: driver, protocol, calibration, analysis and result in one package."""

@@ -1,25 +1,33 @@
-"""From photographs of a lit card to how the lamp drifts."""
+"""The analysis: from the frames of a run to the drift of the lamp."""
 
 import numpy as np
 
 import labrig
 from labrig.analyse import Part
 from labrig.results import Measured
+from lamp_drift.calibration import DRIFT_KIND
+from lamp_drift.protocol import DriftFrames
 from lamp_drift.result import LampDriftResult
 
 
 def analyse(part: Part) -> LampDriftResult:
-    """A straight line through the light of the photographs."""
-    frames = part.run.frames("lit")
+    """Fit a straight line to the light of the card, and compare its slope with the rig file's."""
+    frames = part.run.frames(DriftFrames.CARD)
     green = [
         labrig.measure(labrig.read_raw(frame.path), part.protocol.region).channels["G"]
         for frame in frames
     ]
     time_s = np.array([frame.start_time - frames[0].start_time for frame in frames])
-    level = np.array([one.mean for one in green]) / [frame.exposure_s for frame in frames]
-    (slope, _), covariance = np.polyfit(time_s, level / level.mean(), 1, cov=True)
+    exposure_s = np.array([frame.exposure_s for frame in frames])
+    level_dn_per_s = np.array([channel.mean for channel in green]) / exposure_s
+    relative = level_dn_per_s / level_dn_per_s.mean()
+    (slope, _), covariance = np.polyfit(time_s, relative, 1, cov=True)
+    drift = Measured(float(slope), float(np.sqrt(covariance[0, 0])), "1/s")
+    change_sigmas = None
+    earlier = part.inputs.calibration(DRIFT_KIND)
+    if earlier is not None:
+        sigma_per_s = np.hypot(drift.sigma, earlier.drift_sigma_per_s)
+        change_sigmas = float((drift.value - earlier.drift_per_s) / sigma_per_s)
     return LampDriftResult(
-        drift=Measured(float(slope), float(np.sqrt(covariance[0, 0])), "1/s"),
-        time_s=time_s,
-        level_dn_per_s=level,
+        drift=drift, time_s=time_s, level_dn_per_s=level_dn_per_s, change_sigmas=change_sigmas
     )

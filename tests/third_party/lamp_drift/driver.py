@@ -1,4 +1,4 @@
-"""A relay board that understands `relay on N` and `relay off N`, one line a command."""
+"""Driver of a relay board that understands `relay on N` and `relay off N`, one line a command."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -14,7 +14,13 @@ class PlainRelay:
     """One relay of the board, switching a lamp."""
 
     class Settings(BaseModel):
-        """Keys of the rig file."""
+        """Keys of the device in a rig file.
+
+        Attributes
+        ----------
+        relay
+            Number of the relay on the board, 0 to 9.
+        """
 
         model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -28,33 +34,33 @@ class PlainRelay:
         self._line.drain()
 
     def identity(self) -> str:
-        """What the board is."""
+        """Return the name of the board for journal and report."""
         return f"plain relay {self._relay}"
 
     def reads_back(self) -> bool:
-        """It does."""
+        """Return whether the board can be asked for the state of its relay."""
         return True
 
     def on(self) -> None:
-        """Switch on, read back."""
+        """Switch the lamp on; returns when the board confirms it."""
         self._switch("on")
 
     def off(self) -> None:
-        """Switch off, read back."""
+        """Switch the lamp off; returns when the board confirms it."""
         self._switch("off")
 
     def is_on(self) -> bool:
-        """What the board says."""
+        """Return the state of the relay that the board reports."""
         return "on" in self._ask(f"relay read {self._relay}").splitlines()
 
     def make_safe(self) -> None:
-        """Off."""
+        """Switch the lamp off, whatever was interrupted on the line before."""
         self._line.write(b"\r")
         self._line.drain()
         self.off()
 
     def disconnect(self) -> None:
-        """The port belongs to the connections."""
+        """Do nothing: `connections` closes the port."""
 
     def _switch(self, state: str) -> None:
         self._ask(f"relay {state} {self._relay}")

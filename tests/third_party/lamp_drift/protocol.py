@@ -1,7 +1,8 @@
-"""Photographs of a lit card over a while."""
+"""A protocol that photographs a grey card under the lamp again and again."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from enum import StrEnum
 from typing import Literal
 
 from pydantic import Field
@@ -20,8 +21,26 @@ from labrig.quantity import Count, DurationS
 from labrig.region import CENTRE, Region
 
 
+class DriftFrames(StrEnum):
+    """Role of the protocol's frames."""
+
+    CARD = "card"
+
+
 class LampDrift(ProtocolModel):
-    """Keys of the protocol file."""
+    """Keys of the protocol file.
+
+    Attributes
+    ----------
+    frames
+        Number of photographs.
+    every
+        Time from the end of one photograph to the begin of the next, for example `10 s`.
+    exposure
+        Longest exposure time; the camera's nearest one below is used.
+    region
+        Region of the card in the frame, `[x, y, width, height]`.
+    """
 
     protocol: Literal["lamp_drift"] = "lamp_drift"
     frames: Count = Field(12, ge=3)
@@ -30,19 +49,19 @@ class LampDrift(ProtocolModel):
     region: Region = CENTRE
 
     def units(self) -> Sequence[Unit]:
-        """All in one go."""
-        return [WatchUnit(self)]
+        """Return the units of a run; each is done wholly or not at all."""
+        return [CardUnit(self)]
 
 
 @dataclass(frozen=True)
-class WatchUnit:
-    """The lamp on, photographed again and again, and off."""
+class CardUnit:
+    """The lamp on, all photographs, and the lamp off."""
 
     protocol: LampDrift
-    name: str = "watch"
+    name: str = "card"
 
     def run(self, session: Session) -> None:
-        """Do it."""
+        """Photograph the card; a plan runs this, too, with devices that only take notes."""
         protocol = self.protocol
         session.wait_until_warm("camera")
         offers = session.rig[CAMERA].offers()
@@ -50,5 +69,5 @@ class WatchUnit:
         session.perform(LAMP_ON)
         for _ in range(protocol.frames):
             session.wait(protocol.every, "lamp burns")
-            session.perform(Shoot("lit", settings))
+            session.perform(Shoot(DriftFrames.CARD, settings))
         session.perform(LAMP_OFF)

@@ -1,21 +1,28 @@
-"""What was found of a lamp."""
+"""The result: numbers that a notebook reads, and the calibration's file."""
 
 from dataclasses import dataclass
+from pathlib import Path
 from typing import ClassVar
 
 from labrig.results import FloatArray, Measured, RunResult
+from lamp_drift.calibration import DRIFT_KIND, DriftFile
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class LampDriftResult(RunResult):
-    """A straight line through the lamp's light.
+    """A straight line through the light of a lamp.
 
     Attributes
     ----------
     drift
-        Change of the light relative to its mean.
-    time_s, level_dn_per_s
-        (n,) of the photographs after the first one; mean of the green channel.
+        Change of the light relative to its mean, per second.
+    time_s
+        Begin of each photograph after that of the first one, in seconds, shape (n,).
+    level_dn_per_s
+        Mean of the green channel over the exposure time, shape (n,).
+    change_sigmas
+        Difference from the drift that the rig file names, in standard deviations; None if it
+        names none.
     """
 
     kind: ClassVar[str] = "lamp_drift"
@@ -23,3 +30,9 @@ class LampDriftResult(RunResult):
     drift: Measured
     time_s: FloatArray
     level_dn_per_s: FloatArray
+    change_sigmas: float | None = None
+
+    def write_files(self, folder: Path) -> None:
+        """Write `drift.yaml` into the result's folder."""
+        file = DriftFile(drift_per_s=self.drift.value, drift_sigma_per_s=self.drift.sigma)
+        DRIFT_KIND.write_into(folder, file)

@@ -1,0 +1,34 @@
+"""The calibration that the protocol makes: the drift of one lamp, in a file."""
+
+from functools import partial
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from labrig.calibration import CalibrationKind
+from labrig.yaml_file import read_model, write_yaml
+
+
+class DriftFile(BaseModel):
+    """Content of `drift.yaml`.
+
+    Attributes
+    ----------
+    drift_per_s, drift_sigma_per_s
+        Change of the lamp's light relative to its mean, per second, and its standard uncertainty.
+    """
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    drift_per_s: float
+    drift_sigma_per_s: float = Field(gt=0)
+
+
+#: A rig file names it by `optics: {lamp_drift: …}`, an analysis has it by `Inputs.calibration`.
+DRIFT_KIND = CalibrationKind(
+    name="lamp_drift",
+    protocol="lamp_drift",
+    optics_key="lamp_drift",
+    file_name="drift.yaml",
+    read=partial(read_model, model=DriftFile),
+    write=write_yaml,
+)
