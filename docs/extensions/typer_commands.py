@@ -20,7 +20,7 @@ class TyperCommands(SphinxDirective):
         """Parse Typer's Markdown in place of the directive."""
         whole = command()
         with whole.make_context("labrig", [], resilient_parsing=True) as context:
-            # Typer declares its own subclass of this context and asks for nothing that only that has.
+            # Typer declares a subclass of this context, and uses nothing that only that has.
             text = get_docs_for_click(obj=whole, ctx=cast(Any, context), name="labrig")
         _, _, sections = text.partition("\n")
         return self.parse_text_to_nodes(sections, allow_section_headings=True)
