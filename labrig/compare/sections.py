@@ -29,7 +29,7 @@ def _sections(comparison: RunComparison) -> Iterator[Section]:
         yield Section("Glow, photographed and predicted", (comparison.words,), (shown,), (table,))
     if comparison.residuals:
         table = residuals_table(comparison.residuals)
-        yield Section("What more states gain", tables=(table,))
+        yield Section("Improvement by further states", tables=(table,))
     for one in comparison.beside:
         yield Section(
             f"Measured: {one.names[0]}; reference: {one.names[1]}", tables=(comparison_table(one),)

@@ -100,13 +100,13 @@ def three_channels_table(
 ) -> Table:
     """A row for each material, with the grid on which its spectrum is known."""
     return Table(
-        head=("material", "spectrum of", "ΔE2000 from R, G, B", "missed by three functions / %"),
+        head=("material", "spectrum of", "ΔE2000 from R, G, B", "residual of three functions / %"),
         rows=tuple(
             (one.name, grid, f"{one.delta_e:.2f}", f"{100 * one.missed:.0f}") for one, grid in found
         ),
         caption="Colour from the spectrum against colour from R, G, B by the best 3 × 3 matrix for "
         f"the curves of {camera.name} (least squares over all wavelengths); CIE 2015 2° observer, "
         f"CIELAB with white {white}, scaled so that the spectrum's colour just reaches the white "
-        "in X, Y or Z. Missed: RMS of what the best weighted sum of the three colour-matching "
+        "in X, Y or Z. Residual: RMS of what the best weighted sum of the three colour-matching "
         "functions leaves of the spectrum. A spectrum of bands is taken as constant in each.",
     )

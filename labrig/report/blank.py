@@ -46,18 +46,18 @@ def _section(result: BlankResult) -> Section:
     )
     clean = file.first_clean_s
     said = (
-        "No frame is clean: some light fades as slowly as the sequence lasts."
+        "No frame is free of fading light within the sequence."
         if clean is None
-        else f"Frames that begin {rounded(clean, 3)} s or later after lamp off show nothing that "
-        "fades."
+        else f"Frames that begin {rounded(clean, 3)} s or later after lamp off are free of the "
+        "lamp's turn-off transient."
     )
     return Section(
-        "What is seen without a glow",
+        "Background and stray light",
         (
             said,
-            "What stays is seen after lamp off but not in the dark frames. What leaks in is in "
-            "both, so that dark frames take care of it as long as it stays the same; it is told "
-            "from dark current by its colour, and may be more.",
+            "Background is constant light after lamp off that dark frames do not show. Stray light "
+            "is in both, and dark frames subtract it as long as it is constant; its colour "
+            "distinguishes it from dark current, so that its figure is a lower limit.",
         ),
         (
             Picture(
@@ -66,7 +66,7 @@ def _section(result: BlankResult) -> Section:
                 "Light of the blank over time; bars are ± 1 σ.",
             ),
         ),
-        (Table(("channel", "stays / DN/s", "leaks in / DN/s"), rows),),
+        (Table(("channel", "background / (DN/s)", "stray light / (DN/s)"), rows),),
     )
 
 
@@ -86,19 +86,23 @@ def _figure(result: BlankResult) -> Figure:
         entries.append(marked(name, marker, colour, PAPER))
     if file.first_clean_s is not None:
         axes.axvline(file.first_clean_s, color=MUTED, linewidth=1.0, linestyle=DASHED)
-        entries.append(lined("first clean frame", MUTED, DASHED))
+        entries.append(lined("end of the transient", MUTED, DASHED))
     axes.set_xlabel("Begin of the exposure after lamp off / s")
-    axes.set_ylabel("Above what stays / DN/s")
+    axes.set_ylabel("Signal above background / (DN/s)")
     legend_above(figure, entries, columns=4)
     return figure
 
 
 def _lines(file: BlankFile) -> Iterator[str]:
     clean = file.first_clean_s
-    yield "never clean" if clean is None else f"clean from {rounded(clean, 3)} s after lamp-off"
+    yield (
+        "never free of the turn-off transient"
+        if clean is None
+        else f"free of the turn-off transient from {rounded(clean, 3)} s after lamp off"
+    )
     for what, level, sigma in (
-        ("stays", file.constant_dn_per_s, file.constant_sigma_dn_per_s),
-        ("leaks in", file.ambient_dn_per_s, file.ambient_sigma_dn_per_s),
+        ("background", file.constant_dn_per_s, file.constant_sigma_dn_per_s),
+        ("stray light", file.ambient_dn_per_s, file.ambient_sigma_dn_per_s),
     ):
         named = zip(file.channels, level, sigma, strict=True)
         yield f"{what}: {', '.join(f'{n} {plus_minus(v, s)}' for n, v, s in named)} DN/s"

@@ -58,14 +58,14 @@ def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
         for one in file.noise
     )
     return Section(
-        "Noise of the sensor",
+        "Photon transfer curve",
         ("Variance of the difference of two frames of the same light, over their level.",),
         (
             Picture(
                 "photon-transfer",
                 partial(_transfer_figure, transfers),
-                "Variance of a pixel from frame to frame, dark subtracted, in DN². Lines: photons "
-                "of the gain found.",
+                "Variance of a pixel from frame to frame, dark subtracted, in DN². Lines: photon "
+                "noise of the fitted gain.",
             ),
         ),
         (Table(("ISO", "gain / e/DN", "read noise / e", "row noise / e"), rows),),
@@ -105,14 +105,14 @@ def _linearity(found: Linearity) -> Section:
     return Section(
         "Linearity",
         (
-            "From the channels' ratios along a bracket of shutter times: what shutter and lamp do "
-            f"in a frame is common to the channels. The level at which the sensor is full {full}.",
+            "From the ratios of the channels along a bracket of exposure times: errors of shutter "
+            f"and lamp are common-mode to the channels. The saturation level {full}.",
         ),
         (
             Picture(
                 "linearity",
                 partial(_linearity_figure, found),
-                "Deviation from a linear sensor; bars are ± 1 σ.",
+                "Deviation from linearity; bars are ± 1 σ.",
             ),
         ),
     )
@@ -129,7 +129,7 @@ def _linearity_figure(found: Linearity) -> Figure:
     error_bars(axes, level, percent, sigma, INK)
     points(axes, level, percent, "o", INK, PAPER)
     axes.set_xlabel("Level above dark / DN")
-    axes.set_ylabel("Off a straight line / %")
+    axes.set_ylabel("Deviation from linearity / %")
     return figure
 
 
@@ -137,17 +137,25 @@ def _settings(file: CameraFile, repeat_flicker: Measured) -> Section:
     flicker = plus_minus(100 * file.flicker, 100 * file.flicker_sigma)
     repeated = plus_minus(100 * repeat_flicker.value, 100 * repeat_flicker.sigma)
     tables = (
-        _table("ISO", file.iso_gain, "{:g}", "Signal over that of the label."),
-        _table("f-number", file.aperture, "f/{:g}", "Light over that of the label."),
+        _table("ISO", file.iso_gain, "{:g}", "Signal over that expected of the nominal ISO speed."),
+        _table(
+            "f-number", file.aperture, "f/{:g}", "Light over that expected of the nominal f-number."
+        ),
     )
     return Section(
-        "Shutter, ISO, aperture",
+        "Exposure time, ISO, aperture",
         (
             f"Light flickers from frame to frame by {flicker} % in brackets, by {repeated} % in "
-            "frames of the same exposure. The longest shutter time measured counts as exact: "
+            "frames of the same exposure. The longest measured exposure time is taken as exact: "
             f"{exposure_text(file.shutter[-1].setting)}.",
         ),
-        (Picture("shutter", partial(_shutter_figure, file), "Shutter times; bars are ± 1 σ."),),
+        (
+            Picture(
+                "shutter",
+                partial(_shutter_figure, file),
+                "Actual over nominal exposure time; bars are ± 1 σ.",
+            ),
+        ),
         tuple(table for table in tables if table.rows),
     )
 
@@ -161,8 +169,8 @@ def _shutter_figure(file: CameraFile) -> Figure:
     factor = np.array([one.factor for one in file.shutter])
     error_bars(axes, times_s, factor, np.array([one.sigma for one in file.shutter]), INK)
     points(axes, times_s, factor, "o", INK, PAPER)
-    axes.set_xlabel("Shutter time as the camera tells / s")
-    axes.set_ylabel("True over told")
+    axes.set_xlabel("Nominal exposure time / s")
+    axes.set_ylabel("Actual / nominal")
     return figure
 
 
@@ -187,10 +195,10 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
     head = ("aperture", *(f"{name} in the corner / %" for name in file.channels), "gradient / %")
     stop = shown.flat.f_number
     return Section(
-        "Flat field",
+        "Flat field and vignetting",
         (
-            "What is even about the middle of the frame is taken for the lens's and divided out. "
-            "The gradient across the card is the lamp's and stays.",
+            "The part that is symmetric about the middle of the frame is the lens's vignetting and "
+            "is divided out. The gradient across the card is the lamp's and is kept.",
         ),
         (
             Picture(
@@ -198,10 +206,10 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
                 partial(_flat_figure, shown, file.channels),
                 "Blocks of the card"
                 + ("" if stop is None else f" at f/{stop:g}")
-                + ", the gradient divided out, and the fall-off fitted.",
+                + ", the gradient divided out, and the fitted vignetting.",
             ),
         ),
-        (Table(head, rows, "Light left in the corners, and the lamp's gradient."),),
+        (Table(head, rows, "Relative illumination of the corners, and the lamp's gradient."),),
     )
 
 
@@ -217,7 +225,7 @@ def _flat_figure(shown: FittedFlat, channels: Sequence[str]) -> Figure:
         axes.plot(rho, shown.flat.at(rho**2)[:, number], color=colour, linewidth=1.2)
         entries.append(marked(name, marker, colour, PAPER))
     axes.set_xlabel("Distance from the middle / half the diagonal")
-    axes.set_ylabel("Light over that in the middle")
+    axes.set_ylabel("Relative illumination")
     legend_above(figure, entries, columns=4)
     return figure
 
@@ -234,8 +242,8 @@ def _lines(file: CameraFile) -> Iterator[str]:
             most = max(factors, key=lambda one: abs(one.factor - 1))
             setting = exposure_text(most.setting) if name == "shutter" else f"f/{most.setting:g}"
             factor = plus_minus(most.factor, most.sigma)
-            yield f"{name}: furthest from its label {setting}, × {factor}"
+            yield f"{name}: largest deviation from nominal at {setting}, × {factor}"
     corners = [float(np.min(flat.at(1.0))) for flat in file.flats]
     stops = ["" if flat.f_number is None else f" at f/{flat.f_number:g}" for flat in file.flats]
     falling = (f"{100 * left:.1f} %{at}" for left, at in zip(corners, stops, strict=True))
-    yield f"light left in the corners: {', '.join(falling)}"
+    yield f"vignetting: corners at {', '.join(falling)}"

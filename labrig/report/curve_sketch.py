@@ -65,7 +65,7 @@ def draw_curves(file: CurveFile, path: Path) -> None:
         if curve.sigma is not None:
             low, high = curve.value - curve.sigma, curve.value + curve.sigma
             axes.fill_between(curve.wavelength_nm, low, high, color=line.get_color(), alpha=0.25)
-    axes.set(xlabel="wavelength / nm", title=file.title)
+    axes.set(xlabel="Wavelength / nm", title=file.title)
     if 1 < len(file.curves) <= MOST_CURVES:
         axes.legend(frameon=False)
     try:

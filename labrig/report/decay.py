@@ -223,7 +223,7 @@ def decay_sections(
             "unknown": UNKNOWN,
         },
     )
-    return found, (how, Section("What the numbers rest on", points=DECAY_ASSUMPTIONS))
+    return found, (how, Section("Assumptions", points=DECAY_ASSUMPTIONS))
 
 
 def _reported(name: str, patch: DecayPatch) -> PatchReport:

@@ -338,7 +338,7 @@ def residual_figure(series: Series, fit: FittedDecay) -> Figure:
     )
     lower.set_ylim(-110 * reach, 110 * reach)
     lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
-    lower.set_ylabel("In common / %")
+    lower.set_ylabel("Common-mode / %")
     lower.set_xlabel(TIME_LABEL)
     return figure
 
@@ -359,8 +359,8 @@ NOISE_HEIGHT_PT = 268.0
 #: Parts below this fraction of the whole are not worth their line.
 LEAST_FRACTION = 0.03
 _LINES: dict[str, tuple[str, LineStyle]] = {
-    "photons": (OTHER_CHANNELS[1], "-"),
-    "reading": (OTHER_CHANNELS[2], DASHED),
+    "photon noise": (OTHER_CHANNELS[1], "-"),
+    "read noise": (OTHER_CHANNELS[2], DASHED),
     "uneven light": (OTHER_CHANNELS[3], DASH_DOTTED),
     "flicker": (OTHER_CHANNELS[0], DOTTED),
     "dark level": (MUTED, LONG_DASHED),
@@ -372,8 +372,8 @@ MOST_PERCENT = 300.0
 def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
     """The parts that somewhere are worth a line, by their names."""
     parts = {
-        "photons": budget.photons,
-        "reading": budget.reading,
+        "photon noise": budget.photons,
+        "read noise": budget.reading,
         "uneven light": budget.uneven,
         "flicker": budget.flicker,
         "dark level": budget.dark_level,

@@ -82,18 +82,18 @@ def _shift(comparison: SpectralComparison) -> str:
 def _sections(patch: PatchSpectrum) -> Iterator[Section]:
     frames = patch.charges[0].frames
     white = (
-        "A grey card under the known lamp, through the same filter, has told what the camera's "
-        "curves are off by in every place."
+        "A grey card under the known lamp, seen through the same filter, corrects the camera's "
+        "curves at every position."
         if patch.white_reference
-        else "Without a picture of a grey card under the known lamp the camera's curves are taken "
-        "as they are, with the 6 % by which laboratories disagree in every σ."
+        else "Without a frame of a grey card under the known lamp the camera's curves are used "
+        "uncorrected; the 6 % by which laboratories disagree is part of every σ."
     )
     places = len(patch.centre_nm) // len(patch.channels)
     yield Section(
         "Emission spectrum",
         (
-            f"Λ* from {places} places of the filter in {len(frames)} frames, largest value 1. "
-            f"{white}",
+            f"Λ* from {places} positions along the filter in {len(frames)} frames, largest value "
+            f"1. {white}",
             "Lines much narrower than the filter's band may come out broader than they are, by "
             "more than the credible band says.",
         ),
@@ -123,7 +123,7 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
                 Picture(
                     "over-time",
                     partial(_normalised_figure, at_times),
-                    "Spectra at several times after lamp off, all of one integral; bars: 1 σ, "
+                    "Spectra at several times after lamp off, normalised to equal area; bars: 1 σ, "
                     "most of it common to all times (camera curves).",
                 ),
                 Picture(
@@ -144,7 +144,7 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
                 Picture(
                     "lamps",
                     partial(_normalised_figure, by_lamp),
-                    "Spectra after charging with either lamp, all of one integral; bars: 1 σ, "
+                    "Spectra after charging with either lamp, normalised to equal area; bars: 1 σ, "
                     "most of it common to both (camera curves).",
                 ),
             ),
@@ -157,14 +157,14 @@ def _constancy_text(patch: PatchSpectrum) -> str:
     if patch.changes_with_time:
         worst = max(patch.times, key=lambda one: one.beyond_noise)
         return (
-            "The relative spectrum changes with time: the picture at "
+            "The relative spectrum changes with time: the frame at "
             f"{worst.what} differs from those at the other times by {worst.beyond_noise:.2%} "
             f"beyond noise (p = {least.p_value:.2g})."
         )
     return (
         "The relative spectrum is the same at all times within noise (paper, fig. 6): the least "
-        f"p-value of {len(patch.times)} is {least.p_value:.2g}. Pictures are compared place by "
-        "place, so that camera curves and filter drop out."
+        f"p-value of {len(patch.times)} is {least.p_value:.2g}. Frames are compared "
+        "position by position, so that camera curves and filter cancel."
     )
 
 

@@ -39,8 +39,8 @@ HEIGHT_PT = 270.0
 #: Places along the strip whose charging is shown.
 SHOWN = 5
 MEASURED = (
-    "r(0) and a = Λ* k_r r(0) after the brightest charge by the lamp itself. Nothing is assumed of "
-    "r(0): how the charging curves bend tells it."
+    "r(0) and a = Λ* k_r r(0) after the brightest charge by the lamp itself. r(0) is "
+    "not assumed: it is constrained by the curvature of the charging curves."
 )
 ASSUMED = "r(0) = 1 is assumed after the longest charge, as Nalbach et al. do."
 
@@ -102,14 +102,14 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
             "charging",
             partial(_charging_figure, through, fitted, position_nm),
             "Glow in the first photograph after each charge through the filter, brightest channel, "
-            "at some places along it; lines join what the fit says for these very photographs, "
+            "at some positions along it; lines join the fitted values of the same photographs, "
             "whose times and exposures differ.",
         ),
         Picture(
             "residuals",
             partial(_residual_figure, fit.residuals[0], position_nm),
-            "What the fit leaves at every place along the filter, in standard uncertainties of "
-            "single values, flicker not taken out.",
+            "Residuals at every position along the filter, rms in standard uncertainties of "
+            "single values; flicker is not removed.",
         ),
     ]
     if patch.closure is not None:
@@ -159,7 +159,7 @@ def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
             (f"{low:.0f}–{high:.0f}", *(column[band] for column in columns))
             for band, (low, high) in enumerate(pairwise(bands_nm))
         ),
-        "Value ± 1 σ, or what it is below with 95 % probability.",
+        "Value ± 1 σ, or its upper limit with 95 % probability.",
     )
 
 
@@ -184,7 +184,7 @@ def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
             axes.plot([at_nm, at_nm], [0, limit], color=colour, linewidth=0.9, alpha=0.5)
         entries.append(marked(f"state {number + 1}, k_r {state.k_r_per_s:.3g} s⁻¹", marker, colour))
     axes.set_ylim(0, None)
-    axes.set_xlabel("Wavelength of the exciting light / nm")
+    axes.set_xlabel("Excitation wavelength / nm")
     axes.set_ylabel("k_e / 10⁻³ s⁻¹")
     legend_above(figure, entries, columns=3)
     return figure
@@ -223,7 +223,7 @@ def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: Fl
     times_s = sorted({float(f"{time:.2g}") for time in charge_s})
     axes.set_xticks(times_s, [rounded(time, 2) for time in times_s])
     axes.xaxis.set_minor_locator(NullLocator())
-    axes.set_xlabel("Charged for / s")
+    axes.set_xlabel("Charge / s")
     axes.set_ylabel("First photograph / (DN/s)")
     legend_above(figure, [*entries, lined("fit", MUTED)], columns=6)
     return figure
@@ -237,7 +237,7 @@ def _residual_figure(residuals: FloatArray, position_nm: FloatArray) -> Figure:
     axes.axhline(1.0, color=RULE, linewidth=1.2)
     points(axes, position_nm, of_site, "o", INK, INK, 4.2)
     axes.set_ylim(0, max(1.5, 1.15 * float(np.nanmax(of_site))))
-    axes.set_xlabel("Wavelength that charges the place / nm")
+    axes.set_xlabel("Excitation wavelength / nm")
     axes.set_ylabel("Residuals, rms / σ")
     return figure
 
@@ -246,7 +246,7 @@ def closure_picture(closure: Closure) -> Picture:
     """The figure with what it says about the prediction."""
     caption = (
         "Charging under the whole lamp: the curve is predicted from the rates measured band by "
-        "band, nothing is fitted; points are measured, with ± 1 σ of both. RMS deviation "
+        "band, without any fit; points are measured, with ± 1 σ of both. RMS deviation "
         f"{closure.rms_percent:.2g} % of the RMS level, {closure.rms_sigma:.2g} σ."
     )
     return Picture("closure", partial(closure_figure, closure), caption)

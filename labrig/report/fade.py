@@ -63,7 +63,7 @@ def _changes(file: FadeFile, changes: list[tuple[str, Change, LampChange]]) -> S
     )
     head = ("", "exponent", "lag / ms", "jitter / ms", "χ² per dof", "photographs")
     return Section(
-        "How the lamp goes dark and comes on",
+        "Turn-off and turn-on transients of the lamp",
         (
             "ln fraction = −u(t) (550 nm/λ)^p for all wavelengths, with u(t) smooth; p is 1 for a "
             "black-body emitter. What happens before the first shutter opens is constrained by the "
@@ -91,7 +91,7 @@ def _fractions(file: FadeFile, table: Change) -> Figure:
         axes.plot(time_ms, fraction[:, band], color=colour, linewidth=1.2)
         entries.append(lined(f"{low:g}–{high:g} nm", colour))
     axes.set_xlabel("Time after the switch / ms")
-    axes.set_ylabel("Fraction of the steady lamp")
+    axes.set_ylabel("Light / steady light")
     legend_above(figure, entries, columns=3)
     return figure
 
@@ -103,9 +103,9 @@ def _warming(warm: Warming, seen: WarmingLight) -> Section:
         f"deficit decays with a time constant of {warm.time_constant_s:.0f} s as the housing "
         "warms, and weakens short charges."
     )
-    caption = "Light on the card, by photograph; line: 1 − d e^(−t/τ)."
+    caption = "Light on the card in each photograph; line: 1 − d e^(−t/τ)."
     return Section(
-        "How the lamp warms",
+        "Warm-up transient of the lamp",
         (text,),
         (Picture("warming", partial(_warming_figure, warm, seen), caption),),
     )
@@ -128,17 +128,17 @@ def _lines(changes: list[tuple[str, Change, LampChange]]) -> Iterator[str]:
         if name == "rise":
             missing_s = table.t_s[-1] - missing_s
         first, last = 1e3 * missing_s[0], 1e3 * missing_s[-1]
-        verb = "lacks" if name == "rise" else "is worth"
+        transient = "turn-on transient lacks" if name == "rise" else "turn-off transient is worth"
         yield (
-            f"the {name} {verb} {first:.1f} ms of the steady lamp in the first band, "
+            f"the {transient} {first:.1f} ms of the steady lamp in the first band, "
             f"{last:.1f} ms in the last; over after {rounded(table.t_s[-1], 3)} s; exponent of the "
-            f"wavelength {plus_minus(change.exponent.value, change.exponent.sigma)} (1: a glowing "
-            "body)"
+            f"wavelength {plus_minus(change.exponent.value, change.exponent.sigma)} (1: a "
+            "black-body emitter)"
         )
 
 
 def _warming_line(warm: Warming) -> str:
     return (
-        f"a cold lamp lacks {plus_minus(100 * warm.deficit, 100 * warm.deficit_sigma)} % of its "
-        f"light, which comes with a time constant of {warm.time_constant_s:.0f} s"
+        f"a cold lamp has {plus_minus(100 * warm.deficit, 100 * warm.deficit_sigma)} % less light; "
+        f"the deficit decays with a time constant of {warm.time_constant_s:.0f} s"
     )

@@ -58,8 +58,8 @@ def _section(result: IrradianceResult) -> Section:
             Picture(
                 "scale",
                 partial(_scale_figure, result),
-                "What the card shows over what the calibration of the LVF lets expect: each "
-                "position by itself (points, 1 σ with the camera's curves), and with its "
+                "Measured light of the card over that expected from the calibration of the LVF: "
+                "each position by itself (points, 1 σ with the camera's curves), and with its "
                 "neighbours (line and band).",
             ),
         ),

@@ -81,8 +81,8 @@ def _map_section(result: LvfCalibrationResult) -> Section:
             Picture(
                 "lines",
                 partial(_profile_figure, before, wavelengths),
-                "The strip under the mercury lamp, looked through; dashed: the lines as located. "
-                "Of a blend, its first line.",
+                "The strip under the mercury lamp, in transmission; dashed: the located lines. "
+                "Of a blend, its first line is marked.",
             ),
             Picture(
                 "lines-on-sample",
@@ -102,7 +102,7 @@ def _band_section(result: LvfCalibrationResult) -> Section:
     file, count = result.calibration, len(result.filters)
     median, worst = np.median(result.band_misfit), result.band_misfit.max()
     return Section(
-        "What the strip lets through",
+        "Transmission of the strip",
         (
             f"From {count} colour filters over the grey card, in units of the card seen "
             f"without the strip. Misfit per value {median:.2f} (median over the positions), "
@@ -127,7 +127,7 @@ def _band_section(result: LvfCalibrationResult) -> Section:
             Picture(
                 "camera-curves",
                 partial(_camera_figure, result.camera_before, result.camera_curves),
-                "The camera's curves as the filters tell them; dashed: as their file has them.",
+                "The camera's curves as fitted with the colour filters; dashed: as in their file.",
             ),
             Picture(
                 "filter-residuals",

@@ -216,7 +216,7 @@ def _model(report: DecayReport) -> str:
 
 def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
     offset = (
-        "an offset b_c, which the uncertainty of the dark level restrains"
+        "an offset b_c, constrained by the uncertainty of the dark level"
         if any(any(fit.offsets_sigma) for fit in fits)
         else "no offset, b_c = 0"
     )
@@ -228,7 +228,7 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
     else:
         yield f"Here k_i are the rates and a_i the amplitudes; there are w_c = 1 and {offset}."
     yield "All parameters were fitted together by weighted nonlinear least squares."
-    yield f"The weights follow the photon and reading noise found in the frames{_flicker(fits)}."
+    yield f"The weights follow the photon and read noise found in the frames{_flicker(fits)}."
     states = [str(one) for one in sorted({fit.n_states for fit in fits})]
     number = f"n = {states[0]}" if len(states) == 1 else f"n = {' or '.join(states)} by patch"
     if report.states is not None:

@@ -11,7 +11,7 @@ from labrig.results import FittedDecay, NoiseBudget, Series
 DECAY_ASSUMPTIONS = (
     "The amplitudes aᵢ are what the decay measures: the signal at lamp off in the brightest "
     "channel, extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiance Λᵢ "
-    "and concentration rᵢ(0) cannot be told apart by a decay alone.",
+    "and charge level rᵢ(0) are not determined separately by a decay alone.",
     "A frame measures the mean over its exposure, and is fitted as such.",
     "Rates and amplitudes are shared by the channels; each channel has one weight. So every state "
     "is taken to have the same colour.",
@@ -19,7 +19,7 @@ DECAY_ASSUMPTIONS = (
     "absolute radiance.",
     "Uncertainties are standard uncertainties (1 σ) from photon, read and dark noise and, where it "
     "was fitted, the flicker that all channels of a frame share. They do not cover a wrong model, "
-    "temperature or light that leaks in.",
+    "temperature or stray light.",
 )
 
 

@@ -69,8 +69,8 @@ def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
     ]
     if False in used:
         text.append(
-            "The lamp's relay board does not tell whether it is on: that nothing else switched the "
-            "lamp while it charged could not be checked, except by what the photographs show."
+            "The lamp's relay board does not report its state: only the photographs can show "
+            "whether something else switched the lamp while it charged."
         )
     elif True in used:
         text.append(

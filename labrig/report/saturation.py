@@ -64,12 +64,10 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
     for number, (level, k_per_s) in enumerate(of_states, start=1):
         yield (
             f"state {number} (k = {rounded(float(k_per_s), 3)} s⁻¹): r(0) = "
-            f"{plus_minus(level.r, level.sigma)}; r(0) = 1 may be believed: {level.assessment}"
+            f"{plus_minus(level.r, level.sigma)}; assumption r(0) = 1: {level.assessment}"
         )
     if not patch.levels:
-        yield (
-            "r(0): nothing can be said without a weaker light; saturation in time is none in level"
-        )
+        yield ("r(0): not determined without a weaker light; saturation in time is none in level")
     yield _rates_text(patch)
 
 
@@ -77,7 +75,7 @@ def _rates_text(patch: PatchSaturation) -> str:
     test = patch.rates
     if test.misfit and not test.differ:
         return (
-            f"rates: nothing can be said, {patch.fit.n_states} exponential(s) do not describe the "
+            f"rates: not determined, {patch.fit.n_states} exponential(s) do not describe the "
             f"decays (reduced χ² {test.chi2_own / test.dof_own:.3g} with own rates)"
         )
     verb = "differ with" if test.differ else "are the same after"
@@ -112,8 +110,8 @@ def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Sect
             Picture(
                 f"charges-{name}",
                 partial(_decays_figure, patch),
-                "Decays after different charges over their begin, and what shared rates leave of "
-                "them in σ.",
+                "Decays after different charges over their begin, and their residuals with shared "
+                "rates, in σ.",
             ),
         ),
         (_rates_table(patch.rates, tuple(patch.curves)),),

@@ -90,5 +90,5 @@ def moves_text(actions: Sequence[ActionRecord]) -> str:
         return text
     return (
         f"{text} {n_late} of {len(late_s)} began more than {1e3 * LATE_MOVE_S:g} ms late: the "
-        "frames after may show a door that still moves, or light that should have been gone."
+        "frames after may show a door that still moves, or the lamp's transient."
     )

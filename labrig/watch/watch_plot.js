@@ -107,11 +107,11 @@ export function draw(svg, series, logarithmic) {
       d: `M${MARGIN.left},${MARGIN.top}v${inner[1]}h${inner[0]}`,
     }),
     element("text", { x: MARGIN.left + inner[0] / 2, y: height - 8, "text-anchor": "middle" },
-      "time after lamp off / s"),
+      "Time after lamp off / s"),
     element("text", {
       x: 0, y: 0, "text-anchor": "middle",
       transform: `translate(14 ${MARGIN.top + inner[1] / 2}) rotate(-90)`,
-    }, "signal / (DN/s)"),
+    }, "Signal / (DN/s)"),
   );
   shown.forEach((points, number) => {
     svg.append(...points.map(([t, value]) => marker(number, across(t), down(value))));

@@ -60,7 +60,7 @@ def test_attempts_that_did_not_count_are_told() -> None:
 
 @pytest.mark.parametrize(
     ("reads_back", "said"),
-    [(True, "nothing else had switched it"), (False, "could not be checked"), (None, "")],
+    [(True, "nothing else had switched it"), (False, "does not report its state"), (None, "")],
 )
 def test_whether_the_lamp_was_read_back_is_told(reads_back: bool | None, said: str) -> None:
     charged = attempt([taken("decay", 11.0)], [lamp("on", 0), lamp("off", 10)])

@@ -95,7 +95,14 @@ def test_the_figure_has_a_line_for_each_part_that_matters() -> None:
         (legend,) = figure.legends
         assert legend.get_window_extent().y0 >= figure.axes[0].get_window_extent().y1
     names = [text.get_text() for text in legend.get_texts()]
-    assert names == ["together", "photons", "reading", "uneven light", "flicker", "dark level"]
+    assert names == [
+        "together",
+        "photon noise",
+        "read noise",
+        "uneven light",
+        "flicker",
+        "dark level",
+    ]
     quiet = noise_budget(replace(SERIES, dark_sigma=np.zeros(3)), FIT)
     assert quiet is not None
     assert "dark level" not in visible_parts(quiet)

@@ -57,7 +57,7 @@ def test_two_lights_tell_how_far_a_sample_is_charged(tmp_path: Path) -> None:
     assert len(rows) == 1 + 6
     in_time, of_level, rates = done.lines
     assert "saturated in time" in in_time
-    assert of_level.endswith("r(0) = 1 may be believed: no")
+    assert of_level.endswith("assumption r(0) = 1: no")
     assert "rates are the same after all 6 charges" in rates
     assert "The weaker light was 50% of the full one (σ 2% of that)" in done.report.read_text()
 

@@ -102,7 +102,7 @@ def test_all_numbers_are_on_the_page(plain: Made) -> None:
         "Flicker",
         "Offset",
         "power law",
-        "cannot be told apart by a decay alone",
+        "not determined separately by a decay alone",
         "No warnings.",
         f"{101:064x}",
         "σ of a value",

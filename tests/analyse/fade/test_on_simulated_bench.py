@@ -96,7 +96,7 @@ def test_it_is_a_glowing_bodys(result: FadeResult) -> None:
 
 
 def test_a_person_is_told(processed: Processed) -> None:
-    told = ("the fade is worth", "the rise lacks", "a cold lamp lacks")
+    told = ("the turn-off transient is", "the turn-on transient lacks", "a cold lamp has")
     for line, begin in zip(processed.lines, told, strict=True):
         assert line.startswith(begin)
 
