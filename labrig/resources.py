@@ -41,9 +41,10 @@ def find(place: str, kind: str, name_or_path: str | os.PathLike[str]) -> Path:
         return given
     known = names(place)
     if str(given) not in known:
+        suffix = next(iter(known.values())).suffix
         raise UsageError(
-            f"no shipped {kind} is called '{given}'; {did_you_mean(str(given), list(known))}; a "
-            f"file of your own is given with its suffix, such as {given}.yaml"
+            f"no shipped {kind} is called '{given}' (a file of your own is given with its suffix, "
+            f"such as {given}{suffix}); {did_you_mean(str(given), list(known))}"
         )
     return known[str(given)]
 

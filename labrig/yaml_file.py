@@ -232,7 +232,9 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> str:
     if problem["type"] == "missing":
         return f"the key '{place}' is missing; it is required"
     said = problem["msg"].removeprefix("Value error, ")
-    came = "" if "got " in said else f", got {_kind(problem['input'])}"
+    # A rule of several keys names their values itself.
+    says_all = "got " in said or (problem["type"] == "value_error" and _is_block(problem["input"]))
+    came = "" if says_all else f", got {_kind(problem['input'])}"
     return f"{place}: {said}{came}" if place else f"{said}{came}"
 
 
@@ -259,10 +261,14 @@ def _models_in(annotation: Any) -> Iterator[type[BaseModel]]:
         yield from _models_in(argument)
 
 
+def _is_block(value: Any) -> bool:
+    return isinstance(value, (dict, list))
+
+
 def _kind(value: Any) -> str:
     if value is None:
         return "nothing"
-    if isinstance(value, (dict, list)):
+    if _is_block(value):
         return "a mapping" if isinstance(value, dict) else "a list"
     return f"'{_shown(str(value))}'"
 

@@ -187,12 +187,13 @@ def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
     if len(early) == len(t_s):
         raise DataError(
             f"all frames begin before the bench is dark, the last {max(early):.3g} s after "
-            f"lamp-off; the blank is clean from {blank.first_clean_s:.3g} s on: begin later, or "
-            "use a shield"
+            f"lamp off; by the blank it is dark from {blank.first_clean_s:.3g} s on: begin later, "
+            "or use a shield"
         )
     return (
-        f"{len(early)} frames begin before the bench is dark and are left out: the blank is clean "
-        f"from {blank.first_clean_s:.3g} s after lamp-off on (begin later, or use a shield)",
+        f"frames that begin before the bench is dark are left out, {len(early)} of {len(t_s)}: by "
+        f"the blank it is dark from {blank.first_clean_s:.3g} s after lamp off on (begin later, or "
+        "use a shield)",
     )
 
 

@@ -113,7 +113,11 @@ def fit_table(
         part = replace(part, t_s=part.t_s - origin_s)
         if weights == "counts":
             part = replace(part, sigma=np.sqrt(np.maximum(part.values, LEAST_COUNTS)))
-        fits.append((part.region, fit_series(part, states, offset_sigma, rho)))
+        # Without σ nothing tells flicker from other noise: the scatter about the fit is both.
+        without_sigma = flicker == "auto" and np.isnan(part.sigma).all()
+        fits.append(
+            (part.region, fit_series(part, states, offset_sigma, 0.0 if without_sigma else rho))
+        )
     return fits
 
 

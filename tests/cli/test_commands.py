@@ -7,6 +7,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import Any
 
+import numpy as np
 import pytest
 import yaml
 
@@ -241,3 +242,19 @@ def test_a_run_whose_every_frame_clips_is_kept_and_said(
     one_line(ended, 4, "all are clipped", "the run is kept")
     (folder,) = (tmp_path / "runs").iterdir()
     assert "clipped" in (folder / "result" / "report.html").read_text()
+
+
+def test_a_table_of_time_and_value_is_fitted_with_the_defaults(
+    labrig: Callable[..., Ended], tmp_path: Path
+) -> None:
+    rng = np.random.default_rng(5)
+    t_s = np.arange(0.0, 80.0, 2.0)
+    values = 1000 * np.exp(-0.05 * t_s) + rng.normal(0, 5, len(t_s))
+    rows = [f"{t},{value}" for t, value in zip(t_s, values, strict=True)]
+    (tmp_path / "table.csv").write_text("\n".join(["time_s,counts", *rows]))
+    ended = labrig("fit", "decay", tmp_path / "table.csv", "--json")
+    assert ended.code == 0, ended.err
+    fit = json.loads(ended.out)
+    rate = fit["states"][0]
+    assert abs(rate["k_r_per_s"] - 0.05) < 4 * rate["k_r_sigma_per_s"]
+    assert any("from their scatter" in warning for warning in fit["warnings"])

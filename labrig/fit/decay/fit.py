@@ -175,7 +175,7 @@ def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
     if flicker is None and not series.sigma_given:
         raise FitError(
             "expected σ of the values to tell flicker from other noise, got none; "
-            "give σ, or the flicker"
+            "give σ, or set the flicker to 0"
         )
     if flicker is None and series.n_frames < FEWEST_FOR_FLICKER:
         raise FitError(
