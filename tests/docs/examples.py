@@ -1,0 +1,28 @@
+"""The folder in which the examples of docstrings and of the manual run.
+
+It holds what a bench has after its first measurements: `runs/decay`, a run of the simulated bench
+with its results; `material.yaml` and `series.csv` from it; `frame.dng`, one of its frames; and the
+calibrations `camera.yaml`, `lvf.yaml`, `fade.yaml`, `blank.yaml` and `irradiance.yaml`.
+"""
+
+import shutil
+from pathlib import Path
+
+from labrig.process import process_run
+
+TESTS = Path(__file__).parents[1]
+RUN = TESTS / "recordings/decay/run"
+CALIBRATIONS = TESTS / "acceptance/recorded_phosphor"
+
+
+def make_examples(folder: Path) -> None:
+    """Fill `folder`, which is there and empty."""
+    run = folder / "runs/decay"
+    shutil.copytree(RUN, run)
+    process_run(run)
+    for name in ("material.yaml", "series.csv"):
+        shutil.copy(run / "result" / name, folder)
+    shutil.copy(sorted((run / "frames").iterdir())[-1], folder / "frame.dng")
+    for path in CALIBRATIONS.glob("*/*.yaml"):
+        if path.stem in {"camera", "lvf", "fade", "blank", "irradiance"}:
+            shutil.copy(path, folder)
