@@ -44,7 +44,27 @@ class TimedAction:
 
 
 def at(at_s: float, action: Action) -> TimedAction:
-    """`action`, to begin `at_s` seconds after the start of the sequence."""
+    """Schedule an action within a sequence.
+
+    Parameters
+    ----------
+    at_s
+        Begin of the action in seconds after the start of the sequence.
+    action
+        Action of a device, or photograph.
+
+    Returns
+    -------
+    TimedAction
+        Action with its time, for `Session.run_sequence`.
+
+    Examples
+    --------
+    >>> from labrig.acquire import LAMP_OFF, LAMP_ON, at
+    >>> flash = [at(0.0, LAMP_ON), at(2.0, LAMP_OFF)]
+    >>> [(timed.at_s, str(timed.action)) for timed in flash]
+    [(0.0, 'on'), (2.0, 'off')]
+    """
     return TimedAction(at_s, action)
 
 

@@ -87,12 +87,42 @@ class Plan:
 
 
 def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
-    """Lay out `protocol` on the devices of `rig` without touching any of them.
+    """Lay out a protocol on the devices of a rig without opening any of them.
+
+    The units of the protocol are run on stand-ins that take the time that the drivers declare.
+    Choices that depend on recorded frames are planned with their longest outcome.
+
+    Parameters
+    ----------
+    protocol
+        Protocol to be planned.
+    rig
+        Rig file with the devices.
+    source
+        Name or path of the rig file, for messages.
+
+    Returns
+    -------
+    Plan
+        Timeline, duration, number of frames and steps by hand.
 
     Raises
     ------
     ProtocolError
-        It cannot work: a device is missing, a setting is not offered, a frame does not fit.
+        If a device is missing, a setting is not offered, a frame does not fit before the next
+        action, or there are more than `MOST_STEPS` steps.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> protocol = labrig.read_protocol(Path("runs/decay/protocol.yaml"))
+    >>> rig = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> plan = labrig.plan(protocol, rig, "rig.yaml")
+    >>> plan.units, plan.frames
+    (('dark', 'meter', 'decay-1'), 37)
+    >>> print(plan.lines()[1])
+      @     0.000 s (+    0.000 s)  -        warming up the camera, 1 min
     """
     clock = VirtualClock()
     recorder = _PlanRecorder(clock)

@@ -13,7 +13,29 @@ READ_PERIOD_S = 50.0
 
 
 def lights_that_read_back(rig: Rig) -> dict[str, bool]:
-    """Key of every light → whether its board tells how it is."""
+    """List the lights of a rig with whether their state can be read back.
+
+    Parameters
+    ----------
+    rig
+        Open devices of a bench.
+
+    Returns
+    -------
+    dict of str to bool
+        Whether the state of the light is read from its board, by the light's key in the rig file.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.acquire import lights_that_read_back
+    >>> rig_file = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> with labrig.open_bench(rig_file, "rig.yaml") as bench:
+    ...     with bench.devices() as rig:
+    ...         print(lights_that_read_back(rig))
+    {'lamp': True}
+    """
     return {key: light.reads_back() for key, light in _lights(rig)}
 
 

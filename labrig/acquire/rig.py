@@ -192,6 +192,25 @@ def _is_gone(error: Exception) -> bool:
 
 
 def in_safe_order(keys: Iterable[str]) -> list[str]:
-    """Keys of devices, those first that have to be safe before the others move."""
+    """Sort devices in the order in which they are made safe.
+
+    Lights come first: a door that closes turns its sample to the lamp.
+
+    Parameters
+    ----------
+    keys
+        Keys of the devices in the rig file.
+
+    Returns
+    -------
+    list of str
+        The same keys; devices without a prescribed place come last, in the order given.
+
+    Examples
+    --------
+    >>> from labrig.acquire import in_safe_order
+    >>> in_safe_order(["camera", "door", "lamp"])
+    ['lamp', 'door', 'camera']
+    """
     order = [key for key, role in ROLES.items() if role.safe_first]
     return sorted(keys, key=lambda key: order.index(key) if key in order else len(order))

@@ -102,14 +102,35 @@ class RigFile(BaseModel):
 
 
 def read_rig_file(path: Path) -> RigFile:
-    """Read and check a rig file, all but its drivers' own keys.
+    """Read and validate a rig file, except the keys that belong to its drivers.
 
-    Files beside it are named by absolute paths in what is returned, so that it can be copied.
+    Files that it names relative to its own folder have absolute paths in the result, so that the
+    result can be written elsewhere.
+
+    Parameters
+    ----------
+    path
+        Rig file in YAML.
+
+    Returns
+    -------
+    RigFile
+        Devices, optics and, for a simulated rig, the simulated room.
 
     Raises
     ------
     UsageError
-        One line that names the file and the key.
+        If the file cannot be read, or a key is missing, unknown or invalid; the message names both.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> rig = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> rig.name
+    'simulated dark room with LVF'
+    >>> rig.devices["lamp"].driver, rig.optics.camera
+    ('numato_relay', 'canon_eos_5d_mark_ii')
     """
     rig = validate(_anchored(read_yaml(path), path.resolve().parent), RigFile, str(path))
     for key in rig.devices:

@@ -40,17 +40,59 @@ def run_units(
     observer: RunObserver,
     metadata: Mapping[str, Any],
 ) -> None:
-    """Do all units that are not complete in `folder`, in order.
+    """Run all units that are not complete in a run folder, in order.
 
-    A unit that ends by an exception leaves its attempt open: the caller first reaches the safe
-    state, then closes the attempt with `RunFolder.close_open_attempts`. Where a person takes back
-    what was done by hand last, its unit counts no longer and is done again. The temperature is
-    read at both ends of a unit, and while it waits; lights are read back while it waits.
+    Parameters
+    ----------
+    units
+        Units of the protocol.
+    rig
+        Open devices of the bench.
+    folder
+        Run folder, open for writing.
+    observer
+        Observer of units, frames and waits.
+    metadata
+        Keys and values of the RunStart of every attempt, such as the plan and the versions.
 
     Raises
     ------
     Slept
-        The PC slept in a unit.
+        If the PC was suspended during a unit.
+
+    Notes
+    -----
+    A unit that ends by an exception leaves its attempt open: the caller first reaches the safe
+    state, then closes the attempt with `RunFolder.close_open_attempts`. Where a person undoes the
+    last step done by hand, the unit of that step no longer counts and is done again. The
+    temperature is read at begin and end of a unit and while it waits; lights are read back while it
+    waits.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.acquire import LAMP_OFF, LAMP_ON, at, run_units
+    >>> from labrig.record import RunFolder
+    >>> class Flash:
+    ...     name = "flash"
+    ...     def run(self, session):
+    ...         session.run_sequence([at(0.0, LAMP_ON), at(2.0, LAMP_OFF)])
+    >>> class Silent:
+    ...     def unit(self, name, number, total): pass
+    ...     def frame(self, record): pass
+    ...     def doing(self, what, until_s=None): pass
+    ...     def warn(self, text): pass
+    ...     def ask(self, step, last, meanwhile): return ""
+    >>> rig_file = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> with (
+    ...     labrig.open_bench(rig_file, "rig.yaml") as bench,
+    ...     bench.devices() as rig,
+    ...     RunFolder.create(Path("trials"), "flash", bench.clock.wall(), {}, bench.seed) as folder,
+    ... ):
+    ...     run_units([Flash()], rig, folder, Silent(), {})
+    ...     [str(action.action) for action in folder.read().completed()["flash"].actions]
+    ['on', 'off']
     """
     temperature = TemperatureLog(rig, observer.warn)
     while True:

@@ -85,20 +85,39 @@ class Comparison:
 
 
 def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
-    """The latest results of two runs.
+    """Compare the latest results of two runs of the same sample.
 
     Parameters
     ----------
+    a
+        Folder of the first run.
+    b
+        Folder of the second run.
     reference
-        Patch with a source that is the same on both days, steady or decaying; it ties the days
-        together: the amplitudes of B are scaled by what it lost or gained.
+        Patch with a source that is the same in both runs, steady or decaying. The amplitudes of run
+        B are scaled by the ratio of its signals.
+
+    Returns
+    -------
+    Comparison
+        Differences of rates and amplitudes by patch in units of their σ, and of the protocols.
 
     Raises
     ------
     DataError
-        One of them has no result.
+        If one of the runs has no result.
     UsageError
-        There is no such reference in both.
+        If the reference is not a patch of both runs.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import compare_runs
+    >>> comparison = compare_runs(Path("runs/decay"), Path("runs/decay"))
+    >>> comparison.patches[0].assessment
+    'the rates agree (p = 1)'
+    >>> [difference.quantity for difference in comparison.patches[0].differences]
+    ['k_r 1', 'k_r 2', 'a 1', 'a 2']
     """
     protocols = read_yaml(a / "protocol.yaml"), read_yaml(b / "protocol.yaml")
     of_a, of_b = (_results(run, protocol) for run, protocol in zip((a, b), protocols, strict=True))

@@ -75,12 +75,32 @@ class RunFilter:
 
 
 def list_runs(runs: Path, wanted: RunFilter) -> list[RunSummary]:
-    """The wanted runs in a folder, oldest first.
+    """List the runs in a folder that a filter admits.
+
+    Parameters
+    ----------
+    runs
+        Folder with run folders.
+    wanted
+        Filter by sample, protocol, day and state.
+
+    Returns
+    -------
+    list of RunSummary
+        Summaries of these runs, oldest first.
 
     Raises
     ------
     UsageError
-        There is no such folder.
+        If there is no such folder.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import RunFilter, list_runs
+    >>> runs = list_runs(Path("runs"), RunFilter(protocol="decay"))
+    >>> [(run.folder.name, run.state) for run in runs]
+    [('decay', 'processed')]
     """
     if not runs.is_dir():
         raise UsageError(f"{runs}: no such folder; give the one with the run folders as --runs")
@@ -89,12 +109,31 @@ def list_runs(runs: Path, wanted: RunFilter) -> list[RunSummary]:
 
 
 def find_run(run: Path, runs: Path) -> Path:
-    """The folder of a run: a path, the name of a folder in `runs` or its beginning, or `last`.
+    """Find the folder of a run.
+
+    Parameters
+    ----------
+    run
+        Path of a run folder, name of a folder in `runs` or the beginning of one, or `last`.
+    runs
+        Folder with run folders.
+
+    Returns
+    -------
+    Path
+        The run folder.
 
     Raises
     ------
     UsageError
-        There is none, or several begin so.
+        If there is no such run, or if several names begin alike.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import find_run
+    >>> find_run(Path("last"), Path("runs")).name
+    'decay'
     """
     if (run / "protocol.yaml").is_file():
         return run
@@ -114,7 +153,26 @@ def find_run(run: Path, runs: Path) -> Path:
 
 
 def summarise(folder: Path) -> RunSummary:
-    """What the run in `folder` holds; whatever cannot be read is told as its state."""
+    """Summarise the run in a folder.
+
+    Parameters
+    ----------
+    folder
+        Run folder; its files may be incomplete or damaged.
+
+    Returns
+    -------
+    RunSummary
+        Sample, protocol, state, number of frames and fitted decays.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import summarise
+    >>> summary = summarise(Path("runs/decay"))
+    >>> summary.sample, summary.state, summary.frames
+    ('sample', 'processed', 37)
+    """
     sample, protocol, units = _asked(folder)
     try:
         record, results = read_run(folder), read_fitted_decays(folder / "result")
@@ -160,7 +218,27 @@ def _asked(folder: Path) -> tuple[str, str, int | None]:
 
 
 def state_of(folder: Path, is_complete: bool) -> RunState:
-    """How far the run in `folder` has come, given whether all its units are complete."""
+    """Return the state of a run.
+
+    Parameters
+    ----------
+    folder
+        Run folder.
+    is_complete
+        Whether all units of the run are complete.
+
+    Returns
+    -------
+    RunState
+        One of `running`, `unfinished`, `recorded` and `processed`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import state_of
+    >>> state_of(Path("runs/decay"), is_complete=True)
+    'processed'
+    """
     if _is_being_written(folder):
         return "running"
     if not is_complete:

@@ -18,7 +18,29 @@ _NO_TEXT = re.compile("[\ud800-\udfff]")
 
 
 def guarded(arguments: Sequence[str]) -> int:
-    """Run the command line and return its exit code."""
+    """Run the command line and return its exit code.
+
+    Errors become one line on standard error. Signals that would stop the process are ignored
+    afterwards: the process is expected to end.
+
+    Parameters
+    ----------
+    arguments
+        Arguments of the command line, without the name of the program.
+
+    Returns
+    -------
+    int
+        0 on success; `LabrigError.exit_code` of the error; 2 for a wrong call; 128 plus the number
+        of the signal that stopped the command; 1 for a fault of labrig itself.
+
+    Examples
+    --------
+    >>> from labrig.cli import guarded
+    >>> guarded(["--version"])
+    labrig ...
+    0
+    """
     try:
         code = _run(arguments)
     except BrokenPipeError:

@@ -7,7 +7,29 @@ from labrig.compare.run import RunComparison
 
 
 def numbers(comparison: RunComparison) -> dict[str, Any]:
-    """Lists, dictionaries, texts and finite numbers; what is not known is None."""
+    """Convert a comparison to plain numbers for programs.
+
+    Parameters
+    ----------
+    comparison
+        Comparison of a run.
+
+    Returns
+    -------
+    dict
+        Lists, dictionaries, strings and finite numbers, ready for JSON; unknown values are None.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.compare import compare_run, numbers
+    >>> def refit(series, states, flicker):
+    ...     return labrig.fit_series(series, states, flicker=flicker)
+    >>> glow = numbers(compare_run(Path("runs/decay"), refit))["glow"]["sample"]
+    >>> sorted(glow["delta_e"])
+    ['1 state', '2 states']
+    """
     found: dict[str, Any] = _plain(
         {
             "words": comparison.words,

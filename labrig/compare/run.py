@@ -149,25 +149,57 @@ def compare_run(
     normalisation: str = "all",
     camera: str | None = None,
 ) -> RunComparison:
-    """Compare the latest result of the decay run in `folder`.
+    """Compare the latest result of a decay run with predictions, materials and the paper.
+
+    Photographed and predicted glow are compared as in fig. 8 of Nalbach et al., the residuals of
+    one, two and three states as in section 4.4, spectra in three channels as in fig. 9.
 
     Parameters
     ----------
+    folder
+        Run folder.
     refit
-        Fits a series with a number of states and a given flicker, as the run's processing does.
+        Function that fits a series with a given number of states and a given relative flicker.
     materials
-        `MATERIAL` or `PATCH=MATERIAL`: shipped names or files.
-    white, normalisation
-        See `viewing`.
+        Reference materials as `MATERIAL` or `PATCH=MATERIAL`, by shipped name or path.
+    white
+        CIE illuminant that is the white of CIELAB, such as `D65`.
+    normalisation
+        Normalisation of the photographs, `all` or `each`; see `Normalisation`.
     camera
-        Other curves than the run was processed with.
+        Camera curves that replace those with which the run was processed, by shipped name or path.
+
+    Returns
+    -------
+    RunComparison
+        Glow, residuals, material parameters and spectra.
 
     Raises
     ------
     UsageError
-        Not a run, or a patch, material, white or camera that there is not.
+        If this is not a run folder, or if there is no such patch, material, white or camera.
     DataError
-        There is no result, or it is damaged.
+        If there is no result, or it is damaged.
+
+    References
+    ----------
+    Nalbach, Seidel, Ritschel, "Practical Capture and Reproduction of Phosphorescent Appearance"
+    (2017).
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.compare import compare_run
+    >>> def refit(series, states, flicker):
+    ...     return labrig.fit_series(series, states, flicker=flicker)
+    >>> comparison = compare_run(Path("runs/decay"), refit)
+    >>> [glow.patch for glow in comparison.glows]
+    ['sample']
+    >>> comparison.glows[0].mean("2 states") < 1
+    True
+    >>> {states: round(rms, 2) for states, rms in comparison.residuals[0].rms.items()}
+    {1: 1.0, 2: 0.01, 3: 0.01}
     """
     patches = read_patches(folder)
     references = _by_patch(materials, list(patches))

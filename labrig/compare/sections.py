@@ -13,7 +13,31 @@ from labrig.report import Picture, Section, comparison_table
 
 
 def sections(comparison: RunComparison) -> tuple[Section, ...]:
-    """In the order of the paper's figures."""
+    """Lay out a comparison as sections of a page, in the order of the paper's figures.
+
+    Parameters
+    ----------
+    comparison
+        Comparison of a run.
+
+    Returns
+    -------
+    tuple of Section
+        Sections with text, figures and tables.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.compare import compare_run, sections
+    >>> def refit(series, states, flicker):
+    ...     return labrig.fit_series(series, states, flicker=flicker)
+    >>> for section in sections(compare_run(Path("runs/decay"), refit)):
+    ...     print(section.title)
+    Glow, photographed and predicted
+    What more states gain
+    Spectra in three channels
+    """
     return tuple(_sections(comparison))
 
 

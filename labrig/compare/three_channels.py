@@ -57,14 +57,48 @@ class ThreeChannels:
 def three_channels(
     spectrum: Spectrum, camera: CameraResponse, white: str = DEFAULT_WHITE
 ) -> ThreeChannels:
-    """By the CIE 2015 2° observer.
+    """Compare a spectrum with its representation in three channels.
+
+    The observer is the CIE 2015 2° standard observer.
+
+    Parameters
+    ----------
+    spectrum
+        Relative spectral power over wavelength.
+    camera
+        Spectral responses of the camera's R, G, B.
+    white
+        CIE illuminant that is the white of CIELAB, such as `D65`.
+
+    Returns
+    -------
+    ThreeChannels
+        Colour difference between spectrum and camera, and the part of the spectrum that three
+        colour-matching functions cannot represent.
 
     Raises
     ------
     DataError
-        The spectrum is dark where that observer sees.
+        If the spectrum is zero where the observer is sensitive.
     UsageError
-        There is no such white.
+        If there is no such white.
+
+    References
+    ----------
+    Nalbach, Seidel, Ritschel, "Practical Capture and Reproduction of Phosphorescent Appearance"
+    (2017), fig. 9.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import labrig
+    >>> from labrig.compare import three_channels
+    >>> from labrig.optics import Spectrum
+    >>> wavelength_nm = np.arange(400.0, 701.0, 5.0)
+    >>> green = Spectrum("green", wavelength_nm, np.exp(-(((wavelength_nm - 520) / 40) ** 2)))
+    >>> result = three_channels(green, labrig.read_camera("canon_eos_5d_mark_ii"))
+    >>> f"{result.delta_e:.1f}, {result.missed:.0%}"
+    '1.6, 40%'
     """
     eye = observer(CIE_2015)
     at_eye = spectrum.resampled(eye.wavelength_nm).value

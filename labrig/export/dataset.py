@@ -32,27 +32,44 @@ Column = tuple[Any, ...]
 
 
 def read_dataset(run: Path | str) -> "Dataset | DataTree":
-    """The latest result of the run in folder `run`.
+    """Read the latest result of a run as an xarray Dataset or DataTree.
+
+    Parameters
+    ----------
+    run
+        Run folder with a result.
 
     Returns
     -------
     Dataset
-        Of a decay: dimensions `patch`, `frame` (file names), `channel` and `state` (from 1, by
-        falling rate). `value` and `sigma` (patch, frame, channel), `flag` (patch, frame); over the
-        frames `t_s`, `exposure_s`, `unit`, `iso`, `f_number`. Of the fits `k_r_per_s`, `amplitude`
-        (patch, state), `channel_weight`, `offset` (patch, channel), each with its σ, and
-        `flicker`, `reduced_chi2`, `fit_warnings` (patch); NaN where there is no fit.
-        Units are attributes of the variables; the Dataset's own say which run, sample and devices.
+        Of a decay, with dimensions `patch`, `frame` (file names), `channel` and `state` (from 1, by
+        falling rate). Signals `value` and `sigma` have the shape (patch, frame, channel), `flag`
+        has (patch, frame); the coordinates `t_s`, `exposure_s`, `unit`, `iso`, `f_number` have
+        (frame,). Fit parameters are `k_r_per_s`, `amplitude` (patch, state) and `channel_weight`,
+        `offset` (patch, channel), each with its σ, and `flicker`, `reduced_chi2`, `fit_warnings`
+        (patch); NaN where there is no fit. Units are attributes of the variables; attributes of the
+        Dataset name run, sample and devices.
     DataTree
-        Of any other protocol: every field of its result, fields in fields as nodes; of a chain a
-        node for each part.
+        Of any other protocol, with every field of its result as a variable and fields within fields
+        as nodes; a chain has a node for each part.
 
     Raises
     ------
     UsageError
-        Not a run folder with a result, or xarray is not installed.
+        If this is not a run folder with a result, or xarray is not installed.
     DataError
-        A file in it was changed.
+        If a file of the result was changed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> decay = labrig.read_dataset("runs/decay")
+    >>> decay["value"].dims
+    ('patch', 'frame', 'channel')
+    >>> [f"{rate:.4f}" for rate in decay["k_r_per_s"].sel(patch="sample").values]
+    ['0.2048', '0.0101']
+    >>> decay["k_r_per_s"].attrs["units"]
+    '1/s'
     """
     try:
         import xarray  # noqa: F401
@@ -70,7 +87,30 @@ def read_dataset(run: Path | str) -> "Dataset | DataTree":
 
 
 def tree_of(result: RunResult, attributes: Mapping[str, str] | None = None) -> "DataTree":
-    """A result of any protocol as an xarray DataTree, as `read_dataset` gives it."""
+    """Convert a result of any protocol to an xarray DataTree.
+
+    Parameters
+    ----------
+    result
+        Result of a run.
+    attributes
+        Attributes of the root node.
+
+    Returns
+    -------
+    DataTree
+        Tree with the fields of the result, as described in `read_dataset`.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.export import tree_of
+    >>> tree = tree_of(labrig.read_result("runs/decay"), {"run": "decay"})
+    >>> tree["value"].shape
+    (1, 18, 3)
+    >>> tree.attrs["run"]
+    'decay'
+    """
     import xarray
 
     tree = xarray.DataTree.from_dict(_nodes(result))

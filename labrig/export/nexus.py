@@ -241,25 +241,46 @@ DEVICE_CLASSES = {CAMERA.key: "NXdetector", **dict.fromkeys(LIGHTS, "NXsource")}
 
 
 def write_nexus(path: Path, run: RunRecord, about: RunDescription, result: RunResult) -> None:
-    """Write a run and its result.
+    """Write a run and its result to a NeXus file.
 
-    The bytes follow from the run and labrig's version; nothing in them is of the moment of writing.
+    The bytes depend on the run and on labrig's version only, not on the time of writing.
 
     Parameters
     ----------
     path
-        The file, such as `result/run.nxs`.
+        File to be written, such as `result/run.nxs`.
     run
-        The run, with one completed unit at the least.
+        Run with at least one completed unit.
     about
-        The run, its bench and what its result was made with.
+        Description of the run, its bench and the processing.
     result
-        Of any protocol.
+        Result of any protocol.
 
     Raises
     ------
     DiskError
-        The file cannot be written.
+        If the file cannot be written.
+
+    References
+    ----------
+    NeXus base classes, https://manual.nexusformat.org/classes/base_classes.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import h5py
+    >>> import labrig
+    >>> from labrig.export import write_nexus
+    >>> from labrig.record import RunDescription
+    >>> about = RunDescription(
+    ...     title="paint", protocol="decay", run="decay", started="", ended="", rig="bench",
+    ...     simulated=True, labrig_version="1",
+    ... )
+    >>> run, result = labrig.read_run("runs/decay"), labrig.read_result("runs/decay")
+    >>> write_nexus(Path("decay.nxs"), run, about, result)
+    >>> with h5py.File("decay.nxs") as file:
+    ...     print(file["entry"].attrs["default"], file["entry/decay_1_sample/G"].shape)
+    decay_1_sample (18,)
     """
     # Made in memory: HDF5 has no plain way to say that a disk has failed it.
     content = BytesIO()

@@ -13,16 +13,19 @@ if TYPE_CHECKING:
 
 
 def to_tiled(run: Path | str, client: "Container") -> list[str]:
-    """Write the run in folder `run` to a Tiled server; its frames stay where they are.
+    """Write a run to a Tiled server.
 
-    Every attempt that has ended becomes a BlueskyRun under its uid, with frames and actions as its
-    streams; those that are there already are left alone. The latest result, if there is one,
-    becomes an xarray Dataset under the run folder's name, in place of an earlier one there.
+    Every attempt that has ended becomes a BlueskyRun under its uid, with frames, actions and
+    temperatures as its streams; attempts that the server has already are left alone. The latest
+    result, if there is one, becomes an xarray Dataset under the run folder's name and replaces an
+    earlier one there. The frames stay in the run folder.
 
     Parameters
     ----------
+    run
+        Run folder.
     client
-        From `tiled.client.from_uri`, allowed to write and to delete.
+        Client from `tiled.client.from_uri`, with permission to write and to delete.
 
     Returns
     -------
@@ -32,9 +35,18 @@ def to_tiled(run: Path | str, client: "Container") -> list[str]:
     Raises
     ------
     UsageError
-        bluesky-tiled-plugins is not installed.
+        If bluesky-tiled-plugins is not installed.
     DataError
-        Not a run folder, or one that was changed.
+        If this is not a run folder, or if it was changed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> [attempt.unit for attempt in labrig.read_run("runs/decay").attempts]
+    ['dark', 'meter', 'decay-1']
+    >>> from tiled.client import from_uri  # doctest: +SKIP
+    >>> len(labrig.to_tiled("runs/decay", from_uri("http://127.0.0.1:8000")))  # doctest: +SKIP
+    3
     """
     try:
         from bluesky_tiled_plugins import TiledWriter

@@ -75,22 +75,52 @@ class Prediction:
 def predict(
     protocol: ProtocolModel, laid_out: Plan, rig: RigFile, source: str, sources: Sources
 ) -> Prediction:
-    """Expected uncertainties of `protocol` on `rig`, and of its variants.
+    """Predict the uncertainties of a decay protocol on a rig, and of variants of the protocol.
 
     Parameters
     ----------
+    protocol
+        Protocol that records a decay.
     laid_out
-        The protocol's plan on that rig.
+        Plan of the protocol on the rig.
+    rig
+        Rig file with the devices.
     source
-        Names the rig in messages.
+        Name or path of the rig file, for messages.
     sources
-        What is on the bench, and where its figures are to come from.
+        Materials of the patches, and the sources of noise and brightness.
+
+    Returns
+    -------
+    Prediction
+        Expected standard uncertainties of rates and amplitudes, error budget, and variants of the
+        protocol by the gain that they bring.
 
     Raises
     ------
     UsageError
-        The protocol records no decay, a patch, material or run does not exist, or the material is
-        one of which no decay can be predicted.
+        If the protocol records no decay, if there is no such patch, material or run, or if no decay
+        can be predicted for the material.
+
+    Notes
+    -----
+    The uncertainties are those of the best unbiased estimator, the inverse of the Fisher
+    information (Cramér–Rao bound) of the decay model of `labrig.fit`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.predict import Sources, predict
+    >>> protocol = labrig.read_protocol(Path("runs/decay/protocol.yaml"))
+    >>> rig = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> plan = labrig.plan(protocol, rig, "rig.yaml")
+    >>> prediction = predict(protocol, plan, rig, "rig.yaml", Sources({"": "blue-paint"}))
+    >>> patch = prediction.patches["sample"]
+    >>> f"k_r = {patch.k_r_per_s[0]} ± {patch.k_r_sigma_per_s[0]:.0e} 1/s"
+    'k_r = 0.032 ± 6e-05 1/s'
+    >>> prediction.remedies[0].change.says
+    'for: 3 min'
     """
     asked = predictable(protocol)
     known = what_is_known(protocol, laid_out.offers, sources)

@@ -67,7 +67,31 @@ def changes(before: Path, after: Path) -> tuple[str, ...]:
 
 
 def other_settings(before: Path, after: Path) -> tuple[str, ...]:
-    """What the result folder `after` was made with otherwise than `before`, a line each."""
+    """List the settings in which two results of a run differ.
+
+    Parameters
+    ----------
+    before
+        Folder of the earlier result, with its `provenance.yaml`.
+    after
+        Folder of the later result.
+
+    Returns
+    -------
+    tuple of str
+        A line for each setting, with its earlier and its later value.
+
+    Examples
+    --------
+    >>> import shutil
+    >>> from pathlib import Path
+    >>> from labrig.analyse import Overrides
+    >>> from labrig.process import other_settings, process_run
+    >>> _ = shutil.copytree("runs/decay", "trials/one-state")
+    >>> _ = process_run("trials/one-state", Overrides(states=1))
+    >>> other_settings(Path("runs/decay/result"), Path("trials/one-state/result"))
+    ('states: auto → 1',)
+    """
     return tuple(_other_settings(_settings(before), _settings(after)))
 
 

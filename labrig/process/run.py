@@ -91,37 +91,75 @@ class Processed:
 
 
 def process_run(folder: Path | str, overrides: Overrides | None = None) -> RunResult:
-    """Reduce and fit the run in `folder`, write `result/` and the report in it.
+    """Reduce and fit a run and write its results and its report.
 
-    A `result` that comes out any different from the one before takes its place; that one is kept
-    as `result-1`, `result-2`, …
+    The files are written to the folder `result` of the run. A `result` that differs from the one
+    before replaces it; the earlier one is kept as `result-1`, `result-2`, …
 
     Parameters
     ----------
     folder
-        A run folder.
-    choices
-        What is wanted otherwise than the protocol says.
+        Run folder.
+    overrides
+        Settings that replace those of the protocol and of the rig file.
 
     Returns
     -------
     RunResult
-        Of the type that belongs to the run's protocol.
+        Result of the type that belongs to the run's protocol.
 
     Raises
     ------
     UsageError
-        Not a run folder, or a choice that does not fit it.
+        If this is not a run folder, or an override does not fit the run.
     DataError
-        What there is does not suffice, or a frame is missing or was changed after the run.
+        If frames are too few, missing, or were changed after the run.
     FitError
-        Nothing could be fitted.
+        If nothing could be fitted.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> result = labrig.process_run("runs/decay")
+    >>> [f"{rate.value:.4f}" for rate in result.patches["sample"].fit.rates]
+    ['0.2048', '0.0101']
     """
     return process_and_report(folder, overrides).result
 
 
 def process_and_report(folder: Path | str, overrides: Overrides | None = None) -> Processed:
-    """As `process_run`; with where the report is, and what a person is told."""
+    """Reduce and fit a run and return its result with a summary for people.
+
+    Parameters
+    ----------
+    folder
+        Run folder.
+    overrides
+        Settings that replace those of the protocol and of the rig file.
+
+    Returns
+    -------
+    Processed
+        Result, path of the report, summary, and changes since the result before.
+
+    Raises
+    ------
+    UsageError
+        If this is not a run folder, or an override does not fit the run.
+    DataError
+        If frames are too few, missing, or were changed after the run.
+    FitError
+        If nothing could be fitted; the report is written nevertheless.
+
+    Examples
+    --------
+    >>> from labrig.process import process_and_report
+    >>> processed = process_and_report("runs/decay")
+    >>> processed.report.as_posix()
+    'runs/decay/result/report.html'
+    >>> print(processed.lines[0].splitlines()[1])
+    state  k / s⁻¹      1/k / s    amplitude
+    """
     folder, overrides = Path(folder), overrides or Overrides()
     protocol = read_run_protocol(folder)
     rig, run = overrides.bench(folder), read_run(folder)

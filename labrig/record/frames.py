@@ -74,12 +74,54 @@ PERSON, TAKEN_BACK = "person", "taken back"
 
 
 def unit_in(part: str, unit: str) -> str:
-    """The name of a unit of one part of a chain within the whole."""
+    """Return the name that a unit of one part of a chain has in the whole run.
+
+    Parameters
+    ----------
+    part
+        Name of the part, such as `decay`.
+    unit
+        Name of the unit within the part.
+
+    Returns
+    -------
+    str
+        Name in the journal of the chain's run.
+
+    Examples
+    --------
+    >>> from labrig.record import unit_in
+    >>> unit_in("decay", "decay-1")
+    'decay/decay-1'
+    """
     return f"{part}/{unit}"
 
 
 def unit_within(part: str, name: str) -> str | None:
-    """The name within its part of what `unit_in` named; None if it is not of that part."""
+    """Return the name that a unit of a chain has within one of its parts.
+
+    This is the inverse of `unit_in`.
+
+    Parameters
+    ----------
+    part
+        Name of the part, such as `decay`.
+    name
+        Name of the unit in the journal of the chain's run.
+
+    Returns
+    -------
+    str or None
+        Name of the unit within the part; None if the unit belongs to another part.
+
+    Examples
+    --------
+    >>> from labrig.record import unit_within
+    >>> unit_within("decay", "decay/decay-1")
+    'decay-1'
+    >>> unit_within("excitation", "decay/decay-1") is None
+    True
+    """
     unit = name.removeprefix(f"{part}/")
     return None if unit == name else unit
 

@@ -55,7 +55,29 @@ class TemperatureHistory:
 
 
 def glow_temperature_c(run: RunRecord, roles: Collection[str]) -> float | None:
-    """Mean over the frames of these roles, to a hundredth; None where nothing is known."""
+    """Return the mean temperature during the frames of given roles.
+
+    Parameters
+    ----------
+    run
+        Run with or without readings of a thermometer.
+    roles
+        Roles of the frames, such as `FrameRole.DECAY`.
+
+    Returns
+    -------
+    float or None
+        Mean of the smoothed temperature over the frames in degrees Celsius, rounded to 0.01 °C;
+        None if no frame lies within `KNOWN_FOR_S` of the readings.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.record import FrameRole, glow_temperature_c
+    >>> run = labrig.read_run("runs/decay")
+    >>> round(glow_temperature_c(run, [FrameRole.DECAY]), 1)
+    20.7
+    """
     frames = in_roles(run, roles)
     known = (
         TemperatureHistory(run).during(frames) if run.temperatures() and frames else np.array([])
@@ -64,7 +86,29 @@ def glow_temperature_c(run: RunRecord, roles: Collection[str]) -> float | None:
 
 
 def in_roles(run: RunRecord, roles: Collection[str]) -> list[FrameRecord]:
-    """The frames of these roles in completed units, by time."""
+    """Return the frames of given roles in completed units.
+
+    Parameters
+    ----------
+    run
+        Run whose frames are listed.
+    roles
+        Roles of the frames, such as `FrameRole.DARK`.
+
+    Returns
+    -------
+    list of FrameRecord
+        Frames in order of time.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.record import FrameRole, in_roles
+    >>> run = labrig.read_run("runs/decay")
+    >>> frames = in_roles(run, [FrameRole.DARK, FrameRole.DECAY])
+    >>> len(frames), frames[-1].path.name, frames[-1].exposure_s
+    (30, '000037.dng', 0.5)
+    """
     return [
         frame
         for attempt in run.completed().values()
@@ -74,12 +118,51 @@ def in_roles(run: RunRecord, roles: Collection[str]) -> list[FrameRecord]:
 
 
 def relative_rate_change(from_c: float, to_c: float) -> float:
-    """By which part of themselves rates are faster at the second temperature."""
+    """Return the relative change of thermally activated rates between two temperatures.
+
+    The rates are those of traps 0.65 eV deep, k_r ∝ exp(−E / k_B T).
+
+    Parameters
+    ----------
+    from_c
+        First temperature in degrees Celsius.
+    to_c
+        Second temperature in degrees Celsius.
+
+    Returns
+    -------
+    float
+        Rate at `to_c` over the rate at `from_c`, minus 1; dimensionless.
+
+    Examples
+    --------
+    >>> from labrig.record import relative_rate_change
+    >>> f"{relative_rate_change(20.0, 21.0):.1%}"
+    '9.1%'
+    """
     return math.expm1(TRAP_K * (1 / (from_c + ZERO_C_K) - 1 / (to_c + ZERO_C_K)))
 
 
 def degrees_text(celsius: FloatArray) -> str:
-    """`20.1 °C to 21.4 °C`."""
+    """Return a range of temperatures as text.
+
+    Parameters
+    ----------
+    celsius
+        Temperatures in degrees Celsius, shape (n,) with n ≥ 1.
+
+    Returns
+    -------
+    str
+        Lowest and highest temperature to 0.1 °C.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.record import TemperatureHistory, degrees_text
+    >>> degrees_text(TemperatureHistory(labrig.read_run("runs/decay")).celsius)
+    '20.6 °C to 21.0 °C'
+    """
     return f"{celsius.min():.1f} °C to {celsius.max():.1f} °C"
 
 
@@ -93,7 +176,28 @@ class Interruption:
 
 
 def charges_s(run: RunRecord) -> tuple[float, ...]:
-    """How long the lamp shone in each complete decay before its first frame, looks left out."""
+    """Return how long the lamp charged the sample before each recorded decay.
+
+    The lamp is taken to switch in the middle of the transaction with its relay. Interruptions of
+    the charge, in which photographs are taken, do not count.
+
+    Parameters
+    ----------
+    run
+        Run whose completed units are looked through.
+
+    Returns
+    -------
+    tuple of float
+        Time with the lamp on before the first frame of each decay, in seconds.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.record import charges_s
+    >>> [round(charge_s, 1) for charge_s in charges_s(labrig.read_run("runs/decay"))]
+    [600.0]
+    """
     return tuple(
         sum(_shining_s(attempt, decay[0].start_time))
         for attempt in run.completed().values()
@@ -102,7 +206,25 @@ def charges_s(run: RunRecord) -> tuple[float, ...]:
 
 
 def interruptions(run: RunRecord) -> tuple[Interruption, ...]:
-    """Attempts that did not come to their end, by time."""
+    """Return the attempts at units that did not complete.
+
+    Parameters
+    ----------
+    run
+        Run whose attempts are looked through.
+
+    Returns
+    -------
+    tuple of Interruption
+        Unit, begin and reason of each of these attempts, in order of time.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.record import interruptions
+    >>> [attempt.reason for attempt in interruptions(labrig.read_run("runs/decay"))]
+    []
+    """
     return tuple(
         Interruption(
             attempt.unit,
@@ -115,7 +237,24 @@ def interruptions(run: RunRecord) -> tuple[Interruption, ...]:
 
 
 def written_time(seconds: float) -> str:
-    """Seconds since 1970 as a person reads them."""
+    """Return a time as text for people.
+
+    Parameters
+    ----------
+    seconds
+        Time in seconds since 1970.
+
+    Returns
+    -------
+    str
+        Date and time in UTC to the second.
+
+    Examples
+    --------
+    >>> from labrig.record import written_time
+    >>> written_time(1_767_225_600.0)
+    '2026-01-01 00:00:00 UTC'
+    """
     return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 

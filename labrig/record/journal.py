@@ -41,12 +41,32 @@ REAL_DISK: Disk = RealDisk()
 
 
 def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
-    """Write `data` to `path` by way of `.part`, on the disk before the name appears.
+    """Write a file so that it survives a power cut and is never seen in part.
+
+    The data are written to a file with the suffix `.part` and are on the disk before that file is
+    renamed.
+
+    Parameters
+    ----------
+    path
+        File to be written or replaced.
+    data
+        Content of the file.
+    disk
+        Disk that writes the data.
 
     Raises
     ------
     DiskError
-        The disk is full or gone; `path` is as it was, or as it should be.
+        If the disk is full or gone; `path` then has its old content or the new one.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import write_durably
+    >>> write_durably(Path("serial-number.txt"), b"0123456789")
+    >>> Path("serial-number.txt").read_bytes()
+    b'0123456789'
     """
     part = path.with_name(path.name + ".part")
     try:
@@ -150,12 +170,32 @@ class Journal:
 def read_journal(path: Path) -> JournalContent:
     """Read a journal that may still be growing or may have been cut off by a crash.
 
+    Parameters
+    ----------
+    path
+        File `journal.jsonl` of a run folder.
+
+    Returns
+    -------
+    JournalContent
+        Event-model documents with their names, and whether the last line is incomplete.
+
     Raises
     ------
     DataError
-        There is none, or a line other than the last is damaged.
+        If there is no such file, or a line other than the last is damaged.
     DiskError
-        The disk does not give it back.
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import read_journal
+    >>> journal = read_journal(Path("runs/decay/journal.jsonl"))
+    >>> [document["unit"] for name, document in journal.documents if name == "start"]
+    ['dark', 'meter', 'decay-1']
+    >>> journal.torn
+    False
     """
     try:
         if not path.is_file():
@@ -193,21 +233,36 @@ _NAME = "notes.md"
 
 
 def add_note(run: Path, text: str, written_time: float) -> Path:
-    """Add a note to the run in `run`; returns the file.
+    """Add a note to a run.
 
     Parameters
     ----------
+    run
+        Run folder.
     text
-        Markdown; its lines are kept as they are.
+        Note in Markdown; its lines are kept as they are.
     written_time
-        Seconds since 1970.
+        Time of the note in seconds since 1970.
+
+    Returns
+    -------
+    Path
+        File `notes.md` of the run, to which the note was appended.
 
     Raises
     ------
     UsageError
-        There is nothing to note.
+        If the text is empty.
     DiskError
-        The file cannot be written.
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import add_note
+    >>> file = add_note(Path("runs/decay"), "The lens cap was on until 14:20.", 1_767_225_600.0)
+    >>> file.name
+    'notes.md'
     """
     if not text.strip():
         raise UsageError("expected a text to note, got nothing; write: labrig note RUN 'the text'")
@@ -224,6 +279,25 @@ def add_note(run: Path, text: str, written_time: float) -> Path:
 
 
 def read_notes(run: Path) -> str:
-    """All that was noted, as written; empty if nothing was."""
+    """Read the notes on a run.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+
+    Returns
+    -------
+    str
+        All notes in Markdown, as written; empty if there are none.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import add_note, read_notes
+    >>> _ = add_note(Path("runs/decay"), "Room light on behind the door.", 1_767_225_600.0)
+    >>> print(read_notes(Path("runs/decay")).strip().splitlines()[-1])
+    Room light on behind the door.
+    """
     path = run / _NAME
     return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""

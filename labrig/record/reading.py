@@ -115,14 +115,33 @@ def _within(part: str, attempt: Attempt) -> Attempt | None:
 
 
 def read_run(run: str | os.PathLike[str]) -> RunRecord:
-    """Read the journal of the run in the folder `run`.
+    """Read the journal of a run.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+
+    Returns
+    -------
+    RunRecord
+        Attempts at the units of the run, with the frames, actions and temperatures of each.
 
     Raises
     ------
     DataError
-        Not a run folder, or its journal is damaged or was edited into something that does not fit.
+        If this is not a run folder, or if its journal is damaged or was edited inconsistently.
     DiskError
-        The disk does not give it back.
+        If the journal cannot be read.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> run = labrig.read_run("runs/decay")
+    >>> list(run.completed())
+    ['dark', 'meter', 'decay-1']
+    >>> len(run.frames("decay"))
+    18
     """
     folder = Path(run)
     record = run_record(folder, read_journal(folder / JOURNAL))

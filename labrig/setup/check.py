@@ -168,14 +168,37 @@ class RigReport:
 
 
 def check_rig(stand: Bench) -> RigReport:
-    """Open the rig, look at every device, bring it to its safe state.
+    """Identify and exercise every device of a rig, and bring the rig to its safe state.
 
-    Each device is exercised as its role says, unless its settings would spoil photometry.
+    A device is exercised as its role defines, unless its settings would spoil photometry.
+
+    Parameters
+    ----------
+    stand
+        Bench whose devices are not open.
+
+    Returns
+    -------
+    RigReport
+        Identity, settings and measured times of every device.
 
     Raises
     ------
     DeviceError
-        A device could not be opened; nothing was exercised.
+        If a device cannot be opened; nothing was exercised then.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.setup import check_rig
+    >>> rig_file = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> with labrig.open_bench(rig_file, "rig.yaml") as bench:
+    ...     report = check_rig(bench)
+    >>> [device.key for device in report.devices]
+    ['lamp', 'shield', 'door', 'camera', 'changer', 'thermometer']
+    >>> report.failures, report.refusals
+    ((), ())
     """
     report: RigReport | None = None
     try:

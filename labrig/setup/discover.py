@@ -103,12 +103,32 @@ class Discovery:
 
 
 def discover(around: Host, drivers: Collection[str]) -> Discovery:
-    """Look at every serial port and every USB camera; nothing is sent to any of them.
+    """List serial ports and USB cameras with their entries for a rig file.
+
+    Nothing is sent to any of the devices.
 
     Parameters
     ----------
+    around
+        PC whose devices are listed, such as `Host.of_this_pc()`.
     drivers
-        Names of installed drivers.
+        Names of the installed drivers.
+
+    Returns
+    -------
+    Discovery
+        Ports, cameras and notes.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from labrig.setup import Host, discover
+    >>> port = SimpleNamespace(
+    ...     device="/dev/ttyACM0", description="", vid=0x2A19, pid=0x0C01, serial_number=None
+    ... )
+    >>> pc = Host("linux", ports=lambda: [port], usb_devices=list, processes=list)
+    >>> discover(pc, ["numato_relay"]).ports[0].snippet
+    'lamp: {driver: numato_relay, address: "/dev/ttyACM0", relay: 0, warm_up: 15 min}'
     """
     ports = tuple(
         _serial(port, drivers) for port in sorted(around.ports(), key=lambda port: port.device)

@@ -22,27 +22,43 @@ _EYES = (VIEWFINDER.key, CAMERA.key)
 def view_rig(
     rig_path: Path, protocol_path: Path | None, port: int, tell: Callable[[str], None]
 ) -> Never:
-    """Show a rig's live view until somebody stops it.
+    """Show the live view of a rig in the browser until it is interrupted.
 
     Parameters
     ----------
     rig_path
-        The rig file.
+        Rig file.
     protocol_path
-        The protocol file in which regions are written, if any.
+        Protocol file to which regions are written; None for a page without regions.
     port
-        On 127.0.0.1; 0 for any free one.
+        TCP port on 127.0.0.1; 0 for any that is free.
     tell
-        Called once with the page's address.
+        Function that is called once, with the address of the page.
 
     Raises
     ------
     Interrupted
-        How it ends: the devices are safe, the viewfinder is off.
+        When somebody stops it; the devices are then safe and the viewfinder is off.
     UsageError
-        A malformed file, a port that is taken, or a rig without live view.
+        If a file is malformed, the port is taken, or the rig has no live view.
     DeviceError
-        A device that fails.
+        If a device fails.
+
+    Examples
+    --------
+    >>> import signal
+    >>> from pathlib import Path
+    >>> from labrig.clock import Interrupted
+    >>> from labrig.setup import view_rig
+    >>> def tell(url):
+    ...     print(url.partition(":")[0])
+    ...     raise Interrupted(signal.SIGINT)  # Ctrl-C, as soon as the page is served
+    >>> try:
+    ...     view_rig(Path("runs/decay/rig.yaml"), None, 0, tell)
+    ... except Interrupted:
+    ...     print("devices are safe")
+    http
+    devices are safe
     """
     protocol = None if protocol_path is None else AimedProtocol(protocol_path)
     file = read_rig_file(rig_path)

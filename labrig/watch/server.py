@@ -187,25 +187,46 @@ LOOK_PERIOD_S = 0.3
 
 
 def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -> Never:
-    """Show a run until somebody stops it; the run itself is not touched.
+    """Show a run in the browser while it is recorded, until it is interrupted.
+
+    The run itself is only read.
 
     Parameters
     ----------
+    run
+        Run folder.
     port
-        On 127.0.0.1; 0 for any free one.
+        TCP port on 127.0.0.1; 0 for any that is free.
     clock
-        The PC's.
+        Clock of the PC; its waits are where an interruption is answered.
     tell
-        Called once with the page's address.
+        Function that is called once, with the address of the page.
 
     Raises
     ------
     Interrupted
-        How it ends.
+        When somebody stops it.
     UsageError
-        Not a run folder, or a port that is taken.
+        If this is not a run folder, or the port is taken.
     DataError
-        The run's journal is damaged.
+        If the journal of the run is damaged.
+
+    Examples
+    --------
+    >>> import signal
+    >>> from pathlib import Path
+    >>> from labrig.clock import Interrupted, SystemClock
+    >>> from labrig.watch import watch_run
+    >>> clock = SystemClock()
+    >>> def tell(url):
+    ...     print(url.partition(":")[0])
+    ...     clock.interrupt(signal.SIGINT)  # Ctrl-C, as soon as the page is served
+    >>> try:
+    ...     watch_run(Path("runs/decay"), 0, clock, tell)
+    ... except Interrupted:
+    ...     print("stopped")
+    http
+    stopped
     """
     following = RunFollower(run)
     following.look()
