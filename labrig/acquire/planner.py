@@ -1,4 +1,4 @@
-"""The plan: the protocol's own code run on devices that only take the time they would need."""
+"""The plan: the protocol's own code run on stand-ins that take the time of the devices."""
 
 import json
 from collections.abc import Callable, Sequence
@@ -19,7 +19,7 @@ from labrig.quantity import duration_text
 from labrig.record import PERSON, ActionRecord, FrameRecord
 from labrig.yaml_file import validate
 
-#: More than any run has, and laid out in about a second.
+#: Largest number of steps: more than any run has, and laid out in about a second.
 MOST_STEPS = 50_000
 
 T = TypeVar("T")
@@ -27,7 +27,19 @@ T = TypeVar("T")
 
 @dataclass(frozen=True)
 class Step:
-    """One line of the timeline; `at_s` counts from the start of the run."""
+    """One line of the timeline.
+
+    Attributes
+    ----------
+    at_s
+        Begin of the step in seconds after the start of the run.
+    unit
+        Name of the unit.
+    device
+        Key of the device, `PERSON` for a step by hand, `-` for a wait or a warning.
+    action
+        Action as text.
+    """
 
     at_s: float
     unit: str
@@ -37,7 +49,21 @@ class Step:
 
 @dataclass(frozen=True)
 class Plan:
-    """All that will happen, at the latest and at most."""
+    """Timeline of a run, with the longest durations and the largest number of frames.
+
+    Attributes
+    ----------
+    steps
+        Steps in order of time.
+    units
+        Names of the units in order.
+    unit_ends_s
+        End of each unit in seconds after the start of the run.
+    frames
+        Number of frames.
+    offers
+        Settings that the camera offers.
+    """
 
     steps: tuple[Step, ...]
     units: tuple[str, ...]
@@ -47,21 +73,21 @@ class Plan:
 
     @property
     def duration_s(self) -> float:
-        """Lab time of the whole run."""
+        """Lab time of the whole run in seconds."""
         return self.unit_ends_s[-1] if self.unit_ends_s else 0.0
 
     @property
     def size_bytes(self) -> int:
-        """What the frames will take on disk."""
+        """Size of all frames in bytes."""
         return self.frames * self.offers.frame_bytes
 
     @property
     def manual_steps(self) -> tuple[str, ...]:
-        """What a person does."""
+        """Steps to be done by hand."""
         return tuple(step.action for step in self.steps if step.device == PERSON)
 
     def lines(self) -> list[str]:
-        """The timeline as `@t (+dt) device action`, a heading per unit."""
+        """Return the timeline as lines `@t (+dt) device action`, with a heading for each unit."""
         out, unit, before_s = [], "", 0.0
         for step in self.steps:
             if step.unit != unit:
@@ -75,7 +101,7 @@ class Plan:
         return out
 
     def to_json(self) -> str:
-        """The timeline for a program."""
+        """Return the timeline as JSON."""
         content = {
             "units": self.units,
             "duration_s": self.duration_s,
@@ -150,7 +176,7 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
 
 @dataclass
 class _PlanRecorder:
-    """Recorder and observer of a plan: notes the steps, refuses what comes too late."""
+    """Recorder and observer of a plan, which lists the steps and refuses late ones."""
 
     clock: VirtualClock
     unit: str = ""

@@ -1,4 +1,4 @@
-"""Lights read back while they are relied upon: somebody else may have switched them."""
+"""Read-back of lights during a run, since another program or person may have switched them."""
 
 from collections.abc import Iterable, Iterator
 from typing import cast
@@ -8,7 +8,7 @@ from labrig.acquire.roles import DARK, LIGHTS, ROLES, DeviceAction, Light
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 
-#: How often while something is waited for: with looks every 30 s about once a minute.
+#: Period of readings during waits; checked every 30 s, it is about a minute.
 READ_PERIOD_S = 50.0
 
 
@@ -40,12 +40,12 @@ def lights_that_read_back(rig: Rig) -> dict[str, bool]:
 
 
 class LightReadback:
-    """Compares the lights with what a run has asked of them, where their boards tell.
+    """Comparison of the lights' states with those commanded, for boards that read back.
 
     Parameters
     ----------
     rig
-        Whose lights were made safe, and are switched by nobody else from now on.
+        Rig whose lights are safe, and which nothing else switches from now on.
     """
 
     def __init__(self, rig: Rig) -> None:
@@ -55,28 +55,34 @@ class LightReadback:
 
     @property
     def is_told(self) -> bool:
-        """Whether there is a light whose board tells."""
+        """Whether any light can be read back."""
         return bool(self._read_back)
 
     def asked(self, action: DeviceAction) -> None:
-        """It was begun just now."""
+        """Note an action that was begun just now."""
         if action.device in self._read_back:
             self._read_back[action.device].asked(str(action))
 
     def read_if_due(self) -> None:
-        """Read each whose last reading is long ago; as `read_before`."""
-        for light in self._read_back.values():
-            light.read_if_due()
-
-    def read_before(self, actions: Iterable[DeviceAction]) -> None:
-        """Read each that they will switch.
-
-        A charge that ends now was one only if nobody else has ended it already.
+        """Read every light whose last reading is `READ_PERIOD_S` or longer ago.
 
         Raises
         ------
         DeviceError
-            One is not as it was switched.
+            If a light is not in the state commanded.
+        """
+        for light in self._read_back.values():
+            light.read_if_due()
+
+    def read_before(self, actions: Iterable[DeviceAction]) -> None:
+        """Read the lights that the given actions will switch.
+
+        A charge that ends now is valid only if nothing else has switched the lamp off before.
+
+        Raises
+        ------
+        DeviceError
+            If a light is not in the state commanded.
         """
         for key in {action.device: None for action in actions}:
             if key in self._read_back:

@@ -1,4 +1,4 @@
-"""Drivers as devices of a kind, and protocol files by the model that they name."""
+"""Loading of drivers and protocols by the names under which they are registered."""
 
 from pathlib import Path
 from typing import Any

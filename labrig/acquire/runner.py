@@ -1,4 +1,4 @@
-"""The runner: unit after unit onto the bench and into the run folder."""
+"""The runner: performs the units of a protocol and records them in the run folder."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
@@ -24,13 +24,23 @@ T = TypeVar("T")
 
 
 class RunObserver(Observer, Protocol):
-    """Is also told of units."""
+    """Observer of a run, its units included."""
 
     def unit(self, name: str, number: int, total: int) -> None:
-        """A unit begins."""
+        """Note that a unit begins.
+
+        Parameters
+        ----------
+        name
+            Name of the unit.
+        number
+            Number of the unit, from 1.
+        total
+            Number of units.
+        """
 
     def frame(self, record: FrameRecord) -> None:
-        """A frame was kept."""
+        """Note that a frame was recorded."""
 
 
 def run_units(
@@ -137,7 +147,7 @@ def _run_what_is_left(
 
 
 class _Recorder:
-    """Turns the rig's times into wall times and passes all on to the attempt; tells of frames."""
+    """Recorder that converts the rig's times to wall times and writes to the attempt."""
 
     def __init__(
         self,
@@ -177,7 +187,7 @@ class _Recorder:
         return None if last is None else last.action
 
     def take_back(self) -> None:
-        """The unit of what was done by hand last does not count; this attempt ends."""
+        """Record that the unit of the last manual step no longer counts, and abort this attempt."""
         last, now_s = self._last_manual_step(), self._clock.now()
         assert last is not None, "only what was done is taken back"
         self.acted(TAKEN_BACK, last.unit, now_s, now_s, 0.0)

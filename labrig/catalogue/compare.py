@@ -1,4 +1,4 @@
-"""The same sample on two days: do the numbers agree within what each is certain of?"""
+"""Comparison of two runs of the same sample within their uncertainties."""
 
 import math
 from collections.abc import Mapping
@@ -13,16 +13,26 @@ from labrig.errors import DataError
 from labrig.results import FittedDecay, Measured, read_fitted_decays
 from labrig.yaml_file import read_yaml
 
-#: Chance alone makes two equal sets of numbers differ so much less often than this.
+#: Significance level below which rates differ.
 DIFFERENT_P = 0.01
 NO_GAIN = Measured(1.0, 0.0)
-#: Less than this is not told apart.
+#: Smallest p-value that is reported as a number.
 LEAST_P = 1e-9
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One quantity in both runs; `pull` is the difference B − A in σ of that difference."""
+    """One quantity in two runs.
+
+    Attributes
+    ----------
+    quantity
+        Name of the quantity.
+    unit
+        Unit of the quantity.
+    a, b
+        Values with σ in runs A and B.
+    """
 
     quantity: str
     unit: str
@@ -31,22 +41,26 @@ class Difference:
 
     @property
     def pull(self) -> float:
-        """NaN where nothing is known of the σ."""
+        """Difference B − A in units of its σ; NaN if σ is not known."""
         return self.b.sigmas_from(self.a)
 
 
 @dataclass(frozen=True)
 class PatchComparison:
-    """One patch in both runs.
+    """One patch in two runs.
 
     Attributes
     ----------
+    patch
+        Name of the patch.
+    states
+        Numbers of states in runs A and B.
     differences
-        State by state; empty where the numbers of states differ.
+        Differences of the parameters state by state; empty if the numbers of states differ.
     p_value
-        Probability that equal rates come out as different as these; NaN if they cannot be told.
+        Probability that equal rates differ at least as much as these; NaN if it is not known.
     gain
-        What amplitudes of B were multiplied by, as the reference tells; 1 without one.
+        Factor by which the amplitudes of run B were multiplied; 1 without a reference.
     """
 
     patch: str
@@ -57,7 +71,7 @@ class PatchComparison:
 
     @property
     def assessment(self) -> str:
-        """In words."""
+        """Assessment of the differences as text."""
         if self.states[0] != self.states[1]:
             return f"{self.states[0]} and {self.states[1]} states: fit both with the same --states"
         if math.isnan(self.p_value):
@@ -69,14 +83,16 @@ class PatchComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two runs held against each other.
+    """Comparison of two runs.
 
     Attributes
     ----------
     asked
-        Keys of the protocol that differ, with both values.
+        Keys of the protocol that differ, each with both values.
+    patches
+        Comparisons of the patches fitted in both runs.
     missing
-        Patches that were fitted in only one of the runs.
+        Patches fitted in only one of the runs.
     """
 
     asked: tuple[tuple[str, Any, Any], ...]
@@ -160,7 +176,7 @@ def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_of_b: Measured) -> 
 
 
 def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, FittedDecay]:
-    """By the name of the patch, also where there is only one."""
+    """Return the fits of a run by patch, also where it has one patch only."""
     only = next(iter(protocol.get("patches") or ["sample"]))
     read = read_fitted_decays(run / "result")
     results = {name or only: result for name, result in read.items()}

@@ -1,4 +1,4 @@
-"""One line a run: what it was, how far it came, what it found."""
+"""Summaries of the runs in a folder."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -15,26 +15,36 @@ from labrig.record import read_run
 from labrig.results import FittedDecay, read_fitted_decays
 from labrig.yaml_file import did_you_mean, read_yaml
 
-#: `running`: a labrig is writing to it now; `unfinished`: units are left to do; `recorded`: all
-#: units are there, nothing was made of them; `damaged`: its journal cannot be read.
+#: `running`: a process writes to the run; `unfinished`: units are missing; `recorded`: all units
+#: are complete, without a result; `processed`: with a result; `damaged`: the journal is unreadable.
 RunState = Literal["running", "unfinished", "recorded", "processed", "damaged"]
 STATES: tuple[RunState, ...] = get_args(RunState)
 
 
 @dataclass(frozen=True)
 class RunSummary:
-    """What a run folder holds.
+    """Summary of a run folder.
 
     Attributes
     ----------
+    folder
+        Run folder.
+    sample
+        Name of the sample.
+    protocol
+        Name of the protocol.
     began
-        Of its first attempt, UTC; None before there is one.
-    done, units
-        Completed units, and all; None where the protocol is not installed here.
+        Begin of the first attempt in UTC; None if there is none.
+    state
+        State of the run.
+    done
+        Number of completed units.
+    units
+        Number of all units; None if the protocol is not installed.
     frames
-        Of completed units.
+        Number of frames of completed units.
     results
-        What was fitted to each patch, by its name; "" where there is only one.
+        Fitted decays by patch; by "" if there is one patch only.
     """
 
     folder: Path
@@ -50,7 +60,17 @@ class RunSummary:
 
 @dataclass(frozen=True)
 class RunFilter:
-    """Which runs: sample and protocol by a pattern such as `blue*`, days inclusive and in UTC."""
+    """Filter of runs.
+
+    Attributes
+    ----------
+    sample, protocol
+        Patterns of the names, such as `blue*`, without regard to case.
+    since, until
+        First and last day in UTC, both included.
+    state
+        State of the run; None for any state.
+    """
 
     sample: str = "*"
     protocol: str = "*"
@@ -63,7 +83,7 @@ class RunFilter:
             raise UsageError(f"--state {self.state}: {did_you_mean(self.state, STATES)}")
 
     def admits(self, run: RunSummary) -> bool:
-        """Whether `run` is wanted; one that never began is of no day."""
+        """Whether the filter admits `run`; a run without attempts passes no limits on the day."""
         day = None if run.began is None else run.began.date()
         unbounded = (self.since, self.until) == (date.min, date.max)
         return (
@@ -203,7 +223,7 @@ def _run_folders(runs: Path) -> Iterator[Path]:
 
 
 def _asked(folder: Path) -> tuple[str, str, int | None]:
-    """Sample, protocol, number of units."""
+    """Return sample, protocol and number of units from the protocol file of a run."""
     try:
         content = read_yaml(folder / "protocol.yaml")
     except UsageError:
@@ -247,7 +267,7 @@ def state_of(folder: Path, is_complete: bool) -> RunState:
 
 
 def _is_being_written(folder: Path) -> bool:
-    """Whether a labrig has the run open now."""
+    """Whether a process has the run open for writing."""
     lock = folder / ".lock"
     if not lock.exists():
         return False

@@ -1,4 +1,4 @@
-"""`labrig compare`: a run against predictions, against another material and against the paper."""
+"""`labrig compare`: comparison of a run with predictions, another material and the paper."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -87,7 +87,7 @@ def _tell(section: "Section") -> None:
 
 
 def _draw(section: "Section", folder: Path) -> None:
-    """As PNG to look at and as PDF to print."""
+    """Save the figures of a section as PNG and as PDF."""
     from labrig.report import figure_style
 
     if section.figures:

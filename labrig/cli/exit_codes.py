@@ -1,4 +1,4 @@
-"""How a command ends: an exit code, and one line where something went wrong."""
+"""End of a command: an exit code, and one line for an error."""
 
 import errno
 import re
@@ -11,9 +11,9 @@ from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError, UsageError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
 
-#: Of a file's name, in a message.
+#: Largest number of characters of a file name in a message.
 MOST_SHOWN = 200
-#: What Python makes of bytes of an argument that are no UTF-8.
+#: Surrogates, to which Python decodes bytes of an argument that are not UTF-8.
 _NO_TEXT = re.compile("[\ud800-\udfff]")
 
 
@@ -86,7 +86,7 @@ def _run(arguments: Sequence[str]) -> int:
 
 
 def _fault(error: Exception) -> str:
-    """A fault of labrig's own: the traceback goes to a file that can be sent along."""
+    """Write the traceback of a fault of labrig to a file and return a message that names it."""
     import tempfile
     import traceback
 

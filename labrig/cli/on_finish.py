@@ -1,4 +1,4 @@
-"""What the rig file wants done when a run has ended, however it ended: a bell, a command."""
+"""Notification at the end of a run, as the rig file asks for: a bell or a command."""
 
 import os
 import subprocess
@@ -10,26 +10,27 @@ from dataclasses import dataclass
 from labrig.clock import Interrupted
 from labrig.errors import LabrigError
 
-#: Nobody waits for longer for a message to be sent.
+#: Longest duration of the command.
 COMMAND_TIMEOUT_S = 30.0
 
 
 @dataclass
 class Ending:
-    """What there is to tell at the end."""
+    """Message about the end of a run."""
 
     message: str = ""
 
 
 @contextmanager
 def printed_at_end(on_finish: str | Sequence[str] | None) -> Iterator[Ending]:
-    """Tell whoever waits, when what is inside has ended; devices are safe by then.
+    """Notify when the body has ended, however it ended; devices are safe by then.
 
     Parameters
     ----------
     on_finish
-        `bell`, or a command and its arguments. The command finds in its environment
-        `LABRIG_STATUS` (`done`, `interrupted`, `failed`) and `LABRIG_MESSAGE`, one line.
+        `bell`, or a command with its arguments; None for no notification. The command finds in its
+        environment `LABRIG_STATUS` (`done`, `interrupted`, `failed`) and `LABRIG_MESSAGE`, one
+        line.
     """
     ending = Ending()
     try:
@@ -51,7 +52,7 @@ def _tell(on_finish: str | Sequence[str] | None, status: str, message: str) -> N
 
 
 def _call(command: Sequence[str], said: dict[str, str]) -> None:
-    """A command that fails is worth a warning, not more: the run is over and kept."""
+    """Run a command; a failure of it is only a warning, since the run is over and kept."""
     try:
         subprocess.run(
             list(command),

@@ -1,4 +1,4 @@
-"""`labrig plan --predict`: what a protocol's fits will know, and what would halve that."""
+"""`labrig plan --predict`: expected uncertainties, and changes that would halve them."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -33,11 +33,11 @@ MeteredOption = Annotated[
     ),
 ]
 
-#: Fractions of the variance that are worth a word.
+#: Fraction of the variance from which a source of noise is listed.
 WORTH_SAYING = 0.1
-#: σ of a rate or an amplitude beyond which it is hardly known.
+#: Relative σ of a rate or an amplitude from which a warning is given.
 HARDLY_KNOWN = 0.5
-#: Differences in lab time below this fraction of it are none.
+#: Fraction of the lab time below which a difference counts as none.
 SAME_TIME = 0.005
 
 
@@ -49,7 +49,7 @@ def predict_and_print(
     *,
     json: bool,
 ) -> None:
-    """Predict for a protocol that fits its rig, and print that."""
+    """Predict the uncertainties of a protocol on its rig and print them."""
     from labrig.bench_optics import calibration, camera_curves
     from labrig.calibration import LVF_KIND
     from labrig.predict import Sources, predict
@@ -127,7 +127,7 @@ def _noise(found: "PatchPrediction", state: int) -> str:
 
 
 def _doubts(prediction: "Prediction", patch: str) -> list[str]:
-    """What the fit will not tell, and which change makes it."""
+    """Return warnings on states that the fit will not resolve, with a change that would help."""
     found, said = prediction.patches[patch], []
     if not found.resolves_all_states:
         able = [

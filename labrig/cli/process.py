@@ -56,7 +56,7 @@ def process(
 
 
 def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
-    """Process the run in `run` and print what came out."""
+    """Process the run in the folder `run` and print its result."""
     from labrig.process import process_and_report
 
     done = process_and_report(run, overrides)

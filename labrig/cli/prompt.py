@@ -1,4 +1,4 @@
-"""Asks the person at the terminal to do something by hand, and waits for the answer."""
+"""Prompt for manual steps at the terminal."""
 
 import queue
 import sys
@@ -11,14 +11,14 @@ from labrig.acquire import ManualStep
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
 
-#: What takes back the step before.
+#: Answer that undoes the previous step.
 UNDO = "undo"
-#: How often it is looked whether somebody wants to stop.
+#: Period in which an interruption is looked for.
 LOOK_UP_S = 0.05
 
 
 class Terminal:
-    """Reads lines beside the run, so that Ctrl-C and long waits are answered in the meantime."""
+    """Reader of lines from the terminal in a thread, so that a run can be interrupted."""
 
     def __init__(self) -> None:
         self._lines: queue.Queue[str] = queue.Queue()
@@ -28,12 +28,12 @@ class Terminal:
     def ask(
         self, step: ManualStep, last: str | None, left_s: float, meanwhile: Callable[[], None]
     ) -> str | None:
-        """A remark, mostly empty; None to take back `last`.
+        """Ask for a step to be done and return the remark, mostly empty; None to undo `last`.
 
         Raises
         ------
         UsageError
-            Nobody can answer here.
+            If the input has ended, so that nobody can answer.
         """
         self._read()
         while not self._lines.empty():
@@ -68,7 +68,7 @@ class Terminal:
         self._ended.set()
 
     def _next_line(self, meanwhile: Callable[[], None]) -> str | None:
-        """What was typed; None if nothing can be any more."""
+        """Return the next line of input; None if the input has ended."""
         while True:
             meanwhile()
             ended = self._ended.is_set()  # asked first: what came before the end counts

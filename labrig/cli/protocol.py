@@ -1,4 +1,4 @@
-"""`labrig protocol`: what protocols there are, and a file of one's own to begin with."""
+"""`labrig protocol`: shipped protocols, and copies of them to be edited."""
 
 from pathlib import Path
 from typing import Annotated

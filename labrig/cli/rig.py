@@ -1,4 +1,4 @@
-"""`labrig rig`: what is plugged in, and whether a rig works."""
+"""`labrig rig`: discovery of devices and check of a rig."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated

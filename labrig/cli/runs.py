@@ -1,4 +1,4 @@
-"""`labrig runs` and `labrig note`: what was measured, and what there is to say about it."""
+"""`labrig runs` and `labrig note`: recorded runs and notes on them."""
 
 import itertools
 import math
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class _ListsByDefault(TyperGroup):
-    """`labrig runs --since 2026-11-20` is `labrig runs list --since 2026-11-20`."""
+    """Group whose default command is `list`: `labrig runs --since 2026-11-20` needs no `list`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         is_bare = not args or (args[0].startswith("-") and args[0] not in ctx.help_option_names)
@@ -191,7 +191,7 @@ def _print_comparison(comparison: "Comparison") -> None:
 
 
 def _print_results(folder: Path) -> None:
-    """Each result and what it was made with otherwise than the one before it."""
+    """Print each result and the settings in which it differs from the one before it."""
     from labrig.process import other_settings
     from labrig.results import read_fitted_decays
 
@@ -207,7 +207,7 @@ def _print_results(folder: Path) -> None:
 
 
 def _result_folders(folder: Path) -> list[str]:
-    """The latest result first, then the earlier ones from new to old."""
+    """Return the names of the result folders from new to old, the latest first."""
     earlier = sorted(
         (path.name for path in folder.glob("result-*") if path.name[7:].isdecimal()),
         key=lambda name: -int(name[7:]),
@@ -223,7 +223,7 @@ def _rates(patch: str, result: "FittedDecay") -> str:
 
 
 def _short_rates(patch: str, result: "FittedDecay") -> str:
-    """With σ in units of the last places, so that a line holds them."""
+    """Return the rates with σ in units of the last digits, so that they fit on a line."""
     from labrig.results import with_uncertainty
 
     rates = ",  ".join(with_uncertainty(rate.value, rate.sigma) for rate in result.rates)

@@ -1,4 +1,4 @@
-"""A comparison as plain numbers, for programs."""
+"""Conversion of a comparison to plain numbers."""
 
 import math
 from typing import Any
@@ -82,7 +82,7 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
 
 
 def _plain(item: Any) -> Any:
-    """JSON knows no infinity and no NaN, and keys are texts."""
+    """Replace infinity and NaN, which JSON does not have, by None, and keys by text."""
     if isinstance(item, dict):
         return {str(key): _plain(value) for key, value in item.items()}
     if isinstance(item, list):

@@ -1,4 +1,4 @@
-"""A decay run held against predictions, against other materials and against the paper."""
+"""Comparison of a decay run with predictions, other materials and the paper."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -38,16 +38,16 @@ from labrig.yaml_file import did_you_mean, read_yaml
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPatch:
-    """What a result folder holds of one patch.
+    """Result of one patch.
 
     Attributes
     ----------
     series
-        Usable frames by time, the offsets that the fit found subtracted.
+        Usable frames in order of time, with the fitted offsets subtracted.
     flicker
-        As the fit found it.
+        Fitted relative common-mode noise.
     material
-        Its file: that of all parts, where a chain has made one, else the decay's own.
+        Material file: that of the whole chain if there is one, else that of the decay.
     """
 
     series: Series
@@ -56,19 +56,19 @@ class MeasuredPatch:
 
     @property
     def name(self) -> str:
-        """Of the patch, or of the sample if there is only one."""
+        """Name of the patch, or of the sample if there is one patch only."""
         return self.series.region
 
 
 def read_patches(run: Path) -> dict[str, MeasuredPatch]:
-    """By name: every patch with a decay fit in a run's latest result.
+    """Read every patch with a decay fit in a run's latest result, by name.
 
     Raises
     ------
     UsageError
-        Not a run folder.
+        If this is not a run folder.
     DataError
-        There is no result with a fit, or it is damaged.
+        If there is no result with a fit, or it is damaged.
     """
     if not (run / "protocol.yaml").is_file():
         raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
@@ -108,27 +108,35 @@ def _read_patch(place: Path, name: str | None, of_chain: Path) -> MeasuredPatch:
     )
 
 
-#: Numbers of states of which the glow is predicted, as in the paper's fig. 8.
+#: Numbers of states for which the glow is predicted, as in fig. 8 of Nalbach et al.
 PREDICTED = (1, 2)
-#: Name of the prediction by the material file asked for.
+#: Name of the prediction from the reference material.
 MATERIAL = "material"
 
 
 @dataclass(frozen=True, eq=False)
 class RunComparison:
-    """All that was compared of one run.
+    """Comparison of one run.
 
     Attributes
     ----------
-    camera, white
-        By whose curves colours are seen (None: not known), and with which white.
+    camera
+        Spectral responses of the camera; None if they are not known.
+    white
+        CIE illuminant that is the white of CIELAB.
     words
-        White, normalisation and where the predicted colours come from.
+        Description of white, normalisation and source of the predicted colours.
+    glows
+        Photographed and predicted glow of each patch.
+    residuals
+        Residuals of each patch and weighting.
+    beside
+        Comparisons of measured with reference materials.
     spectra
-        Of what the patches emit as far as it is known, of the materials asked for and of Table 1,
-        each with the grid it is known on.
+        Emission spectra in three channels, each with its resolution: those of the patches where
+        known, of the reference materials and of Table 1.
     left_out
-        What could not be compared, and why.
+        Comparisons that are not possible, with the reason.
     """
 
     camera: CameraResponse | None
@@ -234,7 +242,10 @@ def compare_run(
 
 
 def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Material]:
-    """Materials by patch; without one, the patch of the same name or the only one."""
+    """Return the reference materials by patch.
+
+    A material without a patch belongs to the patch of the same name or to the only one.
+    """
     found: dict[str, Material] = {}
     for text in materials:
         named, _, name = text.rpartition("=")
@@ -251,7 +262,7 @@ def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Mat
 
 
 def _camera(folder: Path, instead: str | None) -> tuple[CameraResponse | None, list[str]]:
-    """The curves asked for, else those the run was processed with, and why there are none."""
+    """Return the curves requested, else those of the processing, and why there are none."""
     rig = read_rig_file(folder / "rig.yaml")
     try:
         lvf = read_result(folder).provides().get("lvf") or calibration(rig, LVF_KIND)
@@ -268,7 +279,7 @@ def _expected(
     reference: Material | None,
     camera: CameraResponse | None,
 ) -> dict[str, FloatArray]:
-    """What is predicted for each photograph, (n, C), by the name of the prediction."""
+    """Return the predictions for each photograph by name, shape (n, C)."""
     series, spectrum = patch.series, emission(patch.material)
     expected = {}
     for number in PREDICTED:
@@ -284,7 +295,7 @@ def _expected(
 def _curves_source(
     patches: Sequence[MeasuredPatch], camera: CameraResponse | None, with_material: bool
 ) -> Iterator[str]:
-    """Where the colours of the predictions come from."""
+    """Yield sentences on the source of the predicted colours."""
     if camera is not None and all(emission(patch.material) for patch in patches):
         yield "The predicted colour is that of the measured spectrum, by the camera's curves."
     else:
@@ -302,7 +313,7 @@ def _spectra(
     camera: CameraResponse,
     white: str,
 ) -> tuple[tuple[ThreeChannels, str], ...]:
-    """Of measured materials first; of those of the same name only the first."""
+    """Return the spectra of all materials, measured ones first; of equal names only the first."""
     known: dict[str, Material] = {}
     for material in (
         *(patch.material for patch in patches.values()),

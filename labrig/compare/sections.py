@@ -1,4 +1,4 @@
-"""A comparison as parts of a page: text, figures, tables."""
+"""Layout of a comparison as sections of a page: text, figures, tables."""
 
 from collections.abc import Iterator
 from functools import partial

@@ -1,4 +1,4 @@
-"""Spectra, what three functions make of them, and their colours (Nalbach et al., fig. 9)."""
+"""Spectra, their approximations by three functions and their colours (Nalbach et al., fig. 9)."""
 
 import math
 from collections.abc import Sequence
@@ -29,15 +29,15 @@ COLUMNS = 3
 PANEL_HEIGHT_PT, LEGEND_PT, BELOW_PT, LEFT_PT = 112.0, 22.0, 18.0, 16.0
 FROM_NM, TO_NM = 395.0, 705.0
 TICKS_NM = (400, 500, 600, 700)
-#: The outer labels end with their axes, so that neighbours stay apart.
+#: Alignment of the labels: the outer ones end with their axes, so that panels stay apart.
 _SIDES: tuple[Literal["left", "center", "right"], ...] = ("left", "center", "center", "right")
 TICK_PT = 8.5
-#: Vertical axes end here: above 1 is room for the colours.
+#: Upper limit of the vertical axes, with space for the colours above 1.
 HIGHEST = 1.4
 
 
 def spectra_figure(found: Sequence[ThreeChannels]) -> Figure:
-    """A panel for each spectrum; its colour and that from R, G, B side by side in a corner."""
+    """Draw a panel for each spectrum, with its colour next to the colour from R, G, B."""
     rows = math.ceil(len(found) / COLUMNS)
     height = LEGEND_PT + rows * PANEL_HEIGHT_PT + BELOW_PT
     figure = new_figure(height)
@@ -92,7 +92,7 @@ def spectra_figure(found: Sequence[ThreeChannels]) -> Figure:
 
 
 def _on_screen(xyz: FloatArray) -> FloatArray:
-    """Linear sRGB, the brightest channel 1."""
+    """Return linear sRGB of X, Y, Z with a maximum of 1, shape (3,)."""
     import colour
 
     linear = into_gamut(np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB) @ xyz)

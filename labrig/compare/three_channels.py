@@ -1,8 +1,8 @@
-"""How well three channels represent a spectrum (Nalbach et al., fig. 9).
+"""Representation of spectra in three channels (Nalbach et al., fig. 9).
 
-A camera's R, G, B and a 3 × 3 matrix see the colour of a spectrum exactly only if its curves are
-a linear transform of the observer's colour-matching functions. And the best spectrum that can be
-made of three numbers, a weighted sum of those functions, leaves out what is narrower than they are.
+A camera's R, G, B with a 3 × 3 matrix give the exact colour of a spectrum only if its curves are
+a linear transform of the observer's colour-matching functions. The best approximation of a
+spectrum by three numbers, a weighted sum of those functions, lacks features narrower than they.
 """
 
 from collections.abc import Sequence
@@ -27,21 +27,26 @@ from labrig.report import Table
 
 @dataclass(frozen=True, eq=False)
 class ThreeChannels:
-    """One spectrum, and what is left of it in three channels.
+    """A spectrum and its representation in three channels.
 
     Attributes
     ----------
+    name
+        Name of the spectrum.
     wavelength_nm
-        Shape (n,).
-    spectrum, approximation
-        Shape (n,): relative, and the best weighted sum of the colour-matching functions.
+        Wavelengths in nm, shape (n,).
+    spectrum
+        Relative spectral power, shape (n,).
+    approximation
+        Best weighted sum of the colour-matching functions, shape (n,).
     missed
-        RMS of their difference over that of the spectrum, 0 to 1.
-    xyz, xyz_from_rgb
-        Shape (3,): of the spectrum, and of the camera's R, G, B by the best 3 × 3; the former just
-        reaches the white in X, Y or Z.
+        RMS of the difference of the two over the RMS of the spectrum, 0 to 1.
+    xyz
+        X, Y, Z of the spectrum, shape (3,), scaled so that it just reaches the white in X, Y or Z.
+    xyz_from_rgb
+        X, Y, Z from the camera's R, G, B by the best 3 × 3 matrix, shape (3,), on the same scale.
     delta_e
-        CIEDE2000 of the two.
+        CIEDE2000 between the two colours.
     """
 
     name: str
@@ -124,7 +129,7 @@ def three_channels(
 
 
 def best_matrix(camera: CameraResponse, eye: Observer) -> FloatArray:
-    """M, shape (3, 3), for which M · (R, G, B) is nearest to X, Y, Z over all wavelengths."""
+    """Return the matrix from R, G, B to X, Y, Z by least squares over wavelengths, shape (3, 3)."""
     fitted = np.linalg.lstsq(camera.at(eye.wavelength_nm), eye.functions, rcond=None)[0]
     return np.asarray(fitted.T)
 
@@ -132,7 +137,7 @@ def best_matrix(camera: CameraResponse, eye: Observer) -> FloatArray:
 def three_channels_table(
     found: Sequence[tuple[ThreeChannels, str]], camera: CameraResponse, white: str
 ) -> Table:
-    """A row for each material, with the grid on which its spectrum is known."""
+    """Return a table with a row for each material and the resolution of its spectrum."""
     return Table(
         head=("material", "spectrum of", "ΔE2000 from R, G, B", "missed by three functions / %"),
         rows=tuple(

@@ -1,4 +1,4 @@
-"""The result of a run for xarray, for notebooks."""
+"""Export of a result to xarray."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +24,7 @@ from labrig.results import (
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
-#: Attributes of variables: xarray's plots write them at the axes.
+#: Attributes of variables, with which xarray labels axes.
 SECONDS, PER_S, DN_PER_S = {"units": "s"}, {"units": "1/s"}, {"units": "DN/s"}
 AFTER_LAMP_OFF = {"long_name": "start of the exposure after lamp off"}
 
@@ -119,7 +119,7 @@ def tree_of(result: RunResult, attributes: Mapping[str, str] | None = None) -> "
 
 
 def _nodes(result: RunResult) -> "dict[str, Dataset]":
-    """The nodes of a tree by their paths."""
+    """Return the nodes of a result's tree by path."""
     import xarray
 
     if isinstance(result, DecayResult):
@@ -139,7 +139,7 @@ def _nodes(result: RunResult) -> "dict[str, Dataset]":
 
 
 def _columns(dimension: str, name: str, value: Any) -> dict[str, Column]:
-    """A field as a variable, with its σ if it has one; nothing where it is empty or no number."""
+    """Return a field as variable, with its σ if it has one; empty for other values."""
     if isinstance(value, Measured):
         unit = {"units": value.unit}
         return {name: ((), value.value, unit), f"{name}_sigma": ((), value.sigma, unit)}
@@ -179,7 +179,7 @@ def _decay(result: DecayResult, attributes: Mapping[str, str]) -> "Dataset":
 
 
 def _attributes(folder: Path) -> dict[str, str]:
-    """What the journal says of the whole run."""
+    """Return the attributes of the whole run from its journal."""
     completed = read_run(folder).completed()
     start = next(iter(completed.values())).start if completed else {}
     known = {
@@ -189,7 +189,7 @@ def _attributes(folder: Path) -> dict[str, str]:
 
 
 def _measured(patches: Sequence[Series]) -> dict[str, Column]:
-    """Every patch was measured in the same frames."""
+    """Return the signals of all patches, which were measured in the same frames."""
     dimensions = ("patch", "frame", "channel")
     values = np.stack([series.values for series in patches])
     flags = np.stack([np.array(series.flag) for series in patches])

@@ -1,7 +1,7 @@
-"""run.nxs: a run and its result in one NeXus file that opens on the decay.
+"""Export of a run and its result to a NeXus file `run.nxs`, whose default plot is the decay.
 
-Base classes as in the NeXus manual (manual.nexusformat.org/classes/base_classes); no application
-definition describes a decay.
+Base classes are those of the NeXus manual (manual.nexusformat.org/classes/base_classes); no
+application definition describes a decay.
 """
 
 import json
@@ -35,7 +35,7 @@ TEXT = h5py.string_dtype()
 
 
 def add_group(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
-    """A new group of that NeXus class."""
+    """Add a group of a NeXus class and return it."""
     group = parent.create_group(name)
     group.attrs["NX_class"] = nx_class
     return group
@@ -44,12 +44,20 @@ def add_group(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
 def add_number(
     group: h5py.Group, name: str, value: ArrayLike, units: str = "", long_name: str = ""
 ) -> h5py.Dataset:
-    """A new field of numbers, without units a pure one.
+    """Add a field of numbers and return it.
 
     Parameters
     ----------
+    group
+        Group to which the field is added.
+    name
+        Name of the field.
+    value
+        Numbers of any shape.
+    units
+        Units of the numbers; empty for dimensionless ones.
     long_name
-        What a plot writes at its axis.
+        Label of the axis in plots.
     """
     field = group.create_dataset(name, data=np.asarray(value), track_times=False)
     field.attrs["units"] = units
@@ -59,13 +67,13 @@ def add_number(
 
 
 def add_text(group: h5py.Group, name: str, value: str | Sequence[str]) -> h5py.Dataset:
-    """A new field of one text or several."""
+    """Add a field of one text or several and return it."""
     data = value if isinstance(value, str) else np.array(value, dtype=object)
     return group.create_dataset(name, data=data, dtype=TEXT, track_times=False)
 
 
 def add_note(parent: h5py.Group, name: str, text: str, kind: str, file_name: str = "") -> None:
-    """A new NXnote: a text with its media type, and the file that it is."""
+    """Add an NXnote: a text with its media type and the name of its file."""
     note = add_group(parent, name, "NXnote")
     add_text(note, "type", kind)
     if file_name:
@@ -74,7 +82,7 @@ def add_note(parent: h5py.Group, name: str, text: str, kind: str, file_name: str
 
 
 def add_fields(entry: h5py.Group, result: RunResult, name: str, version: str) -> None:
-    """An NXprocess `name` with the fields of a result; those of fields in groups of their own."""
+    """Add an NXprocess with the fields of a result; fields within fields become groups."""
     (valid,) = valid_names([name])
     process = add_group(entry, valid, "NXprocess")
     add_text(process, "program", "labrig")
@@ -89,12 +97,12 @@ def add_fields(entry: h5py.Group, result: RunResult, name: str, version: str) ->
 
 
 def _valid(*names: str) -> list[str]:
-    """Each as NeXus allows it; names on one path may be the same."""
+    """Return names that NeXus allows; names along one path may be equal."""
     return [valid_names([name])[0] for name in names]
 
 
 def _add(group: h5py.Group, name: str, field: str, value: Any) -> None:
-    """Numbers or texts of any shape; what is neither is written as text."""
+    """Add a field of numbers or texts of any shape; other values are added as text."""
     if isinstance(value, Measured):
         add_number(group, name, value.value, value.unit)
         add_number(group, f"{name}_errors", value.sigma, value.unit)
@@ -117,12 +125,12 @@ def _add(group: h5py.Group, name: str, field: str, value: Any) -> None:
 
 
 DN_PER_S = "DN/s"
-#: silx and h5web plot it so: a decay is looked at on a logarithmic scale.
+#: Plot style by which silx and h5web show a decay on a logarithmic scale.
 LOGARITHMIC = json.dumps({"signal_scale_type": "log"})
 
 
 def valid_names(names: Sequence[str]) -> list[str]:
-    """Names that NeXus allows (letters of ASCII, digits, underscores), each of them once."""
+    """Return distinct names that NeXus allows: ASCII letters, digits and underscores."""
     valid: list[str] = []
     for name in names:
         allowed = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "unnamed"
@@ -133,7 +141,7 @@ def valid_names(names: Sequence[str]) -> list[str]:
 
 
 def add_decays(entry: h5py.Group, name: str, title: str, patch: DecayPatch) -> None:
-    """An NXdata `decay_1_<name>` for each decay of a patch; the first is the entry's default."""
+    """Add an NXdata `decay_1_<name>` for each decay of a patch; the first is the default plot."""
     for decay, rows in _decays(patch.series):
         series = patch.series.take(rows)
         data = _add_plot(entry, f"{decay}_{name}", title, patch, series)
@@ -154,7 +162,7 @@ def add_decays(entry: h5py.Group, name: str, title: str, patch: DecayPatch) -> N
 
 
 def add_fit(entry: h5py.Group, name: str, title: str, patch: DecayPatch, version: str) -> None:
-    """An NXprocess `fit_<name>`: parameters, curves, residuals, or why there is no fit."""
+    """Add an NXprocess `fit_<name>` with parameters, curves and residuals, or the failure."""
     process, fit = add_group(entry, f"fit_{name}", "NXprocess"), patch.fit
     add_text(process, "program", "labrig")
     add_text(process, "version", version)
@@ -180,7 +188,7 @@ def add_fit(entry: h5py.Group, name: str, title: str, patch: DecayPatch, version
 
 
 def _decays(series: Series) -> Iterator[tuple[str, NDArray[np.intp]]]:
-    """Name and rows of each decay: repeats are plotted apart."""
+    """Yield name and rows of each decay, since repeated decays are plotted apart."""
     units = list(dict.fromkeys(series.unit))
     for unit, name in zip(units, valid_names(units), strict=True):
         yield name, np.flatnonzero(np.array(series.unit) == unit)
@@ -189,7 +197,7 @@ def _decays(series: Series) -> Iterator[tuple[str, NDArray[np.intp]]]:
 def _add_plot(
     parent: h5py.Group, name: str, title: str, patch: DecayPatch, series: Series
 ) -> h5py.Group:
-    """A new NXdata with its time axis, that shows the brightest channel first."""
+    """Add an NXdata with its time axis, whose signal is the brightest channel, and return it."""
     data = add_group(parent, name, "NXdata")
     add_text(data, "title", f"{title}, {series.unit[0]}")
     data.attrs["axes"] = ["time"]
@@ -229,7 +237,7 @@ def _add_parameters(process: h5py.Group, fit: FittedDecay) -> None:
 
 
 def _brightest(patch: DecayPatch) -> int:
-    """Number of the channel that a plot shows first."""
+    """Return the index of the channel that a plot shows first."""
     if patch.fit is not None:
         return patch.fit.brightest
     return int(np.argmax(patch.series.values.mean(axis=0)))
@@ -334,7 +342,7 @@ def _subject(result: RunResult) -> str:
 
 
 def _add_results(entry: h5py.Group, result: RunResult, version: str, part: str = "") -> None:
-    """Decays as plots with their fits, all other results field by field; of a chain every part."""
+    """Add decays with their fits, other results field by field, and every part of a chain."""
     if isinstance(result, PhosphorResult):
         for name, one in result.parts.items():
             _add_results(entry, one, version, name)
@@ -360,7 +368,7 @@ def _add_device(
 
 
 def _add_frames(camera: h5py.Group, run: RunRecord, start_time: float) -> None:
-    """Every frame of completed units: when, how, and how to know the file again."""
+    """Add time, settings and checksum of every frame of completed units."""
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     seconds = np.array([(frame.start_time, frame.end_time) for frame in frames]) - start_time
     add_number(camera, "count_time", [frame.exposure_s for frame in frames], "s")
@@ -382,7 +390,7 @@ def _add_frames(camera: h5py.Group, run: RunRecord, start_time: float) -> None:
 
 
 def _add_switching(light: h5py.Group, key: str, run: RunRecord, start_time: float) -> None:
-    """When the light went on and off: the history of the sample's charge."""
+    """Add the times at which a light was switched, the charging history of the sample."""
     switched = [
         action
         for attempt in run.completed().values()
@@ -401,5 +409,5 @@ def _start_time(run: RunRecord) -> float:
 
 
 def _iso(seconds: float) -> str:
-    """Seconds since 1970 as ISO 8601."""
+    """Return a time in seconds since 1970 as ISO 8601 text."""
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="microseconds")

@@ -1,4 +1,4 @@
-"""A run in a Tiled server (blueskyproject.io/tiled), where other programs find and read it."""
+"""Export of a run to a Tiled server (blueskyproject.io/tiled)."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -71,7 +71,7 @@ def to_tiled(run: Path | str, client: "Container") -> list[str]:
 
 
 def _is_whole(uid: str, client: "Container") -> bool:
-    """Whether the server has that attempt to its end: writing it may have been cut off."""
+    """Whether the server has the attempt to its end; an upload may have been interrupted."""
     return uid in client and "stop" in client[uid].metadata
 
 
@@ -81,7 +81,7 @@ def _delete(keys: list[str], client: "Container") -> None:
 
 
 def _by_attempt(documents: list[Document]) -> Iterator[tuple[str, Document]]:
-    """Each document with the uid of its attempt."""
+    """Yield each document with the uid of its attempt."""
     attempts: dict[str, str] = {}
     for name, doc in documents:
         if name == "start":

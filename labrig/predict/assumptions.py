@@ -1,4 +1,4 @@
-"""What is known before a measurement, and what has to be assumed; each said in a line."""
+"""Assumptions of a prediction on camera, noise and brightness, each stated in a line."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,24 +20,24 @@ from labrig.protocols.decay import Decay
 from labrig.quantity import TIME_S, parse
 from labrig.yaml_file import did_you_mean
 
-#: Where the first exposure has to be assumed: this fraction of the longest, so that it may grow.
+#: Assumed first exposure as a fraction of the longest, so that it may grow.
 FIRST_EXPOSURE_FRACTION = 1 / 8
 
 
 @dataclass(frozen=True)
 class Sources:
-    """What a prediction is to rest on.
+    """Sources of a prediction's assumptions.
 
     Attributes
     ----------
     materials
-        Patch → name or path of its material; the patch "" is the only one there is.
+        Name or path of the material by patch; the patch "" is the only one of the protocol.
     like
         Folder of an earlier run on the same bench.
     first_exposure_s
-        What metering chooses for the first frame; None if that is not known.
+        Exposure time in seconds that metering chooses for the first frame; None if it is not known.
     response
-        Of the rig's camera.
+        Spectral responses of the rig's camera.
     """
 
     materials: Mapping[str, str]
@@ -53,12 +53,23 @@ class Sources:
         metered: str | None,
         response: CameraResponse | None,
     ) -> Self:
-        """From the texts of a command line: `MATERIAL`, or `PATCH=MATERIAL` for each patch.
+        """Parse the arguments of a command line.
+
+        Parameters
+        ----------
+        materials
+            `MATERIAL`, or `PATCH=MATERIAL` for each patch.
+        like
+            Folder of an earlier run on the same bench.
+        metered
+            Exposure time of the first frame, such as `0.5 s`.
+        response
+            Spectral responses of the rig's camera.
 
         Raises
         ------
         UsageError
-            A patch stands twice, or `metered` is no duration.
+            If a patch has two materials, or `metered` is no duration.
         """
         try:
             first_exposure_s = None if metered is None else parse(metered, TIME_S)
@@ -82,12 +93,14 @@ class Assumptions:
 
     Attributes
     ----------
+    bench
+        Camera, flicker and glow of each patch.
     materials
-        Names by patch.
+        Names of the materials by patch.
     brightness_known
-        Patches whose amplitudes are as measured; the others' are as assumed.
+        Patches whose amplitudes are measured; those of the others are assumed.
     notes
-        Where the figures come from, in lines for a person.
+        Origins of the figures, in lines for people.
     """
 
     bench: Bench
@@ -97,12 +110,12 @@ class Assumptions:
 
 
 def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) -> Assumptions:
-    """Camera, flicker and glows: from earlier runs, else what is typical.
+    """Return camera, flicker and glows, from earlier runs or else typical ones.
 
     Raises
     ------
     UsageError
-        No such patch, material or run, or a material of which no decay can be predicted.
+        If there is no such patch, material or run, or if no decay can be predicted for a material.
     """
     protocol = predictable(model)
     files = _by_patch(protocol, sources.materials)
@@ -142,7 +155,7 @@ def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) 
 
 
 def _by_patch(protocol: Decay, materials: Mapping[str, str]) -> dict[str, str]:
-    """Materials by the protocol's own patches."""
+    """Return the materials by the protocol's own patches."""
     patches = list(protocol.patches)
     found = {}
     for name, material in materials.items():
@@ -166,7 +179,7 @@ def _like(run: Path, patch: str) -> Reference:
 
 
 def _own_run(name: str, material: Material, like: Reference | None) -> Reference | None:
-    """The run that measured a material: the one around its file, or the one given."""
+    """Return the run that measured a material: the one around its file, or the one given."""
     place = resources.find("config/materials", "material", name).parent
     if (place / "fit.json").is_file() and run_of(place) is not None:
         return read_reference(place)
@@ -182,7 +195,7 @@ def _brightness(
     relative: Mapping[str, Glow],
     sources: Sources,
 ) -> tuple[float, str]:
-    """By what to multiply the glows of unknown brightness, and why."""
+    """Return the factor for glows of unknown brightness, and the reason for it."""
     if measured:
         brightest = max(float(glow.amplitude.sum()) for glow in measured.values())
         return brightest, f"brightness of {', '.join(relative)}: assumed, as the brightest measured"

@@ -1,9 +1,9 @@
-"""What a decay fit will know: the Fisher information of its parameters, and an error budget.
+"""Fisher information of a decay fit's parameters, and their error budget.
 
-The model is the fit's own (`labrig.fit`): Σ_i a_i g(k_i) times one weight per channel, plus an
-offset per channel of which the dark frames leave σ open; Cov = diag(σ²) + ρ² s sᵀ within a frame.
+The decay model is that of `labrig.fit`: Σ_i a_i g(k_i) times one weight per channel, plus an
+offset per channel with the σ of the dark frames as prior; Cov = diag(σ²) + ρ² s sᵀ within a frame.
 Rates and amplitudes are marginalised over weights and offsets. The inverse information is the
-covariance of the best estimator (Cramér and Rao), which the weighted fit attains.
+covariance of the best unbiased estimator (Cramér and Rao), which the weighted fit attains.
 """
 
 from collections.abc import Mapping
@@ -19,14 +19,14 @@ from labrig.predict.series import DARK, FLICKER, ExpectedSeries
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What the fit will know of k1, a1, k2, a2, …
+    """Expected covariance of the parameters k1, a1, k2, a2, … of a fit with m states.
 
     Attributes
     ----------
     covariance
-        (2m, 2m); infinite variances where the frames say nothing.
+        Covariance, shape (2m, 2m); variances are infinite for parameters that are not determined.
     budget
-        By source, (2m,) its fraction of each variance; they add up to 1.
+        Fractions of each variance by source of noise, shape (2m,); they sum to 1.
     """
 
     covariance: FloatArray
@@ -34,12 +34,12 @@ class Information:
 
     @property
     def sigma(self) -> FloatArray:
-        """(2m,) of k1, a1, …"""
+        """Standard uncertainties of k1, a1, …, shape (2m,)."""
         return np.sqrt(np.diag(self.covariance))
 
 
 def information(series: ExpectedSeries) -> Information:
-    """Covariance and error budget of a fit to `series`."""
+    """Return covariance and error budget of a fit to `series`."""
     slopes, signal = _slopes(series)
     whitening = _whitening(series, signal)
     values = (whitening @ slopes).reshape(-1, slopes.shape[2])
@@ -74,14 +74,17 @@ def information(series: ExpectedSeries) -> Information:
 
 
 def _whitening(series: ExpectedSeries, signal: FloatArray) -> FloatArray:
-    """(n, C, C) W of each frame, Wᵀ W = Cov⁻¹."""
+    """Return the whitening matrix W of each frame, Wᵀ W = Cov⁻¹, shape (n, C, C)."""
     covariance = np.einsum("fc,cd->fcd", series.variance, np.eye(signal.shape[1]))
     covariance += series.flicker**2 * np.einsum("fc,fd->fcd", signal, signal)
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
 def _slopes(series: ExpectedSeries) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (n, C, p) by k1, a1, …, the other channels' weights, the offsets; the signal."""
+    """Return the derivatives by all parameters, shape (n, C, p), and the signal, shape (n, C).
+
+    The parameters are k1, a1, …, the weights of the other channels, and the offsets.
+    """
     rates, weights = series.k_r_per_s, series.weights
     means, by_log_rate = exponential_means_and_slopes(rates, series.t_s, series.exposure_s)
     curve = means @ series.amplitude
@@ -101,7 +104,18 @@ def _slopes(series: ExpectedSeries) -> tuple[FloatArray, FloatArray]:
 
 
 def _pseudo_inverse(design: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """(p, n) of `design` (n, p), and (p,) which parameters it does not determine."""
+    """Return the pseudo-inverse of a design matrix and the parameters that it does not determine.
+
+    Parameters
+    ----------
+    design
+        Design matrix, shape (n, p).
+
+    Returns
+    -------
+    tuple of ndarray
+        Pseudo-inverse, shape (p, n), and mask of the undetermined parameters, shape (p,).
+    """
     scale = np.linalg.norm(design, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     u, s, vt = np.linalg.svd(design / scale, full_matrices=False)

@@ -1,4 +1,4 @@
-"""What a protocol's fits will know, and what would make them know more."""
+"""Predicted uncertainties of a protocol's fits, and changes that would reduce them."""
 
 import json
 from collections.abc import Mapping
@@ -14,24 +14,26 @@ from labrig.predict.variants import changes
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a protocol's fits will know before it is run.
+    """Expected uncertainties of a protocol's fits.
 
     Attributes
     ----------
     patches
-        By name.
+        Predictions by patch.
     materials
-        Names by patch.
+        Names of the materials by patch.
     exposures_s
-        Of the frames of one decay.
+        Exposure times of the frames of one decay in seconds.
     decays
-        How many of them share one fit.
+        Number of decays that share one fit.
     remedies
-        The best first; those that do not help last.
+        Changes of the protocol, those with the largest gain first.
     brightness_known
-        Patches whose amplitudes are as measured, the others' as assumed.
-    notes, warnings
-        Where the figures come from; what the protocol's metering will say.
+        Patches whose amplitudes are measured; those of the others are assumed.
+    notes
+        Origins of the assumed figures.
+    warnings
+        Warnings that the protocol's metering will give.
     """
 
     patches: Mapping[str, PatchPrediction]
@@ -44,7 +46,7 @@ class Prediction:
     warnings: tuple[str, ...]
 
     def to_json(self) -> str:
-        """For a program; what is infinite is null."""
+        """Return the prediction as JSON; infinite values are null."""
         content = {
             "patches": {
                 name: {

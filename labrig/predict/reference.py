@@ -1,4 +1,4 @@
-"""What an earlier run says about bench and camera: noise, flicker, brightness."""
+"""Noise, flicker and brightness of bench and camera from an earlier run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,28 +21,28 @@ from labrig.region import Region
 from labrig.results import Series, find_fitted_decays, read_fitted_decay, read_series
 from labrig.yaml_file import read_yaml
 
-#: A flicker known worse than this is not taken over.
+#: Relative uncertainty from which a flicker is not used.
 FLICKER_KNOWN = 0.2
-#: Dark frames looked at, of the shortest and of the longest exposures.
+#: Number of dark frames used, of the shortest and of the longest exposures each.
 DARKS_EACH = 2
 
 
 @dataclass(frozen=True)
 class Reference:
-    """An earlier run on the same bench, with the same camera.
+    """An earlier run on the same bench with the same camera.
 
     Attributes
     ----------
     run
-        Name of its folder.
+        Name of the run folder.
     camera
-        As its frames show it, at the ISO to which the amplitudes of its materials belong.
+        Noise and range of the camera at the ISO of the run.
     f_number
-        To which they belong, too.
+        Aperture of the run; None if it is not known.
     flicker
-        ρ; None where the run does not tell it.
+        Relative common-mode noise ρ; None if the run does not determine it.
     channel_weights
-        Of the patch looked at, maximum 1.
+        Weights of the channels of the patch by name, maximum 1.
     """
 
     run: str
@@ -53,12 +53,12 @@ class Reference:
 
 
 def result_places(run: Path) -> dict[str, Path]:
-    """Where the fits of `run` lie, by patch; under "" if it has one patch only.
+    """Return the folders of the fits of a run by patch, by "" if there is one patch only.
 
     Raises
     ------
     UsageError
-        There is none.
+        If there is no fit.
     """
     found = find_fitted_decays(run / "result")
     if not found:
@@ -67,19 +67,19 @@ def result_places(run: Path) -> dict[str, Path]:
 
 
 def run_of(place: Path) -> Path | None:
-    """The run folder in whose result `place` lies."""
+    """Return the run folder that contains the result folder `place`; None if there is none."""
     return next((up for up in place.resolve().parents if (up / "journal.jsonl").is_file()), None)
 
 
 def read_reference(place: Path) -> Reference:
-    """What the run with the result in `place` tells.
+    """Read noise, flicker and channel weights from the run with the result folder `place`.
 
     Raises
     ------
     UsageError
-        There is no such run.
+        If there is no run around the folder.
     DataError
-        A file of it is missing or damaged.
+        If a file of the run is missing or damaged.
     """
     folder = run_of(place)
     if folder is None:
@@ -118,7 +118,7 @@ def read_reference(place: Path) -> Reference:
 
 
 def _region(folder: Path, patch: str) -> Region:
-    """Where the patch was when it was processed, or else where the protocol has it."""
+    """Return the region of a patch when it was processed, else that of the protocol."""
     protocol = predictable(read_protocol(folder / "protocol.yaml"))
     processed = folder / "result" / "provenance.yaml"
     patches = read_yaml(processed)["regions"] if processed.is_file() else protocol.patches
@@ -135,7 +135,7 @@ def _first_usable(run: RunRecord, series: Series) -> FrameRecord:
 
 
 def _darks(run: RunRecord, region: Region) -> list[FrameMeasurement]:
-    """Dark frames of the shortest and the longest exposures."""
+    """Return measurements of the dark frames with the shortest and the longest exposures."""
     darks = sorted(run.frames(FrameRole.DARK), key=lambda frame: frame.exposure_s)
     if len(darks) > 2 * DARKS_EACH:
         darks = darks[:DARKS_EACH] + darks[-DARKS_EACH:]
@@ -147,9 +147,9 @@ def _darks(run: RunRecord, region: Region) -> list[FrameMeasurement]:
 def _photon_transfer(
     series: Series, seen: FrameMeasurement, darks: Sequence[FrameMeasurement]
 ) -> tuple[float, float]:
-    """Electrons a DN and read noise in DN, by photon transfer.
+    """Return electrons per DN and read noise in DN from a photon transfer curve.
 
-    0 electrons a DN where the frames are all too dark to tell.
+    The first is 0 if all frames are too dark to determine it.
     """
     pixels = np.array([seen.channels[name].n for name in series.channels])
     exposure_s = series.exposure_s[:, np.newaxis]
@@ -166,7 +166,10 @@ def _photon_transfer(
 
 
 def _dark_current(darks: Sequence[FrameMeasurement]) -> float | None:
-    """DN/s of a pixel; at most that much if all dark frames have one exposure, None without any."""
+    """Return the dark current of a pixel in DN/s.
+
+    It is an upper bound if all dark frames have one exposure time, and None without dark frames.
+    """
     if not darks:
         return None
     stats = [list(dark.channels.values()) for dark in darks]

@@ -1,4 +1,4 @@
-"""What changed from one result of a run to the next, in a few lines for people."""
+"""Differences between two results of a run, in lines for people."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -12,8 +12,7 @@ from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
 from labrig.written_numbers import plus_minus, rounded
 from labrig.yaml_file import read_yaml
 
-#: Moves of less than this fraction of a parameter's σ, and changes of σ by less, are not worth a
-#: word.
+#: Fraction of σ below which the change of a parameter, or of its σ, is not reported.
 WORTH_SAYING = 0.01
 
 Parameters = dict[str, tuple[float, float]]
@@ -21,7 +20,7 @@ Parameters = dict[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class _Move:
-    """A parameter in two fits: each its value and σ."""
+    """A parameter in two fits, with its value and σ in each."""
 
     name: str
     before: tuple[float, float]
@@ -29,7 +28,7 @@ class _Move:
 
     @property
     def in_sigma(self) -> float:
-        """How far the value moved, in σ of before; infinite if it was held both times."""
+        """Change of the value in units of the earlier σ, else the later; infinite if both are 0."""
         moved, sigma = self.after[0] - self.before[0], self.before[1] or self.after[1]
         if moved == 0:
             return 0.0
@@ -37,21 +36,21 @@ class _Move:
 
     @property
     def worth_saying(self) -> bool:
-        """Whether value or σ are other than before, beyond rounding."""
+        """Whether value or σ changed by more than rounding."""
         resized = not math.isclose(self.before[1], self.after[1], rel_tol=WORTH_SAYING)
         return resized or abs(self.in_sigma) >= WORTH_SAYING
 
     def __str__(self) -> str:
-        """`k_r 1 0.0320 ± 0.0001 → 0.0321 ± 0.0001 (+1.0 σ)`."""
+        """Return text such as `k_r 1 0.0320 ± 0.0001 → 0.0321 ± 0.0001 (+1.0 σ)`."""
         moved = f"{self.in_sigma:+.2g}".replace("-", "−")
         by = f" ({moved} σ)" if math.isfinite(self.in_sigma) else ""
         return f"{self.name} {plus_minus(*self.before)} → {plus_minus(*self.after)}{by}"
 
 
 def changes(before: Path, after: Path) -> tuple[str, ...]:
-    """What is other in the result folder `after` than in `before`; nothing if every byte is alike.
+    """Return the differences of the result folder `after` from `before`; empty if there are none.
 
-    Files that only `before` has (a person may have put them there) do not count.
+    Files that exist in `before` only, where a person may have put them, do not count.
     """
     files = sorted(path.relative_to(after) for path in after.rglob("*") if path.is_file())
     other = [file for file in files if not _alike(before / file, after / file)]
@@ -100,7 +99,7 @@ def _alike(one: Path, other: Path) -> bool:
 
 
 def _settings(result: Path) -> dict[str, str]:
-    """`provenance.yaml`, one text a key; without one, nothing is known."""
+    """Return the content of `provenance.yaml` with one text per key; empty if there is none."""
     try:
         return dict(_flat(read_yaml(result / "provenance.yaml"), ""))
     except UsageError:
@@ -128,7 +127,7 @@ def _other_settings(before: Mapping[str, str], after: Mapping[str, str]) -> Iter
 
 
 def _fits(result: Path) -> dict[str, Parameters]:
-    """The parameters of each patch's fit, by its name; unreadable ones are left out."""
+    """Return the parameters of each patch's fit by patch; fits that cannot be read are left out."""
     fits = {}
     for name, path in find_fitted_decays(result).items():
         with suppress(DataError):
@@ -137,7 +136,7 @@ def _fits(result: Path) -> dict[str, Parameters]:
 
 
 def _parameters(fit: FittedDecay) -> Parameters:
-    """Value and σ of every parameter of a fit."""
+    """Return value and σ of every parameter of a fit by name."""
     found: dict[str, tuple[float, float]] = {}
     for number, state in enumerate(fit.states, start=1):
         found[f"k_r {number}"] = state.k_r_per_s, state.k_r_sigma_per_s
@@ -172,7 +171,7 @@ def _other_numbers(
 
 
 def _told(moves: list[_Move]) -> Iterator[str]:
-    """Rates, amplitudes and what was held one by one, the rest in a few words."""
+    """Yield rates, amplitudes and held parameters one by one and the others in one line."""
     rest = []
     for move in moves:
         if move.name.startswith(("k_r", "a ")) or math.isinf(move.in_sigma):
@@ -186,6 +185,6 @@ def _told(moves: list[_Move]) -> Iterator[str]:
 
 
 def _states(parameters: Parameters) -> str:
-    """`2 states (k_r 0.3 ± 0.1, 0.01 ± 0.001 1/s)`."""
+    """Return text such as `2 states (k_r 0.3 ± 0.1, 0.01 ± 0.001 1/s)`."""
     rates = [plus_minus(*pair) for name, pair in parameters.items() if name.startswith("k_r")]
     return f"{len(rates)} state{'s' if len(rates) > 1 else ''} (k_r {', '.join(rates)} 1/s)"

@@ -1,4 +1,4 @@
-"""A run of any protocol, from its folder to its result, report and exports."""
+"""Processing of a run of any protocol, from its folder to result, report and exports."""
 
 import shutil
 from dataclasses import dataclass, replace
@@ -30,7 +30,7 @@ _EARLIER = "result-"
 
 
 def new_result(run: Path) -> Path:
-    """An empty folder in `run` for `put_in_place`."""
+    """Create an empty folder in `run` for `put_in_place`."""
     made = run / "result.part"
     if made.exists():
         shutil.rmtree(made)
@@ -39,10 +39,10 @@ def new_result(run: Path) -> Path:
 
 
 def put_in_place(made: Path) -> tuple[str, ...]:
-    """Make the folder `made` the run's `result`; returns what changed, in lines for people.
+    """Make the folder `made` the run's `result` and return the changes, in lines for people.
 
-    The result before it becomes `result-1`, `result-2`, …, from old to new. One that is the same
-    to the byte stays where it is, and `made` goes.
+    An earlier result that differs is kept as `result-1`, `result-2`, …, from old to new. If all
+    bytes are equal, the earlier result stays and `made` is deleted.
     """
     final = made.with_name("result")
     if not final.exists():
@@ -64,24 +64,24 @@ def _earlier(run: Path) -> list[Path]:
 
 
 def write_provenance(made: Path, provenance: Provenance) -> None:
-    """Write provenance.yaml into `made`."""
+    """Write `provenance.yaml` into the folder `made`."""
     write_yaml(made / "provenance.yaml", provenance)
 
 
 @dataclass(frozen=True)
 class Processed:
-    """What came out of a run, and what a person is told of it.
+    """Outcome of the processing of a run.
 
     Attributes
     ----------
     result
-        Of the type that belongs to the protocol.
+        Result of the type that belongs to the protocol.
     report
-        The page.
+        Path of the HTML report.
     lines
-        The numbers that matter, for the terminal.
+        Most important numbers, in lines for the terminal.
     changes
-        What is other than in the result before, if there was one.
+        Differences from the result before; empty if there was none.
     """
 
     result: RunResult
@@ -196,7 +196,7 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
 def _camera_response(
     rig: RigFile, instead: str | None, lvf: LvfFile | None
 ) -> tuple[CameraResponse | None, tuple[str, ...]]:
-    """The curves that colour the report's pictures, with a warning if the rig's are not here."""
+    """Return the curves that colour the report's pictures, or a warning if they are missing."""
     try:
         return camera_curves(rig, instead, lvf), ()
     except UsageError as error:

@@ -1,4 +1,4 @@
-"""What happened in a run, its temperature, and what it was: bench and sample."""
+"""Temperature, charges and interruptions of a run, and its description."""
 
 import math
 from collections.abc import Collection, Iterator, Sequence
@@ -13,28 +13,31 @@ from labrig.record.reading import Attempt, RunRecord
 
 FloatArray = NDArray[np.float64]
 
-#: Rates of traps 0.65 eV deep follow exp(−E / kT): 8.7 % for a degree at room temperature.
+#: Rates of traps 0.65 eV deep follow exp(−E / k_B T): 8.7 % per degree at 300 K; E / k_B in K.
 TRAP_K, ZERO_C_K = 0.65 / 8.617333e-5, 273.15
-#: Readings scatter by a tenth of a degree, rooms change slowly.
+#: Window of the moving mean: readings scatter by 0.1 °C, rooms change slowly.
 SMOOTHED_S = 300.0
-#: So long after the last reading nobody knows.
+#: Longest time before the first and after the last reading at which a temperature is known.
 KNOWN_FOR_S = 600.0
 
 
 class TemperatureHistory:
-    """The temperature over a run.
+    """The temperature during a run.
 
     Parameters
     ----------
     run
-        With one reading or more.
+        Run with at least one reading of the thermometer.
 
     Attributes
     ----------
-    time, celsius
-        (N,) of the readings; seconds since 1970, rising.
+    time
+        Times of the readings in seconds since 1970, shape (n,), ascending.
+    celsius
+        Readings in degrees Celsius, shape (n,).
     smooth
-        (N,) means of the readings within five minutes.
+        Means of the readings within `SMOOTHED_S` around each reading in degrees Celsius, shape
+        (n,).
     """
 
     def __init__(self, run: RunRecord) -> None:
@@ -47,7 +50,18 @@ class TemperatureHistory:
         self.smooth: FloatArray = (total[after] - total[first]) / (after - first)
 
     def during(self, frames: Sequence[FrameRecord]) -> FloatArray:
-        """At the middle of each frame about whose time something is known."""
+        """Return the smoothed temperature in the middle of each frame.
+
+        Parameters
+        ----------
+        frames
+            Frames of the run.
+
+        Returns
+        -------
+        ndarray
+            Temperatures in degrees Celsius of the frames within `KNOWN_FOR_S` of the readings.
+        """
         middle = np.array([(frame.start_time + frame.end_time) / 2 for frame in frames])
         known = (middle > self.time[0] - KNOWN_FOR_S) & (middle < self.time[-1] + KNOWN_FOR_S)
         found: FloatArray = np.interp(middle[known], self.time, self.smooth)
@@ -168,7 +182,17 @@ def degrees_text(celsius: FloatArray) -> str:
 
 @dataclass(frozen=True)
 class Interruption:
-    """An attempt at a unit that did not count: when it began, and why it ended."""
+    """An attempt at a unit that did not complete.
+
+    Attributes
+    ----------
+    unit
+        Name of the unit.
+    began
+        Begin of the attempt, as text.
+    reason
+        Reason for its end.
+    """
 
     unit: str
     began: str
@@ -259,7 +283,7 @@ def written_time(seconds: float) -> str:
 
 
 def _shining_s(attempt: Attempt, until: float) -> Iterator[float]:
-    """The lengths of the times with the lamp on; relays switch in the middle of a transaction."""
+    """Yield the durations in seconds during which the lamp was on, until the time `until`."""
     since = None
     for action in attempt.actions:
         switched = action.middle_time
@@ -274,7 +298,17 @@ def _shining_s(attempt: Attempt, until: float) -> Iterator[float]:
 
 @dataclass(frozen=True)
 class DeviceLine:
-    """A device of the rig: its role, the address it was reached at, and who answered there."""
+    """A device of the rig, as it is listed in reports.
+
+    Attributes
+    ----------
+    role
+        Key of the device.
+    address
+        Address at which the device was opened.
+    identity
+        Maker, model, serial number and firmware that the device reported.
+    """
 
     role: str
     address: str
@@ -283,36 +317,38 @@ class DeviceLine:
 
 @dataclass(frozen=True, kw_only=True)
 class RunDescription:
-    """A run, its bench and what its result was made with.
+    """Description of a run, its bench and the processing.
 
     Attributes
     ----------
     title
-        The sample's name.
+        Name of the sample.
     protocol
         Name of the protocol.
     run
         Name of the run folder.
     started, ended
-        As they are to be read.
+        Begin and end of the run, as text.
     rig
         Name of the rig.
     simulated
-        Whether the rig is a simulated one.
-    labrig_version, libraries
-        Of the processing; libraries by name and version.
+        Whether the rig is simulated.
+    labrig_version
+        Version of labrig that processed the run.
+    libraries
+        Names and versions of the libraries that processed it.
     sample
-        Pairs of what and value: thickness, batch, …
+        Properties of the sample, such as thickness and batch, with their values.
     devices
-        Of the rig.
+        Devices of the rig.
     guard
-        What would have switched the lights off, had labrig died.
+        Mechanism that would have switched the lights off if labrig had died.
     protocol_text, rig_text
-        The files, as resolved.
+        Protocol and rig files, as resolved.
     interruptions
-        Attempts that failed, by time.
+        Attempts that failed, in order of time.
     notes
-        What a person had to say afterwards.
+        Notes of the user in Markdown.
     """
 
     title: str

@@ -14,15 +14,15 @@ from labrig.errors import DataError, DiskError, UsageError
 
 
 class Disk(Protocol):
-    """Takes what has to survive a power cut."""
+    """Storage for data that must survive a power cut."""
 
     def write(self, file: BinaryIO, data: bytes) -> None:
-        """Append to an unbuffered file and wait until the disk has it.
+        """Append data to an unbuffered file and wait until they are on the disk.
 
         Raises
         ------
         OSError
-            Full, or gone; part of `data` may be in the file.
+            If the disk is full or gone; part of `data` may be in the file.
         """
 
 
@@ -30,7 +30,7 @@ class RealDisk:
     """The disk of this PC."""
 
     def write(self, file: BinaryIO, data: bytes) -> None:
-        """As `Disk.write`."""
+        """Append data to an unbuffered file and wait until they are on the disk."""
         left = memoryview(data)
         while left:
             left = left[file.write(left) :]
@@ -84,7 +84,7 @@ def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make what was made or renamed in `folder` durable, where there is a way (not on Windows)."""
+    """Make new and renamed entries of a folder durable, where the system can (not on Windows)."""
     if hasattr(os, "O_DIRECTORY"):
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -99,20 +99,40 @@ Document = tuple[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class JournalContent:
-    """All documents of a journal, and whether its last line was torn by a crash."""
+    """Content of a journal.
+
+    Attributes
+    ----------
+    documents
+        Event-model documents, each with the name of its kind.
+    torn
+        Whether the last line is incomplete because of a crash.
+    """
 
     documents: list[Document]
     torn: bool
 
 
 class Journal:
-    """Appends documents durably: when `append` returns, the line survives a power cut.
+    """A journal open for writing: a line survives a power cut as soon as `append` returns.
 
-    What a file holds after a write or an fsync that failed, nobody can know: the line may be there
-    as a whole, in part, or only until the power goes. So the lines that were acknowledged are
-    remembered, `read` gives back nothing else, and whatever stands behind them in the file is cut
-    off before the next line is written. The journal of an earlier process is written anew when it
-    is opened, since some of what is read there may not be on the disk.
+    The content of a file after a failed write or fsync is undefined: a line may be there
+    completely, in part, or only until the power fails. Acknowledged lines are therefore kept in
+    memory, `read` returns only those, and anything after them in the file is cut off before the
+    next line is written. The journal of an earlier process is written anew when it is opened, since
+    part of what is read may not be on the disk.
+
+    Parameters
+    ----------
+    path
+        File of the journal; created if it does not exist.
+    disk
+        Disk to which lines are written.
+
+    Raises
+    ------
+    DiskError
+        If the journal cannot be opened.
     """
 
     def __init__(self, path: Path, disk: Disk = REAL_DISK) -> None:
@@ -128,15 +148,15 @@ class Journal:
 
     @property
     def size_bytes(self) -> int:
-        """Of all acknowledged lines."""
+        """Size of all acknowledged lines in bytes."""
         return len(self._acknowledged)
 
     def read(self) -> JournalContent:
-        """All that was acknowledged, also when the disk is gone."""
+        """Return all acknowledged documents; the disk is not accessed."""
         return _parsed(self.path, bytes(self._acknowledged))
 
     def append(self, name: str, doc: Mapping[str, Any]) -> None:
-        """Write `{"name": name, "doc": doc}` and wait until the disk has it."""
+        """Write the line `{"name": name, "doc": doc}` and wait until it is on the disk."""
         text = json.dumps({"name": name, "doc": doc}, ensure_ascii=False, allow_nan=False)
         line = text.encode() + b"\n"
         try:
@@ -151,7 +171,7 @@ class Journal:
         self._acknowledged += line
 
     def close(self) -> None:
-        """Release the file."""
+        """Close the file."""
         with suppress(OSError):  # every line in it was acknowledged before
             self._file.close()
 
@@ -225,7 +245,7 @@ def _parsed(path: Path, raw: bytes) -> JournalContent:
 
 
 def _refuse(constant: str) -> None:
-    """NaN and infinity, which JSON does not have and a journal never holds."""
+    """Refuse NaN and infinity, which are not JSON."""
     raise ValueError(constant)
 
 

@@ -1,4 +1,4 @@
-"""Reading a run folder back: which units completed, and what they hold."""
+"""Reading of a run folder: attempts, their completion and their records."""
 
 import os
 import re
@@ -18,12 +18,12 @@ from labrig.record.frames import (
 )
 from labrig.record.journal import JOURNAL, Document, JournalContent, read_journal
 
-#: End of the year 9999 in seconds since 1970: no calendar reaches further.
+#: End of the year 9999 in seconds since 1970, the limit of `datetime`.
 LATEST = 253_402_300_799.0
-#: No thermometer on a bench reads more, or as little, in degrees Celsius.
+#: Largest plausible magnitude of a reading in degrees Celsius.
 HOTTEST_C = 1000.0
 
-#: As frames are called when they are written.
+#: Names of frames as `AttemptWriter` gives them.
 _FRAME_NAME = re.compile(r"frames/\d{6,}[\w.-]*")
 
 Recorded = TypeVar("Recorded", FrameRecord, ActionRecord)
@@ -33,9 +33,22 @@ _TEMPERATURE = TypeAdapter(TemperatureRecord)
 
 @dataclass(frozen=True)
 class Attempt:
-    """One attempt at a unit, in the order of the journal.
+    """One attempt at a unit, with its records in the order of the journal.
 
-    `exit_status` is `None` while it runs, and for good when the process died.
+    Attributes
+    ----------
+    uid
+        Uid of the RunStart.
+    unit
+        Name of the unit.
+    start
+        RunStart document.
+    exit_status
+        Status of the RunStop; None while the attempt runs, and if the process died during it.
+    reason
+        Reason of the RunStop.
+    frames, actions, temperatures
+        Records of the attempt.
     """
 
     uid: str
@@ -49,13 +62,25 @@ class Attempt:
 
     @property
     def completed(self) -> bool:
-        """Whether it counts."""
+        """Whether the attempt ended with `success`."""
         return self.exit_status == "success"
 
 
 @dataclass(frozen=True)
 class RunRecord:
-    """What a run folder's journal says."""
+    """Content of the journal of a run.
+
+    Attributes
+    ----------
+    folder
+        Run folder.
+    attempts
+        Attempts at units in order of their begin.
+    torn
+        Whether the last line of the journal is incomplete because of a crash.
+    last_time
+        Time of the latest document in seconds since 1970.
+    """
 
     folder: Path
     attempts: list[Attempt]
@@ -64,13 +89,13 @@ class RunRecord:
 
     @property
     def name(self) -> str:
-        """The name of its folder, whatever path leads there."""
+        """Name of the run folder, with links resolved."""
         return self.folder.resolve().name
 
     def completed(self) -> dict[str, Attempt]:
-        """The attempt that counts, of each completed unit, in order of completion.
+        """Return the completed attempt of each unit by the unit's name, in order of completion.
 
-        One that a person took back later does not count.
+        A unit that a person undid later does not count as completed.
         """
         done: dict[str, Attempt] = {}
         for attempt in self.attempts:
@@ -82,12 +107,12 @@ class RunRecord:
         return done
 
     def part(self, name: str) -> "RunRecord":
-        """The completed units of one part of a chain, by their names within it."""
+        """Return the completed units of one part of a chain, by their names within the part."""
         own = [_within(name, attempt) for attempt in self.completed().values()]
         return replace(self, attempts=[attempt for attempt in own if attempt is not None])
 
     def frames(self, role: str) -> list[FrameRecord]:
-        """Frames with that role, of completed units only."""
+        """Return the frames with a given role in completed units."""
         return [
             frame
             for attempt in self.completed().values()
@@ -96,7 +121,7 @@ class RunRecord:
         ]
 
     def temperatures(self) -> list[TemperatureRecord]:
-        """All readings of the thermometer by time, those of attempts that failed included."""
+        """Return all readings of the thermometer in order of time, including failed attempts."""
         readings = [reading for attempt in self.attempts for reading in attempt.temperatures]
         return sorted(readings, key=lambda reading: reading.time)
 
@@ -151,7 +176,13 @@ def read_run(run: str | os.PathLike[str]) -> RunRecord:
 
 
 def run_record(folder: Path, content: JournalContent) -> RunRecord:
-    """What the documents of a journal say of the run in `folder`; errors as of `read_run`."""
+    """Build the record of the run in `folder` from the documents of its journal.
+
+    Raises
+    ------
+    DataError
+        If a document does not fit those before it.
+    """
     attempts: dict[str, Attempt] = {}
     streams: dict[str, tuple[str, str]] = {}
     last_time = 0.0
@@ -196,14 +227,17 @@ def _take(
 
 
 def _frame_name(name: str) -> str:
-    """`name`, if it is one within the run folder."""
+    """Return `name` if it names a frame within the run folder."""
     if not _FRAME_NAME.fullmatch(name):
         raise ValueError(f"'{name}' is no name of a frame, such as frames/000001.cr2")
     return name
 
 
 def _refuse_what_is_no_file(frame: Path) -> None:
-    """A link leads out of the run folder, a device has no end; what is missing is told of later."""
+    """Refuse a frame that is a link, which leads out of the run folder, or a device.
+
+    A missing file is accepted here; processing reports it.
+    """
     try:
         is_something_else = frame.is_symlink() or (frame.exists() and not frame.is_file())
     except OSError as error:
@@ -247,14 +281,14 @@ def _sensible(reading: TemperatureRecord) -> TemperatureRecord:
 
 
 def _seconds(time: float) -> float:
-    """`time`, if it is one of a calendar's."""
+    """Return `time` if a calendar can express it."""
     if not 0 <= time <= LATEST:
         raise ValueError(f"{time} is no time in seconds since 1970")
     return float(time)
 
 
 def _said(error: Exception) -> str:
-    """What is wrong, in a few words."""
+    """Return an error in a few words."""
     if isinstance(error, ValidationError):
         problem = error.errors(include_url=False)[0]
         return f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}"

@@ -1,4 +1,4 @@
-"""Serial ports and USB cameras on this PC, with what a rig file needs to say of each."""
+"""Discovery of serial ports and USB cameras, each with its entry for a rig file."""
 
 from collections import Counter
 from collections.abc import Collection
@@ -20,7 +20,7 @@ _STILL_IMAGE = 6
 
 @dataclass(frozen=True)
 class _Board:
-    """What is known of a USB vendor's serial devices; `keys` are those of its role's entry."""
+    """Serial devices of a USB vendor; `keys` are those of the device's entry in the rig file."""
 
     name: str
     driver: str | None = None
@@ -40,7 +40,7 @@ _MAESTRO = _Board(
     ),
 )
 
-#: USB vendor and product, or vendor alone. Sources: the vendors' manuals, the USB ID repository.
+#: Boards by USB vendor and product, or vendor alone. Sources: vendors' manuals, USB ID repository.
 _BOARDS: dict[tuple[int, int | None], _Board] = {
     (0x2A19, None): _Board("Numato relay board", "numato_relay", ", relay: 0, warm_up: 15 min"),
     (0x1A86, 0x7523): _Board(
@@ -61,8 +61,8 @@ _BOARDS: dict[tuple[int, int | None], _Board] = {
     (0x04D8, 0xFFEE): _Board("Devantech relay board"),
 }
 
-#: USB vendors whose cameras take photographs at commands of their maker's own only, which
-#: `ptp_camera` does not know and libgphoto2 does (its camlibs/ptp2/library.c).
+#: USB vendors whose cameras need proprietary commands for photographs, which `ptp_camera` lacks and
+#: libgphoto2 has (its camlibs/ptp2/library.c).
 _OWN_COMMANDS = {
     0x054C: "Sony",
     0x04CB: "Fujifilm",
@@ -75,16 +75,18 @@ _OWN_COMMANDS = {
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """One device that is plugged in.
+    """One connected device.
 
     Attributes
     ----------
     address
-        As a rig file says it.
+        Address for the rig file.
+    name
+        Maker, model and serial number.
     snippet
-        A line for the rig file's `devices:`; empty where labrig has no driver for it.
+        Line for the rig file's `devices:`; empty if labrig has no driver for the device.
     hints
-        What stands in the way and what to do.
+        Obstacles to its use, with remedies.
     """
 
     address: str
@@ -95,7 +97,17 @@ class FoundDevice:
 
 @dataclass(frozen=True)
 class Discovery:
-    """All that is plugged in; `notes` say what could not be looked for."""
+    """Connected devices.
+
+    Attributes
+    ----------
+    ports
+        Serial ports.
+    cameras
+        USB cameras.
+    notes
+        Kinds of devices that could not be looked for, with the reason.
+    """
 
     ports: tuple[FoundDevice, ...]
     cameras: tuple[FoundDevice, ...]

@@ -1,4 +1,4 @@
-"""What else on this PC uses a camera, and how to make it let go.
+"""Programs on this PC that hold a camera, and how to make them release it.
 
 Sources: gphoto2 issues #154, #181 and #485 (Linux), libgphoto2 issue #1064 (macOS).
 """
@@ -11,7 +11,7 @@ import usb.util
 
 from labrig.setup.host import Host, Process
 
-#: Programs that take every camera they see, and what to do about each.
+#: Programs that open every camera, and how to make each release it.
 _KNOWN = {
     "linux": {
         "gvfsd-gphoto2": "gio mount -s gphoto2",
@@ -35,7 +35,7 @@ _ZADIG = "give this camera the WinUSB driver with Zadig (https://zadig.akeo.ie)"
 
 
 def holders(device: Any, around: Host) -> list[str]:
-    """Who may hold a `usb.core.Device`, each with what to do."""
+    """Return the programs that may hold a `usb.core.Device`, each with a remedy."""
     return [
         f"{process.name} (process {process.pid}): {remedy}"
         for process, remedy in _suspects(_node(device), around.processes(), around.platform)
@@ -43,7 +43,7 @@ def holders(device: Any, around: Host) -> list[str]:
 
 
 def unreachable(device: Any, platform: str) -> str | None:
-    """What to do when this user cannot open a `usb.core.Device`; None when it can be opened."""
+    """Return why this user cannot open a `usb.core.Device`, with a remedy; None if possible."""
     try:
         device.get_active_configuration()
     except (usb.core.USBError, NotImplementedError) as error:
@@ -65,7 +65,7 @@ def unreachable(device: Any, platform: str) -> str | None:
 
 
 def _node(device: Any) -> str:
-    """Where Linux has the device's file."""
+    """Return the device file on Linux."""
     return f"/dev/bus/usb/{device.bus or 0:03d}/{device.address or 0:03d}"
 
 

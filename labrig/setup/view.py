@@ -1,4 +1,4 @@
-"""Looking through a rig's camera in the browser: aim, focus, draw regions into a protocol."""
+"""Live view of a rig's camera in the browser, to aim, focus and draw regions into a protocol."""
 
 import threading
 from collections.abc import Callable
@@ -11,11 +11,11 @@ from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.setup.view_server import AimedProtocol, LivePictures, ViewServer
 
-#: Ten pictures a second are enough for a hand on a focus ring, and leave the camera some rest.
+#: Period of the pictures: enough for focusing by hand, with pauses for the camera.
 PICTURE_PERIOD_S = 0.1
-#: Ctrl-C is answered at least so often, in real time.
+#: Longest real time until Ctrl-C is answered.
 LOOK_UP_S = 0.1
-#: Devices that may have a live view, the one made for it first.
+#: Keys of devices that may have a live view, in order of preference.
 _EYES = (VIEWFINDER.key, CAMERA.key)
 
 
@@ -75,17 +75,17 @@ def view_rig(
 
 
 def hand_over(pictures: LivePictures, eye: LiveView, clock: Clock) -> Never:
-    """Fetch a picture whenever somebody waits for one; only this thread touches the camera.
+    """Fetch a picture whenever a browser waits for one; only this thread uses the camera.
 
-    Real time is paced here whatever the rig's clock: the browser and the person in front of it are
-    real also where the room is simulated.
+    Pictures are paced in real time whatever the rig's clock: browser and user are real even if the
+    room is simulated.
 
     Raises
     ------
     Interrupted
-        Somebody asked to stop.
+        When somebody stops it.
     DeviceError
-        No picture comes.
+        If no picture arrives.
     """
     pause = threading.Event()
     while True:

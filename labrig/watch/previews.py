@@ -1,4 +1,4 @@
-"""Looks at frames in a process of its own, so that the one that runs the rig keeps its time."""
+"""Previews of frames in a process of their own, so that the process of the rig keeps its timing."""
 
 import json
 import os
@@ -18,7 +18,17 @@ from labrig.errors import LabrigError
 
 @dataclass(frozen=True)
 class RenderedPreview:
-    """A frame that was looked at: its values as in `Preview`, its picture (height, width, 3)."""
+    """A preview received from the other process.
+
+    Attributes
+    ----------
+    name
+        File name of the frame.
+    values, clipped
+        Means and clipped patches, as in `Preview`.
+    picture
+        Picture, shape (height, width, 3).
+    """
 
     name: str
     values: dict[str, dict[str, float]]
@@ -27,14 +37,19 @@ class RenderedPreview:
 
 
 class Previews:
-    """Asks for frames of one run to be looked at; the answer comes when it comes.
+    """Process that renders previews of the frames of one run, asynchronously.
 
     Parameters
     ----------
     run
-        The run folder.
+        Run folder.
     width
-        Of the pictures, in pixels.
+        Largest width of the pictures in pixels.
+
+    Attributes
+    ----------
+    latest
+        Latest preview; None before the first one.
     """
 
     def __init__(self, run: Path, width: int) -> None:
@@ -58,7 +73,7 @@ class Previews:
         self._listening.start()
 
     def ask(self, name: str, unit: str) -> None:
-        """Have the frame of that name, which a unit has taken, looked at."""
+        """Request the preview of the frame with a file name, taken by a unit."""
         try:
             self._questions.write(f"{json.dumps([name, unit])}\n")
             self._questions.flush()
@@ -66,7 +81,7 @@ class Previews:
             return
 
     def close(self) -> None:
-        """Let it end."""
+        """End the process."""
         self._process.kill()
         self._process.wait()
         self._listening.join()
@@ -89,7 +104,7 @@ class Previews:
 
 
 def answer(run: Path, width: int, questions: Iterable[str], out: TextIO) -> None:
-    """Look at the frames asked for, one JSON line each; what cannot be read is left out."""
+    """Print the previews requested, one JSON line each; unreadable frames are left out."""
     # only in the process that looks: the one that runs the rig starts without what this loads
     from labrig.acquire import read_protocol
     from labrig.watch.preview import glance

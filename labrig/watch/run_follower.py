@@ -1,4 +1,4 @@
-"""Follows a run folder as it is written: what is done, what comes, the decay so far."""
+"""Follower of a run folder while it is written: progress, plan, and the decay so far."""
 
 import math
 import shutil
@@ -19,33 +19,31 @@ from labrig.watch.preview import Preview, glance
 from labrig.written_numbers import plus_minus
 
 PICTURE_WIDTH = 720
-#: Purpose of the frames that are drawn as a decay.
-#: Of the decay's frames that were there before somebody watched, so many are taken in at a look:
-#: the page does not wait for thousands of them.
+#: Number of earlier decay frames read per look, so that the page does not wait for thousands.
 MOST_EARLIER = 4
 
-#: Section → key → plain value. Whatever grows with a run has a key of its own, so that only what
-#: is new needs to be told.
+#: Section → key → plain value. Everything that grows with a run has keys of its own, so that only
+#: new values are sent.
 State = dict[str, dict[str, Any]]
 
 
 class RunFollower:
-    """One run, seen from its folder alone; looking twice costs little if nothing has changed.
+    """State of a run, from its folder alone; looking again costs little if nothing has changed.
 
     Parameters
     ----------
     run
-        The run folder; it may still be empty but for protocol and rig.
+        Run folder; it may hold nothing but protocol and rig.
 
     Raises
     ------
     UsageError
-        Not a run folder.
+        If this is not a run folder.
 
     Attributes
     ----------
     picture
-        The newest frame that could be read, as a JPEG.
+        Newest frame that could be read, as a JPEG.
     """
 
     def __init__(self, run: Path) -> None:
@@ -70,14 +68,14 @@ class RunFollower:
         self._unreadable: set[str] = set()
 
     def look(self) -> bool:
-        """Take in what is new; whether there is anything.
+        """Read what is new in the folder and return whether there was anything.
 
-        Of the frames of a decay some are taken in at every look, until all are.
+        Some frames of a decay are read at every call, until all have been.
 
         Raises
         ------
         DataError
-            The journal is damaged.
+            If the journal is damaged.
         """
         written = _size(self.run / "journal.jsonl"), _size(self.run / "result" / "report.html")
         if written[0] and written != self._seen[:2]:
@@ -89,7 +87,7 @@ class RunFollower:
         return self._look_at_frames() or is_new
 
     def state(self) -> State:
-        """All of it, for a page: plain values, times in seconds since 1970."""
+        """Return the whole state for a page: plain values, times in seconds since 1970."""
         counting = self._counting()
         done = self._record.completed()
         all_frames = sum(len(attempt.frames) for attempt in self._record.attempts)
@@ -120,12 +118,12 @@ class RunFollower:
         }
 
     def _current(self) -> Attempt | None:
-        """The attempt that is under way; one that a crash left open is not."""
+        """Return the attempt under way; one that a crash left open is not under way."""
         last = self._record.attempts[-1:] if self._state == "running" else []
         return next((attempt for attempt in last if attempt.exit_status is None), None)
 
     def _counting(self) -> list[Attempt]:
-        """The attempts that count, and the one that is under way."""
+        """Return the completed attempts and the one under way."""
         current = self._current()
         return [*self._record.completed().values(), *([] if current is None else [current])]
 
@@ -138,7 +136,7 @@ class RunFollower:
     def _unit_states(
         self, done: Mapping[str, Attempt], current: Attempt | None
     ) -> dict[str, dict[str, Any]]:
-        """Of every unit, by its number."""
+        """Return the state of every unit by its number."""
         tries = Counter(attempt.unit for attempt in self._record.attempts)
         told = {}
         for number, unit in enumerate(self._units):
@@ -159,7 +157,7 @@ class RunFollower:
     def _troubles(
         self, done: Mapping[str, Attempt], current: Attempt | None
     ) -> dict[str, dict[str, Any]]:
-        """Attempts that do not count, by number: why, and whether the unit was done since."""
+        """Return the failed attempts by number, with reason and whether the unit was done since."""
         return {
             str(number): {
                 "unit": attempt.unit,
@@ -171,7 +169,7 @@ class RunFollower:
         }
 
     def _look_at_frames(self) -> bool:
-        """Look at the newest frame, and at some of a decay; whether there was any to look at."""
+        """Read the newest frame and some of a decay; return whether there were any to read."""
         newest = next(
             (
                 (attempt, frame)
@@ -196,7 +194,7 @@ class RunFollower:
         return is_new or bool(earlier)
 
     def _look_at(self, attempt: Attempt, frame: FrameRecord) -> Preview | None:
-        """Look at a frame and keep its points; None if it cannot be read, which processing says."""
+        """Read a frame and keep its points; None if it cannot be read, which processing reports."""
         name = frame.path.name
         self._points[name] = []
         try:
@@ -215,7 +213,7 @@ class RunFollower:
         return seen
 
     def _results(self) -> dict[str, str]:
-        """The rates that were fitted to each patch, as text."""
+        """Return the fitted rates of each patch as text."""
         try:
             results = read_fitted_decays(self.run / "result")
         except DataError:
@@ -228,7 +226,7 @@ class RunFollower:
 
 
 def _points(frame: FrameRecord, seen: Preview, lamp_off_time: float) -> list[dict[str, Any]]:
-    """A frame of a decay in every patch: means above black per second; not the result."""
+    """Return the signals of a decay frame by patch: means above black in DN/s, unreduced."""
     return [
         {
             "unit": frame.unit,

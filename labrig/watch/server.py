@@ -1,4 +1,4 @@
-"""The page of `labrig watch`: what there is to tell of a run, pushed whenever it changes."""
+"""Server of the page of `labrig watch`, which sends every change of a run's state."""
 
 import json
 import threading
@@ -11,13 +11,13 @@ from labrig.clock import Clock
 from labrig.local_server import KINDS, LocalConversation, LocalServer
 from labrig.watch.run_follower import RunFollower
 
-#: A browser that hears nothing for longer takes the connection for dead.
+#: Period of messages without which a browser takes the connection for dead.
 HEARTBEAT_S = 5.0
-#: How soon a browser comes back when the connection broke, in ms.
+#: Time after which a browser reconnects, in ms.
 COME_BACK_MS = 500
 _HERE = Path(__file__).parent
 _PAGE = _HERE / "watch_page.html"
-#: Where in the page the first news stand.
+#: Placeholder in the page for the first update.
 _FIRST = "FIRST_NEWS"
 
 PAGES: Mapping[str, Path] = {
@@ -31,22 +31,22 @@ PAGES: Mapping[str, Path] = {
     )
 }
 
-#: Section → key → value; a value of None: there is no such thing any more.
+#: Section → key → value; None for a value that no longer exists.
 Things = Mapping[str, Mapping[str, Any]]
 
 
 class UpdateFeed:
-    """What there is to tell of a run, handed from the thread that follows it to the browsers.
+    """State of a run, passed from the thread that follows it to the browsers.
 
-    Everything is kept with the number of the telling that changed it last. So a browser that names
-    the last number it knows is told what it lacks, whether that is one frame or the whole run.
+    Every value is kept with the number of the update that changed it last. A browser that names the
+    last number it received gets all later values, be it one frame or the whole run.
 
     Parameters
     ----------
     state
-        Section → key → value of everything.
+        Whole state: section → key → value.
     picture
-        The last frame as a JPEG.
+        Latest frame as a JPEG.
     """
 
     def __init__(self, state: Things, picture: bytes | None) -> None:
@@ -59,12 +59,12 @@ class UpdateFeed:
 
     @property
     def picture(self) -> bytes | None:
-        """The last frame as a JPEG."""
+        """Latest frame as a JPEG."""
         with self._changed:
             return self._picture
 
     def tell(self, state: Things, picture: bytes | None) -> None:
-        """Hand on the state as it is now."""
+        """Publish the present state."""
         now = {
             (section, key): value
             for section, things in state.items()
@@ -80,18 +80,18 @@ class UpdateFeed:
             self._changed.notify_all()
 
     def end(self) -> None:
-        """There will be no more: nobody waits any longer."""
+        """End the feed and release all browsers that wait."""
         with self._changed:
             self._is_over = True
             self._changed.notify_all()
 
     def after(self, number: int, at_most_s: float) -> tuple[int, Things] | None:
-        """What was told later than `number`, and the last number; None if nothing comes in time.
+        """Return the values updated after `number`, with the last number; None on a time-out.
 
         Raises
         ------
         EOFError
-            There will be no more.
+            If the feed has ended.
         """
         with self._changed:
             if number > self._number:  # of another watch: nothing is known
@@ -109,12 +109,19 @@ class UpdateFeed:
 
 
 class WatchServer(LocalServer):
-    """Serves the page and what there is to tell.
+    """Server of the page and of the updates.
+
+    Parameters
+    ----------
+    news
+        Updates of the run's state.
+    port
+        TCP port on 127.0.0.1; 0 for any that is free.
 
     Raises
     ------
     UsageError
-        The port is taken.
+        If the port is taken.
     """
 
     def __init__(self, news: UpdateFeed, port: int = 0) -> None:
@@ -123,13 +130,13 @@ class WatchServer(LocalServer):
 
 
 class _Conversation(LocalConversation):
-    """One connection of a browser."""
+    """A connection of a browser."""
 
     server: WatchServer
     pages: ClassVar[Mapping[str, Path]] = PAGES
 
     def answer(self, path: str) -> None:
-        """The page, the stream of news, or the last frame."""
+        """Send the page, the stream of updates, or the latest frame."""
         if path == "":
             self._send_page()
         elif path == "events":
@@ -144,7 +151,7 @@ class _Conversation(LocalConversation):
             super().answer(path)
 
     def _send_page(self) -> None:
-        """The page with the run as it is now in it, so that it is never seen empty."""
+        """Send the page with the present state of the run in it, so that it is never empty."""
         try:
             first = _message(self.server.news.after(0, 0.0))
         except EOFError:
@@ -155,7 +162,7 @@ class _Conversation(LocalConversation):
         self.send(HTTPStatus.OK, KINDS[".html"], page.encode())
 
     def _stream(self) -> None:
-        """Server-sent events: a browser that loses them comes back for what it lacks by itself."""
+        """Send updates as server-sent events; a browser that loses the connection resumes."""
         self.close_connection = True
         self.send_response(HTTPStatus.OK)
         self.send_header("Content-Type", "text/event-stream")
@@ -182,7 +189,7 @@ def _message(news: tuple[int, Things] | None) -> str:
     return json.dumps({"number": number, "things": things})
 
 
-#: Everything is on the page within a second; the folder is looked at more often than that.
+#: Period of reading the folder, so that news are on the page within a second.
 LOOK_PERIOD_S = 0.3
 
 
