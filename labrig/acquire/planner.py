@@ -88,17 +88,17 @@ class Plan:
 
     def lines(self) -> list[str]:
         """Return the timeline as lines `@t (+dt) device action`, with a heading for each unit."""
-        out, unit, before_s = [], "", 0.0
+        lines, unit, before_s = [], "", 0.0
         for step in self.steps:
             if step.unit != unit:
                 unit = step.unit
-                out.append(f"unit {unit}")
-            out.append(
+                lines.append(f"unit {unit}")
+            lines.append(
                 f"  @{step.at_s:10.3f} s (+{step.at_s - before_s:9.3f} s)  "
                 f"{step.device:8} {step.action}"
             )
             before_s = step.at_s
-        return out
+        return lines
 
     def to_json(self) -> str:
         """Return the timeline as JSON."""
@@ -159,18 +159,18 @@ def plan(protocol: ProtocolModel, rig: RigFile, source: str) -> Plan:
         if stand_in := ROLES[key].planned:
             devices[key] = stand_in(driver, settings, clock)
     warm_up_s = {key: entry.warm_up for key, entry in rig.devices.items()}
-    planned = Rig(rig.name, clock, devices, warm_up_s)
-    units, ends = protocol.units(), []
+    planned_rig = Rig(rig.name, clock, devices, warm_up_s)
+    units, unit_ends_s = protocol.units(), []
     for unit in units:
         recorder.unit = unit.name
-        unit.run(Session(planned, recorder, recorder))
-        ends.append(clock.now())
+        unit.run(Session(planned_rig, recorder, recorder))
+        unit_ends_s.append(clock.now())
     return Plan(
         tuple(recorder.steps),
         tuple(unit.name for unit in units),
-        tuple(ends),
+        tuple(unit_ends_s),
         recorder.frame_count,
-        planned[CAMERA].offers() if CAMERA in planned else CameraOffers((), ()),
+        planned_rig[CAMERA].offers() if CAMERA in planned_rig else CameraOffers((), ()),
     )
 
 
@@ -192,11 +192,11 @@ class _PlanRecorder:
         late_s: float,
         task: str = "",
     ) -> None:
-        self._note(start_s, device, action, late_s)
+        self._add_step(start_s, device, action, late_s)
 
     def photographed(self, role: str, frame: Frame, late_s: float) -> None:
         self.frame_count += 1
-        self._note(frame.start_s, CAMERA.key, f"{role} frame, {frame.settings}", late_s)
+        self._add_step(frame.start_s, CAMERA.key, f"{role} frame, {frame.settings}", late_s)
 
     def temperature(self, celsius: float, at_s: float) -> None:
         pass
@@ -219,17 +219,17 @@ class _PlanRecorder:
 
     def doing(self, what: str, until_s: float | None = None) -> None:
         if until_s is not None:
-            self._note(self.clock.now(), "-", what, 0.0)
+            self._add_step(self.clock.now(), "-", what, 0.0)
 
     def warn(self, text: str) -> None:
-        self._note(self.clock.now(), "-", f"warning: {text}", 0.0)
+        self._add_step(self.clock.now(), "-", f"warning: {text}", 0.0)
 
-    def _note(self, at_s: float, device: str, action: str, late_s: float) -> None:
+    def _add_step(self, at_s: float, device: str, action: str, late_s: float) -> None:
         if late_s > TOLERANCE_S:
-            before = next(step for step in reversed(self.steps) if step.device != "-")
+            previous = next(step for step in reversed(self.steps) if step.device != "-")
             raise ProtocolError(
                 f"{self.unit}: '{action}' would begin {duration_text(late_s)} late, because "
-                f"'{before.action}' is not over; leave more time between frames (every:) or "
+                f"'{previous.action}' is not over; leave more time between frames (every:) or "
                 "expose for less"
             )
         if len(self.steps) == MOST_STEPS:

@@ -50,7 +50,9 @@ class LightReadback:
 
     def __init__(self, rig: Rig) -> None:
         self._read_back = {
-            key: _OneLight(rig, key) for key, tells in lights_that_read_back(rig).items() if tells
+            key: _LightState(rig, key)
+            for key, reads_back in lights_that_read_back(rig).items()
+            if reads_back
         }
 
     @property
@@ -89,16 +91,16 @@ class LightReadback:
                 self._read_back[key].read()
 
 
-class _OneLight:
+class _LightState:
     def __init__(self, rig: Rig, key: str) -> None:
         self._rig = rig
         self._role = ROLES[key]
-        self._asked = DARK
-        self._asked_s = self._read_s = rig.clock.now()
+        self._commanded = DARK
+        self._commanded_s = self._read_s = rig.clock.now()
 
     def asked(self, state: str) -> None:
-        self._asked = state
-        self._asked_s = self._read_s = self._rig.clock.now()
+        self._commanded = state
+        self._commanded_s = self._read_s = self._rig.clock.now()
 
     def read_if_due(self) -> None:
         if self._rig.clock.now() - self._read_s >= READ_PERIOD_S:
@@ -108,14 +110,14 @@ class _OneLight:
         assert self._role.state is not None, "it is a light"
         self._read_s = self._rig.clock.now()
         with device_errors(self._role.key):
-            found = self._role.state(self._rig[self._role])
-        if found == self._asked:
+            state = self._role.state(self._rig[self._role])
+        if state == self._commanded:
             return
         raise DeviceError(
-            f"the {self._role.name} was switched {self._asked} "
-            f"{duration_text(self._read_s - self._asked_s)} ago and reads {found}: something else "
-            "has switched it (another program on its port, or a hand); leave its board to labrig "
-            "while it measures"
+            f"the {self._role.name} was switched {self._commanded} "
+            f"{duration_text(self._read_s - self._commanded_s)} ago and reads {state}: something "
+            "else has switched it (another program on its port, or a hand); leave its board to "
+            "labrig while it measures"
         )
 
 

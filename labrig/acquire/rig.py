@@ -136,12 +136,12 @@ class Rig:
             )
         if failures:
             lost = all(isinstance(error, DeviceLostError) for error in failures.values())
-            said = [
+            messages = [
                 f"{key}: {error if isinstance(error, LabrigError) else repr(error)}"
                 for key, error in failures.items()
             ]
             refusal = (DeviceLostError if lost else DeviceError)(
-                f"the safe state is not confirmed; switch off by hand: {'; '.join(said)}"
+                f"the safe state is not confirmed; switch off by hand: {'; '.join(messages)}"
             )
             refusal.unsafe = tuple(failures)
             raise refusal
@@ -188,20 +188,20 @@ def require(
         Last failures of the steps that did not succeed, by key.
     """
     failures: dict[str, Exception] = {}
-    left = dict(steps)
+    pending = dict(steps)
     deadline_s, pause_s = clock.now() + PATIENCE_S, FIRST_PAUSE_S
     while True:
-        for key, step in list(left.items()):
+        for key, step in list(pending.items()):
             try:
                 step()
             except Exception as error:
                 failures[key] = error
                 if unless(error):
-                    del left[key]
+                    del pending[key]
             else:
                 failures.pop(key, None)
-                del left[key]
-        if not left or clock.now() >= deadline_s:
+                del pending[key]
+        if not pending or clock.now() >= deadline_s:
             return failures
         clock.sleep(pause_s)
         pause_s = min(2 * pause_s, LONGEST_PAUSE_S)

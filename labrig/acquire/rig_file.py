@@ -71,20 +71,20 @@ class Optics(BaseModel):
         UsageError
             If the folder has no such file.
         """
-        shipped_ones = resources.folder("config/optics/filters")
-        folder = shipped_ones if self.filters is None else Path(self.filters)
-        found = {path.stem: path for path in sorted(folder.glob("*.csv"))}
-        if not found:
+        shipped = resources.folder("config/optics/filters")
+        folder = shipped if self.filters is None else Path(self.filters)
+        files = {path.stem: path for path in sorted(folder.glob("*.csv"))}
+        if not files:
             raise UsageError(
                 f"{folder}: expected a table NAME.csv for every colour filter, found none; see "
-                f"{shipped_ones} for what one looks like, and 'filters' under 'optics:'"
+                f"{shipped} for what one looks like, and 'filters' under 'optics:'"
             )
-        return found
+        return files
 
     def named(self, kind: CalibrationKind[Any]) -> str | None:
         """Return the file or run folder named as a calibration of a kind; None if there is none."""
-        named: str | None = getattr(self, kind.optics_key)
-        return named
+        name: str | None = getattr(self, kind.optics_key)
+        return name
 
 
 class RigFile(BaseModel):
@@ -134,7 +134,7 @@ def read_rig_file(path: Path) -> RigFile:
     >>> rig.devices["lamp"].driver, rig.optics.camera
     ('numato_relay', 'canon_eos_5d_mark_ii')
     """
-    rig = validate(_anchored(read_yaml(path), path.resolve().parent), RigFile, str(path))
+    rig = validate(_with_absolute_paths(read_yaml(path), path.resolve().parent), RigFile, str(path))
     for key in rig.devices:
         if key not in ROLES:
             raise UsageError(
@@ -143,11 +143,11 @@ def read_rig_file(path: Path) -> RigFile:
     return rig
 
 
-def _anchored(value: Any, folder: Path) -> Any:
+def _with_absolute_paths(value: Any, folder: Path) -> Any:
     if isinstance(value, dict):
-        return {key: _anchored(inner, folder) for key, inner in value.items()}
+        return {key: _with_absolute_paths(inner, folder) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_anchored(inner, folder) for inner in value]
+        return [_with_absolute_paths(inner, folder) for inner in value]
     if isinstance(value, str) and _looks_like_a_path(value) and (folder / value).exists():
         return str(folder / value)
     return value

@@ -107,14 +107,14 @@ def run_units(
     temperature = TemperatureLog(rig, observer.warn)
     while True:
         try:
-            _run_what_is_left(units, rig, folder, observer, metadata, temperature)
+            _run_remaining_units(units, rig, folder, observer, metadata, temperature)
         except UndoManualStep:
             rig.make_safe()
         else:
             return
 
 
-def _run_what_is_left(
+def _run_remaining_units(
     units: Sequence[Unit],
     rig: Rig,
     folder: RunFolder,
@@ -123,12 +123,12 @@ def _run_what_is_left(
     temperature: TemperatureLog,
 ) -> None:
     record = folder.read()
-    done = record.completed()
-    frames = [frame for attempt in done.values() for frame in attempt.frames]
-    actions = [action for attempt in done.values() for action in attempt.actions]
+    completed = record.completed()
+    frames = [frame for attempt in completed.values() for frame in attempt.frames]
+    actions = [action for attempt in completed.values() for action in attempt.actions]
     lights = LightReadback(rig)
     for number, unit in enumerate(units, start=1):
-        if unit.name in done:
+        if unit.name in completed:
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
@@ -143,7 +143,7 @@ def _run_what_is_left(
             recorder.take_back()
             raise
         writer.stop("success")
-        frames, actions = recorder.kept, recorder.done
+        frames, actions = recorder.kept_frames, recorder.kept_actions
 
 
 class _Recorder:
@@ -153,15 +153,15 @@ class _Recorder:
         self,
         clock: Clock,
         writer: AttemptWriter,
-        kept: Sequence[FrameRecord],
-        done: Sequence[ActionRecord],
+        frames: Sequence[FrameRecord],
+        actions: Sequence[ActionRecord],
         observer: RunObserver,
     ) -> None:
         self._clock = clock
         self._writer = writer
         self._observer = observer
-        self.kept = list(kept)
-        self.done = list(done)
+        self.kept_frames = list(frames)
+        self.kept_actions = list(actions)
 
     def acted(
         self,
@@ -175,7 +175,7 @@ class _Recorder:
         wall, unit = self._clock.wall, self._writer.unit
         record = ActionRecord(unit, device, action, wall(start_s), wall(end_s), late_s, task)
         self._writer.action(record)
-        self.done.append(record)
+        self.kept_actions.append(record)
 
     def temperature(self, celsius: float, at_s: float) -> None:
         self._writer.temperature(
@@ -205,17 +205,17 @@ class _Recorder:
             end_time=self._clock.wall(frame.end_s),
             late_s=late_s,
         )
-        self.kept.append(record)
+        self.kept_frames.append(record)
         self._observer.frame(record)
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
-        return [frame for frame in self.kept if frame.role == role]
+        return [frame for frame in self.kept_frames if frame.role == role]
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
-        return [action for action in self.done if action.device == device]
+        return [action for action in self.kept_actions if action.device == device]
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         return decide()
 
     def _last_manual_step(self) -> ActionRecord | None:
-        return next((action for action in reversed(self.done) if action.is_manual), None)
+        return next((action for action in reversed(self.kept_actions) if action.is_manual), None)

@@ -122,8 +122,8 @@ class Session:
         self._observer = observer
         self._temperature = temperature or TemperatureLog(rig, observer.warn)
         self._lights = lights or LightReadback(rig)
-        self._in_force: ExposureSettings | None = None
-        self._beaten_s = rig.clock.now()
+        self._settings_in_force: ExposureSettings | None = None
+        self._heartbeat_s = rig.clock.now()
 
     @property
     def clock(self) -> Clock:
@@ -144,7 +144,7 @@ class Session:
 
     def perform(self, action: Action) -> None:
         """Perform one action now."""
-        self._beat_if_due()
+        self._heartbeat_if_due()
         self._read_lights_before([action])
         self._prepare(action)
         self._execute(action, late_s=0.0)
@@ -171,27 +171,29 @@ class Session:
         sequence of LateAction
             Actions that began more than `tolerance_s` late, for protocols that repeat them.
         """
-        missed = []
+        late_actions = []
         self._read_lights_before([timed.action for timed in sequence])
         photographs = [timed.action for timed in sequence if isinstance(timed.action, Shoot)]
         if photographs:
             self._prepare(photographs.pop(0))
-        zero_s = self.clock.now()
+        start_s = self.clock.now()
         for timed in sequence:
-            deadline_s = zero_s + timed.at_s
+            deadline_s = start_s + timed.at_s
             self._sleep_until(deadline_s)
             late_s = self.clock.now() - deadline_s
             self._execute(timed.action, late_s)
             if late_s > tolerance_s:
-                missed.append(LateAction(timed, late_s))
+                late_actions.append(LateAction(timed, late_s))
             if isinstance(timed.action, Shoot) and photographs:
                 self._prepare(photographs.pop(0))
-        if moves := [str(one) for one in missed if not isinstance(one.timed.action, Shoot)]:
+        if moves := [
+            str(late) for late in late_actions if not isinstance(late.timed.action, Shoot)
+        ]:
             self.warn(
                 f"began late: {', '.join(moves)}; the times at which it happened are recorded "
                 "(leave more time before it, or let this PC do less)"
             )
-        return missed
+        return late_actions
 
     def ask(self, step: ManualStep) -> str:
         """Have a step done by hand and return the remark that came with it, mostly empty.
@@ -202,15 +204,17 @@ class Session:
             If the last step done by hand is to be undone; the runner then does its unit again.
         """
         start_s = self.clock.now()
-        self._beat_if_due()
-        remark = self._observer.ask(step, self._recorder.last_manual_step(), self._meanwhile())
+        self._heartbeat_if_due()
+        remark = self._observer.ask(
+            step, self._recorder.last_manual_step(), self._service_while_waiting()
+        )
         if remark is None:
             raise UndoManualStep
         if CHANGER in self.rig:
             with device_errors(CHANGER.key):
                 self.rig[CHANGER].do(step.task)
-        said = f"{step.what} ({remark})" if remark else step.what
-        self._recorder.acted(PERSON, said, start_s, self.clock.now(), 0.0, step.task)
+        text = f"{step.what} ({remark})" if remark else step.what
+        self._recorder.acted(PERSON, text, start_s, self.clock.now(), 0.0, step.task)
         return remark
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
@@ -246,59 +250,59 @@ class Session:
 
     def _sleep_until(self, deadline_s: float) -> None:
         """Wait, and keep devices awake and watchdogs served meanwhile."""
-        looked_after = (
-            self._sleepy or self._guarded or self._temperature.is_kept or self._lights.is_told
+        needs_service = (
+            self._kept_awake or self._guarded or self._temperature.is_kept or self._lights.is_told
         )
-        while looked_after and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
+        while needs_service and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
             self.clock.sleep(AWAKE_PERIOD_S)
-            self._look_after()
+            self._serve_devices()
         if deadline_s - self.clock.now() > QUIET_BEFORE_S:
             self._lights.read_if_due()
             self._temperature.read_if_due(self._recorder.temperature)
         if deadline_s - self.clock.now() > BEAT_S:
-            self._beat_if_due()
+            self._heartbeat_if_due()
         self.clock.sleep_until(deadline_s)
 
-    def _meanwhile(self) -> Callable[[], None]:
+    def _service_while_waiting(self) -> Callable[[], None]:
         """Return a function that keeps devices awake and served while a person works."""
         next_s = self.clock.now() + AWAKE_PERIOD_S
 
-        def look_up() -> None:
+        def serve() -> None:
             nonlocal next_s
             self.clock.sleep(0.0)
             if self.clock.now() >= next_s:
-                self._look_after()
+                self._serve_devices()
                 next_s = self.clock.now() + AWAKE_PERIOD_S
 
-        return look_up
+        return serve
 
-    def _look_after(self) -> None:
-        for key, device in self._sleepy.items():
+    def _serve_devices(self) -> None:
+        for key, device in self._kept_awake.items():
             with device_errors(key):
                 device.keep_awake()
-        self._beat()
+        self._heartbeat()
         self._lights.read_if_due()
         self._temperature.read_if_due(self._recorder.temperature)
 
     def _read_lights_before(self, actions: Sequence[Action]) -> None:
-        self._lights.read_before([one for one in actions if not isinstance(one, Shoot)])
+        self._lights.read_before([action for action in actions if not isinstance(action, Shoot)])
 
-    def _beat_if_due(self) -> None:
-        if self.clock.now() - self._beaten_s >= AWAKE_PERIOD_S:
-            self._beat()
+    def _heartbeat_if_due(self) -> None:
+        if self.clock.now() - self._heartbeat_s >= AWAKE_PERIOD_S:
+            self._heartbeat()
 
-    def _beat(self) -> None:
+    def _heartbeat(self) -> None:
         for key, device in self._guarded.items():
             with device_errors(key):
                 device.heartbeat()
-        self._beaten_s = self.clock.now()
+        self._heartbeat_s = self.clock.now()
 
     @cached_property
     def _guarded(self) -> dict[str, Guarded]:
         return {k: d for k, d in self.rig.devices.items() if isinstance(d, Guarded)}
 
     @cached_property
-    def _sleepy(self) -> dict[str, KeptAwake]:
+    def _kept_awake(self) -> dict[str, KeptAwake]:
         return {k: d for k, d in self.rig.devices.items() if isinstance(d, KeptAwake)}
 
     def _prepare(self, action: Action) -> None:
@@ -306,10 +310,10 @@ class Session:
             return
         camera = self.rig[CAMERA]
         with device_errors(CAMERA.key):
-            if action.settings != self._in_force:
-                self._in_force = None
+            if action.settings != self._settings_in_force:
+                self._settings_in_force = None
                 camera.configure(action.settings)
-                self._in_force = action.settings
+                self._settings_in_force = action.settings
             camera.arm()
 
     def _execute(self, action: Action, late_s: float) -> None:
@@ -330,22 +334,22 @@ class Session:
 class _PartRecorder:
     """Recorder that passes records on and shows the frames of one part of a chain as its own."""
 
-    def __init__(self, whole: Recorder, part: str) -> None:
-        self.acted = whole.acted
-        self.photographed = whole.photographed
-        self.temperature = whole.temperature
-        self.last_manual_step = whole.last_manual_step
-        self.choose = whole.choose
-        self._whole = whole
+    def __init__(self, recorder: Recorder, part: str) -> None:
+        self.acted = recorder.acted
+        self.photographed = recorder.photographed
+        self.temperature = recorder.temperature
+        self.last_manual_step = recorder.last_manual_step
+        self.choose = recorder.choose
+        self._recorder = recorder
         self._part = part
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
-        return self._own(self._whole.frames(role))
+        return self._records_of_part(self._recorder.frames(role))
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
-        return self._own(self._whole.actions(device))
+        return self._records_of_part(self._recorder.actions(device))
 
-    def _own(self, records: Sequence[RecordT]) -> list[RecordT]:
+    def _records_of_part(self, records: Sequence[RecordT]) -> list[RecordT]:
         return [
             replace(record, unit=unit)
             for record in records

@@ -95,9 +95,9 @@ class CameraOffers:
                 f"{', '.join(map(str, self.isos))}"
             )
         if self.f_numbers and settings.f_number not in self.f_numbers:
-            asked = "no aperture" if settings.f_number is None else f"f/{settings.f_number:g}"
+            requested = "no aperture" if settings.f_number is None else f"f/{settings.f_number:g}"
             raise ProtocolError(
-                f"the camera cannot be set to {asked}; choose 'f_number:' among "
+                f"the camera cannot be set to {requested}; choose 'f_number:' among "
                 f"{', '.join(f'{offered:g}' for offered in self.f_numbers)}"
             )
         self.exposure_near(settings.exposure_s)

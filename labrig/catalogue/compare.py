@@ -136,12 +136,16 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
     ['k_r 1', 'k_r 2', 'a 1', 'a 2']
     """
     protocols = read_yaml(a / "protocol.yaml"), read_yaml(b / "protocol.yaml")
-    of_a, of_b = (_results(run, protocol) for run, protocol in zip((a, b), protocols, strict=True))
-    if len(of_a) == len(of_b) == 1:  # the one patch, whatever it is called
-        of_b = dict(zip(of_a, of_b.values(), strict=True))
-    shared = [name for name in of_a if name in of_b and name != reference]
+    results_a, results_b = (
+        _results(run, protocol) for run, protocol in zip((a, b), protocols, strict=True)
+    )
+    if len(results_a) == len(results_b) == 1:  # the one patch, whatever it is called
+        results_b = dict(zip(results_a, results_b.values(), strict=True))
+    shared = [name for name in results_a if name in results_b and name != reference]
     gains = {
-        name: NO_GAIN if reference is None else gain(a, b, reference, of_a[name].brightest_channel)
+        name: NO_GAIN
+        if reference is None
+        else gain(a, b, reference, results_a[name].brightest_channel)
         for name in shared
     }
     return Comparison(
@@ -151,28 +155,30 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
             # said as `missing`, in fewer words
             if not (key.startswith("patches.") and None in values)
         ),
-        patches=tuple(_compare(name, of_a[name], of_b[name], gains[name]) for name in shared),
-        missing=tuple(sorted(set(of_a) ^ set(of_b))),
+        patches=tuple(
+            _compare(name, results_a[name], results_b[name], gains[name]) for name in shared
+        ),
+        missing=tuple(sorted(set(results_a) ^ set(results_b))),
     )
 
 
-def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_of_b: Measured) -> PatchComparison:
+def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_b: Measured) -> PatchComparison:
     counts = len(a.rates), len(b.rates)
     if counts[0] != counts[1]:
-        return PatchComparison(name, counts, (), math.nan, gain_of_b)
+        return PatchComparison(name, counts, (), math.nan, gain_b)
     rates = [
-        Difference(f"k_r {number}", "1/s", of_a, of_b)
-        for number, (of_a, of_b) in enumerate(zip(a.rates, b.rates, strict=True), start=1)
+        Difference(f"k_r {number}", "1/s", value_a, value_b)
+        for number, (value_a, value_b) in enumerate(zip(a.rates, b.rates, strict=True), start=1)
     ]
     channel = a.brightest_channel
     pairs = zip(a.amplitudes_in(channel), b.amplitudes_in(channel), strict=True)
     amplitudes = [
-        Difference(f"a {number}", f"DN/s of channel {channel}", of_a, of_b.times(gain_of_b))
-        for number, (of_a, of_b) in enumerate(pairs, start=1)
+        Difference(f"a {number}", f"DN/s of channel {channel}", value_a, value_b.times(gain_b))
+        for number, (value_a, value_b) in enumerate(pairs, start=1)
     ]
     chi2 = sum(difference.pull**2 for difference in rates)
     p_value = float(stats.chi2.sf(chi2, len(rates)))
-    return PatchComparison(name, counts, (*rates, *amplitudes), p_value, gain_of_b)
+    return PatchComparison(name, counts, (*rates, *amplitudes), p_value, gain_b)
 
 
 def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, FittedDecay]:
@@ -188,11 +194,11 @@ def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, FittedDecay]:
 def _differing(
     a: Mapping[str, Any], b: Mapping[str, Any], place: str = ""
 ) -> list[tuple[str, Any, Any]]:
-    found: list[tuple[str, Any, Any]] = []
+    differences: list[tuple[str, Any, Any]] = []
     for key in dict.fromkeys([*a, *b]):
-        of_a, of_b = a.get(key), b.get(key)
-        if isinstance(of_a, dict) and isinstance(of_b, dict):
-            found += _differing(of_a, of_b, f"{place}{key}.")
-        elif of_a != of_b:
-            found.append((f"{place}{key}", of_a, of_b))
-    return found
+        value_a, value_b = a.get(key), b.get(key)
+        if isinstance(value_a, dict) and isinstance(value_b, dict):
+            differences += _differing(value_a, value_b, f"{place}{key}.")
+        elif value_a != value_b:
+            differences.append((f"{place}{key}", value_a, value_b))
+    return differences

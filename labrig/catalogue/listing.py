@@ -94,14 +94,14 @@ class RunFilter:
         )
 
 
-def list_runs(runs: Path, wanted: RunFilter) -> list[RunSummary]:
+def list_runs(runs: Path, run_filter: RunFilter) -> list[RunSummary]:
     """List the runs in a folder that a filter admits.
 
     Parameters
     ----------
     runs
         Folder with run folders.
-    wanted
+    run_filter
         Filter by sample, protocol, day and state.
 
     Returns
@@ -124,8 +124,8 @@ def list_runs(runs: Path, wanted: RunFilter) -> list[RunSummary]:
     """
     if not runs.is_dir():
         raise UsageError(f"{runs}: no such folder; give the one with the run folders as --runs")
-    found = [summarise(path) for path in _run_folders(runs)]
-    return [run for run in found if wanted.admits(run)]
+    summaries = [summarise(path) for path in _run_folders(runs)]
+    return [run for run in summaries if run_filter.admits(run)]
 
 
 def find_run(run: Path, runs: Path) -> Path:
@@ -157,17 +157,17 @@ def find_run(run: Path, runs: Path) -> Path:
     """
     if (run / "protocol.yaml").is_file():
         return run
-    here = list(_run_folders(runs)) if runs.is_dir() else []
-    if str(run) == "last" and here:
-        return here[-1]
-    fitting = [path for path in here if path.name == str(run)] or [
-        path for path in here if path.name.startswith(str(run))
+    folders = list(_run_folders(runs)) if runs.is_dir() else []
+    if str(run) == "last" and folders:
+        return folders[-1]
+    matches = [path for path in folders if path.name == str(run)] or [
+        path for path in folders if path.name.startswith(str(run))
     ]
-    if len(fitting) == 1:
-        return fitting[0]
-    said = f"{len(fitting)} runs begin so" if fitting else "there is no such run"
+    if len(matches) == 1:
+        return matches[0]
+    problem = f"{len(matches)} runs begin so" if matches else "there is no such run"
     raise UsageError(
-        f"{run}: expected a run folder, the beginning of one's name or 'last'; {said}, see: "
+        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}, see: "
         f"labrig runs --runs {runs}"
     )
 
@@ -193,14 +193,14 @@ def summarise(folder: Path) -> RunSummary:
     >>> summary.sample, summary.state, summary.frames
     ('sample', 'processed', 37)
     """
-    sample, protocol, units = _asked(folder)
+    sample, protocol, units = _protocol_summary(folder)
     try:
         record, results = read_run(folder), read_fitted_decays(folder / "result")
     except (DataError, DiskError):
         has_journal = (folder / "journal.jsonl").exists()
         state: RunState = "damaged" if has_journal else "unfinished"
         return RunSummary(folder, sample, protocol, None, state, 0, units, 0, {})
-    done = record.completed()
+    completed = record.completed()
     return RunSummary(
         folder=folder,
         sample=sample,
@@ -210,10 +210,10 @@ def summarise(folder: Path) -> RunSummary:
             if record.attempts
             else None
         ),
-        state=state_of(folder, units is not None and len(done) == units),
-        done=len(done),
+        state=state_of(folder, units is not None and len(completed) == units),
+        done=len(completed),
         units=units,
-        frames=sum(len(attempt.frames) for attempt in done.values()),
+        frames=sum(len(attempt.frames) for attempt in completed.values()),
         results=results,
     )
 
@@ -222,7 +222,7 @@ def _run_folders(runs: Path) -> Iterator[Path]:
     return (path.parent for path in sorted(runs.glob("*/protocol.yaml")))
 
 
-def _asked(folder: Path) -> tuple[str, str, int | None]:
+def _protocol_summary(folder: Path) -> tuple[str, str, int | None]:
     """Return sample, protocol and number of units from the protocol file of a run."""
     try:
         content = read_yaml(folder / "protocol.yaml")

@@ -39,17 +39,17 @@ def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
             f"--reference {name}: it decays in one run and is steady in the other; expected a "
             "source that is the same on both days"
         )
-    of_a, of_b = (
+    signal_a, signal_b = (
         _steady(run, name, channel) if fit is None else _glow(fit, channel)
         for run, fit in zip((a, b), fits, strict=True)
     )
-    for run, seen in ((a, of_a), (b, of_b)):
-        if not seen.value > SEEN_SIGMA * seen.sigma:
+    for run, signal in ((a, signal_a), (b, signal_b)):
+        if not signal.value > SEEN_SIGMA * signal.sigma:
             raise DataError(
                 f"--reference {name}: expected light in {channel} that stands out by "
-                f"{SEEN_SIGMA:g} σ, got {seen.value:.3g} ± {seen.sigma:.2g} DN/s in {run}"
+                f"{SEEN_SIGMA:g} σ, got {signal.value:.3g} ± {signal.sigma:.2g} DN/s in {run}"
             )
-    return of_a.over(of_b)
+    return signal_a.over(signal_b)
 
 
 def _patches(run: Path) -> list[str]:

@@ -59,33 +59,35 @@ def _run(arguments: Sequence[str]) -> int:
     from labrig.cli.app import app
 
     if any(_NO_TEXT.search(argument) for argument in arguments):
-        return _complain(f"expected arguments in UTF-8, got {' '.join(map(ascii, arguments))}", 2)
+        return _print_error(
+            f"expected arguments in UTF-8, got {' '.join(map(ascii, arguments))}", 2
+        )
     for signum in STOP_SIGNALS:
         signal.signal(signum, raise_interrupted)
     try:
         app(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
     except Interrupted as interrupted:
-        return _complain(str(interrupted), 128 + interrupted.signum)
+        return _print_error(str(interrupted), 128 + interrupted.signum)
     except LabrigError as error:
-        return _complain(str(error), error.exit_code)
+        return _print_error(str(error), error.exit_code)
     except typer.Exit as ending:
         return ending.exit_code
     except SystemExit as ending:  # Typer's own answer to a pipe without a reader
         raise BrokenPipeError from ending
     except TyperException as error:
-        return _complain(f"{error.format_message()} (see labrig --help)", 2)
+        return _print_error(f"{error.format_message()} (see labrig --help)", 2)
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
         name = str(error.filename or "disk")[:MOST_SHOWN]
         kind = UsageError if error.errno == errno.ENAMETOOLONG else DiskError
-        return _complain(f"{name}: {error.strerror or error}", kind.exit_code)
+        return _print_error(f"{name}: {error.strerror or error}", kind.exit_code)
     except Exception as error:
-        return _complain(_fault(error), 1)
+        return _print_error(_fault_message(error), 1)
     return 0
 
 
-def _fault(error: Exception) -> str:
+def _fault_message(error: Exception) -> str:
     """Write the traceback of a fault of labrig to a file and return a message that names it."""
     import tempfile
     import traceback
@@ -97,6 +99,6 @@ def _fault(error: Exception) -> str:
     return f"a fault in labrig itself ({error!r}); please report it with {file.name}"
 
 
-def _complain(text: str, code: int) -> int:
+def _print_error(text: str, code: int) -> int:
     print(f"labrig: {' '.join(text.split())}", file=ReaderMayLeave(sys.stderr), flush=True)
     return code

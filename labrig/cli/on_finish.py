@@ -36,27 +36,27 @@ def printed_at_end(on_finish: str | Sequence[str] | None) -> Iterator[Ending]:
     try:
         yield ending
     except Interrupted as stop:
-        _tell(on_finish, "interrupted", str(stop))
+        _notify(on_finish, "interrupted", str(stop))
         raise
     except LabrigError as error:
-        _tell(on_finish, "failed", str(error))
+        _notify(on_finish, "failed", str(error))
         raise
-    _tell(on_finish, "done", ending.message)
+    _notify(on_finish, "done", ending.message)
 
 
-def _tell(on_finish: str | Sequence[str] | None, status: str, message: str) -> None:
+def _notify(on_finish: str | Sequence[str] | None, status: str, message: str) -> None:
     if on_finish == "bell":
         print("\a", end="", file=sys.stderr, flush=True)
     elif on_finish:
-        _call(on_finish, {"LABRIG_STATUS": status, "LABRIG_MESSAGE": message})
+        _run_command(on_finish, {"LABRIG_STATUS": status, "LABRIG_MESSAGE": message})
 
 
-def _call(command: Sequence[str], said: dict[str, str]) -> None:
+def _run_command(command: Sequence[str], variables: dict[str, str]) -> None:
     """Run a command; a failure of it is only a warning, since the run is over and kept."""
     try:
         subprocess.run(
             list(command),
-            env=os.environ | said,
+            env=os.environ | variables,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             timeout=COMMAND_TIMEOUT_S,

@@ -70,11 +70,11 @@ def progress(
         return
     console = Console(file=cast(TextIO, ReaderMayLeave(sys.stderr)))
     with Live(console=console, refresh_per_second=4, transient=True) as live:
-        shown = LiveProgress(state, live, console)
+        observer = LiveProgress(state, live, console)
         try:
-            yield shown
+            yield observer
         finally:
-            shown.close()
+            observer.close()
 
 
 class _State:
@@ -89,7 +89,7 @@ class _State:
         self.doing = "connecting"
         self.until_s: float | None = None
         self.frames = 0
-        self._person = None if yes else Terminal()
+        self._terminal = None if yes else Terminal()
         self._unit_began_s = clock.now()
 
     def begin(self, unit: str, number: int) -> None:
@@ -111,10 +111,10 @@ class _State:
 
     def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         """Ask the person at the terminal; without one, only let the time of the step pass."""
-        if self._person is None:
+        if self._terminal is None:
             self.clock.sleep(step.takes_s)
             return ""
-        return self._person.ask(step, last, self.left_s(), meanwhile)
+        return self._terminal.ask(step, last, self.left_s(), meanwhile)
 
     def next_step(self) -> str:
         """Return the next step of this unit in the plan, else the next unit."""
@@ -150,32 +150,32 @@ class PlainProgress:
     def unit(self, name: str, number: int, total: int) -> None:
         """Print that a unit begins."""
         self._state.begin(name, number)
-        self._say(f"unit {number} of {total}: {name}")
+        self._print(f"unit {number} of {total}: {name}")
 
     def doing(self, what: str, until_s: float | None = None) -> None:
         """Print that a wait begins; actions without an end time are not printed."""
         if until_s is not None:
-            self._say(f"{what}; next: {self._state.next_step()}")
+            self._print(f"{what}; next: {self._state.next_step()}")
 
     def frame(self, record: FrameRecord) -> None:
         """Print that a frame was recorded."""
         self._state.frames += 1
         settings = ExposureSettings(record.exposure_s, record.iso, record.f_number)
         number = f"frame {self._state.frames} of {self._state.plan.frames}"
-        self._say(f"{number}: {record.role}, {settings}")
+        self._print(f"{number}: {record.role}, {settings}")
 
     def warn(self, text: str) -> None:
         """Print a warning."""
-        self._say(f"warning: {text}")
+        self._print(f"warning: {text}")
 
     def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
         """Print a step to be done by hand, and ask the person to do it."""
-        self._say(f"by hand: {step.what}")
+        self._print(f"by hand: {step.what}")
         return self._state.ask(step, last, meanwhile)
 
-    def _say(self, text: str) -> None:
-        left = _countdown(self._state.left_s())
-        print(f"[{left} left] {text}", file=ReaderMayLeave(sys.stderr), flush=True)
+    def _print(self, text: str) -> None:
+        time_left = _countdown(self._state.left_s())
+        print(f"[{time_left} left] {text}", file=ReaderMayLeave(sys.stderr), flush=True)
 
 
 class LiveProgress:
@@ -187,7 +187,7 @@ class LiveProgress:
         self._console = console
         self._total = len(state.plan.units)
         self._run: Path | None = None
-        self._glances: Previews | None = None
+        self._previews: Previews | None = None
         live.update(self)
 
     def unit(self, name: str, number: int, total: int) -> None:
@@ -201,15 +201,15 @@ class LiveProgress:
     def frame(self, record: FrameRecord) -> None:
         """Note that a frame was recorded, and request its preview from another process."""
         self._state.frames += 1
-        if self._glances is None:
+        if self._previews is None:
             self._run = record.path.parents[1]
-            self._glances = Previews(self._run, THUMBNAIL_WIDTH)
-        self._glances.ask(record.path.name, record.unit)
+            self._previews = Previews(self._run, THUMBNAIL_WIDTH)
+        self._previews.ask(record.path.name, record.unit)
 
     def close(self) -> None:
         """End the process of the previews."""
-        if self._glances is not None:
-            self._glances.close()
+        if self._previews is not None:
+            self._previews.close()
 
     def warn(self, text: str) -> None:
         """Print a warning, which stays on the screen above the table."""
@@ -225,12 +225,12 @@ class LiveProgress:
 
     def __rich__(self) -> Group:
         """Return the table and the thumbnail as they are now."""
-        seen = None if self._glances is None else self._glances.latest
-        if seen is None:
+        preview = None if self._previews is None else self._previews.latest
+        if preview is None:
             return Group(self._table(None))
-        return Group(self._table(seen), thumbnail(seen.picture))
+        return Group(self._table(preview), thumbnail(preview.picture))
 
-    def _table(self, seen: RenderedPreview | None) -> Table:
+    def _table(self, preview: RenderedPreview | None) -> Table:
         state = self._state
         table = Table.grid(padding=(0, 2))
         table.add_row(_dim("unit"), f"{state.unit}  ({state.number} of {self._total})")
@@ -241,10 +241,10 @@ class LiveProgress:
         table.add_row(_dim("next"), state.next_step())
         table.add_row(_dim("frames"), f"{state.frames} of {state.plan.frames}{self._disk()}")
         table.add_row(_dim("lab time left"), _countdown(state.left_s()))
-        for patch, values in ({} if seen is None else seen.values).items():
-            shown = "  ".join(f"{channel} {mean:.1f}" for channel, mean in values.items())
-            clipped = "  clipped" if seen is not None and patch in seen.clipped else ""
-            table.add_row(_dim(patch), Text(f"{shown} DN{clipped}", "red" if clipped else ""))
+        for patch, values in ({} if preview is None else preview.values).items():
+            means = "  ".join(f"{channel} {mean:.1f}" for channel, mean in values.items())
+            clipped = "  clipped" if preview is not None and patch in preview.clipped else ""
+            table.add_row(_dim(patch), Text(f"{means} DN{clipped}", "red" if clipped else ""))
         return table
 
     def _disk(self) -> str:

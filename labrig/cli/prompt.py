@@ -39,9 +39,11 @@ class Terminal:
         while not self._lines.empty():
             self._lines.get()  # typed before the question
         offer = f", or: {UNDO} (do again: {last})" if last else ""
-        _say(f"by hand: {step.what}")
-        _say(f"  why: {step.why}; {duration_text(left_s)} of lab time left")
-        _say(f"  Enter when it is done, or a remark{offer}; Ctrl-C stops, labrig resume goes on")
+        _print_line(f"by hand: {step.what}")
+        _print_line(f"  why: {step.why}; {duration_text(left_s)} of lab time left")
+        _print_line(
+            f"  Enter when it is done, or a remark{offer}; Ctrl-C stops, labrig resume goes on"
+        )
         while True:
             line = self._next_line(meanwhile)
             if line is None:
@@ -54,7 +56,7 @@ class Terminal:
                 return answer
             if last:
                 return None
-            _say("  there is nothing to take back; Enter when it is done")
+            _print_line("  there is nothing to take back; Enter when it is done")
 
     def _read(self) -> None:
         if not self._reading:
@@ -79,5 +81,5 @@ class Terminal:
                     return None
 
 
-def _say(text: str) -> None:
+def _print_line(text: str) -> None:
     print(text, file=sys.stderr, flush=True)

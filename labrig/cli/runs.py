@@ -61,18 +61,18 @@ def list_them(
 
     from labrig.catalogue import RunFilter, list_runs
 
-    wanted = RunFilter(
+    run_filter = RunFilter(
         sample,
         protocol,
         since.date() if since else date.min,
         until.date() if until else date.max,
         state,
     )
-    found = list_runs(runs, wanted)
+    summaries = list_runs(runs, run_filter)
     if json:
-        _print_json([_summary_json(run) for run in found])
-    elif found:
-        _print_runs(found)
+        _print_json([_summary_json(run) for run in summaries])
+    elif summaries:
+        _print_runs(summaries)
     else:
         typer.echo(f"no such runs in {runs}")
 
@@ -138,7 +138,7 @@ def note(
     typer.echo(add_note(find_run(run, runs), text, SystemClock().wall()))
 
 
-def _print_runs(found: list["RunSummary"]) -> None:
+def _print_runs(summaries: list["RunSummary"]) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -146,7 +146,7 @@ def _print_runs(found: list["RunSummary"]) -> None:
     table = Table(box=None, pad_edge=False)
     for title in ("began (UTC)", "sample", "protocol", "state", "k_r in 1/s"):
         table.add_column(title, overflow="fold")
-    for run in found:
+    for run in summaries:
         table.add_row(
             _when(run),
             run.sample,
@@ -163,8 +163,8 @@ def _print_comparison(comparison: "Comparison") -> None:
 
     from labrig.written_numbers import plus_minus
 
-    for key, of_a, of_b in comparison.asked:
-        typer.echo(f"asked differently: {key}: {of_a} | {of_b}")
+    for key, value_a, value_b in comparison.asked:
+        typer.echo(f"asked differently: {key}: {value_a} | {value_b}")
     if comparison.missing:
         typer.echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
     if not comparison.patches:
@@ -174,12 +174,12 @@ def _print_comparison(comparison: "Comparison") -> None:
         table = Table(box=None, pad_edge=False)
         for title in ("", "run A", "run B", "B − A in σ"):
             table.add_column(title)
-        for one in patch.differences:
+        for difference in patch.differences:
             table.add_row(
-                f"{one.quantity} in {one.unit}",
-                plus_minus(one.a.value, one.a.sigma),
-                plus_minus(one.b.value, one.b.sigma),
-                "–" if math.isnan(one.pull) else f"{one.pull:+.1f}".replace("-", "−"),
+                f"{difference.quantity} in {difference.unit}",
+                plus_minus(difference.a.value, difference.a.sigma),
+                plus_minus(difference.b.value, difference.b.sigma),
+                "–" if math.isnan(difference.pull) else f"{difference.pull:+.1f}".replace("-", "−"),
             )
         if patch.differences:
             Console().print(table)

@@ -50,7 +50,7 @@ def observer(name: str) -> Observer:
     return Observer(name, np.asarray(table.wavelengths), np.asarray(table.values))
 
 
-def white_xyz(name: str, seen_by: Observer) -> FloatArray:
+def white_xyz(name: str, standard_observer: Observer) -> FloatArray:
     """Return X, Y, Z of an illuminant such as `D65`, shape (3,), with Y = 1.
 
     Raises
@@ -60,15 +60,17 @@ def white_xyz(name: str, seen_by: Observer) -> FloatArray:
     """
     import colour
 
-    known = {key: key for key in colour.SDS_ILLUMINANTS if "_" not in key}
-    if name not in known:
+    names = {key: key for key in colour.SDS_ILLUMINANTS if "_" not in key}
+    if name not in names:
         raise UsageError(
             f"--white: expected the name of a CIE illuminant, got '{name}'; "
-            f"{did_you_mean(name, list(known))}"
+            f"{did_you_mean(name, list(names))}"
         )
     light = colour.SDS_ILLUMINANTS[name]
-    power = np.interp(seen_by.wavelength_nm, light.wavelengths, light.values, left=0.0, right=0.0)
-    xyz = power @ seen_by.functions
+    power = np.interp(
+        standard_observer.wavelength_nm, light.wavelengths, light.values, left=0.0, right=0.0
+    )
+    xyz = power @ standard_observer.functions
     return np.asarray(xyz / xyz[1])
 
 
@@ -79,7 +81,7 @@ def lab(xyz: FloatArray, white: FloatArray) -> FloatArray:
     return np.asarray(colour.XYZ_to_Lab(xyz, colour.XYZ_to_xy(white)))
 
 
-def delta_e(one: FloatArray, other: FloatArray) -> FloatArray:
+def delta_e(first: FloatArray, second: FloatArray) -> FloatArray:
     """Return CIEDE2000 between two CIELAB arrays of shape (…, 3), shape (…).
 
     References
@@ -88,7 +90,7 @@ def delta_e(one: FloatArray, other: FloatArray) -> FloatArray:
     """
     import colour
 
-    return np.asarray(colour.difference.delta_E_CIE2000(one, other))
+    return np.asarray(colour.difference.delta_E_CIE2000(first, second))
 
 
 @dataclass(frozen=True, eq=False)
@@ -141,10 +143,10 @@ def viewing(
     each = normalisation == "each"
     if camera is None:
         to_xyz = np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ)
-        how = "raw R, G, B taken for linear sRGB, since the camera's curves are not known"
+        source = "raw R, G, B taken for linear sRGB, since the camera's curves are not known"
     else:
         to_xyz = camera_to_xyz(camera)
-        how = (
+        source = (
             f"raw R, G, B to X, Y, Z by the best 3 × 3 matrix for the curves of {camera.name} "
             "(least squares over all wavelengths, equal energy exact)"
         )
@@ -158,7 +160,7 @@ def viewing(
         white=white_xyz(white, observer(CIE_1931)),
         normalisation="each" if each else "all",
         words=(
-            f"CIELAB with white {white} of the CIE 1931 2° observer; {how}; {factor} just reaches "
-            "the white in X, Y or Z; the predictions have the same factor."
+            f"CIELAB with white {white} of the CIE 1931 2° observer; {source}; {factor} just "
+            "reaches the white in X, Y or Z; the predictions have the same factor."
         ),
     )

@@ -162,25 +162,30 @@ def compare_glow(
         )
     xyz = series.values @ viewing.to_xyz.T
     scale = _scale(series, xyz, viewing)
-    own = lab(scale * xyz, viewing.white)
-    normalised = {name: scale * (one @ viewing.to_xyz.T) for name, one in predicted.items()}
-    apart = {name: delta_e(own, lab(one, viewing.white)) for name, one in normalised.items()}
-    seen = _seen(series)
-    nearest = min(apart, key=lambda name: float(apart[name][seen].mean()))
+    photographed_lab = lab(scale * xyz, viewing.white)
+    normalised = {name: scale * (values @ viewing.to_xyz.T) for name, values in predicted.items()}
+    differences = {
+        name: delta_e(photographed_lab, lab(values, viewing.white))
+        for name, values in normalised.items()
+    }
+    has_colour = _has_colour(series)
+    nearest = min(differences, key=lambda name: float(differences[name][has_colour].mean()))
     unit = np.array(series.unit)
     return GlowComparison(
         patch=series.region,
         t_s=middles_s(series),
         first=unit == unit[0],
-        seen=seen,
+        seen=has_colour,
         photographed=scale * xyz,
         predicted=normalised,
-        delta_e={name: np.where(seen, one, np.nan) for name, one in apart.items()},
+        delta_e={
+            name: np.where(has_colour, values, np.nan) for name, values in differences.items()
+        },
         noise=_noise(series, predicted[nearest], scale, viewing, flicker),
     )
 
 
-def _seen(series: Series) -> NDArray[np.bool_]:
+def _has_colour(series: Series) -> NDArray[np.bool_]:
     """Whether each photograph is bright enough to have a colour, shape (n,); true without a σ."""
     with np.errstate(invalid="ignore"):
         signal_to_noise = np.linalg.norm(series.values / series.sigma, axis=1)
@@ -190,11 +195,11 @@ def _seen(series: Series) -> NDArray[np.bool_]:
 def _scale(series: Series, xyz: FloatArray, viewing: Viewing) -> FloatArray:
     """Return the factors of X, Y, Z of each photograph, shape (n, 1)."""
     reach = (xyz / viewing.white).max(axis=1)
-    brightest = float(reach[_seen(series)].max(initial=0.0))
+    brightest = float(reach[_has_colour(series)].max(initial=0.0))
     if not brightest > 0:
         raise DataError(f"{series.region}: every photograph is too dim to have a colour")
-    own = np.maximum(reach, np.finfo(float).eps * brightest)
-    factor = own if viewing.normalisation == "each" else np.full_like(reach, brightest)
+    reached = np.maximum(reach, np.finfo(float).eps * brightest)
+    factor = reached if viewing.normalisation == "each" else np.full_like(reach, brightest)
     return np.asarray(1 / factor[:, np.newaxis])
 
 
@@ -206,11 +211,11 @@ def _noise(
         return float("nan")
     rng = np.random.default_rng(0)
     shape = (DRAWS, len(expected))
-    drawn = expected * (1 + flicker * rng.standard_normal((*shape, 1)))
-    drawn = drawn + series.sigma * rng.standard_normal((*shape, 3))
-    of_drawn = lab(scale * (drawn @ viewing.to_xyz.T), viewing.white)
-    of_expected = lab(scale * (expected @ viewing.to_xyz.T), viewing.white)
-    return float(delta_e(of_drawn, of_expected[np.newaxis])[:, _seen(series)].mean())
+    draws = expected * (1 + flicker * rng.standard_normal((*shape, 1)))
+    draws = draws + series.sigma * rng.standard_normal((*shape, 3))
+    drawn_lab = lab(scale * (draws @ viewing.to_xyz.T), viewing.white)
+    expected_lab = lab(scale * (expected @ viewing.to_xyz.T), viewing.white)
+    return float(delta_e(drawn_lab, expected_lab[np.newaxis])[:, _has_colour(series)].mean())
 
 
 def glow_table(glows: Sequence[GlowComparison]) -> Table:
@@ -226,8 +231,8 @@ def glow_table(glows: Sequence[GlowComparison]) -> Table:
     ]
     if len(glows) > 1:
         rows.append(("all patches", *(_mean_and_most(glows, name) for name in names), ""))
-    of_paper = {predicted_by(n): f"{d.mean:.2f} ({d.most:.2f})" for n, d in DELTA_E.items()}
-    rows.append(("paper, 11 materials", *(of_paper.get(name, "–") for name in names), ""))
+    paper_cells = {predicted_by(n): f"{d.mean:.2f} ({d.most:.2f})" for n, d in DELTA_E.items()}
+    rows.append(("paper, 11 materials", *(paper_cells.get(name, "–") for name in names), ""))
     return Table(
         head=("patch", *names, "noise"),
         rows=tuple(rows),
@@ -239,8 +244,8 @@ def glow_table(glows: Sequence[GlowComparison]) -> Table:
 
 
 def _mean_and_most(glows: Sequence[GlowComparison], name: str) -> str:
-    known = [glow.delta_e[name] for glow in glows if name in glow.delta_e]
-    if not known:
+    values = [glow.delta_e[name] for glow in glows if name in glow.delta_e]
+    if not values:
         return "–"
-    together = np.concatenate(known)
-    return f"{np.nanmean(together):.2f} ({np.nanmax(together):.2f})"
+    all_values = np.concatenate(values)
+    return f"{np.nanmean(all_values):.2f} ({np.nanmax(all_values):.2f})"

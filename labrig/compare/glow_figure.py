@@ -37,8 +37,10 @@ def glow_figure(glows: Sequence[GlowComparison]) -> Figure:
     """Draw a block for each patch: photographs above, predictions with their ΔE below."""
     times = [tuple(glow.t_s[shown_rows(glow)]) for glow in glows]
     # Patches of one run were mostly photographed together: their times stand once.
-    timed = [one != after for one, after in zip(times, [*times[1:], ()], strict=True)]
-    tops = np.cumsum([0.0, *(_height(*one) for one in zip(glows, timed, strict=True))])
+    timed = [
+        current != following for current, following in zip(times, [*times[1:], ()], strict=True)
+    ]
+    tops = np.cumsum([0.0, *(_height(*block) for block in zip(glows, timed, strict=True))])
     height = float(tops[-1]) + TIMES_PT
     figure = new_figure(height)
     axes = figure.add_axes((0, 0, 1, 1))
@@ -102,7 +104,7 @@ def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> No
                 axes.text(
                     x + width / 2,
                     y + CELL_HEIGHT_PT / 2,
-                    _written(float(glow.delta_e[name][row])),
+                    _delta_e_text(float(glow.delta_e[name][row])),
                     ha="center",
                     va="center",
                     fontsize=WRITING_PT,
@@ -114,7 +116,7 @@ def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> No
                   ha="center", color=MUTED, fontsize=SMALL_PT)  # fmt: skip
 
 
-def _written(delta_e: float) -> str:
+def _delta_e_text(delta_e: float) -> str:
     return "–" if np.isnan(delta_e) else f"{delta_e:.1f}"
 
 

@@ -30,7 +30,7 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
     >>> sorted(glow["delta_e"])
     ['1 state', '2 states']
     """
-    found: dict[str, Any] = _plain(
+    plain: dict[str, Any] = _plain(
         {
             "words": comparison.words,
             "camera": comparison.camera.name if comparison.camera else None,
@@ -47,15 +47,20 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
                 for glow in comparison.glows
             },
             "residuals": [
-                {"patch": one.patch, "weights": one.weighted, "rms": one.rms, "last": one.last}
-                for one in comparison.residuals
+                {
+                    "patch": residuals.patch,
+                    "weights": residuals.weighted,
+                    "rms": residuals.rms,
+                    "last": residuals.last,
+                }
+                for residuals in comparison.residuals
             ],
             "beside": [
                 {
-                    "measured": one.names[0],
-                    "reference": one.names[1],
-                    "k_e_factor": one.k_e_factor,
-                    "reradiation_factor": one.reradiation_factor,
+                    "measured": materials.names[0],
+                    "reference": materials.names[1],
+                    "k_e_factor": materials.k_e_factor,
+                    "reradiation_factor": materials.reradiation_factor,
                     "rows": [
                         {
                             "quantity": pair.quantity,
@@ -66,19 +71,23 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
                             "percent": pair.percent,
                             "in_sigma": pair.in_sigma,
                         }
-                        for pair in one.pairs
+                        for pair in materials.pairs
                     ],
-                    "notes": list(one.notes),
+                    "notes": list(materials.notes),
                 }
-                for one in comparison.beside
+                for materials in comparison.beside
             ],
             "spectra": {
-                one.name: {"delta_e": one.delta_e, "missed": one.missed, "known_on": grid}
-                for one, grid in comparison.spectra
+                spectrum.name: {
+                    "delta_e": spectrum.delta_e,
+                    "missed": spectrum.missed,
+                    "known_on": grid,
+                }
+                for spectrum, grid in comparison.spectra
             },
         }
     )
-    return found
+    return plain
 
 
 def _plain(item: Any) -> Any:

@@ -54,13 +54,13 @@ def residuals(series: Series, fits: Mapping[int, DecayFit], weighted: str) -> Re
     weighted
         Weighting of the values in the fits, `noise` or `equal`.
     """
-    left = {number: series.values - predicted(series, fit) for number, fit in fits.items()}
+    errors = {number: series.values - predicted(series, fit) for number, fit in fits.items()}
     last = int(np.argmax(series.t_s))
     return Residuals(
         patch=series.region,
         weighted=weighted,
-        rms=_over_one_state(left),
-        last=_over_one_state({number: one[last] for number, one in left.items()}),
+        rms=_over_one_state(errors),
+        last=_over_one_state({number: error[last] for number, error in errors.items()}),
         supported={number: fit.n_states for number, fit in fits.items()},
     )
 
@@ -92,8 +92,8 @@ def fits_by_states(series: Series, flicker: float, refit: Refit) -> dict[int, De
 
 def equally_weighted(series: Series, n_states: int, flicker: float = 0.0) -> DecayFit:
     """Fit the linear values by plain least squares, as Nalbach et al. do."""
-    known = series.sigma[np.isfinite(series.sigma)]
-    sigma = float(np.median(known)) if known.size else 1e-3 * float(np.abs(series.values).max())
+    sigmas = series.sigma[np.isfinite(series.sigma)]
+    sigma = float(np.median(sigmas)) if sigmas.size else 1e-3 * float(np.abs(series.values).max())
     return fit_decay(
         series.t_s,
         series.values,
@@ -106,21 +106,27 @@ def equally_weighted(series: Series, n_states: int, flicker: float = 0.0) -> Dec
     )
 
 
-def residuals_table(found: Sequence[Residuals]) -> Table:
+def residuals_table(entries: Sequence[Residuals]) -> Table:
     """Return a table with a row for each patch and weighting, their medians, and the paper's."""
-    ways = list(dict.fromkeys(one.weighted for one in found))
+    weightings = list(dict.fromkeys(entry.weighted for entry in entries))
     rows = [
-        (one.patch, one.weighted, *_percents(one.rms), *_percents(one.last), _more_states(one))
-        for one in found
+        (
+            entry.patch,
+            entry.weighted,
+            *_percents(entry.rms),
+            *_percents(entry.last),
+            _more_states(entry),
+        )
+        for entry in entries
     ]
-    for way in ways:
-        same = [one for one in found if one.weighted == way]
-        if len(same) > 1:
+    for weighting in weightings:
+        group = [entry for entry in entries if entry.weighted == weighting]
+        if len(group) > 1:
             rms, last = (
-                {n: float(np.median([getattr(one, what)[n] for one in same])) for n in STATES}
-                for what in ("rms", "last")
+                {n: float(np.median([getattr(entry, key)[n] for entry in group])) for n in STATES}
+                for key in ("rms", "last")
             )
-            rows.append(("median", way, *_percents(rms), *_percents(last), ""))
+            rows.append(("median", weighting, *_percents(rms), *_percents(last), ""))
     rows.append(
         ("paper, median of 11", "equal", *_percents(RESIDUALS), *_percents(LAST_RESIDUALS), "")
     )
@@ -143,15 +149,15 @@ def residuals_table(found: Sequence[Residuals]) -> Table:
     )
 
 
-def _over_one_state(left: Mapping[int, FloatArray]) -> dict[int, float]:
+def _over_one_state(errors: Mapping[int, FloatArray]) -> dict[int, float]:
     """Return the RMS by the number of states over that of one state; 1 if that is 0 already."""
-    rms = {number: float(np.sqrt(np.mean(one**2))) for number, one in left.items()}
-    return {number: one / rms[1] if rms[1] > 0 else 1.0 for number, one in rms.items()}
+    rms = {number: float(np.sqrt(np.mean(value**2))) for number, value in errors.items()}
+    return {number: value / rms[1] if rms[1] > 0 else 1.0 for number, value in rms.items()}
 
 
 def _percents(ratios: Mapping[int, float]) -> tuple[str, ...]:
     return tuple(f"{100 * ratios[number]:.3g}" for number in STATES[1:])
 
 
-def _more_states(one: Residuals) -> str:
-    return ", ".join(str(number) for number in one.supported.values())
+def _more_states(entry: Residuals) -> str:
+    return ", ".join(str(number) for number in entry.supported.values())

@@ -73,36 +73,36 @@ def read_patches(run: Path) -> dict[str, MeasuredPatch]:
     if not (run / "protocol.yaml").is_file():
         raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
     fits = find_fitted_decays(run / "result").values()
-    places = [fit.parent for fit in fits if (fit.parent / "series.csv").is_file()]
-    if not places:
+    folders = [fit.parent for fit in fits if (fit.parent / "series.csv").is_file()]
+    if not folders:
         raise DataError(
             f"{run}: expected a result with the fit of a decay, got none; make one: "
             f"labrig process {run}"
         )
     sample = read_yaml(run / "protocol.yaml").get("sample")
-    only = sample.get("name") if isinstance(sample, dict) and len(places) == 1 else None
-    several = len(places) > 1
+    only = sample.get("name") if isinstance(sample, dict) and len(folders) == 1 else None
+    several = len(folders) > 1
     patches = [
-        _read_patch(place, only, run / "result" / (place.name if several else ""))
-        for place in places
+        _read_patch(folder, only, run / "result" / (folder.name if several else ""))
+        for folder in folders
     ]
     return {patch.name: patch for patch in patches}
 
 
-def _read_patch(place: Path, name: str | None, of_chain: Path) -> MeasuredPatch:
-    fit = read_fitted_decay(place / "fit.json")
-    series = joined(read_series(place / "series.csv"))
+def _read_patch(folder: Path, name: str | None, chain_folder: Path) -> MeasuredPatch:
+    fit = read_fitted_decay(folder / "fit.json")
+    series = joined(read_series(folder / "series.csv"))
     if fit.channels != series.channels:
         raise DataError(
-            f"{place}: expected fit.json and series.csv of the same channels, got "
+            f"{folder}: expected fit.json and series.csv of the same channels, got "
             f"{', '.join(fit.channels)} and {', '.join(series.channels)}; make them again: "
             "labrig process RUN"
         )
     rows = np.flatnonzero(series.usable)
-    by_time = rows[np.argsort(series.t_s[rows], kind="stable")]
-    usable = series.take(by_time, name)
-    whole = of_chain / "material.yaml"
-    material = read_material(whole if whole.is_file() else place / "material.yaml")
+    rows_by_time = rows[np.argsort(series.t_s[rows], kind="stable")]
+    usable = series.take(rows_by_time, name)
+    chain_file = chain_folder / "material.yaml"
+    material = read_material(chain_file if chain_file.is_file() else folder / "material.yaml")
     return MeasuredPatch(
         replace(usable, values=usable.values - np.array(fit.offsets)), fit.flicker, material
     )
@@ -212,7 +212,7 @@ def compare_run(
     patches = read_patches(folder)
     references = _by_patch(materials, list(patches))
     curves, left_out = _camera(folder, camera)
-    seen = viewing(curves, white, normalisation)
+    conversion = viewing(curves, white, normalisation)
     glows: list[GlowComparison] = []
     ratios: list[Residuals] = []
     for patch in patches.values():
@@ -221,20 +221,21 @@ def compare_run(
             equal = fits_by_states(patch.series, 0.0, equally_weighted)
             ratios.append(residuals(patch.series, fits, "noise"))
             ratios.append(residuals(patch.series, equal, "equal"))
-            expected = _expected(patch, fits, references.get(patch.name), curves)
-            glows.append(compare_glow(patch.series, expected, seen, patch.flicker))
+            predictions = _predictions(patch, fits, references.get(patch.name), curves)
+            glows.append(compare_glow(patch.series, predictions, conversion, patch.flicker))
         except DataError as error:
             left_out.append(f"{patch.name} is left out: {error}")
     return RunComparison(
         camera=curves,
         white=white,
         words=" ".join(
-            [seen.words, *_curves_source(list(patches.values()), curves, bool(references))]
+            [conversion.words, *_curves_source(list(patches.values()), curves, bool(references))]
         ),
         glows=tuple(glows),
         residuals=tuple(ratios),
         beside=tuple(
-            compare_materials(patches[name].material, one) for name, one in references.items()
+            compare_materials(patches[name].material, reference)
+            for name, reference in references.items()
         ),
         spectra=() if curves is None else _spectra(patches, references, curves, white),
         left_out=tuple(left_out),
@@ -246,34 +247,34 @@ def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Mat
 
     A material without a patch belongs to the patch of the same name or to the only one.
     """
-    found: dict[str, Material] = {}
+    by_patch: dict[str, Material] = {}
     for text in materials:
-        named, _, name = text.rpartition("=")
-        patch = named or (name if name in patches or len(patches) > 1 else patches[0])
+        patch_name, _, name = text.rpartition("=")
+        patch = patch_name or (name if name in patches or len(patches) > 1 else patches[0])
         if patch not in patches:
             raise UsageError(
                 f"--material: no patch is called '{patch}'; {did_you_mean(patch, patches)}; write "
                 f"--material PATCH={name}"
             )
-        if patch in found:
+        if patch in by_patch:
             raise UsageError(f"--material: expected one material for {patch}, got two")
-        found[patch] = read_material(name)
-    return found
+        by_patch[patch] = read_material(name)
+    return by_patch
 
 
-def _camera(folder: Path, instead: str | None) -> tuple[CameraResponse | None, list[str]]:
+def _camera(folder: Path, replacement: str | None) -> tuple[CameraResponse | None, list[str]]:
     """Return the curves requested, else those of the processing, and why there are none."""
     rig = read_rig_file(folder / "rig.yaml")
     try:
         lvf = read_result(folder).provides().get("lvf") or calibration(rig, LVF_KIND)
-        return camera_curves(rig, instead, lvf), []
+        return camera_curves(rig, replacement, lvf), []
     except UsageError as error:
-        if instead is not None:
+        if replacement is not None:
             raise
         return None, [f"no camera curves: {error}; give them with --camera"]
 
 
-def _expected(
+def _predictions(
     patch: MeasuredPatch,
     fits: Mapping[int, DecayFit],
     reference: Material | None,
@@ -281,15 +282,15 @@ def _expected(
 ) -> dict[str, FloatArray]:
     """Return the predictions for each photograph by name, shape (n, C)."""
     series, spectrum = patch.series, emission(patch.material)
-    expected = {}
+    predictions = {}
     for number in PREDICTED:
         values = predicted(series, fits[number])
         if spectrum is not None and camera is not None:
             values = in_colour(values, spectrum, camera)
-        expected[predicted_by(number)] = values
+        predictions[predicted_by(number)] = values
     if reference is not None:
-        expected[MATERIAL] = glow_of(reference, series, camera)
-    return expected
+        predictions[MATERIAL] = glow_of(reference, series, camera)
+    return predictions
 
 
 def _curves_source(
@@ -314,17 +315,17 @@ def _spectra(
     white: str,
 ) -> tuple[tuple[ThreeChannels, str], ...]:
     """Return the spectra of all materials, measured ones first; of equal names only the first."""
-    known: dict[str, Material] = {}
+    by_name: dict[str, Material] = {}
     for material in (
         *(patch.material for patch in patches.values()),
         *references.values(),
         *map(read_material, TABLE_1),
     ):
         if emission(material) is not None:
-            known.setdefault(material.name, material)
-    found = []
-    for material in known.values():
+            by_name.setdefault(material.name, material)
+    spectra = []
+    for material in by_name.values():
         spectrum = emission(material)
         if spectrum is not None:
-            found.append((three_channels(spectrum, camera, white), emission_grid(material)))
-    return tuple(found)
+            spectra.append((three_channels(spectrum, camera, white), emission_grid(material)))
+    return tuple(spectra)

@@ -105,43 +105,48 @@ def three_channels(
     >>> f"{result.delta_e:.1f}, {result.missed:.0%}"
     '1.6, 40%'
     """
-    eye = observer(CIE_2015)
-    at_eye = spectrum.resampled(eye.wavelength_nm).value
-    xyz = at_eye @ eye.functions
+    standard_observer = observer(CIE_2015)
+    resampled = spectrum.resampled(standard_observer.wavelength_nm).value
+    xyz = resampled @ standard_observer.functions
     if not xyz.max() > 0:
         raise DataError(f"{spectrum.name}: expected a spectrum that can be seen, got a dark one")
-    white_point = white_xyz(white, eye)
-    from_rgb = best_matrix(camera, eye) @ (at_eye @ camera.at(eye.wavelength_nm))
+    white_point = white_xyz(white, standard_observer)
+    from_rgb = best_matrix(camera, standard_observer) @ (
+        resampled @ camera.at(standard_observer.wavelength_nm)
+    )
     scale = 1 / float((xyz / white_point).max())
-    weights = np.linalg.lstsq(eye.functions, at_eye, rcond=None)[0]
-    approximation = eye.functions @ weights
-    left = at_eye - approximation
+    weights = np.linalg.lstsq(standard_observer.functions, resampled, rcond=None)[0]
+    approximation = standard_observer.functions @ weights
+    difference = resampled - approximation
     return ThreeChannels(
         name=spectrum.name,
-        wavelength_nm=eye.wavelength_nm,
-        spectrum=at_eye,
+        wavelength_nm=standard_observer.wavelength_nm,
+        spectrum=resampled,
         approximation=approximation,
-        missed=float(np.linalg.norm(left) / np.linalg.norm(at_eye)),
+        missed=float(np.linalg.norm(difference) / np.linalg.norm(resampled)),
         xyz=scale * xyz,
         xyz_from_rgb=scale * from_rgb,
         delta_e=float(delta_e(lab(scale * xyz, white_point), lab(scale * from_rgb, white_point))),
     )
 
 
-def best_matrix(camera: CameraResponse, eye: Observer) -> FloatArray:
+def best_matrix(camera: CameraResponse, standard_observer: Observer) -> FloatArray:
     """Return the matrix from R, G, B to X, Y, Z by least squares over wavelengths, shape (3, 3)."""
-    fitted = np.linalg.lstsq(camera.at(eye.wavelength_nm), eye.functions, rcond=None)[0]
+    fitted = np.linalg.lstsq(
+        camera.at(standard_observer.wavelength_nm), standard_observer.functions, rcond=None
+    )[0]
     return np.asarray(fitted.T)
 
 
 def three_channels_table(
-    found: Sequence[tuple[ThreeChannels, str]], camera: CameraResponse, white: str
+    results: Sequence[tuple[ThreeChannels, str]], camera: CameraResponse, white: str
 ) -> Table:
     """Return a table with a row for each material and the resolution of its spectrum."""
     return Table(
         head=("material", "spectrum of", "ΔE2000 from R, G, B", "missed by three functions / %"),
         rows=tuple(
-            (one.name, grid, f"{one.delta_e:.2f}", f"{100 * one.missed:.0f}") for one, grid in found
+            (result.name, grid, f"{result.delta_e:.2f}", f"{100 * result.missed:.0f}")
+            for result, grid in results
         ),
         caption="Colour from the spectrum against colour from R, G, B by the best 3 × 3 matrix for "
         f"the curves of {camera.name} (least squares over all wavelengths); CIE 2015 2° observer, "

@@ -182,10 +182,10 @@ def _attributes(folder: Path) -> dict[str, str]:
     """Return the attributes of the whole run from its journal."""
     completed = read_run(folder).completed()
     start = next(iter(completed.values())).start if completed else {}
-    known = {
+    values = {
         key: start[key] for key in ("protocol", "sample", "rig", "labrig_version") if key in start
     }
-    return {"run": folder.resolve().name, **known, **start.get("devices", {})}
+    return {"run": folder.resolve().name, **values, **start.get("devices", {})}
 
 
 def _measured(patches: Sequence[Series]) -> dict[str, Column]:
@@ -201,16 +201,16 @@ def _measured(patches: Sequence[Series]) -> dict[str, Column]:
 
 
 def _fitted(fits: Sequence[FittedDecay | None], channels: Sequence[str]) -> dict[str, Column]:
-    most = max((fit.n_states for fit in fits if fit), default=0)
+    n_states = max((fit.n_states for fit in fits if fit), default=0)
 
-    def of_state(key: str) -> NDArray[np.float64]:
-        rows = np.full((len(fits), most), np.nan)
+    def state_rows(key: str) -> NDArray[np.float64]:
+        rows = np.full((len(fits), n_states), np.nan)
         for row, fit in zip(rows, fits, strict=True):
             if fit:
                 row[: fit.n_states] = [getattr(state, key) for state in fit.states]
         return rows
 
-    def of_channel(key: str) -> NDArray[np.float64]:
+    def channel_rows(key: str) -> NDArray[np.float64]:
         rows = np.full((len(fits), len(channels)), np.nan)
         for row, fit in zip(rows, fits, strict=True):
             if fit:
@@ -218,20 +218,20 @@ def _fitted(fits: Sequence[FittedDecay | None], channels: Sequence[str]) -> dict
                 row[:] = [by_name.get(name, np.nan) for name in channels]
         return rows
 
-    def of_patch(key: str) -> NDArray[np.float64]:
+    def patch_values(key: str) -> NDArray[np.float64]:
         return np.array([getattr(fit, key) if fit else np.nan for fit in fits])
 
     states, weights = ("patch", "state"), ("patch", "channel")
     return {
-        "k_r_per_s": (states, of_state("k_r_per_s"), PER_S),
-        "k_r_sigma_per_s": (states, of_state("k_r_sigma_per_s"), PER_S),
-        "amplitude": (states, of_state("amplitude"), DN_PER_S),
-        "amplitude_sigma": (states, of_state("amplitude_sigma"), DN_PER_S),
-        "channel_weight": (weights, of_channel("channel_weights")),
-        "channel_weight_sigma": (weights, of_channel("channel_weights_sigma")),
-        "offset": (weights, of_channel("offsets"), DN_PER_S),
-        "offset_sigma": (weights, of_channel("offsets_sigma"), DN_PER_S),
-        "flicker": ("patch", of_patch("flicker")),
-        "reduced_chi2": ("patch", of_patch("reduced_chi2")),
+        "k_r_per_s": (states, state_rows("k_r_per_s"), PER_S),
+        "k_r_sigma_per_s": (states, state_rows("k_r_sigma_per_s"), PER_S),
+        "amplitude": (states, state_rows("amplitude"), DN_PER_S),
+        "amplitude_sigma": (states, state_rows("amplitude_sigma"), DN_PER_S),
+        "channel_weight": (weights, channel_rows("channel_weights")),
+        "channel_weight_sigma": (weights, channel_rows("channel_weights_sigma")),
+        "offset": (weights, channel_rows("offsets"), DN_PER_S),
+        "offset_sigma": (weights, channel_rows("offsets_sigma"), DN_PER_S),
+        "flicker": ("patch", patch_values("flicker")),
+        "reduced_chi2": ("patch", patch_values("reduced_chi2")),
         "fit_warnings": ("patch", ["\n".join(fit.warnings) if fit else "" for fit in fits]),
     }

@@ -89,14 +89,18 @@ def add_fields(entry: h5py.Group, result: RunResult, name: str, version: str) ->
     add_text(process, "version", version)
     for path, value in leaves(result):
         group = process
-        *groups, last = _valid("result", *path)
-        for one in groups:
-            group = group[one] if one in group else add_group(group, one, "NXcollection")
+        *groups, last = _valid_path("result", *path)
+        for group_name in groups:
+            group = (
+                group[group_name]
+                if group_name in group
+                else add_group(group, group_name, "NXcollection")
+            )
         if value is not None:
             _add(group, last, path[-1], value)
 
 
-def _valid(*names: str) -> list[str]:
+def _valid_path(*names: str) -> list[str]:
     """Return names that NeXus allows; names along one path may be equal."""
     return [valid_names([name])[0] for name in names]
 
@@ -119,7 +123,7 @@ def _add(group: h5py.Group, name: str, field: str, value: Any) -> None:
     elif numbers.dtype.kind == "b":
         add_number(group, name, numbers.astype(np.int8))
     elif isinstance(value, tuple | list):
-        add_text(group, name, [str(one) for one in value])
+        add_text(group, name, [str(element) for element in value])
     else:
         add_text(group, name, str(value))
 
@@ -179,11 +183,11 @@ def add_fit(entry: h5py.Group, name: str, title: str, patch: DecayPatch, version
         curve.attrs["SILX_style"] = LOGARITHMIC
         predicted = fit.predict(series.t_s, series.exposure_s)
         _add_signals(curve, series.channels, predicted)
-        left = _add_plot(
+        residual_plot = _add_plot(
             process, f"{decay}_residuals", f"whitened residuals of {title}", patch, series
         )
         for number, channel in enumerate(series.channels):
-            add_number(left, channel, residuals[rows, number], "", f"{channel} / σ")
+            add_number(residual_plot, channel, residuals[rows, number], "", f"{channel} / σ")
         process.attrs.setdefault("default", f"{decay}_curve")
 
 
@@ -344,8 +348,8 @@ def _subject(result: RunResult) -> str:
 def _add_results(entry: h5py.Group, result: RunResult, version: str, part: str = "") -> None:
     """Add decays with their fits, other results field by field, and every part of a chain."""
     if isinstance(result, PhosphorResult):
-        for name, one in result.parts.items():
-            _add_results(entry, one, version, name)
+        for name, part_result in result.parts.items():
+            _add_results(entry, part_result, version, name)
     if isinstance(result, DecayResult):
         names = valid_names([" ".join(filter(None, (part, name))) for name in result.patches])
         for valid, (name, patch) in zip(names, result.patches.items(), strict=True):
@@ -374,33 +378,33 @@ def _add_frames(camera: h5py.Group, run: RunRecord, start_time: float) -> None:
     add_number(camera, "count_time", [frame.exposure_s for frame in frames], "s")
     for name, column in zip(("start_time", "stop_time"), seconds.T, strict=True):
         add_number(camera, name, column, "s").attrs["start"] = _iso(start_time)
-    kept = add_group(camera, "frames", "NXcollection")
-    add_text(kept, "file_name", [f"frames/{frame.path.name}" for frame in frames])
-    add_text(kept, "sha256", [frame.sha256 for frame in frames])
-    add_number(kept, "size", [frame.size_bytes for frame in frames], "byte")
-    add_text(kept, "role", [frame.role for frame in frames])
-    add_text(kept, "unit", [frame.unit for frame in frames])
-    add_number(kept, "iso", [frame.iso for frame in frames])
+    files = add_group(camera, "frames", "NXcollection")
+    add_text(files, "file_name", [f"frames/{frame.path.name}" for frame in frames])
+    add_text(files, "sha256", [frame.sha256 for frame in frames])
+    add_number(files, "size", [frame.size_bytes for frame in frames], "byte")
+    add_text(files, "role", [frame.role for frame in frames])
+    add_text(files, "unit", [frame.unit for frame in frames])
+    add_number(files, "iso", [frame.iso for frame in frames])
     add_number(
-        kept,
+        files,
         "f_number",
         [np.nan if frame.f_number is None else frame.f_number for frame in frames],
     )
-    add_number(kept, "late", [frame.late_s for frame in frames], "s")
+    add_number(files, "late", [frame.late_s for frame in frames], "s")
 
 
 def _add_switching(light: h5py.Group, key: str, run: RunRecord, start_time: float) -> None:
     """Add the times at which a light was switched, the charging history of the sample."""
-    switched = [
+    actions = [
         action
         for attempt in run.completed().values()
         for action in attempt.actions
         if action.device == key
     ]
     log = add_group(light, "switched", "NXlog")
-    middles = [action.middle_time - start_time for action in switched]
+    middles = [action.middle_time - start_time for action in actions]
     add_number(log, "time", middles, "s").attrs["start"] = _iso(start_time)
-    add_number(log, "value", np.array([action.action != DARK for action in switched], np.int8))
+    add_number(log, "value", np.array([action.action != DARK for action in actions], np.int8))
     add_text(log, "description", "1: on, 0: off")
 
 

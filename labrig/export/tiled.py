@@ -57,20 +57,22 @@ def to_tiled(run: Path | str, client: "Container") -> list[str]:
             "python -m pip install bluesky-tiled-plugins xarray"
         ) from None
     folder = Path(run).resolve()
-    ended = [a.uid for a in read_run(folder).attempts if a.exit_status is not None]
-    wanted = [uid for uid in ended if not _is_whole(uid, client)]
-    _delete([uid for uid in wanted if uid in client], client)
+    ended = [
+        attempt.uid for attempt in read_run(folder).attempts if attempt.exit_status is not None
+    ]
+    missing = [uid for uid in ended if not _is_complete(uid, client)]
+    _delete([uid for uid in missing if uid in client], client)
     writer = TiledWriter(client)
     for uid, (name, doc) in _by_attempt(read_journal(folder / "journal.jsonl").documents):
-        if uid in wanted:
+        if uid in missing:
             writer(name, doc)
     if (folder / "result").is_dir():
         _delete([folder.name] if folder.name in client else [], client)
         write_xarray_dataset(client, read_dataset(folder), key=folder.name)
-    return wanted
+    return missing
 
 
-def _is_whole(uid: str, client: "Container") -> bool:
+def _is_complete(uid: str, client: "Container") -> bool:
     """Whether the server has the attempt to its end; an upload may have been interrupted."""
     return uid in client and "stop" in client[uid].metadata
 

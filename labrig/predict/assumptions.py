@@ -75,16 +75,16 @@ class Sources:
             first_exposure_s = None if metered is None else parse(metered, TIME_S)
         except ValueError as error:
             raise UsageError(f"--metered: {error}") from None
-        named: dict[str, str] = {}
+        by_patch: dict[str, str] = {}
         for text in materials:
             patch, _, material = text.rpartition("=")
-            if patch in named:
+            if patch in by_patch:
                 raise UsageError(
                     "--predict: expected one material for each patch, got two for "
                     f"{patch or 'the only one'}; write --predict PATCH=MATERIAL"
                 )
-            named[patch] = material
-        return cls(named, like, first_exposure_s, response)
+            by_patch[patch] = material
+        return cls(by_patch, like, first_exposure_s, response)
 
 
 @dataclass(frozen=True, eq=False)
@@ -122,15 +122,15 @@ def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) 
     materials = {patch: read_material(name) for patch, name in files.items()}
     for material in materials.values():
         check_states(material)
-    like = None if sources.like is None else _like(sources.like, next(iter(files)))
-    own = {patch: _own_run(name, materials[patch], like) for patch, name in files.items()}
-    reference = like or next((run for run in own.values() if run is not None), None)
+    like = None if sources.like is None else _read_like(sources.like, next(iter(files)))
+    own_runs = {patch: _own_run(name, materials[patch], like) for patch, name in files.items()}
+    reference = like or next((run for run in own_runs.values() if run is not None), None)
     camera = typical_camera(offers, protocol.camera.iso) if reference is None else reference.camera
     flicker = None if reference is None else reference.flicker
     measured = {
         patch: glow
         for patch, material in materials.items()
-        if (glow := measured_glow(material, own[patch])) is not None
+        if (glow := measured_glow(material, own_runs[patch])) is not None
     }
     relative = {
         patch: relative_glow(material, protocol, camera, sources.response)
@@ -157,7 +157,7 @@ def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) 
 def _by_patch(protocol: Decay, materials: Mapping[str, str]) -> dict[str, str]:
     """Return the materials by the protocol's own patches."""
     patches = list(protocol.patches)
-    found = {}
+    by_patch = {}
     for name, material in materials.items():
         if not name and len(patches) > 1:
             raise UsageError(
@@ -169,11 +169,11 @@ def _by_patch(protocol: Decay, materials: Mapping[str, str]) -> dict[str, str]:
             raise UsageError(
                 f"--predict: no patch is called '{patch}'; {did_you_mean(patch, patches)}"
             )
-        found[patch] = material
-    return found
+        by_patch[patch] = material
+    return by_patch
 
 
-def _like(run: Path, patch: str) -> Reference:
+def _read_like(run: Path, patch: str) -> Reference:
     places = result_places(run)
     return read_reference(places.get(patch, next(iter(places.values()))))
 
@@ -200,16 +200,16 @@ def _brightness(
         brightest = max(float(glow.amplitude.sum()) for glow in measured.values())
         return brightest, f"brightness of {', '.join(relative)}: assumed, as the brightest measured"
     protocol = predictable(model)
-    exposure_s, said = sources.first_exposure_s, "as --metered says"
+    exposure_s, reason = sources.first_exposure_s, "as --metered says"
     if exposure_s is None and isinstance(protocol.exposure, float):
-        exposure_s, said = protocol.exposure, "assumed, as suits the protocol's exposure"
+        exposure_s, reason = protocol.exposure, "assumed, as suits the protocol's exposure"
     elif exposure_s is None:
         longest_s = protocol.longest_exposure_s(offers)
         exposure_s = offers.exposure_at_most(longest_s * FIRST_EXPOSURE_FRACTION)
-        said = "assumed; say --metered"
+        reason = "assumed; say --metered"
     metered = predictable(changed(model, {"exposure": "auto"}))
     factor = brightness_metered_as(metered, offers, bench, exposure_s)
-    return factor, f"brightness: metering chooses {exposure_s:.3g} s at first ({said})"
+    return factor, f"brightness: metering chooses {exposure_s:.3g} s at first ({reason})"
 
 
 def _camera_note(camera: CameraFigures, reference: Reference | None) -> str:

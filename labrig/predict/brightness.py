@@ -89,13 +89,15 @@ def brightness_metered_as(
         dimmer in proportion.
     """
     reached_s = min(exposure_s, metered.longest_exposure_s(offers))
-    seen = bench.seen_with(metered.camera)
+    metered_bench = bench.seen_with(metered.camera)
     low, high = np.log(DIMMEST), np.log(BRIGHTEST)
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        brighter = {patch: glow.brighter(np.exp(middle)) for patch, glow in seen.glows.items()}
-        trial = Bench(seen.camera, seen.flicker, brighter)
-        schedule = expected_schedule(metered, offers, trial, lambda _: None)
+        brighter = {
+            patch: glow.brighter(np.exp(middle)) for patch, glow in metered_bench.glows.items()
+        }
+        trial_bench = Bench(metered_bench.camera, metered_bench.flicker, brighter)
+        schedule = expected_schedule(metered, offers, trial_bench, lambda _: None)
         low, high = (
             (middle, high) if schedule.exposures_s[0] >= 0.999 * reached_s else (low, middle)
         )

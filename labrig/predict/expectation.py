@@ -111,7 +111,7 @@ def expect(protocol: Decay, offers: CameraOffers, bench: Bench) -> Expectation:
     return Expectation(
         exposures_s=tuple(schedule.exposures_s),
         series=series,
-        found={patch: information(one) for patch, one in series.items()},
+        found={patch: information(data) for patch, data in series.items()},
         clipped=clipped,
         states_chosen=protocol.states == "auto",
         warnings=tuple(warnings),
@@ -153,12 +153,12 @@ def _series(
     else:
         darks_s = np.array(protocol.dark_exposures_s(offers))
         darks = dark_frames(camera, region, frames.channels, darks_s)
-    one = expected_series(glow, t_s, frames, darks, background, bench.flicker)
-    kept = np.asarray(~is_clipped(frames.saturated, 1.0).any(axis=1))
-    clipped = int(np.count_nonzero(~kept))
-    if len(kept) - clipped < 2 * len(glow.k_r_per_s):
+    decay = expected_series(glow, t_s, frames, darks, background, bench.flicker)
+    usable = np.asarray(~is_clipped(frames.saturated, 1.0).any(axis=1))
+    clipped = int(np.count_nonzero(~usable))
+    if len(usable) - clipped < 2 * len(glow.k_r_per_s):
         raise ProtocolError(
-            f"{patch}: {clipped} of {len(kept)} frames will clip, so that too few are left to fit; "
-            "expose for less (or exposure: auto), or lower camera.iso"
+            f"{patch}: {clipped} of {len(usable)} frames will clip, so that too few are left to "
+            "fit; expose for less (or exposure: auto), or lower camera.iso"
         )
-    return repeated(one, kept, protocol.repeats), clipped
+    return repeated(decay, usable, protocol.repeats), clipped

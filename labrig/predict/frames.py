@@ -53,8 +53,8 @@ class ExpectedFrames:
     @property
     def read_variance(self) -> FloatArray:
         """Variance of the mean by read noise in DN², shape (n, C)."""
-        of_pixel = max(self.camera.read_noise_dn**2, ROUNDING_VARIANCE)
-        return np.broadcast_to(of_pixel / self.pixels, self.light_dn.shape)
+        pixel_variance = max(self.camera.read_noise_dn**2, ROUNDING_VARIANCE)
+        return np.broadcast_to(pixel_variance / self.pixels, self.light_dn.shape)
 
     @property
     def dark_variance(self) -> FloatArray:

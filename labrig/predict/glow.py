@@ -128,11 +128,11 @@ def radiated(
     inside = (band >= 0) & (band < len(edges) - 1)
     spectra = np.where(inside, emitted[:, np.clip(band, 0, len(edges) - 2)], 0.0)
     values = np.array([response.response(spectrum) for spectrum in spectra])
-    together = values.sum(axis=0)
-    if not together.max() > 0:
+    total = values.sum(axis=0)
+    if not total.max() > 0:
         return None
-    weights = dict(zip(CHANNELS, (together / together.max()).tolist(), strict=True))
-    return values[:, int(np.argmax(together))], weights
+    weights = dict(zip(CHANNELS, (total / total.max()).tolist(), strict=True))
+    return values[:, int(np.argmax(total))], weights
 
 
 def _concentrations(material: Material, charge_s: float) -> FloatArray:

@@ -47,27 +47,29 @@ def information(series: ExpectedSeries) -> Information:
     design = np.zeros((len(values) + len(priors), slopes.shape[2]))
     design[: len(values)] = values
     design[len(values) :, slopes.shape[2] - len(priors) :] = np.diag(1 / priors)
-    estimator, unseen = _pseudo_inverse(design)
+    estimator, undetermined = _pseudo_inverse(design)
     # What a deviation of each value, and of each offset by its σ, does to the parameters.
-    by_value = np.einsum(
+    value_response = np.einsum(
         "pfc,fcd->pfd", estimator[:, : len(values)].reshape(-1, *signal.shape), whitening
     )
-    by_offset = estimator[:, len(values) :]
+    offset_response = estimator[:, len(values) :]
     parts = {
-        source: np.einsum("pfc,fc->p", by_value**2, variance)
+        source: np.einsum("pfc,fc->p", value_response**2, variance)
         for source, variance in series.variances.items()
     }
-    parts[FLICKER] = np.square(series.flicker * np.einsum("pfc,fc->pf", by_value, signal)).sum(1)
-    parts[DARK] = parts[DARK] + np.square(by_offset).sum(axis=1)
+    parts[FLICKER] = np.square(
+        series.flicker * np.einsum("pfc,fc->pf", value_response, signal)
+    ).sum(1)
+    parts[DARK] = parts[DARK] + np.square(offset_response).sum(axis=1)
     covariance = estimator @ estimator.T
-    covariance[unseen, :], covariance[:, unseen] = 0.0, 0.0
-    covariance[unseen, unseen] = np.inf
-    asked = slice(0, 2 * len(series.k_r_per_s))
+    covariance[undetermined, :], covariance[:, undetermined] = 0.0, 0.0
+    covariance[undetermined, undetermined] = np.inf
+    reported = slice(0, 2 * len(series.k_r_per_s))
     total = np.sum(list(parts.values()), axis=0)
     return Information(
-        covariance=covariance[asked, asked],
+        covariance=covariance[reported, reported],
         budget={
-            source: (part / np.where(total > 0, total, 1.0))[asked]
+            source: (part / np.where(total > 0, total, 1.0))[reported]
             for source, part in parts.items()
         },
     )
@@ -86,19 +88,21 @@ def _slopes(series: ExpectedSeries) -> tuple[FloatArray, FloatArray]:
     The parameters are k1, a1, …, the weights of the other channels, and the offsets.
     """
     rates, weights = series.k_r_per_s, series.weights
-    means, by_log_rate = exponential_means_and_slopes(rates, series.t_s, series.exposure_s)
+    means, log_rate_slopes = exponential_means_and_slopes(rates, series.t_s, series.exposure_s)
     curve = means @ series.amplitude
-    others = [c for c in range(len(weights)) if c != int(np.argmax(weights))]
-    fitted = [c for c in range(len(weights)) if series.offset_sigma[c] > 0]
+    other_channels = [c for c in range(len(weights)) if c != int(np.argmax(weights))]
+    offset_channels = [c for c in range(len(weights)) if series.offset_sigma[c] > 0]
     n_shape = 2 * len(rates)
-    slopes = np.zeros((len(curve), len(weights), n_shape + len(others) + len(fitted)))
+    slopes = np.zeros(
+        (len(curve), len(weights), n_shape + len(other_channels) + len(offset_channels))
+    )
     slopes[:, :, 0:n_shape:2] = np.einsum(
-        "fi,c->fci", by_log_rate * series.amplitude / rates, weights
+        "fi,c->fci", log_rate_slopes * series.amplitude / rates, weights
     )
     slopes[:, :, 1:n_shape:2] = np.einsum("fi,c->fci", means, weights)
-    for place, channel in enumerate(others, start=n_shape):
+    for place, channel in enumerate(other_channels, start=n_shape):
         slopes[:, channel, place] = curve
-    for place, channel in enumerate(fitted, start=n_shape + len(others)):
+    for place, channel in enumerate(offset_channels, start=n_shape + len(other_channels)):
         slopes[:, channel, place] = 1.0
     return slopes, np.multiply.outer(curve, weights)
 
@@ -119,7 +123,7 @@ def _pseudo_inverse(design: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
     scale = np.linalg.norm(design, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     u, s, vt = np.linalg.svd(design / scale, full_matrices=False)
-    kept = s > max(design.shape) * EPSILON * s[0]
-    inverse = (vt[kept].T / s[kept]) @ u[:, kept].T / scale[:, np.newaxis]
-    seen = np.einsum("ij,ij->j", vt[kept], vt[kept])
-    return inverse, seen < 1 - np.sqrt(EPSILON)
+    significant = s > max(design.shape) * EPSILON * s[0]
+    inverse = (vt[significant].T / s[significant]) @ u[:, significant].T / scale[:, np.newaxis]
+    determined = np.einsum("ij,ij->j", vt[significant], vt[significant])
+    return inverse, determined < 1 - np.sqrt(EPSILON)

@@ -28,7 +28,7 @@ def chance_of_all_states(series: ExpectedSeries) -> float:
     if states == 1:
         return 1.0
     try:
-        fewer = fit_decay(
+        fit = fit_decay(
             series.t_s,
             np.multiply.outer(series.curve, series.weights),
             np.sqrt(series.variance),
@@ -40,12 +40,12 @@ def chance_of_all_states(series: ExpectedSeries) -> float:
         )
     except FitError:
         return 0.0
-    left = frames - 2 * states
-    if left < 1:
+    degrees_of_freedom = frames - 2 * states
+    if degrees_of_freedom < 1:
         return 0.0
-    by_f_test = float(fdtri(ADDED, left, 1 - F_TEST_LEVEL))
-    by_bic = float(np.log(series.variance.size))
-    return float(1 - ncfdtr(ADDED, left, fewer.chi2, max(by_f_test, by_bic)))
+    f_test_limit = float(fdtri(ADDED, degrees_of_freedom, 1 - F_TEST_LEVEL))
+    bic_limit = float(np.log(series.variance.size))
+    return float(1 - ncfdtr(ADDED, degrees_of_freedom, fit.chi2, max(f_test_limit, bic_limit)))
 
 
 #: Probability of resolving all states from which no warning is given.
@@ -130,19 +130,22 @@ def _finite(sigma: float) -> float | None:
     return sigma if math.isfinite(sigma) else None
 
 
-def predicted_patches(expected: Expectation) -> dict[str, PatchPrediction]:
+def predicted_patches(expectation: Expectation) -> dict[str, PatchPrediction]:
     """Return the prediction of every patch."""
     patches = {}
-    for patch, series in expected.series.items():
-        found = expected.found[patch]
+    for patch, series in expectation.series.items():
+        fit_information = expectation.found[patch]
         patches[patch] = PatchPrediction(
             k_r_per_s=tuple(series.k_r_per_s.tolist()),
-            k_r_sigma_per_s=tuple(found.sigma[0::2].tolist()),
+            k_r_sigma_per_s=tuple(fit_information.sigma[0::2].tolist()),
             amplitude_dn_per_s=tuple(series.amplitude.tolist()),
-            amplitude_sigma_dn_per_s=tuple(found.sigma[1::2].tolist()),
-            budget={source: tuple(part[0::2].tolist()) for source, part in found.budget.items()},
-            chance_of_all_states=chance_of_all_states(series) if expected.states_chosen else 1.0,
-            least_apart=_least_apart(series.k_r_per_s, found.covariance[0::2, 0::2]),
-            clipped=expected.clipped[patch],
+            amplitude_sigma_dn_per_s=tuple(fit_information.sigma[1::2].tolist()),
+            budget={
+                source: tuple(part[0::2].tolist())
+                for source, part in fit_information.budget.items()
+            },
+            chance_of_all_states=chance_of_all_states(series) if expectation.states_chosen else 1.0,
+            least_apart=_least_apart(series.k_r_per_s, fit_information.covariance[0::2, 0::2]),
+            clipped=expectation.clipped[patch],
         )
     return patches

@@ -124,18 +124,18 @@ def predict(
     >>> prediction.remedies[0].change.says
     'for: 3 min'
     """
-    asked = predictable(protocol)
-    known = what_is_known(protocol, laid_out.offers, sources)
-    expected = expect(asked, laid_out.offers, known.bench)
-    base = predicted_patches(expected)
-    trials = Trials(protocol, rig, source, known.bench, base, laid_out.duration_s)
+    decay = predictable(protocol)
+    assumptions = what_is_known(protocol, laid_out.offers, sources)
+    expectation = expect(decay, laid_out.offers, assumptions.bench)
+    base = predicted_patches(expectation)
+    trials = Trials(protocol, rig, source, assumptions.bench, base, laid_out.duration_s)
     return Prediction(
         patches=base,
-        materials=known.materials,
-        exposures_s=expected.exposures_s,
-        decays=asked.repeats,
-        remedies=trials.remedies(changes(asked, laid_out.offers, base)),
-        brightness_known=known.brightness_known,
-        notes=known.notes,
-        warnings=expected.warnings,
+        materials=assumptions.materials,
+        exposures_s=expectation.exposures_s,
+        decays=decay.repeats,
+        remedies=trials.remedies(changes(decay, laid_out.offers, base)),
+        brightness_known=assumptions.brightness_known,
+        notes=assumptions.notes,
+        warnings=expectation.warnings,
     )

@@ -60,15 +60,17 @@ def result_places(run: Path) -> dict[str, Path]:
     UsageError
         If there is no fit.
     """
-    found = find_fitted_decays(run / "result")
-    if not found:
+    fits = find_fitted_decays(run / "result")
+    if not fits:
         raise UsageError(f"{run}: expected a run with a fit in its result folder, got none")
-    return {name: path.parent for name, path in found.items()}
+    return {name: path.parent for name, path in fits.items()}
 
 
 def run_of(place: Path) -> Path | None:
     """Return the run folder that contains the result folder `place`; None if there is none."""
-    return next((up for up in place.resolve().parents if (up / "journal.jsonl").is_file()), None)
+    return next(
+        (folder for folder in place.resolve().parents if (folder / "journal.jsonl").is_file()), None
+    )
 
 
 def read_reference(place: Path) -> Reference:
@@ -88,28 +90,30 @@ def read_reference(place: Path) -> Reference:
     series = read_series(place / "series.csv")[0]
     region = _region(folder, series.region)
     frame = _first_usable(run, series)
-    seen = measure(read_raw(frame.path), region)
-    brightest = seen.channels[fit.brightest_channel]
+    measurement = measure(read_raw(frame.path), region)
+    brightest = measurement.channels[fit.brightest_channel]
     noise_dn = PEAK_SIGMAS * brightest.sigma * np.sqrt(brightest.n)
     darks = _darks(run, region)
-    gain, read_noise_dn = _photon_transfer(series, seen, darks)
+    gain, read_noise_dn = _photon_transfer(series, measurement, darks)
     gain = gain or TYPICAL_ELECTRONS_PER_DN * 100 / frame.iso
     dark_dn_per_s = _dark_current(darks)
-    pixels = sum(stats.n for stats in seen.channels.values())
+    pixels = sum(stats.n for stats in measurement.channels.values())
     return Reference(
         run=folder.name,
         camera=CameraFigures(
-            width=seen.width,
-            height=seen.height,
+            width=measurement.width,
+            height=measurement.height,
             iso=frame.iso,
             electrons_per_dn=gain,
             read_noise_electrons=read_noise_dn * gain,
             dark_electrons_per_s=(
                 TYPICAL_DARK_ELECTRONS_PER_S if dark_dn_per_s is None else dark_dn_per_s * gain
             ),
-            range_dn=seen.range_dn,
+            range_dn=measurement.range_dn,
             unevenness=float(max((brightest.peak - noise_dn) / brightest.mean, 1.0)),
-            channel_fractions={name: stats.n / pixels for name, stats in seen.channels.items()},
+            channel_fractions={
+                name: stats.n / pixels for name, stats in measurement.channels.items()
+            },
         ),
         f_number=frame.f_number,
         flicker=fit.flicker if fit.flicker_sigma < FLICKER_KNOWN * fit.flicker else None,
@@ -145,21 +149,21 @@ def _darks(run: RunRecord, region: Region) -> list[FrameMeasurement]:
 
 
 def _photon_transfer(
-    series: Series, seen: FrameMeasurement, darks: Sequence[FrameMeasurement]
+    series: Series, measurement: FrameMeasurement, darks: Sequence[FrameMeasurement]
 ) -> tuple[float, float]:
     """Return electrons per DN and read noise in DN from a photon transfer curve.
 
     The first is 0 if all frames are too dark to determine it.
     """
-    pixels = np.array([seen.channels[name].n for name in series.channels])
+    pixels = np.array([measurement.channels[name].n for name in series.channels])
     exposure_s = series.exposure_s[:, np.newaxis]
-    in_dark = [channel for dark in darks for channel in dark.channels.values()]
+    dark_channels = [channel for dark in darks for channel in dark.channels.values()]
     mean = np.append(
-        (series.values * exposure_s)[series.usable], [channel.mean for channel in in_dark]
+        (series.values * exposure_s)[series.usable], [channel.mean for channel in dark_channels]
     )
     variance = np.append(
         (pixels * np.square(series.sigma * exposure_s))[series.usable],
-        [channel.n * channel.sigma**2 for channel in in_dark],
+        [channel.n * channel.sigma**2 for channel in dark_channels],
     )
     line = NoiseModel.fit(variance_terms(mean)[:, :2], variance, sigma_dn2=variance)
     return 1 / line.photon_dn if line.photon_dn > 0 else 0.0, float(np.sqrt(line.read_dn2))

@@ -64,15 +64,17 @@ class Trials:
     base: Mapping[str, PatchPrediction]
     duration_s: float
 
-    def remedies(self, ideas: Iterable[Change]) -> tuple[Remedy, ...]:
+    def remedies(self, candidates: Iterable[Change]) -> tuple[Remedy, ...]:
         """Return the feasible changes and some combinations of them, the largest gain first."""
-        alone = [remedy for idea in ideas if (remedy := self.remedy(idea)) is not None]
-        alone.sort(key=lambda remedy: remedy.gain)
-        cheap = [one for one in alone if one.extra_time_s <= CHEAP * self.duration_s]
-        found = {one.change.says: one for one in (*alone, *self._stack(cheap))}
-        if not any(remedy.halves for remedy in found.values()):
-            found |= {one.change.says: one for one in self._stack(alone)}
-        return tuple(sorted(found.values(), key=lambda remedy: remedy.gain))
+        single = [
+            remedy for candidate in candidates if (remedy := self.remedy(candidate)) is not None
+        ]
+        single.sort(key=lambda remedy: remedy.gain)
+        cheap = [remedy for remedy in single if remedy.extra_time_s <= CHEAP * self.duration_s]
+        by_name = {remedy.change.says: remedy for remedy in (*single, *self._combined(cheap))}
+        if not any(remedy.halves for remedy in by_name.values()):
+            by_name |= {remedy.change.says: remedy for remedy in self._combined(single)}
+        return tuple(sorted(by_name.values(), key=lambda remedy: remedy.gain))
 
     def remedy(self, change: Change) -> Remedy | None:
         """Return the effect of a change; None if camera, frame or timing do not allow it."""
@@ -89,21 +91,21 @@ class Trials:
             laid_out.duration_s - self.duration_s,
         )
 
-    def _stack(self, remedies: Sequence[Remedy]) -> list[Remedy]:
+    def _combined(self, remedies: Sequence[Remedy]) -> list[Remedy]:
         """Return the best combination of changes, added until σ is halved; empty for one change."""
         helpful = [remedy for remedy in remedies if remedy.helps]
         if not helpful:
             return []
-        stacked, height = helpful[0], 1
-        for one in helpful[1:]:
-            if stacked.halves or height == MOST_TOGETHER:
+        combined, n_changes = helpful[0], 1
+        for remedy in helpful[1:]:
+            if combined.halves or n_changes == MOST_TOGETHER:
                 break
-            if one.change.contradicts(stacked.change):
+            if remedy.change.contradicts(combined.change):
                 continue
-            both = self.remedy(stacked.change & one.change)
-            if both is not None and both.gain <= HELPS * stacked.gain:
-                stacked, height = both, height + 1
-        return [stacked] if height > 1 else []
+            trial = self.remedy(combined.change & remedy.change)
+            if trial is not None and trial.gain <= HELPS * combined.gain:
+                combined, n_changes = trial, n_changes + 1
+        return [combined] if n_changes > 1 else []
 
 
 def _rate_sigmas(patches: Mapping[str, PatchPrediction]) -> list[float]:

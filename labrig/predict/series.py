@@ -125,15 +125,15 @@ def _dark_level_sigma(frames: ExpectedFrames, darks: ExpectedFrames) -> FloatArr
     return np.asarray(np.average(sigma, axis=0, weights=weights))
 
 
-def repeated(series: ExpectedSeries, kept: NDArray[np.bool_], times: int) -> ExpectedSeries:
-    """Return the frames `kept` of several decays that one fit takes together."""
+def repeated(series: ExpectedSeries, usable: NDArray[np.bool_], times: int) -> ExpectedSeries:
+    """Return the frames `usable` of several decays that one fit takes together."""
     return ExpectedSeries(
-        t_s=np.tile(series.t_s[kept], times),
-        exposure_s=np.tile(series.exposure_s[kept], times),
+        t_s=np.tile(series.t_s[usable], times),
+        exposure_s=np.tile(series.exposure_s[usable], times),
         k_r_per_s=series.k_r_per_s,
         amplitude=series.amplitude,
         weights=series.weights,
-        variances={name: np.tile(v[kept], (times, 1)) for name, v in series.variances.items()},
+        variances={name: np.tile(v[usable], (times, 1)) for name, v in series.variances.items()},
         flicker=series.flicker,
         offset_sigma=series.offset_sigma,
     )

@@ -74,10 +74,10 @@ def changes(protocol: Decay, offers: CameraOffers, patches: Iterable[str]) -> It
     yield Change("patch of twice the area", {"patches": larger})
 
 
-def _merged(one: Keys, other: Keys) -> dict[str, Any]:
-    """Return `one` with the values of `other` put over it, also within one level of nesting."""
-    merged = dict(one)
-    for key, value in other.items():
+def _merged(base: Keys, overrides: Keys) -> dict[str, Any]:
+    """Return `base` with the values of `overrides`, also within one level of nesting."""
+    merged = dict(base)
+    for key, value in overrides.items():
         both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
         merged[key] = {**merged[key], **value} if both else value
     return merged

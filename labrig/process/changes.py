@@ -35,7 +35,7 @@ class _Move:
         return moved / sigma if sigma > 0 else math.copysign(math.inf, moved)
 
     @property
-    def worth_saying(self) -> bool:
+    def is_notable(self) -> bool:
         """Whether value or σ changed by more than rounding."""
         resized = not math.isclose(self.before[1], self.after[1], rel_tol=WORTH_SAYING)
         return resized or abs(self.in_sigma) >= WORTH_SAYING
@@ -53,13 +53,13 @@ def changes(before: Path, after: Path) -> tuple[str, ...]:
     Files that exist in `before` only, where a person may have put them, do not count.
     """
     files = sorted(path.relative_to(after) for path in after.rglob("*") if path.is_file())
-    other = [file for file in files if not _alike(before / file, after / file)]
-    if not other:
+    changed_files = [file for file in files if not _same_content(before / file, after / file)]
+    if not changed_files:
         return ()
     settings = other_settings(before, after)
-    numbers = list(_other_numbers(_fits(before), _fits(after)))
+    numbers = list(_parameter_changes(_fits(before), _fits(after)))
     if not numbers:
-        numbers = [f"the numbers are the same; other in {', '.join(map(str, other))}"]
+        numbers = [f"the numbers are the same; other in {', '.join(map(str, changed_files))}"]
     elif not settings:
         numbers.append("nothing that is recorded explains it: labrig's code, or the computer?")
     return (*settings, *numbers)
@@ -94,22 +94,22 @@ def other_settings(before: Path, after: Path) -> tuple[str, ...]:
     return tuple(_other_settings(_settings(before), _settings(after)))
 
 
-def _alike(one: Path, other: Path) -> bool:
-    return one.is_file() and one.read_bytes() == other.read_bytes()
+def _same_content(first: Path, second: Path) -> bool:
+    return first.is_file() and first.read_bytes() == second.read_bytes()
 
 
 def _settings(result: Path) -> dict[str, str]:
     """Return the content of `provenance.yaml` with one text per key; empty if there is none."""
     try:
-        return dict(_flat(read_yaml(result / "provenance.yaml"), ""))
+        return dict(_flattened(read_yaml(result / "provenance.yaml"), ""))
     except UsageError:
         return {}
 
 
-def _flat(content: Mapping[str, Any], place: str) -> Iterator[tuple[str, str]]:
+def _flattened(content: Mapping[str, Any], place: str) -> Iterator[tuple[str, str]]:
     for key, value in content.items():
         if isinstance(value, dict):
-            yield from _flat(value, f"{place}{key} ")
+            yield from _flattened(value, f"{place}{key} ")
         elif isinstance(value, list):
             yield f"{place}{key}", ", ".join(map(str, value)) or "none"
         else:
@@ -137,54 +137,54 @@ def _fits(result: Path) -> dict[str, Parameters]:
 
 def _parameters(fit: FittedDecay) -> Parameters:
     """Return value and σ of every parameter of a fit by name."""
-    found: dict[str, tuple[float, float]] = {}
+    parameters: dict[str, tuple[float, float]] = {}
     for number, state in enumerate(fit.states, start=1):
-        found[f"k_r {number}"] = state.k_r_per_s, state.k_r_sigma_per_s
-        found[f"a {number}"] = state.amplitude, state.amplitude_sigma
+        parameters[f"k_r {number}"] = state.k_r_per_s, state.k_r_sigma_per_s
+        parameters[f"a {number}"] = state.amplitude, state.amplitude_sigma
     for name, values, sigmas in (
         ("weight", fit.channel_weights, fit.channel_weights_sigma),
         ("offset", fit.offsets, fit.offsets_sigma),
     ):
         for channel, value, sigma in zip(fit.channels, values, sigmas, strict=True):
-            found[f"{name} {channel}"] = value, sigma
-    found["flicker"] = fit.flicker, fit.flicker_sigma
-    return found
+            parameters[f"{name} {channel}"] = value, sigma
+    parameters["flicker"] = fit.flicker, fit.flicker_sigma
+    return parameters
 
 
-def _other_numbers(
+def _parameter_changes(
     before: Mapping[str, Parameters], after: Mapping[str, Parameters]
 ) -> Iterator[str]:
     for patch in dict.fromkeys([*before, *after]):
-        said = f"{patch}: " if patch else ""
+        prefix = f"{patch}: " if patch else ""
         old, new = before.get(patch), after.get(patch)
         if old is None or new is None:
-            yield f"{said}{'not fitted before' if old is None else 'fitted before, not now'}"
+            yield f"{prefix}{'not fitted before' if old is None else 'fitted before, not now'}"
         elif old.keys() != new.keys():
-            yield f"{said}{_states(old)} → {_states(new)}"
+            yield f"{prefix}{_states_text(old)} → {_states_text(new)}"
         else:
             moves = [_Move(name, old[name], new[name]) for name in old]
-            moves = [move for move in moves if move.worth_saying]
+            moves = [move for move in moves if move.is_notable]
             if moves:
-                yield said + "; ".join(_told(moves))
+                yield prefix + "; ".join(_move_texts(moves))
             elif old != new:
-                yield f"{said}every parameter within {WORTH_SAYING:g} σ"
+                yield f"{prefix}every parameter within {WORTH_SAYING:g} σ"
 
 
-def _told(moves: list[_Move]) -> Iterator[str]:
+def _move_texts(moves: list[_Move]) -> Iterator[str]:
     """Yield rates, amplitudes and held parameters one by one and the others in one line."""
-    rest = []
+    others = []
     for move in moves:
         if move.name.startswith(("k_r", "a ")) or math.isinf(move.in_sigma):
             yield str(move)
         else:
-            rest.append(move)
-    if rest:
-        most = max(rest, key=lambda move: abs(move.in_sigma))
-        furthest = rounded(abs(most.in_sigma), 2)
-        yield f"{', '.join(move.name for move in rest)} by at most {furthest} σ"
+            others.append(move)
+    if others:
+        largest = max(others, key=lambda move: abs(move.in_sigma))
+        furthest = rounded(abs(largest.in_sigma), 2)
+        yield f"{', '.join(move.name for move in others)} by at most {furthest} σ"
 
 
-def _states(parameters: Parameters) -> str:
+def _states_text(parameters: Parameters) -> str:
     """Return text such as `2 states (k_r 0.3 ± 0.1, 0.01 ± 0.001 1/s)`."""
     rates = [plus_minus(*pair) for name, pair in parameters.items() if name.startswith("k_r")]
     return f"{len(rates)} state{'s' if len(rates) > 1 else ''} (k_r {', '.join(rates)} 1/s)"

@@ -31,41 +31,41 @@ _EARLIER = "result-"
 
 def new_result(run: Path) -> Path:
     """Create an empty folder in `run` for `put_in_place`."""
-    made = run / "result.part"
-    if made.exists():
-        shutil.rmtree(made)
-    made.mkdir()
-    return made
+    folder = run / "result.part"
+    if folder.exists():
+        shutil.rmtree(folder)
+    folder.mkdir()
+    return folder
 
 
-def put_in_place(made: Path) -> tuple[str, ...]:
-    """Make the folder `made` the run's `result` and return the changes, in lines for people.
+def put_in_place(folder: Path) -> tuple[str, ...]:
+    """Make `folder` the run's `result` and return the changes, in lines for people.
 
     An earlier result that differs is kept as `result-1`, `result-2`, …, from old to new. If all
-    bytes are equal, the earlier result stays and `made` is deleted.
+    bytes are equal, the earlier result stays and `folder` is deleted.
     """
-    final = made.with_name("result")
+    final = folder.with_name("result")
     if not final.exists():
-        made.rename(final)
+        folder.rename(final)
         return ()
-    told = changes(final, made)
-    if not told:
-        shutil.rmtree(made)
+    lines = changes(final, folder)
+    if not lines:
+        shutil.rmtree(folder)
         return ("the same result as before",)
-    numbers = [int(path.name[len(_EARLIER) :]) for path in _earlier(made.parent)]
-    earlier = made.with_name(f"{_EARLIER}{max(numbers, default=0) + 1}")
+    numbers = [int(path.name[len(_EARLIER) :]) for path in _earlier_results(folder.parent)]
+    earlier = folder.with_name(f"{_EARLIER}{max(numbers, default=0) + 1}")
     final.rename(earlier)
-    made.rename(final)
-    return (f"changed since the result before, which is kept as {earlier.name}:", *told)
+    folder.rename(final)
+    return (f"changed since the result before, which is kept as {earlier.name}:", *lines)
 
 
-def _earlier(run: Path) -> list[Path]:
+def _earlier_results(run: Path) -> list[Path]:
     return [path for path in run.glob(f"{_EARLIER}*") if path.name[len(_EARLIER) :].isdecimal()]
 
 
-def write_provenance(made: Path, provenance: Provenance) -> None:
-    """Write `provenance.yaml` into the folder `made`."""
-    write_yaml(made / "provenance.yaml", provenance)
+def write_provenance(folder: Path, provenance: Provenance) -> None:
+    """Write `provenance.yaml` into `folder`."""
+    write_yaml(folder / "provenance.yaml", provenance)
 
 
 @dataclass(frozen=True)
@@ -174,18 +174,20 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     result = replace(result, warnings=warnings)
 
     about = describe_run(run, protocol, rig)
-    made = new_result(folder)
-    write_provenance(made, provenance(run, protocol, overrides, camera.name if camera else None))
-    write_result(made, result)
-    write_nexus(made / "run.nxs", run, about, result)
+    result_folder = new_result(folder)
+    write_provenance(
+        result_folder, provenance(run, protocol, overrides, camera.name if camera else None)
+    )
+    write_result(result_folder, result)
+    write_nexus(result_folder / "run.nxs", run, about, result)
     rendered = render(result, Source(run, protocol, rig, about, camera))
     # After the parts of a chain, what is about all of them.
     part = "the_run" if any(section.part for section in rendered.sections) else ""
     about_run = (*lamp_sections(run), *temperature_sections(run, protocol.rate_frames))
-    sections = (*rendered.sections, *(replace(one, part=part) for one in about_run))
+    sections = (*rendered.sections, *(replace(section, part=part) for section in about_run))
     report = Report(about, warnings, sections, rendered.methods, frames, camera)
-    write_report(made / "report.html", report)
-    changes = put_in_place(made)
+    write_report(result_folder / "report.html", report)
+    changes = put_in_place(result_folder)
 
     page = folder / "result" / "report.html"
     if failures := result.failures():
@@ -194,13 +196,13 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
 
 
 def _camera_response(
-    rig: RigFile, instead: str | None, lvf: LvfFile | None
+    rig: RigFile, replacement: str | None, lvf: LvfFile | None
 ) -> tuple[CameraResponse | None, tuple[str, ...]]:
     """Return the curves that colour the report's pictures, or a warning if they are missing."""
     try:
-        return camera_curves(rig, instead, lvf), ()
+        return camera_curves(rig, replacement, lvf), ()
     except UsageError as error:
-        if instead is not None:
+        if replacement is not None:
             raise
-        known = rig.optics.camera is not None
-        return None, (f"colours in the report are the camera's own: {error}",) if known else ()
+        is_named = rig.optics.camera is not None
+        return None, (f"colours in the report are the camera's own: {error}",) if is_named else ()

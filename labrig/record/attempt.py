@@ -59,7 +59,7 @@ class AttemptWriter:
         Keys and values of the RunStart: plan, devices, versions.
     disk
         Disk to which frames are written.
-    beside
+    executor
         Executor of the work done while the disk is busy.
     """
 
@@ -73,7 +73,7 @@ class AttemptWriter:
         new_uid: Callable[[], str],
         metadata: Mapping[str, Any],
         disk: Disk,
-        beside: Executor,
+        executor: Executor,
     ) -> None:
         self.unit = unit
         self._journal = journal
@@ -82,7 +82,7 @@ class AttemptWriter:
         self._wall = wall
         self._new_uid = new_uid
         self._disk = disk
-        self._beside = beside
+        self._executor = executor
         self._bundle = event_model.compose_run(
             uid=new_uid(), time=wall(), metadata={**metadata, "unit": unit}
         )
@@ -122,7 +122,7 @@ class AttemptWriter:
         path = self._frames_folder / f"{self._next_number():06d}{suffix}"
         began = self._wall()
         # Hashed while the disk is busy: of a 25 MB frame that is a quarter of the time.
-        checksum = self._beside.submit(hashlib.sha256, data)
+        checksum = self._executor.submit(hashlib.sha256, data)
         write_durably(path, data, self._disk)
         record = FrameRecord(
             path=path,

@@ -63,9 +63,9 @@ class TemperatureHistory:
             Temperatures in degrees Celsius of the frames within `KNOWN_FOR_S` of the readings.
         """
         middle = np.array([(frame.start_time + frame.end_time) / 2 for frame in frames])
-        known = (middle > self.time[0] - KNOWN_FOR_S) & (middle < self.time[-1] + KNOWN_FOR_S)
-        found: FloatArray = np.interp(middle[known], self.time, self.smooth)
-        return found
+        is_covered = (middle > self.time[0] - KNOWN_FOR_S) & (middle < self.time[-1] + KNOWN_FOR_S)
+        celsius: FloatArray = np.interp(middle[is_covered], self.time, self.smooth)
+        return celsius
 
 
 def glow_temperature_c(run: RunRecord, roles: Collection[str]) -> float | None:
@@ -93,10 +93,10 @@ def glow_temperature_c(run: RunRecord, roles: Collection[str]) -> float | None:
     20.7
     """
     frames = in_roles(run, roles)
-    known = (
+    celsius = (
         TemperatureHistory(run).during(frames) if run.temperatures() and frames else np.array([])
     )
-    return round(float(known.mean()), 2) if known.size else None
+    return round(float(celsius.mean()), 2) if celsius.size else None
 
 
 def in_roles(run: RunRecord, roles: Collection[str]) -> list[FrameRecord]:
@@ -223,7 +223,7 @@ def charges_s(run: RunRecord) -> tuple[float, ...]:
     [600.0]
     """
     return tuple(
-        sum(_shining_s(attempt, decay[0].start_time))
+        sum(_lamp_on_durations_s(attempt, decay[0].start_time))
         for attempt in run.completed().values()
         if (decay := [frame for frame in attempt.frames if frame.role == FrameRole.DECAY])
     )
@@ -282,18 +282,18 @@ def written_time(seconds: float) -> str:
     return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")
 
 
-def _shining_s(attempt: Attempt, until: float) -> Iterator[float]:
+def _lamp_on_durations_s(attempt: Attempt, until: float) -> Iterator[float]:
     """Yield the durations in seconds during which the lamp was on, until the time `until`."""
-    since = None
+    on_time = None
     for action in attempt.actions:
-        switched = action.middle_time
-        if action.device != "lamp" or switched > until:
+        switch_time = action.middle_time
+        if action.device != "lamp" or switch_time > until:
             continue
         if action.action == "on":
-            since = switched if since is None else since
-        elif since is not None:
-            yield switched - since
-            since = None
+            on_time = switch_time if on_time is None else on_time
+        elif on_time is not None:
+            yield switch_time - on_time
+            on_time = None
 
 
 @dataclass(frozen=True)

@@ -31,9 +31,9 @@ class RealDisk:
 
     def write(self, file: BinaryIO, data: bytes) -> None:
         """Append data to an unbuffered file and wait until they are on the disk."""
-        left = memoryview(data)
-        while left:
-            left = left[file.write(left) :]
+        remaining = memoryview(data)
+        while remaining:
+            remaining = remaining[file.write(remaining) :]
         os.fsync(file.fileno())
 
 
@@ -153,7 +153,7 @@ class Journal:
 
     def read(self) -> JournalContent:
         """Return all acknowledged documents; the disk is not accessed."""
-        return _parsed(self.path, bytes(self._acknowledged))
+        return _parse(self.path, bytes(self._acknowledged))
 
     def append(self, name: str, doc: Mapping[str, Any]) -> None:
         """Write the line `{"name": name, "doc": doc}` and wait until it is on the disk."""
@@ -223,16 +223,16 @@ def read_journal(path: Path) -> JournalContent:
         raw = path.read_bytes()
     except OSError as error:
         raise DiskError(f"{path}: the journal cannot be read ({error.strerror})") from None
-    return _parsed(path, raw)
+    return _parse(path, raw)
 
 
-def _parsed(path: Path, raw: bytes) -> JournalContent:
+def _parse(path: Path, raw: bytes) -> JournalContent:
     lines = raw.split(b"\n")
     torn = lines.pop() != b""
     documents: list[Document] = []
     for number, line in enumerate(lines, start=1):
         try:
-            entry = json.loads(line, parse_constant=_refuse)
+            entry = json.loads(line, parse_constant=_refuse_constant)
             if b"\\ud" in line.lower():  # perhaps half of a surrogate pair, which is no text
                 json.dumps(entry, ensure_ascii=False).encode()
             documents.append((str(entry["name"]), dict(entry["doc"])))
@@ -244,7 +244,7 @@ def _parsed(path: Path, raw: bytes) -> JournalContent:
     return JournalContent(documents, torn)
 
 
-def _refuse(constant: str) -> None:
+def _refuse_constant(constant: str) -> None:
     """Refuse NaN and infinity, which are not JSON."""
     raise ValueError(constant)
 

@@ -97,19 +97,19 @@ class RunRecord:
 
         A unit that a person undid later does not count as completed.
         """
-        done: dict[str, Attempt] = {}
+        completed: dict[str, Attempt] = {}
         for attempt in self.attempts:
             for action in attempt.actions:
                 if action.device == TAKEN_BACK:
-                    done.pop(action.action, None)
+                    completed.pop(action.action, None)
             if attempt.completed:
-                done[attempt.unit] = attempt
-        return done
+                completed[attempt.unit] = attempt
+        return completed
 
     def part(self, name: str) -> "RunRecord":
         """Return the completed units of one part of a chain, by their names within the part."""
-        own = [_within(name, attempt) for attempt in self.completed().values()]
-        return replace(self, attempts=[attempt for attempt in own if attempt is not None])
+        attempts = [_attempt_within(name, attempt) for attempt in self.completed().values()]
+        return replace(self, attempts=[attempt for attempt in attempts if attempt is not None])
 
     def frames(self, role: str) -> list[FrameRecord]:
         """Return the frames with a given role in completed units."""
@@ -126,7 +126,7 @@ class RunRecord:
         return sorted(readings, key=lambda reading: reading.time)
 
 
-def _within(part: str, attempt: Attempt) -> Attempt | None:
+def _attempt_within(part: str, attempt: Attempt) -> Attempt | None:
     unit = unit_within(part, attempt.unit)
     if unit is None:
         return None
@@ -171,7 +171,7 @@ def read_run(run: str | os.PathLike[str]) -> RunRecord:
     folder = Path(run)
     record = run_record(folder, read_journal(folder / JOURNAL))
     for frame in (frame for attempt in record.attempts for frame in attempt.frames):
-        _refuse_what_is_no_file(frame.path)
+        _require_file(frame.path)
     return record
 
 
@@ -189,16 +189,16 @@ def run_record(folder: Path, content: JournalContent) -> RunRecord:
     for number, (name, doc) in enumerate(content.documents, start=1):
         try:
             last_time = max(last_time, _seconds(doc.get("time", 0.0)))
-            _take(folder, (name, doc), attempts, streams)
+            _add_document(folder, (name, doc), attempts, streams)
         except (KeyError, TypeError, ValueError) as error:
             raise DataError(
                 f"{folder / JOURNAL}, line {number}: a '{name}' document that does not fit "
-                f"({_said(error)}); the file was changed after the run"
+                f"({_error_text(error)}); the file was changed after the run"
             ) from None
     return RunRecord(folder, list(attempts.values()), content.torn, last_time)
 
 
-def _take(
+def _add_document(
     folder: Path,
     document: Document,
     attempts: dict[str, Attempt],
@@ -206,24 +206,24 @@ def _take(
 ) -> None:
     name, doc = document
     if name == "start":
-        attempts[doc["uid"]] = _opened(doc)
+        attempts[doc["uid"]] = _open_attempt(doc)
     elif name == "descriptor":
         streams[doc["uid"]] = (doc["run_start"], doc["name"])
     elif name == "stop":
-        attempts[doc["run_start"]] = _closed(attempts[doc["run_start"]], doc)
+        attempts[doc["run_start"]] = _close_attempt(attempts[doc["run_start"]], doc)
     elif name == "event":
         run_uid, stream = streams[doc["descriptor"]]
         attempt, data = attempts[run_uid], dict(doc["data"])
         if stream == "frames":
             path = folder / _frame_name(data.pop("frame"))
             frame = _FRAME.validate_python({**data, "path": path, "unit": attempt.unit})
-            attempt.frames.append(_dated(frame))
+            attempt.frames.append(_check_times(frame))
         elif stream == "actions":
             action = _ACTION.validate_python({**data, "unit": attempt.unit})
-            attempt.actions.append(_dated(action))
+            attempt.actions.append(_check_times(action))
         elif stream == "temperatures":
             reading = _TEMPERATURE.validate_python({**data, "unit": attempt.unit})
-            attempt.temperatures.append(_sensible(reading))
+            attempt.temperatures.append(_check_reading(reading))
 
 
 def _frame_name(name: str) -> str:
@@ -233,7 +233,7 @@ def _frame_name(name: str) -> str:
     return name
 
 
-def _refuse_what_is_no_file(frame: Path) -> None:
+def _require_file(frame: Path) -> None:
     """Refuse a frame that is a link, which leads out of the run folder, or a device.
 
     A missing file is accepted here; processing reports it.
@@ -248,32 +248,32 @@ def _refuse_what_is_no_file(frame: Path) -> None:
         )
 
 
-def _opened(doc: dict[str, Any]) -> Attempt:
+def _open_attempt(doc: dict[str, Any]) -> Attempt:
     if not isinstance(doc["unit"], str) or not isinstance(doc.get("devices", {}), dict):
         raise TypeError("'unit' or 'devices' is of another kind")
     _seconds(doc["time"])
     return Attempt(uid=doc["uid"], unit=doc["unit"], start=doc)
 
 
-def _closed(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
-    held = {
+def _close_attempt(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
+    counts = {
         "frames": len(attempt.frames),
         "actions": len(attempt.actions),
         "temperatures": len(attempt.temperatures),
     }
     for stream, number in dict(doc.get("num_events", {})).items():
-        if stream in held and held[stream] != number:
-            raise ValueError(f"it counts {number} {stream}, there are {held[stream]}")
+        if stream in counts and counts[stream] != number:
+            raise ValueError(f"it counts {number} {stream}, there are {counts[stream]}")
     return replace(attempt, exit_status=doc["exit_status"], reason=doc.get("reason", ""))
 
 
-def _dated(record: Recorded) -> Recorded:
+def _check_times(record: Recorded) -> Recorded:
     _seconds(record.start_time)
     _seconds(record.end_time)
     return record
 
 
-def _sensible(reading: TemperatureRecord) -> TemperatureRecord:
+def _check_reading(reading: TemperatureRecord) -> TemperatureRecord:
     _seconds(reading.time)
     if not abs(reading.temperature_c) <= HOTTEST_C:
         raise ValueError(f"{reading.temperature_c} °C is no temperature")
@@ -287,7 +287,7 @@ def _seconds(time: float) -> float:
     return float(time)
 
 
-def _said(error: Exception) -> str:
+def _error_text(error: Exception) -> str:
     """Return an error in a few words."""
     if isinstance(error, ValidationError):
         problem = error.errors(include_url=False)[0]

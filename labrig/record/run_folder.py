@@ -55,7 +55,7 @@ class RunFolder:
             raise DiskError(f"{path}: the run cannot be written to ({error.strerror})") from None
         self._frame_number = _highest_frame(path / "frames")
         self._journal = Journal(path / JOURNAL, disk)
-        self._beside = ThreadPoolExecutor(1)
+        self._executor = ThreadPoolExecutor(1)
 
     @classmethod
     def create(
@@ -91,10 +91,10 @@ class RunFolder:
             If the disk is full or gone; no run folder remains.
         """
         stamp = datetime.fromtimestamp(started, UTC).strftime("%Y-%m-%dT%H-%M-%S")
-        wanted = f"{stamp}_{_slug(name)}"
+        folder_name = f"{stamp}_{_slug(name)}"
         try:
             _make_durably(runs)
-            path = _make_new(runs, wanted)
+            path = _make_new(runs, folder_name)
         except OSError as error:
             raise DiskError(
                 f"{runs}: a run folder cannot be made there ({error.strerror}); give another --runs"
@@ -117,9 +117,9 @@ class RunFolder:
 
     def unknown_files(self) -> list[str]:
         """Return the names of files among the frames that have no journal line, left by a crash."""
-        known = {frame.path.name for one in self.read().attempts for frame in one.frames}
+        recorded = {frame.path.name for attempt in self.read().attempts for frame in attempt.frames}
         return sorted(
-            path.name for path in (self.path / "frames").glob("*") if path.name not in known
+            path.name for path in (self.path / "frames").glob("*") if path.name not in recorded
         )
 
     def attempt(
@@ -145,7 +145,7 @@ class RunFolder:
             self._new_uid,
             metadata,
             self._disk,
-            self._beside,
+            self._executor,
         )
 
     def close_open_attempts(
@@ -162,8 +162,8 @@ class RunFolder:
         reason
             Reason for the RunStop.
         """
-        opened = [attempt for attempt in self.read().attempts if attempt.exit_status is None]
-        for attempt in opened:
+        open_attempts = [attempt for attempt in self.read().attempts if attempt.exit_status is None]
+        for attempt in open_attempts:
             counts = {
                 "frames": len(attempt.frames),
                 "actions": len(attempt.actions),
@@ -180,7 +180,7 @@ class RunFolder:
                     "num_events": {stream: number for stream, number in counts.items() if number},
                 },
             )
-        return [attempt.unit for attempt in opened]
+        return [attempt.unit for attempt in open_attempts]
 
     def discard(self) -> None:
         """Delete a run in which nothing was recorded, as far as the disk allows."""
@@ -188,7 +188,7 @@ class RunFolder:
 
     def close(self) -> None:
         """Release the folder for other processes."""
-        self._beside.shutdown()
+        self._executor.shutdown()
         self._journal.close()
         with suppress(OSError):  # the system lets go of it when labrig ends
             self._lock.release()
@@ -229,10 +229,10 @@ def _make_durably(runs: Path) -> None:
         sync_folder(folder.parent)
 
 
-def _make_new(runs: Path, wanted: str) -> Path:
+def _make_new(runs: Path, name: str) -> Path:
     number = 1
     while True:
-        path = runs / (wanted if number == 1 else f"{wanted}-{number}")
+        path = runs / (name if number == 1 else f"{name}-{number}")
         try:
             path.mkdir()
         except FileExistsError:

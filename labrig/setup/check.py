@@ -181,14 +181,14 @@ class RigReport:
         return asdict(self) | {"failures": list(self.failures), "refusals": list(self.refusals)}
 
 
-def check_rig(stand: Bench) -> RigReport:
+def check_rig(bench: Bench) -> RigReport:
     """Identify and exercise every device of a rig, and bring the rig to its safe state.
 
     A device is exercised as its role defines, unless its settings would spoil photometry.
 
     Parameters
     ----------
-    stand
+    bench
         Bench whose devices are not open.
 
     Returns
@@ -216,8 +216,8 @@ def check_rig(stand: Bench) -> RigReport:
     """
     report: RigReport | None = None
     try:
-        with stand.devices() as rig:
-            report = _look_at(rig)
+        with bench.devices() as rig:
+            report = _checked_rig(rig)
     except DeviceError as error:
         if report is None:
             raise
@@ -225,14 +225,14 @@ def check_rig(stand: Bench) -> RigReport:
     return report
 
 
-def _look_at(rig: Rig) -> RigReport:
-    trial = ExerciseContext(rig.clock, Photographs())
+def _checked_rig(rig: Rig) -> RigReport:
+    context = ExerciseContext(rig.clock, Photographs())
     return RigReport(
-        rig.name, tuple(_checked(key, device, trial) for key, device in rig.devices.items())
+        rig.name, tuple(_checked(key, device, context) for key, device in rig.devices.items())
     )
 
 
-def _checked(key: str, device: Device, trial: ExerciseContext) -> DeviceReport:
+def _checked(key: str, device: Device, context: ExerciseContext) -> DeviceReport:
     """Return the report on one device, up to the step where it failed."""
     report = DeviceReport(key, "did not answer")
     try:
@@ -244,12 +244,12 @@ def _checked(key: str, device: Device, trial: ExerciseContext) -> DeviceReport:
                 report, measured=(Measured("not exercised", "first mend what is refused"),)
             )
         if exercise := ROLES[key].exercise:
-            taught = exercise(device, trial)
+            outcome = exercise(device, context)
             report = replace(
                 report,
-                measured=taught.measured,
-                findings=(*report.findings, *taught.findings),
-                suggestions=taught.suggestions,
+                measured=outcome.measured,
+                findings=(*report.findings, *outcome.findings),
+                suggestions=outcome.suggestions,
             )
     except LabrigError as error:
         report = replace(report, failure=str(error))

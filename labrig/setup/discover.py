@@ -114,14 +114,14 @@ class Discovery:
     notes: tuple[str, ...] = ()
 
 
-def discover(around: Host, drivers: Collection[str]) -> Discovery:
+def discover(host: Host, drivers: Collection[str]) -> Discovery:
     """List serial ports and USB cameras with their entries for a rig file.
 
     Nothing is sent to any of the devices.
 
     Parameters
     ----------
-    around
+    host
         PC whose devices are listed, such as `Host.of_this_pc()`.
     drivers
         Names of the installed drivers.
@@ -143,17 +143,17 @@ def discover(around: Host, drivers: Collection[str]) -> Discovery:
     'lamp: {driver: numato_relay, address: "/dev/ttyACM0", relay: 0, warm_up: 15 min}'
     """
     ports = tuple(
-        _serial(port, drivers) for port in sorted(around.ports(), key=lambda port: port.device)
+        _serial(port, drivers) for port in sorted(host.ports(), key=lambda port: port.device)
     )
     try:
-        devices = [device for device in around.usb_devices() if _is_camera(device)]
+        devices = [device for device in host.usb_devices() if _is_camera(device)]
     except usb.core.NoBackendError:
         return Discovery(ports, (), (NO_LIBUSB,))
-    alike = Counter((device.idVendor, device.idProduct) for device in devices)
+    model_counts = Counter((device.idVendor, device.idProduct) for device in devices)
     return Discovery(
         ports,
         tuple(
-            _camera(device, around, drivers, alike[device.idVendor, device.idProduct] > 1)
+            _camera(device, host, drivers, model_counts[device.idVendor, device.idProduct] > 1)
             for device in devices
         ),
     )
@@ -189,21 +189,23 @@ def _is_camera(device: Any) -> bool:
         return False  # a device that does not even show its descriptors is none of ours
 
 
-def _camera(device: Any, around: Host, drivers: Collection[str], has_twin: bool) -> FoundDevice:
+def _camera(device: Any, host: Host, drivers: Collection[str], has_twin: bool) -> FoundDevice:
     address = f"usb://{device.idVendor:04x}:{device.idProduct:04x}"
-    refused = unreachable(device, around.platform)
-    hints = [refused] if refused else []
-    hints += [f"may be held by {holder}" for holder in holders(device, around)]
-    serial = None if refused else _text(device, device.iSerialNumber)
+    obstacle = unreachable(device, host.platform)
+    hints = [obstacle] if obstacle else []
+    hints += [f"may be held by {holder}" for holder in holders(device, host)]
+    serial = None if obstacle else _text(device, device.iSerialNumber)
     if has_twin and serial:
         address += f"/{serial}"
     elif has_twin:
         hints.append("there are several of this model: append /SERIAL, see labrig rig check")
-    words = [] if refused else [_text(device, device.iManufacturer), _text(device, device.iProduct)]
+    name_parts = (
+        [] if obstacle else [_text(device, device.iManufacturer), _text(device, device.iProduct)]
+    )
     usb.util.dispose_resources(device)
     driver: str | None = "ptp_camera"
     if maker := _OWN_COMMANDS.get(device.idVendor):
-        driver = None if around.platform == "win32" else "gphoto2_camera"
+        driver = None if host.platform == "win32" else "gphoto2_camera"
         hints.append(
             f"{maker} has commands of its own, which libgphoto2 knows (Linux, macOS): "
             "pip install 'labrig[gphoto2]'"
@@ -211,7 +213,7 @@ def _camera(device: Any, around: Host, drivers: Collection[str], has_twin: bool)
     snippet = f'camera: {{driver: {driver}, address: "{address}", warm_up: 30 min}}'
     return FoundDevice(
         address,
-        " ".join(word for word in words if word) or "camera",
+        " ".join(word for word in name_parts if word) or "camera",
         snippet if driver in drivers else "",
         tuple(hints),
     )

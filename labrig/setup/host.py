@@ -81,8 +81,8 @@ def _serial_ports() -> Iterable[Port]:
 def _usb_devices() -> Iterable[Any]:
     import usb.core
 
-    found: Iterable[Any] = usb.core.find(find_all=True)
-    return found
+    devices: Iterable[Any] = usb.core.find(find_all=True)
+    return devices
 
 
 def _linux_processes() -> Iterable[Process]:
@@ -104,7 +104,7 @@ def _usb_files(descriptors: Path) -> frozenset[str]:
 
 def _mac_processes() -> Iterable[Process]:
     try:
-        listed = subprocess.run(
+        listing = subprocess.run(
             ["/bin/ps", "-axo", "pid=,comm="],
             capture_output=True,
             text=True,
@@ -114,6 +114,6 @@ def _mac_processes() -> Iterable[Process]:
         ).stdout
     except (OSError, subprocess.SubprocessError):
         return
-    for line in listed.splitlines():
+    for line in listing.splitlines():
         pid, _, command = line.strip().partition(" ")
         yield Process(int(pid), Path(command.strip()).name)

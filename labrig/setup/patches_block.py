@@ -45,14 +45,14 @@ def write_patches(path: Path, patches: Mapping[str, Region]) -> None:
         raise UsageError(f"{path}: cannot be read as UTF-8 text ({error})") from None
     changed = with_patches(text, patches, str(path))
     # Beside it, because a protocol may name files relative to its own folder.
-    trial = path.with_name(f".{path.name}.trial.yaml")
+    trial_file = path.with_name(f".{path.name}.trial.yaml")
     try:
-        write_durably(trial, changed.encode("utf-8"))
-        read_protocol(trial)
+        write_durably(trial_file, changed.encode("utf-8"))
+        read_protocol(trial_file)
     except UsageError as error:
-        raise UsageError(str(error).replace(str(trial), str(path))) from None
+        raise UsageError(str(error).replace(str(trial_file), str(path))) from None
     finally:
-        trial.unlink(missing_ok=True)
+        trial_file.unlink(missing_ok=True)
     write_durably(path.resolve(), changed.encode("utf-8"))  # a link stays one
 
 
@@ -74,21 +74,21 @@ def with_patches(text: str, patches: Mapping[str, Region], source: str) -> str:
         If the text is not YAML, or the patches cannot be replaced without other changes.
     """
     before = parse_yaml(text, source)
-    wanted = {name: rounded(region) for name, region in patches.items()}
-    for candidate in _candidates(text, wanted):
+    new_patches = {name: rounded(region) for name, region in patches.items()}
+    for candidate in _candidates(text, new_patches):
         try:
             after = parse_yaml(candidate, source)
         except UsageError:
             continue
-        told = after.pop(KEY, None)
-        rest = {key: value for key, value in before.items() if key != KEY}
+        written = after.pop(KEY, None)
+        others = {key: value for key, value in before.items() if key != KEY}
         # Compared as text, because not-a-number is never equal to itself.
-        same = repr(after) == repr(rest) and list(told or ()) == list(wanted)
-        if same and all(tuple(told[name]) == region for name, region in wanted.items()):
+        same = repr(after) == repr(others) and list(written or ()) == list(new_patches)
+        if same and all(tuple(written[name]) == region for name, region in new_patches.items()):
             return candidate
     raise UsageError(
         f"{source}: '{KEY}' is written so that it cannot be changed without touching the rest; "
-        f"write it by hand: {' '.join(_entries(wanted, '', ' '))}"
+        f"write it by hand: {' '.join(_entries(new_patches, '', ' '))}"
     )
 
 
@@ -136,11 +136,11 @@ def _scalar(name: str) -> str:
 
 def _replaced(text: str, key: yaml.Node, value: yaml.Node, lines: str) -> str:
     end = _end_of(value)
-    rest = _REST_OF_LINE.match(text, end)
-    if rest is None:
+    rest_of_line = _REST_OF_LINE.match(text, end)
+    if rest_of_line is None:
         return ""  # something else follows on the line: not a value that can be taken out
     newline = "\r\n" if "\r\n" in text else "\n"
-    after = text[rest.end() :].removeprefix(newline)
+    after = text[rest_of_line.end() :].removeprefix(newline)
     if value.start_mark.line > key.start_mark.line:
         start = value.start_mark.index - value.start_mark.column
         return text[:start] + lines + after
@@ -148,7 +148,7 @@ def _replaced(text: str, key: yaml.Node, value: yaml.Node, lines: str) -> str:
     if colon is None:
         return ""
     # What was said behind the value is kept behind the key.
-    return text[: key.end_mark.index] + ":" + rest[0].rstrip() + newline + lines + after
+    return text[: key.end_mark.index] + ":" + rest_of_line[0].rstrip() + newline + lines + after
 
 
 def _end_of(node: yaml.Node) -> int:

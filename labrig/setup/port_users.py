@@ -12,7 +12,7 @@ import usb.util
 from labrig.setup.host import Host, Process
 
 #: Programs that open every camera, and how to make each release it.
-_KNOWN = {
+_REMEDIES = {
     "linux": {
         "gvfsd-gphoto2": "gio mount -s gphoto2",
         "gvfs-gphoto2-volume-monitor": (
@@ -34,11 +34,11 @@ _KNOWN = {
 _ZADIG = "give this camera the WinUSB driver with Zadig (https://zadig.akeo.ie)"
 
 
-def holders(device: Any, around: Host) -> list[str]:
+def holders(device: Any, host: Host) -> list[str]:
     """Return the programs that may hold a `usb.core.Device`, each with a remedy."""
     return [
         f"{process.name} (process {process.pid}): {remedy}"
-        for process, remedy in _suspects(_node(device), around.processes(), around.platform)
+        for process, remedy in _suspects(_node(device), host.processes(), host.platform)
     ]
 
 
@@ -49,16 +49,16 @@ def unreachable(device: Any, platform: str) -> str | None:
     except (usb.core.USBError, NotImplementedError) as error:
         if isinstance(error, usb.core.USBError) and error.errno is None:
             return None  # pyusb's way of saying that no configuration is set: it was opened
-        said = " ".join(str(error).split())
+        reason = " ".join(str(error).split())
         if platform == "win32":
-            return f"it cannot be opened ({said}): {_ZADIG}"
+            return f"it cannot be opened ({reason}): {_ZADIG}"
         if platform == "linux":
             return (
-                f'it cannot be opened ({said}): put SUBSYSTEM=="usb", '
+                f'it cannot be opened ({reason}): put SUBSYSTEM=="usb", '
                 f'ATTR{{idVendor}}=="{device.idVendor:04x}", TAG+="uaccess" into '
                 "/etc/udev/rules.d/70-labrig.rules and plug it in again"
             )
-        return f"it cannot be opened ({said}): unplug it and plug it in again"
+        return f"it cannot be opened ({reason}): unplug it and plug it in again"
     finally:
         usb.util.dispose_resources(device)
     return None
@@ -72,9 +72,9 @@ def _node(device: Any) -> str:
 def _suspects(
     node: str, processes: Iterable[Process], platform: str
 ) -> Iterable[tuple[Process, str]]:
-    known = _KNOWN.get(platform, {})
+    remedies = _REMEDIES.get(platform, {})
     for process in processes:
         if node in process.open_files:
-            yield process, known.get(process.name, "close it")
-        elif process.name in known:
-            yield process, known[process.name]
+            yield process, remedies.get(process.name, "close it")
+        elif process.name in remedies:
+            yield process, remedies[process.name]

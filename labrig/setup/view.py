@@ -16,7 +16,7 @@ PICTURE_PERIOD_S = 0.1
 #: Longest real time until Ctrl-C is answered.
 LOOK_UP_S = 0.1
 #: Keys of devices that may have a live view, in order of preference.
-_EYES = (VIEWFINDER.key, CAMERA.key)
+_LIVE_VIEW_KEYS = (VIEWFINDER.key, CAMERA.key)
 
 
 def view_rig(
@@ -69,12 +69,12 @@ def view_rig(
         ViewServer(pictures, protocol, rig.name, port) as server,
         server.running(),
     ):
-        eye = _eye(rig, rig_path)
+        viewfinder = _viewfinder(rig, rig_path)
         tell(server.url)
-        hand_over(pictures, eye, rig.clock)
+        hand_over(pictures, viewfinder, rig.clock)
 
 
-def hand_over(pictures: LivePictures, eye: LiveView, clock: Clock) -> Never:
+def hand_over(pictures: LivePictures, live_view: LiveView, clock: Clock) -> Never:
     """Fetch a picture whenever a browser waits for one; only this thread uses the camera.
 
     Pictures are paced in real time whatever the rig's clock: browser and user are real even if the
@@ -90,13 +90,13 @@ def hand_over(pictures: LivePictures, eye: LiveView, clock: Clock) -> Never:
     pause = threading.Event()
     while True:
         if pictures.wait_until_wanted(LOOK_UP_S):
-            pictures.show(eye.preview())
+            pictures.show(live_view.preview())
             pause.wait(PICTURE_PERIOD_S)
         clock.sleep(0.0)  # where an interruption is answered
 
 
-def _eye(rig: Rig, rig_path: Path) -> LiveView:
-    for key in _EYES:
+def _viewfinder(rig: Rig, rig_path: Path) -> LiveView:
+    for key in _LIVE_VIEW_KEYS:
         device = rig.devices.get(key)
         if isinstance(device, LiveView):
             return device

@@ -35,7 +35,7 @@ class LivePictures:
 
     def __init__(self) -> None:
         self._latest: LivePicture | None = None
-        self._wanted = False
+        self._is_wanted = False
         self._changed = threading.Condition()
 
     @property
@@ -47,21 +47,21 @@ class LivePictures:
     def wait_until_wanted(self, at_most_s: float) -> bool:
         """Whether a browser waits for a picture, now or within `at_most_s` seconds of real time."""
         with self._changed:
-            return self._changed.wait_for(lambda: self._wanted, at_most_s)
+            return self._changed.wait_for(lambda: self._is_wanted, at_most_s)
 
     def show(self, jpeg: bytes) -> None:
         """Pass a picture to all browsers that wait."""
         with self._changed:
             number = 1 if self._latest is None else self._latest.number + 1
             self._latest = LivePicture(number, jpeg)
-            self._wanted = False
+            self._is_wanted = False
             self._changed.notify_all()
 
     def after(self, number: int, at_most_s: float) -> LivePicture | None:
         """Return a picture later than `number`; None if none comes within `at_most_s` seconds."""
         with self._changed:
             if self._latest is None or self._latest.number <= number:
-                self._wanted = True
+                self._is_wanted = True
                 self._changed.notify_all()
                 self._changed.wait_for(
                     lambda: self._latest is not None and self._latest.number > number, at_most_s
@@ -165,7 +165,7 @@ class DrawnPatches(BaseModel):
         UsageError
             If two regions have one name, or a region exceeds the frame.
         """
-        found: dict[str, Region] = {}
+        regions: dict[str, Region] = {}
         for patch in self.patches:
             x, y, width, height = patch.region
             if max(x + width, y + height) > 1 + ROUNDING:
@@ -173,10 +173,10 @@ class DrawnPatches(BaseModel):
                     f"'{patch.name}' leaves the frame; expected fractions of it, "
                     f"got {list(patch.region)}"
                 )
-            if patch.name in found:
+            if patch.name in regions:
                 raise UsageError(f"two regions are called '{patch.name}'; rename one")
-            found[patch.name] = patch.region
-        return found
+            regions[patch.name] = patch.region
+        return regions
 
 
 #: Longest wait for a picture until the browser has to repeat its request.
@@ -246,13 +246,14 @@ class _Conversation(LocalConversation):
         if path != "patches" or self.server.protocol is None:
             self.refuse(HTTPStatus.NOT_FOUND, "there is no protocol file to write to")
             return
-        drawn = validate(self.json_object(body), DrawnPatches, "regions").by_name()
-        self.send_json(HTTPStatus.OK, {"written": self.server.protocol.write(drawn)})
+        regions = validate(self.json_object(body), DrawnPatches, "regions").by_name()
+        self.send_json(HTTPStatus.OK, {"written": self.server.protocol.write(regions)})
 
     def _send_picture(self) -> None:
-        seen = self.query("after") or "0"
+        last_number = self.query("after") or "0"
         picture = self.server.pictures.after(
-            int(seen) if seen.isdecimal() and len(seen) < 12 else 0, PICTURE_TIMEOUT_S
+            int(last_number) if last_number.isdecimal() and len(last_number) < 12 else 0,
+            PICTURE_TIMEOUT_S,
         )
         if picture is None:
             self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "no live picture yet")

@@ -52,27 +52,34 @@ class PlannedUnit:
             time and planned time of the last step; `until_s`: planned time at which the next line
             of the journal is due.
         """
-        at, time, at_s = 0, float(attempt.start["time"]), 0.0
+        position, time, at_s = 0, float(attempt.start["time"]), 0.0
         places: defaultdict[_Key, list[int]] = defaultdict(list)
         for number, step in enumerate(self.steps):
             places[_key(step.device, step.action)].append(number)
-        happened: list[ActionRecord | FrameRecord] = [*attempt.actions, *attempt.frames]
-        happened.sort(key=lambda one: one.start_time)
-        for one in happened:
-            fitting = places[_key_of(one)]
-            found = bisect_left(fitting, at)
-            if found < len(fitting):
-                number = fitting[found]
-                at, time, at_s = number + 1, one.start_time, self.steps[number].at_s - self.begins_s
-        coming = [step for step in self.steps[at:] if step.device != FINDING]
+        records: list[ActionRecord | FrameRecord] = [*attempt.actions, *attempt.frames]
+        records.sort(key=lambda record: record.start_time)
+        for record in records:
+            candidates = places[_key_of(record)]
+            index = bisect_left(candidates, position)
+            if index < len(candidates):
+                number = candidates[index]
+                position, time, at_s = (
+                    number + 1,
+                    record.start_time,
+                    self.steps[number].at_s - self.begins_s,
+                )
+        coming = [step for step in self.steps[position:] if step.device != FINDING]
         due = next((step.at_s for step in coming if step.device != WAITING), None)
-        told = [one for one in happened if _device(one) != FINDING]
+        past = [record for record in records if _device(record) != FINDING]
         return {
             "began_time": attempt.start["time"],
             "time": time,
             "at_s": at_s,
             "until_s": self.duration_s if due is None else due - self.begins_s,
-            "done": [{"time": one.start_time, "what": _text_of(one)} for one in told[-MOST_DONE:]],
+            "done": [
+                {"time": record.start_time, "what": _text_of(record)}
+                for record in past[-MOST_DONE:]
+            ],
             "next": [
                 {"at_s": step.at_s - self.begins_s, "what": step_text(step.device, step.action)}
                 for step in coming[:MOST_NEXT]
@@ -112,16 +119,20 @@ def _key(device: str, action: str) -> _Key:
     return device, "" if device == PERSON else action
 
 
-def _key_of(one: ActionRecord | FrameRecord) -> _Key:
-    return ("camera", one.role) if isinstance(one, FrameRecord) else _key(one.device, one.action)
+def _key_of(record: ActionRecord | FrameRecord) -> _Key:
+    return (
+        ("camera", record.role)
+        if isinstance(record, FrameRecord)
+        else _key(record.device, record.action)
+    )
 
 
-def _device(one: ActionRecord | FrameRecord) -> str:
-    return "camera" if isinstance(one, FrameRecord) else one.device
+def _device(record: ActionRecord | FrameRecord) -> str:
+    return "camera" if isinstance(record, FrameRecord) else record.device
 
 
-def _text_of(one: ActionRecord | FrameRecord) -> str:
-    if isinstance(one, ActionRecord):
-        return step_text(one.device, one.action)
-    settings = ExposureSettings(one.exposure_s, one.iso, one.f_number)
-    return step_text("camera", f"{one.role} frame, {settings}")
+def _text_of(record: ActionRecord | FrameRecord) -> str:
+    if isinstance(record, ActionRecord):
+        return step_text(record.device, record.action)
+    settings = ExposureSettings(record.exposure_s, record.iso, record.f_number)
+    return step_text("camera", f"{record.role} frame, {settings}")

@@ -54,13 +54,13 @@ def glance(path: Path, patches: Mapping[str, Region], width: int) -> Preview:
     linear = np.clip(small(binned(raw), width), 0.0, None)
     level = float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE))
     brightened = min(1 / max(level, 1e-9), MOST_BRIGHTENED)
-    shown = 255 * np.clip(linear * brightened, 0.0, 1.0) ** (1 / GAMMA)
+    picture = 255 * np.clip(linear * brightened, 0.0, 1.0) ** (1 / GAMMA)
     return Preview(
         values={
-            name: {channel: stats.mean for channel, stats in one.channels.items()}
-            for name, one in measured.items()
+            name: {channel: stats.mean for channel, stats in measurement.channels.items()}
+            for name, measurement in measured.items()
         },
-        clipped=tuple(name for name, one in measured.items() if one.clipped),
-        picture=shown.round().astype(np.uint8),
+        clipped=tuple(name for name, measurement in measured.items() if measurement.clipped),
+        picture=picture.round().astype(np.uint8),
         brightened=float(f"{brightened:.2g}"),
     )

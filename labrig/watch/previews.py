@@ -68,15 +68,15 @@ class Previews:
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._questions, self._answers = self._process.stdin, self._process.stdout
-        self._listening = threading.Thread(target=self._listen, daemon=True)
-        self._listening.start()
+        self._requests, self._replies = self._process.stdin, self._process.stdout
+        self._thread = threading.Thread(target=self._receive, daemon=True)
+        self._thread.start()
 
     def ask(self, name: str, unit: str) -> None:
         """Request the preview of the frame with a file name, taken by a unit."""
         try:
-            self._questions.write(f"{json.dumps([name, unit])}\n")
-            self._questions.flush()
+            self._requests.write(f"{json.dumps([name, unit])}\n")
+            self._requests.flush()
         except OSError:  # it has died: a run goes on without pictures
             return
 
@@ -84,46 +84,46 @@ class Previews:
         """End the process."""
         self._process.kill()
         self._process.wait()
-        self._listening.join()
-        self._answers.close()
+        self._thread.join()
+        self._replies.close()
         try:
-            self._questions.close()
+            self._requests.close()
         except OSError:
             return
 
-    def _listen(self) -> None:
-        for line in self._answers:
-            said = json.loads(line)
-            picture = np.frombuffer(bytes.fromhex(said.pop("pixels")), np.uint8)
+    def _receive(self) -> None:
+        for line in self._replies:
+            message = json.loads(line)
+            picture = np.frombuffer(bytes.fromhex(message.pop("pixels")), np.uint8)
             self.latest = RenderedPreview(
-                name=said["name"],
-                values=said["values"],
-                clipped=tuple(said["clipped"]),
-                picture=picture.reshape(said["shape"]),
+                name=message["name"],
+                values=message["values"],
+                clipped=tuple(message["clipped"]),
+                picture=picture.reshape(message["shape"]),
             )
 
 
-def answer(run: Path, width: int, questions: Iterable[str], out: TextIO) -> None:
+def answer(run: Path, width: int, requests: Iterable[str], out: TextIO) -> None:
     """Print the previews requested, one JSON line each; unreadable frames are left out."""
     # only in the process that looks: the one that runs the rig starts without what this loads
     from labrig.acquire import read_protocol
     from labrig.watch.preview import glance
 
     protocol = read_protocol(run / "protocol.yaml")
-    for question in questions:
-        name, unit = json.loads(question)
+    for request in requests:
+        name, unit = json.loads(request)
         try:
-            seen = glance(run / "frames" / name, protocol.patches_of(unit), width)
+            preview = glance(run / "frames" / name, protocol.patches_of(unit), width)
         except LabrigError:
             continue
-        said = {
+        message = {
             "name": name,
-            "values": seen.values,
-            "clipped": seen.clipped,
-            "shape": seen.picture.shape,
-            "pixels": seen.picture.tobytes().hex(),
+            "values": preview.values,
+            "clipped": preview.clipped,
+            "shape": preview.picture.shape,
+            "pixels": preview.picture.tobytes().hex(),
         }
-        print(json.dumps(said), file=out, flush=True)
+        print(json.dumps(message), file=out, flush=True)
 
 
 if __name__ == "__main__":

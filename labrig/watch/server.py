@@ -18,7 +18,7 @@ COME_BACK_MS = 500
 _HERE = Path(__file__).parent
 _PAGE = _HERE / "watch_page.html"
 #: Placeholder in the page for the first update.
-_FIRST = "FIRST_NEWS"
+_FIRST_UPDATE = "FIRST_NEWS"
 
 PAGES: Mapping[str, Path] = {
     name: _HERE / name
@@ -51,9 +51,9 @@ class UpdateFeed:
 
     def __init__(self, state: Things, picture: bytes | None) -> None:
         self._number = 0
-        self._told: dict[tuple[str, str], tuple[int, Any]] = {}
+        self._values: dict[tuple[str, str], tuple[int, Any]] = {}
         self._picture: bytes | None = None
-        self._is_over = False
+        self._has_ended = False
         self._changed = threading.Condition()
         self.tell(state, picture)
 
@@ -72,17 +72,17 @@ class UpdateFeed:
         }
         with self._changed:
             self._number += 1
-            for place in [*now, *self._told]:
+            for place in [*now, *self._values]:
                 value = now.get(place)
-                if place not in self._told or self._told[place][1] != value:
-                    self._told[place] = (self._number, value)
+                if place not in self._values or self._values[place][1] != value:
+                    self._values[place] = (self._number, value)
             self._picture = picture
             self._changed.notify_all()
 
     def end(self) -> None:
         """End the feed and release all browsers that wait."""
         with self._changed:
-            self._is_over = True
+            self._has_ended = True
             self._changed.notify_all()
 
     def after(self, number: int, at_most_s: float) -> tuple[int, Things] | None:
@@ -96,14 +96,14 @@ class UpdateFeed:
         with self._changed:
             if number > self._number:  # of another watch: nothing is known
                 number = 0
-            self._changed.wait_for(lambda: self._number > number or self._is_over, at_most_s)
-            if self._is_over:
+            self._changed.wait_for(lambda: self._number > number or self._has_ended, at_most_s)
+            if self._has_ended:
                 raise EOFError
             if self._number <= number:
                 return None
             things: dict[str, dict[str, Any]] = {}
-            for (section, key), (told, value) in self._told.items():
-                if told > number:
+            for (section, key), (changed_number, value) in self._values.items():
+                if changed_number > number:
                     things.setdefault(section, {})[key] = value
             return self._number, things
 
@@ -158,7 +158,9 @@ class _Conversation(LocalConversation):
             self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "labrig watch is ending")
             return
         # a name in it must not end the element that it stands in
-        page = _PAGE.read_text(encoding="utf-8").replace(_FIRST, first.replace("<", "\\u003c"))
+        page = _PAGE.read_text(encoding="utf-8").replace(
+            _FIRST_UPDATE, first.replace("<", "\\u003c")
+        )
         self.send(HTTPStatus.OK, KINDS[".html"], page.encode())
 
     def _stream(self) -> None:
@@ -170,8 +172,8 @@ class _Conversation(LocalConversation):
         self.send_header("Connection", "close")
         self.end_headers()
         self.wfile.write(f"retry: {COME_BACK_MS}\n\n".encode())
-        known = self.headers.get("Last-Event-ID") or self.query("after") or "0"
-        number = int(known) if known.isdecimal() and len(known) < 12 else 0
+        last_id = self.headers.get("Last-Event-ID") or self.query("after") or "0"
+        number = int(last_id) if last_id.isdecimal() and len(last_id) < 12 else 0
         while True:
             try:
                 news = self.server.news.after(number, HEARTBEAT_S)
@@ -235,15 +237,15 @@ def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -
     http
     stopped
     """
-    following = RunFollower(run)
-    following.look()
-    news = UpdateFeed(following.state(), following.picture)
+    follower = RunFollower(run)
+    follower.look()
+    news = UpdateFeed(follower.state(), follower.picture)
     with WatchServer(news, port) as server, server.running():
         try:
             tell(server.url)
             while True:
-                if following.look():
-                    news.tell(following.state(), following.picture)
+                if follower.look():
+                    news.tell(follower.state(), follower.picture)
                 clock.sleep(LOOK_PERIOD_S)
         finally:
             news.end()

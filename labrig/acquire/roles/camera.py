@@ -102,7 +102,7 @@ class Shoot:
         return f"{self.role} frame, {self.settings}"
 
 
-def exercise_camera(camera: Camera, trial: ExerciseContext) -> Exercised:
+def exercise_camera(camera: Camera, context: ExerciseContext) -> Exercised:
     """Take three short frames to measure the timing and a longer one to measure the noise.
 
     Raises
@@ -111,26 +111,26 @@ def exercise_camera(camera: Camera, trial: ExerciseContext) -> Exercised:
         If the camera failed, or its frame cannot be reduced.
     """
     offers = camera.offers()
-    measured, suggestion = _timing(camera, offers, trial)
-    frame, _ = _shoot(camera, _settings(offers, LONG_S), trial)
-    seen = trial.eyes.dark_frame(frame)
+    measured, suggestion = _timing(camera, offers, context)
+    frame, _ = _shoot(camera, _settings(offers, LONG_S), context)
+    reduced = context.eyes.dark_frame(frame)
     return Exercised(
-        (_offered(offers), *measured, *seen.measured),
-        seen.findings,
-        (suggestion, *seen.suggestions),
+        (_measured_offers(offers), *measured, *reduced.measured),
+        reduced.findings,
+        (suggestion, *reduced.suggestions),
     )
 
 
 def _timing(
-    camera: Camera, offers: CameraOffers, trial: ExerciseContext
+    camera: Camera, offers: CameraOffers, context: ExerciseContext
 ) -> tuple[list[Measured], Suggestion]:
     settings = _settings(offers, SHORT_S)
     lags_s, cycles_s = [], []
     for _ in range(SHORT_FRAMES):
-        frame, asked_s = _shoot(camera, settings, trial)
+        frame, requested_s = _shoot(camera, settings, context)
         camera.arm()  # only now can the next exposure begin
-        lags_s.append(frame.start_s - asked_s)
-        cycles_s.append(trial.clock.now() - frame.end_s)
+        lags_s.append(frame.start_s - requested_s)
+        cycles_s.append(context.clock.now() - frame.end_s)
     frame_time_s = math.ceil(max(cycles_s) / STEP_S) * STEP_S
     return [
         Measured(
@@ -141,17 +141,17 @@ def _timing(
 
 
 def _shoot(
-    camera: Camera, settings: ExposureSettings, trial: ExerciseContext
+    camera: Camera, settings: ExposureSettings, context: ExerciseContext
 ) -> tuple[Frame, float]:
     """Return a frame and the time at which it was requested."""
     camera.configure(settings)
     camera.arm()
-    trial.clock.sleep(SETTLING_S)
-    asked_s = trial.clock.now()
+    context.clock.sleep(SETTLING_S)
+    requested_s = context.clock.now()
     frame = camera.shoot()
     if not frame.data:
         raise DeviceError("the camera delivered an empty frame; try again")
-    return frame, asked_s
+    return frame, requested_s
 
 
 def _settings(offers: CameraOffers, exposure_s: float) -> ExposureSettings:
@@ -162,7 +162,7 @@ def _settings(offers: CameraOffers, exposure_s: float) -> ExposureSettings:
     )
 
 
-def _offered(offers: CameraOffers) -> Measured:
+def _measured_offers(offers: CameraOffers) -> Measured:
     return Measured(
         "it offers",
         f"{duration_text(offers.exposures_s[0])} to {duration_text(offers.exposures_s[-1])}, "

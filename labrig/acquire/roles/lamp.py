@@ -78,17 +78,17 @@ LAMP_ON = Switch(on=True)
 LAMP_OFF = Switch(on=False)
 
 
-def _exercise(lamp: Lamp, trial: ExerciseContext) -> Exercised:
+def _exercise(lamp: Lamp, context: ExerciseContext) -> Exercised:
     """Switch the lamp on for some hundredths of a second, `SWITCHINGS` times."""
     on_s, off_s = [], []
     try:
         for _ in range(SWITCHINGS):
-            on_s.append(trial.timed_s(lamp.on))
-            _require(lamp, on=True)
-            off_s.append(trial.timed_s(lamp.off))
-            _require(lamp, on=False)
+            on_s.append(context.timed_s(lamp.on))
+            _require_state(lamp, on=True)
+            off_s.append(context.timed_s(lamp.off))
+            _require_state(lamp, on=False)
     finally:
-        with trial.clock.shielded():
+        with context.clock.shielded():
             lamp.off()
     return Exercised(
         (
@@ -98,7 +98,7 @@ def _exercise(lamp: Lamp, trial: ExerciseContext) -> Exercised:
     )
 
 
-def _require(lamp: Lamp, *, on: bool) -> None:
+def _require_state(lamp: Lamp, *, on: bool) -> None:
     if lamp.is_on() != on:
         state = "on" if on else "off"
         raise DeviceError(

@@ -47,7 +47,7 @@ class PlannedLedBank(PlannedDevice):
 
     def __init__(self, channels: Sequence[str]) -> None:
         self._channels = tuple(channels)
-        self._lit: str | None = None
+        self._channel_on: str | None = None
 
     def reads_back(self) -> bool:
         """Return False: nothing else can switch a stand-in."""
@@ -59,15 +59,15 @@ class PlannedLedBank(PlannedDevice):
 
     def light(self, channel: str) -> None:
         """Switch one LED on."""
-        self._lit = channel
+        self._channel_on = channel
 
     def dark(self) -> None:
         """Switch all LEDs off."""
-        self._lit = None
+        self._channel_on = None
 
     def lit(self) -> str | None:
         """Return the LED that is on, as commanded last."""
-        return self._lit
+        return self._channel_on
 
 
 @dataclass(frozen=True)
@@ -108,27 +108,27 @@ class LedSwitch:
 LEDS_OFF = LedSwitch(None)
 
 
-def _exercise(leds: LedBank, trial: ExerciseContext) -> Exercised:
+def _exercise(leds: LedBank, context: ExerciseContext) -> Exercised:
     """Switch each LED on for some hundredths of a second."""
     measured, off_s = [], []
     try:
         for channel in leds.channels():
-            on_s = trial.timed_s(partial(leds.light, channel))
+            on_s = context.timed_s(partial(leds.light, channel))
             measured.append(Measured(f"{channel} on, read back", f"{on_s * 1e3:.1f} ms"))
-            _require(leds, channel)
-            off_s.append(trial.timed_s(leds.dark))
-            _require(leds, None)
+            _require_state(leds, channel)
+            off_s.append(context.timed_s(leds.dark))
+            _require_state(leds, None)
     finally:
-        with trial.clock.shielded():
+        with context.clock.shielded():
             leds.dark()
     return Exercised((*measured, Measured("off, read back", spread_ms(off_s))))
 
 
-def _require(leds: LedBank, channel: str | None) -> None:
-    if (found := leds.lit()) != channel:
+def _require_state(leds: LedBank, channel: str | None) -> None:
+    if (channel_on := leds.lit()) != channel:
         raise DeviceError(
-            f"the LEDs were switched to {channel or 'dark'}, they say {found or 'dark'}; look at "
-            "them, switch them off by hand and check the relays"
+            f"the LEDs were switched to {channel or 'dark'}, they say {channel_on or 'dark'}; look "
+            "at them, switch them off by hand and check the relays"
         )
 
 

@@ -187,9 +187,9 @@ class ExerciseContext:
 
     def timed_s(self, act: Callable[[], object]) -> float:
         """Call `act` and return its duration in seconds."""
-        asked_s = self.clock.now()
+        start_s = self.clock.now()
         act()
-        return self.clock.now() - asked_s
+        return self.clock.now() - start_s
 
 
 def spread_ms(durations_s: Sequence[float]) -> str:

@@ -112,13 +112,13 @@ SHIELD_UNCOVER = Shield(cover=False)
 
 
 def _swing(
-    ways: Mapping[str, Callable[[], None]], travel_s: float, trial: ExerciseContext
+    moves: Mapping[str, Callable[[], None]], travel_s: float, context: ExerciseContext
 ) -> Exercised:
     """Move a device once in each way, over its full travel; the last way is the safe one."""
     measured = []
-    for what, go in ways.items():
-        measured.append(Measured(what, f"{trial.timed_s(go) * 1e3:.1f} ms"))
-        trial.clock.sleep(travel_s)
+    for name, move in moves.items():
+        measured.append(Measured(name, f"{context.timed_s(move) * 1e3:.1f} ms"))
+        context.clock.sleep(travel_s)
     travelled = Measured(
         "travel, from the rig file",
         f"{duration_text(travel_s)}; watch that it has stopped by then: no board sees that",
@@ -126,14 +126,14 @@ def _swing(
     return Exercised((*measured, travelled))
 
 
-def _exercise_door(door: TrapDoor, trial: ExerciseContext) -> Exercised:
-    ways = {"open, read back": door.open, "close, read back": door.close}
-    return _swing(ways, door.travel_s(), trial)
+def _exercise_door(door: TrapDoor, context: ExerciseContext) -> Exercised:
+    moves = {"open, read back": door.open, "close, read back": door.close}
+    return _swing(moves, door.travel_s(), context)
 
 
-def _exercise_shield(shield: LampShield, trial: ExerciseContext) -> Exercised:
-    ways = {"cover, read back": shield.cover, "uncover, read back": shield.uncover}
-    return _swing(ways, shield.travel_s(), trial)
+def _exercise_shield(shield: LampShield, context: ExerciseContext) -> Exercised:
+    moves = {"cover, read back": shield.cover, "uncover, read back": shield.uncover}
+    return _swing(moves, shield.travel_s(), context)
 
 
 DOOR: Role[TrapDoor] = Role(

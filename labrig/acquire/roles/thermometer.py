@@ -13,14 +13,14 @@ class Thermometer(Device, Protocol):
         """Return the temperature in degrees Celsius; takes seconds at most, even when it fails."""
 
 
-def _exercise(thermometer: Thermometer, trial: ExerciseContext) -> Exercised:
+def _exercise(thermometer: Thermometer, context: ExerciseContext) -> Exercised:
     """Read the temperature once."""
-    asked_s = trial.clock.now()
+    start_s = context.clock.now()
     celsius = thermometer.celsius()
     return Exercised(
         (
             Measured("temperature", f"{celsius:.1f} °C"),
-            Measured("until it was read", f"{(trial.clock.now() - asked_s) * 1e3:.0f} ms"),
+            Measured("until it was read", f"{(context.clock.now() - start_s) * 1e3:.0f} ms"),
         )
     )
 

@@ -21,15 +21,15 @@ class LiveView(Device, Protocol):
         """
 
 
-def _exercise(viewfinder: LiveView, trial: ExerciseContext) -> Exercised:
+def _exercise(viewfinder: LiveView, context: ExerciseContext) -> Exercised:
     """Take one live picture; a camera in this role takes no photographs."""
-    asked_s = trial.clock.now()
+    start_s = context.clock.now()
     jpeg = viewfinder.preview()
-    shown_s = trial.clock.now() - asked_s
+    duration_s = context.clock.now() - start_s
     return Exercised(
         (
-            trial.eyes.live_picture(jpeg),
-            Measured("until it was shown", f"{shown_s * 1e3:.0f} ms"),
+            context.eyes.live_picture(jpeg),
+            Measured("until it was shown", f"{duration_s * 1e3:.0f} ms"),
         )
     )
 
