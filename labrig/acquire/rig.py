@@ -224,7 +224,7 @@ def in_safe_order(keys: Iterable[str]) -> list[str]:
     Returns
     -------
     list of str
-        The same keys; devices without a prescribed place come last, in the order given.
+        Keys in that order; devices without a prescribed place come last, as given.
 
     Examples
     --------

@@ -152,7 +152,7 @@ def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
         asked=tuple(
             (key, *values)
             for key, *values in _differing(*protocols)
-            # said as `missing`, in fewer words
+            # listed in `missing`
             if not (key.startswith("patches.") and None in values)
         ),
         patches=tuple(

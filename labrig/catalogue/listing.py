@@ -276,5 +276,5 @@ def _is_being_written(folder: Path) -> bool:
             return False
     except Timeout:
         return True
-    except OSError:  # somebody else's folder: only its owner writes there
+    except OSError:  # another user's folder: only its owner writes there
         return False

@@ -44,7 +44,7 @@ def guarded(arguments: Sequence[str]) -> int:
     try:
         code = _run(arguments)
     except BrokenPipeError:
-        code = 0  # whoever read it has what it wanted: head, less
+        code = 0  # the reader has ended with all it needs: head, less
     finally:
         ReaderMayLeave(sys.stdout).flush()
         for signum in STOP_SIGNALS:

@@ -49,7 +49,7 @@ def progress(
     clock
         Clock of the rig.
     yes
-        Whether the rig's changer does the manual steps; nobody is asked then.
+        Whether the rig's changer does the manual steps; no person is asked then.
     has_changer
         Whether the rig has a changer.
 

@@ -33,7 +33,7 @@ class Terminal:
         Raises
         ------
         UsageError
-            If the input has ended, so that nobody can answer.
+            If the input has ended without an answer.
         """
         self._read()
         while not self._lines.empty():
@@ -73,7 +73,7 @@ class Terminal:
         """Return the next line of input; None if the input has ended."""
         while True:
             meanwhile()
-            ended = self._ended.is_set()  # asked first: what came before the end counts
+            ended = self._ended.is_set()  # read first, so that input before the end counts
             try:
                 return self._lines.get(timeout=LOOK_UP_S)
             except queue.Empty:

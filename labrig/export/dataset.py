@@ -42,16 +42,16 @@ def read_dataset(run: Path | str) -> "Dataset | DataTree":
     Returns
     -------
     Dataset
-        Of a decay, with dimensions `patch`, `frame` (file names), `channel` and `state` (from 1, by
-        falling rate). Signals `value` and `sigma` have the shape (patch, frame, channel), `flag`
-        has (patch, frame); the coordinates `t_s`, `exposure_s`, `unit`, `iso`, `f_number` have
-        (frame,). Fit parameters are `k_r_per_s`, `amplitude` (patch, state) and `channel_weight`,
-        `offset` (patch, channel), each with its σ, and `flicker`, `reduced_chi2`, `fit_warnings`
-        (patch); NaN where there is no fit. Units are attributes of the variables; attributes of the
-        Dataset name run, sample and devices.
+        Result of a decay, with dimensions `patch`, `frame` (file names), `channel` and `state`
+        (from 1, by falling rate). Signals `value` and `sigma` have the shape (patch, frame,
+        channel), `flag` has (patch, frame); the coordinates `t_s`, `exposure_s`, `unit`, `iso`,
+        `f_number` have (frame,). Fit parameters are `k_r_per_s`, `amplitude` (patch, state) and
+        `channel_weight`, `offset` (patch, channel), each with its σ, and `flicker`, `reduced_chi2`,
+        `fit_warnings` (patch); NaN where there is no fit. Units are attributes of the variables;
+        attributes of the Dataset name run, sample and devices.
     DataTree
-        Of any other protocol, with every field of its result as a variable and fields within fields
-        as nodes; a chain has a node for each part.
+        Result of any other protocol, with its fields as variables and fields within fields as
+        nodes; a chain has a node for each part.
 
     Raises
     ------

@@ -69,7 +69,7 @@ class FrameRecord:
         """Return how the file differs from its record; empty if it does not."""
         try:
             with self.path.open("rb") as file:
-                # A file of another size need not be read; one made up by somebody may have no end.
+                # A file of another size need not be read; a forged one may have no end.
                 same_size = os.fstat(file.fileno()).st_size == self.size_bytes
                 if same_size and file_digest(file, "sha256").hexdigest() == self.sha256:
                     return ""

@@ -147,7 +147,7 @@ def _replaced(text: str, key: yaml.Node, value: yaml.Node, lines: str) -> str:
     colon = _COLON.match(text, key.end_mark.index)
     if colon is None:
         return ""
-    # What was said behind the value is kept behind the key.
+    # A comment after the value is kept after the key.
     return text[: key.end_mark.index] + ":" + rest_of_line[0].rstrip() + newline + lines + after
 
 

@@ -38,7 +38,7 @@ def view_rig(
     Raises
     ------
     Interrupted
-        When somebody stops it; the devices are then safe and the viewfinder is off.
+        On Ctrl-C; the devices are then safe and the viewfinder is off.
     UsageError
         If a file is malformed, the port is taken, or the rig has no live view.
     DeviceError
@@ -83,7 +83,7 @@ def hand_over(pictures: LivePictures, live_view: LiveView, clock: Clock) -> Neve
     Raises
     ------
     Interrupted
-        When somebody stops it.
+        On Ctrl-C.
     DeviceError
         If no picture arrives.
     """

@@ -109,8 +109,8 @@ def step_text(device: str, action: str) -> str:
 def _key(device: str, action: str) -> _Key:
     """Return the key by which a step of the plan is found for a journal line.
 
-    It holds of frames only the role, of choices only the question, of a person nothing more: the
-    exposures, the answers and the remarks are known after the plan was made.
+    The key of a frame has only its role, that of a choice its question, that of a person nothing:
+    exposures, answers and remarks are known after the plan was made.
     """
     if device == "camera":
         return device, action.partition(" frame")[0]

@@ -55,7 +55,7 @@ class Previews:
     def __init__(self, run: Path, width: int) -> None:
         self.latest: RenderedPreview | None = None
         # -P: nothing that lies in the working folder is taken for a module.
-        # Ctrl-C on a terminal goes to all of a group: this one ends when it is told to.
+        # Ctrl-C on a terminal goes to the whole group: this process ends in `close` only.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "labrig.watch.previews", str(run), str(width)],
             stdin=subprocess.PIPE,

@@ -214,7 +214,7 @@ def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -
     Raises
     ------
     Interrupted
-        When somebody stops it.
+        On Ctrl-C.
     UsageError
         If this is not a run folder, or the port is taken.
     DataError

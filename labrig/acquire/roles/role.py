@@ -22,7 +22,7 @@ class Finding:
     what
         The setting and its effect.
     remedy
-        What to change and where, such as the place in the menu; empty if nothing has to be changed.
+        Remedy with its place in the device's menu; empty if none is needed.
     """
 
     severity: Severity
