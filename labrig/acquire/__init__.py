@@ -1,4 +1,4 @@
-"""Devices by role, the rig file, protocols as units, the plan and the runner."""
+"""Device roles, rig files, protocols and their units, plans and the runner."""
 
 from labrig.acquire import roles
 from labrig.acquire.actions import LateAction, ManualStep, TimedAction, UndoManualStep, at

@@ -1,4 +1,4 @@
-"""What a protocol's unit can have done, and when in a sequence."""
+"""Actions of a protocol's units and their times in a sequence."""
 
 from dataclasses import dataclass
 
@@ -8,18 +8,18 @@ from labrig.quantity import duration_text
 
 @dataclass(frozen=True)
 class ManualStep:
-    """One thing to do by hand.
+    """One step to be done by hand.
 
     Attributes
     ----------
     what
-        As one says it to a person: `put filter 37 in`.
+        Instruction to the person, such as `put filter 37 in`.
     why
-        What depends on it.
-    takes_s
-        For the plan.
+        Reason for the step.
     task
-        The same for a changer, a sample changer or the simulated room's: `filter 37`.
+        Command for a changer that replaces the person, such as `filter 37`.
+    takes_s
+        Duration in seconds that is assumed in the plan.
     """
 
     what: str
@@ -29,7 +29,7 @@ class ManualStep:
 
 
 class UndoManualStep(Exception):  # noqa: N818, a wish and no error
-    """A person takes back what was done by hand last: its unit is done again."""
+    """Request of a person to undo the last step done by hand and to do its unit again."""
 
 
 Action = DeviceAction | Shoot
@@ -37,20 +37,56 @@ Action = DeviceAction | Shoot
 
 @dataclass(frozen=True)
 class TimedAction:
-    """An action and when it begins, in seconds after the start of its sequence."""
+    """An action with its time in a sequence.
+
+    Attributes
+    ----------
+    at_s
+        Begin of the action in seconds after the start of the sequence.
+    action
+        Action of a device, or photograph.
+    """
 
     at_s: float
     action: Action
 
 
 def at(at_s: float, action: Action) -> TimedAction:
-    """`action`, to begin `at_s` seconds after the start of the sequence."""
+    """Schedule an action within a sequence.
+
+    Parameters
+    ----------
+    at_s
+        Begin of the action in seconds after the start of the sequence.
+    action
+        Action of a device, or photograph.
+
+    Returns
+    -------
+    TimedAction
+        Action with its time, for `Session.run_sequence`.
+
+    Examples
+    --------
+    >>> from labrig.acquire import LAMP_OFF, LAMP_ON, at
+    >>> flash = [at(0.0, LAMP_ON), at(2.0, LAMP_OFF)]
+    >>> [(timed.at_s, str(timed.action)) for timed in flash]
+    [(0.0, 'on'), (2.0, 'off')]
+    """
     return TimedAction(at_s, action)
 
 
 @dataclass(frozen=True)
 class LateAction:
-    """An action that began later than its tolerance allows."""
+    """An action that began later than its tolerance allows.
+
+    Attributes
+    ----------
+    timed
+        The action with its planned time.
+    late_s
+        Delay in seconds.
+    """
 
     timed: TimedAction
     late_s: float

@@ -1,4 +1,4 @@
-"""How a driver reaches its device: one resolver from address to transport."""
+"""Connections from drivers to devices: one resolver from address to transport."""
 
 import socket
 from collections.abc import Callable
@@ -12,53 +12,56 @@ class SerialPort(Protocol):
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that can be read at once."""
+        """Number of bytes that can be read at once."""
 
     def read(self, size: int = 1, /) -> bytes:
-        """Up to `size` bytes that are there already."""
+        """Read up to `size` bytes that have been received."""
 
     def write(self, data: bytes, /) -> int | None:
         """Send all of `data`."""
 
     def close(self) -> None:
-        """Release the port."""
+        """Close the port."""
 
 
 class Connections(Protocol):
-    """Opens transports for drivers, real or simulated alike; one user an address."""
+    """Factory of transports to real and simulated devices; each address has one user."""
 
     @property
     def clock(self) -> Clock:
-        """The clock on which time-outs count."""
+        """Clock on which time-outs count."""
 
     def serial(self, address: str, baudrate: int) -> SerialPort:
-        """The serial port at `COM3`, `/dev/…` or `sim://room/device`, shared by its users.
+        """Return the serial port at `COM3`, `/dev/…` or `sim://room/device`, shared by its users.
 
         Raises
         ------
         DeviceError
-            There is no such port, or something else holds it.
+            If there is no such port, or another program holds it.
         """
 
     def usb(self, address: str, serial_of: Callable[[Any], str] | None = None) -> Any:
-        """The `usb.core.Device` at `usb://vid:pid[/serial]` or `sim://room/device`.
+        """Return the `usb.core.Device` at `usb://vid:pid[/serial]` or `sim://room/device`.
 
         Parameters
         ----------
+        address
+            Address in the rig file.
         serial_of
-            Asks a device for its serial number that tells none on the bus, and releases it again.
+            Function that queries the serial number of a device without one in its USB descriptor,
+            and releases the device again.
 
         Raises
         ------
         DeviceError
-            No such device, or access is refused.
+            If there is no such device, or access is refused.
         """
 
     def tcp(self, address: str, default_port: int) -> socket.socket:
-        """Another connection to the device at `scheme://host[:port]`, each time it is called.
+        """Open another connection to the device at `scheme://host[:port]`.
 
         Raises
         ------
         DeviceError
-            There is no such host, or nobody listens there.
+            If there is no such host, or it refuses the connection.
         """

@@ -1,4 +1,4 @@
-"""What every protocol is: a small YAML file as a frozen model, that says which units it takes."""
+"""Base of all protocols: a YAML file as a frozen model that lists its units."""
 
 from abc import abstractmethod
 from collections.abc import Collection, Mapping, Sequence
@@ -15,18 +15,18 @@ from labrig.region import Region
 
 
 class Unit(Protocol):
-    """Something that is done completely or did not happen: one charge-and-decay, one filter."""
+    """A part of a run that is either complete or repeated: one charge and decay, one filter."""
 
     @property
     def name(self) -> str:
-        """Unique within the protocol, the same at every run of it."""
+        """Name of the unit, unique within the protocol and the same in every run of it."""
 
     def run(self, session: Session) -> None:
-        """Do it. Ends by exception or complete."""
+        """Run the unit to its end, or raise an exception."""
 
 
 class Sample(BaseModel):
-    """What lies on the bench, for the record."""
+    """Description of the sample on the bench."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -42,9 +42,9 @@ class ProtocolModel(BaseModel):
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
-    #: Roles of the frames to whose glow rates are fitted: rates belong to their temperature.
+    #: Roles of the frames to which rates are fitted; the rates belong to their temperature.
     rate_frames: ClassVar[Collection[str]] = (FrameRole.DECAY,)
-    #: Calibrations on which this one's results rest.
+    #: Kinds of calibrations on which the results depend.
     rests_on: ClassVar[tuple[CalibrationKind[Any], ...]] = ()
 
     protocol: str
@@ -52,40 +52,48 @@ class ProtocolModel(BaseModel):
 
     @abstractmethod
     def units(self) -> Sequence[Unit]:
-        """All units in order, known before anything moves."""
+        """Return all units in order; they are determined before any device moves."""
 
     def patches_of(self, unit: str) -> Mapping[str, Region]:
-        """The regions of interest in the frames of one of its units, by name; most have none."""
+        """Return the regions of interest of a unit's frames by name; empty for most protocols."""
         patches: Mapping[str, Region] = getattr(self, "patches", {})
         return patches
 
     def suited_to(self, rig: RigFile) -> Self:
-        """The protocol with what it leaves to the rig file filled in; most leave nothing to it.
+        """Return the protocol with the values that it takes from the rig file; the base takes none.
 
         Raises
         ------
         UsageError
-            The rig file names what is not there.
+            If the rig file names a file or folder that does not exist.
         """
         return self
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
-        """Protocols on whose results this one's rest, of which the rig file names no run."""
+        """Return the protocols whose results this one needs and the rig file does not name."""
         return [kind.protocol for kind in self.rests_on if rig.optics.named(kind) is None]
 
 
 @dataclass(frozen=True)
 class PartUnit:
-    """A unit of a protocol that is the part called `part` of a chain."""
+    """A unit of a protocol that is one part of a chain.
+
+    Attributes
+    ----------
+    part
+        Name of the part.
+    unit
+        Unit within the part.
+    """
 
     part: str
     unit: Unit
 
     @property
     def name(self) -> str:
-        """`decay/decay-1`."""
+        """Name of the unit in the chain, such as `decay/decay-1`."""
         return unit_in(self.part, self.unit.name)
 
     def run(self, session: Session) -> None:
-        """Do it, seeing what its own part has photographed."""
+        """Run the unit in a session that shows only the frames of its own part."""
         self.unit.run(session.within(self.part))

@@ -1,4 +1,4 @@
-"""Lights read back while they are relied upon: somebody else may have switched them."""
+"""Read-back of lights during a run, since another program or person may have switched them."""
 
 from collections.abc import Iterable, Iterator
 from typing import cast
@@ -8,69 +8,99 @@ from labrig.acquire.roles import DARK, LIGHTS, ROLES, DeviceAction, Light
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 
-#: How often while something is waited for: with looks every 30 s about once a minute.
+#: Period of readings during waits; checked every 30 s, it is about a minute.
 READ_PERIOD_S = 50.0
 
 
 def lights_that_read_back(rig: Rig) -> dict[str, bool]:
-    """Key of every light → whether its board tells how it is."""
-    return {key: light.reads_back() for key, light in _lights(rig)}
-
-
-class LightReadback:
-    """Compares the lights with what a run has asked of them, where their boards tell.
+    """List the lights of a rig with whether their state can be read back.
 
     Parameters
     ----------
     rig
-        Whose lights were made safe, and are switched by nobody else from now on.
+        Open devices of a bench.
+
+    Returns
+    -------
+    dict of str to bool
+        Whether the state of the light is read from its board, by the light's key in the rig file.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.acquire import lights_that_read_back
+    >>> rig_file = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> with labrig.open_bench(rig_file, "rig.yaml") as bench:
+    ...     with bench.devices() as rig:
+    ...         print(lights_that_read_back(rig))
+    {'lamp': True}
+    """
+    return {key: light.reads_back() for key, light in _lights(rig)}
+
+
+class LightReadback:
+    """Comparison of the lights' states with those commanded, for boards that read back.
+
+    Parameters
+    ----------
+    rig
+        Rig whose lights are safe, and which nothing else switches from now on.
     """
 
     def __init__(self, rig: Rig) -> None:
         self._read_back = {
-            key: _OneLight(rig, key) for key, tells in lights_that_read_back(rig).items() if tells
+            key: _LightState(rig, key)
+            for key, reads_back in lights_that_read_back(rig).items()
+            if reads_back
         }
 
     @property
     def is_told(self) -> bool:
-        """Whether there is a light whose board tells."""
+        """Whether any light can be read back."""
         return bool(self._read_back)
 
     def asked(self, action: DeviceAction) -> None:
-        """It was begun just now."""
+        """Note an action that was begun just now."""
         if action.device in self._read_back:
             self._read_back[action.device].asked(str(action))
 
     def read_if_due(self) -> None:
-        """Read each whose last reading is long ago; as `read_before`."""
-        for light in self._read_back.values():
-            light.read_if_due()
-
-    def read_before(self, actions: Iterable[DeviceAction]) -> None:
-        """Read each that they will switch.
-
-        A charge that ends now was one only if nobody else has ended it already.
+        """Read every light whose last reading is `READ_PERIOD_S` or longer ago.
 
         Raises
         ------
         DeviceError
-            One is not as it was switched.
+            If a light is not in the state commanded.
+        """
+        for light in self._read_back.values():
+            light.read_if_due()
+
+    def read_before(self, actions: Iterable[DeviceAction]) -> None:
+        """Read the lights that the given actions will switch.
+
+        A charge that ends now is valid only if nothing else has switched the lamp off before.
+
+        Raises
+        ------
+        DeviceError
+            If a light is not in the state commanded.
         """
         for key in {action.device: None for action in actions}:
             if key in self._read_back:
                 self._read_back[key].read()
 
 
-class _OneLight:
+class _LightState:
     def __init__(self, rig: Rig, key: str) -> None:
         self._rig = rig
         self._role = ROLES[key]
-        self._asked = DARK
-        self._asked_s = self._read_s = rig.clock.now()
+        self._commanded = DARK
+        self._commanded_s = self._read_s = rig.clock.now()
 
     def asked(self, state: str) -> None:
-        self._asked = state
-        self._asked_s = self._read_s = self._rig.clock.now()
+        self._commanded = state
+        self._commanded_s = self._read_s = self._rig.clock.now()
 
     def read_if_due(self) -> None:
         if self._rig.clock.now() - self._read_s >= READ_PERIOD_S:
@@ -80,14 +110,14 @@ class _OneLight:
         assert self._role.state is not None, "it is a light"
         self._read_s = self._rig.clock.now()
         with device_errors(self._role.key):
-            found = self._role.state(self._rig[self._role])
-        if found == self._asked:
+            state = self._role.state(self._rig[self._role])
+        if state == self._commanded:
             return
         raise DeviceError(
-            f"the {self._role.name} was switched {self._asked} "
-            f"{duration_text(self._read_s - self._asked_s)} ago and reads {found}: something else "
-            "has switched it (another program on its port, or a hand); leave its board to labrig "
-            "while it measures"
+            f"the {self._role.name} was switched {self._commanded} "
+            f"{duration_text(self._read_s - self._commanded_s)} ago and reads {state}: something "
+            "else has switched it (another program on its port, or a hand); leave its board to "
+            "labrig while it measures"
         )
 
 

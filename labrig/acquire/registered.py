@@ -1,4 +1,4 @@
-"""Drivers as devices of a kind, and protocol files by the model that they name."""
+"""Loading of drivers and protocols by the names under which they are registered."""
 
 from pathlib import Path
 from typing import Any
@@ -11,12 +11,32 @@ from labrig.yaml_file import read_yaml, validate
 
 
 def load_driver(key: str, name: str, source: str) -> Any:
-    """The driver registered as `name`, for the device `key` of the rig file `source`.
+    """Load the driver class of a device.
+
+    Parameters
+    ----------
+    key
+        Key of the device in the rig file, such as `lamp`.
+    name
+        Name under which the driver is registered, such as `numato_relay`.
+    source
+        Name or path of the rig file, for messages.
+
+    Returns
+    -------
+    type
+        Class of the driver; it satisfies the Protocol of the role `key`.
 
     Raises
     ------
     UsageError
-        As of `load`; or it is the driver of a device of another kind.
+        If there is no such driver, if it cannot be imported, or if it is one for another role.
+
+    Examples
+    --------
+    >>> from labrig.acquire import load_driver
+    >>> load_driver("lamp", "numato_relay", "rig.yaml").__name__
+    'NumatoRelay'
     """
     driver, role = load(DRIVERS, name, source), ROLES[key]
     if not issubclass(driver, role.does):
@@ -28,12 +48,32 @@ def load_driver(key: str, name: str, source: str) -> Any:
 
 
 def read_protocol(path: Path) -> ProtocolModel:
-    """Read and check a protocol file by the model that its key `protocol` names.
+    """Read a protocol file and validate it with the model that its key `protocol` names.
+
+    Parameters
+    ----------
+    path
+        Protocol file in YAML.
+
+    Returns
+    -------
+    ProtocolModel
+        Model of the protocol, frozen.
 
     Raises
     ------
     UsageError
-        One line that names the file and the key.
+        If the file cannot be read, or a key is missing, unknown or invalid; the message names both.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> protocol = labrig.read_protocol(Path("runs/decay/protocol.yaml"))
+    >>> protocol.protocol, protocol.charge, protocol.camera.iso
+    ('decay', 600.0, 400)
+    >>> [unit.name for unit in protocol.units()]
+    ['dark', 'meter', 'decay-1']
     """
     content = read_yaml(path)
     kind = content.get("protocol")

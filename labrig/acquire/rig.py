@@ -1,4 +1,4 @@
-"""The devices of one bench, open, with the clock they share."""
+"""The open devices of one bench and the clock that they share."""
 
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import contextmanager
@@ -15,25 +15,25 @@ from labrig.errors import (
     UnclearAnswerError,
 )
 
-#: For so long a device is told again that does not confirm what it was told.
+#: Time for which a command that a device does not confirm is repeated.
 PATIENCE_S = 30.0
-#: Between two rounds of telling: at first, and at most.
+#: First and longest pause between two rounds of commands.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.1, 2.0
 
 
 class Rig:
-    """Open devices by their key in the rig file.
+    """Open devices by their keys in the rig file.
 
     Parameters
     ----------
     name
-        As in the rig file.
+        Name of the rig.
     clock
-        The clock all devices wait on.
+        Clock on which all devices wait.
     devices
-        Key → open device, each filling the role its key names.
+        Open devices by key, each with the role of that key.
     warm_up_s
-        Key → seconds the device needs from switching on until it is steady.
+        Warm-up times in seconds from switching on until a device is steady, by key.
     """
 
     def __init__(
@@ -50,12 +50,12 @@ class Rig:
         self.connected_s = clock.now()
 
     def __getitem__(self, role: Role[DeviceT]) -> DeviceT:
-        """The device that fills the role.
+        """Return the device with a role.
 
         Raises
         ------
         ProtocolError
-            The rig has none.
+            If the rig has no such device.
         """
         return cast(DeviceT, self.device(role.key))
 
@@ -63,7 +63,13 @@ class Rig:
         return role.key in self.devices
 
     def device(self, key: str) -> Device:
-        """As by its role."""
+        """Return the device with a key.
+
+        Raises
+        ------
+        ProtocolError
+            If the rig has no such device.
+        """
         if key not in self.devices:
             raise ProtocolError(
                 f"the protocol needs a {ROLES[key].name}, the rig '{self.name}' has none "
@@ -72,22 +78,29 @@ class Rig:
         return self.devices[key]
 
     def warm_up_s(self, key: str) -> float:
-        """Seconds that device needs to become steady; 0 where the rig file says nothing."""
+        """Return the warm-up time of a device in seconds; 0 if the rig file gives none."""
         return self._warm_up_s.get(key, 0.0)
 
     def identities(self) -> dict[str, str]:
-        """Key → what each device says it is."""
+        """Return the identity that each device reports, by key."""
         return {key: device.identity() for key, device in self.devices.items()}
 
     def connect(self, key: str, open_device: Callable[[], Device]) -> None:
         """Open a device and bring it to its safe state.
 
+        Parameters
+        ----------
+        key
+            Key of the device.
+        open_device
+            Function that opens the device.
+
         Raises
         ------
         DeviceError
-            It cannot be opened, or does not answer clearly for `PATIENCE_S`.
+            If the device cannot be opened, or gives no clear answer within `PATIENCE_S`.
         UsageError
-            The rig file asks for something that it is not, or does not know.
+            If a setting of the rig file does not fit the device.
         """
 
         def step() -> None:
@@ -102,18 +115,18 @@ class Rig:
                 raise failures[key]
 
     def make_safe(self) -> None:
-        """Lights off, door closed: every device is tried, whatever the others answered.
+        """Bring every device to its safe state, whatever the others answer.
 
-        Lights first: a door that closes turns its sample to the lamp. A device that does not
-        confirm is told again, for up to `PATIENCE_S`; one that is gone is not, since only
-        connecting again helps.
+        Lights come first: a door that closes turns its sample to the lamp. A device that does not
+        confirm its state is commanded again for up to `PATIENCE_S`; a device that is gone is not,
+        since only connecting again can help.
 
         Raises
         ------
         DeviceError
-            Some device could not confirm its safe state; names all of them.
+            If devices could not confirm their safe state; the message names all of them.
         DeviceLostError
-            All of those are gone or do not answer clearly, and may come back.
+            If all of those are gone or do not answer clearly, and may come back.
         """
         with self.clock.shielded():
             failures = require(
@@ -123,18 +136,18 @@ class Rig:
             )
         if failures:
             lost = all(isinstance(error, DeviceLostError) for error in failures.values())
-            said = [
+            messages = [
                 f"{key}: {error if isinstance(error, LabrigError) else repr(error)}"
                 for key, error in failures.items()
             ]
             refusal = (DeviceLostError if lost else DeviceError)(
-                f"the safe state is not confirmed; switch off by hand: {'; '.join(said)}"
+                f"the safe state is not confirmed; switch off by hand: {'; '.join(messages)}"
             )
             refusal.unsafe = tuple(failures)
             raise refusal
 
     def disconnect(self) -> None:
-        """Release every device."""
+        """Disconnect every device."""
         with self.clock.shielded():
             for device in self.devices.values():
                 device.disconnect()
@@ -142,7 +155,7 @@ class Rig:
 
 @contextmanager
 def device_errors(key: str) -> Iterator[None]:
-    """Whatever a driver raises, its own faults included, names the device and ends the run."""
+    """Turn any exception of a driver, its own faults included, into a `DeviceError`."""
     try:
         yield
     except LabrigError:
@@ -156,32 +169,39 @@ def require(
     steps: Mapping[str, Callable[[], None]],
     unless: Callable[[Exception], bool],
 ) -> dict[str, Exception]:
-    """Go round until every step has succeeded once, for up to `PATIENCE_S`; what failed to the end.
+    """Repeat steps until each has succeeded once, for up to `PATIENCE_S`.
 
-    No step waits for another one's patience to be over.
+    The steps take turns, so that none waits until the time of another is over.
 
     Parameters
     ----------
+    clock
+        Clock on which the pauses are waited.
     steps
-        Key → what is to be done, in this order in every round.
+        Steps by key, in their order in every round.
     unless
-        Whether after this failure there is no use in trying that step again.
+        Whether repeating a step is useless after this failure.
+
+    Returns
+    -------
+    dict of str to Exception
+        Last failures of the steps that did not succeed, by key.
     """
     failures: dict[str, Exception] = {}
-    left = dict(steps)
+    pending = dict(steps)
     deadline_s, pause_s = clock.now() + PATIENCE_S, FIRST_PAUSE_S
     while True:
-        for key, step in list(left.items()):
+        for key, step in list(pending.items()):
             try:
                 step()
             except Exception as error:
                 failures[key] = error
                 if unless(error):
-                    del left[key]
+                    del pending[key]
             else:
                 failures.pop(key, None)
-                del left[key]
-        if not left or clock.now() >= deadline_s:
+                del pending[key]
+        if not pending or clock.now() >= deadline_s:
             return failures
         clock.sleep(pause_s)
         pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
@@ -192,6 +212,25 @@ def _is_gone(error: Exception) -> bool:
 
 
 def in_safe_order(keys: Iterable[str]) -> list[str]:
-    """Keys of devices, those first that have to be safe before the others move."""
+    """Sort devices in the order in which they are made safe.
+
+    Lights come first: a door that closes turns its sample to the lamp.
+
+    Parameters
+    ----------
+    keys
+        Keys of the devices in the rig file.
+
+    Returns
+    -------
+    list of str
+        Keys in that order; devices without a prescribed place come last, as given.
+
+    Examples
+    --------
+    >>> from labrig.acquire import in_safe_order
+    >>> in_safe_order(["camera", "door", "lamp"])
+    ['lamp', 'door', 'camera']
+    """
     order = [key for key, role in ROLES.items() if role.safe_first]
     return sorted(keys, key=lambda key: order.index(key) if key in order else len(order))

@@ -1,4 +1,4 @@
-"""The rig file: which driver at which address, and how long each device takes to warm up."""
+"""The rig file: driver, address and warm-up time of each device, and the optics of the bench."""
 
 import os
 from pathlib import Path
@@ -17,7 +17,7 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
 class DeviceEntry(BaseModel):
-    """One device; further keys are its driver's own and checked by the driver's model."""
+    """One device; further keys belong to its driver and are validated by the driver's model."""
 
     model_config = ConfigDict(frozen=True, extra="allow")
 
@@ -26,12 +26,12 @@ class DeviceEntry(BaseModel):
     warm_up: DurationS = 0.0
 
     def settings(self) -> dict[str, Any]:
-        """The driver's own keys."""
+        """Return the keys that belong to the driver."""
         return dict(self.__pydantic_extra__ or {})
 
 
 def _with_calibrations(model: type[ModelT]) -> type[ModelT]:
-    """The model with a key for each kind of calibration."""
+    """Return the model with a key for each kind of calibration."""
     keys: dict[str, Any] = {
         kind.optics_key: (
             str | None,
@@ -44,14 +44,14 @@ def _with_calibrations(model: type[ModelT]) -> type[ModelT]:
 
 @_with_calibrations
 class Optics(BaseModel):
-    """What is known of this bench; beside its curves its calibrations, see `CalibrationKind`.
+    """Measured curves and calibrations of the bench; see `CalibrationKind` for the latter.
 
     Attributes
     ----------
     camera, lamp, grey_card
-        Measured curves: names of shipped files or paths.
+        Measured curves, by names of shipped files or paths.
     filters
-        Folder of the colour filters' transmittances, a file each.
+        Folder of the colour filters' transmittances, with one file each.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -62,31 +62,33 @@ class Optics(BaseModel):
     filters: str | None = None
 
     def filter_files(self) -> dict[str, Path]:
-        """Name → transmittance of every colour filter: in the rig's own folder, else the resources.
+        """Return the files of the colour filters' transmittances by name.
+
+        They are in the rig's own folder if it names one, else in the shipped one.
 
         Raises
         ------
         UsageError
-            The folder has none.
+            If the folder has no such file.
         """
-        shipped_ones = resources.folder("config/optics/filters")
-        folder = shipped_ones if self.filters is None else Path(self.filters)
-        found = {path.stem: path for path in sorted(folder.glob("*.csv"))}
-        if not found:
+        shipped = resources.folder("config/optics/filters")
+        folder = shipped if self.filters is None else Path(self.filters)
+        files = {path.stem: path for path in sorted(folder.glob("*.csv"))}
+        if not files:
             raise UsageError(
                 f"{folder}: expected a table NAME.csv for every colour filter, found none; see "
-                f"{shipped_ones} for what one looks like, and 'filters' under 'optics:'"
+                f"{shipped} for what one looks like, and 'filters' under 'optics:'"
             )
-        return found
+        return files
 
     def named(self, kind: CalibrationKind[Any]) -> str | None:
-        """What is named as a calibration of that kind: its file, or the folder of its run."""
-        named: str | None = getattr(self, kind.optics_key)
-        return named
+        """Return the file or run folder named as a calibration of a kind; None if there is none."""
+        name: str | None = getattr(self, kind.optics_key)
+        return name
 
 
 class RigFile(BaseModel):
-    """A rig file as written."""
+    """Content of a rig file."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -102,16 +104,37 @@ class RigFile(BaseModel):
 
 
 def read_rig_file(path: Path) -> RigFile:
-    """Read and check a rig file, all but its drivers' own keys.
+    """Read and validate a rig file, except the keys that belong to its drivers.
 
-    Files beside it are named by absolute paths in what is returned, so that it can be copied.
+    Files that it names relative to its own folder have absolute paths in the result, so that the
+    result can be written elsewhere.
+
+    Parameters
+    ----------
+    path
+        Rig file in YAML.
+
+    Returns
+    -------
+    RigFile
+        Devices, optics and, for a simulated rig, the simulated room.
 
     Raises
     ------
     UsageError
-        One line that names the file and the key.
+        If the file cannot be read, or a key is missing, unknown or invalid; the message names both.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> rig = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> rig.name
+    'simulated dark room with LVF'
+    >>> rig.devices["lamp"].driver, rig.optics.camera
+    ('numato_relay', 'canon_eos_5d_mark_ii')
     """
-    rig = validate(_anchored(read_yaml(path), path.resolve().parent), RigFile, str(path))
+    rig = validate(_with_absolute_paths(read_yaml(path), path.resolve().parent), RigFile, str(path))
     for key in rig.devices:
         if key not in ROLES:
             raise UsageError(
@@ -120,16 +143,16 @@ def read_rig_file(path: Path) -> RigFile:
     return rig
 
 
-def _anchored(value: Any, folder: Path) -> Any:
+def _with_absolute_paths(value: Any, folder: Path) -> Any:
     if isinstance(value, dict):
-        return {key: _anchored(inner, folder) for key, inner in value.items()}
+        return {key: _with_absolute_paths(inner, folder) for key, inner in value.items()}
     if isinstance(value, list):
-        return [_anchored(inner, folder) for inner in value]
+        return [_with_absolute_paths(inner, folder) for inner in value]
     if isinstance(value, str) and _looks_like_a_path(value) and (folder / value).exists():
         return str(folder / value)
     return value
 
 
 def _looks_like_a_path(value: str) -> bool:
-    """A bare word is a shipped name, whatever lies beside the file."""
+    """Whether `value` is a path; a bare word is a shipped name, whatever files exist."""
     return bool(Path(value).suffix) or "/" in value or os.sep in value

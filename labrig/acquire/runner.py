@@ -1,4 +1,4 @@
-"""The runner: unit after unit onto the bench and into the run folder."""
+"""The runner: performs the units of a protocol and records them in the run folder."""
 
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any, Protocol, TypeVar
@@ -24,13 +24,23 @@ T = TypeVar("T")
 
 
 class RunObserver(Observer, Protocol):
-    """Is also told of units."""
+    """Observer of a run, its units included."""
 
     def unit(self, name: str, number: int, total: int) -> None:
-        """A unit begins."""
+        """Note that a unit begins.
+
+        Parameters
+        ----------
+        name
+            Name of the unit.
+        number
+            Number of the unit, from 1.
+        total
+            Number of units.
+        """
 
     def frame(self, record: FrameRecord) -> None:
-        """A frame was kept."""
+        """Note that a frame was recorded."""
 
 
 def run_units(
@@ -40,29 +50,71 @@ def run_units(
     observer: RunObserver,
     metadata: Mapping[str, Any],
 ) -> None:
-    """Do all units that are not complete in `folder`, in order.
+    """Run all units that are not complete in a run folder, in order.
 
-    A unit that ends by an exception leaves its attempt open: the caller first reaches the safe
-    state, then closes the attempt with `RunFolder.close_open_attempts`. Where a person takes back
-    what was done by hand last, its unit counts no longer and is done again. The temperature is
-    read at both ends of a unit, and while it waits; lights are read back while it waits.
+    Parameters
+    ----------
+    units
+        Units of the protocol.
+    rig
+        Open devices of the bench.
+    folder
+        Run folder, open for writing.
+    observer
+        Observer of units, frames and waits.
+    metadata
+        Keys and values of the RunStart of every attempt, such as the plan and the versions.
 
     Raises
     ------
     Slept
-        The PC slept in a unit.
+        If the PC was suspended during a unit.
+
+    Notes
+    -----
+    A unit that ends by an exception leaves its attempt open: the caller first reaches the safe
+    state, then closes the attempt with `RunFolder.close_open_attempts`. Where a person undoes the
+    last step done by hand, the unit of that step no longer counts and is done again. The
+    temperature is read at begin and end of a unit and while it waits; lights are read back while it
+    waits.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.acquire import LAMP_OFF, LAMP_ON, at, run_units
+    >>> from labrig.record import RunFolder
+    >>> class Flash:
+    ...     name = "flash"
+    ...     def run(self, session):
+    ...         session.run_sequence([at(0.0, LAMP_ON), at(2.0, LAMP_OFF)])
+    >>> class Silent:
+    ...     def unit(self, name, number, total): pass
+    ...     def frame(self, record): pass
+    ...     def doing(self, what, until_s=None): pass
+    ...     def warn(self, text): pass
+    ...     def ask(self, step, last, meanwhile): return ""
+    >>> rig_file = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> with (
+    ...     labrig.open_bench(rig_file, "rig.yaml") as bench,
+    ...     bench.devices() as rig,
+    ...     RunFolder.create(Path("trials"), "flash", bench.clock.wall(), {}, bench.seed) as folder,
+    ... ):
+    ...     run_units([Flash()], rig, folder, Silent(), {})
+    ...     [str(action.action) for action in folder.read().completed()["flash"].actions]
+    ['on', 'off']
     """
     temperature = TemperatureLog(rig, observer.warn)
     while True:
         try:
-            _run_what_is_left(units, rig, folder, observer, metadata, temperature)
+            _run_remaining_units(units, rig, folder, observer, metadata, temperature)
         except UndoManualStep:
             rig.make_safe()
         else:
             return
 
 
-def _run_what_is_left(
+def _run_remaining_units(
     units: Sequence[Unit],
     rig: Rig,
     folder: RunFolder,
@@ -71,12 +123,12 @@ def _run_what_is_left(
     temperature: TemperatureLog,
 ) -> None:
     record = folder.read()
-    done = record.completed()
-    frames = [frame for attempt in done.values() for frame in attempt.frames]
-    actions = [action for attempt in done.values() for action in attempt.actions]
+    completed = record.completed()
+    frames = [frame for attempt in completed.values() for frame in attempt.frames]
+    actions = [action for attempt in completed.values() for action in attempt.actions]
     lights = LightReadback(rig)
     for number, unit in enumerate(units, start=1):
-        if unit.name in done:
+        if unit.name in completed:
             continue
         observer.unit(unit.name, number, len(units))
         writer = folder.attempt(unit.name, rig.clock.wall, metadata)
@@ -91,25 +143,25 @@ def _run_what_is_left(
             recorder.take_back()
             raise
         writer.stop("success")
-        frames, actions = recorder.kept, recorder.done
+        frames, actions = recorder.kept_frames, recorder.kept_actions
 
 
 class _Recorder:
-    """Turns the rig's times into wall times and passes all on to the attempt; tells of frames."""
+    """Recorder that converts the rig's times to wall times and writes to the attempt."""
 
     def __init__(
         self,
         clock: Clock,
         writer: AttemptWriter,
-        kept: Sequence[FrameRecord],
-        done: Sequence[ActionRecord],
+        frames: Sequence[FrameRecord],
+        actions: Sequence[ActionRecord],
         observer: RunObserver,
     ) -> None:
         self._clock = clock
         self._writer = writer
         self._observer = observer
-        self.kept = list(kept)
-        self.done = list(done)
+        self.kept_frames = list(frames)
+        self.kept_actions = list(actions)
 
     def acted(
         self,
@@ -123,7 +175,7 @@ class _Recorder:
         wall, unit = self._clock.wall, self._writer.unit
         record = ActionRecord(unit, device, action, wall(start_s), wall(end_s), late_s, task)
         self._writer.action(record)
-        self.done.append(record)
+        self.kept_actions.append(record)
 
     def temperature(self, celsius: float, at_s: float) -> None:
         self._writer.temperature(
@@ -135,7 +187,7 @@ class _Recorder:
         return None if last is None else last.action
 
     def take_back(self) -> None:
-        """The unit of what was done by hand last does not count; this attempt ends."""
+        """Record that the unit of the last manual step no longer counts, and abort this attempt."""
         last, now_s = self._last_manual_step(), self._clock.now()
         assert last is not None, "only what was done is taken back"
         self.acted(TAKEN_BACK, last.unit, now_s, now_s, 0.0)
@@ -153,17 +205,17 @@ class _Recorder:
             end_time=self._clock.wall(frame.end_s),
             late_s=late_s,
         )
-        self.kept.append(record)
+        self.kept_frames.append(record)
         self._observer.frame(record)
 
     def frames(self, role: str) -> Sequence[FrameRecord]:
-        return [frame for frame in self.kept if frame.role == role]
+        return [frame for frame in self.kept_frames if frame.role == role]
 
     def actions(self, device: str) -> Sequence[ActionRecord]:
-        return [action for action in self.done if action.device == device]
+        return [action for action in self.kept_actions if action.device == device]
 
     def choose(self, what: str, decide: Callable[[], T], worst: T) -> T:
         return decide()
 
     def _last_manual_step(self) -> ActionRecord | None:
-        return next((action for action in reversed(self.done) if action.is_manual), None)
+        return next((action for action in reversed(self.kept_actions) if action.is_manual), None)

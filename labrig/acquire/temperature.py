@@ -1,4 +1,4 @@
-"""The rig's thermometer, read now and then: it holds nothing up and ends no run."""
+"""Log of the rig's thermometer, which delays no action and ends no run."""
 
 import math
 from collections.abc import Callable
@@ -7,22 +7,29 @@ from labrig.acquire.rig import Rig, device_errors
 from labrig.acquire.roles import THERMOMETER
 from labrig.errors import DeviceError
 
-#: How often while something is waited for; rooms change in ten minutes.
+#: Period of readings during waits; rooms change within ten minutes.
 READ_PERIOD_S = 60.0
 
-#: What becomes of a reading: degrees Celsius, and when on the rig's clock.
+#: Receiver of a reading: degrees Celsius, and time on the rig's clock in seconds.
 Keep = Callable[[float, float], None]
 
 
 class TemperatureLog:
-    """Reads the thermometer, if the rig has one.
+    """Reader of the rig's thermometer, if it has one.
 
-    One that fails is told of once, and read again when the next reading is due.
+    A failure gives one warning; the thermometer is read again when the next reading is due.
 
     Parameters
     ----------
+    rig
+        Open devices of the bench.
     warn
-        Tells a person.
+        Function that shows a warning to a person.
+
+    Attributes
+    ----------
+    is_kept
+        Whether the rig has a thermometer.
     """
 
     def __init__(self, rig: Rig, warn: Callable[[str], None]) -> None:
@@ -33,7 +40,7 @@ class TemperatureLog:
         self._read_s = -math.inf
 
     def read(self, keep: Keep) -> None:
-        """Read now."""
+        """Read the thermometer now and pass the reading to `keep`."""
         if not self.is_kept:
             return
         self._read_s = start_s = self._rig.clock.now()
@@ -48,6 +55,6 @@ class TemperatureLog:
         keep(celsius, (start_s + self._rig.clock.now()) / 2)
 
     def read_if_due(self, keep: Keep) -> None:
-        """Read if the last reading is long ago."""
+        """Read the thermometer if the last reading is `READ_PERIOD_S` or longer ago."""
         if self._rig.clock.now() - self._read_s >= READ_PERIOD_S:
             self.read(keep)

@@ -1,4 +1,4 @@
-"""What passes between protocols, drivers and the recorder."""
+"""Values exchanged by protocols, drivers and the recorder."""
 
 import math
 from dataclasses import dataclass
@@ -9,16 +9,16 @@ from labrig.quantity import duration_text
 
 @dataclass(frozen=True)
 class ExposureSettings:
-    """How a photograph is taken.
+    """Settings of a photograph.
 
     Attributes
     ----------
     exposure_s
-        Shutter time in seconds; a camera reports the true one, not the label on its dial.
+        Exposure time in seconds: the actual one, not the nominal one on the camera's dial.
     iso
         Sensitivity, ISO 12232.
     f_number
-        Aperture; `None` for a camera that cannot set or tell it.
+        Aperture; None for a camera that cannot set or report it.
     """
 
     exposure_s: float
@@ -37,20 +37,20 @@ class ExposureSettings:
 
 @dataclass(frozen=True)
 class CameraOffers:
-    """What a camera can be set to, each ascending, and what a frame costs.
+    """Settings that a camera offers, each in ascending order, and the cost of a frame.
 
     Attributes
     ----------
     exposures_s
-        True shutter times in seconds.
+        Actual exposure times in seconds.
     isos
-        Sensitivities.
+        Sensitivities, ISO 12232.
     f_numbers
-        Apertures; empty where the camera cannot set them (a manual lens).
+        Apertures; empty if the camera cannot set them (manual lens).
     overhead_s
-        Seconds from the end of an exposure until the next can begin: readout and transfer.
+        Time in seconds from the end of an exposure until the next can begin: readout and transfer.
     frame_bytes
-        Typical size of a frame.
+        Typical size of a frame in bytes.
     """
 
     exposures_s: tuple[float, ...]
@@ -60,12 +60,12 @@ class CameraOffers:
     frame_bytes: int = 0
 
     def exposure_near(self, exposure_s: float) -> float:
-        """The offered shutter time that is meant by `exposure_s`, such as 1/64 s by 1/60 s.
+        """Return the offered exposure time nearest to `exposure_s`, such as 1/64 s for 1/60 s.
 
         Raises
         ------
         ProtocolError
-            None is within a sixth of a stop.
+            If none is within a sixth of a stop.
         """
         near_s = min(self.exposures_s, key=lambda offered: abs(math.log(offered / exposure_s)))
         if abs(math.log2(near_s / exposure_s)) > 1 / 6:
@@ -77,17 +77,17 @@ class CameraOffers:
         return near_s
 
     def exposure_at_most(self, limit_s: float) -> float:
-        """Longest offered shutter time ≤ `limit_s` seconds, else the shortest there is."""
+        """Return the longest offered exposure time ≤ `limit_s` seconds, else the shortest one."""
         below = [offered for offered in self.exposures_s if offered <= limit_s * 1.0001]
         return max(below, default=self.exposures_s[0])
 
     def check(self, settings: ExposureSettings) -> None:
-        """Refuse `settings` that are not on offer.
+        """Refuse settings that are not offered.
 
         Raises
         ------
         ProtocolError
-            Says what is offered instead.
+            If they are not; the message names what is offered.
         """
         if settings.iso not in self.isos:
             raise ProtocolError(
@@ -95,9 +95,9 @@ class CameraOffers:
                 f"{', '.join(map(str, self.isos))}"
             )
         if self.f_numbers and settings.f_number not in self.f_numbers:
-            asked = "no aperture" if settings.f_number is None else f"f/{settings.f_number:g}"
+            requested = "no aperture" if settings.f_number is None else f"f/{settings.f_number:g}"
             raise ProtocolError(
-                f"the camera cannot be set to {asked}; choose 'f_number:' among "
+                f"the camera cannot be set to {requested}; choose 'f_number:' among "
                 f"{', '.join(f'{offered:g}' for offered in self.f_numbers)}"
             )
         self.exposure_near(settings.exposure_s)
@@ -110,13 +110,13 @@ class Frame:
     Attributes
     ----------
     data
-        The file's bytes, untouched.
+        Bytes of the file, unchanged.
     suffix
-        Lower-case extension with its dot, such as `.cr2`.
+        File extension in lower case with its dot, such as `.cr2`.
     start_s, end_s
-        Measured begin and end of the exposure on the injected clock.
+        Measured begin and end of the exposure on the rig's clock in seconds.
     settings
-        As read back from the camera.
+        Settings read back from the camera.
     """
 
     data: bytes

@@ -1,4 +1,4 @@
-"""All runs in a folder: which there are, what came out, what changed from day to day."""
+"""Catalogue of the runs in a folder: their states, their results, and changes between them."""
 
 from labrig.catalogue.compare import Comparison, Difference, PatchComparison, compare_runs
 from labrig.catalogue.listing import (

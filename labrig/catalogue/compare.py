@@ -1,4 +1,4 @@
-"""The same sample on two days: do the numbers agree within what each is certain of?"""
+"""Comparison of two runs of the same sample within their uncertainties."""
 
 import math
 from collections.abc import Mapping
@@ -13,16 +13,26 @@ from labrig.errors import DataError
 from labrig.results import FittedDecay, Measured, read_fitted_decays
 from labrig.yaml_file import read_yaml
 
-#: Chance alone makes two equal sets of numbers differ so much less often than this.
+#: Significance level below which rates differ.
 DIFFERENT_P = 0.01
 NO_GAIN = Measured(1.0, 0.0)
-#: Less than this is not told apart.
+#: Smallest p-value that is reported as a number.
 LEAST_P = 1e-9
 
 
 @dataclass(frozen=True)
 class Difference:
-    """One quantity in both runs; `pull` is the difference B − A in σ of that difference."""
+    """One quantity in two runs.
+
+    Attributes
+    ----------
+    quantity
+        Name of the quantity.
+    unit
+        Unit of the quantity.
+    a, b
+        Values with σ in runs A and B.
+    """
 
     quantity: str
     unit: str
@@ -31,22 +41,26 @@ class Difference:
 
     @property
     def pull(self) -> float:
-        """NaN where nothing is known of the σ."""
+        """Difference B − A in units of its σ; NaN if σ is not known."""
         return self.b.sigmas_from(self.a)
 
 
 @dataclass(frozen=True)
 class PatchComparison:
-    """One patch in both runs.
+    """One patch in two runs.
 
     Attributes
     ----------
+    patch
+        Name of the patch.
+    states
+        Numbers of states in runs A and B.
     differences
-        State by state; empty where the numbers of states differ.
+        Differences of the parameters state by state; empty if the numbers of states differ.
     p_value
-        Probability that equal rates come out as different as these; NaN if they cannot be told.
+        Probability that equal rates differ at least as much as these; NaN if it is not known.
     gain
-        What amplitudes of B were multiplied by, as the reference tells; 1 without one.
+        Factor by which the amplitudes of run B were multiplied; 1 without a reference.
     """
 
     patch: str
@@ -57,7 +71,7 @@ class PatchComparison:
 
     @property
     def assessment(self) -> str:
-        """In words."""
+        """Assessment of the differences as text."""
         if self.states[0] != self.states[1]:
             return f"{self.states[0]} and {self.states[1]} states: fit both with the same --states"
         if math.isnan(self.p_value):
@@ -69,14 +83,16 @@ class PatchComparison:
 
 @dataclass(frozen=True)
 class Comparison:
-    """Two runs held against each other.
+    """Comparison of two runs.
 
     Attributes
     ----------
     asked
-        Keys of the protocol that differ, with both values.
+        Keys of the protocol that differ, each with both values.
+    patches
+        Comparisons of the patches fitted in both runs.
     missing
-        Patches that were fitted in only one of the runs.
+        Patches fitted in only one of the runs.
     """
 
     asked: tuple[tuple[str, Any, Any], ...]
@@ -85,63 +101,88 @@ class Comparison:
 
 
 def compare_runs(a: Path, b: Path, reference: str | None = None) -> Comparison:
-    """The latest results of two runs.
+    """Compare the latest results of two runs of the same sample.
 
     Parameters
     ----------
+    a
+        Folder of the first run.
+    b
+        Folder of the second run.
     reference
-        Patch with a source that is the same on both days, steady or decaying; it ties the days
-        together: the amplitudes of B are scaled by what it lost or gained.
+        Patch with a source that is the same in both runs, steady or decaying. The amplitudes of run
+        B are scaled by the ratio of its signals.
+
+    Returns
+    -------
+    Comparison
+        Differences of rates and amplitudes by patch in units of their σ, and of the protocols.
 
     Raises
     ------
     DataError
-        One of them has no result.
+        If one of the runs has no result.
     UsageError
-        There is no such reference in both.
+        If the reference is not a patch of both runs.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import compare_runs
+    >>> comparison = compare_runs(Path("runs/decay"), Path("runs/decay"))
+    >>> comparison.patches[0].assessment
+    'the rates agree (p = 1)'
+    >>> [difference.quantity for difference in comparison.patches[0].differences]
+    ['k_r 1', 'k_r 2', 'a 1', 'a 2']
     """
     protocols = read_yaml(a / "protocol.yaml"), read_yaml(b / "protocol.yaml")
-    of_a, of_b = (_results(run, protocol) for run, protocol in zip((a, b), protocols, strict=True))
-    if len(of_a) == len(of_b) == 1:  # the one patch, whatever it is called
-        of_b = dict(zip(of_a, of_b.values(), strict=True))
-    shared = [name for name in of_a if name in of_b and name != reference]
+    results_a, results_b = (
+        _results(run, protocol) for run, protocol in zip((a, b), protocols, strict=True)
+    )
+    if len(results_a) == len(results_b) == 1:  # the one patch, whatever it is called
+        results_b = dict(zip(results_a, results_b.values(), strict=True))
+    shared = [name for name in results_a if name in results_b and name != reference]
     gains = {
-        name: NO_GAIN if reference is None else gain(a, b, reference, of_a[name].brightest_channel)
+        name: NO_GAIN
+        if reference is None
+        else gain(a, b, reference, results_a[name].brightest_channel)
         for name in shared
     }
     return Comparison(
         asked=tuple(
             (key, *values)
             for key, *values in _differing(*protocols)
-            # said as `missing`, in fewer words
+            # listed in `missing`
             if not (key.startswith("patches.") and None in values)
         ),
-        patches=tuple(_compare(name, of_a[name], of_b[name], gains[name]) for name in shared),
-        missing=tuple(sorted(set(of_a) ^ set(of_b))),
+        patches=tuple(
+            _compare(name, results_a[name], results_b[name], gains[name]) for name in shared
+        ),
+        missing=tuple(sorted(set(results_a) ^ set(results_b))),
     )
 
 
-def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_of_b: Measured) -> PatchComparison:
+def _compare(name: str, a: FittedDecay, b: FittedDecay, gain_b: Measured) -> PatchComparison:
     counts = len(a.rates), len(b.rates)
     if counts[0] != counts[1]:
-        return PatchComparison(name, counts, (), math.nan, gain_of_b)
+        return PatchComparison(name, counts, (), math.nan, gain_b)
     rates = [
-        Difference(f"k_r {number}", "1/s", of_a, of_b)
-        for number, (of_a, of_b) in enumerate(zip(a.rates, b.rates, strict=True), start=1)
+        Difference(f"k_r {number}", "1/s", value_a, value_b)
+        for number, (value_a, value_b) in enumerate(zip(a.rates, b.rates, strict=True), start=1)
     ]
     channel = a.brightest_channel
     pairs = zip(a.amplitudes_in(channel), b.amplitudes_in(channel), strict=True)
     amplitudes = [
-        Difference(f"a {number}", f"DN/s of channel {channel}", of_a, of_b.times(gain_of_b))
-        for number, (of_a, of_b) in enumerate(pairs, start=1)
+        Difference(f"a {number}", f"DN/s of channel {channel}", value_a, value_b.times(gain_b))
+        for number, (value_a, value_b) in enumerate(pairs, start=1)
     ]
     chi2 = sum(difference.pull**2 for difference in rates)
     p_value = float(stats.chi2.sf(chi2, len(rates)))
-    return PatchComparison(name, counts, (*rates, *amplitudes), p_value, gain_of_b)
+    return PatchComparison(name, counts, (*rates, *amplitudes), p_value, gain_b)
 
 
 def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, FittedDecay]:
-    """By the name of the patch, also where there is only one."""
+    """Return the fits of a run by patch, also where it has one patch only."""
     only = next(iter(protocol.get("patches") or ["sample"]))
     read = read_fitted_decays(run / "result")
     results = {name or only: result for name, result in read.items()}
@@ -153,11 +194,11 @@ def _results(run: Path, protocol: Mapping[str, Any]) -> dict[str, FittedDecay]:
 def _differing(
     a: Mapping[str, Any], b: Mapping[str, Any], place: str = ""
 ) -> list[tuple[str, Any, Any]]:
-    found: list[tuple[str, Any, Any]] = []
+    differences: list[tuple[str, Any, Any]] = []
     for key in dict.fromkeys([*a, *b]):
-        of_a, of_b = a.get(key), b.get(key)
-        if isinstance(of_a, dict) and isinstance(of_b, dict):
-            found += _differing(of_a, of_b, f"{place}{key}.")
-        elif of_a != of_b:
-            found.append((f"{place}{key}", of_a, of_b))
-    return found
+        value_a, value_b = a.get(key), b.get(key)
+        if isinstance(value_a, dict) and isinstance(value_b, dict):
+            differences += _differing(value_a, value_b, f"{place}{key}.")
+        elif value_a != value_b:
+            differences.append((f"{place}{key}", value_a, value_b))
+    return differences

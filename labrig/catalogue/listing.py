@@ -1,4 +1,4 @@
-"""One line a run: what it was, how far it came, what it found."""
+"""Summaries of the runs in a folder."""
 
 from collections.abc import Iterator, Mapping
 from dataclasses import dataclass
@@ -15,26 +15,36 @@ from labrig.record import read_run
 from labrig.results import FittedDecay, read_fitted_decays
 from labrig.yaml_file import did_you_mean, read_yaml
 
-#: `running`: a labrig is writing to it now; `unfinished`: units are left to do; `recorded`: all
-#: units are there, nothing was made of them; `damaged`: its journal cannot be read.
+#: `running`: a process writes to the run; `unfinished`: units are missing; `recorded`: all units
+#: are complete, without a result; `processed`: with a result; `damaged`: the journal is unreadable.
 RunState = Literal["running", "unfinished", "recorded", "processed", "damaged"]
 STATES: tuple[RunState, ...] = get_args(RunState)
 
 
 @dataclass(frozen=True)
 class RunSummary:
-    """What a run folder holds.
+    """Summary of a run folder.
 
     Attributes
     ----------
+    folder
+        Run folder.
+    sample
+        Name of the sample.
+    protocol
+        Name of the protocol.
     began
-        Of its first attempt, UTC; None before there is one.
-    done, units
-        Completed units, and all; None where the protocol is not installed here.
+        Begin of the first attempt in UTC; None if there is none.
+    state
+        State of the run.
+    done
+        Number of completed units.
+    units
+        Number of all units; None if the protocol is not installed.
     frames
-        Of completed units.
+        Number of frames of completed units.
     results
-        What was fitted to each patch, by its name; "" where there is only one.
+        Fitted decays by patch; by "" if there is one patch only.
     """
 
     folder: Path
@@ -50,7 +60,17 @@ class RunSummary:
 
 @dataclass(frozen=True)
 class RunFilter:
-    """Which runs: sample and protocol by a pattern such as `blue*`, days inclusive and in UTC."""
+    """Filter of runs.
+
+    Attributes
+    ----------
+    sample, protocol
+        Patterns of the names, such as `blue*`, without regard to case.
+    since, until
+        First and last day in UTC, both included.
+    state
+        State of the run; None for any state.
+    """
 
     sample: str = "*"
     protocol: str = "*"
@@ -63,7 +83,7 @@ class RunFilter:
             raise UsageError(f"--state {self.state}: {did_you_mean(self.state, STATES)}")
 
     def admits(self, run: RunSummary) -> bool:
-        """Whether `run` is wanted; one that never began is of no day."""
+        """Whether the filter admits `run`; a run without attempts passes no limits on the day."""
         day = None if run.began is None else run.began.date()
         unbounded = (self.since, self.until) == (date.min, date.max)
         return (
@@ -74,55 +94,113 @@ class RunFilter:
         )
 
 
-def list_runs(runs: Path, wanted: RunFilter) -> list[RunSummary]:
-    """The wanted runs in a folder, oldest first.
+def list_runs(runs: Path, run_filter: RunFilter) -> list[RunSummary]:
+    """List the runs in a folder that a filter admits.
+
+    Parameters
+    ----------
+    runs
+        Folder with run folders.
+    run_filter
+        Filter by sample, protocol, day and state.
+
+    Returns
+    -------
+    list of RunSummary
+        Summaries of these runs, oldest first.
 
     Raises
     ------
     UsageError
-        There is no such folder.
+        If there is no such folder.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import RunFilter, list_runs
+    >>> runs = list_runs(Path("runs"), RunFilter(protocol="decay"))
+    >>> [(run.folder.name, run.state) for run in runs]
+    [('decay', 'processed')]
     """
     if not runs.is_dir():
         raise UsageError(f"{runs}: no such folder; give the one with the run folders as --runs")
-    found = [summarise(path) for path in _run_folders(runs)]
-    return [run for run in found if wanted.admits(run)]
+    summaries = [summarise(path) for path in _run_folders(runs)]
+    return [run for run in summaries if run_filter.admits(run)]
 
 
 def find_run(run: Path, runs: Path) -> Path:
-    """The folder of a run: a path, the name of a folder in `runs` or its beginning, or `last`.
+    """Find the folder of a run.
+
+    Parameters
+    ----------
+    run
+        Path of a run folder, name of a folder in `runs` or the beginning of one, or `last`.
+    runs
+        Folder with run folders.
+
+    Returns
+    -------
+    Path
+        The run folder.
 
     Raises
     ------
     UsageError
-        There is none, or several begin so.
+        If there is no such run, or if several names begin alike.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import find_run
+    >>> find_run(Path("last"), Path("runs")).name
+    'decay'
     """
     if (run / "protocol.yaml").is_file():
         return run
-    here = list(_run_folders(runs)) if runs.is_dir() else []
-    if str(run) == "last" and here:
-        return here[-1]
-    fitting = [path for path in here if path.name == str(run)] or [
-        path for path in here if path.name.startswith(str(run))
+    folders = list(_run_folders(runs)) if runs.is_dir() else []
+    if str(run) == "last" and folders:
+        return folders[-1]
+    matches = [path for path in folders if path.name == str(run)] or [
+        path for path in folders if path.name.startswith(str(run))
     ]
-    if len(fitting) == 1:
-        return fitting[0]
-    said = f"{len(fitting)} runs begin so" if fitting else "there is no such run"
+    if len(matches) == 1:
+        return matches[0]
+    problem = f"{len(matches)} runs begin so" if matches else "there is no such run"
     raise UsageError(
-        f"{run}: expected a run folder, the beginning of one's name or 'last'; {said}, see: "
+        f"{run}: expected a run folder, the beginning of one's name or 'last'; {problem}, see: "
         f"labrig runs --runs {runs}"
     )
 
 
 def summarise(folder: Path) -> RunSummary:
-    """What the run in `folder` holds; whatever cannot be read is told as its state."""
-    sample, protocol, units = _asked(folder)
+    """Summarise the run in a folder.
+
+    Parameters
+    ----------
+    folder
+        Run folder; its files may be incomplete or damaged.
+
+    Returns
+    -------
+    RunSummary
+        Sample, protocol, state, number of frames and fitted decays.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import summarise
+    >>> summary = summarise(Path("runs/decay"))
+    >>> summary.sample, summary.state, summary.frames
+    ('sample', 'processed', 37)
+    """
+    sample, protocol, units = _protocol_summary(folder)
     try:
         record, results = read_run(folder), read_fitted_decays(folder / "result")
     except (DataError, DiskError):
         has_journal = (folder / "journal.jsonl").exists()
         state: RunState = "damaged" if has_journal else "unfinished"
         return RunSummary(folder, sample, protocol, None, state, 0, units, 0, {})
-    done = record.completed()
+    completed = record.completed()
     return RunSummary(
         folder=folder,
         sample=sample,
@@ -132,10 +210,10 @@ def summarise(folder: Path) -> RunSummary:
             if record.attempts
             else None
         ),
-        state=state_of(folder, units is not None and len(done) == units),
-        done=len(done),
+        state=state_of(folder, units is not None and len(completed) == units),
+        done=len(completed),
         units=units,
-        frames=sum(len(attempt.frames) for attempt in done.values()),
+        frames=sum(len(attempt.frames) for attempt in completed.values()),
         results=results,
     )
 
@@ -144,8 +222,8 @@ def _run_folders(runs: Path) -> Iterator[Path]:
     return (path.parent for path in sorted(runs.glob("*/protocol.yaml")))
 
 
-def _asked(folder: Path) -> tuple[str, str, int | None]:
-    """Sample, protocol, number of units."""
+def _protocol_summary(folder: Path) -> tuple[str, str, int | None]:
+    """Return sample, protocol and number of units from the protocol file of a run."""
     try:
         content = read_yaml(folder / "protocol.yaml")
     except UsageError:
@@ -160,7 +238,27 @@ def _asked(folder: Path) -> tuple[str, str, int | None]:
 
 
 def state_of(folder: Path, is_complete: bool) -> RunState:
-    """How far the run in `folder` has come, given whether all its units are complete."""
+    """Return the state of a run.
+
+    Parameters
+    ----------
+    folder
+        Run folder.
+    is_complete
+        Whether all units of the run are complete.
+
+    Returns
+    -------
+    RunState
+        One of `running`, `unfinished`, `recorded` and `processed`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.catalogue import state_of
+    >>> state_of(Path("runs/decay"), is_complete=True)
+    'processed'
+    """
     if _is_being_written(folder):
         return "running"
     if not is_complete:
@@ -169,7 +267,7 @@ def state_of(folder: Path, is_complete: bool) -> RunState:
 
 
 def _is_being_written(folder: Path) -> bool:
-    """Whether a labrig has the run open now."""
+    """Whether a process has the run open for writing."""
     lock = folder / ".lock"
     if not lock.exists():
         return False
@@ -178,5 +276,5 @@ def _is_being_written(folder: Path) -> bool:
             return False
     except Timeout:
         return True
-    except OSError:  # somebody else's folder: only its owner writes there
+    except OSError:  # another user's folder: only its owner writes there
         return False

@@ -1,4 +1,4 @@
-"""A source that is the same on two days: it tells what camera and geometry gained or lost."""
+"""Reference source in two runs, which gives the ratio of sensitivities of camera and geometry."""
 
 import math
 from pathlib import Path
@@ -9,22 +9,22 @@ from labrig.errors import DataError, UsageError
 from labrig.results import FittedDecay, Measured, read_fitted_decays, read_series
 from labrig.yaml_file import did_you_mean
 
-#: What stands out of its own σ by less is no light to rely on.
+#: Signal over σ that a reference needs.
 SEEN_SIGMA = 5.0
 
 
 def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
-    """How much brighter the patch `name` is in run A than in run B, in that channel.
+    """Return the signal of the patch `name` in run A over that in run B, in one channel.
 
-    A reference that was charged and decays is as bright as its amplitudes together, a steady one,
-    in which no decay was found, as the mean of its frames.
+    The signal of a reference that decays is the sum of its amplitudes; that of a steady one,
+    without a fitted decay, is the mean of its frames.
 
     Raises
     ------
     UsageError
-        There is no such patch in both, or it decays in one of them only.
+        If the patch is not in both runs, or decays in one of them only.
     DataError
-        It is dark there, or its series is damaged.
+        If the patch is dark, or its series is damaged.
     """
     shared = [patch for patch in _patches(a) if patch in _patches(b)]
     if name not in shared:
@@ -39,26 +39,26 @@ def gain(a: Path, b: Path, name: str, channel: str) -> Measured:
             f"--reference {name}: it decays in one run and is steady in the other; expected a "
             "source that is the same on both days"
         )
-    of_a, of_b = (
+    signal_a, signal_b = (
         _steady(run, name, channel) if fit is None else _glow(fit, channel)
         for run, fit in zip((a, b), fits, strict=True)
     )
-    for run, seen in ((a, of_a), (b, of_b)):
-        if not seen.value > SEEN_SIGMA * seen.sigma:
+    for run, signal in ((a, signal_a), (b, signal_b)):
+        if not signal.value > SEEN_SIGMA * signal.sigma:
             raise DataError(
                 f"--reference {name}: expected light in {channel} that stands out by "
-                f"{SEEN_SIGMA:g} σ, got {seen.value:.3g} ± {seen.sigma:.2g} DN/s in {run}"
+                f"{SEEN_SIGMA:g} σ, got {signal.value:.3g} ± {signal.sigma:.2g} DN/s in {run}"
             )
-    return of_a.over(of_b)
+    return signal_a.over(signal_b)
 
 
 def _patches(run: Path) -> list[str]:
-    """Those with folders of their own; a fit is not needed."""
+    """Return the names of the patches with result folders of their own, fitted or not."""
     return sorted(path.parent.name for path in (run / "result").glob("*/series.csv"))
 
 
 def _glow(fit: FittedDecay, channel: str) -> Measured:
-    """All amplitudes together, their σ taken as independent."""
+    """Return the sum of all amplitudes in DN/s, their σ taken as independent."""
     amplitudes = fit.amplitudes_in(channel)
     return Measured(
         sum(amplitude.value for amplitude in amplitudes),
@@ -67,7 +67,7 @@ def _glow(fit: FittedDecay, channel: str) -> Measured:
 
 
 def _steady(run: Path, name: str, channel: str) -> Measured:
-    """The mean of the channel in DN/s, by its scatter from frame to frame."""
+    """Return the mean of a channel in DN/s, with σ by its scatter from frame to frame."""
     path = run / "result" / name / "series.csv"
     parts = [part for part in read_series(path) if channel in part.channels]
     columns = [part.values[part.usable, part.channels.index(channel)] for part in parts]

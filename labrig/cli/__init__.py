@@ -1,4 +1,4 @@
-"""The command line: thin, one file per noun."""
+"""The command line, with one module for each noun."""
 
 from labrig.cli.exit_codes import guarded
 

@@ -1,4 +1,4 @@
-"""The command line. Each command is thin, and imports what it needs when it is called."""
+"""The command line; commands import what they need when they are called."""
 
 import typer
 from typer.core import TyperGroup

@@ -1,17 +1,17 @@
-"""When whoever read what a command prints has gone: a pipe's reader, a terminal."""
+"""Output to a pipe or terminal whose reader has gone."""
 
 import os
 from typing import Any, TextIO
 
 
 class ReaderMayLeave:
-    """A stream that can be written to even when its reader has gone: the run goes on."""
+    """A stream that accepts text even when its reader has gone, so that a run continues."""
 
     def __init__(self, stream: TextIO) -> None:
         self._stream = stream
 
     def write(self, text: str) -> int:
-        """Write `text`, if anybody is there."""
+        """Write `text`; discard it if the reader has gone."""
         try:
             return self._stream.write(text)
         except OSError:
@@ -19,7 +19,7 @@ class ReaderMayLeave:
             return len(text)
 
     def flush(self) -> None:
-        """Have it arrive, if anybody is there."""
+        """Flush the stream, if the reader has not gone."""
         try:
             self._stream.flush()
         except OSError:

@@ -1,4 +1,4 @@
-"""`labrig compare`: a run against predictions, against another material and against the paper."""
+"""`labrig compare`: comparison of a run with predictions, another material and the paper."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -58,8 +58,8 @@ def compare(
     for line in comparison.left_out:
         typer.echo(f"warning: {line}", err=True)
     for section in sections(comparison):
-        _tell(section)
-        _draw(section, figures or folder / "comparison")
+        _print_section(section)
+        _save_figures(section, figures or folder / "comparison")
 
 
 def _refit(series: "Series", states: int, flicker: float) -> "DecayFit":
@@ -68,7 +68,7 @@ def _refit(series: "Series", states: int, flicker: float) -> "DecayFit":
     return fit_series(series, states, flicker=flicker)
 
 
-def _tell(section: "Section") -> None:
+def _print_section(section: "Section") -> None:
     from rich.console import Console
     from rich.table import Table
 
@@ -76,18 +76,18 @@ def _tell(section: "Section") -> None:
     console.print(f"\n[bold]{section.title}[/bold]")
     for text in section.text:
         console.print(text, style="dim")
-    for one in section.tables:
+    for data in section.tables:
         table = Table(box=None, pad_edge=False)
-        for number, heading in enumerate(one.head):
+        for number, heading in enumerate(data.head):
             table.add_column(heading, justify="right" if number else "left", overflow="fold")
-        for row in one.rows:
+        for row in data.rows:
             table.add_row(*row)
         console.print(table)
-        console.print(one.caption, style="dim")
+        console.print(data.caption, style="dim")
 
 
-def _draw(section: "Section", folder: Path) -> None:
-    """As PNG to look at and as PDF to print."""
+def _save_figures(section: "Section", folder: Path) -> None:
+    """Save the figures of a section as PNG and as PDF."""
     from labrig.report import figure_style
 
     if section.figures:

@@ -1,4 +1,4 @@
-"""How a command ends: an exit code, and one line where something went wrong."""
+"""End of a command: an exit code, and one line for an error."""
 
 import errno
 import re
@@ -11,18 +11,40 @@ from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError, UsageError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
 
-#: Of a file's name, in a message.
+#: Largest number of characters of a file name in a message.
 MOST_SHOWN = 200
-#: What Python makes of bytes of an argument that are no UTF-8.
+#: Surrogates, to which Python decodes bytes of an argument that are not UTF-8.
 _NO_TEXT = re.compile("[\ud800-\udfff]")
 
 
 def guarded(arguments: Sequence[str]) -> int:
-    """Run the command line and return its exit code."""
+    """Run the command line and return its exit code.
+
+    Errors become one line on standard error. Signals that would stop the process are ignored
+    afterwards: the process is expected to end.
+
+    Parameters
+    ----------
+    arguments
+        Arguments of the command line, without the name of the program.
+
+    Returns
+    -------
+    int
+        0 on success; `LabrigError.exit_code` of the error; 2 for a wrong call; 128 plus the number
+        of the signal that stopped the command; 1 for a fault of labrig itself.
+
+    Examples
+    --------
+    >>> from labrig.cli import guarded
+    >>> guarded(["--version"])
+    labrig ...
+    0
+    """
     try:
         code = _run(arguments)
     except BrokenPipeError:
-        code = 0  # whoever read it has what it wanted: head, less
+        code = 0  # the reader has ended with all it needs: head, less
     finally:
         ReaderMayLeave(sys.stdout).flush()
         for signum in STOP_SIGNALS:
@@ -37,34 +59,36 @@ def _run(arguments: Sequence[str]) -> int:
     from labrig.cli.app import command
 
     if any(_NO_TEXT.search(argument) for argument in arguments):
-        return _complain(f"expected arguments in UTF-8, got {' '.join(map(ascii, arguments))}", 2)
+        return _print_error(
+            f"expected arguments in UTF-8, got {' '.join(map(ascii, arguments))}", 2
+        )
     for signum in STOP_SIGNALS:
         signal.signal(signum, raise_interrupted)
     try:
         command()(args=list(arguments) or ["--help"], prog_name="labrig", standalone_mode=False)
     except Interrupted as interrupted:
-        return _complain(str(interrupted), 128 + interrupted.signum)
+        return _print_error(str(interrupted), 128 + interrupted.signum)
     except LabrigError as error:
-        return _complain(str(error), error.exit_code)
+        return _print_error(str(error), error.exit_code)
     except typer.Exit as ending:
         return ending.exit_code
     except SystemExit as ending:  # Typer's own answer to a pipe without a reader
         raise BrokenPipeError from ending
     except TyperException as error:
-        return _complain(f"{error.format_message()} (see labrig --help)", 2)
+        return _print_error(f"{error.format_message()} (see labrig --help)", 2)
     except OSError as error:
         if isinstance(error, BrokenPipeError):
             raise
         name = str(error.filename or "disk")[:MOST_SHOWN]
         kind = UsageError if error.errno == errno.ENAMETOOLONG else DiskError
-        return _complain(f"{name}: {error.strerror or error}", kind.exit_code)
+        return _print_error(f"{name}: {error.strerror or error}", kind.exit_code)
     except Exception as error:
-        return _complain(_fault(error), 1)
+        return _print_error(_fault_message(error), 1)
     return 0
 
 
-def _fault(error: Exception) -> str:
-    """A fault of labrig's own: the traceback goes to a file that can be sent along."""
+def _fault_message(error: Exception) -> str:
+    """Write the traceback of a fault of labrig to a file and return a message that names it."""
     import tempfile
     import traceback
 
@@ -75,6 +99,6 @@ def _fault(error: Exception) -> str:
     return f"a fault in labrig itself ({error!r}); please report it with {file.name}"
 
 
-def _complain(text: str, code: int) -> int:
+def _print_error(text: str, code: int) -> int:
     print(f"labrig: {' '.join(text.split())}", file=ReaderMayLeave(sys.stderr), flush=True)
     return code

@@ -1,4 +1,4 @@
-"""`labrig fit`: fits of anybody's data."""
+"""`labrig fit`: fits of data from any source."""
 
 from pathlib import Path
 from typing import Annotated

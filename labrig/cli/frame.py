@@ -1,4 +1,4 @@
-"""`labrig frame`: what is in one RAW file."""
+"""`labrig frame`: statistics of one RAW file."""
 
 from pathlib import Path
 from typing import Annotated

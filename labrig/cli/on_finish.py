@@ -1,4 +1,4 @@
-"""What the rig file wants done when a run has ended, however it ended: a bell, a command."""
+"""Notification at the end of a run, as the rig file asks for: a bell or a command."""
 
 import os
 import subprocess
@@ -10,52 +10,53 @@ from dataclasses import dataclass
 from labrig.clock import Interrupted
 from labrig.errors import LabrigError
 
-#: Nobody waits for longer for a message to be sent.
+#: Longest duration of the command.
 COMMAND_TIMEOUT_S = 30.0
 
 
 @dataclass
 class Ending:
-    """What there is to tell at the end."""
+    """Message about the end of a run."""
 
     message: str = ""
 
 
 @contextmanager
 def printed_at_end(on_finish: str | Sequence[str] | None) -> Iterator[Ending]:
-    """Tell whoever waits, when what is inside has ended; devices are safe by then.
+    """Notify when the body has ended, however it ended; devices are safe by then.
 
     Parameters
     ----------
     on_finish
-        `bell`, or a command and its arguments. The command finds in its environment
-        `LABRIG_STATUS` (`done`, `interrupted`, `failed`) and `LABRIG_MESSAGE`, one line.
+        `bell`, or a command with its arguments; None for no notification. The command finds in its
+        environment `LABRIG_STATUS` (`done`, `interrupted`, `failed`) and `LABRIG_MESSAGE`, one
+        line.
     """
     ending = Ending()
     try:
         yield ending
     except Interrupted as stop:
-        _tell(on_finish, "interrupted", str(stop))
+        _notify(on_finish, "interrupted", str(stop))
         raise
     except LabrigError as error:
-        _tell(on_finish, "failed", str(error))
+        _notify(on_finish, "failed", str(error))
         raise
-    _tell(on_finish, "done", ending.message)
+    _notify(on_finish, "done", ending.message)
 
 
-def _tell(on_finish: str | Sequence[str] | None, status: str, message: str) -> None:
+def _notify(on_finish: str | Sequence[str] | None, status: str, message: str) -> None:
     if on_finish == "bell":
         print("\a", end="", file=sys.stderr, flush=True)
     elif on_finish:
-        _call(on_finish, {"LABRIG_STATUS": status, "LABRIG_MESSAGE": message})
+        _run_command(on_finish, {"LABRIG_STATUS": status, "LABRIG_MESSAGE": message})
 
 
-def _call(command: Sequence[str], said: dict[str, str]) -> None:
-    """A command that fails is worth a warning, not more: the run is over and kept."""
+def _run_command(command: Sequence[str], variables: dict[str, str]) -> None:
+    """Run a command; a failure of it is only a warning, since the run is over and kept."""
     try:
         subprocess.run(
             list(command),
-            env=os.environ | said,
+            env=os.environ | variables,
             stdin=subprocess.DEVNULL,
             stdout=subprocess.DEVNULL,
             timeout=COMMAND_TIMEOUT_S,

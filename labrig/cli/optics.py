@@ -22,8 +22,8 @@ def show(
     from labrig.optics import read_sound_curves
     from labrig.report import describe_curves, draw_curves
 
-    found = read_sound_curves(file, curve)
-    typer.echo(describe_curves(found))
+    curves = read_sound_curves(file, curve)
+    typer.echo(describe_curves(curves))
     if picture is not None:
-        draw_curves(found, picture)
+        draw_curves(curves, picture)
         typer.echo(f"drawn into {picture}")

@@ -1,4 +1,4 @@
-"""`labrig plan --predict`: what a protocol's fits will know, and what would halve that."""
+"""`labrig plan --predict`: expected uncertainties, and changes that would halve them."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -33,11 +33,11 @@ MeteredOption = Annotated[
     ),
 ]
 
-#: Fractions of the variance that are worth a word.
+#: Fraction of the variance from which a source of noise is listed.
 WORTH_SAYING = 0.1
-#: σ of a rate or an amplitude beyond which it is hardly known.
+#: Relative σ of a rate or an amplitude from which a warning is given.
 HARDLY_KNOWN = 0.5
-#: Differences in lab time below this fraction of it are none.
+#: Fraction of the lab time below which a difference counts as none.
 SAME_TIME = 0.005
 
 
@@ -49,7 +49,7 @@ def predict_and_print(
     *,
     json: bool,
 ) -> None:
-    """Predict for a protocol that fits its rig, and print that."""
+    """Predict the uncertainties of a protocol on its rig and print them."""
     from labrig.bench_optics import calibration, camera_curves
     from labrig.calibration import LVF_KIND
     from labrig.predict import Sources, predict
@@ -64,10 +64,10 @@ def predict_and_print(
     if json:
         typer.echo(prediction.to_json())
     else:
-        _tell(prediction, recording.plan.duration_s)
+        _print_prediction(prediction, recording.plan.duration_s)
 
 
-def _tell(prediction: "Prediction", duration_s: float) -> None:
+def _print_prediction(prediction: "Prediction", duration_s: float) -> None:
     from rich.console import Console
 
     console = Console(highlight=False)
@@ -91,17 +91,17 @@ def _states(prediction: "Prediction", patch: str) -> "Table":
 
     from labrig.results import with_uncertainty
 
-    found = prediction.patches[patch]
+    predicted = prediction.patches[patch]
     table = Table(title=_title(prediction, patch), title_justify="left")
     for heading in ("state", "k_r / s⁻¹", "σ", "σ of amplitude", "noise"):
         table.add_column(heading)
-    for i, rate in enumerate(found.k_r_per_s):
+    for i, rate in enumerate(predicted.k_r_per_s):
         table.add_row(
             str(i + 1),
-            with_uncertainty(rate, found.k_r_sigma_per_s[i]),
-            _percent(found.k_r_sigma_per_s[i] / rate),
-            _percent(found.amplitude_sigma_dn_per_s[i] / found.amplitude_dn_per_s[i]),
-            _noise(found, i),
+            with_uncertainty(rate, predicted.k_r_sigma_per_s[i]),
+            _percent(predicted.k_r_sigma_per_s[i] / rate),
+            _percent(predicted.amplitude_sigma_dn_per_s[i] / predicted.amplitude_dn_per_s[i]),
+            _noise(predicted, i),
         )
     return table
 
@@ -116,8 +116,8 @@ def _title(prediction: "Prediction", patch: str) -> str:
     return f"{prediction.materials[patch]} on '{patch}': {frames}{decays}{lost}"
 
 
-def _noise(found: "PatchPrediction", state: int) -> str:
-    fractions = {source: part[state] for source, part in found.budget.items()}
+def _noise(predicted: "PatchPrediction", state: int) -> str:
+    fractions = {source: part[state] for source, part in predicted.budget.items()}
     largest = sorted(fractions, key=lambda source: -fractions[source])
     return ", ".join(
         f"{source} {100 * fractions[source]:.0f} %"
@@ -127,41 +127,41 @@ def _noise(found: "PatchPrediction", state: int) -> str:
 
 
 def _doubts(prediction: "Prediction", patch: str) -> list[str]:
-    """What the fit will not tell, and which change makes it."""
-    found, said = prediction.patches[patch], []
-    if not found.resolves_all_states:
-        able = [
+    """Return warnings on states that the fit will not resolve, with a change that would help."""
+    predicted, doubts = prediction.patches[patch], []
+    if not predicted.resolves_all_states:
+        sufficient = [
             remedy for remedy in prediction.remedies if remedy.patches[patch].resolves_all_states
         ]
-        cheapest = min(able, key=lambda remedy: remedy.extra_time_s, default=None)
+        cheapest = min(sufficient, key=lambda remedy: remedy.extra_time_s, default=None)
         would = f"'{cheapest.change.says}' would" if cheapest else "nothing below is enough"
-        said.append(
-            f"the fit will not tell these {len(found.k_r_per_s)} states apart for sure: it sees "
-            f"all of them with a chance of {100 * found.chance_of_all_states:.0f} %, and their "
-            f"rates {found.least_apart:.1f} σ from each other; {would}"
+        doubts.append(
+            f"the fit will not tell these {len(predicted.k_r_per_s)} states apart for sure: it "
+            f"sees all of them with a chance of {100 * predicted.chance_of_all_states:.0f} %, and "
+            f"their rates {predicted.least_apart:.1f} σ from each other; {would}"
         )
-    for i, rate in enumerate(found.k_r_per_s):
-        of_rate = found.k_r_sigma_per_s[i] / rate
-        of_amplitude = found.amplitude_sigma_dn_per_s[i] / found.amplitude_dn_per_s[i]
-        if max(of_rate, of_amplitude) > HARDLY_KNOWN:
-            said.append(
-                f"state {i + 1} is hardly known: its rate to {_percent(of_rate)}, its amplitude "
-                f"to {_percent(of_amplitude)}"
+    for i, rate in enumerate(predicted.k_r_per_s):
+        rate_sigma = predicted.k_r_sigma_per_s[i] / rate
+        amplitude_sigma = predicted.amplitude_sigma_dn_per_s[i] / predicted.amplitude_dn_per_s[i]
+        if max(rate_sigma, amplitude_sigma) > HARDLY_KNOWN:
+            doubts.append(
+                f"state {i + 1} is hardly known: its rate to {_percent(rate_sigma)}, its amplitude "
+                f"to {_percent(amplitude_sigma)}"
             )
-    return said
+    return doubts
 
 
 def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table":
     from rich.table import Table
 
-    found = prediction.patches[patch]
-    count = len(found.k_r_per_s)
+    predicted = prediction.patches[patch]
+    count = len(predicted.k_r_per_s)
     table = Table(title="what would halve it", title_justify="left")
     table.add_column("change")
     for heading in ("σ",) if count == 1 else [f"σ {i + 1}" for i in range(count)]:
         table.add_column(heading, justify="right", no_wrap=True)
     table.add_column("σ ×", justify="right", no_wrap=True)
-    if not found.resolves_all_states:
+    if not predicted.resolves_all_states:
         table.add_column("tells all", justify="right", no_wrap=True)
     table.add_column("lab time", justify="right", no_wrap=True)
     for remedy in prediction.remedies:
@@ -175,7 +175,11 @@ def _remedies(prediction: "Prediction", patch: str, duration_s: float) -> "Table
                 for sigma, rate in zip(after.k_r_sigma_per_s, after.k_r_per_s, strict=True)
             ),
             f"{remedy.gain:.2f}",
-            *([] if found.resolves_all_states else ["yes" if after.resolves_all_states else "no"]),
+            *(
+                []
+                if predicted.resolves_all_states
+                else ["yes" if after.resolves_all_states else "no"]
+            ),
             _extra_time(remedy, duration_s),
             style="bold" if remedy.halves else "",
         )

@@ -56,17 +56,17 @@ def process(
 
 
 def process_and_print(run: Path, overrides: "Overrides | None" = None, *, json: bool) -> None:
-    """Process the run in `run` and print what came out."""
+    """Process the run in the folder `run` and print its result."""
     from labrig.process import process_and_report
 
-    done = process_and_report(run, overrides)
+    processed = process_and_report(run, overrides)
     if json:
-        typer.echo(done.result.to_json())
+        typer.echo(processed.result.to_json())
         return
-    for warning in done.result.warnings:
+    for warning in processed.result.warnings:
         typer.echo(f"warning: {warning}", err=True)
-    for line in done.lines:
+    for line in processed.lines:
         typer.echo(line)
-    for number, line in enumerate(done.changes):
+    for number, line in enumerate(processed.changes):
         typer.echo(f"  {line}" if number else line)
-    typer.echo(f"report: {done.report}")
+    typer.echo(f"report: {processed.report}")

@@ -1,4 +1,4 @@
-"""What is happening, what comes next, how much lab time is left."""
+"""Progress of a run: present action, next step, lab time left."""
 
 import shutil
 import sys
@@ -25,7 +25,7 @@ from labrig.quantity import duration_text
 from labrig.record import FrameRecord
 from labrig.watch import Previews, RenderedPreview
 
-#: Of the last frame, in characters.
+#: Width of the last frame's thumbnail in characters.
 THUMBNAIL_WIDTH = 48
 
 
@@ -38,25 +38,25 @@ def progress(
     yes: bool = False,
     has_changer: bool = False,
 ) -> Iterator[RunObserver]:
-    """An observer that tells the person at the terminal, or a log, on standard error.
+    """Create an observer that reports to the terminal, or to a log, on standard error.
 
     Parameters
     ----------
     plan
-        What is to come, for the time left.
+        Plan of the run, for the time left.
     done
         Names of units that are complete already.
     clock
-        The rig's clock.
+        Clock of the rig.
     yes
-        What is to be done by hand, the rig's changer does; nobody is asked.
+        Whether the rig's changer does the manual steps; no person is asked then.
     has_changer
-        Whether it has any.
+        Whether the rig has a changer.
 
     Raises
     ------
     UsageError
-        `yes` for what only a person can do.
+        If `yes` is given for manual steps that only a person can do.
     """
     if yes and plan.manual_steps and not has_changer:
         raise UsageError(
@@ -70,15 +70,15 @@ def progress(
         return
     console = Console(file=cast(TextIO, ReaderMayLeave(sys.stderr)))
     with Live(console=console, refresh_per_second=4, transient=True) as live:
-        shown = LiveProgress(state, live, console)
+        observer = LiveProgress(state, live, console)
         try:
-            yield shown
+            yield observer
         finally:
-            shown.close()
+            observer.close()
 
 
 class _State:
-    """Where the run is, held against the plan."""
+    """Progress of the run relative to its plan."""
 
     def __init__(self, plan: Plan, done: Sequence[str], clock: Clock, *, yes: bool) -> None:
         self.plan = plan
@@ -89,7 +89,7 @@ class _State:
         self.doing = "connecting"
         self.until_s: float | None = None
         self.frames = 0
-        self._person = None if yes else Terminal()
+        self._terminal = None if yes else Terminal()
         self._unit_began_s = clock.now()
 
     def begin(self, unit: str, number: int) -> None:
@@ -100,7 +100,7 @@ class _State:
         self._unit_began_s = self.clock.now()
 
     def left_s(self) -> float:
-        """Lab time left, by the plan; a unit that takes longer than planned counts as over."""
+        """Return the planned lab time left in seconds; a unit that takes longer counts as over."""
         left_s = 0.0
         for name, begins_s, ends_s in self._spans():
             if name == self.unit:
@@ -110,14 +110,14 @@ class _State:
         return left_s
 
     def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
-        """The person at the terminal; without one, only the time that it takes passes."""
-        if self._person is None:
+        """Ask the person at the terminal; without one, only let the time of the step pass."""
+        if self._terminal is None:
             self.clock.sleep(step.takes_s)
             return ""
-        return self._person.ask(step, last, self.left_s(), meanwhile)
+        return self._terminal.ask(step, last, self.left_s(), meanwhile)
 
     def next_step(self) -> str:
-        """What the plan has next in this unit, else the next unit."""
+        """Return the next step of this unit in the plan, else the next unit."""
         begins_s = next((b for name, b, _ in self._spans() if name == self.unit), 0.0)
         now_s = begins_s + self._elapsed_s()
         for step in self.plan.steps:
@@ -142,44 +142,44 @@ class _State:
 
 
 class PlainProgress:
-    """One line for everything that takes a while; for logs and pipes."""
+    """Progress as one line for each unit, wait and frame; for logs and pipes."""
 
     def __init__(self, state: _State) -> None:
         self._state = state
 
     def unit(self, name: str, number: int, total: int) -> None:
-        """A unit begins."""
+        """Print that a unit begins."""
         self._state.begin(name, number)
-        self._say(f"unit {number} of {total}: {name}")
+        self._print(f"unit {number} of {total}: {name}")
 
     def doing(self, what: str, until_s: float | None = None) -> None:
-        """Say it, if it is worth a line."""
+        """Print that a wait begins; actions without an end time are not printed."""
         if until_s is not None:
-            self._say(f"{what}; next: {self._state.next_step()}")
+            self._print(f"{what}; next: {self._state.next_step()}")
 
     def frame(self, record: FrameRecord) -> None:
-        """Say that a frame was kept."""
+        """Print that a frame was recorded."""
         self._state.frames += 1
         settings = ExposureSettings(record.exposure_s, record.iso, record.f_number)
         number = f"frame {self._state.frames} of {self._state.plan.frames}"
-        self._say(f"{number}: {record.role}, {settings}")
+        self._print(f"{number}: {record.role}, {settings}")
 
     def warn(self, text: str) -> None:
-        """Say a warning."""
-        self._say(f"warning: {text}")
+        """Print a warning."""
+        self._print(f"warning: {text}")
 
     def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
-        """Have something done by hand."""
-        self._say(f"by hand: {step.what}")
+        """Print a step to be done by hand, and ask the person to do it."""
+        self._print(f"by hand: {step.what}")
         return self._state.ask(step, last, meanwhile)
 
-    def _say(self, text: str) -> None:
-        left = _countdown(self._state.left_s())
-        print(f"[{left} left] {text}", file=ReaderMayLeave(sys.stderr), flush=True)
+    def _print(self, text: str) -> None:
+        time_left = _countdown(self._state.left_s())
+        print(f"[{time_left} left] {text}", file=ReaderMayLeave(sys.stderr), flush=True)
 
 
 class LiveProgress:
-    """A small table that is drawn anew four times a second."""
+    """Progress as a small table that is drawn four times a second."""
 
     def __init__(self, state: _State, live: Live, console: Console) -> None:
         self._state = state
@@ -187,36 +187,36 @@ class LiveProgress:
         self._console = console
         self._total = len(state.plan.units)
         self._run: Path | None = None
-        self._glances: Previews | None = None
+        self._previews: Previews | None = None
         live.update(self)
 
     def unit(self, name: str, number: int, total: int) -> None:
-        """A unit begins."""
+        """Note that a unit begins."""
         self._state.begin(name, number)
 
     def doing(self, what: str, until_s: float | None = None) -> None:
-        """Something begins."""
+        """Note that an action or a wait begins."""
         self._state.doing, self._state.until_s = what, until_s
 
     def frame(self, record: FrameRecord) -> None:
-        """A frame was kept: have it looked at, by another process."""
+        """Note that a frame was recorded, and request its preview from another process."""
         self._state.frames += 1
-        if self._glances is None:
+        if self._previews is None:
             self._run = record.path.parents[1]
-            self._glances = Previews(self._run, THUMBNAIL_WIDTH)
-        self._glances.ask(record.path.name, record.unit)
+            self._previews = Previews(self._run, THUMBNAIL_WIDTH)
+        self._previews.ask(record.path.name, record.unit)
 
     def close(self) -> None:
-        """No more frames come."""
-        if self._glances is not None:
-            self._glances.close()
+        """End the process of the previews."""
+        if self._previews is not None:
+            self._previews.close()
 
     def warn(self, text: str) -> None:
-        """A warning stays on the screen above the table."""
+        """Print a warning, which stays on the screen above the table."""
         self._console.print(Text(f"warning: {text}", style="yellow"))
 
     def ask(self, step: ManualStep, last: str | None, meanwhile: Callable[[], None]) -> str | None:
-        """Have something done by hand; the table makes room for question and answer."""
+        """Ask the person to do a step by hand; the table is hidden meanwhile."""
         self._live.stop()
         try:
             return self._state.ask(step, last, meanwhile)
@@ -224,13 +224,13 @@ class LiveProgress:
             self._live.start()
 
     def __rich__(self) -> Group:
-        """All of it as it is now."""
-        seen = None if self._glances is None else self._glances.latest
-        if seen is None:
+        """Return the table and the thumbnail as they are now."""
+        preview = None if self._previews is None else self._previews.latest
+        if preview is None:
             return Group(self._table(None))
-        return Group(self._table(seen), thumbnail(seen.picture))
+        return Group(self._table(preview), thumbnail(preview.picture))
 
-    def _table(self, seen: RenderedPreview | None) -> Table:
+    def _table(self, preview: RenderedPreview | None) -> Table:
         state = self._state
         table = Table.grid(padding=(0, 2))
         table.add_row(_dim("unit"), f"{state.unit}  ({state.number} of {self._total})")
@@ -241,10 +241,10 @@ class LiveProgress:
         table.add_row(_dim("next"), state.next_step())
         table.add_row(_dim("frames"), f"{state.frames} of {state.plan.frames}{self._disk()}")
         table.add_row(_dim("lab time left"), _countdown(state.left_s()))
-        for patch, values in ({} if seen is None else seen.values).items():
-            shown = "  ".join(f"{channel} {mean:.1f}" for channel, mean in values.items())
-            clipped = "  clipped" if seen is not None and patch in seen.clipped else ""
-            table.add_row(_dim(patch), Text(f"{shown} DN{clipped}", "red" if clipped else ""))
+        for patch, values in ({} if preview is None else preview.values).items():
+            means = "  ".join(f"{channel} {mean:.1f}" for channel, mean in values.items())
+            clipped = "  clipped" if preview is not None and patch in preview.clipped else ""
+            table.add_row(_dim(patch), Text(f"{means} DN{clipped}", "red" if clipped else ""))
         return table
 
     def _disk(self) -> str:
@@ -254,7 +254,7 @@ class LiveProgress:
 
 
 def thumbnail(picture: NDArray[np.uint8]) -> Text:
-    """A picture in half blocks, two pixels above each other in a character."""
+    """Return a picture in half blocks, with two pixels one above the other in each character."""
     rows = [
         Text("").join(
             Text("▀", Style(color=_colour(above), bgcolor=_colour(below)))

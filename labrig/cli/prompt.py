@@ -1,4 +1,4 @@
-"""Asks the person at the terminal to do something by hand, and waits for the answer."""
+"""Prompt for manual steps at the terminal."""
 
 import queue
 import sys
@@ -11,14 +11,14 @@ from labrig.acquire import ManualStep
 from labrig.errors import UsageError
 from labrig.quantity import duration_text
 
-#: What takes back the step before.
+#: Answer that undoes the previous step.
 UNDO = "undo"
-#: How often it is looked whether somebody wants to stop.
+#: Period in which an interruption is looked for.
 LOOK_UP_S = 0.05
 
 
 class Terminal:
-    """Reads lines beside the run, so that Ctrl-C and long waits are answered in the meantime."""
+    """Reader of lines from the terminal in a thread, so that a run can be interrupted."""
 
     def __init__(self) -> None:
         self._lines: queue.Queue[str] = queue.Queue()
@@ -28,20 +28,22 @@ class Terminal:
     def ask(
         self, step: ManualStep, last: str | None, left_s: float, meanwhile: Callable[[], None]
     ) -> str | None:
-        """A remark, mostly empty; None to take back `last`.
+        """Ask for a step to be done and return the remark, mostly empty; None to undo `last`.
 
         Raises
         ------
         UsageError
-            Nobody can answer here.
+            If the input has ended without an answer.
         """
         self._read()
         while not self._lines.empty():
             self._lines.get()  # typed before the question
         offer = f", or: {UNDO} (do again: {last})" if last else ""
-        _say(f"by hand: {step.what}")
-        _say(f"  why: {step.why}; {duration_text(left_s)} of lab time left")
-        _say(f"  Enter when it is done, or a remark{offer}; Ctrl-C stops, labrig resume goes on")
+        _print_line(f"by hand: {step.what}")
+        _print_line(f"  why: {step.why}; {duration_text(left_s)} of lab time left")
+        _print_line(
+            f"  Enter when it is done, or a remark{offer}; Ctrl-C stops, labrig resume goes on"
+        )
         while True:
             line = self._next_line(meanwhile)
             if line is None:
@@ -54,7 +56,7 @@ class Terminal:
                 return answer
             if last:
                 return None
-            _say("  there is nothing to take back; Enter when it is done")
+            _print_line("  there is nothing to take back; Enter when it is done")
 
     def _read(self) -> None:
         if not self._reading:
@@ -68,10 +70,10 @@ class Terminal:
         self._ended.set()
 
     def _next_line(self, meanwhile: Callable[[], None]) -> str | None:
-        """What was typed; None if nothing can be any more."""
+        """Return the next line of input; None if the input has ended."""
         while True:
             meanwhile()
-            ended = self._ended.is_set()  # asked first: what came before the end counts
+            ended = self._ended.is_set()  # read first, so that input before the end counts
             try:
                 return self._lines.get(timeout=LOOK_UP_S)
             except queue.Empty:
@@ -79,5 +81,5 @@ class Terminal:
                     return None
 
 
-def _say(text: str) -> None:
+def _print_line(text: str) -> None:
     print(text, file=sys.stderr, flush=True)

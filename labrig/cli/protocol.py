@@ -1,4 +1,4 @@
-"""`labrig protocol`: what protocols there are, and a file of one's own to begin with."""
+"""`labrig protocol`: shipped protocols, and copies of them to be edited."""
 
 from pathlib import Path
 from typing import Annotated
@@ -16,8 +16,8 @@ def list_protocols() -> None:
 
     for path in resources.names("protocols").values():
         model = read_protocol(path)
-        said = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("#").strip()
-        typer.echo(f"{path.stem:16} ({model.protocol})  {said}")
+        summary = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("#").strip()
+        typer.echo(f"{path.stem:16} ({model.protocol})  {summary}")
 
 
 @app.command("new")

@@ -1,4 +1,4 @@
-"""`labrig rig`: what is plugged in, and whether a rig works."""
+"""`labrig rig`: discovery of devices and check of a rig."""
 
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -35,11 +35,11 @@ def list_devices(
     from labrig import plugins
     from labrig.setup import Host, discover
 
-    found = discover(Host.of_this_pc(), plugins.names(plugins.DRIVERS))
+    discovery = discover(Host.of_this_pc(), plugins.names(plugins.DRIVERS))
     if json:
-        typer.echo(dumps(asdict(found), ensure_ascii=False))
+        typer.echo(dumps(asdict(discovery), ensure_ascii=False))
     else:
-        _tell(found)
+        _print_discovery(discovery)
 
 
 @app.command("check")
@@ -61,28 +61,28 @@ def check(
     from labrig.setup import check_rig
 
     path = resources.find("config", "rig", rig)
-    with open_bench(read_rig_file(path), str(path)) as stand:
-        report = check_rig(stand)
+    with open_bench(read_rig_file(path), str(path)) as bench:
+        report = check_rig(bench)
     if json:
         typer.echo(dumps(report.to_json(), ensure_ascii=False))
     else:
         _print_table(report)
-    _end(report, path)
+    _raise_failures(report, path)
 
 
 app.command("view")(view.view)
 
 
-def _tell(found: "Discovery") -> None:
-    for title, devices in (("serial ports", found.ports), ("USB cameras", found.cameras)):
+def _print_discovery(discovery: "Discovery") -> None:
+    for title, devices in (("serial ports", discovery.ports), ("USB cameras", discovery.cameras)):
         typer.echo(f"{title}:" if devices else f"{title}: none")
         for device in devices:
             typer.echo(f"  {device.address}  {device.name}")
             for hint in device.hints:
                 typer.echo(f"    ! {hint}")
-    for note in found.notes:
+    for note in discovery.notes:
         typer.echo(f"! {note}")
-    if snippets := [d.snippet for d in (*found.ports, *found.cameras) if d.snippet]:
+    if snippets := [d.snippet for d in (*discovery.ports, *discovery.cameras) if d.snippet]:
         typer.echo("\nfor the rig file (a key may stand only once: keep what you use):\n\ndevices:")
         for snippet in snippets:
             typer.echo(f"  {snippet}")
@@ -104,7 +104,7 @@ def _print_table(report: "RigReport") -> None:
     Console().print(table)
 
 
-def _end(report: "RigReport", path: Path) -> None:
+def _raise_failures(report: "RigReport", path: Path) -> None:
     if report.failures:
         raise DeviceError(f"{path}: {'; '.join(report.failures)}")
     if report.refusals:

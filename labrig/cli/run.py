@@ -101,15 +101,15 @@ def resume(
     path = folder / "rig.yaml"
     rig = read_rig_file(path) if path.is_file() else None
     watch = partial(progress, yes=yes, has_changer=rig is not None and "changer" in rig.devices)
-    wanted = None if rig is None else rig.on_finish
-    if isinstance(wanted, tuple) and not on_finish:
+    command = None if rig is None else rig.on_finish
+    if isinstance(command, tuple) and not on_finish:
         typer.echo(
             f"note: 'on_finish' in {path} is not run, in case somebody else wrote it: "
-            f"{' '.join(map(ascii, wanted))}; to run it, add --on-finish",
+            f"{' '.join(map(ascii, command))}; to run it, add --on-finish",
             err=True,
         )
-        wanted = None
-    with printed_at_end(wanted) as ending:
+        command = None
+    with printed_at_end(command) as ending:
         _finish(resume_run(folder, watch), no_process, json)
         ending.message = str(folder)
 

@@ -1,4 +1,4 @@
-"""`labrig runs` and `labrig note`: what was measured, and what there is to say about it."""
+"""`labrig runs` and `labrig note`: recorded runs and notes on them."""
 
 import itertools
 import math
@@ -15,7 +15,7 @@ if TYPE_CHECKING:
 
 
 class _ListsByDefault(TyperGroup):
-    """`labrig runs --since 2026-11-20` is `labrig runs list --since 2026-11-20`."""
+    """Group whose default command is `list`: `labrig runs --since 2026-11-20` needs no `list`."""
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         is_bare = not args or (args[0].startswith("-") and args[0] not in ctx.help_option_names)
@@ -61,18 +61,18 @@ def list_them(
 
     from labrig.catalogue import RunFilter, list_runs
 
-    wanted = RunFilter(
+    run_filter = RunFilter(
         sample,
         protocol,
         since.date() if since else date.min,
         until.date() if until else date.max,
         state,
     )
-    found = list_runs(runs, wanted)
+    summaries = list_runs(runs, run_filter)
     if json:
-        _print_json([_summary_json(run) for run in found])
-    elif found:
-        _print_runs(found)
+        _print_json([_summary_json(run) for run in summaries])
+    elif summaries:
+        _print_runs(summaries)
     else:
         typer.echo(f"no such runs in {runs}")
 
@@ -138,7 +138,7 @@ def note(
     typer.echo(add_note(find_run(run, runs), text, SystemClock().wall()))
 
 
-def _print_runs(found: list["RunSummary"]) -> None:
+def _print_runs(summaries: list["RunSummary"]) -> None:
     from rich.console import Console
     from rich.table import Table
     from rich.text import Text
@@ -146,7 +146,7 @@ def _print_runs(found: list["RunSummary"]) -> None:
     table = Table(box=None, pad_edge=False)
     for title in ("began (UTC)", "sample", "protocol", "state", "k_r in 1/s"):
         table.add_column(title, overflow="fold")
-    for run in found:
+    for run in summaries:
         table.add_row(
             _when(run),
             run.sample,
@@ -163,8 +163,8 @@ def _print_comparison(comparison: "Comparison") -> None:
 
     from labrig.written_numbers import plus_minus
 
-    for key, of_a, of_b in comparison.asked:
-        typer.echo(f"asked differently: {key}: {of_a} | {of_b}")
+    for key, value_a, value_b in comparison.asked:
+        typer.echo(f"asked differently: {key}: {value_a} | {value_b}")
     if comparison.missing:
         typer.echo(f"fitted in only one of them: {', '.join(comparison.missing)}")
     if not comparison.patches:
@@ -174,12 +174,12 @@ def _print_comparison(comparison: "Comparison") -> None:
         table = Table(box=None, pad_edge=False)
         for title in ("", "run A", "run B", "B − A in σ"):
             table.add_column(title)
-        for one in patch.differences:
+        for difference in patch.differences:
             table.add_row(
-                f"{one.quantity} in {one.unit}",
-                plus_minus(one.a.value, one.a.sigma),
-                plus_minus(one.b.value, one.b.sigma),
-                "–" if math.isnan(one.pull) else f"{one.pull:+.1f}".replace("-", "−"),
+                f"{difference.quantity} in {difference.unit}",
+                plus_minus(difference.a.value, difference.a.sigma),
+                plus_minus(difference.b.value, difference.b.sigma),
+                "–" if math.isnan(difference.pull) else f"{difference.pull:+.1f}".replace("-", "−"),
             )
         if patch.differences:
             Console().print(table)
@@ -191,7 +191,7 @@ def _print_comparison(comparison: "Comparison") -> None:
 
 
 def _print_results(folder: Path) -> None:
-    """Each result and what it was made with otherwise than the one before it."""
+    """Print each result and the settings in which it differs from the one before it."""
     from labrig.process import other_settings
     from labrig.results import read_fitted_decays
 
@@ -207,7 +207,7 @@ def _print_results(folder: Path) -> None:
 
 
 def _result_folders(folder: Path) -> list[str]:
-    """The latest result first, then the earlier ones from new to old."""
+    """Return the names of the result folders from new to old, the latest first."""
     earlier = sorted(
         (path.name for path in folder.glob("result-*") if path.name[7:].isdecimal()),
         key=lambda name: -int(name[7:]),
@@ -223,7 +223,7 @@ def _rates(patch: str, result: "FittedDecay") -> str:
 
 
 def _short_rates(patch: str, result: "FittedDecay") -> str:
-    """With σ in units of the last places, so that a line holds them."""
+    """Return the rates with σ in units of the last digits, so that they fit on a line."""
     from labrig.results import with_uncertainty
 
     rates = ",  ".join(with_uncertainty(rate.value, rate.sigma) for rate in result.rates)

@@ -1,4 +1,4 @@
-"""`labrig schema`: what editors need to complete and check a YAML file."""
+"""`labrig schema`: JSON Schemas with which editors complete and check YAML files."""
 
 from typing import Annotated
 

@@ -1,4 +1,4 @@
-"""`labrig rig view`: aim, focus and draw regions, in the browser."""
+"""`labrig rig view`: live view in the browser, to aim, focus and draw regions."""
 
 from pathlib import Path
 from typing import Annotated

@@ -1,4 +1,4 @@
-"""`labrig watch`: a run while it happens, in the browser."""
+"""`labrig watch`: display of a run in the browser while it is recorded."""
 
 from pathlib import Path
 from typing import Annotated

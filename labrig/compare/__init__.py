@@ -1,4 +1,4 @@
-"""Held against photographs, against other materials and against the paper."""
+"""Comparison of a run with photographs, other materials and the paper of Nalbach et al."""
 
 from labrig.compare.numbers import numbers
 from labrig.compare.run import RunComparison, compare_run

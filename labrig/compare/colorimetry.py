@@ -1,4 +1,4 @@
-"""CIELAB with a stated white, and differences in it (colour-science)."""
+"""CIELAB with a given white point, and colour differences (colour-science)."""
 
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -15,17 +15,27 @@ FloatArray = NDArray[np.float64]
 
 CIE_1931 = "CIE 1931 2 Degree Standard Observer"
 CIE_2015 = "CIE 2015 2 Degree Standard Observer"
-#: The white of the screens on which such comparisons are looked at.
+#: White of the screens on which comparisons are viewed.
 DEFAULT_WHITE = "D65"
 
-#: `all`: one factor for all photographs of a patch, as one exposure shows them; `each`: one factor
-#: for every photograph, as if each was exposed anew.
+#: `all`: one factor for all photographs of a patch, as with one exposure; `each`: one factor for
+#: every photograph, as if each had an exposure of its own.
 Normalisation = Literal["all", "each"]
 
 
 @dataclass(frozen=True, eq=False)
 class Observer:
-    """x̄, ȳ, z̄, shape (n, 3), at (n,) wavelengths 1 nm apart."""
+    """A standard observer.
+
+    Attributes
+    ----------
+    name
+        Name of the observer in colour-science.
+    wavelength_nm
+        Wavelengths in steps of 1 nm, shape (n,).
+    functions
+        Colour-matching functions x̄, ȳ, z̄, shape (n, 3).
+    """
 
     name: str
     wavelength_nm: FloatArray
@@ -33,63 +43,70 @@ class Observer:
 
 
 def observer(name: str) -> Observer:
-    """One of colour-science's observers."""
+    """Return a standard observer of colour-science by name."""
     import colour  # takes seconds to load
 
     table = colour.MSDS_CMFS[name]
     return Observer(name, np.asarray(table.wavelengths), np.asarray(table.values))
 
 
-def white_xyz(name: str, seen_by: Observer) -> FloatArray:
-    """X, Y, Z of an illuminant such as `D65`, Y = 1.
+def white_xyz(name: str, standard_observer: Observer) -> FloatArray:
+    """Return X, Y, Z of an illuminant such as `D65`, shape (3,), with Y = 1.
 
     Raises
     ------
     UsageError
-        There is no such illuminant.
+        If there is no such illuminant.
     """
     import colour
 
-    known = {key: key for key in colour.SDS_ILLUMINANTS if "_" not in key}
-    if name not in known:
+    names = {key: key for key in colour.SDS_ILLUMINANTS if "_" not in key}
+    if name not in names:
         raise UsageError(
             f"--white: expected the name of a CIE illuminant, got '{name}'; "
-            f"{did_you_mean(name, list(known))}"
+            f"{did_you_mean(name, list(names))}"
         )
     light = colour.SDS_ILLUMINANTS[name]
-    power = np.interp(seen_by.wavelength_nm, light.wavelengths, light.values, left=0.0, right=0.0)
-    xyz = power @ seen_by.functions
+    power = np.interp(
+        standard_observer.wavelength_nm, light.wavelengths, light.values, left=0.0, right=0.0
+    )
+    xyz = power @ standard_observer.functions
     return np.asarray(xyz / xyz[1])
 
 
 def lab(xyz: FloatArray, white: FloatArray) -> FloatArray:
-    """CIELAB of X, Y, Z, shape (…, 3), on the scale on which `white` has Y = 1."""
+    """Return CIELAB of X, Y, Z, shape (…, 3), both on the scale on which `white` has Y = 1."""
     import colour
 
     return np.asarray(colour.XYZ_to_Lab(xyz, colour.XYZ_to_xy(white)))
 
 
-def delta_e(one: FloatArray, other: FloatArray) -> FloatArray:
-    """CIEDE2000 (Sharma, Wu, Dalal 2005) of two CIELAB arrays, shape (…, 3) to (…)."""
+def delta_e(first: FloatArray, second: FloatArray) -> FloatArray:
+    """Return CIEDE2000 between two CIELAB arrays of shape (…, 3), shape (…).
+
+    References
+    ----------
+    Sharma, Wu, Dalal, "The CIEDE2000 color-difference formula" (2005).
+    """
     import colour
 
-    return np.asarray(colour.difference.delta_E_CIE2000(one, other))
+    return np.asarray(colour.difference.delta_E_CIE2000(first, second))
 
 
 @dataclass(frozen=True, eq=False)
 class Viewing:
-    """How a camera's linear raw values become CIELAB.
+    """Conversion of linear raw values of a camera to CIELAB.
 
     Parameters
     ----------
     to_xyz
-        Shape (3, 3), from R, G, B to relative X, Y, Z.
+        Matrix from R, G, B to relative X, Y, Z, shape (3, 3).
     white
-        Shape (3,), Y = 1.
+        White point X, Y, Z with Y = 1, shape (3,).
     normalisation
-        See `Normalisation`.
+        Normalisation of the photographs, see `Normalisation`.
     words
-        All of that as a person reads it.
+        Description of the conversion for people.
     """
 
     to_xyz: FloatArray
@@ -103,12 +120,21 @@ def viewing(
     white: str = DEFAULT_WHITE,
     normalisation: str = "all",
 ) -> Viewing:
-    """By the curves of a camera; without any, its R, G, B are taken for linear sRGB.
+    """Return the conversion for a camera.
+
+    Parameters
+    ----------
+    camera
+        Spectral responses of the camera; None takes its R, G, B for linear sRGB.
+    white
+        CIE illuminant that is the white.
+    normalisation
+        `all` or `each`, see `Normalisation`.
 
     Raises
     ------
     UsageError
-        No such white or normalisation.
+        If there is no such white or normalisation.
     """
     import colour
 
@@ -117,10 +143,10 @@ def viewing(
     each = normalisation == "each"
     if camera is None:
         to_xyz = np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_RGB_to_XYZ)
-        how = "raw R, G, B taken for linear sRGB, since the camera's curves are not known"
+        source = "raw R, G, B taken for linear sRGB, since the camera's curves are not known"
     else:
         to_xyz = camera_to_xyz(camera)
-        how = (
+        source = (
             f"raw R, G, B to X, Y, Z by the best 3 × 3 matrix for the curves of {camera.name} "
             "(least squares over all wavelengths, equal energy exact)"
         )
@@ -134,7 +160,7 @@ def viewing(
         white=white_xyz(white, observer(CIE_1931)),
         normalisation="each" if each else "all",
         words=(
-            f"CIELAB with white {white} of the CIE 1931 2° observer; {how}; {factor} just reaches "
-            "the white in X, Y or Z; the predictions have the same factor."
+            f"CIELAB with white {white} of the CIE 1931 2° observer; {source}; {factor} just "
+            "reaches the white in X, Y or Z; the predictions have the same factor."
         ),
     )

@@ -1,4 +1,4 @@
-"""Predicted against photographed glow over time (Nalbach et al., fig. 8)."""
+"""Predicted and photographed glow over time (Nalbach et al., fig. 8)."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -16,24 +16,34 @@ from labrig.results import Series
 
 
 def in_colour(values: FloatArray, spectrum: Spectrum, camera: CameraResponse) -> FloatArray:
-    """`values`, (n, 3), with the colour that `camera` sees of `spectrum`; as bright as they are."""
+    """Return values with the colour of a spectrum and their own brightness.
+
+    Parameters
+    ----------
+    values
+        Raw values R, G, B, shape (n, 3).
+    spectrum
+        Relative spectral power whose colour the values get.
+    camera
+        Spectral responses of the camera.
+    """
     colour = camera.response(spectrum.resampled(camera.wavelength_nm).value)
     brightness = values @ colour / (colour @ colour)
     return np.asarray(np.multiply.outer(brightness, colour))
 
 
 def glow_of(material: Material, series: Series, camera: CameraResponse | None) -> FloatArray:
-    """Mean over each exposure, (n, 3), on the scale of `series`.
+    """Return the mean glow of a material over each exposure, on the scale of `series`, (n, 3).
 
-    Rates and fractions of the states are the material's: its amplitudes, else Λ_i k_r,i r_i(0) with
-    r_i(0) = 1 where it is not known. All states have one colour, that of its spectrum or, where
-    spectrum or camera are not known, the mean colour of the photographs. One factor is found by
-    least squares.
+    Rates and relative strengths of the states are the material's: its amplitudes, else
+    Λ_i k_r,i r_i(0), with r_i(0) = 1 if it is not known. All states have one colour: that of the
+    material's spectrum or, if spectrum or camera are not known, the mean colour of the photographs.
+    The scale is one factor, found by least squares.
 
     Raises
     ------
     UsageError
-        The material's file has neither amplitudes nor Λ.
+        If the material's file has neither amplitudes nor Λ.
     """
     rates = np.array([state.k_r_per_s for state in material.states])
     means = np.exp(-np.multiply.outer(series.t_s, rates)) * phi1(
@@ -48,7 +58,7 @@ def glow_of(material: Material, series: Series, camera: CameraResponse | None) -
 
 
 def _amplitudes(material: Material) -> FloatArray:
-    """Relative, (m,)."""
+    """Return the relative amplitudes of the states, shape (m,)."""
     amplitudes = [state.amplitude for state in material.states]
     if all(amplitude is not None for amplitude in amplitudes):
         return np.array(amplitudes, dtype=np.float64)
@@ -69,30 +79,35 @@ def _amplitudes(material: Material) -> FloatArray:
 
 
 RGB = ("R", "G", "B")
-#: Photographs drawn anew to tell what their noise alone makes.
+#: Number of random draws of the photographs' noise.
 DRAWS = 64
-#: A photograph must stand out of its noise by so much.
+#: Signal-to-noise ratio from which a photograph has a colour.
 LEAST_FOR_COLOUR = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class GlowComparison:
-    """One patch over n photographs, p predictions.
+    """Comparison of n photographs of a patch with predictions.
 
     Attributes
     ----------
+    patch
+        Name of the patch.
     t_s
-        Shape (n,), rising: middles of the exposures after lamp off.
-    first, seen
-        Shape (n,): photographs of the first decay, where there are several; those bright enough to
-        have a colour.
-    photographed, predicted
-        X, Y, Z as normalised, shape (n, 3) and by name (n, 3).
+        Middles of the exposures in seconds after lamp off, shape (n,), ascending.
+    first
+        Whether a photograph belongs to the first decay, shape (n,).
+    seen
+        Whether a photograph is bright enough to have a colour, shape (n,).
+    photographed
+        Normalised X, Y, Z of the photographs, shape (n, 3).
+    predicted
+        Normalised X, Y, Z of each prediction by name, shape (n, 3).
     delta_e
-        CIEDE2000 by name, shape (n,); NaN where there is no colour.
+        CIEDE2000 of each prediction by name, shape (n,); NaN where there is no colour.
     noise
-        Mean CIEDE2000 that noise alone makes, were the nearest prediction true; NaN if the noise
-        is not known.
+        Expected mean CIEDE2000 from noise alone if the nearest prediction were true; NaN if the
+        noise is not known.
     """
 
     patch: str
@@ -105,37 +120,40 @@ class GlowComparison:
     noise: float
 
     def mean(self, name: str) -> float:
-        """Over all photographs."""
+        """Return the mean CIEDE2000 of a prediction over all photographs."""
         return float(np.nanmean(self.delta_e[name]))
 
     def most(self, name: str) -> float:
-        """Over all photographs."""
+        """Return the largest CIEDE2000 of a prediction over all photographs."""
         return float(np.nanmax(self.delta_e[name]))
 
 
 def predicted_by(n_states: int) -> str:
-    """What the prediction of a fit with so many states is called."""
+    """Return the name of the prediction by a fit with `n_states` states."""
     return "1 state" if n_states == 1 else f"{n_states} states"
 
 
 def compare_glow(
     series: Series, predicted: Mapping[str, FloatArray], viewing: Viewing, flicker: float = 0.0
 ) -> GlowComparison:
-    """Photographs as in `series` against what was `predicted` for each of them.
+    """Compare photographs with predictions of them.
 
     Parameters
     ----------
     series
-        R, G, B of usable photographs, rows by rising time.
+        Signals R, G, B of usable photographs, rows in order of time.
     predicted
-        By name, one or more, shape (n, 3): the mean over each exposure, in the unit of the series.
+        Predictions by name, at least one: means over each exposure in the unit of the series, shape
+        (n, 3).
+    viewing
+        Conversion to CIELAB.
     flicker
-        Relative noise that all channels of a photograph share.
+        Relative common-mode noise of the channels of a photograph.
 
     Raises
     ------
     DataError
-        Other channels than R, G, B, or nothing but darkness.
+        If the channels are not R, G, B, or all photographs are dark.
     """
     if series.channels != RGB:
         raise DataError(
@@ -144,59 +162,64 @@ def compare_glow(
         )
     xyz = series.values @ viewing.to_xyz.T
     scale = _scale(series, xyz, viewing)
-    own = lab(scale * xyz, viewing.white)
-    normalised = {name: scale * (one @ viewing.to_xyz.T) for name, one in predicted.items()}
-    apart = {name: delta_e(own, lab(one, viewing.white)) for name, one in normalised.items()}
-    seen = _seen(series)
-    nearest = min(apart, key=lambda name: float(apart[name][seen].mean()))
+    photographed_lab = lab(scale * xyz, viewing.white)
+    normalised = {name: scale * (values @ viewing.to_xyz.T) for name, values in predicted.items()}
+    differences = {
+        name: delta_e(photographed_lab, lab(values, viewing.white))
+        for name, values in normalised.items()
+    }
+    has_colour = _has_colour(series)
+    nearest = min(differences, key=lambda name: float(differences[name][has_colour].mean()))
     unit = np.array(series.unit)
     return GlowComparison(
         patch=series.region,
         t_s=middles_s(series),
         first=unit == unit[0],
-        seen=seen,
+        seen=has_colour,
         photographed=scale * xyz,
         predicted=normalised,
-        delta_e={name: np.where(seen, one, np.nan) for name, one in apart.items()},
+        delta_e={
+            name: np.where(has_colour, values, np.nan) for name, values in differences.items()
+        },
         noise=_noise(series, predicted[nearest], scale, viewing, flicker),
     )
 
 
-def _seen(series: Series) -> NDArray[np.bool_]:
-    """Photographs that are bright enough to have a colour; without a known σ all are."""
+def _has_colour(series: Series) -> NDArray[np.bool_]:
+    """Whether each photograph is bright enough to have a colour, shape (n,); true without a σ."""
     with np.errstate(invalid="ignore"):
         signal_to_noise = np.linalg.norm(series.values / series.sigma, axis=1)
     return np.asarray(~(signal_to_noise < LEAST_FOR_COLOUR))
 
 
 def _scale(series: Series, xyz: FloatArray, viewing: Viewing) -> FloatArray:
-    """By what X, Y, Z of each photograph are multiplied, shape (n, 1)."""
+    """Return the factors of X, Y, Z of each photograph, shape (n, 1)."""
     reach = (xyz / viewing.white).max(axis=1)
-    brightest = float(reach[_seen(series)].max(initial=0.0))
+    brightest = float(reach[_has_colour(series)].max(initial=0.0))
     if not brightest > 0:
         raise DataError(f"{series.region}: every photograph is too dim to have a colour")
-    own = np.maximum(reach, np.finfo(float).eps * brightest)
-    factor = own if viewing.normalisation == "each" else np.full_like(reach, brightest)
+    reached = np.maximum(reach, np.finfo(float).eps * brightest)
+    factor = reached if viewing.normalisation == "each" else np.full_like(reach, brightest)
     return np.asarray(1 / factor[:, np.newaxis])
 
 
 def _noise(
     series: Series, expected: FloatArray, scale: FloatArray, viewing: Viewing, flicker: float
 ) -> float:
-    """Mean CIEDE2000 between what is expected and photographs of exactly that."""
+    """Return the mean CIEDE2000 between expected values and photographs of them with noise."""
     if not np.isfinite(series.sigma).all():
         return float("nan")
     rng = np.random.default_rng(0)
     shape = (DRAWS, len(expected))
-    drawn = expected * (1 + flicker * rng.standard_normal((*shape, 1)))
-    drawn = drawn + series.sigma * rng.standard_normal((*shape, 3))
-    of_drawn = lab(scale * (drawn @ viewing.to_xyz.T), viewing.white)
-    of_expected = lab(scale * (expected @ viewing.to_xyz.T), viewing.white)
-    return float(delta_e(of_drawn, of_expected[np.newaxis])[:, _seen(series)].mean())
+    draws = expected * (1 + flicker * rng.standard_normal((*shape, 1)))
+    draws = draws + series.sigma * rng.standard_normal((*shape, 3))
+    drawn_lab = lab(scale * (draws @ viewing.to_xyz.T), viewing.white)
+    expected_lab = lab(scale * (expected @ viewing.to_xyz.T), viewing.white)
+    return float(delta_e(drawn_lab, expected_lab[np.newaxis])[:, _has_colour(series)].mean())
 
 
 def glow_table(glows: Sequence[GlowComparison]) -> Table:
-    """ΔE of every patch, of all of them, and the paper's."""
+    """Return a table of the colour differences of every patch, of all patches and of the paper."""
     names = list(dict.fromkeys(name for glow in glows for name in glow.delta_e))
     rows = [
         (
@@ -208,8 +231,8 @@ def glow_table(glows: Sequence[GlowComparison]) -> Table:
     ]
     if len(glows) > 1:
         rows.append(("all patches", *(_mean_and_most(glows, name) for name in names), ""))
-    of_paper = {predicted_by(n): f"{d.mean:.2f} ({d.most:.2f})" for n, d in DELTA_E.items()}
-    rows.append(("paper, 11 materials", *(of_paper.get(name, "–") for name in names), ""))
+    paper_cells = {predicted_by(n): f"{d.mean:.2f} ({d.most:.2f})" for n, d in DELTA_E.items()}
+    rows.append(("paper, 11 materials", *(paper_cells.get(name, "–") for name in names), ""))
     return Table(
         head=("patch", *names, "noise"),
         rows=tuple(rows),
@@ -221,8 +244,8 @@ def glow_table(glows: Sequence[GlowComparison]) -> Table:
 
 
 def _mean_and_most(glows: Sequence[GlowComparison], name: str) -> str:
-    known = [glow.delta_e[name] for glow in glows if name in glow.delta_e]
-    if not known:
+    values = [glow.delta_e[name] for glow in glows if name in glow.delta_e]
+    if not values:
         return "–"
-    together = np.concatenate(known)
-    return f"{np.nanmean(together):.2f} ({np.nanmax(together):.2f})"
+    all_values = np.concatenate(values)
+    return f"{np.nanmean(all_values):.2f} ({np.nanmax(all_values):.2f})"

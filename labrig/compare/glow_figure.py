@@ -1,4 +1,4 @@
-"""Photographed and predicted glow as colour patches over time, as the paper's fig. 8 has them."""
+"""Photographed and predicted glow as colour patches over time, as in fig. 8 of Nalbach et al."""
 
 from collections.abc import Sequence
 
@@ -23,22 +23,24 @@ from labrig.report import (
 )
 from labrig.written_numbers import rounded
 
-#: Photographs side by side, and how their times are spread: dense where the glow changes most.
+#: Number of photographs side by side, and exponent of their spacing, dense at early times.
 COLUMNS = 9
 SPREAD = 1.6
 WRITING_PT = 8.5
 LABELS_PT, CELL_HEIGHT_PT = 74.0, 24.0
 TITLE_PT, TIMES_PT, GAP_PT = 20.0, 16.0, 8.0
-#: Luminance from which black writing has more contrast than white.
+#: Luminance from which black text has more contrast than white text.
 BRIGHT = 0.18
 
 
 def glow_figure(glows: Sequence[GlowComparison]) -> Figure:
-    """A block for each patch: photographs above, predictions below with their ΔE."""
+    """Draw a block for each patch: photographs above, predictions with their ΔE below."""
     times = [tuple(glow.t_s[shown_rows(glow)]) for glow in glows]
     # Patches of one run were mostly photographed together: their times stand once.
-    timed = [one != after for one, after in zip(times, [*times[1:], ()], strict=True)]
-    tops = np.cumsum([0.0, *(_height(*one) for one in zip(glows, timed, strict=True))])
+    timed = [
+        current != following for current, following in zip(times, [*times[1:], ()], strict=True)
+    ]
+    tops = np.cumsum([0.0, *(_height(*block) for block in zip(glows, timed, strict=True))])
     height = float(tops[-1]) + TIMES_PT
     figure = new_figure(height)
     axes = figure.add_axes((0, 0, 1, 1))
@@ -52,7 +54,7 @@ def glow_figure(glows: Sequence[GlowComparison]) -> Figure:
 
 
 def shown_rows(glow: GlowComparison) -> NDArray[np.intp]:
-    """Photographs of the first decay, more of the early ones."""
+    """Return the rows of the photographs shown: of the first decay, denser at early times."""
     rows = np.flatnonzero(glow.first)
     if len(rows) <= COLUMNS:
         return rows
@@ -61,9 +63,9 @@ def shown_rows(glow: GlowComparison) -> NDArray[np.intp]:
 
 
 def screen_colours(glow: GlowComparison) -> dict[str, FloatArray]:
-    """Linear sRGB, (n, 3) each; the brightest photograph just fills the screen.
+    """Return linear sRGB of photographs and predictions by name, shape (n, 3).
 
-    Photographs of nothing but noise are black.
+    The brightest photograph has a channel of 1. Photographs that are nothing but noise are black.
     """
     import colour
 
@@ -102,7 +104,7 @@ def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> No
                 axes.text(
                     x + width / 2,
                     y + CELL_HEIGHT_PT / 2,
-                    _written(float(glow.delta_e[name][row])),
+                    _delta_e_text(float(glow.delta_e[name][row])),
                     ha="center",
                     va="center",
                     fontsize=WRITING_PT,
@@ -114,7 +116,7 @@ def _block(axes: Axes, glow: GlowComparison, top: float, with_times: bool) -> No
                   ha="center", color=MUTED, fontsize=SMALL_PT)  # fmt: skip
 
 
-def _written(delta_e: float) -> str:
+def _delta_e_text(delta_e: float) -> str:
     return "–" if np.isnan(delta_e) else f"{delta_e:.1f}"
 
 

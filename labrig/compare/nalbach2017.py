@@ -1,4 +1,4 @@
-"""What Nalbach et al. found, to stand beside one's own figures.
+"""Published results for comparison.
 
 Nalbach, Seidel, Ritschel: *Practical Capture and Reproduction of Phosphorescent Appearance*.
 """
@@ -34,11 +34,11 @@ class DeltaE(NamedTuple):
     most: float
 
 
-#: By the number of states (caption of fig. 8).
+#: Colour differences by the number of states (caption of fig. 8).
 DELTA_E = {1: DeltaE(13.16, 7.24, 19.75), 2: DeltaE(5.46, 1.23, 10.64)}
-#: Error with so many states over that with one, median of the materials (sec. 4.4).
+#: Residuals by the number of states over those of one state, median of the materials (sec. 4.4).
 RESIDUALS = {2: 0.08, 3: 0.04}
-#: The same of the last time sample.
+#: Residuals of the last time sample by the number of states over those of one state (sec. 4.4).
 LAST_RESIDUALS = {2: 0.18, 3: 0.03}
 
 
@@ -47,10 +47,10 @@ STEP_NM = 1e-6
 
 
 def emission(material: Material) -> Spectrum | None:
-    """On the finest grid its file has; None if it says nothing of it.
+    """Return the emission spectrum of a material; None if its file has none.
 
-    That is the spectrum, or else what all states together radiate at r = 1, Σ_i Λ_i k_r,i, taken
-    as constant within each band.
+    The spectrum is the measured one or, without it, the radiation of all states at r = 1,
+    Σ_i Λ_i k_r,i, constant within each band.
     """
     if material.spectrum is not None:
         return Spectrum(
@@ -71,7 +71,7 @@ def emission(material: Material) -> Spectrum | None:
 
 
 def emission_grid(material: Material) -> str:
-    """In words what `emission` rests on: `31 wavelengths`, `8 bands`."""
+    """Return the resolution of `emission` as text: `31 wavelengths`, `8 bands`."""
     if material.spectrum is not None:
         return f"{len(material.spectrum.wavelength_nm)} wavelengths"
     return "–" if material.bands_nm is None else f"{len(material.bands_nm) - 1} bands"

@@ -1,4 +1,4 @@
-"""A comparison as plain numbers, for programs."""
+"""Conversion of a comparison to plain numbers."""
 
 import math
 from typing import Any
@@ -7,8 +7,30 @@ from labrig.compare.run import RunComparison
 
 
 def numbers(comparison: RunComparison) -> dict[str, Any]:
-    """Lists, dictionaries, texts and finite numbers; what is not known is None."""
-    found: dict[str, Any] = _plain(
+    """Convert a comparison to plain numbers for programs.
+
+    Parameters
+    ----------
+    comparison
+        Comparison of a run.
+
+    Returns
+    -------
+    dict
+        Lists, dictionaries, strings and finite numbers, ready for JSON; unknown values are None.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.compare import compare_run, numbers
+    >>> def refit(series, states, flicker):
+    ...     return labrig.fit_series(series, states, flicker=flicker)
+    >>> glow = numbers(compare_run(Path("runs/decay"), refit))["glow"]["sample"]
+    >>> sorted(glow["delta_e"])
+    ['1 state', '2 states']
+    """
+    plain: dict[str, Any] = _plain(
         {
             "words": comparison.words,
             "camera": comparison.camera.name if comparison.camera else None,
@@ -25,15 +47,20 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
                 for glow in comparison.glows
             },
             "residuals": [
-                {"patch": one.patch, "weights": one.weighted, "rms": one.rms, "last": one.last}
-                for one in comparison.residuals
+                {
+                    "patch": residuals.patch,
+                    "weights": residuals.weighted,
+                    "rms": residuals.rms,
+                    "last": residuals.last,
+                }
+                for residuals in comparison.residuals
             ],
             "beside": [
                 {
-                    "measured": one.names[0],
-                    "reference": one.names[1],
-                    "k_e_factor": one.k_e_factor,
-                    "reradiation_factor": one.reradiation_factor,
+                    "measured": materials.names[0],
+                    "reference": materials.names[1],
+                    "k_e_factor": materials.k_e_factor,
+                    "reradiation_factor": materials.reradiation_factor,
                     "rows": [
                         {
                             "quantity": pair.quantity,
@@ -44,23 +71,27 @@ def numbers(comparison: RunComparison) -> dict[str, Any]:
                             "percent": pair.percent,
                             "in_sigma": pair.in_sigma,
                         }
-                        for pair in one.pairs
+                        for pair in materials.pairs
                     ],
-                    "notes": list(one.notes),
+                    "notes": list(materials.notes),
                 }
-                for one in comparison.beside
+                for materials in comparison.beside
             ],
             "spectra": {
-                one.name: {"delta_e": one.delta_e, "missed": one.missed, "known_on": grid}
-                for one, grid in comparison.spectra
+                spectrum.name: {
+                    "delta_e": spectrum.delta_e,
+                    "missed": spectrum.missed,
+                    "known_on": grid,
+                }
+                for spectrum, grid in comparison.spectra
             },
         }
     )
-    return found
+    return plain
 
 
 def _plain(item: Any) -> Any:
-    """JSON knows no infinity and no NaN, and keys are texts."""
+    """Replace infinity and NaN, which JSON does not have, by None, and keys by text."""
     if isinstance(item, dict):
         return {str(key): _plain(value) for key, value in item.items()}
     if isinstance(item, list):

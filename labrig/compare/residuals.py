@@ -1,4 +1,4 @@
-"""What two and three states leave of a decay that one state leaves (Nalbach et al., sec. 4.4)."""
+"""Residuals of decay fits with two and three states over one state (Nalbach et al., sec. 4.4)."""
 
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,25 +12,27 @@ from labrig.fit import DecayFit, fit_decay
 from labrig.report import Table
 from labrig.results import Series
 
-#: A fit to a series: so many states, and so much flicker.
+#: Fit of a series with a number of states and a relative flicker.
 Refit = Callable[[Series, int, float], DecayFit]
 STATES = (1, 2, 3)
 
 
 @dataclass(frozen=True)
 class Residuals:
-    """Errors with n states over those with one, by n.
+    """Residuals of fits with n states over those with one state, by n.
 
     Attributes
     ----------
+    patch
+        Name of the patch.
     weighted
-        How the values were weighted in the fit.
+        Weighting of the values in the fit, `noise` or `equal`.
     rms
-        Root mean square over all frames and channels.
+        Ratio of the root mean squares over all frames and channels.
     last
-        The same of the last frame alone.
+        Ratio of the root mean squares of the last frame.
     supported
-        How many states came out where n were asked for.
+        Number of states that could be fitted where n were requested.
     """
 
     patch: str
@@ -41,20 +43,30 @@ class Residuals:
 
 
 def residuals(series: Series, fits: Mapping[int, DecayFit], weighted: str) -> Residuals:
-    """Of fits to `series` by their number of states, as `fits_by_states` has them."""
-    left = {number: series.values - predicted(series, fit) for number, fit in fits.items()}
+    """Return the residuals of fits to a series.
+
+    Parameters
+    ----------
+    series
+        Series that was fitted.
+    fits
+        Fits by the number of states requested, from `fits_by_states`.
+    weighted
+        Weighting of the values in the fits, `noise` or `equal`.
+    """
+    errors = {number: series.values - predicted(series, fit) for number, fit in fits.items()}
     last = int(np.argmax(series.t_s))
     return Residuals(
         patch=series.region,
         weighted=weighted,
-        rms=_over_one_state(left),
-        last=_over_one_state({number: one[last] for number, one in left.items()}),
+        rms=_over_one_state(errors),
+        last=_over_one_state({number: error[last] for number, error in errors.items()}),
         supported={number: fit.n_states for number, fit in fits.items()},
     )
 
 
 def predicted(series: Series, fit: DecayFit) -> FloatArray:
-    """What `fit` says of every row of its series, (n, C), each repeat at its own level."""
+    """Return the prediction of a fit for every row of its series, with repeat levels, (n, C)."""
     levels = dict(zip(fit.repeats, fit.levels, strict=True))
     level = np.array([levels.get(unit, 1.0) for unit in series.unit])
     signal = fit.predict(series.t_s, series.exposure_s) - fit.offsets
@@ -62,12 +74,12 @@ def predicted(series: Series, fit: DecayFit) -> FloatArray:
 
 
 def fits_by_states(series: Series, flicker: float, refit: Refit) -> dict[int, DecayFit]:
-    """Fits of one, two, three states; where one more cannot be told, the fit of one less.
+    """Fit one, two and three states; where one more is not supported, the fit of one less is taken.
 
     Raises
     ------
     FitError
-        Not even one state can be fitted.
+        If not even one state can be fitted.
     """
     fits = {1: refit(series, 1, flicker)}
     for number in STATES[1:]:
@@ -79,9 +91,9 @@ def fits_by_states(series: Series, flicker: float, refit: Refit) -> dict[int, De
 
 
 def equally_weighted(series: Series, n_states: int, flicker: float = 0.0) -> DecayFit:
-    """A fit as the paper's: plain least squares of the linear values."""
-    known = series.sigma[np.isfinite(series.sigma)]
-    sigma = float(np.median(known)) if known.size else 1e-3 * float(np.abs(series.values).max())
+    """Fit the linear values by plain least squares, as Nalbach et al. do."""
+    sigmas = series.sigma[np.isfinite(series.sigma)]
+    sigma = float(np.median(sigmas)) if sigmas.size else 1e-3 * float(np.abs(series.values).max())
     return fit_decay(
         series.t_s,
         series.values,
@@ -94,21 +106,27 @@ def equally_weighted(series: Series, n_states: int, flicker: float = 0.0) -> Dec
     )
 
 
-def residuals_table(found: Sequence[Residuals]) -> Table:
-    """A row for each patch and way of weighting, their medians, and the paper's figures."""
-    ways = list(dict.fromkeys(one.weighted for one in found))
+def residuals_table(entries: Sequence[Residuals]) -> Table:
+    """Return a table with a row for each patch and weighting, their medians, and the paper's."""
+    weightings = list(dict.fromkeys(entry.weighted for entry in entries))
     rows = [
-        (one.patch, one.weighted, *_percents(one.rms), *_percents(one.last), _more_states(one))
-        for one in found
+        (
+            entry.patch,
+            entry.weighted,
+            *_percents(entry.rms),
+            *_percents(entry.last),
+            _more_states(entry),
+        )
+        for entry in entries
     ]
-    for way in ways:
-        same = [one for one in found if one.weighted == way]
-        if len(same) > 1:
+    for weighting in weightings:
+        group = [entry for entry in entries if entry.weighted == weighting]
+        if len(group) > 1:
             rms, last = (
-                {n: float(np.median([getattr(one, what)[n] for one in same])) for n in STATES}
-                for what in ("rms", "last")
+                {n: float(np.median([getattr(entry, key)[n] for entry in group])) for n in STATES}
+                for key in ("rms", "last")
             )
-            rows.append(("median", way, *_percents(rms), *_percents(last), ""))
+            rows.append(("median", weighting, *_percents(rms), *_percents(last), ""))
     rows.append(
         ("paper, median of 11", "equal", *_percents(RESIDUALS), *_percents(LAST_RESIDUALS), "")
     )
@@ -131,15 +149,15 @@ def residuals_table(found: Sequence[Residuals]) -> Table:
     )
 
 
-def _over_one_state(left: Mapping[int, FloatArray]) -> dict[int, float]:
-    """RMS by the number of states, over that with one; 1 where that one is 0 already."""
-    rms = {number: float(np.sqrt(np.mean(one**2))) for number, one in left.items()}
-    return {number: one / rms[1] if rms[1] > 0 else 1.0 for number, one in rms.items()}
+def _over_one_state(errors: Mapping[int, FloatArray]) -> dict[int, float]:
+    """Return the RMS by the number of states over that of one state; 1 if that is 0 already."""
+    rms = {number: float(np.sqrt(np.mean(value**2))) for number, value in errors.items()}
+    return {number: value / rms[1] if rms[1] > 0 else 1.0 for number, value in rms.items()}
 
 
 def _percents(ratios: Mapping[int, float]) -> tuple[str, ...]:
     return tuple(f"{100 * ratios[number]:.3g}" for number in STATES[1:])
 
 
-def _more_states(one: Residuals) -> str:
-    return ", ".join(str(number) for number in one.supported.values())
+def _more_states(entry: Residuals) -> str:
+    return ", ".join(str(number) for number in entry.supported.values())

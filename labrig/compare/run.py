@@ -1,4 +1,4 @@
-"""A decay run held against predictions, against other materials and against the paper."""
+"""Comparison of a decay run with predictions, other materials and the paper."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -38,16 +38,16 @@ from labrig.yaml_file import did_you_mean, read_yaml
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPatch:
-    """What a result folder holds of one patch.
+    """Result of one patch.
 
     Attributes
     ----------
     series
-        Usable frames by time, the offsets that the fit found subtracted.
+        Usable frames in order of time, with the fitted offsets subtracted.
     flicker
-        As the fit found it.
+        Fitted relative common-mode noise.
     material
-        Its file: that of all parts, where a chain has made one, else the decay's own.
+        Material file: that of the whole chain if there is one, else that of the decay.
     """
 
     series: Series
@@ -56,79 +56,87 @@ class MeasuredPatch:
 
     @property
     def name(self) -> str:
-        """Of the patch, or of the sample if there is only one."""
+        """Name of the patch, or of the sample if there is one patch only."""
         return self.series.region
 
 
 def read_patches(run: Path) -> dict[str, MeasuredPatch]:
-    """By name: every patch with a decay fit in a run's latest result.
+    """Read every patch with a decay fit in a run's latest result, by name.
 
     Raises
     ------
     UsageError
-        Not a run folder.
+        If this is not a run folder.
     DataError
-        There is no result with a fit, or it is damaged.
+        If there is no result with a fit, or it is damaged.
     """
     if not (run / "protocol.yaml").is_file():
         raise UsageError(f"{run}: expected a run folder with protocol.yaml in it")
     fits = find_fitted_decays(run / "result").values()
-    places = [fit.parent for fit in fits if (fit.parent / "series.csv").is_file()]
-    if not places:
+    folders = [fit.parent for fit in fits if (fit.parent / "series.csv").is_file()]
+    if not folders:
         raise DataError(
             f"{run}: expected a result with the fit of a decay, got none; make one: "
             f"labrig process {run}"
         )
     sample = read_yaml(run / "protocol.yaml").get("sample")
-    only = sample.get("name") if isinstance(sample, dict) and len(places) == 1 else None
-    several = len(places) > 1
+    only = sample.get("name") if isinstance(sample, dict) and len(folders) == 1 else None
+    several = len(folders) > 1
     patches = [
-        _read_patch(place, only, run / "result" / (place.name if several else ""))
-        for place in places
+        _read_patch(folder, only, run / "result" / (folder.name if several else ""))
+        for folder in folders
     ]
     return {patch.name: patch for patch in patches}
 
 
-def _read_patch(place: Path, name: str | None, of_chain: Path) -> MeasuredPatch:
-    fit = read_fitted_decay(place / "fit.json")
-    series = joined(read_series(place / "series.csv"))
+def _read_patch(folder: Path, name: str | None, chain_folder: Path) -> MeasuredPatch:
+    fit = read_fitted_decay(folder / "fit.json")
+    series = joined(read_series(folder / "series.csv"))
     if fit.channels != series.channels:
         raise DataError(
-            f"{place}: expected fit.json and series.csv of the same channels, got "
+            f"{folder}: expected fit.json and series.csv of the same channels, got "
             f"{', '.join(fit.channels)} and {', '.join(series.channels)}; make them again: "
             "labrig process RUN"
         )
     rows = np.flatnonzero(series.usable)
-    by_time = rows[np.argsort(series.t_s[rows], kind="stable")]
-    usable = series.take(by_time, name)
-    whole = of_chain / "material.yaml"
-    material = read_material(whole if whole.is_file() else place / "material.yaml")
+    rows_by_time = rows[np.argsort(series.t_s[rows], kind="stable")]
+    usable = series.take(rows_by_time, name)
+    chain_file = chain_folder / "material.yaml"
+    material = read_material(chain_file if chain_file.is_file() else folder / "material.yaml")
     return MeasuredPatch(
         replace(usable, values=usable.values - np.array(fit.offsets)), fit.flicker, material
     )
 
 
-#: Numbers of states of which the glow is predicted, as in the paper's fig. 8.
+#: Numbers of states for which the glow is predicted, as in fig. 8 of Nalbach et al.
 PREDICTED = (1, 2)
-#: Name of the prediction by the material file asked for.
+#: Name of the prediction from the reference material.
 MATERIAL = "material"
 
 
 @dataclass(frozen=True, eq=False)
 class RunComparison:
-    """All that was compared of one run.
+    """Comparison of one run.
 
     Attributes
     ----------
-    camera, white
-        By whose curves colours are seen (None: not known), and with which white.
+    camera
+        Spectral responses of the camera; None if they are not known.
+    white
+        CIE illuminant that is the white of CIELAB.
     words
-        White, normalisation and where the predicted colours come from.
+        Description of white, normalisation and source of the predicted colours.
+    glows
+        Photographed and predicted glow of each patch.
+    residuals
+        Residuals of each patch and weighting.
+    beside
+        Comparisons of measured with reference materials.
     spectra
-        Of what the patches emit as far as it is known, of the materials asked for and of Table 1,
-        each with the grid it is known on.
+        Emission spectra in three channels, each with its resolution: those of the patches where
+        known, of the reference materials and of Table 1.
     left_out
-        What could not be compared, and why.
+        Comparisons that are not possible, with the reason.
     """
 
     camera: CameraResponse | None
@@ -149,30 +157,62 @@ def compare_run(
     normalisation: str = "all",
     camera: str | None = None,
 ) -> RunComparison:
-    """Compare the latest result of the decay run in `folder`.
+    """Compare the latest result of a decay run with predictions, materials and the paper.
+
+    Photographed and predicted glow are compared as in fig. 8 of Nalbach et al., the residuals of
+    one, two and three states as in section 4.4, spectra in three channels as in fig. 9.
 
     Parameters
     ----------
+    folder
+        Run folder.
     refit
-        Fits a series with a number of states and a given flicker, as the run's processing does.
+        Function that fits a series with a given number of states and a given relative flicker.
     materials
-        `MATERIAL` or `PATCH=MATERIAL`: shipped names or files.
-    white, normalisation
-        See `viewing`.
+        Reference materials as `MATERIAL` or `PATCH=MATERIAL`, by shipped name or path.
+    white
+        CIE illuminant that is the white of CIELAB, such as `D65`.
+    normalisation
+        Normalisation of the photographs, `all` or `each`; see `Normalisation`.
     camera
-        Other curves than the run was processed with.
+        Camera curves that replace those with which the run was processed, by shipped name or path.
+
+    Returns
+    -------
+    RunComparison
+        Glow, residuals, material parameters and spectra.
 
     Raises
     ------
     UsageError
-        Not a run, or a patch, material, white or camera that there is not.
+        If this is not a run folder, or if there is no such patch, material, white or camera.
     DataError
-        There is no result, or it is damaged.
+        If there is no result, or it is damaged.
+
+    References
+    ----------
+    Nalbach, Seidel, Ritschel, "Practical Capture and Reproduction of Phosphorescent Appearance"
+    (2017).
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.compare import compare_run
+    >>> def refit(series, states, flicker):
+    ...     return labrig.fit_series(series, states, flicker=flicker)
+    >>> comparison = compare_run(Path("runs/decay"), refit)
+    >>> [glow.patch for glow in comparison.glows]
+    ['sample']
+    >>> comparison.glows[0].mean("2 states") < 1
+    True
+    >>> {states: round(rms, 2) for states, rms in comparison.residuals[0].rms.items()}
+    {1: 1.0, 2: 0.01, 3: 0.01}
     """
     patches = read_patches(folder)
     references = _by_patch(materials, list(patches))
     curves, left_out = _camera(folder, camera)
-    seen = viewing(curves, white, normalisation)
+    conversion = viewing(curves, white, normalisation)
     glows: list[GlowComparison] = []
     ratios: list[Residuals] = []
     for patch in patches.values():
@@ -181,20 +221,21 @@ def compare_run(
             equal = fits_by_states(patch.series, 0.0, equally_weighted)
             ratios.append(residuals(patch.series, fits, "noise"))
             ratios.append(residuals(patch.series, equal, "equal"))
-            expected = _expected(patch, fits, references.get(patch.name), curves)
-            glows.append(compare_glow(patch.series, expected, seen, patch.flicker))
+            predictions = _predictions(patch, fits, references.get(patch.name), curves)
+            glows.append(compare_glow(patch.series, predictions, conversion, patch.flicker))
         except DataError as error:
             left_out.append(f"{patch.name} is left out: {error}")
     return RunComparison(
         camera=curves,
         white=white,
         words=" ".join(
-            [seen.words, *_curves_source(list(patches.values()), curves, bool(references))]
+            [conversion.words, *_curves_source(list(patches.values()), curves, bool(references))]
         ),
         glows=tuple(glows),
         residuals=tuple(ratios),
         beside=tuple(
-            compare_materials(patches[name].material, one) for name, one in references.items()
+            compare_materials(patches[name].material, reference)
+            for name, reference in references.items()
         ),
         spectra=() if curves is None else _spectra(patches, references, curves, white),
         left_out=tuple(left_out),
@@ -202,57 +243,60 @@ def compare_run(
 
 
 def _by_patch(materials: Sequence[str], patches: Sequence[str]) -> dict[str, Material]:
-    """Materials by patch; without one, the patch of the same name or the only one."""
-    found: dict[str, Material] = {}
+    """Return the reference materials by patch.
+
+    A material without a patch belongs to the patch of the same name or to the only one.
+    """
+    by_patch: dict[str, Material] = {}
     for text in materials:
-        named, _, name = text.rpartition("=")
-        patch = named or (name if name in patches or len(patches) > 1 else patches[0])
+        patch_name, _, name = text.rpartition("=")
+        patch = patch_name or (name if name in patches or len(patches) > 1 else patches[0])
         if patch not in patches:
             raise UsageError(
                 f"--material: no patch is called '{patch}'; {did_you_mean(patch, patches)}; write "
                 f"--material PATCH={name}"
             )
-        if patch in found:
+        if patch in by_patch:
             raise UsageError(f"--material: expected one material for {patch}, got two")
-        found[patch] = read_material(name)
-    return found
+        by_patch[patch] = read_material(name)
+    return by_patch
 
 
-def _camera(folder: Path, instead: str | None) -> tuple[CameraResponse | None, list[str]]:
-    """The curves asked for, else those the run was processed with, and why there are none."""
+def _camera(folder: Path, replacement: str | None) -> tuple[CameraResponse | None, list[str]]:
+    """Return the curves requested, else those of the processing, and why there are none."""
     rig = read_rig_file(folder / "rig.yaml")
     try:
         lvf = read_result(folder).provides().get("lvf") or calibration(rig, LVF_KIND)
-        return camera_curves(rig, instead, lvf), []
+        return camera_curves(rig, replacement, lvf), []
     except UsageError as error:
-        if instead is not None:
+        if replacement is not None:
             raise
         return None, [f"no camera curves: {error}; give them with --camera"]
 
 
-def _expected(
+def _predictions(
     patch: MeasuredPatch,
     fits: Mapping[int, DecayFit],
     reference: Material | None,
     camera: CameraResponse | None,
 ) -> dict[str, FloatArray]:
-    """What is predicted for each photograph, (n, C), by the name of the prediction."""
+    """Return the predictions for each photograph by name, shape (n, C)."""
     series, spectrum = patch.series, emission(patch.material)
-    expected = {}
+    predictions = {}
     for number in PREDICTED:
         values = predicted(series, fits[number])
         if spectrum is not None and camera is not None:
             values = in_colour(values, spectrum, camera)
-        expected[predicted_by(number)] = values
+        predictions[predicted_by(number)] = values
     if reference is not None:
-        expected[MATERIAL] = glow_of(reference, series, camera)
-    return expected
+        predictions[MATERIAL] = glow_of(reference, series, camera)
+    return predictions
 
 
 def _curves_source(
     patches: Sequence[MeasuredPatch], camera: CameraResponse | None, with_material: bool
 ) -> Iterator[str]:
-    """Where the colours of the predictions come from."""
+    """Yield sentences on the source of the predicted colours."""
     if camera is not None and all(emission(patch.material) for patch in patches):
         yield "The predicted colour is that of the measured spectrum, by the camera's curves."
     else:
@@ -270,18 +314,18 @@ def _spectra(
     camera: CameraResponse,
     white: str,
 ) -> tuple[tuple[ThreeChannels, str], ...]:
-    """Of measured materials first; of those of the same name only the first."""
-    known: dict[str, Material] = {}
+    """Return the spectra of all materials, measured ones first; of equal names only the first."""
+    by_name: dict[str, Material] = {}
     for material in (
         *(patch.material for patch in patches.values()),
         *references.values(),
         *map(read_material, TABLE_1),
     ):
         if emission(material) is not None:
-            known.setdefault(material.name, material)
-    found = []
-    for material in known.values():
+            by_name.setdefault(material.name, material)
+    spectra = []
+    for material in by_name.values():
         spectrum = emission(material)
         if spectrum is not None:
-            found.append((three_channels(spectrum, camera, white), emission_grid(material)))
-    return tuple(found)
+            spectra.append((three_channels(spectrum, camera, white), emission_grid(material)))
+    return tuple(spectra)

@@ -1,4 +1,4 @@
-"""Spectra, what three functions make of them, and their colours (Nalbach et al., fig. 9)."""
+"""Spectra, their approximations by three functions and their colours (Nalbach et al., fig. 9)."""
 
 import math
 from collections.abc import Sequence
@@ -29,20 +29,20 @@ COLUMNS = 3
 PANEL_HEIGHT_PT, LEGEND_PT, BELOW_PT, LEFT_PT = 112.0, 22.0, 18.0, 16.0
 FROM_NM, TO_NM = 395.0, 705.0
 TICKS_NM = (400, 500, 600, 700)
-#: The outer labels end with their axes, so that neighbours stay apart.
+#: Alignment of the labels: the outer ones end with their axes, so that panels stay apart.
 _SIDES: tuple[Literal["left", "center", "right"], ...] = ("left", "center", "center", "right")
 TICK_PT = 8.5
-#: Vertical axes end here: above 1 is room for the colours.
+#: Upper limit of the vertical axes, with space for the colours above 1.
 HIGHEST = 1.4
 
 
-def spectra_figure(found: Sequence[ThreeChannels]) -> Figure:
-    """A panel for each spectrum; its colour and that from R, G, B side by side in a corner."""
-    rows = math.ceil(len(found) / COLUMNS)
+def spectra_figure(results: Sequence[ThreeChannels]) -> Figure:
+    """Draw a panel for each spectrum, with its colour next to the colour from R, G, B."""
+    rows = math.ceil(len(results) / COLUMNS)
     height = LEGEND_PT + rows * PANEL_HEIGHT_PT + BELOW_PT
     figure = new_figure(height)
     width = (WIDTH_PT - LEFT_PT) / COLUMNS
-    for number, one in enumerate(found):
+    for number, result in enumerate(results):
         row, column = divmod(number, COLUMNS)
         axes = place(
             figure,
@@ -51,26 +51,28 @@ def spectra_figure(found: Sequence[ThreeChannels]) -> Figure:
             right=WIDTH_PT - LEFT_PT - (column + 1) * width + 10,
             top=LEGEND_PT + row * PANEL_HEIGHT_PT + 18,
         )
-        full = float(one.spectrum.max())
-        axes.plot(one.wavelength_nm, one.spectrum / full, color=INK, linewidth=1.2)
+        full = float(result.spectrum.max())
+        axes.plot(result.wavelength_nm, result.spectrum / full, color=INK, linewidth=1.2)
         axes.plot(
-            one.wavelength_nm,
-            one.approximation / full,
+            result.wavelength_nm,
+            result.approximation / full,
             color=MUTED,
             linewidth=1.2,
             linestyle=DASHED,
         )
         axes.set_xlim(FROM_NM, TO_NM)
         axes.set_xticks(TICKS_NM)
-        lowest = float(one.approximation.min()) / full
+        lowest = float(result.approximation.min()) / full
         axes.set_ylim(min(lowest * 1.1, -0.04), HIGHEST)
         axes.set_yticks((0, 1), ("0", "1") if column == 0 else ("", ""))
         axes.tick_params(labelsize=TICK_PT, pad=2)
         for label, side in zip(axes.get_xticklabels(), _SIDES, strict=True):
             label.set_horizontalalignment(side)
-        axes.set_title(one.name, fontsize=SMALL_PT, color=INK, loc="left", pad=4)
-        axes.set_title(f"ΔE {one.delta_e:.1f}", fontsize=SMALL_PT, color=MUTED, loc="right", pad=4)
-        for place_x, xyz in ((0.72, one.xyz), (0.86, one.xyz_from_rgb)):
+        axes.set_title(result.name, fontsize=SMALL_PT, color=INK, loc="left", pad=4)
+        axes.set_title(
+            f"ΔE {result.delta_e:.1f}", fontsize=SMALL_PT, color=MUTED, loc="right", pad=4
+        )
+        for place_x, xyz in ((0.72, result.xyz), (0.86, result.xyz_from_rgb)):
             axes.add_patch(
                 Rectangle(
                     (place_x, 0.84),
@@ -92,7 +94,7 @@ def spectra_figure(found: Sequence[ThreeChannels]) -> Figure:
 
 
 def _on_screen(xyz: FloatArray) -> FloatArray:
-    """Linear sRGB, the brightest channel 1."""
+    """Return linear sRGB of X, Y, Z with a maximum of 1, shape (3,)."""
     import colour
 
     linear = into_gamut(np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB) @ xyz)

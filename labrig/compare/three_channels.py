@@ -1,8 +1,8 @@
-"""How well three channels represent a spectrum (Nalbach et al., fig. 9).
+"""Representation of spectra in three channels (Nalbach et al., fig. 9).
 
-A camera's R, G, B and a 3 × 3 matrix see the colour of a spectrum exactly only if its curves are
-a linear transform of the observer's colour-matching functions. And the best spectrum that can be
-made of three numbers, a weighted sum of those functions, leaves out what is narrower than they are.
+A camera's R, G, B with a 3 × 3 matrix give the exact colour of a spectrum only if its curves are
+a linear transform of the observer's colour-matching functions. The best approximation of a
+spectrum by three numbers, a weighted sum of those functions, lacks features narrower than they.
 """
 
 from collections.abc import Sequence
@@ -27,21 +27,26 @@ from labrig.report import Table
 
 @dataclass(frozen=True, eq=False)
 class ThreeChannels:
-    """One spectrum, and what is left of it in three channels.
+    """A spectrum and its representation in three channels.
 
     Attributes
     ----------
+    name
+        Name of the spectrum.
     wavelength_nm
-        Shape (n,).
-    spectrum, approximation
-        Shape (n,): relative, and the best weighted sum of the colour-matching functions.
+        Wavelengths in nm, shape (n,).
+    spectrum
+        Relative spectral power, shape (n,).
+    approximation
+        Best weighted sum of the colour-matching functions, shape (n,).
     missed
-        RMS of their difference over that of the spectrum, 0 to 1.
-    xyz, xyz_from_rgb
-        Shape (3,): of the spectrum, and of the camera's R, G, B by the best 3 × 3; the former just
-        reaches the white in X, Y or Z.
+        RMS of the difference of the two over the RMS of the spectrum, 0 to 1.
+    xyz
+        X, Y, Z of the spectrum, shape (3,), scaled so that it just reaches the white in X, Y or Z.
+    xyz_from_rgb
+        X, Y, Z from the camera's R, G, B by the best 3 × 3 matrix, shape (3,), on the same scale.
     delta_e
-        CIEDE2000 of the two.
+        CIEDE2000 between the two colours.
     """
 
     name: str
@@ -57,52 +62,91 @@ class ThreeChannels:
 def three_channels(
     spectrum: Spectrum, camera: CameraResponse, white: str = DEFAULT_WHITE
 ) -> ThreeChannels:
-    """By the CIE 2015 2° observer.
+    """Compare a spectrum with its representation in three channels.
+
+    The observer is the CIE 2015 2° standard observer.
+
+    Parameters
+    ----------
+    spectrum
+        Relative spectral power over wavelength.
+    camera
+        Spectral responses of the camera's R, G, B.
+    white
+        CIE illuminant that is the white of CIELAB, such as `D65`.
+
+    Returns
+    -------
+    ThreeChannels
+        Colour difference between spectrum and camera, and the part of the spectrum that three
+        colour-matching functions cannot represent.
 
     Raises
     ------
     DataError
-        The spectrum is dark where that observer sees.
+        If the spectrum is zero where the observer is sensitive.
     UsageError
-        There is no such white.
+        If there is no such white.
+
+    References
+    ----------
+    Nalbach, Seidel, Ritschel, "Practical Capture and Reproduction of Phosphorescent Appearance"
+    (2017), fig. 9.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import labrig
+    >>> from labrig.compare import three_channels
+    >>> from labrig.optics import Spectrum
+    >>> wavelength_nm = np.arange(400.0, 701.0, 5.0)
+    >>> green = Spectrum("green", wavelength_nm, np.exp(-(((wavelength_nm - 520) / 40) ** 2)))
+    >>> result = three_channels(green, labrig.read_camera("canon_eos_5d_mark_ii"))
+    >>> f"{result.delta_e:.1f}, {result.missed:.0%}"
+    '1.6, 40%'
     """
-    eye = observer(CIE_2015)
-    at_eye = spectrum.resampled(eye.wavelength_nm).value
-    xyz = at_eye @ eye.functions
+    standard_observer = observer(CIE_2015)
+    resampled = spectrum.resampled(standard_observer.wavelength_nm).value
+    xyz = resampled @ standard_observer.functions
     if not xyz.max() > 0:
         raise DataError(f"{spectrum.name}: expected a spectrum that can be seen, got a dark one")
-    white_point = white_xyz(white, eye)
-    from_rgb = best_matrix(camera, eye) @ (at_eye @ camera.at(eye.wavelength_nm))
+    white_point = white_xyz(white, standard_observer)
+    from_rgb = best_matrix(camera, standard_observer) @ (
+        resampled @ camera.at(standard_observer.wavelength_nm)
+    )
     scale = 1 / float((xyz / white_point).max())
-    weights = np.linalg.lstsq(eye.functions, at_eye, rcond=None)[0]
-    approximation = eye.functions @ weights
-    left = at_eye - approximation
+    weights = np.linalg.lstsq(standard_observer.functions, resampled, rcond=None)[0]
+    approximation = standard_observer.functions @ weights
+    difference = resampled - approximation
     return ThreeChannels(
         name=spectrum.name,
-        wavelength_nm=eye.wavelength_nm,
-        spectrum=at_eye,
+        wavelength_nm=standard_observer.wavelength_nm,
+        spectrum=resampled,
         approximation=approximation,
-        missed=float(np.linalg.norm(left) / np.linalg.norm(at_eye)),
+        missed=float(np.linalg.norm(difference) / np.linalg.norm(resampled)),
         xyz=scale * xyz,
         xyz_from_rgb=scale * from_rgb,
         delta_e=float(delta_e(lab(scale * xyz, white_point), lab(scale * from_rgb, white_point))),
     )
 
 
-def best_matrix(camera: CameraResponse, eye: Observer) -> FloatArray:
-    """M, shape (3, 3), for which M · (R, G, B) is nearest to X, Y, Z over all wavelengths."""
-    fitted = np.linalg.lstsq(camera.at(eye.wavelength_nm), eye.functions, rcond=None)[0]
+def best_matrix(camera: CameraResponse, standard_observer: Observer) -> FloatArray:
+    """Return the matrix from R, G, B to X, Y, Z by least squares over wavelengths, shape (3, 3)."""
+    fitted = np.linalg.lstsq(
+        camera.at(standard_observer.wavelength_nm), standard_observer.functions, rcond=None
+    )[0]
     return np.asarray(fitted.T)
 
 
 def three_channels_table(
-    found: Sequence[tuple[ThreeChannels, str]], camera: CameraResponse, white: str
+    results: Sequence[tuple[ThreeChannels, str]], camera: CameraResponse, white: str
 ) -> Table:
-    """A row for each material, with the grid on which its spectrum is known."""
+    """Return a table with a row for each material and the resolution of its spectrum."""
     return Table(
         head=("material", "spectrum of", "ΔE2000 from R, G, B", "residual of three functions / %"),
         rows=tuple(
-            (one.name, grid, f"{one.delta_e:.2f}", f"{100 * one.missed:.0f}") for one, grid in found
+            (result.name, grid, f"{result.delta_e:.2f}", f"{100 * result.missed:.0f}")
+            for result, grid in results
         ),
         caption="Colour from the spectrum against colour from R, G, B by the best 3 × 3 matrix for "
         f"the curves of {camera.name} (least squares over all wavelengths); CIE 2015 2° observer, "

@@ -1,4 +1,4 @@
-"""Runs and results for other programs: NeXus, xarray, Tiled."""
+"""Exports of runs and results to NeXus, xarray and Tiled."""
 
 from labrig.export.dataset import read_dataset, tree_of
 from labrig.export.nexus import write_nexus

@@ -1,4 +1,4 @@
-"""The result of a run for xarray, for notebooks."""
+"""Export of a result to xarray."""
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
@@ -24,7 +24,7 @@ from labrig.results import (
 if TYPE_CHECKING:
     from xarray import Dataset, DataTree
 
-#: Attributes of variables: xarray's plots write them at the axes.
+#: Attributes of variables, with which xarray labels axes.
 SECONDS, PER_S, DN_PER_S = {"units": "s"}, {"units": "1/s"}, {"units": "DN/s"}
 AFTER_LAMP_OFF = {"long_name": "start of the exposure after lamp off"}
 
@@ -32,27 +32,44 @@ Column = tuple[Any, ...]
 
 
 def read_dataset(run: Path | str) -> "Dataset | DataTree":
-    """The latest result of the run in folder `run`.
+    """Read the latest result of a run as an xarray Dataset or DataTree.
+
+    Parameters
+    ----------
+    run
+        Run folder with a result.
 
     Returns
     -------
     Dataset
-        Of a decay: dimensions `patch`, `frame` (file names), `channel` and `state` (from 1, by
-        falling rate). `value` and `sigma` (patch, frame, channel), `flag` (patch, frame); over the
-        frames `t_s`, `exposure_s`, `unit`, `iso`, `f_number`. Of the fits `k_r_per_s`, `amplitude`
-        (patch, state), `channel_weight`, `offset` (patch, channel), each with its σ, and
-        `flicker`, `reduced_chi2`, `fit_warnings` (patch); NaN where there is no fit.
-        Units are attributes of the variables; the Dataset's own say which run, sample and devices.
+        Result of a decay, with dimensions `patch`, `frame` (file names), `channel` and `state`
+        (from 1, by falling rate). Signals `value` and `sigma` have the shape (patch, frame,
+        channel), `flag` has (patch, frame); the coordinates `t_s`, `exposure_s`, `unit`, `iso`,
+        `f_number` have (frame,). Fit parameters are `k_r_per_s`, `amplitude` (patch, state) and
+        `channel_weight`, `offset` (patch, channel), each with its σ, and `flicker`, `reduced_chi2`,
+        `fit_warnings` (patch); NaN where there is no fit. Units are attributes of the variables;
+        attributes of the Dataset name run, sample and devices.
     DataTree
-        Of any other protocol: every field of its result, fields in fields as nodes; of a chain a
-        node for each part.
+        Result of any other protocol, with its fields as variables and fields within fields as
+        nodes; a chain has a node for each part.
 
     Raises
     ------
     UsageError
-        Not a run folder with a result, or xarray is not installed.
+        If this is not a run folder with a result, or xarray is not installed.
     DataError
-        A file in it was changed.
+        If a file of the result was changed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> decay = labrig.read_dataset("runs/decay")
+    >>> decay["value"].dims
+    ('patch', 'frame', 'channel')
+    >>> [f"{rate:.4f}" for rate in decay["k_r_per_s"].sel(patch="sample").values]
+    ['0.2048', '0.0101']
+    >>> decay["k_r_per_s"].attrs["units"]
+    '1/s'
     """
     try:
         import xarray  # noqa: F401
@@ -70,7 +87,30 @@ def read_dataset(run: Path | str) -> "Dataset | DataTree":
 
 
 def tree_of(result: RunResult, attributes: Mapping[str, str] | None = None) -> "DataTree":
-    """A result of any protocol as an xarray DataTree, as `read_dataset` gives it."""
+    """Convert a result of any protocol to an xarray DataTree.
+
+    Parameters
+    ----------
+    result
+        Result of a run.
+    attributes
+        Attributes of the root node.
+
+    Returns
+    -------
+    DataTree
+        Tree with the fields of the result, as described in `read_dataset`.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.export import tree_of
+    >>> tree = tree_of(labrig.read_result("runs/decay"), {"run": "decay"})
+    >>> tree["value"].shape
+    (1, 18, 3)
+    >>> tree.attrs["run"]
+    'decay'
+    """
     import xarray
 
     tree = xarray.DataTree.from_dict(_nodes(result))
@@ -79,7 +119,7 @@ def tree_of(result: RunResult, attributes: Mapping[str, str] | None = None) -> "
 
 
 def _nodes(result: RunResult) -> "dict[str, Dataset]":
-    """The nodes of a tree by their paths."""
+    """Return the nodes of a result's tree by path."""
     import xarray
 
     if isinstance(result, DecayResult):
@@ -99,7 +139,7 @@ def _nodes(result: RunResult) -> "dict[str, Dataset]":
 
 
 def _columns(dimension: str, name: str, value: Any) -> dict[str, Column]:
-    """A field as a variable, with its σ if it has one; nothing where it is empty or no number."""
+    """Return a field as variable, with its σ if it has one; empty for other values."""
     if isinstance(value, Measured):
         unit = {"units": value.unit}
         return {name: ((), value.value, unit), f"{name}_sigma": ((), value.sigma, unit)}
@@ -139,17 +179,17 @@ def _decay(result: DecayResult, attributes: Mapping[str, str]) -> "Dataset":
 
 
 def _attributes(folder: Path) -> dict[str, str]:
-    """What the journal says of the whole run."""
+    """Return the attributes of the whole run from its journal."""
     completed = read_run(folder).completed()
     start = next(iter(completed.values())).start if completed else {}
-    known = {
+    values = {
         key: start[key] for key in ("protocol", "sample", "rig", "labrig_version") if key in start
     }
-    return {"run": folder.resolve().name, **known, **start.get("devices", {})}
+    return {"run": folder.resolve().name, **values, **start.get("devices", {})}
 
 
 def _measured(patches: Sequence[Series]) -> dict[str, Column]:
-    """Every patch was measured in the same frames."""
+    """Return the signals of all patches, which were measured in the same frames."""
     dimensions = ("patch", "frame", "channel")
     values = np.stack([series.values for series in patches])
     flags = np.stack([np.array(series.flag) for series in patches])
@@ -161,16 +201,16 @@ def _measured(patches: Sequence[Series]) -> dict[str, Column]:
 
 
 def _fitted(fits: Sequence[FittedDecay | None], channels: Sequence[str]) -> dict[str, Column]:
-    most = max((fit.n_states for fit in fits if fit), default=0)
+    n_states = max((fit.n_states for fit in fits if fit), default=0)
 
-    def of_state(key: str) -> NDArray[np.float64]:
-        rows = np.full((len(fits), most), np.nan)
+    def state_rows(key: str) -> NDArray[np.float64]:
+        rows = np.full((len(fits), n_states), np.nan)
         for row, fit in zip(rows, fits, strict=True):
             if fit:
                 row[: fit.n_states] = [getattr(state, key) for state in fit.states]
         return rows
 
-    def of_channel(key: str) -> NDArray[np.float64]:
+    def channel_rows(key: str) -> NDArray[np.float64]:
         rows = np.full((len(fits), len(channels)), np.nan)
         for row, fit in zip(rows, fits, strict=True):
             if fit:
@@ -178,20 +218,20 @@ def _fitted(fits: Sequence[FittedDecay | None], channels: Sequence[str]) -> dict
                 row[:] = [by_name.get(name, np.nan) for name in channels]
         return rows
 
-    def of_patch(key: str) -> NDArray[np.float64]:
+    def patch_values(key: str) -> NDArray[np.float64]:
         return np.array([getattr(fit, key) if fit else np.nan for fit in fits])
 
     states, weights = ("patch", "state"), ("patch", "channel")
     return {
-        "k_r_per_s": (states, of_state("k_r_per_s"), PER_S),
-        "k_r_sigma_per_s": (states, of_state("k_r_sigma_per_s"), PER_S),
-        "amplitude": (states, of_state("amplitude"), DN_PER_S),
-        "amplitude_sigma": (states, of_state("amplitude_sigma"), DN_PER_S),
-        "channel_weight": (weights, of_channel("channel_weights")),
-        "channel_weight_sigma": (weights, of_channel("channel_weights_sigma")),
-        "offset": (weights, of_channel("offsets"), DN_PER_S),
-        "offset_sigma": (weights, of_channel("offsets_sigma"), DN_PER_S),
-        "flicker": ("patch", of_patch("flicker")),
-        "reduced_chi2": ("patch", of_patch("reduced_chi2")),
+        "k_r_per_s": (states, state_rows("k_r_per_s"), PER_S),
+        "k_r_sigma_per_s": (states, state_rows("k_r_sigma_per_s"), PER_S),
+        "amplitude": (states, state_rows("amplitude"), DN_PER_S),
+        "amplitude_sigma": (states, state_rows("amplitude_sigma"), DN_PER_S),
+        "channel_weight": (weights, channel_rows("channel_weights")),
+        "channel_weight_sigma": (weights, channel_rows("channel_weights_sigma")),
+        "offset": (weights, channel_rows("offsets"), DN_PER_S),
+        "offset_sigma": (weights, channel_rows("offsets_sigma"), DN_PER_S),
+        "flicker": ("patch", patch_values("flicker")),
+        "reduced_chi2": ("patch", patch_values("reduced_chi2")),
         "fit_warnings": ("patch", ["\n".join(fit.warnings) if fit else "" for fit in fits]),
     }

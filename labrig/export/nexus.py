@@ -1,7 +1,7 @@
-"""run.nxs: a run and its result in one NeXus file that opens on the decay.
+"""Export of a run and its result to a NeXus file `run.nxs`, whose default plot is the decay.
 
-Base classes as in the NeXus manual (manual.nexusformat.org/classes/base_classes); no application
-definition describes a decay.
+Base classes are those of the NeXus manual (manual.nexusformat.org/classes/base_classes); no
+application definition describes a decay.
 """
 
 import json
@@ -35,7 +35,7 @@ TEXT = h5py.string_dtype()
 
 
 def add_group(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
-    """A new group of that NeXus class."""
+    """Add a group of a NeXus class and return it."""
     group = parent.create_group(name)
     group.attrs["NX_class"] = nx_class
     return group
@@ -44,12 +44,20 @@ def add_group(parent: h5py.Group, name: str, nx_class: str) -> h5py.Group:
 def add_number(
     group: h5py.Group, name: str, value: ArrayLike, units: str = "", long_name: str = ""
 ) -> h5py.Dataset:
-    """A new field of numbers, without units a pure one.
+    """Add a field of numbers and return it.
 
     Parameters
     ----------
+    group
+        Group to which the field is added.
+    name
+        Name of the field.
+    value
+        Numbers of any shape.
+    units
+        Units of the numbers; empty for dimensionless ones.
     long_name
-        What a plot writes at its axis.
+        Label of the axis in plots.
     """
     field = group.create_dataset(name, data=np.asarray(value), track_times=False)
     field.attrs["units"] = units
@@ -59,13 +67,13 @@ def add_number(
 
 
 def add_text(group: h5py.Group, name: str, value: str | Sequence[str]) -> h5py.Dataset:
-    """A new field of one text or several."""
+    """Add a field of one text or several and return it."""
     data = value if isinstance(value, str) else np.array(value, dtype=object)
     return group.create_dataset(name, data=data, dtype=TEXT, track_times=False)
 
 
 def add_note(parent: h5py.Group, name: str, text: str, kind: str, file_name: str = "") -> None:
-    """A new NXnote: a text with its media type, and the file that it is."""
+    """Add an NXnote: a text with its media type and the name of its file."""
     note = add_group(parent, name, "NXnote")
     add_text(note, "type", kind)
     if file_name:
@@ -74,27 +82,31 @@ def add_note(parent: h5py.Group, name: str, text: str, kind: str, file_name: str
 
 
 def add_fields(entry: h5py.Group, result: RunResult, name: str, version: str) -> None:
-    """An NXprocess `name` with the fields of a result; those of fields in groups of their own."""
+    """Add an NXprocess with the fields of a result; fields within fields become groups."""
     (valid,) = valid_names([name])
     process = add_group(entry, valid, "NXprocess")
     add_text(process, "program", "labrig")
     add_text(process, "version", version)
     for path, value in leaves(result):
         group = process
-        *groups, last = _valid("result", *path)
-        for one in groups:
-            group = group[one] if one in group else add_group(group, one, "NXcollection")
+        *groups, last = _valid_path("result", *path)
+        for group_name in groups:
+            group = (
+                group[group_name]
+                if group_name in group
+                else add_group(group, group_name, "NXcollection")
+            )
         if value is not None:
             _add(group, last, path[-1], value)
 
 
-def _valid(*names: str) -> list[str]:
-    """Each as NeXus allows it; names on one path may be the same."""
+def _valid_path(*names: str) -> list[str]:
+    """Return names that NeXus allows; names along one path may be equal."""
     return [valid_names([name])[0] for name in names]
 
 
 def _add(group: h5py.Group, name: str, field: str, value: Any) -> None:
-    """Numbers or texts of any shape; what is neither is written as text."""
+    """Add a field of numbers or texts of any shape; other values are added as text."""
     if isinstance(value, Measured):
         add_number(group, name, value.value, value.unit)
         add_number(group, f"{name}_errors", value.sigma, value.unit)
@@ -111,18 +123,18 @@ def _add(group: h5py.Group, name: str, field: str, value: Any) -> None:
     elif numbers.dtype.kind == "b":
         add_number(group, name, numbers.astype(np.int8))
     elif isinstance(value, tuple | list):
-        add_text(group, name, [str(one) for one in value])
+        add_text(group, name, [str(element) for element in value])
     else:
         add_text(group, name, str(value))
 
 
 DN_PER_S = "DN/s"
-#: silx and h5web plot it so: a decay is looked at on a logarithmic scale.
+#: Plot style by which silx and h5web show a decay on a logarithmic scale.
 LOGARITHMIC = json.dumps({"signal_scale_type": "log"})
 
 
 def valid_names(names: Sequence[str]) -> list[str]:
-    """Names that NeXus allows (letters of ASCII, digits, underscores), each of them once."""
+    """Return distinct names that NeXus allows: ASCII letters, digits and underscores."""
     valid: list[str] = []
     for name in names:
         allowed = re.sub(r"[^A-Za-z0-9_]+", "_", name).strip("_") or "unnamed"
@@ -133,7 +145,7 @@ def valid_names(names: Sequence[str]) -> list[str]:
 
 
 def add_decays(entry: h5py.Group, name: str, title: str, patch: DecayPatch) -> None:
-    """An NXdata `decay_1_<name>` for each decay of a patch; the first is the entry's default."""
+    """Add an NXdata `decay_1_<name>` for each decay of a patch; the first is the default plot."""
     for decay, rows in _decays(patch.series):
         series = patch.series.take(rows)
         data = _add_plot(entry, f"{decay}_{name}", title, patch, series)
@@ -154,7 +166,7 @@ def add_decays(entry: h5py.Group, name: str, title: str, patch: DecayPatch) -> N
 
 
 def add_fit(entry: h5py.Group, name: str, title: str, patch: DecayPatch, version: str) -> None:
-    """An NXprocess `fit_<name>`: parameters, curves, residuals, or why there is no fit."""
+    """Add an NXprocess `fit_<name>` with parameters, curves and residuals, or the failure."""
     process, fit = add_group(entry, f"fit_{name}", "NXprocess"), patch.fit
     add_text(process, "program", "labrig")
     add_text(process, "version", version)
@@ -171,16 +183,16 @@ def add_fit(entry: h5py.Group, name: str, title: str, patch: DecayPatch, version
         curve.attrs["SILX_style"] = LOGARITHMIC
         predicted = fit.predict(series.t_s, series.exposure_s)
         _add_signals(curve, series.channels, predicted)
-        left = _add_plot(
+        residual_plot = _add_plot(
             process, f"{decay}_residuals", f"whitened residuals of {title}", patch, series
         )
         for number, channel in enumerate(series.channels):
-            add_number(left, channel, residuals[rows, number], "", f"{channel} / σ")
+            add_number(residual_plot, channel, residuals[rows, number], "", f"{channel} / σ")
         process.attrs.setdefault("default", f"{decay}_curve")
 
 
 def _decays(series: Series) -> Iterator[tuple[str, NDArray[np.intp]]]:
-    """Name and rows of each decay: repeats are plotted apart."""
+    """Yield name and rows of each decay, since repeated decays are plotted apart."""
     units = list(dict.fromkeys(series.unit))
     for unit, name in zip(units, valid_names(units), strict=True):
         yield name, np.flatnonzero(np.array(series.unit) == unit)
@@ -189,7 +201,7 @@ def _decays(series: Series) -> Iterator[tuple[str, NDArray[np.intp]]]:
 def _add_plot(
     parent: h5py.Group, name: str, title: str, patch: DecayPatch, series: Series
 ) -> h5py.Group:
-    """A new NXdata with its time axis, that shows the brightest channel first."""
+    """Add an NXdata with its time axis, whose signal is the brightest channel, and return it."""
     data = add_group(parent, name, "NXdata")
     add_text(data, "title", f"{title}, {series.unit[0]}")
     data.attrs["axes"] = ["time"]
@@ -229,7 +241,7 @@ def _add_parameters(process: h5py.Group, fit: FittedDecay) -> None:
 
 
 def _brightest(patch: DecayPatch) -> int:
-    """Number of the channel that a plot shows first."""
+    """Return the index of the channel that a plot shows first."""
     if patch.fit is not None:
         return patch.fit.brightest
     return int(np.argmax(patch.series.values.mean(axis=0)))
@@ -241,25 +253,46 @@ DEVICE_CLASSES = {CAMERA.key: "NXdetector", **dict.fromkeys(LIGHTS, "NXsource")}
 
 
 def write_nexus(path: Path, run: RunRecord, about: RunDescription, result: RunResult) -> None:
-    """Write a run and its result.
+    """Write a run and its result to a NeXus file.
 
-    The bytes follow from the run and labrig's version; nothing in them is of the moment of writing.
+    The bytes depend on the run and on labrig's version only, not on the time of writing.
 
     Parameters
     ----------
     path
-        The file, such as `result/run.nxs`.
+        File to be written, such as `result/run.nxs`.
     run
-        The run, with one completed unit at the least.
+        Run with at least one completed unit.
     about
-        The run, its bench and what its result was made with.
+        Description of the run, its bench and the processing.
     result
-        Of any protocol.
+        Result of any protocol.
 
     Raises
     ------
     DiskError
-        The file cannot be written.
+        If the file cannot be written.
+
+    References
+    ----------
+    NeXus base classes, https://manual.nexusformat.org/classes/base_classes.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import h5py
+    >>> import labrig
+    >>> from labrig.export import write_nexus
+    >>> from labrig.record import RunDescription
+    >>> about = RunDescription(
+    ...     title="paint", protocol="decay", run="decay", started="", ended="", rig="bench",
+    ...     simulated=True, labrig_version="1",
+    ... )
+    >>> run, result = labrig.read_run("runs/decay"), labrig.read_result("runs/decay")
+    >>> write_nexus(Path("decay.nxs"), run, about, result)
+    >>> with h5py.File("decay.nxs") as file:
+    ...     print(file["entry"].attrs["default"], file["entry/decay_1_sample/G"].shape)
+    decay_1_sample (18,)
     """
     # Made in memory: HDF5 has no plain way to say that a disk has failed it.
     content = BytesIO()
@@ -313,10 +346,10 @@ def _subject(result: RunResult) -> str:
 
 
 def _add_results(entry: h5py.Group, result: RunResult, version: str, part: str = "") -> None:
-    """Decays as plots with their fits, all other results field by field; of a chain every part."""
+    """Add decays with their fits, other results field by field, and every part of a chain."""
     if isinstance(result, PhosphorResult):
-        for name, one in result.parts.items():
-            _add_results(entry, one, version, name)
+        for name, part_result in result.parts.items():
+            _add_results(entry, part_result, version, name)
     if isinstance(result, DecayResult):
         names = valid_names([" ".join(filter(None, (part, name))) for name in result.patches])
         for valid, (name, patch) in zip(names, result.patches.items(), strict=True):
@@ -339,39 +372,39 @@ def _add_device(
 
 
 def _add_frames(camera: h5py.Group, run: RunRecord, start_time: float) -> None:
-    """Every frame of completed units: when, how, and how to know the file again."""
+    """Add time, settings and checksum of every frame of completed units."""
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     seconds = np.array([(frame.start_time, frame.end_time) for frame in frames]) - start_time
     add_number(camera, "count_time", [frame.exposure_s for frame in frames], "s")
     for name, column in zip(("start_time", "stop_time"), seconds.T, strict=True):
         add_number(camera, name, column, "s").attrs["start"] = _iso(start_time)
-    kept = add_group(camera, "frames", "NXcollection")
-    add_text(kept, "file_name", [f"frames/{frame.path.name}" for frame in frames])
-    add_text(kept, "sha256", [frame.sha256 for frame in frames])
-    add_number(kept, "size", [frame.size_bytes for frame in frames], "byte")
-    add_text(kept, "role", [frame.role for frame in frames])
-    add_text(kept, "unit", [frame.unit for frame in frames])
-    add_number(kept, "iso", [frame.iso for frame in frames])
+    files = add_group(camera, "frames", "NXcollection")
+    add_text(files, "file_name", [f"frames/{frame.path.name}" for frame in frames])
+    add_text(files, "sha256", [frame.sha256 for frame in frames])
+    add_number(files, "size", [frame.size_bytes for frame in frames], "byte")
+    add_text(files, "role", [frame.role for frame in frames])
+    add_text(files, "unit", [frame.unit for frame in frames])
+    add_number(files, "iso", [frame.iso for frame in frames])
     add_number(
-        kept,
+        files,
         "f_number",
         [np.nan if frame.f_number is None else frame.f_number for frame in frames],
     )
-    add_number(kept, "late", [frame.late_s for frame in frames], "s")
+    add_number(files, "late", [frame.late_s for frame in frames], "s")
 
 
 def _add_switching(light: h5py.Group, key: str, run: RunRecord, start_time: float) -> None:
-    """When the light went on and off: the history of the sample's charge."""
-    switched = [
+    """Add the times at which a light was switched, the charging history of the sample."""
+    actions = [
         action
         for attempt in run.completed().values()
         for action in attempt.actions
         if action.device == key
     ]
     log = add_group(light, "switched", "NXlog")
-    middles = [action.middle_time - start_time for action in switched]
+    middles = [action.middle_time - start_time for action in actions]
     add_number(log, "time", middles, "s").attrs["start"] = _iso(start_time)
-    add_number(log, "value", np.array([action.action != DARK for action in switched], np.int8))
+    add_number(log, "value", np.array([action.action != DARK for action in actions], np.int8))
     add_text(log, "description", "1: on, 0: off")
 
 
@@ -380,5 +413,5 @@ def _start_time(run: RunRecord) -> float:
 
 
 def _iso(seconds: float) -> str:
-    """Seconds since 1970 as ISO 8601."""
+    """Return a time in seconds since 1970 as ISO 8601 text."""
     return datetime.fromtimestamp(seconds, UTC).isoformat(timespec="microseconds")

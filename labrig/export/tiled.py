@@ -1,4 +1,4 @@
-"""A run in a Tiled server (blueskyproject.io/tiled), where other programs find and read it."""
+"""Export of a run to a Tiled server (blueskyproject.io/tiled)."""
 
 from collections.abc import Iterator
 from pathlib import Path
@@ -13,16 +13,19 @@ if TYPE_CHECKING:
 
 
 def to_tiled(run: Path | str, client: "Container") -> list[str]:
-    """Write the run in folder `run` to a Tiled server; its frames stay where they are.
+    """Write a run to a Tiled server.
 
-    Every attempt that has ended becomes a BlueskyRun under its uid, with frames and actions as its
-    streams; those that are there already are left alone. The latest result, if there is one,
-    becomes an xarray Dataset under the run folder's name, in place of an earlier one there.
+    Every attempt that has ended becomes a BlueskyRun under its uid, with frames, actions and
+    temperatures as its streams; attempts that the server has already are left alone. The latest
+    result, if there is one, becomes an xarray Dataset under the run folder's name and replaces an
+    earlier one there. The frames stay in the run folder.
 
     Parameters
     ----------
+    run
+        Run folder.
     client
-        From `tiled.client.from_uri`, allowed to write and to delete.
+        Client from `tiled.client.from_uri`, with permission to write and to delete.
 
     Returns
     -------
@@ -32,9 +35,18 @@ def to_tiled(run: Path | str, client: "Container") -> list[str]:
     Raises
     ------
     UsageError
-        bluesky-tiled-plugins is not installed.
+        If bluesky-tiled-plugins is not installed.
     DataError
-        Not a run folder, or one that was changed.
+        If this is not a run folder, or if it was changed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> [attempt.unit for attempt in labrig.read_run("runs/decay").attempts]
+    ['dark', 'meter', 'decay-1']
+    >>> from tiled.client import from_uri  # doctest: +SKIP
+    >>> len(labrig.to_tiled("runs/decay", from_uri("http://127.0.0.1:8000")))  # doctest: +SKIP
+    3
     """
     try:
         from bluesky_tiled_plugins import TiledWriter
@@ -45,21 +57,23 @@ def to_tiled(run: Path | str, client: "Container") -> list[str]:
             "python -m pip install bluesky-tiled-plugins xarray"
         ) from None
     folder = Path(run).resolve()
-    ended = [a.uid for a in read_run(folder).attempts if a.exit_status is not None]
-    wanted = [uid for uid in ended if not _is_whole(uid, client)]
-    _delete([uid for uid in wanted if uid in client], client)
+    ended = [
+        attempt.uid for attempt in read_run(folder).attempts if attempt.exit_status is not None
+    ]
+    missing = [uid for uid in ended if not _is_complete(uid, client)]
+    _delete([uid for uid in missing if uid in client], client)
     writer = TiledWriter(client)
     for uid, (name, doc) in _by_attempt(read_journal(folder / "journal.jsonl").documents):
-        if uid in wanted:
+        if uid in missing:
             writer(name, doc)
     if (folder / "result").is_dir():
         _delete([folder.name] if folder.name in client else [], client)
         write_xarray_dataset(client, read_dataset(folder), key=folder.name)
-    return wanted
+    return missing
 
 
-def _is_whole(uid: str, client: "Container") -> bool:
-    """Whether the server has that attempt to its end: writing it may have been cut off."""
+def _is_complete(uid: str, client: "Container") -> bool:
+    """Whether the server has the attempt to its end; an upload may have been interrupted."""
     return uid in client and "stop" in client[uid].metadata
 
 
@@ -69,7 +83,7 @@ def _delete(keys: list[str], client: "Container") -> None:
 
 
 def _by_attempt(documents: list[Document]) -> Iterator[tuple[str, Document]]:
-    """Each document with the uid of its attempt."""
+    """Yield each document with the uid of its attempt."""
     attempts: dict[str, str] = {}
     for name, doc in documents:
         if name == "start":

@@ -1,4 +1,4 @@
-"""What a protocol will know before it is run: uncertainties, and what would halve them."""
+"""Prediction of a protocol's uncertainties, and of changes that would halve them."""
 
 from labrig.predict.assumptions import Sources
 from labrig.predict.patch import PatchPrediction

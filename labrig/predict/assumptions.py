@@ -1,4 +1,4 @@
-"""What is known before a measurement, and what has to be assumed; each said in a line."""
+"""Assumptions of a prediction on camera, noise and brightness, each stated in a line."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -20,24 +20,24 @@ from labrig.protocols.decay import Decay
 from labrig.quantity import TIME_S, parse
 from labrig.yaml_file import did_you_mean
 
-#: Where the first exposure has to be assumed: this fraction of the longest, so that it may grow.
+#: Assumed first exposure as a fraction of the longest, so that it may grow.
 FIRST_EXPOSURE_FRACTION = 1 / 8
 
 
 @dataclass(frozen=True)
 class Sources:
-    """What a prediction is to rest on.
+    """Sources of a prediction's assumptions.
 
     Attributes
     ----------
     materials
-        Patch → name or path of its material; the patch "" is the only one there is.
+        Name or path of the material by patch; the patch "" is the only one of the protocol.
     like
         Folder of an earlier run on the same bench.
     first_exposure_s
-        What metering chooses for the first frame; None if that is not known.
+        Exposure time in seconds that metering chooses for the first frame; None if it is not known.
     response
-        Of the rig's camera.
+        Spectral responses of the rig's camera.
     """
 
     materials: Mapping[str, str]
@@ -53,27 +53,38 @@ class Sources:
         metered: str | None,
         response: CameraResponse | None,
     ) -> Self:
-        """From the texts of a command line: `MATERIAL`, or `PATCH=MATERIAL` for each patch.
+        """Parse the arguments of a command line.
+
+        Parameters
+        ----------
+        materials
+            `MATERIAL`, or `PATCH=MATERIAL` for each patch.
+        like
+            Folder of an earlier run on the same bench.
+        metered
+            Exposure time of the first frame, such as `0.5 s`.
+        response
+            Spectral responses of the rig's camera.
 
         Raises
         ------
         UsageError
-            A patch stands twice, or `metered` is no duration.
+            If a patch has two materials, or `metered` is no duration.
         """
         try:
             first_exposure_s = None if metered is None else parse(metered, TIME_S)
         except ValueError as error:
             raise UsageError(f"--metered: {error}") from None
-        named: dict[str, str] = {}
+        by_patch: dict[str, str] = {}
         for text in materials:
             patch, _, material = text.rpartition("=")
-            if patch in named:
+            if patch in by_patch:
                 raise UsageError(
                     "--predict: expected one material for each patch, got two for "
                     f"{patch or 'the only one'}; write --predict PATCH=MATERIAL"
                 )
-            named[patch] = material
-        return cls(named, like, first_exposure_s, response)
+            by_patch[patch] = material
+        return cls(by_patch, like, first_exposure_s, response)
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,12 +93,14 @@ class Assumptions:
 
     Attributes
     ----------
+    bench
+        Camera, flicker and glow of each patch.
     materials
-        Names by patch.
+        Names of the materials by patch.
     brightness_known
-        Patches whose amplitudes are as measured; the others' are as assumed.
+        Patches whose amplitudes are measured; those of the others are assumed.
     notes
-        Where the figures come from, in lines for a person.
+        Origins of the figures, in lines for people.
     """
 
     bench: Bench
@@ -97,27 +110,27 @@ class Assumptions:
 
 
 def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) -> Assumptions:
-    """Camera, flicker and glows: from earlier runs, else what is typical.
+    """Return camera, flicker and glows, from earlier runs or else typical ones.
 
     Raises
     ------
     UsageError
-        No such patch, material or run, or a material of which no decay can be predicted.
+        If there is no such patch, material or run, or if no decay can be predicted for a material.
     """
     protocol = predictable(model)
     files = _by_patch(protocol, sources.materials)
     materials = {patch: read_material(name) for patch, name in files.items()}
     for material in materials.values():
         check_states(material)
-    like = None if sources.like is None else _like(sources.like, next(iter(files)))
-    own = {patch: _own_run(name, materials[patch], like) for patch, name in files.items()}
-    reference = like or next((run for run in own.values() if run is not None), None)
+    like = None if sources.like is None else _read_like(sources.like, next(iter(files)))
+    own_runs = {patch: _own_run(name, materials[patch], like) for patch, name in files.items()}
+    reference = like or next((run for run in own_runs.values() if run is not None), None)
     camera = typical_camera(offers, protocol.camera.iso) if reference is None else reference.camera
     flicker = None if reference is None else reference.flicker
     measured = {
         patch: glow
         for patch, material in materials.items()
-        if (glow := measured_glow(material, own[patch])) is not None
+        if (glow := measured_glow(material, own_runs[patch])) is not None
     }
     relative = {
         patch: relative_glow(material, protocol, camera, sources.response)
@@ -142,9 +155,9 @@ def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) 
 
 
 def _by_patch(protocol: Decay, materials: Mapping[str, str]) -> dict[str, str]:
-    """Materials by the protocol's own patches."""
+    """Return the materials by the protocol's own patches."""
     patches = list(protocol.patches)
-    found = {}
+    by_patch = {}
     for name, material in materials.items():
         if not name and len(patches) > 1:
             raise UsageError(
@@ -156,17 +169,17 @@ def _by_patch(protocol: Decay, materials: Mapping[str, str]) -> dict[str, str]:
             raise UsageError(
                 f"--predict: no patch is called '{patch}'; {did_you_mean(patch, patches)}"
             )
-        found[patch] = material
-    return found
+        by_patch[patch] = material
+    return by_patch
 
 
-def _like(run: Path, patch: str) -> Reference:
+def _read_like(run: Path, patch: str) -> Reference:
     places = result_places(run)
     return read_reference(places.get(patch, next(iter(places.values()))))
 
 
 def _own_run(name: str, material: Material, like: Reference | None) -> Reference | None:
-    """The run that measured a material: the one around its file, or the one given."""
+    """Return the run that measured a material: the one around its file, or the one given."""
     place = resources.find("config/materials", "material", name).parent
     if (place / "fit.json").is_file() and run_of(place) is not None:
         return read_reference(place)
@@ -182,21 +195,21 @@ def _brightness(
     relative: Mapping[str, Glow],
     sources: Sources,
 ) -> tuple[float, str]:
-    """By what to multiply the glows of unknown brightness, and why."""
+    """Return the factor for glows of unknown brightness, and the reason for it."""
     if measured:
         brightest = max(float(glow.amplitude.sum()) for glow in measured.values())
         return brightest, f"brightness of {', '.join(relative)}: assumed, as the brightest measured"
     protocol = predictable(model)
-    exposure_s, said = sources.first_exposure_s, "as --metered says"
+    exposure_s, reason = sources.first_exposure_s, "as --metered says"
     if exposure_s is None and isinstance(protocol.exposure, float):
-        exposure_s, said = protocol.exposure, "assumed, as suits the protocol's exposure"
+        exposure_s, reason = protocol.exposure, "assumed, as suits the protocol's exposure"
     elif exposure_s is None:
         longest_s = protocol.longest_exposure_s(offers)
         exposure_s = offers.exposure_at_most(longest_s * FIRST_EXPOSURE_FRACTION)
-        said = "assumed; say --metered"
+        reason = "assumed; say --metered"
     metered = predictable(changed(model, {"exposure": "auto"}))
     factor = brightness_metered_as(metered, offers, bench, exposure_s)
-    return factor, f"brightness: metering chooses {exposure_s:.3g} s at first ({said})"
+    return factor, f"brightness: metering chooses {exposure_s:.3g} s at first ({reason})"
 
 
 def _camera_note(camera: CameraFigures, reference: Reference | None) -> str:

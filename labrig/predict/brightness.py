@@ -1,4 +1,4 @@
-"""How bright a sample is: as measured on this bench, else as bright as its exposure says."""
+"""Brightness of a sample: measured on this bench, or derived from its metered exposure."""
 
 from collections.abc import Mapping
 
@@ -14,15 +14,15 @@ from labrig.predict.glow import Glow, measured_amplitudes, radiated, rates
 from labrig.predict.reference import Reference
 from labrig.protocols.decay import Decay
 
-#: Range of brightness searched, DN/s, and how often it is halved.
+#: Range of the bisection in DN/s, and number of its steps.
 DIMMEST, BRIGHTEST = 1e-3, 1e9
 BISECTIONS = 50
-#: Exposures come in thirds of a stop: half of one up is the middle of those metered alike.
+#: Half a step of exposure times, in thirds of a stop: middle of brightnesses metered alike.
 HALF_A_THIRD_STOP = 2 ** (1 / 6)
 
 
 def measured_glow(material: Material, reference: Reference | None) -> Glow | None:
-    """The glow of a material that `reference` measured; None for any other."""
+    """Return the glow of a material that the reference run measured; None for others."""
     amplitude = measured_amplitudes(material)
     if reference is None or amplitude is None:
         return None
@@ -41,12 +41,12 @@ def relative_glow(
     camera: CameraFigures,
     response: CameraResponse | None,
 ) -> Glow:
-    """The glow of a material but for its brightness, which is 1 in all.
+    """Return the glow of a material with a total brightness of 1.
 
     Raises
     ------
     UsageError
-        How strong its states are relative to each other is not known.
+        If the relative strengths of its states are not known.
     """
     charge_s = protocol.charge if isinstance(protocol.charge, float) else np.inf
     weights: Mapping[str, float] = {}
@@ -74,23 +74,30 @@ def relative_glow(
 def brightness_metered_as(
     metered: Decay, offers: CameraOffers, bench: Bench, exposure_s: float
 ) -> float:
-    """By what to multiply the glows of `bench` so that metering chooses `exposure_s` at first.
+    """Return the factor for the glows with which metering chooses a given first exposure.
 
     Parameters
     ----------
     metered
-        The protocol with `exposure: auto`.
+        Protocol with `exposure: auto`.
+    offers
+        Settings that the camera offers.
+    bench
+        Bench with the glows to be scaled.
     exposure_s
-        May be longer than the time between frames allows: the glow is dimmer by as much.
+        First exposure time in seconds; if the time between frames does not allow it, the glow is
+        dimmer in proportion.
     """
     reached_s = min(exposure_s, metered.longest_exposure_s(offers))
-    seen = bench.seen_with(metered.camera)
+    metered_bench = bench.seen_with(metered.camera)
     low, high = np.log(DIMMEST), np.log(BRIGHTEST)
     for _ in range(BISECTIONS):
         middle = (low + high) / 2
-        brighter = {patch: glow.brighter(np.exp(middle)) for patch, glow in seen.glows.items()}
-        trial = Bench(seen.camera, seen.flicker, brighter)
-        schedule = expected_schedule(metered, offers, trial, lambda _: None)
+        brighter = {
+            patch: glow.brighter(np.exp(middle)) for patch, glow in metered_bench.glows.items()
+        }
+        trial_bench = Bench(metered_bench.camera, metered_bench.flicker, brighter)
+        schedule = expected_schedule(metered, offers, trial_bench, lambda _: None)
         low, high = (
             (middle, high) if schedule.exposures_s[0] >= 0.999 * reached_s else (low, middle)
         )

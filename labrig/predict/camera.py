@@ -1,4 +1,4 @@
-"""What of a camera decides how noisy its frames are."""
+"""Noise model of a camera for predictions."""
 
 import math
 from collections.abc import Mapping
@@ -7,45 +7,47 @@ from dataclasses import dataclass, field, replace
 from labrig.acquire import CameraOffers
 from labrig.region import Region, region_pixels
 
-#: Of a full-format DSLR with 14 bits, for want of anything measured: electrons a DN at ISO 100, …
+#: Conversion gain in electrons per DN at ISO 100 of a typical full-frame DSLR with 14 bits.
 TYPICAL_ELECTRONS_PER_DN = 4.0
-#: … noise of reading a pixel, before amplification and after it at ISO 100, in electrons, …
+#: Read noise in electrons, before amplification, and after it at ISO 100.
 TYPICAL_NOISE_BEFORE_GAIN = 2.5
 TYPICAL_NOISE_AFTER_GAIN = 27.0
-#: … black to white, …
+#: Range from black to white in DN.
 TYPICAL_RANGE_DN = 14_500.0
-#: … dark current of a pixel near room temperature, …
+#: Dark current of a pixel near room temperature in electrons per second.
 TYPICAL_DARK_ELECTRONS_PER_S = 0.1
-#: … and the size of its files in bytes a pixel, compressed without loss.
+#: File size in bytes per pixel with lossless compression, and number of pixels.
 TYPICAL_BYTES_PER_PIXEL = 1.5
 TYPICAL_PIXELS = 20e6
-#: Brightest over mean in a patch: shading of lens and lamp, the sample's own structure.
+#: Brightest over mean signal in a patch: vignetting, shading of the lamp, structure of the sample.
 TYPICAL_UNEVENNESS = 1.1
-#: Shutters and apertures scatter by 0.5 to 1 % from frame to frame.
+#: Relative common-mode noise of a frame; shutters and apertures scatter by 0.5 to 1 %.
 TYPICAL_FLICKER = 0.007
 BAYER_FRACTIONS = {"R": 0.25, "G": 0.5, "B": 0.25}
 
 
 @dataclass(frozen=True)
 class CameraFigures:
-    """A camera at one ISO.
+    """Noise and range of a camera at one ISO.
 
     Attributes
     ----------
     width, height
-        Of a frame, in pixels.
+        Size of a frame in pixels.
     iso
-        At which the following hold.
-    electrons_per_dn, read_noise_electrons
-        Conversion gain; noise of reading one pixel.
+        Sensitivity at which the other figures hold.
+    electrons_per_dn
+        Conversion gain in electrons per DN.
+    read_noise_electrons
+        Read noise of a pixel in electrons.
     dark_electrons_per_s
-        Dark current of a pixel.
+        Dark current of a pixel in electrons per second.
     range_dn
-        From black to white.
+        Range from black to white in DN.
     unevenness
-        Brightest over mean of a patch, without noise.
+        Brightest over mean signal within a patch, without noise.
     channel_fractions
-        Fraction of the pixels that each channel has.
+        Fraction of the pixels in each channel.
     """
 
     width: int
@@ -60,21 +62,21 @@ class CameraFigures:
 
     @property
     def read_noise_dn(self) -> float:
-        """Noise of reading one pixel, DN."""
+        """Read noise of a pixel in DN."""
         return self.read_noise_electrons / self.electrons_per_dn
 
     @property
     def dark_dn_per_s(self) -> float:
-        """Dark current of a pixel, DN/s."""
+        """Dark current of a pixel in DN/s."""
         return self.dark_electrons_per_s / self.electrons_per_dn
 
     def pixels(self, region: Region, channel: str) -> float:
-        """Pixels of `channel` in `region`."""
+        """Return the number of pixels of a channel in a region."""
         _, _, width, height = region_pixels(region, self.width, self.height)
         return width * height * self.channel_fractions[channel]
 
     def at_iso(self, iso: float) -> "CameraFigures":
-        """The camera at another ISO; how its read noise changes is taken from the typical one."""
+        """Return the camera at another ISO; its read noise scales as that of the typical camera."""
         change = typical_read_noise_electrons(iso) / typical_read_noise_electrons(self.iso)
         return replace(
             self,
@@ -85,12 +87,12 @@ class CameraFigures:
 
 
 def typical_read_noise_electrons(iso: float) -> float:
-    """Noise of reading a pixel: some is added before amplification, some after it."""
+    """Return the typical read noise in electrons, added before and after amplification."""
     return math.hypot(TYPICAL_NOISE_BEFORE_GAIN, TYPICAL_NOISE_AFTER_GAIN * 100 / iso)
 
 
 def typical_camera(offers: CameraOffers, iso: float) -> CameraFigures:
-    """A camera of which nothing is known but the size of its files; 3 to 2 wide."""
+    """Return typical figures for a camera of which only the file size is known; aspect 3:2."""
     pixels = offers.frame_bytes / TYPICAL_BYTES_PER_PIXEL or TYPICAL_PIXELS
     height = 2 * round(math.sqrt(pixels / 6))
     return CameraFigures(

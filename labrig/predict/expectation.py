@@ -1,4 +1,4 @@
-"""From a protocol to the fit that it will allow: schedule, frames, noise, information."""
+"""Expected data of a protocol: schedule, frames, noise, information of the fit."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -19,12 +19,12 @@ from labrig.reduce import FrameMeasurement, is_clipped
 
 
 def predictable(protocol: ProtocolModel) -> Decay:
-    """`protocol` as one whose fit can be predicted.
+    """Return the protocol if its fit can be predicted.
 
     Raises
     ------
     UsageError
-        It records no decay.
+        If it records no decay.
     """
     if not isinstance(protocol, Decay):
         raise UsageError(
@@ -36,16 +36,16 @@ def predictable(protocol: ProtocolModel) -> Decay:
 
 @dataclass(frozen=True, eq=False)
 class Bench:
-    """What is known, or assumed, before anything is measured.
+    """Camera and samples, measured or assumed before the run.
 
     Attributes
     ----------
     camera
-        At some ISO; what it is at others follows.
+        Camera at some ISO, from which other sensitivities follow.
     flicker
-        ρ of all light between frames.
+        Relative common-mode noise ρ of a frame.
     glows
-        What each predicted patch will shine like.
+        Glow of each predicted patch by name.
     """
 
     camera: CameraFigures
@@ -53,7 +53,7 @@ class Bench:
     glows: Mapping[str, Glow]
 
     def seen_with(self, settings: CameraSettings) -> "Bench":
-        """The same at a protocol's settings."""
+        """Return the bench at a protocol's camera settings."""
         glows = {
             patch: glow.seen_at(settings.iso, settings.f_number)
             for patch, glow in self.glows.items()
@@ -63,20 +63,22 @@ class Bench:
 
 @dataclass(frozen=True, eq=False)
 class Expectation:
-    """What one protocol will measure and find.
+    """Expected data and information of one protocol.
 
     Attributes
     ----------
     exposures_s
-        Of the frames of one decay.
-    series, found
-        By patch: the fit's data, and what it will know.
+        Exposure times of the frames of one decay in seconds.
+    series
+        Expected data of the fit by patch.
+    found
+        Information of the fit by patch.
     clipped
-        By patch: frames of one decay that clip and are left out.
+        Number of clipped frames of one decay, which are left out, by patch.
     states_chosen
-        Whether the fit is to find out how many states there are.
+        Whether the fit chooses the number of states.
     warnings
-        Of the protocol's own metering, and of what it asks of the fit.
+        Warnings of the protocol's metering and of the number of states.
     """
 
     exposures_s: tuple[float, ...]
@@ -88,12 +90,12 @@ class Expectation:
 
 
 def expect(protocol: Decay, offers: CameraOffers, bench: Bench) -> Expectation:
-    """Predict every patch of `bench`.
+    """Predict every patch of a bench.
 
     Raises
     ------
     ProtocolError
-        Too few frames of a patch are left that do not clip.
+        If too few frames of a patch remain that do not clip.
     """
     bench = bench.seen_with(protocol.camera)
     warnings: list[str] = []
@@ -109,7 +111,7 @@ def expect(protocol: Decay, offers: CameraOffers, bench: Bench) -> Expectation:
     return Expectation(
         exposures_s=tuple(schedule.exposures_s),
         series=series,
-        found={patch: information(one) for patch, one in series.items()},
+        found={patch: information(data) for patch, data in series.items()},
         clipped=clipped,
         states_chosen=protocol.states == "auto",
         warnings=tuple(warnings),
@@ -122,7 +124,7 @@ def expected_schedule(
     bench: Bench,
     warn: Callable[[str], None],
 ) -> Schedule:
-    """What the protocol's metering makes of the glows of `bench`, given at its settings."""
+    """Return the schedule that the protocol's metering chooses for the glows of a bench."""
 
     def expected(t_s: float, exposure_s: float) -> list[FrameMeasurement]:
         at = np.array([t_s]), np.array([exposure_s])
@@ -141,7 +143,7 @@ def _series(
     patch: str,
     schedule: Schedule,
 ) -> tuple[ExpectedSeries, int]:
-    """What the fit of `patch` will be given, and how many frames of a decay clip."""
+    """Return the expected data of a patch and the number of clipped frames of a decay."""
     camera, region, glow = bench.camera, protocol.patches[patch], bench.glows[patch]
     t_s, exposure_s = np.array(schedule.times_s), np.array(schedule.exposures_s)
     frames = glow_frames(glow, camera, region, t_s, exposure_s)
@@ -151,12 +153,12 @@ def _series(
     else:
         darks_s = np.array(protocol.dark_exposures_s(offers))
         darks = dark_frames(camera, region, frames.channels, darks_s)
-    one = expected_series(glow, t_s, frames, darks, background, bench.flicker)
-    kept = np.asarray(~is_clipped(frames.saturated, 1.0).any(axis=1))
-    clipped = int(np.count_nonzero(~kept))
-    if len(kept) - clipped < 2 * len(glow.k_r_per_s):
+    decay = expected_series(glow, t_s, frames, darks, background, bench.flicker)
+    usable = np.asarray(~is_clipped(frames.saturated, 1.0).any(axis=1))
+    clipped = int(np.count_nonzero(~usable))
+    if len(usable) - clipped < 2 * len(glow.k_r_per_s):
         raise ProtocolError(
-            f"{patch}: {clipped} of {len(kept)} frames will clip, so that too few are left to fit; "
-            "expose for less (or exposure: auto), or lower camera.iso"
+            f"{patch}: {clipped} of {len(usable)} frames will clip, so that too few are left to "
+            "fit; expose for less (or exposure: auto), or lower camera.iso"
         )
-    return repeated(one, kept, protocol.repeats), clipped
+    return repeated(decay, usable, protocol.repeats), clipped

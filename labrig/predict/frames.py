@@ -1,4 +1,4 @@
-"""What frames will show, before they are taken."""
+"""Expected signal and noise of frames."""
 
 from dataclasses import dataclass
 
@@ -18,20 +18,20 @@ PEAK_SIGMAS = 2.576
 
 @dataclass(frozen=True, eq=False)
 class ExpectedFrames:
-    """n frames of one region in C channels, in DN above black.
+    """n expected frames of one region in C channels, in DN above black.
 
     Attributes
     ----------
     camera
-        At the ISO of the frames.
+        Camera at the ISO of the frames.
     channels
-        C names.
+        Names of the C channels.
     pixels
-        (C,) of the region in each channel.
+        Number of pixels of the region in each channel, shape (C,).
     exposure_s
-        (n,) shutter times.
+        Exposure times in seconds, shape (n,).
     light_dn
-        (n, C) mean of what the sample sends.
+        Mean signal of the sample in DN, shape (n, C).
     """
 
     camera: CameraFigures
@@ -42,39 +42,39 @@ class ExpectedFrames:
 
     @property
     def dark_dn(self) -> FloatArray:
-        """(n, 1) mean of the dark current."""
+        """Mean dark current in DN, shape (n, 1)."""
         return self.exposure_s[:, np.newaxis] * self.camera.dark_dn_per_s
 
     @property
     def photon_variance(self) -> FloatArray:
-        """(n, C) of the mean, DN²: the light's part."""
+        """Variance of the mean by photon noise in DN², shape (n, C)."""
         return self.light_dn / self.camera.electrons_per_dn / self.pixels
 
     @property
     def read_variance(self) -> FloatArray:
-        """(n, C) of the mean, DN²: what reading the pixels adds."""
-        of_pixel = max(self.camera.read_noise_dn**2, ROUNDING_VARIANCE)
-        return np.broadcast_to(of_pixel / self.pixels, self.light_dn.shape)
+        """Variance of the mean by read noise in DN², shape (n, C)."""
+        pixel_variance = max(self.camera.read_noise_dn**2, ROUNDING_VARIANCE)
+        return np.broadcast_to(pixel_variance / self.pixels, self.light_dn.shape)
 
     @property
     def dark_variance(self) -> FloatArray:
-        """(n, C) of the mean, DN²: the dark current's electrons."""
+        """Variance of the mean by dark current in DN², shape (n, C)."""
         return self.dark_dn / self.camera.electrons_per_dn / self.pixels
 
     @property
     def variance(self) -> FloatArray:
-        """(n, C) of the mean, DN², flicker left out."""
+        """Variance of the mean in DN² without flicker, shape (n, C)."""
         return self.photon_variance + self.read_variance + self.dark_variance
 
     @property
     def saturated(self) -> FloatArray:
-        """(n, C) fraction of the pixels that clip."""
+        """Fraction of the pixels that clip, shape (n, C)."""
         brightest = self.light_dn * self.camera.unevenness + self.dark_dn
         deviation = np.sqrt(self.variance * self.pixels)
         return np.asarray(ndtr((brightest - self.camera.range_dn) / deviation))
 
     def measurements(self) -> list[FrameMeasurement]:
-        """Each frame as `labrig.reduce.measure` would see it."""
+        """Return each frame as `labrig.reduce.measure` would reduce it."""
         camera = self.camera
         mean = np.minimum(self.light_dn + self.dark_dn, camera.range_dn)
         deviation = np.sqrt(self.variance * self.pixels)
@@ -113,7 +113,7 @@ class ExpectedFrames:
 def glow_frames(
     glow: Glow, camera: CameraFigures, region: Region, t_s: FloatArray, exposure_s: FloatArray
 ) -> ExpectedFrames:
-    """Frames of `glow` that begin at `t_s` (n,) after lamp off."""
+    """Return the expected frames of a glow that begin `t_s` (n,) seconds after lamp off."""
     decay = exponential_means(glow.k_r_per_s, t_s, exposure_s) @ glow.amplitude
     light_dn = np.multiply.outer(exposure_s * decay, np.array([*glow.weights.values()]))
     return _frames(camera, region, tuple(glow.weights), exposure_s, light_dn)
@@ -122,7 +122,7 @@ def glow_frames(
 def dark_frames(
     camera: CameraFigures, region: Region, channels: tuple[str, ...], exposure_s: FloatArray
 ) -> ExpectedFrames:
-    """Frames of a region that sends no light."""
+    """Return the expected frames of a region without light."""
     light_dn = np.zeros((len(exposure_s), len(channels)))
     return _frames(camera, region, channels, exposure_s, light_dn)
 

@@ -1,4 +1,4 @@
-"""How bright a material glows: from its file, as far as that tells."""
+"""Glow of a material over time, from its file."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,22 +11,26 @@ from labrig.fit import FloatArray
 from labrig.material import Material, State
 from labrig.optics import CHANNELS, CameraResponse
 
-#: A fit tells no more states apart; with more, a file describes something like a power law.
+#: Largest number of states that a fit resolves; a file with more approximates a power law.
 MOST_STATES = 3
 
 
 @dataclass(frozen=True, eq=False)
 class Glow:
-    """Σ_i a_i e^(−k_i t) times one weight per channel, as a camera at `iso` and `f_number` sees it.
+    """Glow Σ_i a_i exp(−k_i t) with one weight per channel, for given camera settings.
 
     Attributes
     ----------
     k_r_per_s
-        (m,) rates, falling.
+        Rates in 1/s, descending, shape (m,).
     amplitude
-        (m,) at lamp off in the brightest channel, DN/s.
+        Amplitudes at lamp off in the brightest channel in DN/s, shape (m,).
     weights
-        Channel → weight, maximum 1.
+        Weights of the channels by name, maximum 1.
+    iso
+        Sensitivity of the camera.
+    f_number
+        Aperture of the camera; None if it is not known.
     """
 
     k_r_per_s: FloatArray
@@ -36,7 +40,7 @@ class Glow:
     f_number: float | None
 
     def seen_at(self, iso: float, f_number: float | None) -> "Glow":
-        """The same glow at other settings; an aperture that is not known stays as it is."""
+        """Return the glow at other camera settings; an unknown aperture is taken as unchanged."""
         light = 1.0
         if self.f_number is not None and f_number is not None:
             light = (self.f_number / f_number) ** 2
@@ -48,17 +52,17 @@ class Glow:
         )
 
     def brighter(self, factor: float) -> "Glow":
-        """The same glow, `factor` times as bright."""
+        """Return the glow with its amplitudes multiplied by `factor`."""
         return replace(self, amplitude=self.amplitude * factor)
 
 
 def check_states(material: Material) -> None:
-    """Refuse a material whose states a decay cannot tell apart.
+    """Refuse a material whose states a decay cannot resolve.
 
     Raises
     ------
     UsageError
-        More states than a fit tells apart, or two with the same rate.
+        If it has more states than a fit can resolve, or two with the same rate.
     """
     rates = sorted((state.k_r_per_s for state in material.states), reverse=True)
     if len(rates) > MOST_STATES:
@@ -74,7 +78,7 @@ def check_states(material: Material) -> None:
 
 
 def measured_amplitudes(material: Material) -> FloatArray | None:
-    """(m,) amplitudes by falling rate, in the file's own unit; None if one is missing."""
+    """Return the amplitudes by descending rate in the file's unit, (m,); None if one is missing."""
     amplitudes = [state.amplitude for state in by_falling_rate(material)]
     if any(amplitude is None for amplitude in amplitudes):
         return None
@@ -82,26 +86,34 @@ def measured_amplitudes(material: Material) -> FloatArray | None:
 
 
 def by_falling_rate(material: Material) -> Sequence[State]:
-    """The states as fits list them."""
+    """Return the states in order of descending rate, as in fits."""
     return sorted(material.states, key=lambda state: -state.k_r_per_s)
 
 
 def rates(material: Material) -> FloatArray:
-    """(m,) k_r in 1/s, falling."""
+    """Return the rates k_r of the states in 1/s, descending, shape (m,)."""
     return np.array([state.k_r_per_s for state in by_falling_rate(material)])
 
 
 def radiated(
     material: Material, response: CameraResponse | None, charge_s: float
 ) -> tuple[FloatArray, dict[str, float]] | None:
-    """Relative amplitudes Λ_i k_r,i r_i(0), (m,) by falling rate, and channel weights.
-
-    None where some state's Λ is not known. Without `response` the weights are empty.
+    """Return relative amplitudes Λ_i k_r,i r_i(0) and channel weights.
 
     Parameters
     ----------
+    material
+        Material with its states.
+    response
+        Spectral responses of the camera; without them there are no weights.
     charge_s
-        Length of the charge; infinite for one until the plateau.
+        Duration of the charge in seconds; infinite for a charge to the plateau.
+
+    Returns
+    -------
+    tuple or None
+        Amplitudes by descending rate, shape (m,), and weights by channel; None if Λ of a state is
+        not known.
     """
     states = by_falling_rate(material)
     if material.bands_nm is None or any(state.reradiation is None for state in states):
@@ -116,18 +128,19 @@ def radiated(
     inside = (band >= 0) & (band < len(edges) - 1)
     spectra = np.where(inside, emitted[:, np.clip(band, 0, len(edges) - 2)], 0.0)
     values = np.array([response.response(spectrum) for spectrum in spectra])
-    together = values.sum(axis=0)
-    if not together.max() > 0:
+    total = values.sum(axis=0)
+    if not total.max() > 0:
         return None
-    weights = dict(zip(CHANNELS, (together / together.max()).tolist(), strict=True))
-    return values[:, int(np.argmax(together))], weights
+    weights = dict(zip(CHANNELS, (total / total.max()).tolist(), strict=True))
+    return values[:, int(np.argmax(total))], weights
 
 
 def _concentrations(material: Material, charge_s: float) -> FloatArray:
-    """(m,) r(0) as the file has it; else what its k_e reach under even light; else 1, as the paper.
+    """Return the concentrations r(0) of the states, shape (m,).
 
-    The irradiance is taken to be the same in all bands and of the length to which the file's k_e
-    belong.
+    They are those of the file, else those that its k_e reach within the charge under spectrally
+    even light, else 1 as in Nalbach et al. The irradiance is taken to be equal in all bands, with
+    the norm to which the file's k_e belong.
     """
     states = by_falling_rate(material)
     if all(state.r0 is not None for state in states):

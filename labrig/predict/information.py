@@ -1,9 +1,9 @@
-"""What a decay fit will know: the Fisher information of its parameters, and an error budget.
+"""Fisher information of a decay fit's parameters, and their error budget.
 
-The model is the fit's own (`labrig.fit`): Σ_i a_i g(k_i) times one weight per channel, plus an
-offset per channel of which the dark frames leave σ open; Cov = diag(σ²) + ρ² s sᵀ within a frame.
+The decay model is that of `labrig.fit`: Σ_i a_i g(k_i) times one weight per channel, plus an
+offset per channel with the σ of the dark frames as prior; Cov = diag(σ²) + ρ² s sᵀ within a frame.
 Rates and amplitudes are marginalised over weights and offsets. The inverse information is the
-covariance of the best estimator (Cramér and Rao), which the weighted fit attains.
+covariance of the best unbiased estimator (Cramér and Rao), which the weighted fit attains.
 """
 
 from collections.abc import Mapping
@@ -19,14 +19,14 @@ from labrig.predict.series import DARK, FLICKER, ExpectedSeries
 
 @dataclass(frozen=True, eq=False)
 class Information:
-    """What the fit will know of k1, a1, k2, a2, …
+    """Expected covariance of the parameters k1, a1, k2, a2, … of a fit with m states.
 
     Attributes
     ----------
     covariance
-        (2m, 2m); infinite variances where the frames say nothing.
+        Covariance, shape (2m, 2m); variances are infinite for parameters that are not determined.
     budget
-        By source, (2m,) its fraction of each variance; they add up to 1.
+        Fractions of each variance by source of noise, shape (2m,); they sum to 1.
     """
 
     covariance: FloatArray
@@ -34,12 +34,12 @@ class Information:
 
     @property
     def sigma(self) -> FloatArray:
-        """(2m,) of k1, a1, …"""
+        """Standard uncertainties of k1, a1, …, shape (2m,)."""
         return np.sqrt(np.diag(self.covariance))
 
 
 def information(series: ExpectedSeries) -> Information:
-    """Covariance and error budget of a fit to `series`."""
+    """Return covariance and error budget of a fit to `series`."""
     slopes, signal = _slopes(series)
     whitening = _whitening(series, signal)
     values = (whitening @ slopes).reshape(-1, slopes.shape[2])
@@ -47,65 +47,83 @@ def information(series: ExpectedSeries) -> Information:
     design = np.zeros((len(values) + len(priors), slopes.shape[2]))
     design[: len(values)] = values
     design[len(values) :, slopes.shape[2] - len(priors) :] = np.diag(1 / priors)
-    estimator, unseen = _pseudo_inverse(design)
+    estimator, undetermined = _pseudo_inverse(design)
     # What a deviation of each value, and of each offset by its σ, does to the parameters.
-    by_value = np.einsum(
+    value_response = np.einsum(
         "pfc,fcd->pfd", estimator[:, : len(values)].reshape(-1, *signal.shape), whitening
     )
-    by_offset = estimator[:, len(values) :]
+    offset_response = estimator[:, len(values) :]
     parts = {
-        source: np.einsum("pfc,fc->p", by_value**2, variance)
+        source: np.einsum("pfc,fc->p", value_response**2, variance)
         for source, variance in series.variances.items()
     }
-    parts[FLICKER] = np.square(series.flicker * np.einsum("pfc,fc->pf", by_value, signal)).sum(1)
-    parts[DARK] = parts[DARK] + np.square(by_offset).sum(axis=1)
+    parts[FLICKER] = np.square(
+        series.flicker * np.einsum("pfc,fc->pf", value_response, signal)
+    ).sum(1)
+    parts[DARK] = parts[DARK] + np.square(offset_response).sum(axis=1)
     covariance = estimator @ estimator.T
-    covariance[unseen, :], covariance[:, unseen] = 0.0, 0.0
-    covariance[unseen, unseen] = np.inf
-    asked = slice(0, 2 * len(series.k_r_per_s))
+    covariance[undetermined, :], covariance[:, undetermined] = 0.0, 0.0
+    covariance[undetermined, undetermined] = np.inf
+    reported = slice(0, 2 * len(series.k_r_per_s))
     total = np.sum(list(parts.values()), axis=0)
     return Information(
-        covariance=covariance[asked, asked],
+        covariance=covariance[reported, reported],
         budget={
-            source: (part / np.where(total > 0, total, 1.0))[asked]
+            source: (part / np.where(total > 0, total, 1.0))[reported]
             for source, part in parts.items()
         },
     )
 
 
 def _whitening(series: ExpectedSeries, signal: FloatArray) -> FloatArray:
-    """(n, C, C) W of each frame, Wᵀ W = Cov⁻¹."""
+    """Return the whitening matrix W of each frame, Wᵀ W = Cov⁻¹, shape (n, C, C)."""
     covariance = np.einsum("fc,cd->fcd", series.variance, np.eye(signal.shape[1]))
     covariance += series.flicker**2 * np.einsum("fc,fd->fcd", signal, signal)
     return np.linalg.inv(np.linalg.cholesky(covariance))
 
 
 def _slopes(series: ExpectedSeries) -> tuple[FloatArray, FloatArray]:
-    """Derivatives (n, C, p) by k1, a1, …, the other channels' weights, the offsets; the signal."""
+    """Return the derivatives by all parameters, shape (n, C, p), and the signal, shape (n, C).
+
+    The parameters are k1, a1, …, the weights of the other channels, and the offsets.
+    """
     rates, weights = series.k_r_per_s, series.weights
-    means, by_log_rate = exponential_means_and_slopes(rates, series.t_s, series.exposure_s)
+    means, log_rate_slopes = exponential_means_and_slopes(rates, series.t_s, series.exposure_s)
     curve = means @ series.amplitude
-    others = [c for c in range(len(weights)) if c != int(np.argmax(weights))]
-    fitted = [c for c in range(len(weights)) if series.offset_sigma[c] > 0]
+    other_channels = [c for c in range(len(weights)) if c != int(np.argmax(weights))]
+    offset_channels = [c for c in range(len(weights)) if series.offset_sigma[c] > 0]
     n_shape = 2 * len(rates)
-    slopes = np.zeros((len(curve), len(weights), n_shape + len(others) + len(fitted)))
+    slopes = np.zeros(
+        (len(curve), len(weights), n_shape + len(other_channels) + len(offset_channels))
+    )
     slopes[:, :, 0:n_shape:2] = np.einsum(
-        "fi,c->fci", by_log_rate * series.amplitude / rates, weights
+        "fi,c->fci", log_rate_slopes * series.amplitude / rates, weights
     )
     slopes[:, :, 1:n_shape:2] = np.einsum("fi,c->fci", means, weights)
-    for place, channel in enumerate(others, start=n_shape):
+    for place, channel in enumerate(other_channels, start=n_shape):
         slopes[:, channel, place] = curve
-    for place, channel in enumerate(fitted, start=n_shape + len(others)):
+    for place, channel in enumerate(offset_channels, start=n_shape + len(other_channels)):
         slopes[:, channel, place] = 1.0
     return slopes, np.multiply.outer(curve, weights)
 
 
 def _pseudo_inverse(design: FloatArray) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """(p, n) of `design` (n, p), and (p,) which parameters it does not determine."""
+    """Return the pseudo-inverse of a design matrix and the parameters that it does not determine.
+
+    Parameters
+    ----------
+    design
+        Design matrix, shape (n, p).
+
+    Returns
+    -------
+    tuple of ndarray
+        Pseudo-inverse, shape (p, n), and mask of the undetermined parameters, shape (p,).
+    """
     scale = np.linalg.norm(design, axis=0)
     scale = np.where(scale > 0, scale, 1.0)
     u, s, vt = np.linalg.svd(design / scale, full_matrices=False)
-    kept = s > max(design.shape) * EPSILON * s[0]
-    inverse = (vt[kept].T / s[kept]) @ u[:, kept].T / scale[:, np.newaxis]
-    seen = np.einsum("ij,ij->j", vt[kept], vt[kept])
-    return inverse, seen < 1 - np.sqrt(EPSILON)
+    significant = s > max(design.shape) * EPSILON * s[0]
+    inverse = (vt[significant].T / s[significant]) @ u[:, significant].T / scale[:, np.newaxis]
+    determined = np.einsum("ij,ij->j", vt[significant], vt[significant])
+    return inverse, determined < 1 - np.sqrt(EPSILON)

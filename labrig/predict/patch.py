@@ -1,4 +1,4 @@
-"""What the fit of one patch will know, in the units of its rates."""
+"""Expected uncertainties of the fit of one patch."""
 
 import math
 from collections.abc import Mapping
@@ -14,21 +14,21 @@ from labrig.fit.decay import APART_SIGMAS, F_TEST_LEVEL
 from labrig.predict.expectation import Expectation
 from labrig.predict.series import ExpectedSeries
 
-#: Parameters that one more state takes.
+#: Number of parameters that one more state adds.
 ADDED = 2
 
 
 def chance_of_all_states(series: ExpectedSeries) -> float:
-    """Probability that the fit tells as many states as there are.
+    """Return the probability that the fit resolves as many states as there are.
 
-    One state fewer is fitted to what is expected without noise; the χ² that it leaves is the
+    A fit with one state less is made to the expected signal without noise; its χ² is the
     noncentrality of the F-test and of the BIC by which the fit chooses (`labrig.fit`).
     """
     states, frames = len(series.k_r_per_s), len(series.t_s)
     if states == 1:
         return 1.0
     try:
-        fewer = fit_decay(
+        fit = fit_decay(
             series.t_s,
             np.multiply.outer(series.curve, series.weights),
             np.sqrt(series.variance),
@@ -40,36 +40,41 @@ def chance_of_all_states(series: ExpectedSeries) -> float:
         )
     except FitError:
         return 0.0
-    left = frames - 2 * states
-    if left < 1:
+    degrees_of_freedom = frames - 2 * states
+    if degrees_of_freedom < 1:
         return 0.0
-    by_f_test = float(fdtri(ADDED, left, 1 - F_TEST_LEVEL))
-    by_bic = float(np.log(series.variance.size))
-    return float(1 - ncfdtr(ADDED, left, fewer.chi2, max(by_f_test, by_bic)))
+    f_test_limit = float(fdtri(ADDED, degrees_of_freedom, 1 - F_TEST_LEVEL))
+    bic_limit = float(np.log(series.variance.size))
+    return float(1 - ncfdtr(ADDED, degrees_of_freedom, fit.chi2, max(f_test_limit, bic_limit)))
 
 
-#: Chance of telling all states from which on there is nothing to say.
+#: Probability of resolving all states from which no warning is given.
 SURE = 0.95
 
 
 @dataclass(frozen=True)
 class PatchPrediction:
-    """m states, by falling rate.
+    """Expected uncertainties of a patch with m states, by descending rate.
 
     Attributes
     ----------
-    k_r_per_s, amplitude_dn_per_s
-        (m,) as put in.
-    k_r_sigma_per_s, amplitude_sigma_dn_per_s
-        (m,) standard uncertainties; infinite where the frames say nothing.
+    k_r_per_s
+        Rates assumed in 1/s, shape (m,).
+    k_r_sigma_per_s
+        Standard uncertainties of the rates in 1/s, shape (m,); infinite if undetermined.
+    amplitude_dn_per_s
+        Amplitudes assumed in DN/s, shape (m,).
+    amplitude_sigma_dn_per_s
+        Standard uncertainties of the amplitudes in DN/s, shape (m,); infinite if undetermined.
     budget
-        By source of noise, (m,) fraction of each rate's variance.
+        Fraction of each rate's variance by source of noise, shape (m,).
     chance_of_all_states
-        That the fit tells as many states as there are; 1 if the protocol gives their number.
+        Probability that the fit resolves all states; 1 if the protocol gives their number.
     least_apart
-        Distance of the two closest rates on a logarithmic scale, in its σ; infinite for one rate.
+        Distance of the two closest rates on a logarithmic scale, in units of its σ; infinite for
+        one rate.
     clipped
-        Frames of one decay that clip and are left out.
+        Number of frames of one decay that clip and are left out.
     """
 
     k_r_per_s: tuple[float, ...]
@@ -83,11 +88,11 @@ class PatchPrediction:
 
     @property
     def resolves_all_states(self) -> bool:
-        """Whether the fit will see every state, and know it from the others."""
+        """Whether the fit will resolve every state."""
         return self.chance_of_all_states >= SURE and self.least_apart >= APART_SIGMAS
 
     def to_json(self) -> dict[str, Any]:
-        """For a program; what is infinite is None."""
+        """Return plain values for JSON; infinite ones are None."""
         return {
             "states": [
                 {
@@ -106,7 +111,15 @@ class PatchPrediction:
 
 
 def _least_apart(rates: FloatArray, covariance: FloatArray) -> float:
-    """Of neighbours among the rates (m,), falling, with their covariance (m, m)."""
+    """Return the smallest distance of neighbouring rates in units of its σ.
+
+    Parameters
+    ----------
+    rates
+        Rates in 1/s, descending, shape (m,).
+    covariance
+        Covariance of the rates in 1/s², shape (m, m).
+    """
     relative = covariance / np.outer(rates, rates)
     variance = np.diag(relative)
     sigma2 = variance[:-1] + variance[1:] - 2 * np.diag(relative, 1)
@@ -117,19 +130,22 @@ def _finite(sigma: float) -> float | None:
     return sigma if math.isfinite(sigma) else None
 
 
-def predicted_patches(expected: Expectation) -> dict[str, PatchPrediction]:
-    """Every patch of `expected`."""
+def predicted_patches(expectation: Expectation) -> dict[str, PatchPrediction]:
+    """Return the prediction of every patch."""
     patches = {}
-    for patch, series in expected.series.items():
-        found = expected.found[patch]
+    for patch, series in expectation.series.items():
+        fit_information = expectation.found[patch]
         patches[patch] = PatchPrediction(
             k_r_per_s=tuple(series.k_r_per_s.tolist()),
-            k_r_sigma_per_s=tuple(found.sigma[0::2].tolist()),
+            k_r_sigma_per_s=tuple(fit_information.sigma[0::2].tolist()),
             amplitude_dn_per_s=tuple(series.amplitude.tolist()),
-            amplitude_sigma_dn_per_s=tuple(found.sigma[1::2].tolist()),
-            budget={source: tuple(part[0::2].tolist()) for source, part in found.budget.items()},
-            chance_of_all_states=chance_of_all_states(series) if expected.states_chosen else 1.0,
-            least_apart=_least_apart(series.k_r_per_s, found.covariance[0::2, 0::2]),
-            clipped=expected.clipped[patch],
+            amplitude_sigma_dn_per_s=tuple(fit_information.sigma[1::2].tolist()),
+            budget={
+                source: tuple(part[0::2].tolist())
+                for source, part in fit_information.budget.items()
+            },
+            chance_of_all_states=chance_of_all_states(series) if expectation.states_chosen else 1.0,
+            least_apart=_least_apart(series.k_r_per_s, fit_information.covariance[0::2, 0::2]),
+            clipped=expectation.clipped[patch],
         )
     return patches

@@ -1,4 +1,4 @@
-"""What a protocol's fits will know, and what would make them know more."""
+"""Predicted uncertainties of a protocol's fits, and changes that would reduce them."""
 
 import json
 from collections.abc import Mapping
@@ -14,24 +14,26 @@ from labrig.predict.variants import changes
 
 @dataclass(frozen=True)
 class Prediction:
-    """What a protocol's fits will know before it is run.
+    """Expected uncertainties of a protocol's fits.
 
     Attributes
     ----------
     patches
-        By name.
+        Predictions by patch.
     materials
-        Names by patch.
+        Names of the materials by patch.
     exposures_s
-        Of the frames of one decay.
+        Exposure times of the frames of one decay in seconds.
     decays
-        How many of them share one fit.
+        Number of decays that share one fit.
     remedies
-        The best first; those that do not help last.
+        Changes of the protocol, those with the largest gain first.
     brightness_known
-        Patches whose amplitudes are as measured, the others' as assumed.
-    notes, warnings
-        Where the figures come from; what the protocol's metering will say.
+        Patches whose amplitudes are measured; those of the others are assumed.
+    notes
+        Origins of the assumed figures.
+    warnings
+        Warnings that the protocol's metering will give.
     """
 
     patches: Mapping[str, PatchPrediction]
@@ -44,7 +46,7 @@ class Prediction:
     warnings: tuple[str, ...]
 
     def to_json(self) -> str:
-        """For a program; what is infinite is null."""
+        """Return the prediction as JSON; infinite values are null."""
         content = {
             "patches": {
                 name: {
@@ -75,35 +77,65 @@ class Prediction:
 def predict(
     protocol: ProtocolModel, laid_out: Plan, rig: RigFile, source: str, sources: Sources
 ) -> Prediction:
-    """Expected uncertainties of `protocol` on `rig`, and of its variants.
+    """Predict the uncertainties of a decay protocol on a rig, and of variants of the protocol.
 
     Parameters
     ----------
+    protocol
+        Protocol that records a decay.
     laid_out
-        The protocol's plan on that rig.
+        Plan of the protocol on the rig.
+    rig
+        Rig file with the devices.
     source
-        Names the rig in messages.
+        Name or path of the rig file, for messages.
     sources
-        What is on the bench, and where its figures are to come from.
+        Materials of the patches, and the sources of noise and brightness.
+
+    Returns
+    -------
+    Prediction
+        Expected standard uncertainties of rates and amplitudes, error budget, and variants of the
+        protocol by the gain that they bring.
 
     Raises
     ------
     UsageError
-        The protocol records no decay, a patch, material or run does not exist, or the material is
-        one of which no decay can be predicted.
+        If the protocol records no decay, if there is no such patch, material or run, or if no decay
+        can be predicted for the material.
+
+    Notes
+    -----
+    The uncertainties are those of the best unbiased estimator, the inverse of the Fisher
+    information (Cramér–Rao bound) of the decay model of `labrig.fit`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.predict import Sources, predict
+    >>> protocol = labrig.read_protocol(Path("runs/decay/protocol.yaml"))
+    >>> rig = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> plan = labrig.plan(protocol, rig, "rig.yaml")
+    >>> prediction = predict(protocol, plan, rig, "rig.yaml", Sources({"": "blue-paint"}))
+    >>> patch = prediction.patches["sample"]
+    >>> f"k_r = {patch.k_r_per_s[0]} ± {patch.k_r_sigma_per_s[0]:.0e} 1/s"
+    'k_r = 0.032 ± 6e-05 1/s'
+    >>> prediction.remedies[0].change.says
+    'for: 3 min'
     """
-    asked = predictable(protocol)
-    known = what_is_known(protocol, laid_out.offers, sources)
-    expected = expect(asked, laid_out.offers, known.bench)
-    base = predicted_patches(expected)
-    trials = Trials(protocol, rig, source, known.bench, base, laid_out.duration_s)
+    decay = predictable(protocol)
+    assumptions = what_is_known(protocol, laid_out.offers, sources)
+    expectation = expect(decay, laid_out.offers, assumptions.bench)
+    base = predicted_patches(expectation)
+    trials = Trials(protocol, rig, source, assumptions.bench, base, laid_out.duration_s)
     return Prediction(
         patches=base,
-        materials=known.materials,
-        exposures_s=expected.exposures_s,
-        decays=asked.repeats,
-        remedies=trials.remedies(changes(asked, laid_out.offers, base)),
-        brightness_known=known.brightness_known,
-        notes=known.notes,
-        warnings=expected.warnings,
+        materials=assumptions.materials,
+        exposures_s=expectation.exposures_s,
+        decays=decay.repeats,
+        remedies=trials.remedies(changes(decay, laid_out.offers, base)),
+        brightness_known=assumptions.brightness_known,
+        notes=assumptions.notes,
+        warnings=expectation.warnings,
     )

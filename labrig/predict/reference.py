@@ -1,4 +1,4 @@
-"""What an earlier run says about bench and camera: noise, flicker, brightness."""
+"""Noise, flicker and brightness of bench and camera from an earlier run."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -21,28 +21,28 @@ from labrig.region import Region
 from labrig.results import Series, find_fitted_decays, read_fitted_decay, read_series
 from labrig.yaml_file import read_yaml
 
-#: A flicker known worse than this is not taken over.
+#: Relative uncertainty from which a flicker is not used.
 FLICKER_KNOWN = 0.2
-#: Dark frames looked at, of the shortest and of the longest exposures.
+#: Number of dark frames used, of the shortest and of the longest exposures each.
 DARKS_EACH = 2
 
 
 @dataclass(frozen=True)
 class Reference:
-    """An earlier run on the same bench, with the same camera.
+    """An earlier run on the same bench with the same camera.
 
     Attributes
     ----------
     run
-        Name of its folder.
+        Name of the run folder.
     camera
-        As its frames show it, at the ISO to which the amplitudes of its materials belong.
+        Noise and range of the camera at the ISO of the run.
     f_number
-        To which they belong, too.
+        Aperture of the run; None if it is not known.
     flicker
-        ρ; None where the run does not tell it.
+        Relative common-mode noise ρ; None if the run does not determine it.
     channel_weights
-        Of the patch looked at, maximum 1.
+        Weights of the channels of the patch by name, maximum 1.
     """
 
     run: str
@@ -53,33 +53,35 @@ class Reference:
 
 
 def result_places(run: Path) -> dict[str, Path]:
-    """Where the fits of `run` lie, by patch; under "" if it has one patch only.
+    """Return the folders of the fits of a run by patch, by "" if there is one patch only.
 
     Raises
     ------
     UsageError
-        There is none.
+        If there is no fit.
     """
-    found = find_fitted_decays(run / "result")
-    if not found:
+    fits = find_fitted_decays(run / "result")
+    if not fits:
         raise UsageError(f"{run}: expected a run with a fit in its result folder, got none")
-    return {name: path.parent for name, path in found.items()}
+    return {name: path.parent for name, path in fits.items()}
 
 
 def run_of(place: Path) -> Path | None:
-    """The run folder in whose result `place` lies."""
-    return next((up for up in place.resolve().parents if (up / "journal.jsonl").is_file()), None)
+    """Return the run folder that contains the result folder `place`; None if there is none."""
+    return next(
+        (folder for folder in place.resolve().parents if (folder / "journal.jsonl").is_file()), None
+    )
 
 
 def read_reference(place: Path) -> Reference:
-    """What the run with the result in `place` tells.
+    """Read noise, flicker and channel weights from the run with the result folder `place`.
 
     Raises
     ------
     UsageError
-        There is no such run.
+        If there is no run around the folder.
     DataError
-        A file of it is missing or damaged.
+        If a file of the run is missing or damaged.
     """
     folder = run_of(place)
     if folder is None:
@@ -88,28 +90,30 @@ def read_reference(place: Path) -> Reference:
     series = read_series(place / "series.csv")[0]
     region = _region(folder, series.region)
     frame = _first_usable(run, series)
-    seen = measure(read_raw(frame.path), region)
-    brightest = seen.channels[fit.brightest_channel]
+    measurement = measure(read_raw(frame.path), region)
+    brightest = measurement.channels[fit.brightest_channel]
     noise_dn = PEAK_SIGMAS * brightest.sigma * np.sqrt(brightest.n)
     darks = _darks(run, region)
-    gain, read_noise_dn = _photon_transfer(series, seen, darks)
+    gain, read_noise_dn = _photon_transfer(series, measurement, darks)
     gain = gain or TYPICAL_ELECTRONS_PER_DN * 100 / frame.iso
     dark_dn_per_s = _dark_current(darks)
-    pixels = sum(stats.n for stats in seen.channels.values())
+    pixels = sum(stats.n for stats in measurement.channels.values())
     return Reference(
         run=folder.name,
         camera=CameraFigures(
-            width=seen.width,
-            height=seen.height,
+            width=measurement.width,
+            height=measurement.height,
             iso=frame.iso,
             electrons_per_dn=gain,
             read_noise_electrons=read_noise_dn * gain,
             dark_electrons_per_s=(
                 TYPICAL_DARK_ELECTRONS_PER_S if dark_dn_per_s is None else dark_dn_per_s * gain
             ),
-            range_dn=seen.range_dn,
+            range_dn=measurement.range_dn,
             unevenness=float(max((brightest.peak - noise_dn) / brightest.mean, 1.0)),
-            channel_fractions={name: stats.n / pixels for name, stats in seen.channels.items()},
+            channel_fractions={
+                name: stats.n / pixels for name, stats in measurement.channels.items()
+            },
         ),
         f_number=frame.f_number,
         flicker=fit.flicker if fit.flicker_sigma < FLICKER_KNOWN * fit.flicker else None,
@@ -118,7 +122,7 @@ def read_reference(place: Path) -> Reference:
 
 
 def _region(folder: Path, patch: str) -> Region:
-    """Where the patch was when it was processed, or else where the protocol has it."""
+    """Return the region of a patch when it was processed, else that of the protocol."""
     protocol = predictable(read_protocol(folder / "protocol.yaml"))
     processed = folder / "result" / "provenance.yaml"
     patches = read_yaml(processed)["regions"] if processed.is_file() else protocol.patches
@@ -135,7 +139,7 @@ def _first_usable(run: RunRecord, series: Series) -> FrameRecord:
 
 
 def _darks(run: RunRecord, region: Region) -> list[FrameMeasurement]:
-    """Dark frames of the shortest and the longest exposures."""
+    """Return measurements of the dark frames with the shortest and the longest exposures."""
     darks = sorted(run.frames(FrameRole.DARK), key=lambda frame: frame.exposure_s)
     if len(darks) > 2 * DARKS_EACH:
         darks = darks[:DARKS_EACH] + darks[-DARKS_EACH:]
@@ -145,28 +149,31 @@ def _darks(run: RunRecord, region: Region) -> list[FrameMeasurement]:
 
 
 def _photon_transfer(
-    series: Series, seen: FrameMeasurement, darks: Sequence[FrameMeasurement]
+    series: Series, measurement: FrameMeasurement, darks: Sequence[FrameMeasurement]
 ) -> tuple[float, float]:
-    """Electrons a DN and read noise in DN, by photon transfer.
+    """Return electrons per DN and read noise in DN from a photon transfer curve.
 
-    0 electrons a DN where the frames are all too dark to tell.
+    The first is 0 if all frames are too dark to determine it.
     """
-    pixels = np.array([seen.channels[name].n for name in series.channels])
+    pixels = np.array([measurement.channels[name].n for name in series.channels])
     exposure_s = series.exposure_s[:, np.newaxis]
-    in_dark = [channel for dark in darks for channel in dark.channels.values()]
+    dark_channels = [channel for dark in darks for channel in dark.channels.values()]
     mean = np.append(
-        (series.values * exposure_s)[series.usable], [channel.mean for channel in in_dark]
+        (series.values * exposure_s)[series.usable], [channel.mean for channel in dark_channels]
     )
     variance = np.append(
         (pixels * np.square(series.sigma * exposure_s))[series.usable],
-        [channel.n * channel.sigma**2 for channel in in_dark],
+        [channel.n * channel.sigma**2 for channel in dark_channels],
     )
     line = NoiseModel.fit(variance_terms(mean)[:, :2], variance, sigma_dn2=variance)
     return 1 / line.photon_dn if line.photon_dn > 0 else 0.0, float(np.sqrt(line.read_dn2))
 
 
 def _dark_current(darks: Sequence[FrameMeasurement]) -> float | None:
-    """DN/s of a pixel; at most that much if all dark frames have one exposure, None without any."""
+    """Return the dark current of a pixel in DN/s.
+
+    It is an upper bound if all dark frames have one exposure time, and None without dark frames.
+    """
     if not darks:
         return None
     stats = [list(dark.channels.values()) for dark in darks]

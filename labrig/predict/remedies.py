@@ -1,4 +1,4 @@
-"""Variants of a protocol, each predicted as if it had been asked about."""
+"""Predictions for variants of a protocol."""
 
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
@@ -12,29 +12,29 @@ from labrig.predict.expectation import Bench, expect, predictable
 from labrig.predict.patch import PatchPrediction, predicted_patches
 from labrig.predict.variants import Change, changed
 
-#: A change that leaves more than this of σ does not help.
+#: Largest ratio of σ after over before a change that helps.
 HELPS = 0.95
-#: This is half: dark frames are not taken anew for each decay, so that 4 of them fall just short.
+#: Ratio that counts as half: dark frames are shared, so that 4 decays fall just short of it.
 HALF = 0.52
-#: Most changes taken together, and which of them cost next to no lab time.
+#: Largest number of combined changes, and fraction of the lab time up to which one is cheap.
 MOST_TOGETHER = 3
 CHEAP = 0.1
 
 
 @dataclass(frozen=True)
 class Remedy:
-    """A change of the protocol, what it comes to and what it costs.
+    """A change of the protocol with its effect and cost.
 
     Attributes
     ----------
     change
-        Of the protocol.
+        Change of the protocol.
     patches
-        What their fits will then know.
+        Predictions by patch after the change.
     gain
-        σ of the rates over what it was, the geometric mean of all.
+        σ of the rates after over before the change, geometric mean over all rates.
     extra_time_s
-        Lab time beyond the protocol's own.
+        Additional lab time in seconds.
     """
 
     change: Change
@@ -44,18 +44,18 @@ class Remedy:
 
     @property
     def helps(self) -> bool:
-        """Whether it makes a difference."""
+        """Whether the change reduces σ noticeably."""
         return self.gain <= HELPS
 
     @property
     def halves(self) -> bool:
-        """Whether it leaves half of σ or less."""
+        """Whether the change halves σ."""
         return self.gain <= HALF
 
 
 @dataclass(frozen=True)
 class Trials:
-    """What changes are measured against: a protocol on a bench, and what it will know."""
+    """A protocol on a bench and its prediction, with which changes are compared."""
 
     protocol: ProtocolModel
     rig: RigFile
@@ -64,18 +64,20 @@ class Trials:
     base: Mapping[str, PatchPrediction]
     duration_s: float
 
-    def remedies(self, ideas: Iterable[Change]) -> tuple[Remedy, ...]:
-        """Those of the changes that can be made, the best first; some of them together, too."""
-        alone = [remedy for idea in ideas if (remedy := self.remedy(idea)) is not None]
-        alone.sort(key=lambda remedy: remedy.gain)
-        cheap = [one for one in alone if one.extra_time_s <= CHEAP * self.duration_s]
-        found = {one.change.says: one for one in (*alone, *self._stack(cheap))}
-        if not any(remedy.halves for remedy in found.values()):
-            found |= {one.change.says: one for one in self._stack(alone)}
-        return tuple(sorted(found.values(), key=lambda remedy: remedy.gain))
+    def remedies(self, candidates: Iterable[Change]) -> tuple[Remedy, ...]:
+        """Return the feasible changes and some combinations of them, the largest gain first."""
+        single = [
+            remedy for candidate in candidates if (remedy := self.remedy(candidate)) is not None
+        ]
+        single.sort(key=lambda remedy: remedy.gain)
+        cheap = [remedy for remedy in single if remedy.extra_time_s <= CHEAP * self.duration_s]
+        by_name = {remedy.change.says: remedy for remedy in (*single, *self._combined(cheap))}
+        if not any(remedy.halves for remedy in by_name.values()):
+            by_name |= {remedy.change.says: remedy for remedy in self._combined(single)}
+        return tuple(sorted(by_name.values(), key=lambda remedy: remedy.gain))
 
     def remedy(self, change: Change) -> Remedy | None:
-        """What `change` comes to; None if camera, frame or timing do not allow it."""
+        """Return the effect of a change; None if camera, frame or timing do not allow it."""
         try:
             variant = changed(self.protocol, change.keys)
             laid_out = plan(variant, self.rig, self.source)
@@ -89,21 +91,21 @@ class Trials:
             laid_out.duration_s - self.duration_s,
         )
 
-    def _stack(self, remedies: Sequence[Remedy]) -> list[Remedy]:
-        """The best change with the next best on top, until half is reached; empty for one alone."""
+    def _combined(self, remedies: Sequence[Remedy]) -> list[Remedy]:
+        """Return the best combination of changes, added until σ is halved; empty for one change."""
         helpful = [remedy for remedy in remedies if remedy.helps]
         if not helpful:
             return []
-        stacked, height = helpful[0], 1
-        for one in helpful[1:]:
-            if stacked.halves or height == MOST_TOGETHER:
+        combined, n_changes = helpful[0], 1
+        for remedy in helpful[1:]:
+            if combined.halves or n_changes == MOST_TOGETHER:
                 break
-            if one.change.contradicts(stacked.change):
+            if remedy.change.contradicts(combined.change):
                 continue
-            both = self.remedy(stacked.change & one.change)
-            if both is not None and both.gain <= HELPS * stacked.gain:
-                stacked, height = both, height + 1
-        return [stacked] if height > 1 else []
+            trial = self.remedy(combined.change & remedy.change)
+            if trial is not None and trial.gain <= HELPS * combined.gain:
+                combined, n_changes = trial, n_changes + 1
+        return [combined] if n_changes > 1 else []
 
 
 def _rate_sigmas(patches: Mapping[str, PatchPrediction]) -> list[float]:
@@ -111,7 +113,7 @@ def _rate_sigmas(patches: Mapping[str, PatchPrediction]) -> list[float]:
 
 
 def _geometric_mean_ratio(after: Sequence[float], before: Sequence[float]) -> float:
-    """Of σ that may be infinite: what was unknown and is still so has not changed."""
+    """Return the geometric mean of ratios of σ; a σ that remains infinite counts as unchanged."""
     ratios = [
         new / old if np.isfinite(old) else float(not np.isfinite(new)) or 1e-3
         for new, old in zip(after, before, strict=True)

@@ -1,4 +1,4 @@
-"""What a decay's fit will be given: times, states, noise by its sources."""
+"""Expected data of a decay fit: times, states and noise by source."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,22 +17,26 @@ PHOTONS, READING, FLICKER, DARK = "photons", "reading", "flicker", "dark"
 
 @dataclass(frozen=True, eq=False)
 class ExpectedSeries:
-    """n frames, C channels, m states; values are in DN/s.
+    """Expected data of n frames with C channels and m states.
 
     Attributes
     ----------
-    t_s, exposure_s
-        (n,) of the frames.
-    k_r_per_s, amplitude
-        (m,) of the states.
+    t_s
+        Begins of the exposures in seconds after lamp off, shape (n,).
+    exposure_s
+        Exposure times in seconds, shape (n,).
+    k_r_per_s
+        Rates in 1/s, shape (m,).
+    amplitude
+        Amplitudes in DN/s, shape (m,).
     weights
-        (C,) of the channels, maximum 1.
+        Weights of the channels, maximum 1, shape (C,).
     variances
-        By source, (n, C), independent between values.
+        Variances in (DN/s)² by source of noise, independent between values, shape (n, C).
     flicker
-        ρ, common to the channels of a frame.
+        Relative common-mode noise ρ of the channels of a frame.
     offset_sigma
-        (C,) prior σ of the channels' offsets, 0 where held.
+        Prior σ of the channels' offsets in DN/s, 0 for fixed offsets, shape (C,).
     """
 
     t_s: FloatArray
@@ -46,14 +50,14 @@ class ExpectedSeries:
 
     @property
     def curve(self) -> FloatArray:
-        """(n,) what the brightest channel shows."""
+        """Signal of the brightest channel in DN/s, shape (n,)."""
         means = exponential_means(self.k_r_per_s, self.t_s, self.exposure_s)
         curve: FloatArray = means @ self.amplitude
         return curve
 
     @property
     def variance(self) -> FloatArray:
-        """(n, C) of each value, flicker left out."""
+        """Variance of each value in (DN/s)² without flicker, shape (n, C)."""
         return np.asarray(sum(self.variances.values()))
 
 
@@ -65,18 +69,22 @@ def expected_series(
     background: ExpectedFrames | None,
     flicker: float,
 ) -> ExpectedSeries:
-    """The series of a patch.
+    """Return the expected data of a patch.
 
     Parameters
     ----------
+    glow
+        Glow of the patch.
     t_s
-        (n,) begin of the frames after lamp off.
+        Begins of the exposures in seconds after lamp off, shape (n,).
     frames
-        n frames of the patch.
+        Expected frames of the patch.
     darks
-        Of the patch, if they are subtracted.
+        Expected dark frames of the patch; None if none are subtracted.
     background
-        The same n frames in another region, if that is subtracted instead.
+        Expected frames of the background region; None if it is not subtracted.
+    flicker
+        Relative common-mode noise ρ of a frame.
     """
     per_second = frames.exposure_s[:, np.newaxis]
     variances = {
@@ -103,7 +111,7 @@ def expected_series(
 
 
 def _dark_level_sigma(frames: ExpectedFrames, darks: ExpectedFrames) -> FloatArray:
-    """(C,) DN/s, what the dark frames leave open of the dark level, as `reduce_patches` has it."""
+    """Return the uncertainty of the dark level in DN/s, shape (C,), as in `reduce_patches`."""
     level = np.broadcast_to(darks.dark_dn, darks.light_dn.shape)
     model = fit_dark(darks.exposure_s, level, np.sqrt(darks.variance))
     sigma = np.array(
@@ -117,15 +125,15 @@ def _dark_level_sigma(frames: ExpectedFrames, darks: ExpectedFrames) -> FloatArr
     return np.asarray(np.average(sigma, axis=0, weights=weights))
 
 
-def repeated(series: ExpectedSeries, kept: NDArray[np.bool_], times: int) -> ExpectedSeries:
-    """The frames `kept` (n,) of so many decays, which one fit takes together."""
+def repeated(series: ExpectedSeries, usable: NDArray[np.bool_], times: int) -> ExpectedSeries:
+    """Return the frames `usable` of several decays that one fit takes together."""
     return ExpectedSeries(
-        t_s=np.tile(series.t_s[kept], times),
-        exposure_s=np.tile(series.exposure_s[kept], times),
+        t_s=np.tile(series.t_s[usable], times),
+        exposure_s=np.tile(series.exposure_s[usable], times),
         k_r_per_s=series.k_r_per_s,
         amplitude=series.amplitude,
         weights=series.weights,
-        variances={name: np.tile(v[kept], (times, 1)) for name, v in series.variances.items()},
+        variances={name: np.tile(v[usable], (times, 1)) for name, v in series.variances.items()},
         flicker=series.flicker,
         offset_sigma=series.offset_sigma,
     )

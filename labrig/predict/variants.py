@@ -1,4 +1,4 @@
-"""Protocols that differ in a key or two from the one asked about."""
+"""Variants of a protocol that differ in a key or two."""
 
 from collections.abc import Iterable, Iterator, Mapping
 from dataclasses import dataclass
@@ -10,7 +10,7 @@ from labrig.protocols.decay import Decay
 from labrig.quantity import duration_text
 from labrig.region import Region
 
-#: As many decays as halve what scatters from frame to frame.
+#: Factor of the number of decays that halves uncorrelated noise.
 REPEATS = 4
 
 Keys = Mapping[str, Any]
@@ -18,7 +18,15 @@ Keys = Mapping[str, Any]
 
 @dataclass(frozen=True)
 class Change:
-    """Other values for some keys of a protocol, as in its file, and how to say that."""
+    """Values for some keys of a protocol.
+
+    Attributes
+    ----------
+    says
+        Description of the change.
+    keys
+        Keys with their values, as in the protocol file.
+    """
 
     says: str
     keys: Keys
@@ -27,24 +35,24 @@ class Change:
         return Change(f"{self.says}, {other.says}", _merged(self.keys, other.keys))
 
     def contradicts(self, other: "Change") -> bool:
-        """Whether both set the same key."""
+        """Whether both changes set the same key."""
         return bool(_leaves(self.keys) & _leaves(other.keys))
 
 
 def changed(protocol: ProtocolModel, keys: Keys) -> ProtocolModel:
-    """`protocol` with other values for some keys, checked as if it were read from a file.
+    """Return a protocol with other values for some keys, validated as if read from a file.
 
     Raises
     ------
     pydantic.ValidationError
-        The protocol cannot be so.
+        If the values do not fit the protocol.
     """
     content = _merged(protocol.model_dump(mode="json", by_alias=True), keys)
     return type(protocol).model_validate(content)
 
 
 def changes(protocol: Decay, offers: CameraOffers, patches: Iterable[str]) -> Iterator[Change]:
-    """What one might do to know the rates of `patches` better, one thing at a time."""
+    """Yield changes that may determine the rates of `patches` better, one key at a time."""
     if isinstance(protocol.exposure, float):
         yield Change("exposure: auto", {"exposure": "auto"})
     if protocol.exposure != "grow":
@@ -66,10 +74,10 @@ def changes(protocol: Decay, offers: CameraOffers, patches: Iterable[str]) -> It
     yield Change("patch of twice the area", {"patches": larger})
 
 
-def _merged(one: Keys, other: Keys) -> dict[str, Any]:
-    """`one` overruled by `other`, a level deep."""
-    merged = dict(one)
-    for key, value in other.items():
+def _merged(base: Keys, overrides: Keys) -> dict[str, Any]:
+    """Return `base` with the values of `overrides`, also within one level of nesting."""
+    merged = dict(base)
+    for key, value in overrides.items():
         both = isinstance(value, Mapping) and isinstance(merged.get(key), Mapping)
         merged[key] = {**merged[key], **value} if both else value
     return merged
@@ -84,13 +92,13 @@ def _leaves(keys: Keys) -> set[tuple[str, str]]:
 
 
 def _neighbours(offered: tuple[int, ...], value: int) -> list[int]:
-    """What is offered next below and above `value`."""
+    """Return the offered values next below and above `value`."""
     pairs = [pair for pair in pairwise(offered) if value in pair]
     return [low if high == value else high for low, high in pairs]
 
 
 def _twice_the_area(region: Region) -> tuple[float, ...]:
-    """The region grown about its centre, in whole pixels if it was."""
+    """Return a region grown about its centre, in whole pixels if it was in pixels."""
     x, y, width, height = region
     wider, higher = width * 2**0.5, height * 2**0.5
     grown = (x - (wider - width) / 2, y - (higher - height) / 2, wider, higher)

@@ -1,4 +1,4 @@
-"""A run folder through analysis, report and exports to its result."""
+"""Processing of a run folder: analysis, report and exports."""
 
 from labrig.process.changes import other_settings
 from labrig.process.run import Processed, process_and_report, process_run

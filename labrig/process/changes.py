@@ -1,4 +1,4 @@
-"""What changed from one result of a run to the next, in a few lines for people."""
+"""Differences between two results of a run, in lines for people."""
 
 import math
 from collections.abc import Iterator, Mapping
@@ -12,8 +12,7 @@ from labrig.results import FittedDecay, find_fitted_decays, read_fitted_decay
 from labrig.written_numbers import plus_minus, rounded
 from labrig.yaml_file import read_yaml
 
-#: Moves of less than this fraction of a parameter's σ, and changes of σ by less, are not worth a
-#: word.
+#: Fraction of σ below which the change of a parameter, or of its σ, is not reported.
 WORTH_SAYING = 0.01
 
 Parameters = dict[str, tuple[float, float]]
@@ -21,7 +20,7 @@ Parameters = dict[str, tuple[float, float]]
 
 @dataclass(frozen=True)
 class _Move:
-    """A parameter in two fits: each its value and σ."""
+    """A parameter in two fits, with its value and σ in each."""
 
     name: str
     before: tuple[float, float]
@@ -29,64 +28,88 @@ class _Move:
 
     @property
     def in_sigma(self) -> float:
-        """How far the value moved, in σ of before; infinite if it was held both times."""
+        """Change of the value in units of the earlier σ, else the later; infinite if both are 0."""
         moved, sigma = self.after[0] - self.before[0], self.before[1] or self.after[1]
         if moved == 0:
             return 0.0
         return moved / sigma if sigma > 0 else math.copysign(math.inf, moved)
 
     @property
-    def worth_saying(self) -> bool:
-        """Whether value or σ are other than before, beyond rounding."""
+    def is_notable(self) -> bool:
+        """Whether value or σ changed by more than rounding."""
         resized = not math.isclose(self.before[1], self.after[1], rel_tol=WORTH_SAYING)
         return resized or abs(self.in_sigma) >= WORTH_SAYING
 
     def __str__(self) -> str:
-        """`k_r 1 0.0320 ± 0.0001 → 0.0321 ± 0.0001 (+1.0 σ)`."""
+        """Return text such as `k_r 1 0.0320 ± 0.0001 → 0.0321 ± 0.0001 (+1.0 σ)`."""
         moved = f"{self.in_sigma:+.2g}".replace("-", "−")
         by = f" ({moved} σ)" if math.isfinite(self.in_sigma) else ""
         return f"{self.name} {plus_minus(*self.before)} → {plus_minus(*self.after)}{by}"
 
 
 def changes(before: Path, after: Path) -> tuple[str, ...]:
-    """What is other in the result folder `after` than in `before`; nothing if every byte is alike.
+    """Return the differences of the result folder `after` from `before`; empty if there are none.
 
-    Files that only `before` has (a person may have put them there) do not count.
+    Files that exist in `before` only, where a person may have put them, do not count.
     """
     files = sorted(path.relative_to(after) for path in after.rglob("*") if path.is_file())
-    other = [file for file in files if not _alike(before / file, after / file)]
-    if not other:
+    changed_files = [file for file in files if not _same_content(before / file, after / file)]
+    if not changed_files:
         return ()
     settings = other_settings(before, after)
-    numbers = list(_other_numbers(_fits(before), _fits(after)))
+    numbers = list(_parameter_changes(_fits(before), _fits(after)))
     if not numbers:
-        numbers = [f"the numbers are the same; other in {', '.join(map(str, other))}"]
+        numbers = [f"the numbers are the same; other in {', '.join(map(str, changed_files))}"]
     elif not settings:
         numbers.append("nothing that is recorded explains it: labrig's code, or the computer?")
     return (*settings, *numbers)
 
 
 def other_settings(before: Path, after: Path) -> tuple[str, ...]:
-    """What the result folder `after` was made with otherwise than `before`, a line each."""
+    """List the settings in which two results of a run differ.
+
+    Parameters
+    ----------
+    before
+        Folder of the earlier result, with its `provenance.yaml`.
+    after
+        Folder of the later result.
+
+    Returns
+    -------
+    tuple of str
+        A line for each setting, with its earlier and its later value.
+
+    Examples
+    --------
+    >>> import shutil
+    >>> from pathlib import Path
+    >>> from labrig.analyse import Overrides
+    >>> from labrig.process import other_settings, process_run
+    >>> _ = shutil.copytree("runs/decay", "trials/one-state")
+    >>> _ = process_run("trials/one-state", Overrides(states=1))
+    >>> other_settings(Path("runs/decay/result"), Path("trials/one-state/result"))
+    ('states: auto → 1',)
+    """
     return tuple(_other_settings(_settings(before), _settings(after)))
 
 
-def _alike(one: Path, other: Path) -> bool:
-    return one.is_file() and one.read_bytes() == other.read_bytes()
+def _same_content(first: Path, second: Path) -> bool:
+    return first.is_file() and first.read_bytes() == second.read_bytes()
 
 
 def _settings(result: Path) -> dict[str, str]:
-    """`provenance.yaml`, one text a key; without one, nothing is known."""
+    """Return the content of `provenance.yaml` with one text per key; empty if there is none."""
     try:
-        return dict(_flat(read_yaml(result / "provenance.yaml"), ""))
+        return dict(_flattened(read_yaml(result / "provenance.yaml"), ""))
     except UsageError:
         return {}
 
 
-def _flat(content: Mapping[str, Any], place: str) -> Iterator[tuple[str, str]]:
+def _flattened(content: Mapping[str, Any], place: str) -> Iterator[tuple[str, str]]:
     for key, value in content.items():
         if isinstance(value, dict):
-            yield from _flat(value, f"{place}{key} ")
+            yield from _flattened(value, f"{place}{key} ")
         elif isinstance(value, list):
             yield f"{place}{key}", ", ".join(map(str, value)) or "none"
         else:
@@ -104,7 +127,7 @@ def _other_settings(before: Mapping[str, str], after: Mapping[str, str]) -> Iter
 
 
 def _fits(result: Path) -> dict[str, Parameters]:
-    """The parameters of each patch's fit, by its name; unreadable ones are left out."""
+    """Return the parameters of each patch's fit by patch; fits that cannot be read are left out."""
     fits = {}
     for name, path in find_fitted_decays(result).items():
         with suppress(DataError):
@@ -113,55 +136,55 @@ def _fits(result: Path) -> dict[str, Parameters]:
 
 
 def _parameters(fit: FittedDecay) -> Parameters:
-    """Value and σ of every parameter of a fit."""
-    found: dict[str, tuple[float, float]] = {}
+    """Return value and σ of every parameter of a fit by name."""
+    parameters: dict[str, tuple[float, float]] = {}
     for number, state in enumerate(fit.states, start=1):
-        found[f"k_r {number}"] = state.k_r_per_s, state.k_r_sigma_per_s
-        found[f"a {number}"] = state.amplitude, state.amplitude_sigma
+        parameters[f"k_r {number}"] = state.k_r_per_s, state.k_r_sigma_per_s
+        parameters[f"a {number}"] = state.amplitude, state.amplitude_sigma
     for name, values, sigmas in (
         ("weight", fit.channel_weights, fit.channel_weights_sigma),
         ("offset", fit.offsets, fit.offsets_sigma),
     ):
         for channel, value, sigma in zip(fit.channels, values, sigmas, strict=True):
-            found[f"{name} {channel}"] = value, sigma
-    found["flicker"] = fit.flicker, fit.flicker_sigma
-    return found
+            parameters[f"{name} {channel}"] = value, sigma
+    parameters["flicker"] = fit.flicker, fit.flicker_sigma
+    return parameters
 
 
-def _other_numbers(
+def _parameter_changes(
     before: Mapping[str, Parameters], after: Mapping[str, Parameters]
 ) -> Iterator[str]:
     for patch in dict.fromkeys([*before, *after]):
-        said = f"{patch}: " if patch else ""
+        prefix = f"{patch}: " if patch else ""
         old, new = before.get(patch), after.get(patch)
         if old is None or new is None:
-            yield f"{said}{'not fitted before' if old is None else 'fitted before, not now'}"
+            yield f"{prefix}{'not fitted before' if old is None else 'fitted before, not now'}"
         elif old.keys() != new.keys():
-            yield f"{said}{_states(old)} → {_states(new)}"
+            yield f"{prefix}{_states_text(old)} → {_states_text(new)}"
         else:
             moves = [_Move(name, old[name], new[name]) for name in old]
-            moves = [move for move in moves if move.worth_saying]
+            moves = [move for move in moves if move.is_notable]
             if moves:
-                yield said + "; ".join(_told(moves))
+                yield prefix + "; ".join(_move_texts(moves))
             elif old != new:
-                yield f"{said}every parameter within {WORTH_SAYING:g} σ"
+                yield f"{prefix}every parameter within {WORTH_SAYING:g} σ"
 
 
-def _told(moves: list[_Move]) -> Iterator[str]:
-    """Rates, amplitudes and what was held one by one, the rest in a few words."""
-    rest = []
+def _move_texts(moves: list[_Move]) -> Iterator[str]:
+    """Yield rates, amplitudes and held parameters one by one and the others in one line."""
+    others = []
     for move in moves:
         if move.name.startswith(("k_r", "a ")) or math.isinf(move.in_sigma):
             yield str(move)
         else:
-            rest.append(move)
-    if rest:
-        most = max(rest, key=lambda move: abs(move.in_sigma))
-        furthest = rounded(abs(most.in_sigma), 2)
-        yield f"{', '.join(move.name for move in rest)} by at most {furthest} σ"
+            others.append(move)
+    if others:
+        largest = max(others, key=lambda move: abs(move.in_sigma))
+        furthest = rounded(abs(largest.in_sigma), 2)
+        yield f"{', '.join(move.name for move in others)} by at most {furthest} σ"
 
 
-def _states(parameters: Parameters) -> str:
-    """`2 states (k_r 0.3 ± 0.1, 0.01 ± 0.001 1/s)`."""
+def _states_text(parameters: Parameters) -> str:
+    """Return text such as `2 states (k_r 0.3 ± 0.1, 0.01 ± 0.001 1/s)`."""
     rates = [plus_minus(*pair) for name, pair in parameters.items() if name.startswith("k_r")]
     return f"{len(rates)} state{'s' if len(rates) > 1 else ''} (k_r {', '.join(rates)} 1/s)"

@@ -1,4 +1,4 @@
-"""What a result was made with: labrig, the libraries its numbers pass through, what was asked."""
+"""Provenance of a result: versions of labrig and its libraries, and processing settings."""
 
 from collections import Counter
 from functools import cache
@@ -23,24 +23,28 @@ _LIBRARIES = ("numpy", "scipy", "nlopt", "rawpy", "matplotlib", "colour-science"
 
 
 class Provenance(BaseModel):
-    """`provenance.yaml` of a result: the same in all of these gives the same result.
+    """Content of `provenance.yaml`; equal provenance gives an equal result.
 
     Attributes
     ----------
-    labrig, libraries
-        Versions.
+    labrig
+        Version of labrig.
+    libraries
+        Versions of the libraries by name.
     regions
-        Of the patches, by name, as they were used.
-    states, fixed_rates_per_s
-        What a person asked of the fits of decays, otherwise than the protocol.
+        Regions of the patches by name, as they were used.
+    states
+        Number of states that was fitted, or `auto`.
+    fixed_rates_per_s
+        Rates in 1/s that the user held fixed.
     camera
-        Name of the curves that coloured the report's pictures.
+        Name of the camera curves with which the report's pictures were coloured.
     frames
-        How many went in, by role.
+        Number of frames used, by role.
     excluded
-        Names of the frames a person left out.
+        Names of the frames that the user excluded.
     optics
-        Calibrations that a person named instead of the rig file's.
+        Calibrations that the user named instead of the rig file's.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -59,7 +63,19 @@ class Provenance(BaseModel):
 def provenance(
     run: RunRecord, protocol: Any, overrides: Overrides, camera: str | None
 ) -> Provenance:
-    """Gather it; `camera` names the curves that coloured the pictures."""
+    """Collect the provenance of a result.
+
+    Parameters
+    ----------
+    run
+        Run that is processed.
+    protocol
+        Protocol of the run.
+    overrides
+        Settings that replace those of protocol and rig file.
+    camera
+        Name of the camera curves with which the report's pictures are coloured.
+    """
     frames = [frame for attempt in run.completed().values() for frame in attempt.frames]
     patches = hasattr(protocol, "patches")
     return Provenance(
@@ -77,7 +93,7 @@ def provenance(
 
 @cache
 def library_versions() -> dict[str, str]:
-    """Versions of what decodes, reduces, fits and draws."""
+    """Return the versions of the libraries that decode, reduce, fit and draw."""
     import cv2
     import rawpy
 
@@ -88,7 +104,7 @@ def library_versions() -> dict[str, str]:
 
 
 def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDescription:
-    """Gather it from the run folder, and from what processes it."""
+    """Collect the description of a run from its folder, its protocol and its rig."""
     attempts = list(run.completed().values())
     start = attempts[0].start if attempts else run.attempts[0].start
     identities = start.get("devices", {})

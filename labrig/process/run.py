@@ -1,4 +1,4 @@
-"""A run of any protocol, from its folder to its result, report and exports."""
+"""Processing of a run of any protocol, from its folder to result, report and exports."""
 
 import shutil
 from dataclasses import dataclass, replace
@@ -30,58 +30,58 @@ _EARLIER = "result-"
 
 
 def new_result(run: Path) -> Path:
-    """An empty folder in `run` for `put_in_place`."""
-    made = run / "result.part"
-    if made.exists():
-        shutil.rmtree(made)
-    made.mkdir()
-    return made
+    """Create an empty folder in `run` for `put_in_place`."""
+    folder = run / "result.part"
+    if folder.exists():
+        shutil.rmtree(folder)
+    folder.mkdir()
+    return folder
 
 
-def put_in_place(made: Path) -> tuple[str, ...]:
-    """Make the folder `made` the run's `result`; returns what changed, in lines for people.
+def put_in_place(folder: Path) -> tuple[str, ...]:
+    """Make `folder` the run's `result` and return the changes, in lines for people.
 
-    The result before it becomes `result-1`, `result-2`, …, from old to new. One that is the same
-    to the byte stays where it is, and `made` goes.
+    An earlier result that differs is kept as `result-1`, `result-2`, …, from old to new. If all
+    bytes are equal, the earlier result stays and `folder` is deleted.
     """
-    final = made.with_name("result")
+    final = folder.with_name("result")
     if not final.exists():
-        made.rename(final)
+        folder.rename(final)
         return ()
-    told = changes(final, made)
-    if not told:
-        shutil.rmtree(made)
+    lines = changes(final, folder)
+    if not lines:
+        shutil.rmtree(folder)
         return ("the same result as before",)
-    numbers = [int(path.name[len(_EARLIER) :]) for path in _earlier(made.parent)]
-    earlier = made.with_name(f"{_EARLIER}{max(numbers, default=0) + 1}")
+    numbers = [int(path.name[len(_EARLIER) :]) for path in _earlier_results(folder.parent)]
+    earlier = folder.with_name(f"{_EARLIER}{max(numbers, default=0) + 1}")
     final.rename(earlier)
-    made.rename(final)
-    return (f"changed since the result before, which is kept as {earlier.name}:", *told)
+    folder.rename(final)
+    return (f"changed since the result before, which is kept as {earlier.name}:", *lines)
 
 
-def _earlier(run: Path) -> list[Path]:
+def _earlier_results(run: Path) -> list[Path]:
     return [path for path in run.glob(f"{_EARLIER}*") if path.name[len(_EARLIER) :].isdecimal()]
 
 
-def write_provenance(made: Path, provenance: Provenance) -> None:
-    """Write provenance.yaml into `made`."""
-    write_yaml(made / "provenance.yaml", provenance)
+def write_provenance(folder: Path, provenance: Provenance) -> None:
+    """Write `provenance.yaml` into `folder`."""
+    write_yaml(folder / "provenance.yaml", provenance)
 
 
 @dataclass(frozen=True)
 class Processed:
-    """What came out of a run, and what a person is told of it.
+    """Outcome of the processing of a run.
 
     Attributes
     ----------
     result
-        Of the type that belongs to the protocol.
+        Result of the type that belongs to the protocol.
     report
-        The page.
+        Path of the HTML report.
     lines
-        The numbers that matter, for the terminal.
+        Most important numbers, in lines for the terminal.
     changes
-        What is other than in the result before, if there was one.
+        Differences from the result before; empty if there was none.
     """
 
     result: RunResult
@@ -91,37 +91,75 @@ class Processed:
 
 
 def process_run(folder: Path | str, overrides: Overrides | None = None) -> RunResult:
-    """Reduce and fit the run in `folder`, write `result/` and the report in it.
+    """Reduce and fit a run and write its results and its report.
 
-    A `result` that comes out any different from the one before takes its place; that one is kept
-    as `result-1`, `result-2`, …
+    The files are written to the folder `result` of the run. A `result` that differs from the one
+    before replaces it; the earlier one is kept as `result-1`, `result-2`, …
 
     Parameters
     ----------
     folder
-        A run folder.
-    choices
-        What is wanted otherwise than the protocol says.
+        Run folder.
+    overrides
+        Settings that replace those of the protocol and of the rig file.
 
     Returns
     -------
     RunResult
-        Of the type that belongs to the run's protocol.
+        Result of the type that belongs to the run's protocol.
 
     Raises
     ------
     UsageError
-        Not a run folder, or a choice that does not fit it.
+        If this is not a run folder, or an override does not fit the run.
     DataError
-        What there is does not suffice, or a frame is missing or was changed after the run.
+        If frames are too few, missing, or were changed after the run.
     FitError
-        Nothing could be fitted.
+        If nothing could be fitted.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> result = labrig.process_run("runs/decay")
+    >>> [f"{rate.value:.4f}" for rate in result.patches["sample"].fit.rates]
+    ['0.2048', '0.0101']
     """
     return process_and_report(folder, overrides).result
 
 
 def process_and_report(folder: Path | str, overrides: Overrides | None = None) -> Processed:
-    """As `process_run`; with where the report is, and what a person is told."""
+    """Reduce and fit a run and return its result with a summary for people.
+
+    Parameters
+    ----------
+    folder
+        Run folder.
+    overrides
+        Settings that replace those of the protocol and of the rig file.
+
+    Returns
+    -------
+    Processed
+        Result, path of the report, summary, and changes since the result before.
+
+    Raises
+    ------
+    UsageError
+        If this is not a run folder, or an override does not fit the run.
+    DataError
+        If frames are too few, missing, or were changed after the run.
+    FitError
+        If nothing could be fitted; the report is written nevertheless.
+
+    Examples
+    --------
+    >>> from labrig.process import process_and_report
+    >>> processed = process_and_report("runs/decay")
+    >>> processed.report.as_posix()
+    'runs/decay/result/report.html'
+    >>> print(processed.lines[0].splitlines()[1])
+    state  k / s⁻¹      1/k / s    amplitude
+    """
     folder, overrides = Path(folder), overrides or Overrides()
     protocol = read_run_protocol(folder)
     rig, run = overrides.bench(folder), read_run(folder)
@@ -136,18 +174,20 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
     result = replace(result, warnings=warnings)
 
     about = describe_run(run, protocol, rig)
-    made = new_result(folder)
-    write_provenance(made, provenance(run, protocol, overrides, camera.name if camera else None))
-    write_result(made, result)
-    write_nexus(made / "run.nxs", run, about, result)
+    result_folder = new_result(folder)
+    write_provenance(
+        result_folder, provenance(run, protocol, overrides, camera.name if camera else None)
+    )
+    write_result(result_folder, result)
+    write_nexus(result_folder / "run.nxs", run, about, result)
     rendered = render(result, Source(run, protocol, rig, about, camera))
     # After the parts of a chain, what is about all of them.
     part = "the_run" if any(section.part for section in rendered.sections) else ""
     about_run = (*lamp_sections(run), *temperature_sections(run, protocol.rate_frames))
-    sections = (*rendered.sections, *(replace(one, part=part) for one in about_run))
+    sections = (*rendered.sections, *(replace(section, part=part) for section in about_run))
     report = Report(about, warnings, sections, rendered.methods, frames, camera)
-    write_report(made / "report.html", report)
-    changes = put_in_place(made)
+    write_report(result_folder / "report.html", report)
+    changes = put_in_place(result_folder)
 
     page = folder / "result" / "report.html"
     if failures := result.failures():
@@ -156,13 +196,13 @@ def process_and_report(folder: Path | str, overrides: Overrides | None = None) -
 
 
 def _camera_response(
-    rig: RigFile, instead: str | None, lvf: LvfFile | None
+    rig: RigFile, replacement: str | None, lvf: LvfFile | None
 ) -> tuple[CameraResponse | None, tuple[str, ...]]:
-    """The curves that colour the report's pictures, with a warning if the rig's are not here."""
+    """Return the curves that colour the report's pictures, or a warning if they are missing."""
     try:
-        return camera_curves(rig, instead, lvf), ()
+        return camera_curves(rig, replacement, lvf), ()
     except UsageError as error:
-        if instead is not None:
+        if replacement is not None:
             raise
-        known = rig.optics.camera is not None
-        return None, (f"colours in the report are the camera's own: {error}",) if known else ()
+        is_named = rig.optics.camera is not None
+        return None, (f"colours in the report are the camera's own: {error}",) if is_named else ()

@@ -1,4 +1,4 @@
-"""The run folder: written while it happens, read afterwards."""
+"""Run folders: written during a run, read afterwards."""
 
 from labrig.record.attempt import AttemptWriter
 from labrig.record.frames import (

@@ -1,4 +1,4 @@
-"""One attempt at a unit: one event-model run, committed by a RunStop that says `success`."""
+"""One attempt at a unit: one event-model run, committed by a RunStop with the status `success`."""
 
 import hashlib
 from collections.abc import Callable, Mapping
@@ -36,10 +36,10 @@ _FRAME_KEYS: dict[str, str] = {
 
 
 class AttemptWriter:
-    """Writes what happens in one attempt, frame by frame, line by line.
+    """Writer of what happens in one attempt: every frame to a file, every event to a journal line.
 
-    Only its beginning, which tells what others asked for, is held against event-model's schemas:
-    that takes milliseconds between two actions. The tests validate all documents.
+    Only the RunStart, which contains user input, is validated against event-model's schemas:
+    validation takes milliseconds between two actions. The tests validate all documents.
 
     Parameters
     ----------
@@ -48,17 +48,19 @@ class AttemptWriter:
     unit
         Name of the unit attempted.
     frames_folder
-        Where frames go, with the number the next one gets from `next_number`.
+        Folder of the frames.
+    next_number
+        Function that gives the number of the next frame.
     wall
-        Gives the time in seconds since 1970.
+        Function that gives the time in seconds since 1970.
     new_uid
-        Gives the uid of the next document.
+        Function that gives the uid of the next document.
     metadata
-        Plan, devices, versions: what the RunStart says.
+        Keys and values of the RunStart: plan, devices, versions.
     disk
-        Keeps the frames.
-    beside
-        Does what can be done while the disk is busy.
+        Disk to which frames are written.
+    executor
+        Executor of the work done while the disk is busy.
     """
 
     def __init__(
@@ -71,7 +73,7 @@ class AttemptWriter:
         new_uid: Callable[[], str],
         metadata: Mapping[str, Any],
         disk: Disk,
-        beside: Executor,
+        executor: Executor,
     ) -> None:
         self.unit = unit
         self._journal = journal
@@ -80,7 +82,7 @@ class AttemptWriter:
         self._wall = wall
         self._new_uid = new_uid
         self._disk = disk
-        self._beside = beside
+        self._executor = executor
         self._bundle = event_model.compose_run(
             uid=new_uid(), time=wall(), metadata={**metadata, "unit": unit}
         )
@@ -88,7 +90,7 @@ class AttemptWriter:
         journal.append("start", self._bundle.start_doc)
 
     def action(self, record: ActionRecord) -> None:
-        """Write one action."""
+        """Write one action to the journal."""
         self._event(
             "actions",
             _ACTION_KEYS,
@@ -96,7 +98,7 @@ class AttemptWriter:
         )
 
     def temperature(self, record: TemperatureRecord) -> None:
-        """Write one reading of the thermometer."""
+        """Write one reading of the thermometer to the journal."""
         self._event(
             "temperatures",
             _TEMPERATURE_KEYS,
@@ -116,11 +118,11 @@ class AttemptWriter:
         end_time: float,
         late_s: float,
     ) -> FrameRecord:
-        """Keep one frame: file first, durably, then its line. Returns its record."""
+        """Write one frame, first its file and then its journal line, and return its record."""
         path = self._frames_folder / f"{self._next_number():06d}{suffix}"
         began = self._wall()
         # Hashed while the disk is busy: of a 25 MB frame that is a quarter of the time.
-        checksum = self._beside.submit(hashlib.sha256, data)
+        checksum = self._executor.submit(hashlib.sha256, data)
         write_durably(path, data, self._disk)
         record = FrameRecord(
             path=path,
@@ -141,7 +143,7 @@ class AttemptWriter:
         return record
 
     def stop(self, exit_status: str, reason: str = "") -> None:
-        """Close the attempt; `success` is the commit."""
+        """Write the RunStop of the attempt; the status `success` commits it."""
         self._journal.append(
             "stop",
             self._bundle.compose_stop(

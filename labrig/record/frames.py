@@ -1,4 +1,4 @@
-"""What is known of a recorded photograph and of anything else that was done or read."""
+"""Records of frames, actions and temperatures."""
 
 import os
 from dataclasses import dataclass
@@ -8,10 +8,10 @@ from pathlib import Path
 
 
 class FrameRole(StrEnum):
-    """What a frame of any protocol may be for; protocols have roles of their own besides.
+    """Purpose of a frame in any protocol; a protocol may have further roles.
 
-    `METER` sets exposures, `LOOK` answers a question on the way, `REST` shows the sample before it
-    is charged, `DECAY` tells rates.
+    `METER` frames set exposures, `LOOK` frames decide how a unit goes on, `REST` frames show the
+    sample before it is charged, rates are fitted to `DECAY` frames.
     """
 
     DARK = "dark"
@@ -24,20 +24,32 @@ class FrameRole(StrEnum):
 
 @dataclass(frozen=True)
 class FrameRecord:
-    """One frame in a run folder. Times are seconds since 1970, as measured.
+    """One frame in a run folder.
 
     Attributes
     ----------
     path
-        The file, as the camera delivered it.
-    unit, role
-        Which unit took it, and what for: a `FrameRole`, or one of its protocol's own.
+        File of the frame, as the camera delivered it.
+    sha256
+        Checksum of the file.
+    size_bytes
+        Size of the file in bytes.
+    unit
+        Name of the unit that took the frame.
+    role
+        Purpose of the frame: a `FrameRole` or a role of the protocol.
+    exposure_s
+        Exposure time in seconds.
+    iso
+        Sensitivity, ISO 12232.
+    f_number
+        Aperture; None where the camera does not report it.
     start_time, end_time
-        Measured begin and end of the exposure.
+        Measured begin and end of the exposure in seconds since 1970.
     late_s
-        How long after its planned time it began.
+        Delay of the begin of the exposure after its planned time, in seconds.
     disk_s
-        How long it took to be on the disk, during which nothing else was done.
+        Time that writing the file took, in seconds; nothing else is done during it.
     """
 
     path: Path
@@ -54,10 +66,10 @@ class FrameRecord:
     disk_s: float = 0.0
 
     def damage(self) -> str:
-        """What is wrong with the file, nothing if it is as recorded."""
+        """Return how the file differs from its record; empty if it does not."""
         try:
             with self.path.open("rb") as file:
-                # A file of another size need not be read; one made up by somebody may have no end.
+                # A file of another size need not be read; a forged one may have no end.
                 same_size = os.fstat(file.fileno()).st_size == self.size_bytes
                 if same_size and file_digest(file, "sha256").hexdigest() == self.sha256:
                     return ""
@@ -68,27 +80,82 @@ class FrameRecord:
         return "was changed after the run (its checksum differs)"
 
 
-#: Devices of actions that are a person's: what was done by hand, and the unit that does not count
-#: any more because it was done wrongly.
+#: Devices of a person's actions: a step done by hand, and the undoing of a unit that was done
+#: wrongly.
 PERSON, TAKEN_BACK = "person", "taken back"
 
 
 def unit_in(part: str, unit: str) -> str:
-    """The name of a unit of one part of a chain within the whole."""
+    """Return the name that a unit of one part of a chain has in the whole run.
+
+    Parameters
+    ----------
+    part
+        Name of the part, such as `decay`.
+    unit
+        Name of the unit within the part.
+
+    Returns
+    -------
+    str
+        Name in the journal of the chain's run.
+
+    Examples
+    --------
+    >>> from labrig.record import unit_in
+    >>> unit_in("decay", "decay-1")
+    'decay/decay-1'
+    """
     return f"{part}/{unit}"
 
 
 def unit_within(part: str, name: str) -> str | None:
-    """The name within its part of what `unit_in` named; None if it is not of that part."""
+    """Return the name that a unit of a chain has within one of its parts.
+
+    This is the inverse of `unit_in`.
+
+    Parameters
+    ----------
+    part
+        Name of the part, such as `decay`.
+    name
+        Name of the unit in the journal of the chain's run.
+
+    Returns
+    -------
+    str or None
+        Name of the unit within the part; None if the unit belongs to another part.
+
+    Examples
+    --------
+    >>> from labrig.record import unit_within
+    >>> unit_within("decay", "decay/decay-1")
+    'decay-1'
+    >>> unit_within("excitation", "decay/decay-1") is None
+    True
+    """
     unit = name.removeprefix(f"{part}/")
     return None if unit == name else unit
 
 
 @dataclass(frozen=True)
 class ActionRecord:
-    """One switch, move or choice. Times are seconds since 1970, as measured.
+    """One action of a device, a person or the protocol.
 
-    `task` is what hands that are a device are told; empty where a device did it by itself.
+    Attributes
+    ----------
+    unit
+        Name of the unit.
+    device
+        Key of the device, `PERSON`, `TAKEN_BACK`, or `protocol` for a choice.
+    action
+        Action as text.
+    start_time, end_time
+        Measured begin and end of the action in seconds since 1970.
+    late_s
+        Delay of its begin after its planned time, in seconds.
+    task
+        Command for a changer that replaces the person; empty for the action of a device.
     """
 
     unit: str
@@ -101,18 +168,28 @@ class ActionRecord:
 
     @property
     def middle_time(self) -> float:
-        """When a relay switched, as near as is known: in the middle of the transaction."""
+        """Middle of the transaction in seconds since 1970, best estimate of a relay's switching."""
         return (self.start_time + self.end_time) / 2
 
     @property
     def is_manual(self) -> bool:
-        """Whether a person did it."""
+        """Whether a person performed the action."""
         return self.device == PERSON
 
 
 @dataclass(frozen=True)
 class TemperatureRecord:
-    """One reading of the thermometer; `time` in seconds since 1970."""
+    """One reading of the thermometer.
+
+    Attributes
+    ----------
+    unit
+        Name of the unit during which it was read.
+    time
+        Time of the reading in seconds since 1970.
+    temperature_c
+        Temperature in degrees Celsius.
+    """
 
     unit: str
     time: float

@@ -14,15 +14,15 @@ from labrig.errors import DataError, DiskError, UsageError
 
 
 class Disk(Protocol):
-    """Takes what has to survive a power cut."""
+    """Storage for data that must survive a power cut."""
 
     def write(self, file: BinaryIO, data: bytes) -> None:
-        """Append to an unbuffered file and wait until the disk has it.
+        """Append data to an unbuffered file and wait until they are on the disk.
 
         Raises
         ------
         OSError
-            Full, or gone; part of `data` may be in the file.
+            If the disk is full or gone; part of `data` may be in the file.
         """
 
 
@@ -30,10 +30,10 @@ class RealDisk:
     """The disk of this PC."""
 
     def write(self, file: BinaryIO, data: bytes) -> None:
-        """As `Disk.write`."""
-        left = memoryview(data)
-        while left:
-            left = left[file.write(left) :]
+        """Append data to an unbuffered file and wait until they are on the disk."""
+        remaining = memoryview(data)
+        while remaining:
+            remaining = remaining[file.write(remaining) :]
         os.fsync(file.fileno())
 
 
@@ -41,12 +41,32 @@ REAL_DISK: Disk = RealDisk()
 
 
 def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
-    """Write `data` to `path` by way of `.part`, on the disk before the name appears.
+    """Write a file so that it survives a power cut and is never seen in part.
+
+    The data are written to a file with the suffix `.part` and are on the disk before that file is
+    renamed.
+
+    Parameters
+    ----------
+    path
+        File to be written or replaced.
+    data
+        Content of the file.
+    disk
+        Disk that writes the data.
 
     Raises
     ------
     DiskError
-        The disk is full or gone; `path` is as it was, or as it should be.
+        If the disk is full or gone; `path` then has its old content or the new one.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import write_durably
+    >>> write_durably(Path("serial-number.txt"), b"0123456789")
+    >>> Path("serial-number.txt").read_bytes()
+    b'0123456789'
     """
     part = path.with_name(path.name + ".part")
     try:
@@ -64,7 +84,7 @@ def write_durably(path: Path, data: bytes, disk: Disk = REAL_DISK) -> None:
 
 
 def sync_folder(folder: Path) -> None:
-    """Make what was made or renamed in `folder` durable, where there is a way (not on Windows)."""
+    """Make new and renamed entries of a folder durable, where the system can (not on Windows)."""
     if hasattr(os, "O_DIRECTORY"):
         handle = os.open(folder, os.O_RDONLY | os.O_DIRECTORY)
         try:
@@ -79,20 +99,40 @@ Document = tuple[str, dict[str, Any]]
 
 @dataclass(frozen=True)
 class JournalContent:
-    """All documents of a journal, and whether its last line was torn by a crash."""
+    """Content of a journal.
+
+    Attributes
+    ----------
+    documents
+        Event-model documents, each with the name of its kind.
+    torn
+        Whether the last line is incomplete because of a crash.
+    """
 
     documents: list[Document]
     torn: bool
 
 
 class Journal:
-    """Appends documents durably: when `append` returns, the line survives a power cut.
+    """A journal open for writing: a line survives a power cut as soon as `append` returns.
 
-    What a file holds after a write or an fsync that failed, nobody can know: the line may be there
-    as a whole, in part, or only until the power goes. So the lines that were acknowledged are
-    remembered, `read` gives back nothing else, and whatever stands behind them in the file is cut
-    off before the next line is written. The journal of an earlier process is written anew when it
-    is opened, since some of what is read there may not be on the disk.
+    The content of a file after a failed write or fsync is undefined: a line may be there
+    completely, in part, or only until the power fails. Acknowledged lines are therefore kept in
+    memory, `read` returns only those, and anything after them in the file is cut off before the
+    next line is written. The journal of an earlier process is written anew when it is opened, since
+    part of what is read may not be on the disk.
+
+    Parameters
+    ----------
+    path
+        File of the journal; created if it does not exist.
+    disk
+        Disk to which lines are written.
+
+    Raises
+    ------
+    DiskError
+        If the journal cannot be opened.
     """
 
     def __init__(self, path: Path, disk: Disk = REAL_DISK) -> None:
@@ -108,15 +148,15 @@ class Journal:
 
     @property
     def size_bytes(self) -> int:
-        """Of all acknowledged lines."""
+        """Size of all acknowledged lines in bytes."""
         return len(self._acknowledged)
 
     def read(self) -> JournalContent:
-        """All that was acknowledged, also when the disk is gone."""
-        return _parsed(self.path, bytes(self._acknowledged))
+        """Return all acknowledged documents; the disk is not accessed."""
+        return _parse(self.path, bytes(self._acknowledged))
 
     def append(self, name: str, doc: Mapping[str, Any]) -> None:
-        """Write `{"name": name, "doc": doc}` and wait until the disk has it."""
+        """Write the line `{"name": name, "doc": doc}` and wait until it is on the disk."""
         text = json.dumps({"name": name, "doc": doc}, ensure_ascii=False, allow_nan=False)
         line = text.encode() + b"\n"
         try:
@@ -131,7 +171,7 @@ class Journal:
         self._acknowledged += line
 
     def close(self) -> None:
-        """Release the file."""
+        """Close the file."""
         with suppress(OSError):  # every line in it was acknowledged before
             self._file.close()
 
@@ -150,12 +190,32 @@ class Journal:
 def read_journal(path: Path) -> JournalContent:
     """Read a journal that may still be growing or may have been cut off by a crash.
 
+    Parameters
+    ----------
+    path
+        File `journal.jsonl` of a run folder.
+
+    Returns
+    -------
+    JournalContent
+        Event-model documents with their names, and whether the last line is incomplete.
+
     Raises
     ------
     DataError
-        There is none, or a line other than the last is damaged.
+        If there is no such file, or a line other than the last is damaged.
     DiskError
-        The disk does not give it back.
+        If the file cannot be read.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import read_journal
+    >>> journal = read_journal(Path("runs/decay/journal.jsonl"))
+    >>> [document["unit"] for name, document in journal.documents if name == "start"]
+    ['dark', 'meter', 'decay-1']
+    >>> journal.torn
+    False
     """
     try:
         if not path.is_file():
@@ -163,16 +223,16 @@ def read_journal(path: Path) -> JournalContent:
         raw = path.read_bytes()
     except OSError as error:
         raise DiskError(f"{path}: the journal cannot be read ({error.strerror})") from None
-    return _parsed(path, raw)
+    return _parse(path, raw)
 
 
-def _parsed(path: Path, raw: bytes) -> JournalContent:
+def _parse(path: Path, raw: bytes) -> JournalContent:
     lines = raw.split(b"\n")
     torn = lines.pop() != b""
     documents: list[Document] = []
     for number, line in enumerate(lines, start=1):
         try:
-            entry = json.loads(line, parse_constant=_refuse)
+            entry = json.loads(line, parse_constant=_refuse_constant)
             if b"\\ud" in line.lower():  # perhaps half of a surrogate pair, which is no text
                 json.dumps(entry, ensure_ascii=False).encode()
             documents.append((str(entry["name"]), dict(entry["doc"])))
@@ -184,8 +244,8 @@ def _parsed(path: Path, raw: bytes) -> JournalContent:
     return JournalContent(documents, torn)
 
 
-def _refuse(constant: str) -> None:
-    """NaN and infinity, which JSON does not have and a journal never holds."""
+def _refuse_constant(constant: str) -> None:
+    """Refuse NaN and infinity, which are not JSON."""
     raise ValueError(constant)
 
 
@@ -193,21 +253,36 @@ _NAME = "notes.md"
 
 
 def add_note(run: Path, text: str, written_time: float) -> Path:
-    """Add a note to the run in `run`; returns the file.
+    """Add a note to a run.
 
     Parameters
     ----------
+    run
+        Run folder.
     text
-        Markdown; its lines are kept as they are.
+        Note in Markdown; its lines are kept as they are.
     written_time
-        Seconds since 1970.
+        Time of the note in seconds since 1970.
+
+    Returns
+    -------
+    Path
+        File `notes.md` of the run, to which the note was appended.
 
     Raises
     ------
     UsageError
-        There is nothing to note.
+        If the text is empty.
     DiskError
-        The file cannot be written.
+        If the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import add_note
+    >>> file = add_note(Path("runs/decay"), "The lens cap was on until 14:20.", 1_767_225_600.0)
+    >>> file.name
+    'notes.md'
     """
     if not text.strip():
         raise UsageError("expected a text to note, got nothing; write: labrig note RUN 'the text'")
@@ -224,6 +299,25 @@ def add_note(run: Path, text: str, written_time: float) -> Path:
 
 
 def read_notes(run: Path) -> str:
-    """All that was noted, as written; empty if nothing was."""
+    """Read the notes on a run.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+
+    Returns
+    -------
+    str
+        All notes in Markdown, as written; empty if there are none.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import add_note, read_notes
+    >>> _ = add_note(Path("runs/decay"), "Room light on behind the door.", 1_767_225_600.0)
+    >>> print(read_notes(Path("runs/decay")).strip().splitlines()[-1])
+    Room light on behind the door.
+    """
     path = run / _NAME
     return path.read_text(encoding="utf-8", errors="replace") if path.is_file() else ""

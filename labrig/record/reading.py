@@ -1,4 +1,4 @@
-"""Reading a run folder back: which units completed, and what they hold."""
+"""Reading of a run folder: attempts, their completion and their records."""
 
 import os
 import re
@@ -18,12 +18,12 @@ from labrig.record.frames import (
 )
 from labrig.record.journal import JOURNAL, Document, JournalContent, read_journal
 
-#: End of the year 9999 in seconds since 1970: no calendar reaches further.
+#: End of the year 9999 in seconds since 1970, the limit of `datetime`.
 LATEST = 253_402_300_799.0
-#: No thermometer on a bench reads more, or as little, in degrees Celsius.
+#: Largest plausible magnitude of a reading in degrees Celsius.
 HOTTEST_C = 1000.0
 
-#: As frames are called when they are written.
+#: Names of frames as `AttemptWriter` gives them.
 _FRAME_NAME = re.compile(r"frames/\d{6,}[\w.-]*")
 
 Recorded = TypeVar("Recorded", FrameRecord, ActionRecord)
@@ -33,9 +33,22 @@ _TEMPERATURE = TypeAdapter(TemperatureRecord)
 
 @dataclass(frozen=True)
 class Attempt:
-    """One attempt at a unit, in the order of the journal.
+    """One attempt at a unit, with its records in the order of the journal.
 
-    `exit_status` is `None` while it runs, and for good when the process died.
+    Attributes
+    ----------
+    uid
+        Uid of the RunStart.
+    unit
+        Name of the unit.
+    start
+        RunStart document.
+    exit_status
+        Status of the RunStop; None while the attempt runs, and if the process died during it.
+    reason
+        Reason of the RunStop.
+    frames, actions, temperatures
+        Records of the attempt.
     """
 
     uid: str
@@ -49,13 +62,25 @@ class Attempt:
 
     @property
     def completed(self) -> bool:
-        """Whether it counts."""
+        """Whether the attempt ended with `success`."""
         return self.exit_status == "success"
 
 
 @dataclass(frozen=True)
 class RunRecord:
-    """What a run folder's journal says."""
+    """Content of the journal of a run.
+
+    Attributes
+    ----------
+    folder
+        Run folder.
+    attempts
+        Attempts at units in order of their begin.
+    torn
+        Whether the last line of the journal is incomplete because of a crash.
+    last_time
+        Time of the latest document in seconds since 1970.
+    """
 
     folder: Path
     attempts: list[Attempt]
@@ -64,30 +89,30 @@ class RunRecord:
 
     @property
     def name(self) -> str:
-        """The name of its folder, whatever path leads there."""
+        """Name of the run folder, with links resolved."""
         return self.folder.resolve().name
 
     def completed(self) -> dict[str, Attempt]:
-        """The attempt that counts, of each completed unit, in order of completion.
+        """Return the completed attempt of each unit by the unit's name, in order of completion.
 
-        One that a person took back later does not count.
+        A unit that a person undid later does not count as completed.
         """
-        done: dict[str, Attempt] = {}
+        completed: dict[str, Attempt] = {}
         for attempt in self.attempts:
             for action in attempt.actions:
                 if action.device == TAKEN_BACK:
-                    done.pop(action.action, None)
+                    completed.pop(action.action, None)
             if attempt.completed:
-                done[attempt.unit] = attempt
-        return done
+                completed[attempt.unit] = attempt
+        return completed
 
     def part(self, name: str) -> "RunRecord":
-        """The completed units of one part of a chain, by their names within it."""
-        own = [_within(name, attempt) for attempt in self.completed().values()]
-        return replace(self, attempts=[attempt for attempt in own if attempt is not None])
+        """Return the completed units of one part of a chain, by their names within the part."""
+        attempts = [_attempt_within(name, attempt) for attempt in self.completed().values()]
+        return replace(self, attempts=[attempt for attempt in attempts if attempt is not None])
 
     def frames(self, role: str) -> list[FrameRecord]:
-        """Frames with that role, of completed units only."""
+        """Return the frames with a given role in completed units."""
         return [
             frame
             for attempt in self.completed().values()
@@ -96,12 +121,12 @@ class RunRecord:
         ]
 
     def temperatures(self) -> list[TemperatureRecord]:
-        """All readings of the thermometer by time, those of attempts that failed included."""
+        """Return all readings of the thermometer in order of time, including failed attempts."""
         readings = [reading for attempt in self.attempts for reading in attempt.temperatures]
         return sorted(readings, key=lambda reading: reading.time)
 
 
-def _within(part: str, attempt: Attempt) -> Attempt | None:
+def _attempt_within(part: str, attempt: Attempt) -> Attempt | None:
     unit = unit_within(part, attempt.unit)
     if unit is None:
         return None
@@ -115,40 +140,65 @@ def _within(part: str, attempt: Attempt) -> Attempt | None:
 
 
 def read_run(run: str | os.PathLike[str]) -> RunRecord:
-    """Read the journal of the run in the folder `run`.
+    """Read the journal of a run.
+
+    Parameters
+    ----------
+    run
+        Run folder.
+
+    Returns
+    -------
+    RunRecord
+        Attempts at the units of the run, with the frames, actions and temperatures of each.
 
     Raises
     ------
     DataError
-        Not a run folder, or its journal is damaged or was edited into something that does not fit.
+        If this is not a run folder, or if its journal is damaged or was edited inconsistently.
     DiskError
-        The disk does not give it back.
+        If the journal cannot be read.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> run = labrig.read_run("runs/decay")
+    >>> list(run.completed())
+    ['dark', 'meter', 'decay-1']
+    >>> len(run.frames("decay"))
+    18
     """
     folder = Path(run)
     record = run_record(folder, read_journal(folder / JOURNAL))
     for frame in (frame for attempt in record.attempts for frame in attempt.frames):
-        _refuse_what_is_no_file(frame.path)
+        _require_file(frame.path)
     return record
 
 
 def run_record(folder: Path, content: JournalContent) -> RunRecord:
-    """What the documents of a journal say of the run in `folder`; errors as of `read_run`."""
+    """Build the record of the run in `folder` from the documents of its journal.
+
+    Raises
+    ------
+    DataError
+        If a document does not fit those before it.
+    """
     attempts: dict[str, Attempt] = {}
     streams: dict[str, tuple[str, str]] = {}
     last_time = 0.0
     for number, (name, doc) in enumerate(content.documents, start=1):
         try:
             last_time = max(last_time, _seconds(doc.get("time", 0.0)))
-            _take(folder, (name, doc), attempts, streams)
+            _add_document(folder, (name, doc), attempts, streams)
         except (KeyError, TypeError, ValueError) as error:
             raise DataError(
                 f"{folder / JOURNAL}, line {number}: a '{name}' document that does not fit "
-                f"({_said(error)}); the file was changed after the run"
+                f"({_error_text(error)}); the file was changed after the run"
             ) from None
     return RunRecord(folder, list(attempts.values()), content.torn, last_time)
 
 
-def _take(
+def _add_document(
     folder: Path,
     document: Document,
     attempts: dict[str, Attempt],
@@ -156,35 +206,38 @@ def _take(
 ) -> None:
     name, doc = document
     if name == "start":
-        attempts[doc["uid"]] = _opened(doc)
+        attempts[doc["uid"]] = _open_attempt(doc)
     elif name == "descriptor":
         streams[doc["uid"]] = (doc["run_start"], doc["name"])
     elif name == "stop":
-        attempts[doc["run_start"]] = _closed(attempts[doc["run_start"]], doc)
+        attempts[doc["run_start"]] = _close_attempt(attempts[doc["run_start"]], doc)
     elif name == "event":
         run_uid, stream = streams[doc["descriptor"]]
         attempt, data = attempts[run_uid], dict(doc["data"])
         if stream == "frames":
             path = folder / _frame_name(data.pop("frame"))
             frame = _FRAME.validate_python({**data, "path": path, "unit": attempt.unit})
-            attempt.frames.append(_dated(frame))
+            attempt.frames.append(_check_times(frame))
         elif stream == "actions":
             action = _ACTION.validate_python({**data, "unit": attempt.unit})
-            attempt.actions.append(_dated(action))
+            attempt.actions.append(_check_times(action))
         elif stream == "temperatures":
             reading = _TEMPERATURE.validate_python({**data, "unit": attempt.unit})
-            attempt.temperatures.append(_sensible(reading))
+            attempt.temperatures.append(_check_reading(reading))
 
 
 def _frame_name(name: str) -> str:
-    """`name`, if it is one within the run folder."""
+    """Return `name` if it names a frame within the run folder."""
     if not _FRAME_NAME.fullmatch(name):
         raise ValueError(f"'{name}' is no name of a frame, such as frames/000001.cr2")
     return name
 
 
-def _refuse_what_is_no_file(frame: Path) -> None:
-    """A link leads out of the run folder, a device has no end; what is missing is told of later."""
+def _require_file(frame: Path) -> None:
+    """Refuse a frame that is a link, which leads out of the run folder, or a device.
+
+    A missing file is accepted here; processing reports it.
+    """
     try:
         is_something_else = frame.is_symlink() or (frame.exists() and not frame.is_file())
     except OSError as error:
@@ -195,32 +248,32 @@ def _refuse_what_is_no_file(frame: Path) -> None:
         )
 
 
-def _opened(doc: dict[str, Any]) -> Attempt:
+def _open_attempt(doc: dict[str, Any]) -> Attempt:
     if not isinstance(doc["unit"], str) or not isinstance(doc.get("devices", {}), dict):
         raise TypeError("'unit' or 'devices' is of another kind")
     _seconds(doc["time"])
     return Attempt(uid=doc["uid"], unit=doc["unit"], start=doc)
 
 
-def _closed(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
-    held = {
+def _close_attempt(attempt: Attempt, doc: dict[str, Any]) -> Attempt:
+    counts = {
         "frames": len(attempt.frames),
         "actions": len(attempt.actions),
         "temperatures": len(attempt.temperatures),
     }
     for stream, number in dict(doc.get("num_events", {})).items():
-        if stream in held and held[stream] != number:
-            raise ValueError(f"it counts {number} {stream}, there are {held[stream]}")
+        if stream in counts and counts[stream] != number:
+            raise ValueError(f"it counts {number} {stream}, there are {counts[stream]}")
     return replace(attempt, exit_status=doc["exit_status"], reason=doc.get("reason", ""))
 
 
-def _dated(record: Recorded) -> Recorded:
+def _check_times(record: Recorded) -> Recorded:
     _seconds(record.start_time)
     _seconds(record.end_time)
     return record
 
 
-def _sensible(reading: TemperatureRecord) -> TemperatureRecord:
+def _check_reading(reading: TemperatureRecord) -> TemperatureRecord:
     _seconds(reading.time)
     if not abs(reading.temperature_c) <= HOTTEST_C:
         raise ValueError(f"{reading.temperature_c} °C is no temperature")
@@ -228,14 +281,14 @@ def _sensible(reading: TemperatureRecord) -> TemperatureRecord:
 
 
 def _seconds(time: float) -> float:
-    """`time`, if it is one of a calendar's."""
+    """Return `time` if a calendar can express it."""
     if not 0 <= time <= LATEST:
         raise ValueError(f"{time} is no time in seconds since 1970")
     return float(time)
 
 
-def _said(error: Exception) -> str:
-    """What is wrong, in a few words."""
+def _error_text(error: Exception) -> str:
+    """Return an error in a few words."""
     if isinstance(error, ValidationError):
         problem = error.errors(include_url=False)[0]
         return f"{'.'.join(map(str, problem['loc']))}: {problem['msg']}"

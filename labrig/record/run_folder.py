@@ -1,4 +1,4 @@
-"""The run folder: what was asked, what happened, every frame; made once, then only added to."""
+"""The run folder: protocol, rig, journal and frames; created once, then only appended to."""
 
 import re
 import shutil
@@ -18,21 +18,28 @@ from labrig.record.attempt import AttemptWriter
 from labrig.record.journal import JOURNAL, REAL_DISK, Disk, Journal, sync_folder, write_durably
 from labrig.record.reading import RunRecord, run_record
 
-#: What a run folder is known by.
+#: File by which a run folder is recognised.
 PROTOCOL = "protocol.yaml"
 
 
 class RunFolder:
-    """A run folder open for writing; held by one labrig at a time.
+    """A run folder open for writing, by one process at a time.
 
     Parameters
     ----------
     path
-        The folder, with `protocol.yaml` and `rig.yaml` in it.
+        Run folder with `protocol.yaml` and `rig.yaml`.
     seed
-        `None` for random uids; a number makes them, and so the journal's bytes, repeatable.
+        Seed of the uids, with which the journal's bytes are repeatable; None for random uids.
     disk
-        Takes frames and journal.
+        Disk to which frames and journal are written.
+
+    Raises
+    ------
+    UsageError
+        If another process has the folder open.
+    DiskError
+        If the folder cannot be written to.
     """
 
     def __init__(self, path: Path, seed: int | None = None, disk: Disk = REAL_DISK) -> None:
@@ -48,7 +55,7 @@ class RunFolder:
             raise DiskError(f"{path}: the run cannot be written to ({error.strerror})") from None
         self._frame_number = _highest_frame(path / "frames")
         self._journal = Journal(path / JOURNAL, disk)
-        self._beside = ThreadPoolExecutor(1)
+        self._executor = ThreadPoolExecutor(1)
 
     @classmethod
     def create(
@@ -60,26 +67,34 @@ class RunFolder:
         seed: int | None,
         disk: Disk = REAL_DISK,
     ) -> Self:
-        """Make a new run folder `<runs>/<time>_<name>`, `-2` and so on if that is taken.
+        """Create a run folder `<runs>/<time>_<name>`, with `-2`, `-3`, … appended if it exists.
 
         Parameters
         ----------
+        runs
+            Folder in which the run folder is created.
+        name
+            Name of the sample.
         started
-            Seconds since 1970.
+            Begin of the run in seconds since 1970.
         texts
-            File name → content: the protocol and the rig, as resolved. The protocol, which a run
-            folder is known by, is written last.
+            Contents of protocol and rig files, as resolved, by file name. The protocol file, by
+            which a run folder is recognised, is written last.
+        seed
+            Seed of the uids; None for random uids.
+        disk
+            Disk to which files are written.
 
         Raises
         ------
         DiskError
-            The disk is full, or gone; no run is left.
+            If the disk is full or gone; no run folder remains.
         """
         stamp = datetime.fromtimestamp(started, UTC).strftime("%Y-%m-%dT%H-%M-%S")
-        wanted = f"{stamp}_{_slug(name)}"
+        folder_name = f"{stamp}_{_slug(name)}"
         try:
             _make_durably(runs)
-            path = _make_new(runs, wanted)
+            path = _make_new(runs, folder_name)
         except OSError as error:
             raise DiskError(
                 f"{runs}: a run folder cannot be made there ({error.strerror}); give another --runs"
@@ -97,20 +112,30 @@ class RunFolder:
             ) from None
 
     def read(self) -> RunRecord:
-        """What was acknowledged so far; the disk is not asked, it may be gone."""
+        """Return the record of everything acknowledged so far, without access to the disk."""
         return run_record(self.path, self._journal.read())
 
     def unknown_files(self) -> list[str]:
-        """Files among the frames that no line of the journal tells of: a crash left them."""
-        known = {frame.path.name for one in self.read().attempts for frame in one.frames}
+        """Return the names of files among the frames that have no journal line, left by a crash."""
+        recorded = {frame.path.name for attempt in self.read().attempts for frame in attempt.frames}
         return sorted(
-            path.name for path in (self.path / "frames").glob("*") if path.name not in known
+            path.name for path in (self.path / "frames").glob("*") if path.name not in recorded
         )
 
     def attempt(
         self, unit: str, wall: Callable[[], float], metadata: Mapping[str, Any]
     ) -> AttemptWriter:
-        """Begin an attempt at `unit`."""
+        """Begin an attempt at `unit`.
+
+        Parameters
+        ----------
+        unit
+            Name of the unit.
+        wall
+            Function that gives the time in seconds since 1970.
+        metadata
+            Keys and values of the RunStart.
+        """
         return AttemptWriter(
             self._journal,
             unit,
@@ -120,21 +145,25 @@ class RunFolder:
             self._new_uid,
             metadata,
             self._disk,
-            self._beside,
+            self._executor,
         )
 
     def close_open_attempts(
         self, wall: Callable[[], float], exit_status: str, reason: str
     ) -> list[str]:
-        """Write the RunStop of attempts that an exception or a crash cut off; returns their units.
+        """Write the RunStop of interrupted attempts and return the names of their units.
 
         Parameters
         ----------
+        wall
+            Function that gives the time in seconds since 1970.
         exit_status
-            `abort` (somebody stopped it) or `fail`.
+            `abort` if somebody stopped the run, else `fail`.
+        reason
+            Reason for the RunStop.
         """
-        opened = [attempt for attempt in self.read().attempts if attempt.exit_status is None]
-        for attempt in opened:
+        open_attempts = [attempt for attempt in self.read().attempts if attempt.exit_status is None]
+        for attempt in open_attempts:
             counts = {
                 "frames": len(attempt.frames),
                 "actions": len(attempt.actions),
@@ -151,15 +180,15 @@ class RunFolder:
                     "num_events": {stream: number for stream, number in counts.items() if number},
                 },
             )
-        return [attempt.unit for attempt in opened]
+        return [attempt.unit for attempt in open_attempts]
 
     def discard(self) -> None:
-        """Take away a run in which nothing happened, as far as the disk lets it."""
+        """Delete a run in which nothing was recorded, as far as the disk allows."""
         _discard(self.path)
 
     def close(self) -> None:
-        """Release the folder."""
-        self._beside.shutdown()
+        """Release the folder for other processes."""
+        self._executor.shutdown()
         self._journal.close()
         with suppress(OSError):  # the system lets go of it when labrig ends
             self._lock.release()
@@ -187,7 +216,7 @@ class RunFolder:
 
 
 def _discard(path: Path) -> None:
-    """No half of a run is left: first goes what it is known by, and if that stays, so does all."""
+    """Delete a run folder, first the file by which it is recognised; keep all if that one stays."""
     with suppress(OSError):
         (path / PROTOCOL).unlink(missing_ok=True)
         shutil.rmtree(path)
@@ -200,10 +229,10 @@ def _make_durably(runs: Path) -> None:
         sync_folder(folder.parent)
 
 
-def _make_new(runs: Path, wanted: str) -> Path:
+def _make_new(runs: Path, name: str) -> Path:
     number = 1
     while True:
-        path = runs / (wanted if number == 1 else f"{wanted}-{number}")
+        path = runs / (name if number == 1 else f"{name}-{number}")
         try:
             path.mkdir()
         except FileExistsError:
@@ -217,6 +246,6 @@ def _slug(name: str) -> str:
 
 
 def _highest_frame(frames: Path) -> int:
-    """Highest number in use, acknowledged or not: no frame is ever overwritten."""
+    """Return the highest frame number in use, acknowledged or not: no frame is ever overwritten."""
     numbers = [int(path.name[:6]) for path in frames.glob("[0-9]" * 6 + ".*")]
     return max(numbers, default=0)

@@ -1,4 +1,4 @@
-"""Setting up a bench: what is plugged into this PC, and whether a rig does what it should."""
+"""Setting up a bench: discovery of devices, check of a rig, live view."""
 
 from labrig.setup.check import DeviceReport, RigReport, check_rig
 from labrig.setup.discover import Discovery, FoundDevice, discover

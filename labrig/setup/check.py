@@ -1,4 +1,4 @@
-"""A rig's devices identified, looked over and exercised gently."""
+"""Check of a rig: identity, settings and exercise of its devices."""
 
 import io
 import logging
@@ -23,24 +23,24 @@ from labrig.errors import DeviceError, LabrigError
 from labrig.reduce import FrameMeasurement, measure, read_raw
 from labrig.setup.picture_stats import decode
 
-#: Mean above black, as a part of the range, from which on a frame is not dark.
+#: Mean above black, as a fraction of the range, from which a frame is not dark.
 LIGHT = 0.005
-#: EXIF orientation of a picture that was not turned.
+#: EXIF orientation of a picture without rotation.
 UPRIGHT = 1
 
 
 class Photographs:
-    """The eyes of a rig check: reads RAW frames and live pictures."""
+    """Reader of RAW frames and live pictures in a rig check."""
 
     def dark_frame(self, frame: Frame) -> Exercised:
-        """Its noise, whether it is dark, whether it is turned."""
+        """Return the noise of a dark frame, and whether it is dark and not rotated."""
         reduced = measure(read_raw(frame.data, "the dark frame"))
         return Exercised(
             tuple(_noise(reduced, frame)), (_darkness(reduced), _orientation(frame.data))
         )
 
     def live_picture(self, jpeg: bytes) -> Measured:
-        """Its size."""
+        """Return the size of a live picture."""
         height, width, _ = decode(jpeg).shape
         return Measured("live picture", f"{width} x {height} pixels, {len(jpeg) / 1e3:.1f} kB")
 
@@ -69,7 +69,7 @@ def _darkness(reduced: FrameMeasurement) -> Finding:
 
 
 def _orientation(content: bytes) -> Finding:
-    """Auto rotate: no known property tells it, a turned frame does."""
+    """Return whether auto rotate is off, from the EXIF; no known property reports it."""
     import exifread
 
     # it warns through logging of every odd tag
@@ -94,12 +94,22 @@ def _orientation(content: bytes) -> Finding:
 
 @dataclass(frozen=True)
 class DeviceReport:
-    """One device of the rig.
+    """Report on one device of a rig.
 
     Attributes
     ----------
+    key
+        Key of the device in the rig file.
+    identity
+        Maker, model, serial number and firmware that the device reported.
+    findings
+        Assessments of the device's settings.
+    measured
+        Quantities measured in the exercise.
+    suggestions
+        Values for the rig file.
     failure
-        What it could not do, in one line; None if it did all that was asked.
+        Reason why the device failed, in one line; None if it did not.
     """
 
     key: str
@@ -112,12 +122,16 @@ class DeviceReport:
 
 @dataclass(frozen=True)
 class RigReport:
-    """All devices of a rig, and whether it was left in its safe state.
+    """Report on all devices of a rig.
 
     Attributes
     ----------
+    rig
+        Name of the rig.
+    devices
+        Reports on the devices.
     unsafe
-        Why the safe state is not confirmed; None if it is.
+        Reason why the safe state is not confirmed; None if it is.
     """
 
     rig: str
@@ -126,13 +140,13 @@ class RigReport:
 
     @property
     def failures(self) -> tuple[str, ...]:
-        """What did not work, one line each."""
+        """Failures of devices, one line each."""
         failed = [f"{d.key}: {d.failure}" for d in self.devices if d.failure is not None]
         return (*failed, *([self.unsafe] if self.unsafe else []))
 
     @property
     def refusals(self) -> tuple[str, ...]:
-        """What would spoil a measurement, one line each."""
+        """Settings that would spoil a measurement, one line each."""
         return tuple(
             f"{device.key}: {finding}"
             for device in self.devices
@@ -141,7 +155,7 @@ class RigReport:
         )
 
     def rows(self) -> Iterator[tuple[str, str, str, str]]:
-        """Device, verdict, what, and what to do: the lines of a table."""
+        """Yield the rows of a table: device, assessment, subject, and value or remedy."""
         for device in self.devices:
             yield device.key, "", device.identity, ""
             for finding in device.findings:
@@ -163,24 +177,47 @@ class RigReport:
             yield "rig", "fine", "left in its safe state", ""
 
     def to_json(self) -> dict[str, Any]:
-        """What `labrig rig check --json` prints."""
+        """Return the content of `labrig rig check --json`."""
         return asdict(self) | {"failures": list(self.failures), "refusals": list(self.refusals)}
 
 
-def check_rig(stand: Bench) -> RigReport:
-    """Open the rig, look at every device, bring it to its safe state.
+def check_rig(bench: Bench) -> RigReport:
+    """Identify and exercise every device of a rig, and bring the rig to its safe state.
 
-    Each device is exercised as its role says, unless its settings would spoil photometry.
+    A device is exercised as its role defines, unless its settings would spoil photometry.
+
+    Parameters
+    ----------
+    bench
+        Bench whose devices are not open.
+
+    Returns
+    -------
+    RigReport
+        Identity, settings and measured times of every device.
 
     Raises
     ------
     DeviceError
-        A device could not be opened; nothing was exercised.
+        If a device cannot be opened; nothing was exercised then.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.setup import check_rig
+    >>> rig_file = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> with labrig.open_bench(rig_file, "rig.yaml") as bench:
+    ...     report = check_rig(bench)
+    >>> [device.key for device in report.devices]
+    ['lamp', 'shield', 'door', 'camera', 'changer', 'thermometer']
+    >>> report.failures, report.refusals
+    ((), ())
     """
     report: RigReport | None = None
     try:
-        with stand.devices() as rig:
-            report = _look_at(rig)
+        with bench.devices() as rig:
+            report = _checked_rig(rig)
     except DeviceError as error:
         if report is None:
             raise
@@ -188,15 +225,15 @@ def check_rig(stand: Bench) -> RigReport:
     return report
 
 
-def _look_at(rig: Rig) -> RigReport:
-    trial = ExerciseContext(rig.clock, Photographs())
+def _checked_rig(rig: Rig) -> RigReport:
+    context = ExerciseContext(rig.clock, Photographs())
     return RigReport(
-        rig.name, tuple(_checked(key, device, trial) for key, device in rig.devices.items())
+        rig.name, tuple(_checked(key, device, context) for key, device in rig.devices.items())
     )
 
 
-def _checked(key: str, device: Device, trial: ExerciseContext) -> DeviceReport:
-    """Everything that can be told of one device, up to where it failed."""
+def _checked(key: str, device: Device, context: ExerciseContext) -> DeviceReport:
+    """Return the report on one device, up to the step where it failed."""
     report = DeviceReport(key, "did not answer")
     try:
         report = replace(report, identity=device.identity())
@@ -207,12 +244,12 @@ def _checked(key: str, device: Device, trial: ExerciseContext) -> DeviceReport:
                 report, measured=(Measured("not exercised", "first mend what is refused"),)
             )
         if exercise := ROLES[key].exercise:
-            taught = exercise(device, trial)
+            outcome = exercise(device, context)
             report = replace(
                 report,
-                measured=taught.measured,
-                findings=(*report.findings, *taught.findings),
-                suggestions=taught.suggestions,
+                measured=outcome.measured,
+                findings=(*report.findings, *outcome.findings),
+                suggestions=outcome.suggestions,
             )
     except LabrigError as error:
         report = replace(report, failure=str(error))

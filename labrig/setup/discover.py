@@ -1,4 +1,4 @@
-"""Serial ports and USB cameras on this PC, with what a rig file needs to say of each."""
+"""Discovery of serial ports and USB cameras, each with its entry for a rig file."""
 
 from collections import Counter
 from collections.abc import Collection
@@ -20,7 +20,7 @@ _STILL_IMAGE = 6
 
 @dataclass(frozen=True)
 class _Board:
-    """What is known of a USB vendor's serial devices; `keys` are those of its role's entry."""
+    """Serial devices of a USB vendor; `keys` are those of the device's entry in the rig file."""
 
     name: str
     driver: str | None = None
@@ -40,7 +40,7 @@ _MAESTRO = _Board(
     ),
 )
 
-#: USB vendor and product, or vendor alone. Sources: the vendors' manuals, the USB ID repository.
+#: Boards by USB vendor and product, or vendor alone. Sources: vendors' manuals, USB ID repository.
 _BOARDS: dict[tuple[int, int | None], _Board] = {
     (0x2A19, None): _Board("Numato relay board", "numato_relay", ", relay: 0, warm_up: 15 min"),
     (0x1A86, 0x7523): _Board(
@@ -61,8 +61,8 @@ _BOARDS: dict[tuple[int, int | None], _Board] = {
     (0x04D8, 0xFFEE): _Board("Devantech relay board"),
 }
 
-#: USB vendors whose cameras take photographs at commands of their maker's own only, which
-#: `ptp_camera` does not know and libgphoto2 does (its camlibs/ptp2/library.c).
+#: USB vendors whose cameras need proprietary commands for photographs, which `ptp_camera` lacks and
+#: libgphoto2 has (its camlibs/ptp2/library.c).
 _OWN_COMMANDS = {
     0x054C: "Sony",
     0x04CB: "Fujifilm",
@@ -75,16 +75,18 @@ _OWN_COMMANDS = {
 
 @dataclass(frozen=True)
 class FoundDevice:
-    """One device that is plugged in.
+    """One connected device.
 
     Attributes
     ----------
     address
-        As a rig file says it.
+        Address for the rig file.
+    name
+        Maker, model and serial number.
     snippet
-        A line for the rig file's `devices:`; empty where labrig has no driver for it.
+        Line for the rig file's `devices:`; empty if labrig has no driver for the device.
     hints
-        What stands in the way and what to do.
+        Obstacles to its use, with remedies.
     """
 
     address: str
@@ -95,33 +97,63 @@ class FoundDevice:
 
 @dataclass(frozen=True)
 class Discovery:
-    """All that is plugged in; `notes` say what could not be looked for."""
+    """Connected devices.
+
+    Attributes
+    ----------
+    ports
+        Serial ports.
+    cameras
+        USB cameras.
+    notes
+        Kinds of devices that could not be looked for, with the reason.
+    """
 
     ports: tuple[FoundDevice, ...]
     cameras: tuple[FoundDevice, ...]
     notes: tuple[str, ...] = ()
 
 
-def discover(around: Host, drivers: Collection[str]) -> Discovery:
-    """Look at every serial port and every USB camera; nothing is sent to any of them.
+def discover(host: Host, drivers: Collection[str]) -> Discovery:
+    """List serial ports and USB cameras with their entries for a rig file.
+
+    Nothing is sent to any of the devices.
 
     Parameters
     ----------
+    host
+        PC whose devices are listed, such as `Host.of_this_pc()`.
     drivers
-        Names of installed drivers.
+        Names of the installed drivers.
+
+    Returns
+    -------
+    Discovery
+        Ports, cameras and notes.
+
+    Examples
+    --------
+    >>> from types import SimpleNamespace
+    >>> from labrig.setup import Host, discover
+    >>> port = SimpleNamespace(
+    ...     device="/dev/ttyACM0", description="", vid=0x2A19, pid=0x0C01, serial_number=None
+    ... )
+    >>> pc = Host("linux", ports=lambda: [port], usb_devices=list, processes=list)
+    >>> discover(pc, ["numato_relay"]).ports[0].snippet
+    'lamp: {driver: numato_relay, address: "/dev/ttyACM0", relay: 0, warm_up: 15 min}'
     """
     ports = tuple(
-        _serial(port, drivers) for port in sorted(around.ports(), key=lambda port: port.device)
+        _serial(port, drivers) for port in sorted(host.ports(), key=lambda port: port.device)
     )
     try:
-        devices = [device for device in around.usb_devices() if _is_camera(device)]
+        devices = [device for device in host.usb_devices() if _is_camera(device)]
     except usb.core.NoBackendError:
         return Discovery(ports, (), (NO_LIBUSB,))
-    alike = Counter((device.idVendor, device.idProduct) for device in devices)
+    model_counts = Counter((device.idVendor, device.idProduct) for device in devices)
     return Discovery(
         ports,
         tuple(
-            _camera(device, around, drivers, alike[device.idVendor, device.idProduct] > 1)
+            _camera(device, host, drivers, model_counts[device.idVendor, device.idProduct] > 1)
             for device in devices
         ),
     )
@@ -157,21 +189,23 @@ def _is_camera(device: Any) -> bool:
         return False  # a device that does not even show its descriptors is none of ours
 
 
-def _camera(device: Any, around: Host, drivers: Collection[str], has_twin: bool) -> FoundDevice:
+def _camera(device: Any, host: Host, drivers: Collection[str], has_twin: bool) -> FoundDevice:
     address = f"usb://{device.idVendor:04x}:{device.idProduct:04x}"
-    refused = unreachable(device, around.platform)
-    hints = [refused] if refused else []
-    hints += [f"may be held by {holder}" for holder in holders(device, around)]
-    serial = None if refused else _text(device, device.iSerialNumber)
+    obstacle = unreachable(device, host.platform)
+    hints = [obstacle] if obstacle else []
+    hints += [f"may be held by {holder}" for holder in holders(device, host)]
+    serial = None if obstacle else _text(device, device.iSerialNumber)
     if has_twin and serial:
         address += f"/{serial}"
     elif has_twin:
         hints.append("there are several of this model: append /SERIAL, see labrig rig check")
-    words = [] if refused else [_text(device, device.iManufacturer), _text(device, device.iProduct)]
+    name_parts = (
+        [] if obstacle else [_text(device, device.iManufacturer), _text(device, device.iProduct)]
+    )
     usb.util.dispose_resources(device)
     driver: str | None = "ptp_camera"
     if maker := _OWN_COMMANDS.get(device.idVendor):
-        driver = None if around.platform == "win32" else "gphoto2_camera"
+        driver = None if host.platform == "win32" else "gphoto2_camera"
         hints.append(
             f"{maker} has commands of its own, which libgphoto2 knows (Linux, macOS): "
             "pip install 'labrig[gphoto2]'"
@@ -179,7 +213,7 @@ def _camera(device: Any, around: Host, drivers: Collection[str], has_twin: bool)
     snippet = f'camera: {{driver: {driver}, address: "{address}", warm_up: 30 min}}'
     return FoundDevice(
         address,
-        " ".join(word for word in words if word) or "camera",
+        " ".join(word for word in name_parts if word) or "camera",
         snippet if driver in drivers else "",
         tuple(hints),
     )

@@ -1,4 +1,4 @@
-"""What the operating system tells of devices and programs; tests put their own in its place."""
+"""Devices and programs that the operating system lists; tests replace them."""
 
 import subprocess
 import sys
@@ -12,7 +12,7 @@ _LISTING_S = 10.0
 
 
 class Port(Protocol):
-    """The part of pyserial's `ListPortInfo` that is used; None where the system does not know."""
+    """The part of pyserial's `ListPortInfo` that is used; unknown values are None."""
 
     device: str
     description: str
@@ -27,10 +27,12 @@ class Process:
 
     Attributes
     ----------
+    pid
+        Number of the process.
     name
-        Of its file, without the folder.
+        Name of the program's file without its folder.
     open_files
-        Device files that it holds, as far as this user may know.
+        Device files that it has open, as far as this user may list them.
     """
 
     pid: int
@@ -45,13 +47,13 @@ class Host:
     Attributes
     ----------
     platform
-        As `sys.platform`.
+        Name of the platform as in `sys.platform`.
     ports
-        Lists serial ports.
+        Function that lists serial ports.
     usb_devices
-        Lists `usb.core.Device`; raises `usb.core.NoBackendError` without libusb.
+        Function that lists `usb.core.Device`; raises `usb.core.NoBackendError` without libusb.
     processes
-        Lists programs.
+        Function that lists running programs.
     """
 
     platform: str
@@ -61,7 +63,7 @@ class Host:
 
     @classmethod
     def of_this_pc(cls) -> "Host":
-        """The PC that this runs on."""
+        """Return the PC on which this runs."""
         listings: dict[str, Callable[[], Iterable[Process]]] = {
             "linux": _linux_processes,
             "darwin": _mac_processes,
@@ -79,8 +81,8 @@ def _serial_ports() -> Iterable[Port]:
 def _usb_devices() -> Iterable[Any]:
     import usb.core
 
-    found: Iterable[Any] = usb.core.find(find_all=True)
-    return found
+    devices: Iterable[Any] = usb.core.find(find_all=True)
+    return devices
 
 
 def _linux_processes() -> Iterable[Process]:
@@ -102,7 +104,7 @@ def _usb_files(descriptors: Path) -> frozenset[str]:
 
 def _mac_processes() -> Iterable[Process]:
     try:
-        listed = subprocess.run(
+        listing = subprocess.run(
             ["/bin/ps", "-axo", "pid=,comm="],
             capture_output=True,
             text=True,
@@ -112,6 +114,6 @@ def _mac_processes() -> Iterable[Process]:
         ).stdout
     except (OSError, subprocess.SubprocessError):
         return
-    for line in listed.splitlines():
+    for line in listing.splitlines():
         pid, _, command = line.strip().partition(" ")
         yield Process(int(pid), Path(command.strip()).name)

@@ -1,7 +1,7 @@
-"""Changing `patches:` in a person's protocol file, and nothing else in it.
+"""Editing of `patches:` in a user's protocol file, without any other change.
 
-Only the characters of that one value are replaced, so that comments, order and spelling of all the
-rest stay as they were. What comes out is read back before it is handed out.
+Only the characters of that value are replaced, so that comments, order and spelling of the rest
+are preserved. The new text is parsed and checked before it is returned.
 """
 
 import json
@@ -18,26 +18,26 @@ from labrig.region import Region
 from labrig.yaml_file import parse_yaml
 
 KEY = "patches"
-#: Finer than a pixel of any live picture, and still readable.
+#: Decimals of written fractions: finer than a pixel of a live picture, still readable.
 DECIMALS = 4
 INDENT = "  "
 
 _PLAIN = re.compile(r"[A-Za-z][A-Za-z0-9_-]*")
-#: Words that some YAML reader takes for a truth value or for nothing.
+#: Words that some YAML parser reads as a boolean or as null.
 _WORDS = frozenset({"true", "false", "null", "yes", "no", "on", "off", "y", "n"})
 _REST_OF_LINE = re.compile(r"[ \t]*(?:#[^\r\n]*)?(?=\r?\n|\Z)")
 _COLON = re.compile(r"[ \t]*:[ \t]*")
 
 
 def write_patches(path: Path, patches: Mapping[str, Region]) -> None:
-    """Replace the patches in the protocol at `path`; it stays whole whatever happens.
+    """Replace the patches in the protocol at `path`, atomically.
 
     Raises
     ------
     UsageError
-        The file cannot be changed without touching anything else, or would be no valid protocol.
+        If the file cannot be changed without other changes, or would not be a valid protocol.
     DiskError
-        It cannot be written.
+        If the file cannot be written.
     """
     try:
         text = path.read_bytes().decode("utf-8")
@@ -45,53 +45,55 @@ def write_patches(path: Path, patches: Mapping[str, Region]) -> None:
         raise UsageError(f"{path}: cannot be read as UTF-8 text ({error})") from None
     changed = with_patches(text, patches, str(path))
     # Beside it, because a protocol may name files relative to its own folder.
-    trial = path.with_name(f".{path.name}.trial.yaml")
+    trial_file = path.with_name(f".{path.name}.trial.yaml")
     try:
-        write_durably(trial, changed.encode("utf-8"))
-        read_protocol(trial)
+        write_durably(trial_file, changed.encode("utf-8"))
+        read_protocol(trial_file)
     except UsageError as error:
-        raise UsageError(str(error).replace(str(trial), str(path))) from None
+        raise UsageError(str(error).replace(str(trial_file), str(path))) from None
     finally:
-        trial.unlink(missing_ok=True)
+        trial_file.unlink(missing_ok=True)
     write_durably(path.resolve(), changed.encode("utf-8"))  # a link stays one
 
 
 def with_patches(text: str, patches: Mapping[str, Region], source: str) -> str:
-    """The YAML `text` with `patches` as its patches.
+    """Return the YAML `text` with `patches` as its patches.
 
     Parameters
     ----------
+    text
+        Content of a protocol file.
     patches
-        By name; regions as fractions of the frame.
+        Regions by name, in fractions of the frame.
     source
-        Names the text in messages.
+        Name or path of the file, for messages.
 
     Raises
     ------
     UsageError
-        Not YAML, or written so that the patches cannot be replaced alone.
+        If the text is not YAML, or the patches cannot be replaced without other changes.
     """
     before = parse_yaml(text, source)
-    wanted = {name: rounded(region) for name, region in patches.items()}
-    for candidate in _candidates(text, wanted):
+    new_patches = {name: rounded(region) for name, region in patches.items()}
+    for candidate in _candidates(text, new_patches):
         try:
             after = parse_yaml(candidate, source)
         except UsageError:
             continue
-        told = after.pop(KEY, None)
-        rest = {key: value for key, value in before.items() if key != KEY}
+        written = after.pop(KEY, None)
+        others = {key: value for key, value in before.items() if key != KEY}
         # Compared as text, because not-a-number is never equal to itself.
-        same = repr(after) == repr(rest) and list(told or ()) == list(wanted)
-        if same and all(tuple(told[name]) == region for name, region in wanted.items()):
+        same = repr(after) == repr(others) and list(written or ()) == list(new_patches)
+        if same and all(tuple(written[name]) == region for name, region in new_patches.items()):
             return candidate
     raise UsageError(
         f"{source}: '{KEY}' is written so that it cannot be changed without touching the rest; "
-        f"write it by hand: {' '.join(_entries(wanted, '', ' '))}"
+        f"write it by hand: {' '.join(_entries(new_patches, '', ' '))}"
     )
 
 
 def rounded(region: Region) -> Region:
-    """The region with edges rounded, so that it still ends inside the frame."""
+    """Return the region with rounded edges, which still ends inside the frame."""
     x, y, width, height = region
     left, top = round(x, DECIMALS), round(y, DECIMALS)
     right, low = round(x + width, DECIMALS), round(y + height, DECIMALS)
@@ -99,7 +101,7 @@ def rounded(region: Region) -> Region:
 
 
 def _candidates(text: str, patches: Mapping[str, Region]) -> Iterator[str]:
-    """Texts that may be what is wanted, the best first; the caller reads them back."""
+    """Yield candidates of the new text, the best first; the caller parses and checks them."""
     root = yaml.compose(text, Loader=yaml.SafeLoader)
     if not isinstance(root, yaml.MappingNode) or root.flow_style:
         return
@@ -134,23 +136,26 @@ def _scalar(name: str) -> str:
 
 def _replaced(text: str, key: yaml.Node, value: yaml.Node, lines: str) -> str:
     end = _end_of(value)
-    rest = _REST_OF_LINE.match(text, end)
-    if rest is None:
+    rest_of_line = _REST_OF_LINE.match(text, end)
+    if rest_of_line is None:
         return ""  # something else follows on the line: not a value that can be taken out
     newline = "\r\n" if "\r\n" in text else "\n"
-    after = text[rest.end() :].removeprefix(newline)
+    after = text[rest_of_line.end() :].removeprefix(newline)
     if value.start_mark.line > key.start_mark.line:
         start = value.start_mark.index - value.start_mark.column
         return text[:start] + lines + after
     colon = _COLON.match(text, key.end_mark.index)
     if colon is None:
         return ""
-    # What was said behind the value is kept behind the key.
-    return text[: key.end_mark.index] + ":" + rest[0].rstrip() + newline + lines + after
+    # A comment after the value is kept after the key.
+    return text[: key.end_mark.index] + ":" + rest_of_line[0].rstrip() + newline + lines + after
 
 
 def _end_of(node: yaml.Node) -> int:
-    """Index behind the last character: a block's own end mark is where the next thing begins."""
+    """Return the index after the last character of a node.
+
+    A block's own end mark is where the next node begins.
+    """
     if isinstance(node, yaml.CollectionNode) and not node.flow_style and node.value:
         last = node.value[-1]
         parts = last if isinstance(last, tuple) else (last,)
@@ -159,7 +164,7 @@ def _end_of(node: yaml.Node) -> int:
 
 
 def _document_end(text: str) -> int:
-    """Index at which a further key can be added: before `...`, else at the end."""
+    """Return the index at which another key can be added: before `...`, else at the end."""
     for event in yaml.parse(text, Loader=yaml.SafeLoader):
         if isinstance(event, yaml.DocumentEndEvent) and event.explicit and event.start_mark:
             return int(event.start_mark.index)

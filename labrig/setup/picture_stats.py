@@ -1,7 +1,7 @@
-"""What a live picture says about exposure and focus.
+"""Exposure and focus of a live picture.
 
-It is an 8-bit JPEG with the camera's own tone curve: good for comparing one moment with the next,
-not for measuring light.
+A live picture is an 8-bit JPEG with the camera's tone curve: suited for comparing one moment with
+the next, not for photometry.
 """
 
 from dataclasses import asdict, dataclass
@@ -14,10 +14,10 @@ from numpy.typing import NDArray
 from labrig.errors import DeviceError
 from labrig.region import Region, region_pixels
 
-#: A JPEG's 255 rings a little below itself beside an edge. For display only: what a measurement
-#: calls clipped is `labrig.reduce.saturation.is_clipped`.
+#: Level from which a pixel counts as clipped; JPEG artefacts lower 255 a little next to edges. For
+#: display only: clipping of measurements is `labrig.reduce.saturation.is_clipped`.
 CLIPPED_FROM = 250
-#: Bars of the histogram, each two values wide.
+#: Number of bins of the histogram, each two levels wide.
 BINS = 128
 
 Picture = NDArray[np.uint8]
@@ -25,21 +25,22 @@ Picture = NDArray[np.uint8]
 
 @dataclass(frozen=True)
 class PictureStats:
-    """Of one live picture.
+    """Statistics of one live picture.
 
     Attributes
     ----------
     width, height
-        In pixels of the live picture.
+        Size of the live picture in pixels.
     histogram
-        Red, green, blue: fraction of the pixels in each bin; the bins span 0 to 255.
+        Fraction of the pixels in each bin from 0 to 255, for red, green, blue.
     clipped
-        Red, green, blue: fraction of the pixels at `CLIPPED_FROM` or above.
+        Fraction of the pixels at `CLIPPED_FROM` or above, for red, green, blue.
     focus
-        Of the whole picture, see `sharpness`.
-    region_focus, region_clipped
-        The same of the region asked for; `None` if none was. `region_clipped` is of the worst
-        channel.
+        Sharpness of the whole picture, see `sharpness`.
+    region_focus
+        Sharpness of the region; None without a region.
+    region_clipped
+        Fraction of clipped pixels in the worst channel of the region; None without a region.
     """
 
     width: int
@@ -51,17 +52,17 @@ class PictureStats:
     region_clipped: float | None
 
     def to_json(self) -> dict[str, Any]:
-        """As plain values, with what the page needs to mark clipped pixels."""
+        """Return plain values, with the level from which the page marks clipped pixels."""
         return {**asdict(self), "clipped_from": CLIPPED_FROM}
 
 
 def decode(jpeg: bytes) -> Picture:
-    """A live picture's pixels, shape (height, width, 3): R, G, B.
+    """Return the pixels R, G, B of a live picture, shape (height, width, 3).
 
     Raises
     ------
     DeviceError
-        The camera sent something that is no JPEG.
+        If the camera sent something other than a JPEG.
     """
     picture = cv2.imdecode(np.frombuffer(jpeg, np.uint8), cv2.IMREAD_COLOR) if jpeg else None
     if picture is None:
@@ -74,12 +75,12 @@ def decode(jpeg: bytes) -> Picture:
 
 
 def picture_stats(picture: Picture, region: Region | None = None) -> PictureStats:
-    """Histogram, clipping and focus of a picture, and of a region of it.
+    """Return histogram, clipping and focus of a picture, and of a region of it.
 
     Raises
     ------
     UsageError
-        The region leaves the picture.
+        If the region exceeds the picture.
     """
     height, width, _ = picture.shape
     inside = None
@@ -98,10 +99,14 @@ def picture_stats(picture: Picture, region: Region | None = None) -> PictureStat
 
 
 def sharpness(picture: Picture) -> float:
-    """Variance of the Laplacian of the luminance over its mean squared, ×1000; higher is sharper.
+    """Return the variance of the Laplacian of the luminance over its squared mean, times 1000.
 
-    Without the division a brighter picture would count as a sharper one. Variance of the Laplacian
-    as focus measure: Pech-Pacheco et al., "Diatom autofocusing in brightfield microscopy" (2000).
+    Higher is sharper. Without the normalisation a brighter picture would count as a sharper one.
+
+    References
+    ----------
+    Pech-Pacheco et al., "Diatom autofocusing in brightfield microscopy" (2000), for the variance of
+    the Laplacian as focus measure.
     """
     grey = cv2.cvtColor(np.ascontiguousarray(picture), cv2.COLOR_RGB2GRAY)
     mean = float(grey.mean())

@@ -1,4 +1,4 @@
-"""What else on this PC uses a camera, and how to make it let go.
+"""Programs on this PC that hold a camera, and how to make them release it.
 
 Sources: gphoto2 issues #154, #181 and #485 (Linux), libgphoto2 issue #1064 (macOS).
 """
@@ -11,8 +11,8 @@ import usb.util
 
 from labrig.setup.host import Host, Process
 
-#: Programs that take every camera they see, and what to do about each.
-_KNOWN = {
+#: Programs that open every camera, and how to make each release it.
+_REMEDIES = {
     "linux": {
         "gvfsd-gphoto2": "gio mount -s gphoto2",
         "gvfs-gphoto2-volume-monitor": (
@@ -34,47 +34,47 @@ _KNOWN = {
 _ZADIG = "give this camera the WinUSB driver with Zadig (https://zadig.akeo.ie)"
 
 
-def holders(device: Any, around: Host) -> list[str]:
-    """Who may hold a `usb.core.Device`, each with what to do."""
+def holders(device: Any, host: Host) -> list[str]:
+    """Return the programs that may hold a `usb.core.Device`, each with a remedy."""
     return [
         f"{process.name} (process {process.pid}): {remedy}"
-        for process, remedy in _suspects(_node(device), around.processes(), around.platform)
+        for process, remedy in _suspects(_node(device), host.processes(), host.platform)
     ]
 
 
 def unreachable(device: Any, platform: str) -> str | None:
-    """What to do when this user cannot open a `usb.core.Device`; None when it can be opened."""
+    """Return why this user cannot open a `usb.core.Device`, with a remedy; None if possible."""
     try:
         device.get_active_configuration()
     except (usb.core.USBError, NotImplementedError) as error:
         if isinstance(error, usb.core.USBError) and error.errno is None:
             return None  # pyusb's way of saying that no configuration is set: it was opened
-        said = " ".join(str(error).split())
+        reason = " ".join(str(error).split())
         if platform == "win32":
-            return f"it cannot be opened ({said}): {_ZADIG}"
+            return f"it cannot be opened ({reason}): {_ZADIG}"
         if platform == "linux":
             return (
-                f'it cannot be opened ({said}): put SUBSYSTEM=="usb", '
+                f'it cannot be opened ({reason}): put SUBSYSTEM=="usb", '
                 f'ATTR{{idVendor}}=="{device.idVendor:04x}", TAG+="uaccess" into '
                 "/etc/udev/rules.d/70-labrig.rules and plug it in again"
             )
-        return f"it cannot be opened ({said}): unplug it and plug it in again"
+        return f"it cannot be opened ({reason}): unplug it and plug it in again"
     finally:
         usb.util.dispose_resources(device)
     return None
 
 
 def _node(device: Any) -> str:
-    """Where Linux has the device's file."""
+    """Return the device file on Linux."""
     return f"/dev/bus/usb/{device.bus or 0:03d}/{device.address or 0:03d}"
 
 
 def _suspects(
     node: str, processes: Iterable[Process], platform: str
 ) -> Iterable[tuple[Process, str]]:
-    known = _KNOWN.get(platform, {})
+    remedies = _REMEDIES.get(platform, {})
     for process in processes:
         if node in process.open_files:
-            yield process, known.get(process.name, "close it")
-        elif process.name in known:
-            yield process, known[process.name]
+            yield process, remedies.get(process.name, "close it")
+        elif process.name in remedies:
+            yield process, remedies[process.name]

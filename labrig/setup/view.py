@@ -1,4 +1,4 @@
-"""Looking through a rig's camera in the browser: aim, focus, draw regions into a protocol."""
+"""Live view of a rig's camera in the browser, to aim, focus and draw regions into a protocol."""
 
 import threading
 from collections.abc import Callable
@@ -11,38 +11,54 @@ from labrig.clock import Clock
 from labrig.errors import UsageError
 from labrig.setup.view_server import AimedProtocol, LivePictures, ViewServer
 
-#: Ten pictures a second are enough for a hand on a focus ring, and leave the camera some rest.
+#: Period of the pictures: enough for focusing by hand, with pauses for the camera.
 PICTURE_PERIOD_S = 0.1
-#: Ctrl-C is answered at least so often, in real time.
+#: Longest real time until Ctrl-C is answered.
 LOOK_UP_S = 0.1
-#: Devices that may have a live view, the one made for it first.
-_EYES = (VIEWFINDER.key, CAMERA.key)
+#: Keys of devices that may have a live view, in order of preference.
+_LIVE_VIEW_KEYS = (VIEWFINDER.key, CAMERA.key)
 
 
 def view_rig(
     rig_path: Path, protocol_path: Path | None, port: int, tell: Callable[[str], None]
 ) -> Never:
-    """Show a rig's live view until somebody stops it.
+    """Show the live view of a rig in the browser until it is interrupted.
 
     Parameters
     ----------
     rig_path
-        The rig file.
+        Rig file.
     protocol_path
-        The protocol file in which regions are written, if any.
+        Protocol file to which regions are written; None for a page without regions.
     port
-        On 127.0.0.1; 0 for any free one.
+        TCP port on 127.0.0.1; 0 for any that is free.
     tell
-        Called once with the page's address.
+        Function that is called once, with the address of the page.
 
     Raises
     ------
     Interrupted
-        How it ends: the devices are safe, the viewfinder is off.
+        On Ctrl-C; the devices are then safe and the viewfinder is off.
     UsageError
-        A malformed file, a port that is taken, or a rig without live view.
+        If a file is malformed, the port is taken, or the rig has no live view.
     DeviceError
-        A device that fails.
+        If a device fails.
+
+    Examples
+    --------
+    >>> import signal
+    >>> from pathlib import Path
+    >>> from labrig.clock import Interrupted
+    >>> from labrig.setup import view_rig
+    >>> def tell(url):
+    ...     print(url.partition(":")[0])
+    ...     raise Interrupted(signal.SIGINT)  # Ctrl-C, as soon as the page is served
+    >>> try:
+    ...     view_rig(Path("runs/decay/rig.yaml"), None, 0, tell)
+    ... except Interrupted:
+    ...     print("devices are safe")
+    http
+    devices are safe
     """
     protocol = None if protocol_path is None else AimedProtocol(protocol_path)
     file = read_rig_file(rig_path)
@@ -53,34 +69,34 @@ def view_rig(
         ViewServer(pictures, protocol, rig.name, port) as server,
         server.running(),
     ):
-        eye = _eye(rig, rig_path)
+        viewfinder = _viewfinder(rig, rig_path)
         tell(server.url)
-        hand_over(pictures, eye, rig.clock)
+        hand_over(pictures, viewfinder, rig.clock)
 
 
-def hand_over(pictures: LivePictures, eye: LiveView, clock: Clock) -> Never:
-    """Fetch a picture whenever somebody waits for one; only this thread touches the camera.
+def hand_over(pictures: LivePictures, live_view: LiveView, clock: Clock) -> Never:
+    """Fetch a picture whenever a browser waits for one; only this thread uses the camera.
 
-    Real time is paced here whatever the rig's clock: the browser and the person in front of it are
-    real also where the room is simulated.
+    Pictures are paced in real time whatever the rig's clock: browser and user are real even if the
+    room is simulated.
 
     Raises
     ------
     Interrupted
-        Somebody asked to stop.
+        On Ctrl-C.
     DeviceError
-        No picture comes.
+        If no picture arrives.
     """
     pause = threading.Event()
     while True:
         if pictures.wait_until_wanted(LOOK_UP_S):
-            pictures.show(eye.preview())
+            pictures.show(live_view.preview())
             pause.wait(PICTURE_PERIOD_S)
         clock.sleep(0.0)  # where an interruption is answered
 
 
-def _eye(rig: Rig, rig_path: Path) -> LiveView:
-    for key in _EYES:
+def _viewfinder(rig: Rig, rig_path: Path) -> LiveView:
+    for key in _LIVE_VIEW_KEYS:
         device = rig.devices.get(key)
         if isinstance(device, LiveView):
             return device

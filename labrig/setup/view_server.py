@@ -1,4 +1,4 @@
-"""The page of `labrig rig view`: live pictures, and regions drawn into a protocol."""
+"""Server of the page of `labrig rig view`: live pictures, and regions drawn into a protocol."""
 
 import threading
 from collections.abc import Mapping
@@ -20,48 +20,48 @@ from labrig.yaml_file import validate
 
 @dataclass(frozen=True)
 class LivePicture:
-    """One picture and its number, which counts from 1."""
+    """A live picture with its number, from 1."""
 
     number: int
     jpeg: bytes
 
 
 class LivePictures:
-    """At most one picture, and whether somebody wants the next.
+    """Exchange of live pictures between camera and browsers, which holds the latest one.
 
-    A camera's live view warms its sensor, and a warm sensor is a noisy one: a picture is only
-    fetched when somebody waits for it.
+    A camera's live view warms its sensor and so raises its noise: a picture is only fetched when a
+    browser waits for it.
     """
 
     def __init__(self) -> None:
         self._latest: LivePicture | None = None
-        self._wanted = False
+        self._is_wanted = False
         self._changed = threading.Condition()
 
     @property
     def latest(self) -> LivePicture | None:
-        """The last picture that was shown."""
+        """The latest picture; None before the first one."""
         with self._changed:
             return self._latest
 
     def wait_until_wanted(self, at_most_s: float) -> bool:
-        """Whether somebody wants a picture, now or within so many seconds of real time."""
+        """Whether a browser waits for a picture, now or within `at_most_s` seconds of real time."""
         with self._changed:
-            return self._changed.wait_for(lambda: self._wanted, at_most_s)
+            return self._changed.wait_for(lambda: self._is_wanted, at_most_s)
 
     def show(self, jpeg: bytes) -> None:
-        """Hand a picture to everybody who waits."""
+        """Pass a picture to all browsers that wait."""
         with self._changed:
             number = 1 if self._latest is None else self._latest.number + 1
             self._latest = LivePicture(number, jpeg)
-            self._wanted = False
+            self._is_wanted = False
             self._changed.notify_all()
 
     def after(self, number: int, at_most_s: float) -> LivePicture | None:
-        """A picture later than that number, waited for; None if none came in time."""
+        """Return a picture later than `number`; None if none comes within `at_most_s` seconds."""
         with self._changed:
             if self._latest is None or self._latest.number <= number:
-                self._wanted = True
+                self._is_wanted = True
                 self._changed.notify_all()
                 self._changed.wait_for(
                     lambda: self._latest is not None and self._latest.number > number, at_most_s
@@ -71,17 +71,17 @@ class LivePictures:
 
 
 class AimedProtocol:
-    """A person's protocol file.
+    """A user's protocol file.
 
     Parameters
     ----------
     path
-        Of the file.
+        Protocol file.
 
     Raises
     ------
     UsageError
-        Not a protocol, or one of a kind that has no regions.
+        If the file is not a protocol, or one of a kind without regions.
     """
 
     def __init__(self, path: Path) -> None:
@@ -94,7 +94,7 @@ class AimedProtocol:
         self._regions = self._read()
 
     def in_fractions(self) -> list[dict[str, Any]]:
-        """Regions that can be shown: name and fractions of the frame."""
+        """Return the regions given in fractions of the frame, with their names."""
         return [
             {"name": name, "region": list(region)}
             for name, region in self._regions.items()
@@ -102,18 +102,18 @@ class AimedProtocol:
         ]
 
     def in_pixels(self) -> list[str]:
-        """Names of those that cannot: pixels of a RAW frame, whose size nobody knows here."""
+        """Return the names of regions in pixels of a RAW frame, whose size is not known here."""
         return [name for name, region in self._regions.items() if max(region) > 1]
 
     def write(self, patches: Mapping[str, Region]) -> list[dict[str, Any]]:
-        """Replace the regions in the file; returns them as they now stand in it.
+        """Replace the regions in the file; return them as the file now has them.
 
         Raises
         ------
         UsageError
-            The protocol would not be one any more; the file is as before.
+            If the protocol would be invalid; the file is unchanged.
         DiskError
-            It cannot be written.
+            If the file cannot be written.
         """
         write_patches(self.path, {name: rounded(region) for name, region in patches.items()})
         self._regions = self._read()
@@ -130,9 +130,9 @@ class AimedProtocol:
 
 
 MOST_PATCHES = 200
-#: A fraction as the page computes it may end beyond the frame by its last digits.
+#: Tolerance of the page's rounding, by which a region may exceed the frame.
 ROUNDING = 1e-6
-#: No control characters and no line ends of any kind: a name is one line of YAML.
+#: Names on one line of YAML, without control characters and line ends.
 _ONE_LINE = r"^[^\x00-\x1f\x7f-\x9f\u2028\u2029]+$"
 
 Name = Annotated[
@@ -142,7 +142,7 @@ Name = Annotated[
 
 
 class DrawnPatch(BaseModel):
-    """One region; fractions of the frame."""
+    """A region in fractions of the frame, with its name."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -151,21 +151,21 @@ class DrawnPatch(BaseModel):
 
 
 class DrawnPatches(BaseModel):
-    """All regions of the page."""
+    """All regions drawn on the page."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
     patches: tuple[DrawnPatch, ...] = Field(min_length=1, max_length=MOST_PATCHES)
 
     def by_name(self) -> dict[str, Region]:
-        """Name → region.
+        """Return the regions by name.
 
         Raises
         ------
         UsageError
-            A name stands twice, or a region is not within the frame.
+            If two regions have one name, or a region exceeds the frame.
         """
-        found: dict[str, Region] = {}
+        regions: dict[str, Region] = {}
         for patch in self.patches:
             x, y, width, height = patch.region
             if max(x + width, y + height) > 1 + ROUNDING:
@@ -173,13 +173,13 @@ class DrawnPatches(BaseModel):
                     f"'{patch.name}' leaves the frame; expected fractions of it, "
                     f"got {list(patch.region)}"
                 )
-            if patch.name in found:
+            if patch.name in regions:
                 raise UsageError(f"two regions are called '{patch.name}'; rename one")
-            found[patch.name] = patch.region
-        return found
+            regions[patch.name] = patch.region
+        return regions
 
 
-#: How long a browser waits for a picture before it is told to ask again.
+#: Longest wait for a picture until the browser has to repeat its request.
 PICTURE_TIMEOUT_S = 10.0
 _HERE = Path(__file__).parent
 
@@ -192,23 +192,23 @@ PAGES: Mapping[str, Path] = {
 
 
 class ViewServer(LocalServer):
-    """Serves the page, live pictures, and the regions of one protocol.
+    """Server of the page, the live pictures and the regions of one protocol.
 
     Parameters
     ----------
     pictures
-        Where live pictures come from.
+        Exchange of the live pictures.
     protocol
-        Whose regions are drawn; `None` if there is no file to write.
+        Protocol whose regions are drawn; None if there is no file to write.
     rig_name
-        For the page's heading.
+        Name of the rig, for the page's heading.
     port
-        0 for any free one.
+        TCP port on 127.0.0.1; 0 for any that is free.
 
     Raises
     ------
     UsageError
-        The port is taken.
+        If the port is taken.
     """
 
     def __init__(
@@ -225,13 +225,13 @@ class ViewServer(LocalServer):
 
 
 class _Conversation(LocalConversation):
-    """One connection of a browser."""
+    """A connection of a browser."""
 
     server: ViewServer
     pages: ClassVar[Mapping[str, Path]] = PAGES
 
     def answer(self, path: str) -> None:
-        """Picture, statistics or regions."""
+        """Send the latest picture, its statistics, the regions or a page."""
         if path == "frame.jpg":
             self._send_picture()
         elif path == "stats":
@@ -242,17 +242,18 @@ class _Conversation(LocalConversation):
             super().answer(path)
 
     def accept(self, path: str, body: bytes) -> None:
-        """Write the regions."""
+        """Write the regions to the protocol."""
         if path != "patches" or self.server.protocol is None:
             self.refuse(HTTPStatus.NOT_FOUND, "there is no protocol file to write to")
             return
-        drawn = validate(self.json_object(body), DrawnPatches, "regions").by_name()
-        self.send_json(HTTPStatus.OK, {"written": self.server.protocol.write(drawn)})
+        regions = validate(self.json_object(body), DrawnPatches, "regions").by_name()
+        self.send_json(HTTPStatus.OK, {"written": self.server.protocol.write(regions)})
 
     def _send_picture(self) -> None:
-        seen = self.query("after") or "0"
+        last_number = self.query("after") or "0"
         picture = self.server.pictures.after(
-            int(seen) if seen.isdecimal() and len(seen) < 12 else 0, PICTURE_TIMEOUT_S
+            int(last_number) if last_number.isdecimal() and len(last_number) < 12 else 0,
+            PICTURE_TIMEOUT_S,
         )
         if picture is None:
             self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "no live picture yet")

@@ -1,4 +1,4 @@
-"""A run while it happens, seen from outside the dark room."""
+"""Display of a run while it is recorded, from outside the dark room."""
 
 from labrig.watch.previews import Previews, RenderedPreview
 from labrig.watch.server import watch_run

@@ -1,4 +1,4 @@
-"""Where a unit that is under way stands: what was done, by the journal; what comes, by the plan."""
+"""Progress of a unit: what was done, by the journal; what comes next, by the plan."""
 
 from bisect import bisect_left
 from collections import defaultdict
@@ -8,25 +8,29 @@ from typing import Any
 from labrig.acquire import ExposureSettings, Plan, Step
 from labrig.record import PERSON, ActionRecord, Attempt, FrameRecord
 
-#: Lines of each, so that what is told after a frame is as short as a page shows.
+#: Largest numbers of past and coming steps, as many as the page shows.
 MOST_DONE = 2
 MOST_NEXT = 6
-#: Devices of steps that only say what is waited for, and of what is found and not done.
+#: Devices of steps that are waits, and of choices of the protocol.
 WAITING, FINDING = "-", "protocol"
-#: Decides which step of the plan a line of the journal is.
+#: Key by which a step of the plan is found for a journal line.
 _Key = tuple[str, str]
 
 
 @dataclass(frozen=True)
 class PlannedUnit:
-    """One unit of the plan; its steps' `at_s` count from the start of the run.
+    """One unit of a plan.
 
     Attributes
     ----------
+    name
+        Name of the unit.
     begins_s
-        When it begins, on the same count.
+        Begin of the unit in seconds after the start of the run.
     duration_s
-        How long it takes, at the latest.
+        Longest duration of the unit in seconds.
+    steps
+        Steps of the unit, with times from the start of the run.
     """
 
     name: str
@@ -35,39 +39,47 @@ class PlannedUnit:
     steps: tuple[Step, ...]
 
     def status_of_unit(self, attempt: Attempt) -> dict[str, Any]:
-        """What an attempt that is under way has done last, and what is to come.
+        """Return the last and the next steps of an attempt that is under way.
 
-        The journal decides how far it is: nobody knows how long a person takes, and the plan has
-        more in it than turns out to be needed.
+        The progress is that of the journal: the time that a person takes is not known, and a plan
+        has more steps than turn out to be needed.
 
         Returns
         -------
         dict
-            `done`: what and its `time` in seconds since 1970. `next`: what and its time in the
-            plan, `at_s` after the unit's beginning. At `time` the plan's time was `at_s`; it
-            stands still at `until_s`, when the next line of the journal is due.
+            `done`: last steps, each with its `time` in seconds since 1970. `next`: next steps, each
+            with its planned time `at_s` in seconds after the begin of the unit. `time` and `at_s`:
+            time and planned time of the last step; `until_s`: planned time at which the next line
+            of the journal is due.
         """
-        at, time, at_s = 0, float(attempt.start["time"]), 0.0
+        position, time, at_s = 0, float(attempt.start["time"]), 0.0
         places: defaultdict[_Key, list[int]] = defaultdict(list)
         for number, step in enumerate(self.steps):
             places[_key(step.device, step.action)].append(number)
-        happened: list[ActionRecord | FrameRecord] = [*attempt.actions, *attempt.frames]
-        happened.sort(key=lambda one: one.start_time)
-        for one in happened:
-            fitting = places[_key_of(one)]
-            found = bisect_left(fitting, at)
-            if found < len(fitting):
-                number = fitting[found]
-                at, time, at_s = number + 1, one.start_time, self.steps[number].at_s - self.begins_s
-        coming = [step for step in self.steps[at:] if step.device != FINDING]
+        records: list[ActionRecord | FrameRecord] = [*attempt.actions, *attempt.frames]
+        records.sort(key=lambda record: record.start_time)
+        for record in records:
+            candidates = places[_key_of(record)]
+            index = bisect_left(candidates, position)
+            if index < len(candidates):
+                number = candidates[index]
+                position, time, at_s = (
+                    number + 1,
+                    record.start_time,
+                    self.steps[number].at_s - self.begins_s,
+                )
+        coming = [step for step in self.steps[position:] if step.device != FINDING]
         due = next((step.at_s for step in coming if step.device != WAITING), None)
-        told = [one for one in happened if _device(one) != FINDING]
+        past = [record for record in records if _device(record) != FINDING]
         return {
             "began_time": attempt.start["time"],
             "time": time,
             "at_s": at_s,
             "until_s": self.duration_s if due is None else due - self.begins_s,
-            "done": [{"time": one.start_time, "what": _text_of(one)} for one in told[-MOST_DONE:]],
+            "done": [
+                {"time": record.start_time, "what": _text_of(record)}
+                for record in past[-MOST_DONE:]
+            ],
             "next": [
                 {"at_s": step.at_s - self.begins_s, "what": step_text(step.device, step.action)}
                 for step in coming[:MOST_NEXT]
@@ -76,7 +88,7 @@ class PlannedUnit:
 
 
 def planned_units(plan: Plan) -> tuple[PlannedUnit, ...]:
-    """The units of a plan, each with its steps."""
+    """Return the units of a plan, each with its steps."""
     steps: defaultdict[str, list[Step]] = defaultdict(list)
     for step in plan.steps:
         steps[step.unit].append(step)
@@ -88,16 +100,17 @@ def planned_units(plan: Plan) -> tuple[PlannedUnit, ...]:
 
 
 def step_text(device: str, action: str) -> str:
-    """A step in words."""
+    """Return a step as text."""
     if device == PERSON:
         return f"by hand: {action}"
     return action if device in (WAITING, "camera") else f"{device} {action}"
 
 
 def _key(device: str, action: str) -> _Key:
-    """Of frames only the role, of findings only the question, of a person nothing else.
+    """Return the key by which a step of the plan is found for a journal line.
 
-    Exposures are settled while a unit runs, findings are what they are, a person remarks on things.
+    The key of a frame has only its role, that of a choice its question, that of a person nothing:
+    exposures, answers and remarks are known after the plan was made.
     """
     if device == "camera":
         return device, action.partition(" frame")[0]
@@ -106,16 +119,20 @@ def _key(device: str, action: str) -> _Key:
     return device, "" if device == PERSON else action
 
 
-def _key_of(one: ActionRecord | FrameRecord) -> _Key:
-    return ("camera", one.role) if isinstance(one, FrameRecord) else _key(one.device, one.action)
+def _key_of(record: ActionRecord | FrameRecord) -> _Key:
+    return (
+        ("camera", record.role)
+        if isinstance(record, FrameRecord)
+        else _key(record.device, record.action)
+    )
 
 
-def _device(one: ActionRecord | FrameRecord) -> str:
-    return "camera" if isinstance(one, FrameRecord) else one.device
+def _device(record: ActionRecord | FrameRecord) -> str:
+    return "camera" if isinstance(record, FrameRecord) else record.device
 
 
-def _text_of(one: ActionRecord | FrameRecord) -> str:
-    if isinstance(one, ActionRecord):
-        return step_text(one.device, one.action)
-    settings = ExposureSettings(one.exposure_s, one.iso, one.f_number)
-    return step_text("camera", f"{one.role} frame, {settings}")
+def _text_of(record: ActionRecord | FrameRecord) -> str:
+    if isinstance(record, ActionRecord):
+        return step_text(record.device, record.action)
+    settings = ExposureSettings(record.exposure_s, record.iso, record.f_number)
+    return step_text("camera", f"{record.role} frame, {settings}")

@@ -1,4 +1,4 @@
-"""One frame at a glance: its patches' values and a small picture, in a fraction of a second."""
+"""Preview of a frame: means of its patches and a small picture, in a fraction of a second."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -10,25 +10,27 @@ from numpy.typing import NDArray
 from labrig.reduce import binned, measure, read_raw, small
 from labrig.region import Region
 
-#: Brought to full brightness: this quantile of the pixels, so that hot ones do not decide.
+#: Quantile of the pixels that becomes full brightness, so that hot pixels have no influence.
 BRIGHT_QUANTILE = 0.995
-#: Noise brightened more than this tells nothing.
+#: Largest factor of brightening; more would only show noise.
 MOST_BRIGHTENED = 4096.0
 GAMMA = 2.2
 
 
 @dataclass(frozen=True)
 class Preview:
-    """What a frame shows.
+    """Preview of a frame.
 
     Attributes
     ----------
     values
-        Patch → channel → mean in DN above the file's black; nothing else is subtracted.
+        Means in DN above black by patch and channel; nothing else is subtracted.
     clipped
-        Patches that are.
+        Names of the patches that clip.
     picture
-        (height, width, 3), brightened by `brightened`; in the camera's own colours.
+        Picture in the camera's own colours, shape (height, width, 3).
+    brightened
+        Factor by which the linear values of the picture were multiplied.
     """
 
     values: Mapping[str, Mapping[str, float]]
@@ -38,27 +40,27 @@ class Preview:
 
 
 def glance(path: Path, patches: Mapping[str, Region], width: int) -> Preview:
-    """Look at the frame at `path`; the picture is `width` pixels wide at most.
+    """Read the frame at `path`, measure its patches and render it at most `width` pixels wide.
 
     Raises
     ------
     FrameError
-        The frame cannot be read.
+        If the frame cannot be read.
     UsageError
-        A patch lies outside it.
+        If a patch lies outside the frame.
     """
     raw = read_raw(path)
     measured = {name: measure(raw, region) for name, region in patches.items()}
     linear = np.clip(small(binned(raw), width), 0.0, None)
     level = float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE))
     brightened = min(1 / max(level, 1e-9), MOST_BRIGHTENED)
-    shown = 255 * np.clip(linear * brightened, 0.0, 1.0) ** (1 / GAMMA)
+    picture = 255 * np.clip(linear * brightened, 0.0, 1.0) ** (1 / GAMMA)
     return Preview(
         values={
-            name: {channel: stats.mean for channel, stats in one.channels.items()}
-            for name, one in measured.items()
+            name: {channel: stats.mean for channel, stats in measurement.channels.items()}
+            for name, measurement in measured.items()
         },
-        clipped=tuple(name for name, one in measured.items() if one.clipped),
-        picture=shown.round().astype(np.uint8),
+        clipped=tuple(name for name, measurement in measured.items() if measurement.clipped),
+        picture=picture.round().astype(np.uint8),
         brightened=float(f"{brightened:.2g}"),
     )

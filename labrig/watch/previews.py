@@ -1,4 +1,4 @@
-"""Looks at frames in a process of its own, so that the one that runs the rig keeps its time."""
+"""Previews of frames in a process of their own, so that the process of the rig keeps its timing."""
 
 import json
 import os
@@ -18,7 +18,17 @@ from labrig.errors import LabrigError
 
 @dataclass(frozen=True)
 class RenderedPreview:
-    """A frame that was looked at: its values as in `Preview`, its picture (height, width, 3)."""
+    """A preview received from the other process.
+
+    Attributes
+    ----------
+    name
+        File name of the frame.
+    values, clipped
+        Means and clipped patches, as in `Preview`.
+    picture
+        Picture, shape (height, width, 3).
+    """
 
     name: str
     values: dict[str, dict[str, float]]
@@ -27,20 +37,25 @@ class RenderedPreview:
 
 
 class Previews:
-    """Asks for frames of one run to be looked at; the answer comes when it comes.
+    """Process that renders previews of the frames of one run, asynchronously.
 
     Parameters
     ----------
     run
-        The run folder.
+        Run folder.
     width
-        Of the pictures, in pixels.
+        Largest width of the pictures in pixels.
+
+    Attributes
+    ----------
+    latest
+        Latest preview; None before the first one.
     """
 
     def __init__(self, run: Path, width: int) -> None:
         self.latest: RenderedPreview | None = None
         # -P: nothing that lies in the working folder is taken for a module.
-        # Ctrl-C on a terminal goes to all of a group: this one ends when it is told to.
+        # Ctrl-C on a terminal goes to the whole group: this process ends in `close` only.
         self._process = subprocess.Popen(
             [sys.executable, "-P", "-m", "labrig.watch.previews", str(run), str(width)],
             stdin=subprocess.PIPE,
@@ -53,62 +68,62 @@ class Previews:
         )
         assert self._process.stdin is not None
         assert self._process.stdout is not None
-        self._questions, self._answers = self._process.stdin, self._process.stdout
-        self._listening = threading.Thread(target=self._listen, daemon=True)
-        self._listening.start()
+        self._requests, self._replies = self._process.stdin, self._process.stdout
+        self._thread = threading.Thread(target=self._receive, daemon=True)
+        self._thread.start()
 
     def ask(self, name: str, unit: str) -> None:
-        """Have the frame of that name, which a unit has taken, looked at."""
+        """Request the preview of the frame with a file name, taken by a unit."""
         try:
-            self._questions.write(f"{json.dumps([name, unit])}\n")
-            self._questions.flush()
+            self._requests.write(f"{json.dumps([name, unit])}\n")
+            self._requests.flush()
         except OSError:  # it has died: a run goes on without pictures
             return
 
     def close(self) -> None:
-        """Let it end."""
+        """End the process."""
         self._process.kill()
         self._process.wait()
-        self._listening.join()
-        self._answers.close()
+        self._thread.join()
+        self._replies.close()
         try:
-            self._questions.close()
+            self._requests.close()
         except OSError:
             return
 
-    def _listen(self) -> None:
-        for line in self._answers:
-            said = json.loads(line)
-            picture = np.frombuffer(bytes.fromhex(said.pop("pixels")), np.uint8)
+    def _receive(self) -> None:
+        for line in self._replies:
+            message = json.loads(line)
+            picture = np.frombuffer(bytes.fromhex(message.pop("pixels")), np.uint8)
             self.latest = RenderedPreview(
-                name=said["name"],
-                values=said["values"],
-                clipped=tuple(said["clipped"]),
-                picture=picture.reshape(said["shape"]),
+                name=message["name"],
+                values=message["values"],
+                clipped=tuple(message["clipped"]),
+                picture=picture.reshape(message["shape"]),
             )
 
 
-def answer(run: Path, width: int, questions: Iterable[str], out: TextIO) -> None:
-    """Look at the frames asked for, one JSON line each; what cannot be read is left out."""
+def answer(run: Path, width: int, requests: Iterable[str], out: TextIO) -> None:
+    """Print the previews requested, one JSON line each; unreadable frames are left out."""
     # only in the process that looks: the one that runs the rig starts without what this loads
     from labrig.acquire import read_protocol
     from labrig.watch.preview import glance
 
     protocol = read_protocol(run / "protocol.yaml")
-    for question in questions:
-        name, unit = json.loads(question)
+    for request in requests:
+        name, unit = json.loads(request)
         try:
-            seen = glance(run / "frames" / name, protocol.patches_of(unit), width)
+            preview = glance(run / "frames" / name, protocol.patches_of(unit), width)
         except LabrigError:
             continue
-        said = {
+        message = {
             "name": name,
-            "values": seen.values,
-            "clipped": seen.clipped,
-            "shape": seen.picture.shape,
-            "pixels": seen.picture.tobytes().hex(),
+            "values": preview.values,
+            "clipped": preview.clipped,
+            "shape": preview.picture.shape,
+            "pixels": preview.picture.tobytes().hex(),
         }
-        print(json.dumps(said), file=out, flush=True)
+        print(json.dumps(message), file=out, flush=True)
 
 
 if __name__ == "__main__":

@@ -1,4 +1,4 @@
-"""Follows a run folder as it is written: what is done, what comes, the decay so far."""
+"""Follower of a run folder while it is written: progress, plan, and the decay so far."""
 
 import math
 import shutil
@@ -19,33 +19,31 @@ from labrig.watch.preview import Preview, glance
 from labrig.written_numbers import plus_minus
 
 PICTURE_WIDTH = 720
-#: Purpose of the frames that are drawn as a decay.
-#: Of the decay's frames that were there before somebody watched, so many are taken in at a look:
-#: the page does not wait for thousands of them.
+#: Number of earlier decay frames read per look, so that the page does not wait for thousands.
 MOST_EARLIER = 4
 
-#: Section → key → plain value. Whatever grows with a run has a key of its own, so that only what
-#: is new needs to be told.
+#: Section → key → plain value. Everything that grows with a run has keys of its own, so that only
+#: new values are sent.
 State = dict[str, dict[str, Any]]
 
 
 class RunFollower:
-    """One run, seen from its folder alone; looking twice costs little if nothing has changed.
+    """State of a run, from its folder alone; looking again costs little if nothing has changed.
 
     Parameters
     ----------
     run
-        The run folder; it may still be empty but for protocol and rig.
+        Run folder; it may hold nothing but protocol and rig.
 
     Raises
     ------
     UsageError
-        Not a run folder.
+        If this is not a run folder.
 
     Attributes
     ----------
     picture
-        The newest frame that could be read, as a JPEG.
+        Newest frame that could be read, as a JPEG.
     """
 
     def __init__(self, run: Path) -> None:
@@ -62,38 +60,38 @@ class RunFollower:
         self._patches: dict[str, Mapping[str, Region]] = {
             unit: self._protocol.patches_of(unit) for unit in laid_out.units
         }
-        self._seen: tuple[object, ...] = ()
+        self._last_look: tuple[object, ...] = ()
         self._record = RunRecord(run, [], False, 0.0)
         self._state: RunState = "unfinished"
         self._points: dict[str, list[dict[str, Any]]] = {}
-        self._newest: dict[str, Any] = {}
+        self._newest_frame: dict[str, Any] = {}
         self._unreadable: set[str] = set()
 
     def look(self) -> bool:
-        """Take in what is new; whether there is anything.
+        """Read what is new in the folder and return whether there was anything.
 
-        Of the frames of a decay some are taken in at every look, until all are.
+        Some frames of a decay are read at every call, until all have been.
 
         Raises
         ------
         DataError
-            The journal is damaged.
+            If the journal is damaged.
         """
-        written = _size(self.run / "journal.jsonl"), _size(self.run / "result" / "report.html")
-        if written[0] and written != self._seen[:2]:
+        sizes = _size(self.run / "journal.jsonl"), _size(self.run / "result" / "report.html")
+        if sizes[0] and sizes != self._last_look[:2]:
             self._record = read_run(self.run)
         is_complete = len(self._record.completed()) == len(self._units)
         self._state = state_of(self.run, is_complete)
-        is_new = (*written, self._state) != self._seen
-        self._seen = (*written, self._state)
-        return self._look_at_frames() or is_new
+        is_new = (*sizes, self._state) != self._last_look
+        self._last_look = (*sizes, self._state)
+        return self._read_frames() or is_new
 
     def state(self) -> State:
-        """All of it, for a page: plain values, times in seconds since 1970."""
-        counting = self._counting()
-        done = self._record.completed()
+        """Return the whole state for a page: plain values, times in seconds since 1970."""
+        counted = self._counted_attempts()
+        completed = self._record.completed()
         all_frames = sum(len(attempt.frames) for attempt in self._record.attempts)
-        frames = [frame for attempt in counting for frame in attempt.frames]
+        frames = [frame for attempt in counted for frame in attempt.frames]
         current = self._current()
         return {
             "run": {
@@ -106,72 +104,72 @@ class RunFollower:
                 "discarded_frames": all_frames - len(frames),
                 "planned_frames": self._planned_frames,
                 "disk_free_bytes": shutil.disk_usage(self.run).free,
-                "now": None if current is None else self._standing(current),
+                "now": None if current is None else self._unit_status(current),
             },
-            "units": self._unit_states(done, current),
+            "units": self._unit_states(completed, current),
             "points": {
                 frame.path.name: self._points[frame.path.name]
                 for frame in frames
                 if self._points.get(frame.path.name)
             },
-            "frame": self._newest,
-            "troubles": self._troubles(done, current),
+            "frame": self._newest_frame,
+            "troubles": self._troubles(completed, current),
             "results": self._results(),
         }
 
     def _current(self) -> Attempt | None:
-        """The attempt that is under way; one that a crash left open is not."""
+        """Return the attempt under way; one that a crash left open is not under way."""
         last = self._record.attempts[-1:] if self._state == "running" else []
         return next((attempt for attempt in last if attempt.exit_status is None), None)
 
-    def _counting(self) -> list[Attempt]:
-        """The attempts that count, and the one that is under way."""
+    def _counted_attempts(self) -> list[Attempt]:
+        """Return the completed attempts and the one under way."""
         current = self._current()
         return [*self._record.completed().values(), *([] if current is None else [current])]
 
-    def _standing(self, attempt: Attempt) -> dict[str, Any] | None:
+    def _unit_status(self, attempt: Attempt) -> dict[str, Any] | None:
         for number, unit in enumerate(self._units):
             if unit.name == attempt.unit:
                 return {"unit": number, **unit.status_of_unit(attempt)}
         return None
 
     def _unit_states(
-        self, done: Mapping[str, Attempt], current: Attempt | None
+        self, completed: Mapping[str, Attempt], current: Attempt | None
     ) -> dict[str, dict[str, Any]]:
-        """Of every unit, by its number."""
+        """Return the state of every unit by its number."""
         tries = Counter(attempt.unit for attempt in self._record.attempts)
-        told = {}
+        states = {}
         for number, unit in enumerate(self._units):
             if current is not None and unit.name == current.unit:
                 state = "now"
-            elif unit.name in done:
+            elif unit.name in completed:
                 state = "done"
             else:
                 state = "again" if tries[unit.name] else "to do"
-            told[str(number)] = {
+            states[str(number)] = {
                 "name": unit.name,
                 "state": state,
                 "planned_s": unit.duration_s,
                 "tries": tries[unit.name],
             }
-        return told
+        return states
 
     def _troubles(
-        self, done: Mapping[str, Attempt], current: Attempt | None
+        self, completed: Mapping[str, Attempt], current: Attempt | None
     ) -> dict[str, dict[str, Any]]:
-        """Attempts that do not count, by number: why, and whether the unit was done since."""
+        """Return the failed attempts by number, with reason and whether the unit was done since."""
         return {
             str(number): {
                 "unit": attempt.unit,
                 "reason": attempt.reason or "labrig was cut off",
-                "mended": attempt.unit in done,
+                "mended": attempt.unit in completed,
             }
             for number, attempt in enumerate(self._record.attempts)
             if not attempt.completed and attempt is not current
         }
 
-    def _look_at_frames(self) -> bool:
-        """Look at the newest frame, and at some of a decay; whether there was any to look at."""
+    def _read_frames(self) -> bool:
+        """Read the newest frame and some of a decay; return whether there were any to read."""
         newest = next(
             (
                 (attempt, frame)
@@ -181,26 +179,26 @@ class RunFollower:
             ),
             None,
         )
-        is_new = newest is not None and newest[1].path.name != self._newest.get("name")
-        if newest is not None and is_new and (seen := self._look_at(*newest)) is not None:
-            self._newest = _shown(newest[1], seen)
-            self.picture = jpeg(seen.picture)
+        is_new = newest is not None and newest[1].path.name != self._newest_frame.get("name")
+        if newest is not None and is_new and (preview := self._read_frame(*newest)) is not None:
+            self._newest_frame = _frame_state(newest[1], preview)
+            self.picture = jpeg(preview.picture)
         earlier = [
             (attempt, frame)
-            for attempt in self._counting()
+            for attempt in self._counted_attempts()
             for frame in attempt.frames
             if frame.role == FrameRole.DECAY and frame.path.name not in self._points
         ]
         for attempt, frame in earlier[:MOST_EARLIER]:
-            self._look_at(attempt, frame)
+            self._read_frame(attempt, frame)
         return is_new or bool(earlier)
 
-    def _look_at(self, attempt: Attempt, frame: FrameRecord) -> Preview | None:
-        """Look at a frame and keep its points; None if it cannot be read, which processing says."""
+    def _read_frame(self, attempt: Attempt, frame: FrameRecord) -> Preview | None:
+        """Read a frame and keep its points; None if it cannot be read, which processing reports."""
         name = frame.path.name
         self._points[name] = []
         try:
-            seen = glance(frame.path, self._patches.get(frame.unit, {}), PICTURE_WIDTH)
+            preview = glance(frame.path, self._patches.get(frame.unit, {}), PICTURE_WIDTH)
         except LabrigError:
             self._unreadable.add(name)
             return None
@@ -211,11 +209,11 @@ class RunFollower:
             and action.middle_time <= frame.start_time
         ]
         if frame.role == FrameRole.DECAY and off_times:
-            self._points[name] = _points(frame, seen, off_times[-1])
-        return seen
+            self._points[name] = _points(frame, preview, off_times[-1])
+        return preview
 
     def _results(self) -> dict[str, str]:
-        """The rates that were fitted to each patch, as text."""
+        """Return the fitted rates of each patch as text."""
         try:
             results = read_fitted_decays(self.run / "result")
         except DataError:
@@ -227,8 +225,8 @@ class RunFollower:
         }
 
 
-def _points(frame: FrameRecord, seen: Preview, lamp_off_time: float) -> list[dict[str, Any]]:
-    """A frame of a decay in every patch: means above black per second; not the result."""
+def _points(frame: FrameRecord, preview: Preview, lamp_off_time: float) -> list[dict[str, Any]]:
+    """Return the signals of a decay frame by patch: means above black in DN/s, unreduced."""
     return [
         {
             "unit": frame.unit,
@@ -240,11 +238,11 @@ def _points(frame: FrameRecord, seen: Preview, lamp_off_time: float) -> list[dic
                 if math.isfinite(mean)
             },
         }
-        for patch, values in seen.values.items()
+        for patch, values in preview.values.items()
     ]
 
 
-def _shown(frame: FrameRecord, seen: Preview) -> dict[str, Any]:
+def _frame_state(frame: FrameRecord, preview: Preview) -> dict[str, Any]:
     return {
         "name": frame.path.name,
         "unit": frame.unit,
@@ -252,16 +250,16 @@ def _shown(frame: FrameRecord, seen: Preview) -> dict[str, Any]:
         "exposure_s": frame.exposure_s,
         "iso": frame.iso,
         "late_s": frame.late_s,
-        "brightened": seen.brightened,
+        "brightened": preview.brightened,
         "values": {
             patch: {
                 channel: mean if math.isfinite(mean) else None for channel, mean in values.items()
             }
-            for patch, values in seen.values.items()
+            for patch, values in preview.values.items()
         },
-        "clipped": seen.clipped,
-        "width": seen.picture.shape[1],
-        "height": seen.picture.shape[0],
+        "clipped": preview.clipped,
+        "width": preview.picture.shape[1],
+        "height": preview.picture.shape[0],
     }
 
 

@@ -1,4 +1,4 @@
-"""The page of `labrig watch`: what there is to tell of a run, pushed whenever it changes."""
+"""Server of the page of `labrig watch`, which sends every change of a run's state."""
 
 import json
 import threading
@@ -11,14 +11,14 @@ from labrig.clock import Clock
 from labrig.local_server import KINDS, LocalConversation, LocalServer
 from labrig.watch.run_follower import RunFollower
 
-#: A browser that hears nothing for longer takes the connection for dead.
+#: Period of messages without which a browser takes the connection for dead.
 HEARTBEAT_S = 5.0
-#: How soon a browser comes back when the connection broke, in ms.
+#: Time after which a browser reconnects, in ms.
 COME_BACK_MS = 500
 _HERE = Path(__file__).parent
 _PAGE = _HERE / "watch_page.html"
-#: Where in the page the first news stand.
-_FIRST = "FIRST_NEWS"
+#: Placeholder in the page for the first update.
+_FIRST_UPDATE = "FIRST_NEWS"
 
 PAGES: Mapping[str, Path] = {
     name: _HERE / name
@@ -31,40 +31,40 @@ PAGES: Mapping[str, Path] = {
     )
 }
 
-#: Section → key → value; a value of None: there is no such thing any more.
+#: Section → key → value; None for a value that no longer exists.
 Things = Mapping[str, Mapping[str, Any]]
 
 
 class UpdateFeed:
-    """What there is to tell of a run, handed from the thread that follows it to the browsers.
+    """State of a run, passed from the thread that follows it to the browsers.
 
-    Everything is kept with the number of the telling that changed it last. So a browser that names
-    the last number it knows is told what it lacks, whether that is one frame or the whole run.
+    Every value is kept with the number of the update that changed it last. A browser that names the
+    last number it received gets all later values, be it one frame or the whole run.
 
     Parameters
     ----------
     state
-        Section → key → value of everything.
+        Whole state: section → key → value.
     picture
-        The last frame as a JPEG.
+        Latest frame as a JPEG.
     """
 
     def __init__(self, state: Things, picture: bytes | None) -> None:
         self._number = 0
-        self._told: dict[tuple[str, str], tuple[int, Any]] = {}
+        self._values: dict[tuple[str, str], tuple[int, Any]] = {}
         self._picture: bytes | None = None
-        self._is_over = False
+        self._has_ended = False
         self._changed = threading.Condition()
         self.tell(state, picture)
 
     @property
     def picture(self) -> bytes | None:
-        """The last frame as a JPEG."""
+        """Latest frame as a JPEG."""
         with self._changed:
             return self._picture
 
     def tell(self, state: Things, picture: bytes | None) -> None:
-        """Hand on the state as it is now."""
+        """Publish the present state."""
         now = {
             (section, key): value
             for section, things in state.items()
@@ -72,49 +72,56 @@ class UpdateFeed:
         }
         with self._changed:
             self._number += 1
-            for place in [*now, *self._told]:
+            for place in [*now, *self._values]:
                 value = now.get(place)
-                if place not in self._told or self._told[place][1] != value:
-                    self._told[place] = (self._number, value)
+                if place not in self._values or self._values[place][1] != value:
+                    self._values[place] = (self._number, value)
             self._picture = picture
             self._changed.notify_all()
 
     def end(self) -> None:
-        """There will be no more: nobody waits any longer."""
+        """End the feed and release all browsers that wait."""
         with self._changed:
-            self._is_over = True
+            self._has_ended = True
             self._changed.notify_all()
 
     def after(self, number: int, at_most_s: float) -> tuple[int, Things] | None:
-        """What was told later than `number`, and the last number; None if nothing comes in time.
+        """Return the values updated after `number`, with the last number; None on a time-out.
 
         Raises
         ------
         EOFError
-            There will be no more.
+            If the feed has ended.
         """
         with self._changed:
             if number > self._number:  # of another watch: nothing is known
                 number = 0
-            self._changed.wait_for(lambda: self._number > number or self._is_over, at_most_s)
-            if self._is_over:
+            self._changed.wait_for(lambda: self._number > number or self._has_ended, at_most_s)
+            if self._has_ended:
                 raise EOFError
             if self._number <= number:
                 return None
             things: dict[str, dict[str, Any]] = {}
-            for (section, key), (told, value) in self._told.items():
-                if told > number:
+            for (section, key), (changed_number, value) in self._values.items():
+                if changed_number > number:
                     things.setdefault(section, {})[key] = value
             return self._number, things
 
 
 class WatchServer(LocalServer):
-    """Serves the page and what there is to tell.
+    """Server of the page and of the updates.
+
+    Parameters
+    ----------
+    news
+        Updates of the run's state.
+    port
+        TCP port on 127.0.0.1; 0 for any that is free.
 
     Raises
     ------
     UsageError
-        The port is taken.
+        If the port is taken.
     """
 
     def __init__(self, news: UpdateFeed, port: int = 0) -> None:
@@ -123,13 +130,13 @@ class WatchServer(LocalServer):
 
 
 class _Conversation(LocalConversation):
-    """One connection of a browser."""
+    """A connection of a browser."""
 
     server: WatchServer
     pages: ClassVar[Mapping[str, Path]] = PAGES
 
     def answer(self, path: str) -> None:
-        """The page, the stream of news, or the last frame."""
+        """Send the page, the stream of updates, or the latest frame."""
         if path == "":
             self._send_page()
         elif path == "events":
@@ -144,18 +151,20 @@ class _Conversation(LocalConversation):
             super().answer(path)
 
     def _send_page(self) -> None:
-        """The page with the run as it is now in it, so that it is never seen empty."""
+        """Send the page with the present state of the run in it, so that it is never empty."""
         try:
             first = _message(self.server.news.after(0, 0.0))
         except EOFError:
             self.refuse(HTTPStatus.SERVICE_UNAVAILABLE, "labrig watch is ending")
             return
         # a name in it must not end the element that it stands in
-        page = _PAGE.read_text(encoding="utf-8").replace(_FIRST, first.replace("<", "\\u003c"))
+        page = _PAGE.read_text(encoding="utf-8").replace(
+            _FIRST_UPDATE, first.replace("<", "\\u003c")
+        )
         self.send(HTTPStatus.OK, KINDS[".html"], page.encode())
 
     def _stream(self) -> None:
-        """Server-sent events: a browser that loses them comes back for what it lacks by itself."""
+        """Send updates as server-sent events; a browser that loses the connection resumes."""
         self.close_connection = True
         self.send_response(HTTPStatus.OK)
         self.send_header("Content-Type", "text/event-stream")
@@ -163,8 +172,8 @@ class _Conversation(LocalConversation):
         self.send_header("Connection", "close")
         self.end_headers()
         self.wfile.write(f"retry: {COME_BACK_MS}\n\n".encode())
-        known = self.headers.get("Last-Event-ID") or self.query("after") or "0"
-        number = int(known) if known.isdecimal() and len(known) < 12 else 0
+        last_id = self.headers.get("Last-Event-ID") or self.query("after") or "0"
+        number = int(last_id) if last_id.isdecimal() and len(last_id) < 12 else 0
         while True:
             try:
                 news = self.server.news.after(number, HEARTBEAT_S)
@@ -182,40 +191,61 @@ def _message(news: tuple[int, Things] | None) -> str:
     return json.dumps({"number": number, "things": things})
 
 
-#: Everything is on the page within a second; the folder is looked at more often than that.
+#: Period of reading the folder, so that news are on the page within a second.
 LOOK_PERIOD_S = 0.3
 
 
 def watch_run(run: Path, port: int, clock: Clock, tell: Callable[[str], None]) -> Never:
-    """Show a run until somebody stops it; the run itself is not touched.
+    """Show a run in the browser while it is recorded, until it is interrupted.
+
+    The run itself is only read.
 
     Parameters
     ----------
+    run
+        Run folder.
     port
-        On 127.0.0.1; 0 for any free one.
+        TCP port on 127.0.0.1; 0 for any that is free.
     clock
-        The PC's.
+        Clock of the PC; its waits are where an interruption is answered.
     tell
-        Called once with the page's address.
+        Function that is called once, with the address of the page.
 
     Raises
     ------
     Interrupted
-        How it ends.
+        On Ctrl-C.
     UsageError
-        Not a run folder, or a port that is taken.
+        If this is not a run folder, or the port is taken.
     DataError
-        The run's journal is damaged.
+        If the journal of the run is damaged.
+
+    Examples
+    --------
+    >>> import signal
+    >>> from pathlib import Path
+    >>> from labrig.clock import Interrupted, SystemClock
+    >>> from labrig.watch import watch_run
+    >>> clock = SystemClock()
+    >>> def tell(url):
+    ...     print(url.partition(":")[0])
+    ...     clock.interrupt(signal.SIGINT)  # Ctrl-C, as soon as the page is served
+    >>> try:
+    ...     watch_run(Path("runs/decay"), 0, clock, tell)
+    ... except Interrupted:
+    ...     print("stopped")
+    http
+    stopped
     """
-    following = RunFollower(run)
-    following.look()
-    news = UpdateFeed(following.state(), following.picture)
+    follower = RunFollower(run)
+    follower.look()
+    news = UpdateFeed(follower.state(), follower.picture)
     with WatchServer(news, port) as server, server.running():
         try:
             tell(server.url)
             while True:
-                if following.look():
-                    news.tell(following.state(), following.picture)
+                if follower.look():
+                    news.tell(follower.state(), follower.picture)
                 clock.sleep(LOOK_PERIOD_S)
         finally:
             news.end()

@@ -1,8 +1,9 @@
-"""Roles: what a protocol may ask of a device; a driver fills one of them.
+"""Roles: what protocols can demand of devices; every driver fills one of them.
 
-All that labrig knows of a role stands in its module: what its devices can do, what protocols tell
-them, the stand-in of a plan, the exercise of a rig check, whether it gives light. To add one,
-write its module and list it in `ROLES`, and what protocols and drivers need of it in `__all__`.
+The module of a role defines everything that depends on it: the methods of its devices, the
+actions of protocols, the stand-in of a plan, the exercise of a rig check, whether it gives light.
+To add a role, write its module and list it in `ROLES`, and the names that protocols and drivers
+need in `__all__`.
 """
 
 from typing import Any
@@ -43,8 +44,8 @@ from labrig.acquire.roles.swings import (
 from labrig.acquire.roles.thermometer import THERMOMETER, Thermometer
 from labrig.acquire.roles.viewfinder import VIEWFINDER, LiveView
 
-#: Every role by its key in the rig file. The order is that in which devices are made safe, as far
-#: as it matters: lights go out before anything moves.
+#: Roles by their keys in the rig file, in the order in which devices are made safe: lights go out
+#: before anything moves.
 ROLES: dict[str, Role[Any]] = {
     role.key: role
     for role in (
@@ -60,7 +61,7 @@ ROLES: dict[str, Role[Any]] = {
     )
 }
 
-#: Those that give light: somebody has to know if one of them may be on.
+#: Keys of the roles that give light.
 LIGHTS = frozenset(key for key, role in ROLES.items() if role.state is not None)
 
 __all__ = [

@@ -1,4 +1,4 @@
-"""The camera: delivers RAW frames."""
+"""The camera, which delivers RAW frames."""
 
 import math
 from dataclasses import dataclass
@@ -19,42 +19,42 @@ from labrig.clock import VirtualClock
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 
-#: Of the exercise: frames for their timing, a longer one for its noise.
+#: Exercise: number and exposure time of the frames for timing, exposure time of that for noise.
 SHORT_FRAMES = 3
 SHORT_S, LONG_S = 1 / 60, 2.0
-#: From a half press until the camera is certainly ready: in a run it has that time, too.
+#: Time from half press until the camera is ready, which a run allows, too.
 SETTLING_S = 0.5
-#: A sensitivity at which read noise and dark current both show.
+#: Sensitivity at which both read noise and dark current are visible.
 ISO = 400
-#: Suggested times are rounded up to this, so that the plan is kept.
+#: Step to which suggested times are rounded up, so that plans are met.
 STEP_S = 0.1
 
 
 @runtime_checkable
 class Camera(Device, Protocol):
-    """A camera that delivers RAW frames. Safe: shutter released, nothing pending."""
+    """A camera that delivers RAW frames. Safe state: shutter released, nothing pending."""
 
     def offers(self) -> CameraOffers:
-        """What it can be set to, as it is now."""
+        """Return the settings that the camera offers in its present state."""
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
-        """Set and read back; returns the settings in force, with the true shutter time.
+        """Apply and read back settings; return those in force, with the actual exposure time.
 
         Raises
         ------
         DeviceError
-            The camera does not offer them or did not take them.
+            If the camera does not offer the settings or did not apply them.
         """
 
     def arm(self) -> None:
-        """Do all that can be done beforehand, so that `shoot` starts without delay."""
+        """Do everything that can be done beforehand, so that `shoot` starts without delay."""
 
     def shoot(self) -> Frame:
-        """Release now, wait for the exposure, transfer the frame."""
+        """Release the shutter now, wait for the exposure and transfer the frame."""
 
 
 class PlannedCamera(PlannedDevice):
-    """A camera of a plan: it takes the time that its driver declares, and delivers nothing."""
+    """Stand-in of a camera in a plan, which takes the time that the driver declares."""
 
     def __init__(self, clock: VirtualClock, offers: CameraOffers) -> None:
         self._clock = clock
@@ -62,20 +62,20 @@ class PlannedCamera(PlannedDevice):
         self._settings: ExposureSettings | None = None
 
     def offers(self) -> CameraOffers:
-        """As its driver declares."""
+        """Return the settings that the driver declares."""
         return self._offers
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
-        """Take what is offered."""
+        """Accept settings that are offered."""
         self._offers.check(settings)
         self._settings = settings
         return settings
 
     def arm(self) -> None:
-        """It is."""
+        """Do nothing."""
 
     def shoot(self) -> Frame:
-        """Expose, and take the time of a frame."""
+        """Let the time of an exposure and its transfer pass; return a frame without data."""
         assert self._settings is not None, "a session configures before it shoots"
         start_s = self._clock.now()
         end_s = start_s + self._settings.exposure_s
@@ -85,9 +85,14 @@ class PlannedCamera(PlannedDevice):
 
 @dataclass(frozen=True)
 class Shoot:
-    """One photograph, in a role: `dark`, `meter`, `decay`, `daylight`.
+    """One photograph, for which the session configures the camera beforehand and records the frame.
 
-    The session takes it: it sets the camera beforehand, and keeps the frame.
+    Attributes
+    ----------
+    role
+        Purpose of the frame, such as `dark`, `meter`, `decay`, `daylight`.
+    settings
+        Settings of the camera.
     """
 
     role: str
@@ -97,35 +102,35 @@ class Shoot:
         return f"{self.role} frame, {self.settings}"
 
 
-def exercise_camera(camera: Camera, trial: ExerciseContext) -> Exercised:
-    """Three short frames for their timing, a longer one for noise.
+def exercise_camera(camera: Camera, context: ExerciseContext) -> Exercised:
+    """Take three short frames to measure the timing and a longer one to measure the noise.
 
     Raises
     ------
     LabrigError
-        The camera failed, or its frame cannot be reduced.
+        If the camera failed, or its frame cannot be reduced.
     """
     offers = camera.offers()
-    measured, suggestion = _timing(camera, offers, trial)
-    frame, _ = _shoot(camera, _settings(offers, LONG_S), trial)
-    seen = trial.eyes.dark_frame(frame)
+    measured, suggestion = _timing(camera, offers, context)
+    frame, _ = _shoot(camera, _settings(offers, LONG_S), context)
+    reduced = context.eyes.dark_frame(frame)
     return Exercised(
-        (_offered(offers), *measured, *seen.measured),
-        seen.findings,
-        (suggestion, *seen.suggestions),
+        (_measured_offers(offers), *measured, *reduced.measured),
+        reduced.findings,
+        (suggestion, *reduced.suggestions),
     )
 
 
 def _timing(
-    camera: Camera, offers: CameraOffers, trial: ExerciseContext
+    camera: Camera, offers: CameraOffers, context: ExerciseContext
 ) -> tuple[list[Measured], Suggestion]:
     settings = _settings(offers, SHORT_S)
     lags_s, cycles_s = [], []
     for _ in range(SHORT_FRAMES):
-        frame, asked_s = _shoot(camera, settings, trial)
+        frame, requested_s = _shoot(camera, settings, context)
         camera.arm()  # only now can the next exposure begin
-        lags_s.append(frame.start_s - asked_s)
-        cycles_s.append(trial.clock.now() - frame.end_s)
+        lags_s.append(frame.start_s - requested_s)
+        cycles_s.append(context.clock.now() - frame.end_s)
     frame_time_s = math.ceil(max(cycles_s) / STEP_S) * STEP_S
     return [
         Measured(
@@ -136,17 +141,17 @@ def _timing(
 
 
 def _shoot(
-    camera: Camera, settings: ExposureSettings, trial: ExerciseContext
+    camera: Camera, settings: ExposureSettings, context: ExerciseContext
 ) -> tuple[Frame, float]:
-    """The frame, and when it was asked for."""
+    """Return a frame and the time at which it was requested."""
     camera.configure(settings)
     camera.arm()
-    trial.clock.sleep(SETTLING_S)
-    asked_s = trial.clock.now()
+    context.clock.sleep(SETTLING_S)
+    requested_s = context.clock.now()
     frame = camera.shoot()
     if not frame.data:
         raise DeviceError("the camera delivered an empty frame; try again")
-    return frame, asked_s
+    return frame, requested_s
 
 
 def _settings(offers: CameraOffers, exposure_s: float) -> ExposureSettings:
@@ -157,7 +162,7 @@ def _settings(offers: CameraOffers, exposure_s: float) -> ExposureSettings:
     )
 
 
-def _offered(offers: CameraOffers) -> Measured:
+def _measured_offers(offers: CameraOffers) -> Measured:
     return Measured(
         "it offers",
         f"{duration_text(offers.exposures_s[0])} to {duration_text(offers.exposures_s[-1])}, "

@@ -1,4 +1,4 @@
-"""The changer: it does at the bench what protocols would ask a person to do."""
+"""The changer, a device that does the manual steps of protocols."""
 
 from typing import Protocol, runtime_checkable
 
@@ -7,17 +7,17 @@ from labrig.acquire.roles.role import Device, Role
 
 @runtime_checkable
 class Changer(Device, Protocol):
-    """Do what a person would do at the bench: a sample changer, a filter wheel. Safe: still."""
+    """A device that replaces the person: a sample changer, a filter wheel. Safe state: at rest."""
 
     def do(self, task: str) -> None:
-        """Do it; returns when it is done.
+        """Perform a task; return when it is done.
 
         Raises
         ------
         DeviceError
-            They do not know how, or something went wrong.
+            If the changer does not know the task, or fails.
         """
 
 
-#: In a plan everything is done by a person.
+#: Without a stand-in: in a plan, manual steps are done by a person.
 CHANGER: Role[Changer] = Role(key="changer", does=Changer, name="changer")

@@ -1,4 +1,4 @@
-"""The lamp: the light that charges the sample."""
+"""The lamp, the light that charges the sample."""
 
 from dataclasses import dataclass
 from typing import ClassVar, Protocol, runtime_checkable
@@ -15,50 +15,50 @@ from labrig.acquire.roles.role import (
 )
 from labrig.errors import DeviceError
 
-#: Often enough to see a slow line, seldom enough not to wear the relay.
+#: Number of switchings: enough to notice a slow line, too few to wear the relay.
 SWITCHINGS = 3
 
 
 @runtime_checkable
 class Lamp(Light, Protocol):
-    """A light that charges the sample. Safe: off."""
+    """A light that charges the sample. Safe state: off."""
 
     def on(self) -> None:
-        """Switch on, read back where the device can."""
+        """Switch the lamp on, read back where the device can."""
 
     def off(self) -> None:
-        """Switch off, read back where the device can."""
+        """Switch the lamp off, read back where the device can."""
 
     def is_on(self) -> bool:
-        """What the device says, not what was asked, where it reads back."""
+        """Whether the lamp is on: as read back where the device can, else as commanded last."""
 
 
 class PlannedLamp(PlannedDevice):
-    """A lamp of a plan."""
+    """Stand-in of a lamp in a plan."""
 
     def __init__(self) -> None:
         self._on = False
 
     def reads_back(self) -> bool:
-        """Nobody else switches it."""
+        """Return False: nothing else can switch a stand-in."""
         return False
 
     def on(self) -> None:
-        """Switch on."""
+        """Switch the lamp on."""
         self._on = True
 
     def off(self) -> None:
-        """Switch off."""
+        """Switch the lamp off."""
         self._on = False
 
     def is_on(self) -> bool:
-        """As it was switched."""
+        """Whether the lamp is on, as commanded last."""
         return self._on
 
 
 @dataclass(frozen=True)
 class Switch:
-    """Lamp on or off."""
+    """The action that switches the lamp on or off."""
 
     on: bool
     device: ClassVar[str] = "lamp"
@@ -67,7 +67,7 @@ class Switch:
         return "on" if self.on else DARK
 
     def begin(self, lamp: Lamp) -> None:
-        """Do it."""
+        """Switch the lamp."""
         if self.on:
             lamp.on()
         else:
@@ -78,17 +78,17 @@ LAMP_ON = Switch(on=True)
 LAMP_OFF = Switch(on=False)
 
 
-def _exercise(lamp: Lamp, trial: ExerciseContext) -> Exercised:
-    """Light it for some hundredths of a second, some times."""
+def _exercise(lamp: Lamp, context: ExerciseContext) -> Exercised:
+    """Switch the lamp on for some hundredths of a second, `SWITCHINGS` times."""
     on_s, off_s = [], []
     try:
         for _ in range(SWITCHINGS):
-            on_s.append(trial.timed_s(lamp.on))
-            _require(lamp, on=True)
-            off_s.append(trial.timed_s(lamp.off))
-            _require(lamp, on=False)
+            on_s.append(context.timed_s(lamp.on))
+            _require_state(lamp, on=True)
+            off_s.append(context.timed_s(lamp.off))
+            _require_state(lamp, on=False)
     finally:
-        with trial.clock.shielded():
+        with context.clock.shielded():
             lamp.off()
     return Exercised(
         (
@@ -98,7 +98,7 @@ def _exercise(lamp: Lamp, trial: ExerciseContext) -> Exercised:
     )
 
 
-def _require(lamp: Lamp, *, on: bool) -> None:
+def _require_state(lamp: Lamp, *, on: bool) -> None:
     if lamp.is_on() != on:
         state = "on" if on else "off"
         raise DeviceError(

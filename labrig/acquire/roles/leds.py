@@ -1,4 +1,4 @@
-"""The bank of LEDs: narrow bands of light that charge the sample, one at a time."""
+"""The bank of LEDs, narrow bands of light that charge the sample, one at a time."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -21,58 +21,64 @@ from labrig.yaml_file import did_you_mean
 
 @runtime_checkable
 class LedBank(Light, Protocol):
-    """Narrow-band LEDs, one lit at a time. Safe: all off."""
+    """Narrow-band LEDs of which at most one is on. Safe state: all off."""
 
     def channels(self) -> tuple[str, ...]:
-        """Names of the LEDs."""
+        """Return the names of the LEDs."""
 
     def light(self, channel: str) -> None:
-        """Light one LED, once all others are off; both read back where the device can."""
+        """Switch one LED on after all others are off; both are read back where the device can."""
 
     def dark(self) -> None:
-        """All off, read back where the device can."""
+        """Switch all LEDs off, read back where the device can."""
 
     def lit(self) -> str | None:
-        """The LED that is lit, None if all are off: what the device says, where it reads back.
+        """Return the LED that is on, None if all are off: as read back where the device can.
 
         Raises
         ------
         DeviceError
-            More than one is lit.
+            If more than one LED is on.
         """
 
 
 class PlannedLedBank(PlannedDevice):
-    """A bank of LEDs of a plan."""
+    """Stand-in of a bank of LEDs in a plan."""
 
     def __init__(self, channels: Sequence[str]) -> None:
         self._channels = tuple(channels)
-        self._lit: str | None = None
+        self._channel_on: str | None = None
 
     def reads_back(self) -> bool:
-        """Nobody else switches it."""
+        """Return False: nothing else can switch a stand-in."""
         return False
 
     def channels(self) -> tuple[str, ...]:
-        """As its driver declares."""
+        """Return the names that the driver declares."""
         return self._channels
 
     def light(self, channel: str) -> None:
-        """Light it."""
-        self._lit = channel
+        """Switch one LED on."""
+        self._channel_on = channel
 
     def dark(self) -> None:
-        """All off."""
-        self._lit = None
+        """Switch all LEDs off."""
+        self._channel_on = None
 
     def lit(self) -> str | None:
-        """As it was switched."""
-        return self._lit
+        """Return the LED that is on, as commanded last."""
+        return self._channel_on
 
 
 @dataclass(frozen=True)
 class LedSwitch:
-    """One LED is lit instead of another, or of none; None: all go off."""
+    """The action that switches one LED on and all others off.
+
+    Attributes
+    ----------
+    channel
+        Name of the LED; None to switch all off.
+    """
 
     channel: str | None
     device: ClassVar[str] = "leds"
@@ -81,12 +87,12 @@ class LedSwitch:
         return DARK if self.channel is None else f"{self.channel} on"
 
     def begin(self, leds: LedBank) -> None:
-        """Do it.
+        """Switch the LEDs.
 
         Raises
         ------
         ProtocolError
-            There is no such LED.
+            If there is no such LED.
         """
         if self.channel is None:
             leds.dark()
@@ -102,27 +108,27 @@ class LedSwitch:
 LEDS_OFF = LedSwitch(None)
 
 
-def _exercise(leds: LedBank, trial: ExerciseContext) -> Exercised:
-    """Light each for some hundredths of a second."""
+def _exercise(leds: LedBank, context: ExerciseContext) -> Exercised:
+    """Switch each LED on for some hundredths of a second."""
     measured, off_s = [], []
     try:
         for channel in leds.channels():
-            on_s = trial.timed_s(partial(leds.light, channel))
+            on_s = context.timed_s(partial(leds.light, channel))
             measured.append(Measured(f"{channel} on, read back", f"{on_s * 1e3:.1f} ms"))
-            _require(leds, channel)
-            off_s.append(trial.timed_s(leds.dark))
-            _require(leds, None)
+            _require_state(leds, channel)
+            off_s.append(context.timed_s(leds.dark))
+            _require_state(leds, None)
     finally:
-        with trial.clock.shielded():
+        with context.clock.shielded():
             leds.dark()
     return Exercised((*measured, Measured("off, read back", spread_ms(off_s))))
 
 
-def _require(leds: LedBank, channel: str | None) -> None:
-    if (found := leds.lit()) != channel:
+def _require_state(leds: LedBank, channel: str | None) -> None:
+    if (channel_on := leds.lit()) != channel:
         raise DeviceError(
-            f"the LEDs were switched to {channel or 'dark'}, they say {found or 'dark'}; look at "
-            "them, switch them off by hand and check the relays"
+            f"the LEDs were switched to {channel or 'dark'}, they say {channel_on or 'dark'}; look "
+            "at them, switch them off by hand and check the relays"
         )
 
 

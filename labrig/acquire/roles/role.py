@@ -1,4 +1,4 @@
-"""What a role is: what its devices can do, what stands in for one in a plan, how it is tried."""
+"""Definition of a role: methods of its devices, stand-in of a plan, exercise of a rig check."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -7,20 +7,22 @@ from typing import Any, Generic, Literal, Protocol, TypeVar, runtime_checkable
 from labrig.acquire.values import Frame
 from labrig.clock import Clock, VirtualClock
 
-#: `refuse`: photometry would be spoilt. `warn`: somebody should look. `fine`: as it should be.
+#: `refuse`: the setting spoils photometry. `warn`: it may. `fine`: it is correct.
 Severity = Literal["refuse", "warn", "fine"]
 
 
 @dataclass(frozen=True)
 class Finding:
-    """One setting of a device.
+    """Assessment of one setting of a device.
 
     Attributes
     ----------
+    severity
+        Effect on a measurement; see `Severity`.
     what
-        How it is set, and what that does.
+        The setting and its effect.
     remedy
-        What to do, and where: the place in the menu. Empty where all is fine.
+        Remedy with its place in the device's menu; empty if none is needed.
     """
 
     severity: Severity
@@ -33,79 +35,87 @@ class Finding:
 
 @runtime_checkable
 class Device(Protocol):
-    """What every device can do."""
+    """Methods of every device."""
 
     def identity(self) -> str:
-        """One line that identifies the device that answers: maker, model, serial, firmware."""
+        """Return one line that identifies the device: maker, model, serial number, firmware."""
 
     def make_safe(self) -> None:
-        """Bring the line back into step, whatever was interrupted, then reach the safe state.
+        """Synchronise the connection, whatever was interrupted, then reach the safe state.
 
         Raises
         ------
         DeviceError
-            The safe state could not be confirmed.
+            If the safe state could not be confirmed.
         """
 
     def disconnect(self) -> None:
-        """Release the device. Never raises because it is gone already."""
+        """Release the device; never raises if it is gone already."""
 
 
 @runtime_checkable
 class Light(Device, Protocol):
-    """What every device can do that gives light. Safe: dark."""
+    """Methods of every device that gives light. Safe state: dark."""
 
     def reads_back(self) -> bool:
-        """Whether its state is what the device says; else it is what was asked last."""
+        """Whether the device reports its state; else the state is the one commanded last."""
 
 
 @runtime_checkable
 class Checkable(Protocol):
-    """A device that can say whether its own settings spoil a measurement."""
+    """A device that can report settings of its own that spoil a measurement."""
 
     def findings(self) -> Sequence[Finding]:
-        """How it is set by hand, as far as it tells."""
+        """Return assessments of the settings made by hand, as far as the device reports them."""
 
 
 @runtime_checkable
 class KeptAwake(Protocol):
-    """A device that switches itself off unless it is spoken to."""
+    """A device that switches itself off unless it receives commands."""
 
     def keep_awake(self) -> None:
-        """Make it count its time anew. Short, and harmless at any time between two actions."""
+        """Restart the device's auto-off timer; short, and harmless between any two actions."""
 
 
 @runtime_checkable
 class Guarded(Protocol):
-    """A device with a watchdog: it goes to its safe state when it hears nothing for long."""
+    """A device with a watchdog, which reaches its safe state when commands stay away for long."""
 
     def heartbeat(self) -> None:
-        """Let it hear from this PC; takes milliseconds.
+        """Restart the watchdog; takes milliseconds.
 
         Raises
         ------
         DeviceError
-            Its watchdog has struck already.
+            If the watchdog has triggered already.
         """
 
 
 class PlannedDevice:
-    """What all stand-ins of a plan have in common: nothing happens, and it takes no time."""
+    """Base of all stand-ins in plans: every method does nothing and takes no time."""
 
     def identity(self) -> str:
-        """Nobody asks a plan."""
+        """Return a placeholder."""
         return "planned"
 
     def make_safe(self) -> None:
-        """It is."""
+        """Do nothing."""
 
     def disconnect(self) -> None:
-        """It is not connected."""
+        """Do nothing."""
 
 
 @dataclass(frozen=True)
 class Measured:
-    """One thing that was measured, with its unit in the text of `value`."""
+    """One measured quantity.
+
+    Attributes
+    ----------
+    what
+        Name of the quantity.
+    value
+        Value with its unit, as text.
+    """
 
     what: str
     value: str
@@ -113,7 +123,7 @@ class Measured:
 
 @dataclass(frozen=True)
 class Suggestion:
-    """A key of the rig file and the measured value it could have."""
+    """A key of the rig file with the value that was measured for it."""
 
     key: str
     value: str
@@ -121,7 +131,17 @@ class Suggestion:
 
 @dataclass(frozen=True)
 class Exercised:
-    """What a gentle exercise of a device has taught, beside that it worked."""
+    """Outcome of the exercise of a device that worked.
+
+    Attributes
+    ----------
+    measured
+        Measured quantities.
+    findings
+        Assessments of the device's settings.
+    suggestions
+        Values for the rig file.
+    """
 
     measured: tuple[Measured, ...] = ()
     findings: tuple[Finding, ...] = ()
@@ -129,75 +149,84 @@ class Exercised:
 
 
 class FrameReader(Protocol):
-    """Somebody who can read what a camera delivers."""
+    """Reader of the pictures that a camera delivers."""
 
     def dark_frame(self, frame: Frame) -> Exercised:
-        """What a frame tells that was taken in darkness.
+        """Return measurements and findings of a frame taken in darkness.
 
         Raises
         ------
         FrameError
-            It cannot be read.
+            If the frame cannot be read.
         """
 
     def live_picture(self, jpeg: bytes) -> Measured:
-        """What is to be told of a live view's picture.
+        """Return a measurement of a picture of the live view.
 
         Raises
         ------
         FrameError
-            It cannot be read.
+            If the picture cannot be read.
         """
 
 
 @dataclass(frozen=True)
 class ExerciseContext:
-    """What there is to exercise a device with."""
+    """Resources for the exercise of a device.
+
+    Attributes
+    ----------
+    clock
+        Clock of the rig.
+    eyes
+        Reader of frames and live pictures.
+    """
 
     clock: Clock
     eyes: FrameReader
 
     def timed_s(self, act: Callable[[], object]) -> float:
-        """Do it; returns how long it took."""
-        asked_s = self.clock.now()
+        """Call `act` and return its duration in seconds."""
+        start_s = self.clock.now()
         act()
-        return self.clock.now() - asked_s
+        return self.clock.now() - start_s
 
 
 def spread_ms(durations_s: Sequence[float]) -> str:
-    """Shortest to longest, in milliseconds."""
+    """Return shortest and longest of durations in milliseconds, as text."""
     shortest, longest = min(durations_s) * 1e3, max(durations_s) * 1e3
     return f"{shortest:.1f} to {longest:.1f} ms ({len(durations_s)} times)"
 
 
 DeviceT = TypeVar("DeviceT", bound=Device)
 
-#: What is called the state of a light that gives none, as by the action that switches it off.
+#: State of a light that is off, as in the action that switches it off.
 DARK = "off"
 
 
 @dataclass(frozen=True)
 class Role(Generic[DeviceT]):
-    """A role that devices fill, and all that labrig knows of it.
+    """A role that devices fill.
 
     Parameters
     ----------
     key
-        Of its device in a rig file and in the journal.
+        Key of the role's device in a rig file and in the journal.
     does
-        The Protocol that its drivers satisfy.
+        Protocol class that its drivers satisfy.
     name
-        What to call its device in messages.
+        Name of its device in messages.
     planned
-        The stand-in of a plan, from the driver's class, its settings and the plan's clock; None:
-        a plan does without. What it has to know beforehand, drivers declare by class methods.
+        Factory of the stand-in in a plan, from the driver's class, its settings and the plan's
+        clock; None if a plan needs none. Drivers declare what it has to know by class methods.
     exercise
-        Tries it gently; None: nothing is tried. Leaves it safe, whatever happens.
+        Function that exercises the device gently and leaves it safe in any case; None for no
+        exercise.
     state
-        Of a role that gives light: how its device is, in the words of the actions that switch it
-        (`DARK` if it gives none), as it reads. None: it gives no light.
+        Function that reads the state of a device that gives light, in the words of the actions that
+        switch it (`DARK` if it is off); None if the role gives no light.
     safe_first
-        Whether it is made safe before all devices that are not, in the order of `ROLES`.
+        Whether the device is made safe before the devices of other roles, in the order of `ROLES`.
     """
 
     key: str
@@ -210,22 +239,19 @@ class Role(Generic[DeviceT]):
 
 
 class DeviceAction(Protocol):
-    """Something that a device is told to do, now or at a time of a sequence.
-
-    Its text is what the journal says of it.
-    """
+    """An action of a device, now or at a time of a sequence; its text is in the journal."""
 
     @property
     def device(self) -> str:
         """Key of the role."""
 
     def begin(self, device: Any, /) -> None:
-        """Begin it on the device that fills the role.
+        """Begin the action on the device of the role.
 
         Raises
         ------
         ProtocolError
-            The device has not got what is asked for.
+            If the device does not have what is demanded.
         DeviceError
-            It did not do it.
+            If the device did not perform the action.
         """

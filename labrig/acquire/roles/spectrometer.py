@@ -1,4 +1,4 @@
-"""The spectrometer: how the light is distributed over wavelengths."""
+"""The spectrometer, which measures the spectral distribution of light."""
 
 from typing import Protocol, runtime_checkable
 
@@ -7,13 +7,13 @@ from labrig.acquire.roles.role import Device, Role
 
 @runtime_checkable
 class Spectrometer(Device, Protocol):
-    """Measures relative spectral irradiance. Safe: idle."""
+    """An instrument that measures relative spectral irradiance. Safe state: idle."""
 
     def wavelengths_nm(self) -> tuple[float, ...]:
-        """Wavelength of each pixel, ascending."""
+        """Return the wavelength of each pixel in nm, ascending."""
 
     def counts(self, integration_s: float) -> tuple[float, ...]:
-        """One reading, dark not subtracted, one value per wavelength."""
+        """Return one reading in counts per pixel, without dark subtraction."""
 
 
 SPECTROMETER: Role[Spectrometer] = Role(key="spectrometer", does=Spectrometer, name="spectrometer")

@@ -1,4 +1,4 @@
-"""What swings to and fro: the trap door below the sample, the shield before the lamp."""
+"""Devices that swing: the trap door below the sample and the shield before the lamp."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -17,61 +17,61 @@ from labrig.quantity import duration_text
 
 @runtime_checkable
 class TrapDoor(Device, Protocol):
-    """Swings the sample away from the filter and towards the camera. Safe: closed."""
+    """A door that swings the sample from the filter towards the camera. Safe state: closed."""
 
     def open(self) -> None:
-        """Begin to open; returns when the command is acknowledged."""
+        """Begin to open the door; return when the command is acknowledged."""
 
     def close(self) -> None:
-        """Begin to close."""
+        """Begin to close the door; return when the command is acknowledged."""
 
     def travel_s(self) -> float:
-        """Seconds from the command until the door has stopped."""
+        """Return the time in seconds from the command until the door has stopped."""
 
 
 @runtime_checkable
 class LampShield(Device, Protocol):
-    """Keeps the afterglow of a lamp that is off from the sample (Nalbach et al., section 4.4).
+    """A shield that keeps the afterglow of the lamp from the sample (Nalbach et al., section 4.4).
 
-    Safe: uncovered, since a hot lamp behind a shield cannot lose its heat.
+    Safe state: uncovered, since a hot lamp behind a shield cannot lose its heat.
     """
 
     def cover(self) -> None:
-        """Begin to cover the lamp; returns when the command is acknowledged."""
+        """Begin to cover the lamp; return when the command is acknowledged."""
 
     def uncover(self) -> None:
-        """Begin to uncover it."""
+        """Begin to uncover the lamp; return when the command is acknowledged."""
 
     def travel_s(self) -> float:
-        """Seconds from the command until the shield has stopped."""
+        """Return the time in seconds from the command until the shield has stopped."""
 
 
 class PlannedSwing(PlannedDevice):
-    """A trap door or a shield; moving it takes no time, its travel is the protocol's to wait."""
+    """Stand-in of a trap door or shield in a plan; protocols wait for its travel themselves."""
 
     def __init__(self, travel_s: float) -> None:
         self._travel_s = travel_s
 
     def travel_s(self) -> float:
-        """As its driver declares."""
+        """Return the travel time in seconds that the driver declares."""
         return self._travel_s
 
     def open(self) -> None:
-        """It is open."""
+        """Do nothing."""
 
     def close(self) -> None:
-        """It is closed."""
+        """Do nothing."""
 
     def cover(self) -> None:
-        """It covers the lamp."""
+        """Do nothing."""
 
     def uncover(self) -> None:
-        """It does not."""
+        """Do nothing."""
 
 
 @dataclass(frozen=True)
 class Door:
-    """The trap door begins to open or to close."""
+    """The action that opens or closes the trap door."""
 
     open: bool
     device: ClassVar[str] = "door"
@@ -80,7 +80,7 @@ class Door:
         return "open" if self.open else "close"
 
     def begin(self, door: TrapDoor) -> None:
-        """Begin it; it is over `TrapDoor.travel_s` later."""
+        """Begin the movement, which ends `TrapDoor.travel_s` later."""
         if self.open:
             door.open()
         else:
@@ -89,7 +89,7 @@ class Door:
 
 @dataclass(frozen=True)
 class Shield:
-    """The lamp's shield begins to cover the lamp or to uncover it."""
+    """The action that covers or uncovers the lamp."""
 
     cover: bool
     device: ClassVar[str] = "shield"
@@ -98,7 +98,7 @@ class Shield:
         return "cover" if self.cover else "uncover"
 
     def begin(self, shield: LampShield) -> None:
-        """Begin it; it is over `LampShield.travel_s` later."""
+        """Begin the movement, which ends `LampShield.travel_s` later."""
         if self.cover:
             shield.cover()
         else:
@@ -112,13 +112,13 @@ SHIELD_UNCOVER = Shield(cover=False)
 
 
 def _swing(
-    ways: Mapping[str, Callable[[], None]], travel_s: float, trial: ExerciseContext
+    moves: Mapping[str, Callable[[], None]], travel_s: float, context: ExerciseContext
 ) -> Exercised:
-    """There and back, the full travel each; the last way is the safe one."""
+    """Move a device once in each way, over its full travel; the last way is the safe one."""
     measured = []
-    for what, go in ways.items():
-        measured.append(Measured(what, f"{trial.timed_s(go) * 1e3:.1f} ms"))
-        trial.clock.sleep(travel_s)
+    for name, move in moves.items():
+        measured.append(Measured(name, f"{context.timed_s(move) * 1e3:.1f} ms"))
+        context.clock.sleep(travel_s)
     travelled = Measured(
         "travel, from the rig file",
         f"{duration_text(travel_s)}; watch that it has stopped by then: no board sees that",
@@ -126,14 +126,14 @@ def _swing(
     return Exercised((*measured, travelled))
 
 
-def _exercise_door(door: TrapDoor, trial: ExerciseContext) -> Exercised:
-    ways = {"open, read back": door.open, "close, read back": door.close}
-    return _swing(ways, door.travel_s(), trial)
+def _exercise_door(door: TrapDoor, context: ExerciseContext) -> Exercised:
+    moves = {"open, read back": door.open, "close, read back": door.close}
+    return _swing(moves, door.travel_s(), context)
 
 
-def _exercise_shield(shield: LampShield, trial: ExerciseContext) -> Exercised:
-    ways = {"cover, read back": shield.cover, "uncover, read back": shield.uncover}
-    return _swing(ways, shield.travel_s(), trial)
+def _exercise_shield(shield: LampShield, context: ExerciseContext) -> Exercised:
+    moves = {"cover, read back": shield.cover, "uncover, read back": shield.uncover}
+    return _swing(moves, shield.travel_s(), context)
 
 
 DOOR: Role[TrapDoor] = Role(

@@ -1,4 +1,4 @@
-"""The thermometer: how warm it is at the sample, or in the room."""
+"""The thermometer, which measures the temperature of the sample or the room."""
 
 from typing import Protocol, runtime_checkable
 
@@ -7,20 +7,20 @@ from labrig.acquire.roles.role import Device, ExerciseContext, Exercised, Measur
 
 @runtime_checkable
 class Thermometer(Device, Protocol):
-    """Tells how warm it is at the sample, or in the room. Safe: anything; one may be gone."""
+    """A thermometer at the sample or in the room. It has no unsafe state, and may be missing."""
 
     def celsius(self) -> float:
-        """Temperature now, in degrees Celsius; takes seconds at most, even when it fails."""
+        """Return the temperature in degrees Celsius; takes seconds at most, even when it fails."""
 
 
-def _exercise(thermometer: Thermometer, trial: ExerciseContext) -> Exercised:
-    """Read it once."""
-    asked_s = trial.clock.now()
+def _exercise(thermometer: Thermometer, context: ExerciseContext) -> Exercised:
+    """Read the temperature once."""
+    start_s = context.clock.now()
     celsius = thermometer.celsius()
     return Exercised(
         (
             Measured("temperature", f"{celsius:.1f} °C"),
-            Measured("until it was read", f"{(trial.clock.now() - asked_s) * 1e3:.0f} ms"),
+            Measured("until it was read", f"{(context.clock.now() - start_s) * 1e3:.0f} ms"),
         )
     )
 

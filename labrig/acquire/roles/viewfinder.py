@@ -1,4 +1,4 @@
-"""The viewfinder: a live view for aiming, be it the camera's or a webcam beside it."""
+"""The viewfinder, a live view for aiming, by the camera or by a webcam next to it."""
 
 from typing import Protocol, runtime_checkable
 
@@ -7,27 +7,29 @@ from labrig.acquire.roles.role import Device, ExerciseContext, Exercised, Measur
 
 @runtime_checkable
 class LiveView(Device, Protocol):
-    """Shows what it sees, for aiming and focusing before the lights go out. Safe: switched off."""
+    """A live view for aiming and focusing while the lights are on. Safe state: switched off."""
 
     def preview(self) -> bytes:
-        """One live picture, a JPEG. The first one starts the live view, `make_safe` stops it.
+        """Return one live picture as a JPEG.
+
+        The first call starts the live view, `make_safe` stops it.
 
         Raises
         ------
         DeviceError
-            There is no live view, or no picture comes.
+            If there is no live view, or no picture arrives.
         """
 
 
-def _exercise(viewfinder: LiveView, trial: ExerciseContext) -> Exercised:
-    """Have it show one picture; a camera in its place takes no photographs."""
-    asked_s = trial.clock.now()
+def _exercise(viewfinder: LiveView, context: ExerciseContext) -> Exercised:
+    """Take one live picture; a camera in this role takes no photographs."""
+    start_s = context.clock.now()
     jpeg = viewfinder.preview()
-    shown_s = trial.clock.now() - asked_s
+    duration_s = context.clock.now() - start_s
     return Exercised(
         (
-            trial.eyes.live_picture(jpeg),
-            Measured("until it was shown", f"{shown_s * 1e3:.0f} ms"),
+            context.eyes.live_picture(jpeg),
+            Measured("until it was shown", f"{duration_s * 1e3:.0f} ms"),
         )
     )
 
