@@ -107,15 +107,32 @@ class Bench:
 
 @contextmanager
 def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterator[Bench]:
-    """The bench that a rig file describes; nothing is opened yet.
+    """Open the bench that a rig file describes, without connecting a device yet.
 
     Parameters
     ----------
+    file
+        The validated rig file.
     source
         Path of the rig file, for messages.
     not_before_s
-        Seconds since 1970 at which a simulated room's clock starts at the earliest: a resumed run
-        goes on after its last journal line.
+        Earliest time, in seconds since 1970, at which the clock of a simulated room starts: a
+        resumed run continues after its last journal line.
+
+    Yields
+    ------
+    Bench
+        The bench with its clock; `Bench.devices` opens the devices.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> path = Path("runs/decay/rig.yaml")
+    >>> opened = labrig.open_bench(labrig.read_rig_file(path), str(path))
+    >>> with opened as bench, bench.devices() as rig:
+    ...     print(sorted(rig.devices))
+    ['camera', 'changer', 'door', 'lamp', 'shield', 'thermometer']
     """
     if file.simulation is None:
         with guarding(file, source) as guard:

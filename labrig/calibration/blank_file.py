@@ -107,18 +107,54 @@ class BlankFile(BaseModel):
 
 
 def read_blank_file(path: Path) -> BlankFile:
-    """The blank in the file at `path`.
+    """Read a blank: the stray light that remains after lamp off.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    BlankFile
+        The validated blank.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_blank_file
+    >>> blank = read_blank_file(Path("blank.yaml"))
+    >>> blank.channels, blank.is_clean(2.0)
+    (('R', 'G', 'B'), True)
     """
     return read_model(path, BlankFile)
 
 
 def write_blank_file(path: Path, file: BlankFile) -> None:
-    """Write `file` so that `read_blank_file` gives it back."""
+    """Write a blank to a file that `read_blank_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The blank.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_blank_file, write_blank_file
+    >>> blank = read_blank_file(Path("blank.yaml"))
+    >>> noted = blank.model_copy(update={"source": "remeasured with the shield in place"})
+    >>> write_blank_file(Path("shielded.yaml"), noted)
+    >>> read_blank_file(Path("shielded.yaml")).source
+    'remeasured with the shield in place'
+    """
     write_yaml(path, file)
 
 

@@ -121,18 +121,54 @@ class CameraFile(CameraModel):
 
 
 def read_camera_file(path: Path) -> CameraFile:
-    """The calibration in the file at `path`.
+    """Read the calibration of a camera body and lens.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    CameraFile
+        The validated calibration.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_camera_file
+    >>> camera = read_camera_file(Path("camera.yaml"))
+    >>> exposure_s, relative_sigma = camera.exposure_s(1 / 64)
+    >>> f"{1e3 * exposure_s:.2f} ms ± {100 * relative_sigma:.1f} %"
+    '15.58 ms ± 0.5 %'
     """
     return read_model(path, CameraFile)
 
 
 def write_camera_file(path: Path, file: CameraFile) -> None:
-    """Write `file` so that `read_camera_file` gives it back."""
+    """Write the calibration of a camera to a file that `read_camera_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The calibration.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_camera_file, write_camera_file
+    >>> camera = read_camera_file(Path("camera.yaml"))
+    >>> write_camera_file(Path("no-lens.yaml"), camera.model_copy(update={"lens": None}))
+    >>> read_camera_file(Path("no-lens.yaml")).lens is None
+    True
+    """
     write_yaml(path, file)
 
 

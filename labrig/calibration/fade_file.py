@@ -108,18 +108,56 @@ class FadeFile(_Part):
 
 
 def read_fade_file(path: Path) -> FadeFile:
-    """The fade in the file at `path`.
+    """Read the turn-off and warm-up transients of a lamp.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    FadeFile
+        The validated transients.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_fade_file
+    >>> lamp = read_fade_file(Path("fade.yaml"))
+    >>> t_s, fraction = lamp.in_bands(lamp.fade, [400, 500, 600, 700])
+    >>> fraction.shape == (len(t_s), 3)
+    True
+    >>> lamp.fade.missing_s()[:2].round(3).tolist()
+    [0.029, 0.031]
     """
     return read_model(path, FadeFile)
 
 
 def write_fade_file(path: Path, file: FadeFile) -> None:
-    """Write `file` so that `read_fade_file` gives it back."""
+    """Write the transients of a lamp to a file that `read_fade_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The transients.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_fade_file, write_fade_file
+    >>> transients = read_fade_file(Path("fade.yaml"))
+    >>> write_fade_file(Path("lamp-2.yaml"), transients.model_copy(update={"lamp": "lamp 2"}))
+    >>> read_fade_file(Path("lamp-2.yaml")).lamp
+    'lamp 2'
+    """
     write_yaml(path, file)
 
 

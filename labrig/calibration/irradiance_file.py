@@ -76,18 +76,56 @@ class IrradianceFile(BaseModel):
 
 
 def read_irradiance_file(path: Path) -> IrradianceFile:
-    """The irradiance in the file at `path`.
+    """Read the irradiance of a lamp on the sample, directly and through the LVF.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    IrradianceFile
+        The validated irradiance.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from labrig.calibration import read_irradiance_file
+    >>> lamp = read_irradiance_file(Path("irradiance.yaml"))
+    >>> f"|E| = {np.linalg.norm(lamp.direct):.3f} in {len(lamp.direct)} bands"
+    '|E| = 1.000 in 8 bands'
+    >>> len(lamp.through) == len(lamp.position)
+    True
     """
     return read_model(path, IrradianceFile)
 
 
 def write_irradiance_file(path: Path, file: IrradianceFile) -> None:
-    """Write `file` so that `read_irradiance_file` gives it back."""
+    """Write an irradiance to a file that `read_irradiance_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The irradiance.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_irradiance_file, write_irradiance_file
+    >>> lamp = read_irradiance_file(Path("irradiance.yaml"))
+    >>> write_irradiance_file(Path("copy.yaml"), lamp.model_copy(update={"source": "a copy"}))
+    >>> read_irradiance_file(Path("copy.yaml")).source
+    'a copy'
+    """
     write_yaml(path, file)
 
 

@@ -160,18 +160,57 @@ _FIGURES = tuple(BandColumns.model_fields)
 
 
 def read_lvf_file(path: Path) -> LvfFile:
-    """The calibrated filter in the file at `path`.
+    """Read the calibration of a linear variable filter.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    LvfFile
+        The validated calibration.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_lvf_file
+    >>> file = read_lvf_file(Path("lvf.yaml"))
+    >>> wavelength_nm = file.wavelengths.map().wavelength_nm([0.0, 0.5, 1.0])
+    >>> [f"{nm:.0f} nm" for nm in wavelength_nm]
+    ['391 nm', '554 nm', '704 nm']
+    >>> file.lvf.transmission(wavelength_nm).shape
+    (31, 3)
     """
     return read_model(path, LvfFile)
 
 
 def write_lvf_file(path: Path, file: LvfFile) -> None:
-    """Write `file` so that `read_lvf_file` gives it back."""
+    """Write the calibration of a filter to a file that `read_lvf_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The calibration.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_lvf_file, write_lvf_file
+    >>> filter_file = read_lvf_file(Path("lvf.yaml"))
+    >>> second = filter_file.model_copy(update={"source": "second filter"})
+    >>> write_lvf_file(Path("lvf-2.yaml"), second)
+    >>> read_lvf_file(Path("lvf-2.yaml")).source
+    'second filter'
+    """
     write_yaml(path, file)
 
 

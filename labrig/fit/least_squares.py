@@ -114,21 +114,38 @@ def least_squares(
     Parameters
     ----------
     residuals
-        Function of the parameters (p,) that returns residuals (m,) over their σ and their
-        Jacobian (m, p). May overflow at a trial point: such a step is refused.
+        Function of the parameters (p,) that returns the residuals (m,) in units of their σ and
+        their Jacobian (m, p). It may overflow at a trial point, which is then rejected.
     start
-        (p,) finite; moved into the box if outside.
+        Finite start values, shape (p,), moved into the box if outside.
     lower, upper
-        Bounds, scalar or (p,).
+        Bounds, scalar or of shape (p,).
     max_iterations
-        Evaluations of `residuals` allowed to the damped search.
+        Largest number of evaluations of `residuals` in the damped search.
     tolerance
-        Relative step small enough to stop at; 0 goes on to the precision of the arithmetic.
+        Relative step at which to stop; 0 continues to the precision of the arithmetic.
+
+    Returns
+    -------
+    LeastSquaresFit
+        The minimum with covariance, residuals, Jacobian and convergence.
 
     Raises
     ------
     FitError
         The residuals or the Jacobian at `start` are not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.fit import least_squares
+    >>> t, y = np.array([0.0, 1.0, 2.0, 3.0]), np.array([2.02, 1.21, 0.73, 0.45])
+    >>> def residuals(x):
+    ...     model = x[0] * np.exp(-x[1] * t)
+    ...     return (model - y) / 0.02, np.column_stack([model / x[0], -t * model]) / 0.02
+    >>> fit = least_squares(residuals, [1.0, 1.0], lower=0.0)
+    >>> fit.parameters.round(3).tolist(), fit.sigma.round(3).tolist()
+    ([2.017, 0.506], [0.019, 0.01])
     """
     x = np.array(start, dtype=np.float64)
     low = np.broadcast_to(np.asarray(lower, dtype=np.float64), x.shape)

@@ -60,7 +60,33 @@ class MaterialComparison:
 
 
 def compare_materials(measured: Material, reference: Material) -> MaterialComparison:
-    """`measured` beside `reference`, state by state by falling rate, band by band."""
+    """Compare two materials state by state, by falling rate, and band by band.
+
+    Two scales are free: k_e belongs to the light of one lamp, and Λ is relative. Each is multiplied
+    by the factor that brings `measured` closest to `reference`.
+
+    Parameters
+    ----------
+    measured
+        The material to judge.
+    reference
+        The material to compare with, such as the same in Table 1 of Nalbach et al.
+
+    Returns
+    -------
+    MaterialComparison
+        A pair of values for each quantity that one of the two materials has.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.material import compare_materials
+    >>> measured = labrig.read_material("material.yaml")
+    >>> comparison = compare_materials(measured, labrig.read_material("double-wide"))
+    >>> for pair in comparison.pairs[::2]:
+    ...     print(f"{pair.quantity}: {pair.measured:.3f} {pair.unit}, {pair.percent:+.1f} %")
+    k_r 1: 0.205 s⁻¹, +2.4 %
+    """
     notes = []
     ours, theirs = _by_falling_rate(measured), _by_falling_rate(reference)
     if len(ours) != len(theirs):

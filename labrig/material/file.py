@@ -158,18 +158,54 @@ class Material(_Part):
 
 
 def read_material(name_or_path: str | os.PathLike[str]) -> Material:
-    """The material in a file, or the shipped one of that name, such as `blue-paint`.
+    """Read a material from a file, or a shipped one by its name.
+
+    Parameters
+    ----------
+    name_or_path
+        Path of a material file, or the name of a shipped material such as `blue-paint`.
+
+    Returns
+    -------
+    Material
+        The validated material.
 
     Raises
     ------
     UsageError
-        No such material, or its file is malformed.
+        There is no such material, or its file is malformed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> material = labrig.read_material("material.yaml")
+    >>> [round(state.k_r_per_s, 3) for state in material.states]
+    [0.205, 0.01]
+    >>> labrig.read_material("blue-paint").bands_nm
+    (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
     """
     return read_model(resources.find("config/materials", "material", name_or_path), Material)
 
 
 def write_material(path: Path, material: Material) -> None:
-    """Write `material` so that `read_material` gives it back."""
+    """Write a material to a file that `read_material` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    material
+        The material.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> material = labrig.read_material("blue-paint")
+    >>> labrig.write_material(Path("mine.yaml"), material.model_copy(update={"name": "mine"}))
+    >>> labrig.read_material("mine.yaml").name
+    'mine'
+    """
     write_yaml(path, material)
 
 

@@ -67,18 +67,36 @@ class CameraResponse:
 
 
 def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
-    """The shipped camera of that name, or the one in a file.
+    """Read the spectral sensitivity of a colour camera, by its shipped name or from a file.
 
     Parameters
     ----------
     name_or_path
-        Such as `canon_eos_5d_mark_ii`, or a path: rawtoaces' JSON, or a table in CSV with
-        `wavelength_nm,R,G,B` or, as Jiang et al. have it, those four columns without a header.
+        Name of a shipped camera such as `canon_eos_5d_mark_ii`, or the path of a file: JSON as
+        rawtoaces writes it, or a CSV table with the columns `wavelength_nm,R,G,B`, or those four
+        columns without a header (Jiang et al. 2013).
+
+    Returns
+    -------
+    CameraResponse
+        Relative sensitivities of R, G and B; the highest value of all is 1.
 
     Raises
     ------
     UsageError
-        No such camera, or its file is malformed.
+        There is no such camera, or its file is malformed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> camera = labrig.read_camera("canon_eos_5d_mark_ii")
+    >>> camera.name
+    'Canon EOS 5D Mark II'
+    >>> camera.sensitivity.max(axis=0).round(2).tolist()
+    [0.54, 1.0, 0.9]
+    >>> peak = camera.sensitivity.argmax(axis=0)
+    >>> camera.wavelength_nm[peak].tolist()
+    [600.0, 520.0, 460.0]
     """
     file = read_curve_file(camera_path(name_or_path))
     if set(file.curves) != set(CHANNELS):
@@ -92,12 +110,33 @@ def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
 def read_monochrome_camera(
     path: str | os.PathLike[str], curve: str | None = None
 ) -> CameraResponse:
-    """A camera without colours, from a file as `read_spectrum` takes it.
+    r"""Read the spectral sensitivity of a monochrome camera from a file.
+
+    Parameters
+    ----------
+    path
+        Path of a curve file in any format of `read_curve_file`.
+    curve
+        Name of the curve in the file; not needed where there is only one.
+
+    Returns
+    -------
+    CameraResponse
+        Relative sensitivity of the channel `L`, with maximum 1.
 
     Raises
     ------
     UsageError
-        The file or the name of the curve is no good.
+        The file is malformed, or it has no curve of that name.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_monochrome_camera
+    >>> _ = Path("mono.csv").write_text("wavelength_nm,value\n400,0.2\n550,0.6\n700,0.3\n")
+    >>> camera = read_monochrome_camera("mono.csv")
+    >>> camera.channels, camera.at([550, 625]).round(2).ravel().tolist()
+    (('L',), [1.0, 0.75])
     """
     file = read_curve_file(path)
     name, columns = file.pick(curve)
@@ -108,12 +147,32 @@ def read_monochrome_camera(
 def read_sound_curves(
     name_or_path: str | os.PathLike[str], names: Sequence[str] | None = None
 ) -> CurveFile:
-    """A file with the curves of some names, all of them sound.
+    """Read curves from a file and check each of them.
+
+    Parameters
+    ----------
+    name_or_path
+        Name of a shipped camera, or the path of a curve file.
+    names
+        Names of the curves to keep; all curves by default.
+
+    Returns
+    -------
+    CurveFile
+        The file with the selected curves.
 
     Raises
     ------
     UsageError
-        No such file or curve, or a curve that makes no sense.
+        There is no such file or curve, or a curve has wavelengths that do not rise or values that
+        are not finite.
+
+    Examples
+    --------
+    >>> from labrig.optics import read_sound_curves
+    >>> file = read_sound_curves("canon_eos_5d_mark_ii", ["G"])
+    >>> list(file.curves), len(file.curves["G"].wavelength_nm)
+    (['G'], 81)
     """
     file = read_curve_file(camera_path(name_or_path))
     if names:

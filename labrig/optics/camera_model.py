@@ -161,7 +161,28 @@ class CameraModel(_Part):
 
 
 def rho_squared(x: FloatArray, y: FloatArray, width: int, height: int) -> FloatArray:
-    """ρ² of places in pixels."""
+    """Return ρ², the squared distance from the image centre over that of a corner.
+
+    Parameters
+    ----------
+    x, y
+        Positions in pixels from the upper left corner, of any shape.
+    width, height
+        Width and height of the frame in pixels.
+
+    Returns
+    -------
+    ndarray
+        Values of ρ², in the shape of `x`: 0 at the centre, 1 in the corners.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import rho_squared
+    >>> x, y = np.array([320, 640, 640]), np.array([240, 240, 480])
+    >>> rho_squared(x, y, 640, 480).round(3).tolist()
+    [0.0, 0.64, 1.0]
+    """
     across, down = x - width / 2, y - height / 2
     return (across**2 + down**2) / ((width / 2) ** 2 + (height / 2) ** 2)
 
@@ -180,5 +201,24 @@ def _same(one: float | None, other: float | None) -> bool:
 
 
 def stop_text(f_number: float | None) -> str:
-    """An aperture in words."""
+    """Format an aperture for messages and reports.
+
+    Parameters
+    ----------
+    f_number
+        The f-number; None for a lens that does not report it.
+
+    Returns
+    -------
+    str
+        The aperture, such as `f/4`.
+
+    Examples
+    --------
+    >>> from labrig.optics import stop_text
+    >>> stop_text(5.6)
+    'f/5.6'
+    >>> stop_text(None)
+    'an unknown aperture'
+    """
     return "an unknown aperture" if f_number is None else f"f/{f_number:g}"

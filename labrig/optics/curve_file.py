@@ -265,12 +265,33 @@ class CurveFile:
 
 
 def read_curve_file(path: str | os.PathLike[str]) -> CurveFile:
-    """All curves of a file.
+    r"""Read all curves of a file.
+
+    Parameters
+    ----------
+    path
+        Path of a JSON file (rawtoaces, LSPDD, color-filter-sds) or of a text table.
+
+    Returns
+    -------
+    CurveFile
+        The curves by name, each sorted by wavelength, otherwise unchecked.
 
     Raises
     ------
     UsageError
-        It cannot be read, or is none of the formats.
+        The file cannot be read, or it has none of these formats.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_curve_file
+    >>> _ = Path("leds.csv").write_text("wavelength_nm,blue,red\n450,1,0\n550,0.1,0.2\n650,0,1\n")
+    >>> file = read_curve_file("leds.csv")
+    >>> file.title, list(file.curves)
+    ('leds', ['blue', 'red'])
+    >>> file.curves["red"].value.tolist()
+    [0.0, 0.2, 1.0]
     """
     place = Path(path)
     text = read_text(place)
@@ -287,19 +308,33 @@ def read_curve_file(path: str | os.PathLike[str]) -> CurveFile:
 
 
 def read_spectrum(path: str | os.PathLike[str], name: str | None = None) -> Spectrum:
-    """A lamp, an emission … from a file.
+    r"""Read the spectrum of a lamp, an emission … from a file.
 
     Parameters
     ----------
     path
-        A file as `read_curve_file` takes it.
+        Path of a curve file in any format of `read_curve_file`.
     name
-        Which of its curves; not needed where there is only one.
+        Name of the curve in the file; not needed where there is only one.
+
+    Returns
+    -------
+    Spectrum
+        The checked curve, with σ where the file has it.
 
     Raises
     ------
     UsageError
-        The file, the name or the curve is no good.
+        The file is malformed, has no curve of that name, or the curve is invalid.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_spectrum
+    >>> _ = Path("lamp.csv").write_text("wavelength_nm,value\n400,0.5\n500,1.0\n600,1.2\n")
+    >>> lamp = read_spectrum("lamp.csv")
+    >>> lamp.name, lamp.at([450, 550, 700]).round(3).tolist()
+    ('lamp', [0.75, 1.1, 0.0])
     """
     file = read_curve_file(path)
     found, curve = file.pick(name)
@@ -307,7 +342,34 @@ def read_spectrum(path: str | os.PathLike[str], name: str | None = None) -> Spec
 
 
 def read_transmittance(path: str | os.PathLike[str], name: str | None = None) -> Transmittance:
-    """A filter or a grey card from a file; parameters and errors as `read_spectrum`."""
+    r"""Read the transmittance of a filter or the reflectance of a grey card from a file.
+
+    Parameters
+    ----------
+    path
+        Path of a curve file in any format of `read_curve_file`.
+    name
+        Name of the curve in the file; not needed where there is only one.
+
+    Returns
+    -------
+    Transmittance
+        The checked curve of fractions from 0 to 1.
+
+    Raises
+    ------
+    UsageError
+        The file is malformed, has no curve of that name, or its values are no fractions.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_transmittance
+    >>> _ = Path("card.csv").write_text("wavelength_nm,value\n400,0.17\n500,0.18\n700,0.18\n")
+    >>> card = read_transmittance("card.csv")
+    >>> card.at([450, 800]).round(3).tolist()
+    [0.175, 0.18]
+    """
     file = read_curve_file(path)
     found, curve = file.pick(name)
     return checked(f"{file.path}: {found}", lambda c: Transmittance(found, *c), curve)

@@ -16,19 +16,40 @@ _LN2 = float(np.log(2.0))
 
 
 def peak_shape(distance_nm: FloatArray, fwhm_nm: ArrayLike, skew: ArrayLike) -> FloatArray:
-    """A skewed Gaussian of height 1.
+    """Return a skewed Gaussian of height 1.
 
-    exp(−ln 2 · [ln(1 + 2 a x / w) / a]²) with a = `skew` and w so that the full width at half
-    maximum is `fwhm_nm`; a > 0 reaches further to long wavelengths, a = 0 is a Gaussian (Fraser
-    and Suzuki, *Resolution of overlapping absorption bands by least squares procedures*, Anal.
-    Chem. 38, 1966).
+    The shape is exp(−ln 2 · [ln(1 + 2 a x / w) / a]²) with a = `skew` and w such that the full
+    width at half maximum is `fwhm_nm`. a > 0 extends the tail to long wavelengths, a = 0 is a
+    Gaussian.
 
     Parameters
     ----------
     distance_nm
-        λ minus that of the peak.
-    fwhm_nm, skew
-        Broadcast against `distance_nm`.
+        Wavelength minus that of the peak, in nm.
+    fwhm_nm
+        Full width at half maximum in nm, broadcast against `distance_nm`.
+    skew
+        Dimensionless asymmetry a, broadcast against `distance_nm`.
+
+    Returns
+    -------
+    ndarray
+        Values from 0 to 1 in the broadcast shape.
+
+    References
+    ----------
+    R. D. B. Fraser, E. Suzuki, *Resolution of overlapping absorption bands by least squares
+    procedures*, Anal. Chem. 38 (1966).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import peak_shape
+    >>> distance_nm = np.array([-25.0, -12.5, 0.0, 12.5, 25.0])
+    >>> peak_shape(distance_nm, 25.0, 0.0).round(4).tolist()
+    [0.0625, 0.5, 1.0, 0.5, 0.0625]
+    >>> peak_shape(distance_nm, 25.0, 0.3).round(3).tolist()
+    [0.001, 0.362, 1.0, 0.58, 0.175]
     """
     a = np.asarray(skew, dtype=np.float64)
     skewed = np.abs(a) > _GAUSSIAN
@@ -240,7 +261,40 @@ def nominal_lvf(
     fwhm_nm: float = NOMINAL_FWHM_NM,
     leakage: float = 0.0,
 ) -> Lvf:
-    """An LVF as its maker describes it: Gaussian bands, at the positions of some wavelengths."""
+    """Return a filter as its maker describes it, with equal Gaussian bands.
+
+    Parameters
+    ----------
+    wavelengths
+        Centre wavelength along the strip.
+    centre_nm
+        Centre wavelengths of the bands in nm, shape (p,), in any order.
+    fwhm_nm
+        Full width at half maximum of every band in nm.
+    leakage
+        Transmission outside of the bands, as a fraction of the peak's.
+
+    Returns
+    -------
+    Lvf
+        The filter at the p positions of these wavelengths, with peak transmission 1.
+
+    Raises
+    ------
+    ValueError
+        A wavelength is not on the strip.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import WavelengthMap, nominal_lvf
+    >>> wavelengths = WavelengthMap(np.array([550.0, 200.0]), span=(0.0, 1.0))
+    >>> lvf = nominal_lvf(wavelengths, [400.0, 500.0, 600.0], fwhm_nm=20.0)
+    >>> lvf.position.round(6).tolist()
+    [0.125, 0.375, 0.625]
+    >>> lvf.transmission(np.array([500.0, 510.0])).round(3).tolist()
+    [[0.0, 0.0], [1.0, 0.5], [0.0, 0.0]]
+    """
     position = np.sort(wavelengths.position(centre_nm))
     centre = wavelengths.wavelength_nm(position)
     same = np.ones_like(centre)
@@ -248,7 +302,33 @@ def nominal_lvf(
 
 
 def seen_through(lvf: Lvf, camera: CameraResponse, light: Spectrum) -> FloatArray:
-    """What a camera sees of a light through the filter, ∫ T_p L S_c dλ, shape (p, channels)."""
+    """Return the signal of a light in a camera behind the filter, ∫ T_p L S_c dλ.
+
+    Parameters
+    ----------
+    lvf
+        The filter with its transmission T_p at p positions.
+    camera
+        The camera with the sensitivities S_c.
+    light
+        Spectrum L of the light, per nm.
+
+    Returns
+    -------
+    ndarray
+        Signal at each position in each channel, shape (p, channels), in the unit of the light times
+        nm.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import Spectrum, WavelengthMap, nominal_lvf, read_camera, seen_through
+    >>> wavelengths = WavelengthMap(np.array([550.0, 200.0]), span=(0.0, 1.0))
+    >>> lvf = nominal_lvf(wavelengths, [450.0, 530.0, 610.0])
+    >>> white = Spectrum("equal energy", np.array([380.0, 780.0]), np.ones(2))
+    >>> seen_through(lvf, read_camera("canon_eos_5d_mark_ii"), white).round(1).tolist()
+    [[0.2, 2.9, 22.3], [3.8, 25.9, 3.5], [12.5, 4.4, 0.2]]
+    """
     low, high = camera.wavelength_nm[0], camera.wavelength_nm[-1]
     nodes, weights = quadrature(low, high, camera.wavelength_nm, light.wavelength_nm)
     seen: FloatArray = lvf.transmission(nodes) @ (

@@ -43,49 +43,69 @@ def fit_decay(
     correlation: ArrayLike | None = None,
     offset_correlation: ArrayLike | None = None,
 ) -> DecayFit:
-    """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al. sec. 4.4).
+    """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al., section 4.4).
 
-    Frame f, channel c: y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + b_c, g the mean of e^(−k t) over the
-    exposure. Cov = (σ_fc r_cd σ_fd) + ρ² s_f s_fᵀ within a frame, s the signal without b_c.
+    For frame f and channel c, y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + b_c with g the mean of e^(−k t)
+    over the exposure. The covariance within a frame is Cov = (σ_fc r_cd σ_fd) + ρ² s_f s_fᵀ, s the
+    signal without b_c.
 
     Parameters
     ----------
     t_s
-        (n,) start of the exposures after lamp off, ≥ 0, in any order.
+        Begin of each exposure in seconds after lamp off, shape (n,), ≥ 0, in any order.
     values
-        (n,) or (n, C), linear in light, dark subtracted.
+        Signals linear in light with the dark level subtracted, shape (n,) or (n, C), in any unit.
     sigma
-        Their standard uncertainties without flicker, > 0, broadcast to `values`; inf leaves a value
-        out. None, for one channel only: equal for all, estimated from the scatter.
+        Standard uncertainties of the values without flicker, > 0, broadcast to `values`; inf
+        excludes a value. None, for a single channel only, estimates one σ for all values from the
+        scatter.
     exposure_s
-        Length of the exposures ≥ 0, one for all or (n,).
+        Length of the exposures in seconds, ≥ 0, a scalar or of shape (n,).
     channels
-        C names.
+        Names of the C channels.
     n_states
-        Number of states, or None to choose up to `max_states`, by BIC and F-test.
+        Number of states; None selects it, up to `max_states`, by BIC and F-test.
     max_states
-        Most states tried.
+        Largest number of states tried.
     offset_sigma
-        Prior σ of the channels' independent constants b_c, such as the σ of the dark level
-        subtracted from each; in the values' units, one for all or (C,): 0 holds it at zero, inf
-        leaves it free.
+        Prior σ of the channels' constants b_c, such as the σ of the subtracted dark level, in the
+        unit of the values, a scalar or of shape (C,). 0 fixes b_c at zero, inf leaves it free.
     flicker
-        Relative noise ρ that all channels of a frame share; None estimates it from the scatter of
+        Relative noise ρ that all channels of a frame share. None estimates it from the scatter of
         the frames about the best monotone curve, whatever the number of states.
     fixed_rates
-        Rates in 1/s that take part and are held; they count as states.
+        Rates in 1/s that are held fixed; they count as states.
     repeats
-        (n,) name of the charge that each frame follows: all decay alike, each from a level of its
-        own. None: there was one.
+        Name of the charge that each frame follows, shape (n,): all decays have the same rates, each
+        its own level. None is a single charge.
     correlation
-        (C, C) r of the channels' noise in one frame without flicker; None: they are independent.
+        Correlation matrix r of the channels' noise within a frame without flicker, shape (C, C).
+        None is no correlation.
     offset_correlation
-        (C, C) of the offsets' priors, likewise: a sensor that warms does so in all channels.
+        Correlation matrix of the offsets' priors, shape (C, C): the dark level of a warming sensor
+        drifts in all channels. None is no correlation.
+
+    Returns
+    -------
+    DecayFit
+        States by falling rate with covariance, channel weights, offsets, warnings and residuals.
 
     Raises
     ------
     FitError
-        Data from which no decay can be had.
+        The data do not constrain a decay.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> [decay] = labrig.read_series("series.csv")
+    >>> G = decay.channels.index("G")
+    >>> y, sigma = decay.values[:, G], decay.sigma[:, G]
+    >>> fit = labrig.fit_decay(decay.t_s, y, sigma, exposure_s=decay.exposure_s, flicker=0.007)
+    >>> for state in fit.states:
+    ...     print(f"k = {state.k_r_per_s:.4f} ± {state.k_r_sigma_per_s:.4f} 1/s")
+    k = 0.2046 ± 0.0029 1/s
+    k = 0.0101 ± 0.0001 1/s
     """
     series = decay_series(
         t_s,
