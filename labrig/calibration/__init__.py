@@ -1,8 +1,8 @@
-"""Calibrations of a bench as files: what its own protocols measure and later ones use.
+"""Calibrations of a bench as files, written by calibration protocols and read by later ones.
 
 To add a kind, write its file's module with its `CalibrationKind` and list that in `KINDS`: rig
-files then have its key. Analyses find it in the field of `labrig.analyse.part.Inputs` that has
-its name.
+files then accept its key. Analyses find it in the field of the same name of
+`labrig.analyse.part.Inputs`.
 """
 
 from typing import Any

@@ -1,4 +1,4 @@
-"""The blank file: what a decay's frames show where nothing glows."""
+"""The blank file: signal of a decay's frames without a glowing sample."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -21,23 +21,26 @@ SAME_TIME_S = 0.02
 
 
 class BlankFile(BaseModel):
-    """Light after lamp-off that is no glow, in DN/s above dark frames taken as the decay's are.
+    """Light after lamp off without a sample, in DN/s above dark frames taken as those of the decay.
 
     Attributes
     ----------
     iso, f_number
-        To which the numbers belong.
+        Settings to which the numbers belong.
+    channels
+        Names of the channels.
     t_s
-        Middles of the exposures after lamp-off, rising.
+        Rising middles of the exposures in seconds after lamp off.
     rate_dn_per_s, sigma_dn_per_s
-        A row for each of `t_s`, a number for each channel: the constant level not in it.
+        Signal without the constant level and its σ in DN/s, a row for each of `t_s`, a number for
+        each channel.
     constant_dn_per_s, constant_sigma_dn_per_s
-        What stays for good but is not in the dark frames.
+        Constant level after lamp off that the dark frames lack, in DN/s, and its σ.
     ambient_dn_per_s, ambient_sigma_dn_per_s
-        What is in frames and dark frames alike beyond dark current: light that leaks in. At least
-        so much; the channel that sees least of it is taken for dark.
+        Stray light in frames and dark frames alike, beyond dark current, in DN/s, and its σ. It is
+        a lower bound: the channel with the least signal is taken for dark.
     first_clean_s
-        From when on nothing but the constant level is seen; null: never.
+        Time after lamp off in seconds from which only the constant level remains; null if never.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -75,7 +78,7 @@ class BlankFile(BaseModel):
         return self
 
     def is_clean(self, t_s: float) -> bool:
-        """Whether a frame that begins `t_s` after lamp-off shows nothing that fades but the glow.
+        """Return whether a frame that begins `t_s` after lamp off has no fading light but the glow.
 
         Raises
         ------
@@ -90,7 +93,7 @@ class BlankFile(BaseModel):
         return t_s >= self.first_clean_s - SAME_TIME_S
 
     def leaks(self) -> tuple[str, ...]:
-        """What shines all the time, a line each."""
+        """Return a message for each source of constant stray light."""
         said = []
         for what, level, sigma in (
             ("after lamp-off, but not in dark frames", self.constant_dn_per_s,

@@ -1,7 +1,7 @@
-"""A measured material beside another one, such as the same in Table 1 of Nalbach et al.
+"""Comparison of a measured material with a reference, such as Table 1 of Nalbach et al.
 
 Two scales are free: k_e belongs to the light of one lamp, scaled to a stated length, and Λ is
-relative. Each is multiplied by the factor that brings it closest.
+relative. Each is multiplied by the factor that brings it closest to the reference.
 """
 
 import math
@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pair:
-    """One quantity of both; σ NaN where it is not known, values NaN where there are none."""
+    """One quantity of both materials, NaN where a value or its σ is not known."""
 
     quantity: str
     unit: str
@@ -30,26 +30,30 @@ class Pair:
 
     @property
     def percent(self) -> float:
-        """Deviation of the measured value from the reference; NaN where that is 0."""
+        """Deviation of the measured value in per cent; NaN where the reference is 0."""
         return 100 * (self.measured / self.reference - 1) if self.reference else math.nan
 
     @property
     def in_sigma(self) -> float:
-        """Deviation in σ of the difference; a σ that is not known counts as 0."""
+        """Deviation in units of σ of the difference, in which an unknown σ counts as 0."""
         sigma = math.hypot(_or_zero(self.sigma), _or_zero(self.reference_sigma))
         return (self.measured - self.reference) / sigma if sigma > 0 else math.nan
 
 
 @dataclass(frozen=True)
 class MaterialComparison:
-    """All quantities that one of two materials has.
+    """All quantities that at least one of two materials has.
 
     Attributes
     ----------
+    names
+        Names of the measured material and of the reference.
+    pairs
+        Measured and reference value of each quantity.
     k_e_factor, reradiation_factor
-        By what k_e and Λ of the measured one were multiplied.
+        Factors by which k_e and Λ of the measured material were multiplied.
     notes
-        What could not be laid side by side, and why.
+        Quantities that could not be compared, and why.
     """
 
     names: tuple[str, str]
@@ -125,7 +129,7 @@ def _by_falling_rate(material: Material) -> Sequence[State]:
 
 
 def _closest(ours: Sequence[State], theirs: Sequence[State], name: str) -> float:
-    """The c for which Σ (c x − x')² over states and bands of `name` is least; 1 without any."""
+    """Return the c that minimises Σ (c x − x')² over states and bands of `name`; 1 without any."""
     both = [
         (np.array(getattr(one, name)), np.array(getattr(other, name)))
         for one, other in zip(ours, theirs, strict=False)
@@ -146,7 +150,7 @@ def _pairs(
     bands: Sequence[float] = (),
     factor: float = 1.0,
 ) -> list[Pair]:
-    """The quantity `name` of two states, one pair or one for each band; none if neither has it."""
+    """Return `name` of two states as one pair or one per band; none if both lack it."""
     value, sigma = _values(one, name)
     reference, reference_sigma = _values(other, name)
     if value is None and reference is None:
@@ -170,7 +174,7 @@ def _pairs(
 
 
 def _values(state: State | None, name: str) -> tuple[FloatArray | None, FloatArray | None]:
-    """Value and σ of a quantity of `state`, (1,) or (bands,), None where not known."""
+    """Return value and σ of a quantity of `state`, shape (1,) or (bands,), None where not known."""
     found = (getattr(state, name, None), getattr(state, f"{name}_sigma", None))
     value, sigma = (None if one is None else np.atleast_1d(np.array(one, float)) for one in found)
     return value, sigma

@@ -5,7 +5,7 @@ dr/dt = (1 − r) κ − k_r r  (Nalbach et al., eq. 1, κ = Σ_j k_e,j E_j). Wi
 
     r(τ) = r(0) e⁻ˣ + κ τ φ₁(x),      ∫₀^τ r dt = r(0) τ φ₁(x) + κ τ² φ₂(x),
 
-which keeps all digits also where x, κ or k_r vanish. All functions broadcast.
+which is accurate to all digits even where x, κ or k_r vanish. All functions broadcast.
 """
 
 import math
@@ -106,7 +106,7 @@ def exponential_means(
 
 
 def _phi1_and_phi2(x: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Both, of x and e⁻ˣ."""
+    """Return φ₁ and φ₂ of x, given e⁻ˣ."""
     near = x < _SERIES_BELOW
     series = np.polyval(_PHI2_SERIES, np.minimum(x, _SERIES_BELOW))
     away = np.maximum(x, _SERIES_BELOW)
@@ -115,12 +115,12 @@ def _phi1_and_phi2(x: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatAr
 
 
 class Relaxation(NamedTuple):
-    """What a time of constant light does to a concentration: r → kept r + gained.
+    """Step r(τ) = kept · r(0) + gained of the rate equation.
 
     Attributes
     ----------
     kept
-        e⁻ˣ, ∂r(τ)/∂r(0).
+        Fraction e⁻ˣ = ∂r(τ)/∂r(0) of the initial concentration.
     gained
         Concentration reached from 0.
     """
@@ -130,7 +130,15 @@ class Relaxation(NamedTuple):
 
 
 class RelaxationSlopes(NamedTuple):
-    """Derivatives of a `Relaxation`'s parts: of `kept` (by κ and by k_r alike), of `gained`."""
+    """Derivatives of a `Relaxation` in seconds.
+
+    Attributes
+    ----------
+    kept
+        Derivative of `kept`, equal by κ and by k_r.
+    gained_by_kappa, gained_by_k_r
+        Derivatives of `gained` by κ and by k_r.
+    """
 
     kept: FloatArray
     gained_by_kappa: FloatArray
@@ -138,14 +146,14 @@ class RelaxationSlopes(NamedTuple):
 
 
 def relaxation(kappa_per_s: ArrayLike, k_r_per_s: ArrayLike, duration_s: ArrayLike) -> Relaxation:
-    """The exact step.
+    """Return the exact step of the rate equation under constant light.
 
     Parameters
     ----------
     kappa_per_s, k_r_per_s
-        Excitation κ ≥ 0 and re-radiation rate k_r ≥ 0, constant meanwhile.
+        Excitation κ ≥ 0 and re-radiation rate k_r ≥ 0 in 1/s, constant during the step.
     duration_s
-        τ ≥ 0.
+        Duration τ ≥ 0 in seconds.
     """
     kappa, tau = np.asarray(kappa_per_s, dtype=np.float64), np.asarray(duration_s)
     x = (kappa + np.asarray(k_r_per_s)) * tau
@@ -231,7 +239,7 @@ def concentration(
 def concentration_integral(
     start: ArrayLike, kappa_per_s: ArrayLike, k_r_per_s: ArrayLike, duration_s: ArrayLike
 ) -> FloatArray:
-    """∫ r dt over `duration_s`, in seconds; what a photograph of that length collects."""
+    """Return ∫ r dt over `duration_s`, in seconds: the signal of an exposure of that length."""
     kappa, tau = np.asarray(kappa_per_s, dtype=np.float64), np.asarray(duration_s)
     x = (kappa + np.asarray(k_r_per_s)) * tau
     total: FloatArray = np.asarray(start) * tau * phi1(x) + kappa * tau**2 * phi2(x)
@@ -239,7 +247,7 @@ def concentration_integral(
 
 
 def equilibrium(kappa_per_s: ArrayLike, k_r_per_s: ArrayLike) -> FloatArray:
-    """r∞ = κ/(κ + k_r), which constant light leads to; 0 without light."""
+    """Return the concentration r∞ = κ/(κ + k_r) under constant light; 0 without light."""
     kappa = np.asarray(kappa_per_s, dtype=np.float64)
     total = kappa + np.asarray(k_r_per_s)
     return np.where(total > 0, kappa / np.where(total > 0, total, 1.0), 0.0)

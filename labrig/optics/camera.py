@@ -29,15 +29,15 @@ class CameraResponse:
     Parameters
     ----------
     name
-        Maker and model.
+        Maker and model of the camera.
     wavelength_nm
-        Shape (n,), rising.
+        Rising wavelengths in nm, shape (n,).
     sensitivity
-        Shape (n, channels), the highest of all 1. How high the channels stand relative to each
-        other is kept: it is what links raw numbers, not white balanced, to colours. Straight lines
-        in between, zero outside.
+        Sensitivities, shape (n, channels), the highest value of all 1, piecewise linear in between
+        and zero outside. The ratios between channels are kept: they link raw signals, which are not
+        white balanced, to colours.
     channels
-        Their names.
+        Names of the channels.
     """
 
     name: str
@@ -46,12 +46,12 @@ class CameraResponse:
     channels: tuple[str, ...] = CHANNELS
 
     def response(self, spectrum: FloatArray) -> FloatArray:
-        """Camera values of a spectrum given at `wavelength_nm`, shape (channels,), relative."""
+        """Return the relative signal of a spectrum given at `wavelength_nm`, shape (channels,)."""
         values: FloatArray = (spectrum * np.gradient(self.wavelength_nm)) @ self.sensitivity
         return values
 
     def at(self, wavelength_nm: ArrayLike) -> FloatArray:
-        """Sensitivity at (q,) wavelengths, shape (q, channels)."""
+        """Return the sensitivity at (q,) wavelengths in nm, shape (q, channels)."""
         wanted = np.asarray(wavelength_nm, dtype=np.float64)
         return np.stack(
             [
@@ -62,7 +62,7 @@ class CameraResponse:
         )
 
     def in_bands(self, edges_nm: ArrayLike) -> FloatArray:
-        """Mean over each band between neighbouring `edges_nm`, shape (edges − 1, channels)."""
+        """Average the sensitivity between neighbouring `edges_nm`, shape (edges − 1, channels)."""
         return band_means(self.wavelength_nm, self.sensitivity, edges_nm)
 
 
@@ -183,7 +183,7 @@ def read_sound_curves(
 
 
 def camera_path(name_or_path: str | os.PathLike[str]) -> Path:
-    """File of a shipped camera, or the path as given."""
+    """Return the file of a shipped camera, or the path as given."""
     path = Path(name_or_path)
     if path.suffix.lower() in _TABLES:
         return path
@@ -191,6 +191,7 @@ def camera_path(name_or_path: str | os.PathLike[str]) -> Path:
 
 
 def _camera(file: CurveFile, names: tuple[str, ...]) -> CameraResponse:
+    """Check curves and scale them to a maximum of 1."""
     curves = [file.curves[name] for name in names]
     wavelength_nm, values = curves[0].wavelength_nm, np.stack([c.value for c in curves], axis=1)
     check_curve(wavelength_nm, values, None)

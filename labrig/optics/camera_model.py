@@ -1,4 +1,4 @@
-"""How one body and lens turn light and settings into numbers: what a reduction applies."""
+"""Model of how a camera body and lens turn light and settings into signal, used by a reduction."""
 
 import math
 from typing import Annotated, Self
@@ -25,22 +25,24 @@ class _Part(BaseModel):
 
 
 class Flat(_Part):
-    """1 + Σ_k c_k ρ^(2k), k = 1, 2 …, ρ the distance from the middle over half the diagonal.
+    """Flat field 1 + Σ_k c_k ρ^(2k), k = 1, 2 …, ρ the distance from the centre per half diagonal.
 
-    What is even about the middle is the lens's. The odd part, `gradient`, is the lamp's: it is
-    kept for the record and not divided out. An even part of the lamp's light cannot be told from
-    the lens's.
+    The part even about the centre is taken for the lens's vignetting. The odd part, `gradient`, is
+    the lamp's: it is recorded, not divided out. An even part of the lamp's illumination cannot be
+    distinguished from the lens's vignetting.
 
     Attributes
     ----------
     f_number
-        Null for a lens that does not tell it.
+        The f-number; null for a lens that does not report it.
     falloff
-        c_k, a row for each channel.
+        Coefficients c_k, a row for each channel.
     gradient
-        Of the lit card along x and y, over half the diagonal, a row for each channel.
+        Relative slope of the illuminated card's signal along x and y, per half diagonal, a row for
+        each channel.
     sigma
-        What the card's light and these numbers differ by, relative, from place to place.
+        Relative scatter between the card's signal and this model over the frame, one standard
+        deviation.
     """
 
     f_number: Annotated[float, Field(gt=0)] | None
@@ -57,14 +59,14 @@ class Flat(_Part):
         return self
 
     def at(self, rho2: ArrayLike) -> FloatArray:
-        """At squared distances (…,) from the middle, shape (…, channels)."""
+        """Return the flat field at squared distances ρ² (…,), shape (…, channels)."""
         squared = np.asarray(rho2, dtype=np.float64)
         powers = squared[..., None] ** np.arange(1, len(self.falloff[0]) + 1)
         result: FloatArray = 1 + powers @ np.array(self.falloff).T
         return result
 
     def mean(self, region: Region, width: int, height: int) -> FloatArray:
-        """Over a region of a frame of `width` × `height` pixels, shape (channels,)."""
+        """Average the flat field over a region of a `width` × `height` frame, shape (channels,)."""
         left, top, wide, high = region_pixels(region, width, height)
         steps = (np.arange(POINTS) + 0.5) / POINTS
         x, y = np.meshgrid(left + steps * wide, top + steps * high)
@@ -73,7 +75,7 @@ class Flat(_Part):
 
 
 class Factor(_Part):
-    """What a setting does over what its label says, and one standard deviation."""
+    """Actual over nominal effect of a setting, with one standard deviation."""
 
     setting: Positive
     factor: Positive
@@ -81,22 +83,22 @@ class Factor(_Part):
 
 
 class CameraModel(_Part):
-    """A body and a lens, calibrated.
+    """A calibrated camera body and lens.
 
     Attributes
     ----------
     iso, f_number
-        Settings at which all factors are 1; `f_number` is null for a lens that does not tell it.
+        Settings at which all factors are 1; `f_number` is null for a lens that does not report it.
     channels
-        Of the sensor.
+        Names of the sensor's channels.
     shutter
-        True shutter time over the one the camera tells, by the latter in s. 1 at the longest.
+        Actual over nominal exposure time, by the nominal one in s; 1 at the longest.
     iso_gain
-        Signal of the same light over that at `iso` times the ratio of the labels.
+        Signal of the same light over that at `iso` times the ratio of the nominal values.
     aperture
-        Light over that at `f_number` times the squared ratio of the labels.
+        Light over that at `f_number` times the squared ratio of the nominal values.
     flats
-        By f-number.
+        Flat fields, one for each f-number.
     """
 
     iso: Positive
@@ -108,10 +110,11 @@ class CameraModel(_Part):
     flats: Annotated[tuple[Flat, ...], Field(min_length=1)]
 
     def exposure_s(self, told_s: float) -> tuple[float, float]:
-        """True shutter time of one the camera tells, and its relative σ.
+        """Return the actual exposure time of a nominal one in s, and its relative σ.
 
-        Between two that were measured straight in the logarithm; beyond the longest as the camera
-        tells, since a shutter's error is of milliseconds; below the shortest as that.
+        The factor is interpolated in the logarithm of the nominal time and constant below the
+        shortest calibrated one. Beyond the longest one the nominal time holds, since a shutter's
+        error is of milliseconds.
         """
         if not self.shutter:
             return told_s, 0.0
@@ -124,10 +127,10 @@ class CameraModel(_Part):
         return told_s * float(np.interp(at, told, [one.factor for one in self.shutter])), sigma
 
     def scale(self, iso: float, f_number: float | None) -> tuple[float, float]:
-        """Signal of some light at those settings over that at the file's own, and its relative σ.
+        """Return the signal at these settings over that at the model's own, and its relative σ.
 
-        The σ is common to all frames at those settings. A setting that was not calibrated counts
-        by its label.
+        The σ is common to all frames at these settings. A setting that was not calibrated takes its
+        nominal value.
         """
         gain, gain_sigma = _found(self.iso_gain, iso)
         scale, sigma = gain * iso / self.iso, gain_sigma
@@ -138,12 +141,16 @@ class CameraModel(_Part):
         return scale, sigma
 
     def flat(self, f_number: float | None, region: Region, width: int, height: int) -> FloatArray:
-        """Light in a region over that in the middle of the lens, (channels,).
+        """Return the light in a region over that at the centre of the lens, shape (channels,).
 
         Parameters
         ----------
+        f_number
+            The f-number; None for a lens that does not report it.
+        region
+            Region of the frame.
         width, height
-            Of the frame, in pixels.
+            Width and height of the frame in pixels.
 
         Raises
         ------
@@ -156,7 +163,7 @@ class CameraModel(_Part):
         return flat.mean(region, width, height)
 
     def flat_at(self, f_number: float | None) -> Flat | None:
-        """The flat field of an aperture; None if it was not calibrated."""
+        """Return the flat field of an aperture, or None if it was not calibrated."""
         return next((flat for flat in self.flats if _same(flat.f_number, f_number)), None)
 
 

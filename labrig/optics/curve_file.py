@@ -1,8 +1,8 @@
-"""Files of measured curves, whatever their format: named curves over wavelength.
+"""Files of measured curves in several formats: named curves over wavelength.
 
-Read are JSON of rawtoaces, of LSPDD and of a gel catalogue (color-filter-sds), and tables in text:
-`wavelength_nm` and a column a curve, `name,wavelength_nm,value` one below the other, and without a
-header wavelength and R, G, B (Jiang et al. 2013) or wavelength and value.
+Supported formats are JSON of rawtoaces, of LSPDD and of a gel catalogue (color-filter-sds), and
+text tables: `wavelength_nm` followed by one column per curve, `name,wavelength_nm,value` in long
+form, and without a header wavelength and R, G, B (Jiang et al. 2013) or wavelength and value.
 """
 
 import csv
@@ -37,12 +37,12 @@ PLAUSIBLE_NM = (100.0, 20_000.0)
 
 
 def curves_from_text(text: str) -> tuple[str, Curves]:
-    """Title (may be empty) and name → columns.
+    """Return the title, which may be empty, and the curves of a table by name.
 
     Raises
     ------
     ValueError
-        Not such a table.
+        The text is no such table.
     """
     lines = [line for line in text.splitlines() if line.strip()]
     rows = _rows([line for line in lines if not line.startswith("#")])
@@ -60,7 +60,7 @@ def curves_from_text(text: str) -> tuple[str, Curves]:
 
 
 def sorted_columns(wavelength_nm: FloatArray, values: FloatArray) -> Columns:
-    """Rows sorted by wavelength, no σ."""
+    """Return rows sorted by wavelength, without σ."""
     order = np.argsort(wavelength_nm, kind="stable")
     return wavelength_nm[order], values[order], None
 
@@ -131,12 +131,12 @@ _EXPECTED_JSON = (
 
 
 def curves_from_json(content: Any) -> tuple[str, Curves]:
-    """Title (may be empty) and name → columns.
+    """Return the title, which may be empty, and the curves of JSON content by name.
 
     Raises
     ------
     ValueError
-        None of the formats.
+        The content has none of the formats.
     """
     if isinstance(content, dict) and isinstance(content.get("spectraldata"), str):
         return _lspdd(content)
@@ -156,7 +156,7 @@ def _lspdd(content: dict[str, Any]) -> tuple[str, Curves]:
 
 
 def _gels(filters: dict[str, Any]) -> Curves:
-    """Those of which there is a spectrum."""
+    """Return the gels that have a spectrum."""
     return {
         name: _columns(gel["sd"])
         for name, gel in filters.items()
@@ -200,7 +200,7 @@ def _columns(table: dict[str, Any]) -> Columns:
 
 
 def _entry(content: dict[str, Any], section: str, key: str) -> Any:
-    """`content[section][key]`, None if it is not there."""
+    """Return `content[section][key]`, or None if it is missing."""
     part = content.get(section)
     return part.get(key) if isinstance(part, dict) else None
 
@@ -212,7 +212,7 @@ LISTED = 8
 
 
 class Curve(NamedTuple):
-    """What a file says of one curve, sorted by wavelength, otherwise unchecked."""
+    """One curve of a file, sorted by wavelength, otherwise unchecked."""
 
     wavelength_nm: FloatArray
     value: FloatArray
@@ -221,16 +221,16 @@ class Curve(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CurveFile:
-    """A file's curves.
+    """Curves of a file.
 
     Attributes
     ----------
     path
-        Where it lies.
+        Path of the file.
     title
-        Maker and model, or what else the file calls itself; else its name.
+        Maker and model or another title in the file; else the file's name.
     curves
-        Name → curve, in the file's order.
+        Curves by name, in the file's order.
     """
 
     path: Path
@@ -238,12 +238,12 @@ class CurveFile:
     curves: Mapping[str, Curve]
 
     def pick(self, name: str | None) -> tuple[str, Curve]:
-        """The curve of a name, or the only one.
+        """Return the name and the curve of that name, or of the only one.
 
         Raises
         ------
         UsageError
-            No such curve, or several and no name.
+            There is no such curve, or there are several and no name is given.
         """
         if name is None:
             if len(self.curves) == 1:
@@ -379,7 +379,7 @@ ContentT = TypeVar("ContentT")
 
 
 def checked(place: object, make: Callable[[ContentT], T], content: ContentT) -> T:
-    """`make(content)`, its ValueError said as one line about `place`."""
+    """Return `make(content)`; a ValueError becomes a UsageError in one line about `place`."""
     try:
         return make(content)
     except ValueError as error:

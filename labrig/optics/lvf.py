@@ -1,4 +1,4 @@
-"""A linear variable filter (LVF): a band whose wavelength depends on the place along a strip."""
+"""A linear variable filter (LVF): its pass band depends on the position along a strip."""
 
 from dataclasses import dataclass, field, fields
 from typing import Self
@@ -69,15 +69,15 @@ class Bands:
     Attributes
     ----------
     centre_nm
-        Wavelength of highest transmission.
+        Wavelength of highest transmission in nm.
     fwhm_nm
-        Full width at half maximum, above the leakage.
+        Full width at half maximum above the leakage in nm.
     skew
-        As in `peak_shape`.
+        Dimensionless asymmetry, as defined in `peak_shape`.
     peak
         Transmission at the centre, above the leakage.
     leakage
-        Transmission everywhere else.
+        Transmission outside of the band.
     """
 
     centre_nm: FloatArray
@@ -87,13 +87,13 @@ class Bands:
     leakage: FloatArray
 
     def transmission(self, wavelength_nm: FloatArray) -> FloatArray:
-        """T_p(λ) at (q,) wavelengths, shape (positions, q)."""
+        """Return T_p(λ) at (q,) wavelengths in nm, shape (positions, q)."""
         distance = wavelength_nm - self.centre_nm[:, np.newaxis]
         shape = peak_shape(distance, self.fwhm_nm[:, np.newaxis], self.skew[:, np.newaxis])
         return self.leakage[:, np.newaxis] + self.peak[:, np.newaxis] * shape
 
     def between(self, position: FloatArray, wanted: FloatArray) -> Self:
-        """The bands at `wanted` positions, every figure interpolated along `position`."""
+        """Return the bands at other positions, each parameter interpolated along `position`."""
         return type(self)(
             *(np.interp(wanted, position, getattr(self, field.name)) for field in fields(self))
         )
@@ -105,21 +105,21 @@ _SAMPLES = 2049
 
 @dataclass(frozen=True, eq=False)
 class WavelengthMap:
-    """λ(u) = Σ_k c_k ((u − u_0)/s)^k along a strip.
+    """Centre wavelength λ(u) = Σ_k c_k ((u − u_0)/s)^k along a strip.
 
     Parameters
     ----------
     coefficients
-        c, shape (k,), in nm, the constant first.
+        Coefficients c in nm, shape (k,), the constant first.
     span
-        First and last position where the map holds: u_0 is their middle, s half their distance.
+        First and last position at which the map holds: u_0 is their middle, s half their distance.
     covariance
-        Of the coefficients, shape (k, k), in nm².
+        Covariance of the coefficients in nm², shape (k, k).
 
     Raises
     ------
     ValueError
-        A map that does not rise or fall all the way within `span`.
+        The map is not monotone within `span`.
     """
 
     coefficients: FloatArray
@@ -136,16 +136,16 @@ class WavelengthMap:
 
     @property
     def rising(self) -> bool:
-        """Whether the wavelength grows with the position."""
+        """Whether the wavelength increases with the position."""
         first, last = self.wavelength_nm(np.array(self.span))
         return bool(last > first)
 
     def wavelength_nm(self, position: ArrayLike) -> FloatArray:
-        """Centre wavelengths at some positions."""
+        """Return the centre wavelengths in nm at some positions."""
         return self._powers(position) @ self.coefficients
 
     def sigma_nm(self, position: ArrayLike) -> FloatArray:
-        """One standard deviation of `wavelength_nm`, 0 where no covariance is known."""
+        """Return one standard deviation of `wavelength_nm`, 0 without a covariance."""
         powers = self._powers(position)
         if self.covariance is None:
             return np.zeros(len(powers))
@@ -153,12 +153,12 @@ class WavelengthMap:
         return np.sqrt(np.maximum(variance, 0.0))
 
     def position(self, wavelength_nm: ArrayLike) -> FloatArray:
-        """Where some wavelengths are, by Newton's method from a table.
+        """Return the positions of some wavelengths, by Newton's method from a table.
 
         Raises
         ------
         ValueError
-            A wavelength that is not on the strip.
+            A wavelength is not on the strip.
         """
         wanted = np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
         places = np.linspace(*self.span, _SAMPLES)
@@ -196,24 +196,26 @@ NOMINAL_FWHM_NM = 25.0
 
 @dataclass(frozen=True, eq=False)
 class Lvf:
-    """A filter's bands at rising positions along the strip.
+    """Pass bands of a filter at rising positions along the strip.
 
     Parameters
     ----------
     position
-        Shape (p,), p ≥ 2, rising, in the unit of whoever measured them (pixels, mm).
+        Rising positions, shape (p,), p ≥ 2, in any unit (pixels, mm).
     bands
-        At those positions.
+        Pass bands at these positions.
     sigma
-        One standard deviation of each of the bands' figures, where it is known.
+        One standard deviation of each of the bands' parameters, where it is known.
+    remainder_nm
+        Wavelengths of `remainder` in nm, shape (n,); n may be 0.
     remainder
-        (p, n) what the bands' shape leaves of T_p(λ), straight lines between `remainder_nm` (n,);
-        n may be 0.
+        Deviation of T_p(λ) from the bands' shape, shape (p, n), piecewise linear between
+        `remainder_nm`.
 
     Raises
     ------
     ValueError
-        Positions or centre wavelengths that do not rise or fall all the way.
+        Positions or centre wavelengths are not monotone.
     """
 
     position: FloatArray
@@ -230,14 +232,14 @@ class Lvf:
             raise ValueError("expected centre wavelengths that rise or fall along the filter")
 
     def transmission(self, wavelength_nm: FloatArray) -> FloatArray:
-        """T_p(λ) at (q,) wavelengths, shape (p, q), never negative."""
+        """Return T_p(λ) ≥ 0 at (q,) wavelengths in nm, shape (p, q)."""
         transmission = self.bands.transmission(wavelength_nm)
         if len(self.remainder_nm):
             transmission = transmission + self.remainder @ hats(self.remainder_nm, wavelength_nm).T
         return np.maximum(transmission, 0.0)
 
     def at(self, position: ArrayLike) -> "Lvf":
-        """The filter at other rising positions within its own, linear in between."""
+        """Return the filter at other rising positions within its own, linearly interpolated."""
         wanted = np.asarray(position, dtype=np.float64)
         if wanted.min() < self.position[0] or wanted.max() > self.position[-1]:
             raise ValueError(

@@ -1,7 +1,7 @@
-"""Integrals of measured curves, exact for straight lines between their points.
+"""Integrals of measured curves, exact for curves that are piecewise linear between their points.
 
-A curve is piecewise linear between the wavelengths where it was measured. Sampling it at a coarse
-grid loses what lies between (a line 1 nm wide on a 10 nm grid, all of it); integrating does not.
+Sampling a curve on a coarse grid loses the structure between the samples (all of a line 1 nm wide
+on a 10 nm grid); integration keeps it.
 """
 
 import numpy as np
