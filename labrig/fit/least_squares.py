@@ -1,10 +1,10 @@
-"""The one nonlinear least-squares core under every fit.
+"""The nonlinear least-squares core of every fit.
 
 A Levenberg–Marquardt search with Moré's column scaling and Nielsen's damping finds the basin;
 undamped Gauss–Newton steps, each by an orthogonal factorisation of the scaled Jacobian (never the
 normal equations, which square its condition), then carry the minimum to the precision of the
-arithmetic. While it searches, a large problem is solved by its normal equations, in a third of the
-time: a step need not be exact to be tried.
+arithmetic. The search solves a large problem by its normal equations, in a third of the time: a
+trial step need not be exact.
 
 References
 ----------
@@ -45,26 +45,26 @@ POLISH_PATIENCE = 3
 
 @dataclass(frozen=True)
 class LeastSquaresFit:
-    """A minimum of ½‖r(x)‖² and what is known about it.
+    """A minimum of ½‖r(x)‖² with its covariance and diagnostics.
 
     Attributes
     ----------
     parameters
-        (p,) at the minimum.
+        Parameters at the minimum, shape (p,).
     covariance
-        (p, p) (JᵀJ)⁻¹: the parameters' covariance if the residuals have unit variance, else to be
-        multiplied by `reduced_chi2`. Bounds are ignored; a parameter on which no residual depends
-        independently of the others has an infinite variance.
+        Covariance (JᵀJ)⁻¹ of the parameters if the residuals have unit variance, else to be
+        multiplied by `reduced_chi2`, shape (p, p). Bounds are ignored; a parameter on which no
+        residual depends independently of the others has an infinite variance.
     residuals, jacobian
-        (m,) and (m, p) at the minimum.
+        Residuals (m,) and Jacobian (m, p) at the minimum.
     chi2, dof
-        Sum of squared residuals, and m − rank.
+        Sum of squared residuals, and degrees of freedom m − rank.
     rank, condition
         Numerical rank and 2-norm condition of the Jacobian with its columns scaled to length 1.
     at_bound
-        (p,) bool, parameters held by a bound.
+        Whether a bound holds the parameter, shape (p,), bool.
     iterations, converged
-        Evaluations of the residuals, and whether the last step was negligible.
+        Number of evaluations of the residuals, and whether the last step was negligible.
     """
 
     parameters: FloatArray
@@ -81,18 +81,18 @@ class LeastSquaresFit:
 
     @property
     def reduced_chi2(self) -> float:
-        """χ² per degree of freedom; NaN if there are none."""
+        """χ² per degree of freedom; NaN without any."""
         return self.chi2 / self.dof if self.dof > 0 else float("nan")
 
     @property
     def sigma(self) -> FloatArray:
-        """(p,) standard uncertainties for residuals of unit variance."""
+        """Standard uncertainties of the parameters for residuals of unit variance, shape (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
 
 @dataclass
 class _Point:
-    """Where the search stands: parameters, residuals, Jacobian and χ²."""
+    """Current point of the search: parameters, residuals, Jacobian and χ²."""
 
     x: FloatArray
     residuals: FloatArray
@@ -177,7 +177,7 @@ def _evaluate(residuals: Residuals, x: FloatArray) -> _Point:
 
 
 def _free(point: _Point, low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
-    """Parameters that no bound holds: inside the box, or pulled back into it by the gradient."""
+    """Return which parameters are free: inside the box, or pulled back into it by the gradient."""
     inside = (low < point.x) & (point.x < high)
     if inside.all():
         return inside
@@ -197,21 +197,21 @@ def _length(vector: FloatArray) -> float:
 
 @cache
 def _upper(rows: int, columns: int) -> FloatArray:
-    """1 on the diagonal and above it, else 0."""
+    """Return a matrix of 1 on and above the diagonal, else 0."""
     return np.triu(np.ones((rows, columns)))
 
 
 class _Linearised:
-    """The linear problem about a point, turned so that p rows say what m rows of J and r said.
+    """Linear problem at a point, rotated so that p rows are equivalent to the m rows of J and r.
 
     Attributes
     ----------
     triangle
-        (p, p) R of J = Q R; fewer rows if m < p.
+        R of J = Q R, shape (p, p); fewer rows if m < p.
     turned
-        (p,) Qᵀ r.
+        Rotated residuals Qᵀ r, shape (p,).
     norms
-        (p,) lengths of the columns of J, 1 where they are 0.
+        Lengths of the columns of J, 1 where they are 0, shape (p,).
     """
 
     def __init__(self, factors: FloatArray) -> None:
@@ -222,7 +222,7 @@ class _Linearised:
 
     @classmethod
     def exactly(cls, point: _Point) -> "_Linearised":
-        """By an orthogonal factorisation."""
+        """Linearise by an orthogonal factorisation."""
         m, p = point.jacobian.shape
         columns = np.empty((m, p + 1), order="F")
         columns[:, :p], columns[:, p] = point.jacobian, point.residuals
@@ -230,7 +230,7 @@ class _Linearised:
 
     @classmethod
     def roughly(cls, point: _Point) -> "_Linearised":
-        """By the normal equations, if the problem is large and they can be solved."""
+        """Linearise by the normal equations if the problem is large and they can be solved."""
         m, p = point.jacobian.shape
         if m <= p or m * p < LARGE_JACOBIAN:
             return cls.exactly(point)
@@ -245,12 +245,13 @@ class _Linearised:
     def directions(
         self, free: NDArray[np.bool_], scale: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The free columns of J over `scale`, decomposed into singular values.
+        """Decompose the free columns of J over `scale` into singular values.
 
         Returns
         -------
-        (k,) the values s, (k, p) their directions v in units of the parameters, and (k,) r along
-        them: the undamped step is −Σ_i (r_i/s_i) v_i.
+        values, directions, along
+            Singular values s (k,), their directions v (k, p) in units of the parameters, and r
+            along them (k,): the undamped step is −Σ_i (r_i/s_i) v_i.
         """
         scaled = self.triangle * (free / scale)
         u, s, vt, _ = lapack.dgesdd(scaled[:, free], full_matrices=0)
@@ -309,9 +310,10 @@ def _damped_search(
 def _polish(
     residuals: Residuals, point: _Point, low: FloatArray, high: FloatArray, tolerance: float
 ) -> tuple[_Point, float]:
-    """Undamped steps for as long as they shrink; the least relative one tells the convergence.
+    """Take undamped steps while they shrink; return the point and the smallest relative step.
 
-    Where residuals are large the steps shrink by a constant factor, alternating; so patience.
+    Where residuals are large the steps shrink by a constant factor, alternating, hence the
+    patience.
     """
     least, idle = np.inf, 0
     for _ in range(POLISH_STEPS):
@@ -341,9 +343,9 @@ def _rank_tolerance(jacobian: FloatArray) -> float:
 
 
 def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(JᵀJ)⁻¹ of J (m, p), as in `LeastSquaresFit.covariance`.
+    """Return (JᵀJ)⁻¹ of J (m, p), defined as `LeastSquaresFit.covariance`, and singular values.
 
-    With it, (p,), the singular values of J with its columns scaled to length 1.
+    The singular values (p,) are those of J with its columns scaled to length 1.
     """
     scale = _column_norms(jacobian)
     _, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)

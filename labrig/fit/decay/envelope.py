@@ -1,10 +1,10 @@
-"""A smooth curve that no choice of model has shaped, to measure the noise against.
+"""A smooth model-independent curve to measure the noise against.
 
 Sums of positive exponentials with *any* number of rates are all the completely monotone functions
-(Bernstein's theorem): every sum of exponentials, and every power law and stretched exponential,
-too. Non-negative least squares over a grid of rates, refined where it puts weight, finds the best
-of them. What scatters about it is noise, whatever the number of states: so flicker measured here
-cannot hide a missing state or a power law.
+(Bernstein's theorem), which include power laws and stretched exponentials. Non-negative least
+squares over a grid of rates, refined where the weights are, finds the best of them. The scatter
+about it is noise, whatever the number of states: flicker measured like this cannot hide a missing
+state or a power law.
 """
 
 from dataclasses import dataclass
@@ -52,20 +52,20 @@ class Envelope:
     Attributes
     ----------
     series
-        What it is of, with the repeats of a decay brought to the same level.
+        The series, with the repeats of a decay scaled to the same level.
     signal
-        (n, C) without offset.
+        Curve without offset, shape (n, C).
     weights
-        (C,) maximum 1.
+        Weights of the channels with maximum 1, shape (C,).
     offsets
-        (C,).
+        Offsets of the channels, shape (C,).
     dof
-        Degrees of freedom of the noise's estimate: the frames that tell, less those the curve took.
+        Degrees of freedom of the noise estimate: effective frames less those that the curve took.
     flicker, flicker_sigma
-        Relative, common to the channels of a frame; with fewer than `FEWEST_NOISE_DOF` degrees of
-        freedom one σ(ρ²) more than the estimate.
+        Relative flicker common to the channels of a frame, and σ; with fewer than
+        `FEWEST_NOISE_DOF` degrees of freedom one σ(ρ²) above the estimate.
     likely_flickers
-        (m,) values of ρ equally likely after the measurement; the one given.
+        Equally probable values of ρ after the measurement, or the given one, shape (m,).
     noise_scale
         Scatter in units of σ; 1 unless σ was not given.
     """
@@ -82,14 +82,15 @@ class Envelope:
 
 
 def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
-    """Curve, channel weights, levels of the repeats and, if `flicker` is None, it; by turns.
+    """Alternate fits of the curve, the channel weights, the repeats' levels and the flicker.
 
-    One channel of one decay with noise given needs none of these: the envelope is then flat.
+    The flicker is fitted only if `flicker` is None. One channel of a single decay with given noise
+    needs no envelope, which then is zero.
 
     Raises
     ------
     FitError
-        Nothing that decays, or too few bright frames to estimate flicker.
+        The signal does not decay, or there are too few bright frames to estimate flicker.
     """
     weights = _first_weights(series)
     offsets = np.zeros_like(weights)
@@ -123,7 +124,7 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
 
 
 def _first_weights(series: DecaySeries) -> FloatArray:
-    """Channels by the values where the signal is, relative to the brightest."""
+    """Estimate channel weights from the values where the signal is, relative to the brightest."""
     information = (series.values * series.inverse_sigma**2).sum(axis=1)
     common = np.maximum(information, 0) / np.maximum((series.inverse_sigma**2).sum(axis=1), 1e-300)
     weights = np.maximum(common @ series.values, 0)
@@ -133,7 +134,7 @@ def _first_weights(series: DecaySeries) -> FloatArray:
 def _monotone_curve(
     data: WhitenedSeries, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The curve (n,), offsets (C,), and how much of each frame's scatter (n,) they follow."""
+    """Return the curve (n,), the offsets (C,) and their leverage on each frame (n,)."""
     series = data.series
     problem = projection(data, weights)
     low, high = series.log_rate_bounds
@@ -159,7 +160,7 @@ def _monotone_curve(
 def _channel_weights(
     data: WhitenedSeries, curve: FloatArray, offsets: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Weights (maximum 1) that explain the values by `curve`, and the curve in their units."""
+    """Return weights (maximum 1) that scale `curve` to the values, and the curve in their units."""
     design = (data.matrices * curve[:, None, None]).reshape(-1, data.matrices.shape[2])
     target = (data.values - data.constant(offsets)).ravel()
     weights = np.maximum(np.linalg.lstsq(design, target)[0], 0)
@@ -172,10 +173,10 @@ def _channel_weights(
 def _gains(
     data: WhitenedSeries, curve: FloatArray, weights: FloatArray, offsets: FloatArray
 ) -> FloatArray:
-    """What the values after each charge are to be divided by to follow one curve, mean level 1.
+    """Return the divisors that bring the values after each charge to one curve with mean level 1.
 
-    A lamp that ages or a sample that is warmer charges to another level, yet decays alike. Taken
-    for noise of the frames, the difference would be a flicker that there is not.
+    An ageing lamp or a warmer sample changes the level of a charge, not its decay. The difference
+    would otherwise count as flicker.
     """
     series = data.series
     model = data.constant(weights) * curve[:, None]
@@ -190,7 +191,7 @@ def _gains(
 def _flicker(
     series: DecaySeries, signal: FloatArray, offsets: FloatArray, leverage: FloatArray
 ) -> tuple[float, float, float, FloatArray]:
-    """ρ, its σ, its degrees of freedom and likely values, from the frames' common scatter.
+    """Return ρ, its σ, its degrees of freedom and likely values, from the frames' common scatter.
 
     Along the signal's direction a frame scatters with variance V = 1 + ρ² B, B = |s/σ|², of which
     the curve followed the fraction `leverage` (n,). ρ² is the restricted maximum of the likelihood
@@ -213,7 +214,7 @@ def _flicker(
         variance = min(max(scatter / float(told**2 @ spare), 0.0), MOST_FLICKER**2)
 
     def error(variance: float) -> tuple[float, float]:
-        """σ(ρ²), and ν: 2/ν is the squared relative error of V where frames tell of the decay."""
+        """Return σ(ρ²), and ν: 2/ν is the squared relative error of V where it matters most."""
         told = brightness2 / (1 + variance * brightness2)
         sigma = float(np.sqrt(2 / (told**2 @ spare)))
         return sigma, 2 / (sigma**2 * float((told**3).sum() / told.sum()))
@@ -230,7 +231,10 @@ def _flicker(
 
 
 def _likely_flickers(brightness2: FloatArray, along2: FloatArray, spare: FloatArray) -> FloatArray:
-    """Values of ρ at equal steps of its posterior probability, arguments as in `_flicker`."""
+    """Return values of ρ at equal steps of its posterior probability.
+
+    The arguments are named as in `_flicker`.
+    """
     # Dense near zero, where a small ρ already tells.
     rho = MOST_FLICKER * np.linspace(0, 1, FLICKER_GRID) ** 2
     variance = 1 + np.multiply.outer(rho**2, brightness2)

@@ -162,7 +162,7 @@ def _log_rates(rates_per_s: Sequence[float], span_s: float) -> FloatArray:
 def _numbers_of_states(
     series: DecaySeries, n_states: int | None, max_states: int, n_fixed: int
 ) -> range:
-    """Numbers of states to try: what was asked for, or as many as the frames can tell."""
+    """Return the numbers of states to try: the requested one, or all that the frames constrain."""
     fewest = max(1, n_fixed) if n_states is None else n_states
     most = max(max_states, fewest) if n_states is None else n_states
     if fewest < max(1, n_fixed):
@@ -209,7 +209,7 @@ def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
 def _supported_states(
     data: WhitenedSeries, numbers: range, fixed: FloatArray, smooth: Envelope, noise_dof: float
 ) -> tuple[StatesFit, list[Candidate]]:
-    """The states chosen; fewer than the fewest wanted if amplitudes vanish."""
+    """Return the selected states; fewer than requested if amplitudes vanish."""
     for fewest in range(numbers.start, max(len(fixed), 1) - 1, -1):
         those = range(fewest, max(numbers.stop, fewest + 1))
         chosen, tried = choose_states(data, those, fixed, smooth.weights, smooth.offsets, noise_dof)
@@ -219,7 +219,7 @@ def _supported_states(
 
 
 def _alternatives(data: WhitenedSeries, chosen: StatesFit) -> tuple[AlternativeModel, ...]:
-    """What is no sum of exponentials, fitted under the candidates' weights."""
+    """Fit the models that are no sum of exponentials, with the weights of the candidates."""
     joint = chosen.joint
     fits = [
         (shape, fit_alternative(data, shape, joint.weights, joint.offsets))
@@ -231,7 +231,7 @@ def _alternatives(data: WhitenedSeries, chosen: StatesFit) -> tuple[AlternativeM
 def _reweighted(
     data: WhitenedSeries, fit: StatesFit, flicker: float
 ) -> tuple[WhitenedSeries, StatesFit]:
-    """The fit whose flicker is a fraction of its own signal, and the data so whitened."""
+    """Refit with flicker as a fraction of the fit's own signal; return the whitened data, too."""
     if flicker == 0:
         return data, refit(data, fit)
     for _ in range(REWEIGHTINGS):

@@ -1,4 +1,4 @@
-"""What speaks for and against a fit: refusals, and the warnings in its result."""
+"""Refusals of a decay fit, and the warnings in its result."""
 
 from dataclasses import dataclass
 
@@ -26,18 +26,18 @@ AT_BOUND = 1e-3
 
 @dataclass(frozen=True)
 class Evidence:
-    """What led to the fit chosen.
+    """Steps that led to the selected fit.
 
     Attributes
     ----------
     noise, noise_dof
-        The envelope; its degrees of freedom if σ or flicker come from it, else inf.
-    candidates, alternative models
-        What was tried.
+        Envelope, and its degrees of freedom if σ or flicker were estimated from it, else inf.
+    candidates, alternative_models
+        Numbers of states and other models that were tried.
     better_model
-        The alternative model that does clearly better than exponentials, if one does.
+        Alternative model that fits clearly better than exponentials, if there is one.
     asked, max_states, n_fixed
-        As the user had it.
+        Requested number of states, largest number and number of fixed rates.
     """
 
     noise: Envelope
@@ -51,7 +51,7 @@ class Evidence:
 
 
 def refuse_if_rising(data: WhitenedSeries, weights: FloatArray) -> None:
-    """No fit of a decay to what grows.
+    """Refuse to fit a decay to a rising signal.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def refuse_if_rising(data: WhitenedSeries, weights: FloatArray) -> None:
 
 
 def refuse_if_constant(fit: StatesFit, data: WhitenedSeries) -> None:
-    """No rate for what does not change.
+    """Refuse to fit a rate to a constant signal.
 
     Raises
     ------
@@ -90,18 +90,18 @@ def warnings_about(
     log_rate_covariance: FloatArray,
     evidence: Evidence,
 ) -> list[str]:
-    """What to distrust, in one line each.
+    """Return the warnings about a fit, one line each.
 
     Parameters
     ----------
     data
-        As whitened for `fit`.
+        Series whitened for `fit`.
     fit, states
         The fit, and its states in the user's units by falling rate.
     log_rate_covariance
-        (n, n) of log k of `states`.
+        Covariance of log k of `states`, shape (n, n).
     evidence
-        What led to the fit.
+        Steps that led to the fit.
     """
     series, joint = data.series, fit.joint
     warnings = []
@@ -158,7 +158,7 @@ def warnings_about(
 def _common_signal(
     data: WhitenedSeries, weights: FloatArray, offsets: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(n,) what the channels together say of the signal without `offsets`, and its 1/variance."""
+    """Return the weighted signal of all channels without `offsets`, and its 1/variance, (n,)."""
     unit = data.constant(weights)
     information = np.einsum("fc,fc->f", unit, unit)
     values = data.values - data.constant(offsets)

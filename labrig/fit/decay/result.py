@@ -1,4 +1,4 @@
-"""From the fit's own units to the user's: rates, amplitudes, covariance, warnings."""
+"""Conversion of a fit from its own units to the user's: rates, amplitudes, covariance, warnings."""
 
 from dataclasses import dataclass
 
@@ -16,13 +16,13 @@ from labrig.results import DecayState, FittedDecay
 
 @dataclass(frozen=True)
 class DecayFit(FittedDecay):
-    """A decay's result with the residuals of its fit.
+    """Result of a decay fit with its residuals.
 
     Attributes
     ----------
     residuals, normalised_residuals
         Value − model, one row per frame in the order given, one column per channel: in the values'
-        units, and whitened (independent, unit variance if the noise is as assumed).
+        unit, and whitened (independent, of unit variance if the noise is as assumed).
     """
 
     residuals: FloatArray
@@ -30,7 +30,7 @@ class DecayFit(FittedDecay):
 
 
 def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayFit:
-    """The result in the user's units and order of frames."""
+    """Convert the fit to the user's units and order of frames."""
     series, joint = data.series, fit.joint
     own = _own_covariance(fit, data, evidence.noise)
     covariance, log_rate_covariance = _covariances(fit, data, own)
@@ -83,10 +83,11 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
 
 
 def _own_covariance(fit: StatesFit, data: WhitenedSeries, noise: Envelope) -> FloatArray:
-    """Of the parameters fitted, (p, p); the noise's own uncertainty is in it.
+    """Return the covariance of the fitted parameters (p, p), with the noise's uncertainty in it.
 
-    An estimated flicker is marginalised: the mean over its likely values. Where it rules and is
-    known with ν degrees of freedom, that makes of the normal distribution Student's t.
+    An estimated flicker is marginalised: the covariance is the mean over its likely values. Where
+    flicker dominates and is known with ν degrees of freedom, the normal distribution becomes
+    Student's t.
     """
     own = fit.joint.least_squares.covariance
     if not data.series.sigma_given:
@@ -105,7 +106,10 @@ def _own_covariance(fit: StatesFit, data: WhitenedSeries, noise: Envelope) -> Fl
 def _covariances(
     fit: StatesFit, data: WhitenedSeries, own: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Of k1, a1, … by falling rate and all offsets in the user's units; of log k, free first."""
+    """Return the covariance of k₁, a₁, … and all offsets in the user's units, and of log k.
+
+    The former is by falling rate, the latter has free rates first.
+    """
     series, n_free = data.series, fit.n_free
     n_states = fit.n_states
     order = np.argsort(-fit.log_rates, kind="stable")
@@ -129,7 +133,7 @@ def _covariances(
 
 
 def _propagated(covariance: FloatArray, transform: FloatArray) -> FloatArray:
-    """T Cov Tᵀ, where an infinite variance stays one and correlates with nothing."""
+    """Return T Cov Tᵀ; an infinite variance stays infinite and correlates with nothing."""
     known = np.isfinite(np.diag(covariance))
     finite = np.where(np.multiply.outer(known, known), covariance, 0.0)
     # What the data say nothing about may overflow: that is as good as infinite.

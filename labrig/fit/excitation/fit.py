@@ -1,8 +1,8 @@
-"""Excitation rates, re-radiation rates and how far the sample was charged, from all that glowed.
+"""Joint fit of excitation rates, re-radiation rates and the sample's level of charge.
 
-Nalbach et al. (sec. 4.6) fit k_e band by band with r_i(0) = 1 assumed. Here decay and excitation
-are fitted together, with nothing assumed about the level: how the charging curve bends tells how
-near it is to saturation, and so what is Λ and what is r(0).
+Nalbach et al. (sec. 4.6) fit k_e band by band under the assumption r_i(0) = 1. Here decay and
+excitation are fitted together without that assumption: the curvature of the charging curve measures
+the distance to saturation, and so separates Λ from r(0).
 """
 
 from collections.abc import Sequence
@@ -41,19 +41,19 @@ def fit_excitation(
     Parameters
     ----------
     series
-        The first one's irradiance is the E to which k_e belongs.
+        Charging series; k_e belongs to the irradiance E of the first one.
     k_r_per_s, fractions
-        (N,) rates to start from and each state's part of the glow, such as a decay fit found.
+        Start values of the rates in 1/s and each state's fraction of the glow, such as from a decay
+        fit, shape (N,).
     uncertain
-        What else scatters; nothing by default.
+        Further sources of scatter; none by default.
     near
-        A fit of nearly the same series, at which to start; by default a few levels of charge are
-        tried.
+        A fit of nearly the same series as start; by default several levels of charge are tried.
 
     Raises
     ------
     FitError
-        Series that do not go together, or no glow.
+        The series are inconsistent, or nothing glows.
     """
     series = [one.checked() for one in series]
     bands_of(series)
@@ -73,7 +73,7 @@ def fit_excitation(
 
 
 def _brightest(series: Sequence[ChargingSeries]) -> int:
-    """Channel that is brightest where every one is measured."""
+    """Return the brightest channel, where all channels are measured."""
     total = np.zeros(series[0].values.shape[2])
     for one in series:
         known = np.isfinite(one.values) & (one.sigma > 0)
@@ -160,7 +160,7 @@ def _result(
 def _at_off(
     problem: ExcitationProblem, rates: Rates, covariance: FloatArray, order: NDArray[np.intp]
 ) -> tuple[LevelAtOff, ...]:
-    """The brightest lamp-off of every series, σ by linear propagation."""
+    """Return the brightest lamp-off level of every series, σ by linear propagation."""
     n, bands = problem.parameters.states, problem.parameters.bands
     found = []
     for one in problem.lit(rates):

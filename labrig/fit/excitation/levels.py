@@ -1,8 +1,8 @@
-"""How charged every site is at every photograph, with derivatives: exact steps, no integrator.
+"""Concentration of every site at every exposure, with derivatives: exact steps, no integrator.
 
-κ = Σ_j k_e,j E_j is constant within a step: the steady lamp is one, its rise and fade a few dozen.
-Steps are affine in r, and so is a charge: all charges of a series are worked out at once, each from
-r = 0, and only then follow one another.
+κ = Σ_j k_e,j E_j is constant within a step: the steady lamp is one, its turn-on and turn-off
+transients a few dozen. Steps are affine in r, and so is a charge: all charges of a series are
+computed at once, each from r = 0, and then chained.
 """
 
 from typing import NamedTuple
@@ -20,11 +20,11 @@ class Levels(NamedTuple):
     Attributes
     ----------
     value
-        (n, P, N) r, mean over each exposure.
+        Concentrations r, mean over each exposure, shape (n, P, N).
     by_k_r
-        (n, P, N) by the state's own k_r.
+        Derivatives by the state's own k_r in s, shape (n, P, N).
     by_k_e
-        (n, P, N, B) by the state's own k_e in every band.
+        Derivatives by the state's own k_e of every band in s, shape (n, P, N, B).
     """
 
     value: FloatArray
@@ -32,16 +32,16 @@ class Levels(NamedTuple):
     by_k_e: FloatArray
 
     def of(self, which: NDArray[np.intp]) -> "Levels":
-        """Some of them, in the order wanted."""
+        """Return the levels at some indices, in their order."""
         return Levels(self.value[which], self.by_k_r[which], self.by_k_e[which])
 
     def meaned(self, places: int) -> "Levels":
-        """Of sites that stand one after the other for each of so many places within them."""
+        """Average over `places` per site, given all sites for one place after the other."""
         parts = (part.reshape(len(part), places, -1, *part.shape[2:]) for part in self)
         return Levels(*(part.mean(axis=1) for part in parts))
 
     def decayed(self, k_r_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray) -> "Levels":
-        """In the dark: means over exposures (n,) that begin `t_s` (n,) later."""
+        """Return the levels in the dark, averaged over exposures that begin `t_s` later, (n,)."""
         t, x = t_s[:, None, None], exposure_s[:, None, None] * k_r_per_s
         mean = phi1(x)
         left = np.exp(-k_r_per_s * t) * mean
@@ -54,16 +54,16 @@ class Levels(NamedTuple):
 
 
 class _Charges(NamedTuple):
-    """What K charges, from lamp-on to the end of the fade, do to r: r → kept r + gained.
+    """Effect of K charges on r, from lamp on until the lamp is dark: r → kept r + gained.
 
     Attributes
     ----------
     lasted_s, dose
-        (K,) and (K, P, B) s, −∂ ln kept by k_r and by k_e.
+        Derivatives −∂ ln kept by k_r in s (K,) and by k_e in s (K, P, B).
     kept
-        (K, P, N).
+        Fraction of the initial concentration that is kept, shape (K, P, N).
     gained
-        Levels, n = K, reached from 0.
+        Levels reached from 0, n = K.
     """
 
     lasted_s: FloatArray
@@ -73,12 +73,14 @@ class _Charges(NamedTuple):
 
 
 def levels(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
-    """Of all photographs of a series.
+    """Return the levels of all exposures of a series.
 
     Parameters
     ----------
+    series
+        The charging series.
     k_r_per_s, k_e_per_s
-        (N,) and (N, B).
+        Re-radiation rates (N,) and excitation rates (N, B) in 1/s.
     """
     if series.across is not None:
         every = levels(series.spread(), k_r_per_s, k_e_per_s)
@@ -92,9 +94,10 @@ def levels(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
 
 
 def levels_at_off(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
-    """After every charge, traced back in the dark from the end of the fade to lamp-off.
+    """Return the levels after every charge, traced back in the dark to lamp off.
 
-    The fade itself charges a little: this is the r(0) to which the amplitude of a decay belongs.
+    The turn-off transient itself charges a little: this is the r(0) to which the amplitude of a
+    decay belongs.
     """
     none = np.zeros(len(series.charges))
     ended = _ended(series, k_r_per_s, k_e_per_s)
@@ -102,12 +105,12 @@ def levels_at_off(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: Floa
 
 
 def _dark_s(series: ChargingSeries) -> FloatArray:
-    """(K,) when the lamp is dark after each charge."""
+    """Return the time at which the lamp is dark after each charge, in s, shape (K,)."""
     return np.array([charge.off_s for charge in series.charges]) + series.fade.total_s
 
 
 def _ended(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
-    """After every charge, when the lamp is dark, n = K."""
+    """Return the levels after every charge, when the lamp is dark, n = K."""
     alone = _alone(series, k_r_per_s, k_e_per_s)
     on_s = np.array([charge.on_s for charge in series.charges])
     waited_s = on_s[1:] - _dark_s(series)[:-1]
@@ -130,7 +133,7 @@ def _ended(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
 
 
 def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> _Charges:
-    """Every charge for itself."""
+    """Compute the effect of every charge on its own."""
     duration_s, fraction = _steps(series)
     brightness = np.array([charge.brightness for charge in series.charges])
     sites, bands = series.irradiance.shape
@@ -165,7 +168,7 @@ def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
 
 
 def _steps(series: ChargingSeries) -> tuple[FloatArray, FloatArray]:
-    """(m, K) durations of the steps, (m, B) irradiance of the bands in each over the steady one."""
+    """Return durations (m, K) in s and relative irradiance (m, B) of the steps of all charges."""
     rise, fade = series.rise, series.fade
     steady_s = [charge.off_s - charge.on_s - rise.total_s for charge in series.charges]
     changes = len(rise.duration_s), len(fade.duration_s)

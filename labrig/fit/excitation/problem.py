@@ -1,4 +1,4 @@
-"""Residuals of all series together: of rates, amplitudes and what is only half known.
+"""Residuals of all series as a function of rates, amplitudes and parameters with a prior.
 
 The signal of a site is w_c Σ_i A_i r_i: one amplitude A_i = Λ* k_r,i for every state, the signal of
 a fully charged sample in the brightest channel, and one weight per channel.
@@ -21,13 +21,13 @@ class ExcitationProblem:
     Parameters
     ----------
     series
-        The first one defines E.
+        Charging series; the first one defines E.
     states
-        N.
+        Number N of states.
     reference
-        Channel whose weight is 1.
+        Index of the channel whose weight is 1.
     uncertain
-        What else scatters.
+        Further sources of scatter.
     """
 
     def __init__(
@@ -55,11 +55,11 @@ class ExcitationProblem:
 
     @property
     def n_values(self) -> int:
-        """Values measured."""
+        """Number of values measured."""
         return sum(int(np.count_nonzero(one)) for one in self._inverse_sigma)
 
     def signal(self, theta: FloatArray) -> list[FloatArray]:
-        """(n, P, C) of every series."""
+        """Return the model of every series, shape (n, P, C) each."""
         rates = self.parameters.unpack(theta)
         return [
             _signal(levels(one, rates.k_r_per_s, rates.k_e_per_s).value @ rates.amplitude, rates)
@@ -67,7 +67,7 @@ class ExcitationProblem:
         ]
 
     def plain_residuals(self, theta: FloatArray) -> tuple[FloatArray, ...]:
-        """(n, P, C) of every series: value − model in σ, NaN where nothing was measured."""
+        """Return value − model in σ of every series, shape (n, P, C), NaN where not measured."""
         return tuple(
             np.where(inverse > 0, (values - signal) * inverse, np.nan)
             for values, inverse, signal in zip(
@@ -86,7 +86,7 @@ class ExcitationProblem:
             ]
 
     def residuals(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Whitened model − values, then priors; and the Jacobian."""
+        """Return whitened model − values, followed by priors, and the Jacobian."""
         rates = self.parameters.unpack(theta)
         parts = [self._of_series(number, one, rates) for number, one in enumerate(self.lit(rates))]
         sigma = self.parameters.prior_sigma
@@ -98,7 +98,7 @@ class ExcitationProblem:
         return np.concatenate(residuals), np.concatenate(jacobians)
 
     def lit(self, rates: Rates) -> list[ChargingSeries]:
-        """The series with irradiance and brightness as θ has them."""
+        """Return the series with the irradiance and the brightness of θ."""
         lit = []
         for number, (one, log_scale) in enumerate(zip(self.series, rates.log_scale, strict=True)):
             cold = np.array([charge.cold for charge in one.charges])
@@ -139,7 +139,7 @@ class ExcitationProblem:
         return self._whitened(number, misfit.reshape(shots, -1), jacobian)
 
     def _by_light(self, number: int, one: ChargingSeries, rates: Rates, slopes: FloatArray) -> None:
-        """Derivatives by all that changes the light, from those by k_e."""
+        """Set the derivatives by all parameters of the light, from those by k_e."""
         columns, charges = self.parameters.columns, self.parameters.charges(number)
         by_k_e = slopes[..., columns.k_e].reshape(*slopes.shape[:2], *rates.k_e_per_s.shape)
         by_band = np.einsum("fpnb,nb->fpb", by_k_e, rates.k_e_per_s)
@@ -164,7 +164,7 @@ class ExcitationProblem:
     def _whitened(
         self, number: int, misfit: FloatArray, jacobian: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Multiplied by a W with Wᵀ W = (1 + Σ u uᵀ)⁻¹, photograph by photograph."""
+        """Multiply by a W with Wᵀ W = (1 + Σ u uᵀ)⁻¹, exposure by exposure."""
         misfit, jacobian = misfit[..., None], jacobian.reshape(*misfit.shape, -1)
         for common in self._common[number]:
             common.take_from(misfit)
@@ -173,24 +173,24 @@ class ExcitationProblem:
 
 
 class _Common(NamedTuple):
-    """u (n, PC) of each photograph, and u over √(1 + u²) (1 + √(1 + u²))."""
+    """Common-mode direction u (n, PC) of each exposure, and u over √(1 + u²) (1 + √(1 + u²))."""
 
     u: FloatArray
     shrunk: FloatArray
 
     @classmethod
     def along(cls, u: FloatArray) -> Self:
-        """(1 + u uᵀ)^(−1/2) = 1 − shrunk uᵀ."""
+        """Return the whitening along u: (1 + u uᵀ)^(−1/2) = 1 − shrunk uᵀ."""
         root = np.sqrt(1 + np.einsum("fv,fv->f", u, u))
         return cls(u, u / (root * (1 + root))[:, None])
 
     def take_from(self, columns: FloatArray) -> None:
-        """Whiten (n, PC, k) in place."""
+        """Whiten columns (n, PC, k) in place."""
         columns -= self.shrunk[..., None] * (self.u[:, None, :] @ columns)
 
 
 def _one_by_one(vectors: Sequence[FloatArray]) -> list[_Common]:
-    """Of a covariance 1 + Σ u uᵀ: each u as it is once those before it are whitened."""
+    """Factor a covariance 1 + Σ u uᵀ: each u is whitened by those before it."""
     every: list[_Common] = []
     for vector in vectors:
         column = vector[..., None].copy()
@@ -201,11 +201,11 @@ def _one_by_one(vectors: Sequence[FloatArray]) -> list[_Common]:
 
 
 def _flat(values: FloatArray) -> FloatArray:
-    """(n, PC) of (n, P, C)."""
+    """Reshape (n, P, C) to (n, PC)."""
     return values.reshape(len(values), -1)
 
 
 def _signal(glow: FloatArray, rates: Rates) -> FloatArray:
-    """(n, P, C) of a glow (n, P) in the brightest channel."""
+    """Return the signal (n, P, C) of a glow (n, P) in the brightest channel."""
     signal: FloatArray = np.multiply.outer(glow, rates.weights)
     return signal + rates.offset if len(rates.offset) else signal

@@ -1,4 +1,4 @@
-"""Where the fit of an excitation starts: one state for all, charged by a few guesses."""
+"""Start values of an excitation fit: one state of the mean rate, charged to guessed levels."""
 
 from collections.abc import Iterator
 
@@ -18,14 +18,16 @@ KAPPA_OVER_K_R = np.geomspace(1e-5, 1e3, 65)
 def starts(
     problem: ExcitationProblem, k_r_per_s: FloatArray, fractions: FloatArray, reference: int
 ) -> Iterator[FloatArray]:
-    """θ to start from, one per guessed level.
+    """Yield a start θ for each guessed level.
 
     Parameters
     ----------
+    problem
+        The least-squares problem.
     k_r_per_s, fractions
-        (N,) rates and what each state contributes to the glow, as a decay shows them.
+        Rates in 1/s and each state's fraction of the glow, from a decay, shape (N,).
     reference
-        The brightest channel.
+        Index of the brightest channel.
     """
     fractions = fractions / fractions.sum()
     peak = max(float(np.nanmax(one.values[..., reference])) for one in problem.series)
@@ -49,7 +51,7 @@ def _irradiances(problem: ExcitationProblem) -> FloatArray:
 
 
 def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: int) -> FloatArray:
-    """(P,) κ of every site that explains its glow best, of one state of amplitude `total`."""
+    """Return the κ (P,) of each site that fits its glow best, for one state of amplitude `total`."""
     bands = series.irradiance.shape[1]
     grid = ChargingSeries(
         series.name,
@@ -71,7 +73,7 @@ def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: in
 
 
 def _weights(problem: ExcitationProblem, reference: int) -> FloatArray:
-    """(C,) of the channels over the reference, from all values."""
+    """Estimate channel weights (C,) over the reference from all values."""
     totals = sum(np.nansum(one.values, axis=(0, 1)) for one in problem.series)
     weights: FloatArray = np.maximum(totals / totals[reference], 0)
     return weights

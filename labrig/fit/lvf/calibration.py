@@ -1,10 +1,9 @@
-"""What a variable filter lets through at every position, from colour filters over a grey card.
+"""Transmission of a variable filter at every position, from colour filters over a grey card.
 
-I_pfc = ∫ T_p F_f L R S_c dλ (paper, section 4.2) says little about T_p by itself, so T_p is a
-skewed peak on a leakage, plus a remainder on a coarse grid that is held small. The mercury lines'
-map comes in as what is known of the centres beforehand, and how a strip's figures run along it as
-what its other positions let expect. The camera's curves are fitted along: they are wrong in the
-same way everywhere.
+I_pfc = ∫ T_p F_f L R S_c dλ (paper, section 4.2) constrains T_p weakly, so T_p is a skewed peak on
+a leakage, plus a remainder on a coarse grid with a narrow prior. The wavelength map of the mercury
+lines is the prior of the centres, and a smooth run of the parameters along the strip that of the
+other parameters. The camera's curves are fitted, too: their error is common to all positions.
 """
 
 from collections.abc import Sequence
@@ -61,12 +60,12 @@ class LvfCalibration:
     Attributes
     ----------
     lvf
-        Its bands with their σ, transmission relative to the same unknown factor at all positions.
+        Bands with σ, transmission relative to one unknown factor that is common to all positions.
     misfit
-        (p,) root mean square of what is left, in σ; where it is above 1 σ has been raised by it.
+        Root mean square of the residuals in σ, shape (p,); where it is above 1, σ was multiplied by
+        it.
     camera
-        The camera that was used, its curves as the filters tell them: what the strip lets through
-        belongs to these.
+        Camera with its curves as fitted with the filters; the transmission belongs to these.
     """
 
     lvf: Lvf
@@ -86,28 +85,28 @@ def calibrate_lvf(
     wavelengths: WavelengthMap,
     curve_error: CurveError | None = CurveError(),  # noqa: B008 (frozen)
 ) -> LvfCalibration:
-    """T_p(λ) at every position.
+    """Fit T_p(λ) at every position.
 
     Parameters
     ----------
     position
-        (p,) rising.
+        Rising positions, shape (p,).
     value, sigma
-        (p, filters, channels), every channel in units in which the card by itself, without filter
-        and strip, gives ∫ L R S_c dλ; NaN leaves a value out (clipped, missing).
+        Values and σ, shape (p, filters, channels), every channel in units in which the card without
+        filter and strip gives ∫ L R S_c dλ; NaN leaves a value out (clipped, missing).
     filters
-        One after the other over the grey card; a `Transmittance` of 1 is none.
+        Colour filters, in front of the grey card one at a time; a `Transmittance` of 1 is none.
     lamp, card, camera
-        Known irradiance (relative), reflectance and curves.
+        Relative irradiance of the lamp, reflectance of the card, and curves of the camera.
     wavelengths
-        Position → wavelength from mercury lines.
+        Wavelength along the strip from mercury lines.
     curve_error
-        How well the camera's curves are known.
+        Error of the camera's curves; None takes them for exact.
 
     Raises
     ------
     FitError
-        Too few filters, or a position with too few values or no light.
+        There are too few filters, or a position has too few values or no light.
     """
     places = np.asarray(position, dtype=np.float64)
     values, sigmas = np.asarray(value, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
@@ -140,7 +139,7 @@ def calibrate_lvf(
 
 
 def _before(centre_nm: FloatArray, sigma_nm: FloatArray, knots_nm: FloatArray) -> Expected:
-    """What is known before anything is measured."""
+    """Return the prior of all parameters."""
     mean = np.zeros((len(centre_nm), of.FIGURES + len(knots_nm)))
     sigma = np.empty_like(mean)
     near = np.abs(knots_nm - centre_nm[:, np.newaxis]) < SHAPE_NM
@@ -158,12 +157,12 @@ def _before(centre_nm: FloatArray, sigma_nm: FloatArray, knots_nm: FloatArray) -
 
 
 def _begin(problem: StripProblem, first: Expected, places: FloatArray) -> StripSolution:
-    """The bands that are expected, as high as they are seen.
+    """Return the expected bands, scaled to the measured light.
 
     Raises
     ------
     FitError
-        A position with too few values or no light.
+        A position has too few values or no light.
     """
     for place, count in zip(places, problem.used.sum(axis=1), strict=True):
         if count < of.FIGURES:
@@ -181,9 +180,10 @@ def _begin(problem: StripProblem, first: Expected, places: FloatArray) -> StripS
 def _from_the_others(
     places: FloatArray, found: StripSolution, sigmas: FloatArray, first: Expected
 ) -> Expected:
-    """What all other positions let expect of each one, by polynomials along the strip, and σ.
+    """Return the prior of each position from all others, by polynomials along the strip, with σ.
 
-    A strip is coated in one go; what a position at the end says badly its neighbours say well.
+    A strip is coated in one process; at its ends, where a position is poorly constrained, the
+    neighbours constrain it.
     """
     scaled = (places - places.mean()) / (np.ptp(places) / 2)
     mean, unsure = first.mean.copy(), first.sigma.copy()

@@ -1,4 +1,4 @@
-"""The profile of a strip under a mercury lamp, as a sum of lines on a background."""
+"""Model of a strip's profile under a mercury lamp: a sum of lines on a background."""
 
 from dataclasses import dataclass
 
@@ -27,15 +27,15 @@ _STEP = 1e-5
 
 @dataclass(frozen=True)
 class Line:
-    """A spectral line, or two that are seen as one.
+    """A spectral line, or an unresolved pair.
 
     Attributes
     ----------
     wavelength_nm
-        In air; of the two, the shorter one first.
+        Wavelengths in air in nm; of a pair, the shorter one first.
     second_fraction
-        Fraction of the second one in the light of both, and how well that is known; it depends on
-        the lamp and on the camera.
+        Fraction of the second line in the light of a pair, and its σ; it depends on the lamp and on
+        the camera.
     """
 
     wavelength_nm: tuple[float, ...]
@@ -43,7 +43,7 @@ class Line:
 
     @property
     def centre_nm(self) -> float:
-        """Mean of the two by their fractions."""
+        """Mean wavelength weighted by the fractions, in nm."""
         if len(self.wavelength_nm) == 1:
             return self.wavelength_nm[0]
         fraction = self.second_fraction[0]
@@ -62,7 +62,7 @@ MERCURY = (
 
 @dataclass(frozen=True)
 class Assignment:
-    """λ ≈ offset + slope · position, and how well the peaks agree with it."""
+    """Assignment of peaks to lines, λ ≈ offset + slope · position, with a score."""
 
     offset_nm: float
     slope_nm: float
@@ -71,7 +71,7 @@ class Assignment:
 
 
 class LineModel:
-    """The profile as a sum of lines; heights and background are eliminated at every step."""
+    """Profile as a sum of lines; heights and background are eliminated at every step."""
 
     def __init__(
         self, u: FloatArray, values: FloatArray, lines: tuple[Line, ...], way: Assignment
@@ -84,7 +84,7 @@ class LineModel:
         self.middle, self.reach = float(u.mean()), float(np.ptp(u)) / 2
 
     def located(self) -> LocatedLines:
-        """Fit; lines too faint to be located are left out, and the rest fitted again."""
+        """Fit; lines too faint to be located are dropped, and the rest fitted again."""
         while True:
             x, sigma, noise = self._fitted()
             position, at_sigma = x[: len(self.lines)], sigma[: len(self.lines)]
@@ -113,7 +113,7 @@ class LineModel:
         )
 
     def _fitted(self) -> tuple[FloatArray, FloatArray, float]:
-        """Positions, log width and its change, skew, fractions; their σ; the noise."""
+        """Return positions, log width and its change, skew and fractions; their σ; the noise."""
         fractions = [line.second_fraction for line in self.lines if len(line.wavelength_nm) == 2]
         start = np.array(
             [*self.start, np.log(self.way.fwhm), 0.0, 0.0, *(fraction for fraction, _ in fractions)]
@@ -142,7 +142,7 @@ class LineModel:
         return fit.parameters, np.sqrt(variance), noise
 
     def _blend_variance(self, x: FloatArray) -> FloatArray:
-        """(lines,) of the positions, by the fractions of blends that are not resolved."""
+        """Return the positions' variance from the fractions of unresolved blends, (lines,)."""
         per_nm, fwhm = abs(self._per_nm(x[: len(self.lines)])), np.exp(x[len(self.lines)])
         apart = np.array([per_nm * np.ptp(line.wavelength_nm) for line in self.lines])
         unsure = np.array([line.second_fraction[1] for line in self.lines])
@@ -152,7 +152,7 @@ class LineModel:
     def _with_derivatives(
         self, x: FloatArray, scale: FloatArray, noise: float, prior: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Residuals and their Jacobian by central differences."""
+        """Return residuals and their Jacobian by central differences."""
         steps = np.diag(_STEP * np.maximum(np.abs(scale), 1.0))
         here, up, down = np.split(
             self._residuals(np.concatenate([x[np.newaxis], x + steps, x - steps]), noise, prior),
@@ -161,14 +161,14 @@ class LineModel:
         return here[0], ((up - down) / (2 * np.diag(steps)[:, np.newaxis])).T
 
     def _residuals(self, x: FloatArray, noise: float, prior: FloatArray) -> FloatArray:
-        """(..., residuals) of parameters of shape (..., parameters)."""
+        """Return residuals (..., residuals) of parameters (..., parameters)."""
         left = (self.values - self._fit_values(x)) / noise
         fractions = [line.second_fraction[0] for line in self.lines if len(line.wavelength_nm) == 2]
         pulled = (x[..., len(self.lines) + 3 :] - fractions) / prior
         return np.concatenate([left.reshape(*x.shape[:-1], -1), pulled], axis=-1)
 
     def _shapes(self, x: FloatArray) -> FloatArray:
-        """(..., n, lines + 2): every line at height 1, and the background."""
+        """Return every line at height 1, and the background, shape (..., n, lines + 2)."""
         n = len(self.lines)
         positions, of_all = x[..., :n], x[..., n : n + 3, np.newaxis]
         log_width, change, skew = of_all[..., 0, :], of_all[..., 1, :], of_all[..., 2:, :]
@@ -191,20 +191,20 @@ class LineModel:
         return np.concatenate([lines, np.broadcast_to(background, (*lines.shape[:-1], 2))], axis=-1)
 
     def _per_nm(self, positions: FloatArray) -> FloatArray:
-        """(...,) slope of the positions (..., lines) over the wavelengths."""
+        """Return the slope of the positions (..., lines) over the wavelengths, shape (...,)."""
         nm = np.array([line.wavelength_nm[0] for line in self.lines])
         nm -= nm.mean()
         slope: FloatArray = positions @ nm / (nm @ nm)
         return slope
 
     def _fit_values(self, x: FloatArray) -> FloatArray:
-        """(..., n, channels): what is nearest to the values."""
+        """Return the best fit to the values, shape (..., n, channels)."""
         basis, _ = np.linalg.qr(self._shapes(x))
         fitted: FloatArray = basis @ (np.swapaxes(basis, -1, -2) @ self.values)
         return fitted
 
     def _heights(self, x: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
-        """(lines, channels) heights and their (lines, 1) σ."""
+        """Return the heights (lines, channels) and their σ (lines, 1)."""
         shapes, n = self._shapes(x), len(self.lines)
         heights = np.asarray(np.linalg.lstsq(shapes, self.values)[0][:n], dtype=np.float64)
         variance = np.diag(np.linalg.pinv(shapes.T @ shapes))[:n]

@@ -1,4 +1,4 @@
-"""Lines of a mercury lamp in the profile of a strip, to a fraction of a pixel."""
+"""Location of the lines of a mercury lamp in the profile of a strip, to a fraction of a pixel."""
 
 from dataclasses import dataclass
 from itertools import combinations
@@ -37,14 +37,14 @@ _MAD = 0.6745 * np.sqrt(20.0)
 
 @dataclass(frozen=True)
 class Peak:
-    """A peak of one channel or more.
+    """A peak of at least one channel.
 
     Attributes
     ----------
     position, fwhm
-        In the unit of the profile's positions.
+        Position and full width at half maximum, in the unit of the profile's positions.
     prominence
-        In units of the noise.
+        Prominence in units of the noise.
     blueness
         Fraction of blue in blue and red; 0 without colours.
     """
@@ -56,9 +56,9 @@ class Peak:
 
 
 def find_line_peaks(position: FloatArray, values: FloatArray) -> list[Peak]:
-    """The most prominent peaks of a profile (n, channels), by rising position.
+    """Return the most prominent peaks of a profile (n, channels), by rising position.
 
-    Sought channel by channel: in the sum neighbouring lines run together.
+    They are searched channel by channel: in the sum neighbouring lines merge.
     """
     finest = max(float(np.diff(position).min()), float(np.ptp(position)) / MOST_SAMPLES)
     even = np.arange(position[0], position[-1], finest)
@@ -90,7 +90,7 @@ def find_line_peaks(position: FloatArray, values: FloatArray) -> list[Peak]:
 
 
 def _once_each(found: list[Peak]) -> list[Peak]:
-    """Of peaks at the same place in several channels, the most prominent one."""
+    """Return the most prominent one of peaks at the same place in several channels."""
     kept: list[Peak] = []
     for peak in sorted(found, key=lambda peak: -peak.prominence):
         if all(abs(peak.position - other.position) > SAME * other.fwhm for other in kept):
@@ -117,26 +117,27 @@ def locate_lines(
     fwhm_nm: float = NOMINAL_FWHM_NM,
     rising: bool | None = None,
 ) -> LocatedLines:
-    """Find which peaks are which lines, then fit all of them at once.
+    """Assign peaks to lines, then fit all lines at once.
 
     A blend is the sum of its two lines at their known distance. All lines have the same skewed
-    shape, whose width may change evenly along the strip, and lie on a straight background.
+    shape, whose width may change linearly along the strip, and lie on a linear background.
 
     Parameters
     ----------
     position, profile
-        (n,) rising, and (n,) or (n, channels): of R, G and B the colours tell which end is blue.
+        Rising positions (n,), and profile (n,) or (n, channels); the colours of R, G and B tell the
+        blue end.
     lines
-        To look for, by rising wavelength.
+        Lines to find, by rising wavelength.
     fwhm_nm
-        Width of a line, to within a factor of two.
+        Width of a line in nm, to within a factor of two.
     rising
-        Which way round the strip is expected to be; None takes it as it is.
+        Whether the wavelength is expected to rise with the position; None accepts both.
 
     Raises
     ------
     FitError
-        No such lines, a strip the wrong way round, or no way to tell which way round it is.
+        There are no such lines, the strip is the wrong way round, or its orientation is ambiguous.
     """
     u = np.asarray(position, dtype=np.float64)
     values = np.asarray(profile, dtype=np.float64).reshape(len(u), -1)
@@ -175,7 +176,7 @@ def locate_lines(
 
 
 def _best_each_way(models: list[LineModel]) -> list[LocatedLines]:
-    """Of the models that can be fitted, the one that explains most, for either way round."""
+    """Return the model that explains most for each orientation, of those that can be fitted."""
     best: dict[bool, LocatedLines] = {}
     refusal: FitError | None = None
     for model in models:
@@ -198,7 +199,7 @@ def _best_each_way(models: list[LineModel]) -> list[LocatedLines]:
 
 
 def _bend_nm(lines: LocatedLines, middle: float, reach: float) -> float:
-    """How far the strip's middle is off the line between its ends."""
+    """Return the distance of the strip's middle from the line between its ends, in nm."""
     scaled = (lines.position - middle) / reach
     return abs(float(np.polyfit(scaled, lines.wavelength_nm, 2, w=1 / lines.sigma)[0]))
 
@@ -206,7 +207,7 @@ def _bend_nm(lines: LocatedLines, middle: float, reach: float) -> float:
 def _assigned(
     peaks: list[Peak], lines: tuple[Line, ...], fwhm_nm: float, rising: bool
 ) -> list[Assignment]:
-    """For every choice of lines, the peaks that agree with it best."""
+    """Return the peaks that agree best with each choice of lines."""
     centres = [line.centre_nm for line in lines]
     found: list[Assignment] = []
     for number in range(min(len(lines), len(peaks)), FEWEST_LINES - 1, -1):

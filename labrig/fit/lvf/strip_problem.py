@@ -1,8 +1,8 @@
-"""A strip's bands at all positions and the camera's curves, fitted to all pictures together.
+"""Joint fit of a strip's bands at all positions and the camera's curves.
 
-The curves are wrong in the same way at every position, so that all positions together tell of it
-what one alone could take for light that leaks. Given the curves each position stands by itself: a
-step solves the positions one by one, and the curves from what that leaves (a Schur complement).
+The curves have the same error at every position, so that all positions together constrain what one
+alone could attribute to leakage. Given the curves the positions are independent: a step solves them
+one by one, and the curves from the rest (a Schur complement).
 """
 
 from collections.abc import Sequence
@@ -31,7 +31,7 @@ _ENOUGH = 0.1
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """What is known of every position's figures beforehand: (p, figures) each."""
+    """Prior of every position's parameters: mean and σ, shape (p, figures) each."""
 
     mean: FloatArray
     sigma: FloatArray
@@ -39,7 +39,7 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class StripSolution:
-    """Figures (p, figures) and z of the curves' modes (modes,), where χ² is least."""
+    """Parameters (p, figures) and amplitudes z of the curves' modes (modes,) at the minimum."""
 
     figures: FloatArray
     curves: FloatArray
@@ -47,7 +47,7 @@ class StripSolution:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """One of Gauss and Newton, damped."""
+    """Damped Gauss–Newton step."""
 
     figures: FloatArray
     curves: FloatArray
@@ -63,12 +63,12 @@ class StripProblem:
     Parameters
     ----------
     value, sigma
-        (p, filters, channels), in units in which the card by itself gives ∫ L R S_c dλ; NaN leaves
-        a value out.
+        Values and σ, shape (p, filters, channels), in units in which the card alone gives ∫ L R S_c
+        dλ; NaN leaves a value out.
     filters, lamp, card, camera
-        Known.
+        Colour filters, irradiance of the lamp, reflectance of the card and curves of the camera.
     curve_error
-        How well the curves are; None takes them for exact.
+        Error of the curves; None takes them for exact.
     """
 
     def __init__(
@@ -109,11 +109,11 @@ class StripProblem:
 
     @property
     def modes(self) -> int:
-        """Ways in which the curves may be wrong."""
+        """Number of error modes of the curves."""
         return len(self._modes)
 
     def scales(self, figures: FloatArray) -> FloatArray:
-        """(p,) by which the light that these figures let through is to be multiplied."""
+        """Return the factors (p,) from the light of these parameters to the measured light."""
         expected = self._transmission(figures) @ self._design.T
         weight = expected * self.used
         total = (weight**2).sum(axis=1)
@@ -121,7 +121,7 @@ class StripProblem:
         return scales
 
     def camera(self, curves: FloatArray) -> CameraResponse:
-        """The camera with its curves as found; the highest of all is 1."""
+        """Return the camera with the fitted curves; the highest value of all is 1."""
         order = np.argsort(self._nodes)
         changes = np.tensordot(curves, self._modes, axes=1)[order]
         columns = [
@@ -132,13 +132,13 @@ class StripProblem:
         return replace(self._camera, sensitivity=sensitivity / sensitivity.max())
 
     def misfit(self, found: StripSolution) -> FloatArray:
-        """(p,) root mean square of what is left, in σ."""
+        """Return the root mean square of the residuals in σ, shape (p,)."""
         left, _ = self._left(found)
         rms: FloatArray = np.sqrt((left**2).sum(axis=1) / self.used.sum(axis=1))
         return rms
 
     def solve(self, begin: StripSolution, expected: Expected, iterations: int) -> StripSolution:
-        """Levenberg–Marquardt from `begin` on; at most so many steps."""
+        """Minimise χ² by Levenberg–Marquardt from `begin`, in at most `iterations` steps."""
         found, chi2, damping = begin, self._chi2(begin, expected), _DAMPING
         for _ in range(iterations):
             better, after = self._better(found, chi2, expected, damping)
@@ -153,7 +153,7 @@ class StripProblem:
         return found
 
     def sigmas(self, found: StripSolution, expected: Expected) -> FloatArray:
-        """(p, figures) standard uncertainties, those of the curves included."""
+        """Return standard uncertainties (p, figures), those of the curves included."""
         step = self._step(found, expected, 0.0)
         curves = np.linalg.inv(step.information)
         rows = []
@@ -181,7 +181,7 @@ class StripProblem:
         return float((left**2).sum() + (prior**2).sum() + found.curves @ found.curves)
 
     def _left(self, found: StripSolution) -> tuple[FloatArray, FloatArray]:
-        """(p, values) measured − expected in σ, and the design (values, grid) with its curves."""
+        """Return measured − expected in σ (p, values), and the fitted design (values, grid)."""
         design = self._design + np.tensordot(found.curves, self._bent, axes=1)
         expected = self._transmission(found.figures) @ design.T
         return (self._value - expected) * self._inverse, design
@@ -214,14 +214,14 @@ class StripProblem:
         return _Step(np.array(figures), curves, triangles, information)
 
     def _transmission(self, figures: FloatArray) -> FloatArray:
-        """(p, grid)."""
+        """Return T_p on the wavelength grid, shape (p, grid)."""
         relative = _shapes(self.grid_nm, figures) + figures[:, [LEAKAGE]]
         relative = relative + figures[:, FIGURES:] @ self._hat_functions.T
         transmission: FloatArray = np.exp(figures[:, [LOG_PEAK]]) * relative
         return transmission
 
     def _derivatives(self, figures: FloatArray) -> FloatArray:
-        """(p, figures, grid)."""
+        """Return the derivatives of T_p by the parameters, shape (p, figures, grid)."""
         peak = np.exp(figures[:, [LOG_PEAK]])
         columns = []
         for number in (CENTRE, LOG_WIDTH, SKEW):
@@ -235,12 +235,12 @@ class StripProblem:
 
 
 def _on_grid(light: FloatArray, sensitivity: FloatArray, onto_grid: FloatArray) -> FloatArray:
-    """(filters · channels, grid): a value is this times the transmission on the grid."""
+    """Return the design (filters · channels, grid) from transmission on the grid to values."""
     rows = [light * column @ onto_grid for column in sensitivity.T]
     return np.stack(rows, axis=1).reshape(-1, onto_grid.shape[1])
 
 
 def _shapes(nm: FloatArray, figures: FloatArray) -> FloatArray:
-    """(p, grid) peaks of height 1."""
+    """Return peaks of height 1, shape (p, grid)."""
     centre, log_width, skew = (figures[:, [number]] for number in (CENTRE, LOG_WIDTH, SKEW))
     return peak_shape(nm - centre, np.exp(log_width), skew)

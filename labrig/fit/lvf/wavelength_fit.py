@@ -1,4 +1,4 @@
-"""The wavelength along a strip from lines that were located."""
+"""Wavelength along a strip from located lines."""
 
 from dataclasses import dataclass
 
@@ -20,17 +20,17 @@ USUAL_BEND_NM = 5.0
 
 @dataclass(frozen=True, eq=False)
 class WavelengthFit:
-    """A map along a strip, and what was left over.
+    """A wavelength map along a strip, and its residuals.
 
     Attributes
     ----------
     map
-        With the covariance of its coefficients; in it is what a bend that was not believed may
-        still do, so that σ grows honestly where the map is extrapolated.
+        Wavelength map with the covariance of its coefficients; it includes a bend that was not
+        significant, so that σ grows realistically where the map is extrapolated.
     residual_nm
-        (l,) wavelength of the map minus that of the line.
+        Wavelength of the map minus that of each line in nm, shape (l,).
     order
-        1 or 2: straight or bent.
+        Order of the polynomial: 1 straight, 2 bent.
     """
 
     map: WavelengthMap
@@ -39,19 +39,19 @@ class WavelengthFit:
 
 
 def fit_wavelengths(lines: LocatedLines, span: tuple[float, float]) -> WavelengthFit:
-    """Position → wavelength, straight or, where that is clearly better, bent.
+    """Fit the wavelength along a strip, linear or, where clearly better, quadratic.
 
     Parameters
     ----------
     lines
-        Three or more.
+        Three or more located lines.
     span
         First and last position of the strip.
 
     Raises
     ------
     FitError
-        The lines do not rise or fall along the strip.
+        The lines are not monotone along the strip.
     """
     middle, half = (span[0] + span[1]) / 2, (span[1] - span[0]) / 2
     powers = np.vander((lines.position - middle) / half, 3, increasing=True)
@@ -76,7 +76,7 @@ def fit_wavelengths(lines: LocatedLines, span: tuple[float, float]) -> Wavelengt
 def _weighted(
     powers: FloatArray, wanted: FloatArray, sigma: FloatArray, bend_sigma: float
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Coefficients, covariance and χ²; the last of three is 0 ± `bend_sigma` beforehand."""
+    """Return coefficients, covariance and χ²; the last of three has the prior 0 ± `bend_sigma`."""
     rows = powers / sigma[:, np.newaxis]
     precision = rows.T @ rows
     if np.isfinite(bend_sigma):

@@ -1,9 +1,9 @@
-"""Where a narrow line is, told by values that each see much of the spectrum.
+"""Wavelength of a narrow line from broadband values.
 
-A spectrum that is only smooth (`fit_spectrum`) comes out as broad as what one value sees of it, and
-its highest point lies where the values' own curves draw it. Of light that is known to be narrow, a
-laser's, a monochromator's, one LED's, two numbers are unknown, wavelength and strength: they are
-found by likelihood, with the values' noise and with how the system itself may be wrong.
+A spectrum that is only smooth (`fit_spectrum`) comes out as broad as the response of one value, and
+its maximum depends on the shape of the responses. Light that is known to be narrow (a laser, a
+monochromator, an LED) has two unknowns, wavelength and strength: they are found by maximum
+likelihood, with the values' noise and the errors of the system.
 """
 
 from dataclasses import dataclass
@@ -36,12 +36,12 @@ class LineFit:
     Attributes
     ----------
     wavelength_nm, sigma_nm
-        Centre and one standard deviation: the Cramér–Rao bound, times `misfit` where that is
-        above 1. Other wavelengths that explain the values nearly as well are not in it.
+        Centre in nm and one standard deviation: the Cramér–Rao bound, times `misfit` where that is
+        above 1. It does not cover other wavelengths that explain the values nearly as well.
     strength
         Integral over wavelength, in the unit of the system's spectrum times nm.
     misfit
-        Root of χ² per degree of freedom: about 1 if the σ given, the system and the line's shape
+        Root of χ² per degree of freedom: about 1 if the given σ, the system and the line's shape
         hold.
     """
 
@@ -52,21 +52,22 @@ class LineFit:
 
 
 def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm: float) -> LineFit:
-    """The line behind some values.
+    """Fit the line that explains some values.
 
     Parameters
     ----------
     value, sigma
-        (m,) as for `fit_spectrum`.
+        Values and σ as for `fit_spectrum`, shape (m,).
     system
-        Design on evenly spaced knots, and how it may be wrong.
+        Design matrix on evenly spaced knots, and its errors.
     fwhm_nm
-        Of the line, a Gaussian; 0 for one much narrower than what a value sees.
+        Full width at half maximum of the line, a Gaussian, in nm; 0 for one much narrower than the
+        response of a value.
 
     Raises
     ------
     FitError
-        Too few values, none above its noise, or no line between the outermost knots.
+        There are too few values, none above its noise, or no line between the outermost knots.
     """
     _, part, y, s = measured(value, sigma, system)
     knots = part.knots_nm
@@ -103,16 +104,16 @@ def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm
 
 @dataclass(frozen=True)
 class _LineAt:
-    """Values by a line at one wavelength, of the likeliest strength.
+    """Values of a line at one wavelength with its most likely strength.
 
     Attributes
     ----------
     shape, whitened
-        (m,) values of a line of strength 1, and over all that may be wrong.
+        Values of a line of strength 1, and the same whitened by their covariance, shape (m,).
     lower
-        (m, m) root of the values' covariance.
+        Cholesky factor of the values' covariance, shape (m, m).
     strength, chi2, minus_two_log_likelihood
-        Likeliest strength, χ² and −2 ln likelihood but for a constant.
+        Most likely strength, χ², and −2 ln likelihood up to a constant.
     """
 
     shape: FloatArray
@@ -141,10 +142,10 @@ def _line_at(
 
 
 def _hat_functions(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -> FloatArray:
-    """(n,) values at the knots of a line of integral 1, with its centre and its width.
+    """Return the values (n,) at the knots of a line of integral 1, with its centre and its width.
 
-    The straight lines between the knots make it wider by h²/3 in its variance, h the distance of
-    the knots: so much is taken off, if there is so much.
+    Linear interpolation between the knots adds h²/3 to its variance, h the distance of the knots:
+    that much is subtracted as far as possible.
     """
     h = float(knots_nm[1] - knots_nm[0])
     width = np.sqrt(max((fwhm_nm / FWHM_OVER_SIGMA) ** 2 - h**2 / 3, (TOLERANCE * h) ** 2))
