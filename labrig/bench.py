@@ -1,4 +1,4 @@
-"""Opens a rig: the one place where drivers, clock and, in a simulated rig, the room meet."""
+"""Opening of a rig: here drivers and clock meet the simulated room, if there is one."""
 
 import socket
 from collections.abc import Callable, Iterable, Iterator
@@ -31,7 +31,7 @@ TCP_CONNECT_TIMEOUT_S = 5.0
 
 @dataclass(frozen=True)
 class Bench:
-    """A rig before its devices are opened: which clock it runs on, which room it stands in."""
+    """A rig before its devices are opened: file, clock, simulated room, guard and ports."""
 
     file: RigFile
     source: str
@@ -42,7 +42,7 @@ class Bench:
 
     @property
     def guarded_by(self) -> str:
-        """What switches the lights off if this process cannot, as the run's record says it."""
+        """Description for the record of what switches the lights off if this process cannot."""
         if self.guard is not None:
             return self.guard.described
         return "nothing: no light of this rig outlives the process that runs it"
@@ -54,27 +54,27 @@ class Bench:
 
     @property
     def disk(self) -> Disk:
-        """The disk of the PC that the rig hangs on."""
+        """Disk of the PC to which the rig is connected."""
         return REAL_DISK if self.room is None else self.room.disk
 
     def kept_awake(self, warn: Callable[[str], None]) -> AbstractContextManager[None]:
-        """Keep the PC from falling asleep meanwhile; time in a simulated room would sleep, too."""
+        """Keep the PC awake; not for a simulated room, whose time stops while the PC sleeps."""
         return kept_awake(warn) if self.room is None else nullcontext()
 
     @contextmanager
     def devices(self) -> Iterator[Rig]:
-        """Open all devices, each at once brought to its safe state; safe again at the end.
+        """Open all devices, each at once brought to its safe state, and make them safe at the end.
 
-        Ctrl-C and its like are answered at waits, and never keep the safe state from being reached.
+        Ctrl-C and similar signals are handled at waits, and never prevent the safe state.
 
         Raises
         ------
         DeviceError
-            A device is missing, or cannot confirm that it is safe; the guard cannot be started.
+            A device is missing, or cannot confirm that it is safe; or the guard cannot be started.
         UsageError
             Another labrig holds one of the addresses.
         Interrupted
-            Somebody asked to stop.
+            A stop was requested.
         """
         with ExitStack() as stack:
             stack.enter_context(interrupting(self.clock))
@@ -94,7 +94,7 @@ class Bench:
             yield rig
 
     def _make_safe(self, rig: Rig) -> None:
-        """As the rig's; the guard may go when all lights are off, and not before."""
+        """Make the rig safe; the guard stands down only when all lights are off."""
         try:
             rig.make_safe()
         except DeviceError as error:
@@ -149,19 +149,21 @@ def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], No
 
     Parameters
     ----------
+    file
+        The validated rig file.
     source
         Path of the rig file, for messages.
     port
-        TCP port on the loopback network; 0 for any that is free.
+        TCP port on the loopback network; 0 for any free one.
     tell
-        Called with the address once it can be reached.
+        Callback that receives the address once it can be reached.
 
     Raises
     ------
     UsageError
-        No simulated rig, or the port is taken.
+        The rig is not simulated, or the port is taken.
     Interrupted
-        Somebody asked to stop: the only way to end.
+        A stop was requested, which is the only way to end.
     """
     if file.simulation is None:
         raise UsageError(
@@ -186,7 +188,7 @@ def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str
 
 
 class _Connections:
-    """Opens each port once, by whatever name; what is real under a lock that labrigs respect."""
+    """Opener of ports, each once by whatever name; real devices are locked for this labrig."""
 
     def __init__(
         self, clock: Clock, room: "OpenRoom | None", stack: ExitStack, names: SerialPorts
@@ -287,7 +289,7 @@ class _Connections:
             ) from None
 
     def _hold(self, devices: Iterable[str], address: str) -> None:
-        """Keep other labrigs from real devices; a simulated room is private to its process."""
+        """Lock real devices against other labrigs; a simulated room is private to its process."""
         for device in devices:
             if device not in self._held and not address.startswith("sim://"):
                 self._stack.enter_context(held(device, address))
@@ -297,7 +299,7 @@ class _Connections:
 def _with_serial(
     alike: list[Any], serial: str, address: str, serial_of: Callable[[Any], str] | None
 ) -> Any:
-    """The device with that serial number; those that tell none on the bus are asked in turn."""
+    """Return the device with that serial number; devices without one on the bus are queried."""
     others = []
     problem: LabrigError | None = None
     for device in sorted(alike, key=lambda device: not device.iSerialNumber):

@@ -1,4 +1,4 @@
-"""Fills a run folder: unit after unit, and once more where a device was lost and came back."""
+"""Execution of a protocol into a run folder, unit by unit, with recovery from lost devices."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -45,25 +45,25 @@ MOST_NAMED = 4
 
 
 class Watch(Protocol):
-    """Tells a person what is going on: given the plan, the units already complete, the clock."""
+    """Factory of a run's observer, from the plan, the units already complete and the clock."""
 
     def __call__(
         self, plan: Plan, done: Sequence[str], clock: Clock
     ) -> AbstractContextManager[RunObserver]:
-        """The observer of one run."""
+        """Return the observer of one run."""
 
 
 def execute(
     folder: RunFolder, protocol: ProtocolModel, stand: Bench, laid_out: Plan, watch: Watch
 ) -> None:
-    """Do all units that `folder` lacks, with this PC kept awake.
+    """Record all units that `folder` lacks, with this PC kept awake.
 
-    A unit that was cut off by a crash or a lost device, or in which the PC slept, is done again.
+    A unit that was cut off by a crash or a lost device, or in which the PC slept, is repeated.
 
     Raises
     ------
     Interrupted, LabrigError
-        After the safe state was reached; the text says what is kept and how to go on.
+        The run ended early, in the safe state; the text tells what is kept and how to continue.
     """
     dead = folder.close_open_attempts(
         stand.clock.wall, "abort", "labrig ended before this attempt did; closed at resume"
@@ -120,9 +120,9 @@ def execute(
 
 @dataclass
 class _Reconnecting:
-    """Connects, and connects again when a device was lost: unplugged, asleep, switched off.
+    """Connection to the devices, restored when a device was lost: unplugged, asleep, switched off.
 
-    The devices of a PC that slept were without it, and often without power: they are lost, too.
+    While a PC sleeps its devices have no connection, and often no power: they count as lost, too.
     """
 
     stand: Bench
@@ -131,13 +131,13 @@ class _Reconnecting:
     losses: Counter[str] = field(default_factory=Counter)
 
     def run(self, use: Callable[[Rig], None]) -> None:
-        """Have `use` do what is left to do, on devices that are all there.
+        """Call `use` with all devices connected until it completes.
 
         Raises
         ------
         DeviceError
-            A device was missing from the start, did not come back, or was lost too often; or
-            somebody stopped waiting for it.
+            A device was missing from the start, did not come back, or was lost too often; or the
+            wait for it was interrupted.
         """
         lost: DeviceLostError | None = None
         back_by_s = 0.0
@@ -166,14 +166,14 @@ class _Reconnecting:
                     raise lost from error
 
     def _pause(self) -> None:
-        """Ctrl-Z: all is safe, so this process may stop; what was under way is done again."""
+        """Stop at Ctrl-Z in the safe state; open units are repeated."""
         units = self.folder.close_open_attempts(self.stand.clock.wall, "abort", "paused by Ctrl-Z")
         again = "".join(f"; the unit {unit} is done again" for unit in units)
         self.observer.warn(f"paused, safe state reached{again} when it goes on (fg)")
         stop_here()
 
     def _give_up_units(self, error: DeviceLostError) -> None:
-        """Close what was under way, so that it is done again; not for ever."""
+        """Close the open units, so that they are repeated, up to `MOST_LOSSES` times."""
         units = self.folder.close_open_attempts(self.stand.clock.wall, "fail", str(error))
         self.losses.update(units or ["between units"])
         if max(self.losses.values()) >= MOST_LOSSES:
@@ -185,7 +185,7 @@ class _Reconnecting:
 
 
 def _loss(error: DeviceError | Slept) -> DeviceLostError | None:
-    """What may come back, where that can be waited for: nobody asked to stop."""
+    """Return the loss to wait for, None if there is none or a stop was requested."""
     if _met(error, Interrupted):
         return None
     nap = _met(error, Slept)
@@ -200,14 +200,14 @@ def _loss(error: DeviceError | Slept) -> DeviceLostError | None:
 
 
 def _met(error: BaseException | None, kind: type[ErrorT]) -> ErrorT | None:
-    """`error`, or what was raised before it on the way to the safe state, if of that kind."""
+    """Return `error` or its first predecessor on the way to the safe state of that kind."""
     while error is not None and not isinstance(error, kind):
         error = error.__context__
     return error
 
 
 def _refuse_what_spoils(rig: Rig) -> None:
-    """Raise `ProtocolError` if a device is set so that its data could not be trusted."""
+    """Raise `ProtocolError` if a device's settings would invalidate the data."""
     spoilers = [
         f"{key}: {finding}"
         for key, device in rig.devices.items()
@@ -220,9 +220,9 @@ def _refuse_what_spoils(rig: Rig) -> None:
 
 
 def _arrange_again(left: Sequence[ActionRecord], rig: Rig, observer: RunObserver) -> None:
-    """What was put on the bench by hand before the run was interrupted lies there, or must again.
+    """Restore what was put on the bench by hand before the interruption.
 
-    Hands that are a device do it all once more; a person is told what was last.
+    A changer repeats all actions; otherwise the user is reminded of the last one.
     """
     if left and CHANGER in rig:
         for action in left:
@@ -237,7 +237,7 @@ def _arrange_again(left: Sequence[ActionRecord], rig: Rig, observer: RunObserver
 def _report_exchanged_camera(
     folder: RunFolder, devices: dict[str, str], observer: RunObserver
 ) -> None:
-    """Dark frames of one camera are none for another."""
+    """Warn if a camera was exchanged: dark frames of one camera do not apply to another."""
     before: dict[str, Any] = {}
     for attempt in folder.read().completed().values():
         before |= attempt.start.get("devices", {})
@@ -250,7 +250,7 @@ def _report_exchanged_camera(
 
 
 def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
-    """What is not as the journal says among the frames of a run that goes on, in lines."""
+    """Yield warnings about frames of a resumed run that disagree with the journal."""
     if unknown := folder.unknown_files():
         yield (
             f"{folder.path / 'frames'}: the journal does not tell of {_listed(unknown)}, which a "

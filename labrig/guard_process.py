@@ -1,9 +1,9 @@
-"""What runs in the guard's process: waits until labrig dies or hangs, then switches the lights off.
+"""The guard's process, which switches the lights off when labrig dies or hangs.
 
     python -P -m labrig.guard_process
 
-reads from its standard input what it is to switch off, a line of JSON, then a byte a second: may a
-light be on? The end of its input is the end of labrig.
+It reads from its standard input a line of JSON with the lights to switch off, then a byte per
+second that says whether a light may be on. The end of its input is the end of labrig.
 """
 
 import json
@@ -30,7 +30,7 @@ FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 2.0
 
 
 def main() -> None:
-    """Serve one labrig; ends when all lights are off."""
+    """Serve one labrig until all lights are off."""
     # What ends labrig is what the guard is there for.
     for signum in signal.valid_signals():
         with suppress(OSError, ValueError):  # SIGKILL and SIGSTOP
@@ -50,7 +50,7 @@ def main() -> None:
 
 
 def labrig_is_gone(source: BinaryIO, pid: int) -> bool:
-    """Wait until labrig has ended, or hangs and is ended; may a light be on?"""
+    """Wait until labrig has ended or was killed as hung; return whether a light may be on."""
     heard: queue.Queue[bytes] = queue.Queue()
     threading.Thread(target=_listen, args=(source, heard), daemon=True).start()
     state, silent_s = ALL_OFF, 0.0
@@ -70,19 +70,19 @@ def labrig_is_gone(source: BinaryIO, pid: int) -> bool:
 
 
 class Lights:
-    """The lights of a rig that another process runs, for when that has ended.
+    """Lights of a rig that another process runs, to be switched off after its end.
 
     Parameters
     ----------
     file
-        The lights alone.
+        Rig file with the lights alone.
     source
         Path of the rig file, for messages.
 
     Raises
     ------
     UsageError
-        A driver is not installed here.
+        A driver is not installed.
     """
 
     def __init__(self, file: RigFile, source: str) -> None:
@@ -96,7 +96,7 @@ class Lights:
             self._benches.append(Bench(alone, source, self._clock, None, ports=ports))
 
     def switch_off(self) -> None:
-        """Switch all of them off, none waiting for another one, for up to `TRIES_FOR_S`."""
+        """Switch all lights off in parallel, trying for up to `TRIES_FOR_S`."""
         with ThreadPoolExecutor(len(self._benches)) as each:
             list(each.map(self._switch_off, self._benches))
 
@@ -119,7 +119,7 @@ def _listen(source: BinaryIO, heard: "queue.Queue[bytes]") -> None:
 
 
 def _kill(pid: int) -> None:
-    """End labrig where it hangs: by SIGKILL, or what Windows has in its place."""
+    """Kill a hung labrig by SIGKILL or the equivalent on Windows."""
     if sys.platform == "win32" or os.getppid() == pid:  # else it has ended, and the number is free
         with suppress(OSError):
             os.kill(pid, getattr(signal, "SIGKILL", signal.SIGTERM))

@@ -1,4 +1,4 @@
-"""Files that somebody hands in, read with an error that says what is wrong with them."""
+"""Reading of input files, with messages that name the problem."""
 
 import errno
 from pathlib import Path
@@ -13,14 +13,14 @@ MOST_TEXT_BYTES = 50_000_000
 
 
 def read_bytes(path: Path, most_bytes: int) -> bytes:
-    """What is in the file at `path`.
+    """Read the bytes of the file at `path`.
 
     Raises
     ------
     UsageError
-        There is none that may be read, or it has more than `most_bytes`.
+        There is no readable file, or it has more than `most_bytes`.
     DiskError
-        The disk does not give it back.
+        The disk cannot be read.
     """
     try:
         with path.open("rb") as file:
@@ -36,12 +36,12 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
 
 
 def read_text(path: Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
-    """The text in the file at `path`, without a byte-order mark.
+    """Read the text in the file at `path`, without a byte-order mark.
 
     Raises
     ------
     UsageError, DiskError
-        As of `read_bytes`; or it is not text in UTF-8.
+        The file is refused by `read_bytes`, or it is not text in UTF-8.
     """
     try:
         return read_bytes(path, most_bytes).decode("utf-8-sig")

@@ -1,8 +1,8 @@
 """Linear least squares with coefficients ≥ 0.
 
 SciPy's `nnls` is fast, but aborts the process on an empty matrix and may stop short of the minimum
-(scipy issues 24861 and 25389), which a measurement cannot afford: its answer is taken only if it
-meets the conditions of Kuhn and Tucker, else the minimum is found here.
+(scipy issues 24861 and 25389), which a measurement cannot afford: its solution is used only if it
+satisfies the Kuhn–Tucker conditions, else the minimum is found here.
 
 References
 ----------
@@ -22,13 +22,14 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
     Parameters
     ----------
     design
-        (m, n) A; any shape, rank and scale of columns.
+        Matrix A of any rank and scale of columns, shape (m, n).
     target
-        (m,) b.
+        Right-hand side b, shape (m,).
 
     Returns
     -------
-    (n,) x, exactly 0 where the bound holds it.
+    ndarray
+        Minimum x, exactly 0 where the bound is active, shape (n,).
     """
     norms = np.sqrt(np.einsum("ij,ij->j", design, design))
     lengths = np.where(norms > 0, norms, 1.0)
@@ -43,7 +44,7 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
 
 
 def _quickly(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray | None:
-    """What SciPy finds, if it is the minimum."""
+    """Return SciPy's solution if it is the minimum, else None."""
     if not columns.size:
         return None
     try:
@@ -56,7 +57,7 @@ def _quickly(columns: FloatArray, target: FloatArray, least_gain: float) -> Floa
 
 
 def _by_active_sets(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray:
-    """Lawson and Hanson's algorithm for columns of length 1 (or 0), each set solved by itself."""
+    """Run Lawson and Hanson's algorithm for columns of length 1 (or 0), each set solved anew."""
     n = columns.shape[1]
     solution, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
     empty = np.asarray(~columns.any(axis=0), dtype=np.bool_)

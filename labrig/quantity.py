@@ -1,7 +1,7 @@
-"""Quantities as people write them: `90 min`, `320 ms`, `1/60 s`, `0.7 %`, `25 MB`.
+"""Quantities with units in files: `90 min`, `320 ms`, `1/60 s`, `0.7 %`, `25 MB`.
 
 Each annotated type below turns such a text into a plain float in the named unit, so that inside
-labrig a name such as `exposure_s` says everything.
+labrig a name such as `exposure_s` carries the unit.
 """
 
 import math
@@ -29,12 +29,12 @@ _PATTERN = re.compile(
 
 
 def parse(text: str, units: dict[str, float]) -> float:
-    """Value of `text` in the base unit of `units`.
+    """Return the value of `text` in the base unit of `units`.
 
     Raises
     ------
     ValueError
-        Not a number with one of the units, negative, or not finite.
+        The text is not a number with one of the units, or it is negative or not finite.
     """
     match = _PATTERN.fullmatch(text)
     if match is None or match["unit"] not in units:
@@ -51,7 +51,7 @@ def parse(text: str, units: dict[str, float]) -> float:
 
 
 def duration_text(seconds: float) -> str:
-    """`seconds` as a person says it: `1 h 30 min`, `5 s`, `1/60 s`, `320 ms`."""
+    """Format a duration, such as `1 h 30 min`, `5 s`, `320 ms`."""
     if seconds >= 3600:
         minutes = round(seconds / 60)
         return f"{minutes // 60} h" + (f" {minutes % 60} min" if minutes % 60 else "")
@@ -80,7 +80,7 @@ def _written(unit: str) -> PlainSerializer:
 
 
 def _schema(units: dict[str, float], bare: bool) -> WithJsonSchema:
-    """For editors: what may be written, as a JSON Schema."""
+    """Return the JSON Schema of the accepted texts, for editors."""
     known = "|".join(sorted(units, key=len, reverse=True))
     text = {
         "type": "string",

@@ -29,12 +29,12 @@ CENTRE: Region = (0.25, 0.25, 0.5, 0.5)
 
 
 def parse_region(text: str) -> Region:
-    """The region in `x,y,width,height`, as given on a command line.
+    """Parse a region `x,y,width,height` from the command line.
 
     Raises
     ------
     UsageError
-        Not four numbers that can be a region.
+        The text is not four numbers of a valid region.
     """
     try:
         return TypeAdapter(Region).validate_python([float(part) for part in text.split(",")])
@@ -46,12 +46,12 @@ def parse_region(text: str) -> Region:
 
 
 def region_pixels(region: Region, width: int, height: int) -> tuple[int, int, int, int]:
-    """`(x, y, width, height)` in pixels of a `width` × `height` frame.
+    """Return `(x, y, width, height)` in pixels of a `width` × `height` frame.
 
     Raises
     ------
     UsageError
-        The region leaves the frame.
+        The region extends beyond the frame.
     """
     x, y, w, h = region
     if max(region) <= 1:

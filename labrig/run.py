@@ -1,4 +1,4 @@
-"""A protocol on a bench, into a run folder: prepared, recorded, resumed."""
+"""Runs: preparing, recording and resuming a protocol on a bench in a run folder."""
 
 import shutil
 from dataclasses import dataclass
@@ -20,7 +20,7 @@ SPARE_BYTES = 200e6
 
 @dataclass(frozen=True)
 class Recording:
-    """A protocol that fits its rig, before anything is opened."""
+    """A protocol validated for its rig, before anything is opened."""
 
     protocol: ProtocolModel
     rig: RigFile
@@ -30,14 +30,14 @@ class Recording:
 
     @classmethod
     def prepare(cls, protocol_path: Path, rig_path: Path, runs: Path) -> Self:
-        """Read both files, lay out the plan, refuse what cannot work.
+        """Read both files, lay out the plan, and refuse what cannot work.
 
         Raises
         ------
         UsageError
             A file is malformed, or the plan cannot work on this rig.
         DiskError
-            The frames will not fit.
+            The disk has no room for the frames.
         """
         asked = read_protocol(protocol_path)
         rig = read_rig_file(rig_path)
@@ -54,14 +54,14 @@ class Recording:
         return cls(protocol, rig, rig_path, runs, laid_out)
 
     def summary(self) -> str:
-        """Duration, frames and bytes in one line."""
+        """Return the number of units, the duration, the frames and the bytes in one line."""
         return (
             f"{len(self.plan.units)} units, at most {duration_text(self.plan.duration_s)} of lab "
             f"time, {self.plan.frames} frames, {self.plan.size_bytes / 1e6:.0f} MB"
         )
 
     def notes(self) -> tuple[str, ...]:
-        """What the person should know before it begins, a line each."""
+        """Return notes for the user before the run, one line each."""
         return tuple(
             f"what {self.protocol.protocol} finds rests on {name}, of which the rig file names no "
             "run ('optics:'); frames will be kept: measure it, too, and name it to labrig process "
@@ -70,12 +70,12 @@ class Recording:
         )
 
     def record(self, watch: Watch) -> Path:
-        """Make a run folder and fill it; returns its path.
+        """Create a run folder, record into it and return its path.
 
         Raises
         ------
         Interrupted, LabrigError
-            After the safe state was reached; the text says what is kept and how to go on.
+            The run ended early, in the safe state; the text tells what is kept and how to continue.
         """
         with open_bench(self.rig, str(self.rig_source)) as stand:
             folder = RunFolder.create(
@@ -102,12 +102,12 @@ class Recording:
 
 
 def resume_run(path: Path, watch: Watch) -> Path:
-    """Do what is left of the run in `path`; returns the path.
+    """Complete the run in `path` and return the path.
 
     Raises
     ------
     UsageError
-        Not a run folder.
+        The path is not a run folder.
     """
     if not (path / "protocol.yaml").is_file():
         raise UsageError(f"{path}: expected a run folder with protocol.yaml in it; see --runs")

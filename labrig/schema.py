@@ -1,4 +1,4 @@
-"""JSON Schemas of the files that people write, so that an editor completes and checks them."""
+"""JSON Schemas of the files that users write, with which an editor completes and checks them."""
 
 import inspect
 import operator
@@ -21,7 +21,7 @@ KINDS = ("protocol", "rig", "material")
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """The JSON Schema of a `protocol`, a `rig` or a `material` file, as YAML loads it.
+    """Return the JSON Schema of a `protocol`, a `rig` or a `material` file, as YAML loads it.
 
     Raises
     ------
@@ -37,13 +37,13 @@ def schema(kind: str) -> dict[str, Any]:
 
 
 def _protocol() -> Any:
-    """One of the registered protocols; its key `protocol` says which."""
+    """Return the union of the registered protocols, discriminated by the key `protocol`."""
     names = plugins.names(plugins.PROTOCOLS)
     return _one_of("protocol", [plugins.load(plugins.PROTOCOLS, name, "schema") for name in names])
 
 
 def _rig() -> Any:
-    """A rig file whose devices have the keys of the driver that each names."""
+    """Return the model of a rig file whose devices have the keys of their drivers."""
     names = plugins.names(plugins.DRIVERS)
     drivers = {name: plugins.load(plugins.DRIVERS, name, "schema") for name in names}
     entries = {name: _entry(name, driver.Settings) for name, driver in drivers.items()}
@@ -68,7 +68,7 @@ def _rig() -> Any:
 
 
 def _entry(driver: str, settings: type[BaseModel]) -> type[BaseModel]:
-    """A device entry of one driver."""
+    """Return the model of a device entry of one driver."""
     shared: dict[str, Any] = {
         name: (field.annotation, field) for name, field in DeviceEntry.model_fields.items()
     }
@@ -83,7 +83,7 @@ def _one_of(key: str, models: list[type[BaseModel]]) -> Any:
 
 
 class _Described(GenerateJsonSchema):
-    """Keys are described as the models' docstrings do; a default has the written form or none."""
+    """Schema generator with the models' docstrings as descriptions and defaults as written."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         made = super().model_schema(schema)
@@ -105,7 +105,7 @@ class _Described(GenerateJsonSchema):
 
 
 def _attributes(documented: str) -> Iterator[tuple[str, str]]:
-    """Name and text of each entry in a numpy docstring's section of attributes."""
+    """Yield name and text of each entry in the Attributes section of a numpy docstring."""
     _, _, section = documented.partition("Attributes\n----------\n")
     for names, text in re.findall(r"^(\w[\w, ]*)\n((?:    .*\n?|\n(?=    ))+)", section, re.M):
         for name in names.split(","):

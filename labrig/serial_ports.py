@@ -1,8 +1,8 @@
-"""Finds a serial board again that comes back under another name.
+"""Recognition of a serial board that comes back under another name.
 
 A USB board that loses its power for a moment, or resets itself when its own relay disturbs it,
-comes back as `/dev/ttyACM1` or COM4 while the rig file says `/dev/ttyACM0` or COM3. What it is on
-the USB stays the same.
+comes back as `/dev/ttyACM1` or COM4 while the rig file names `/dev/ttyACM0` or COM3. Its identity
+on the USB stays the same.
 """
 
 import os
@@ -18,14 +18,18 @@ from labrig.errors import DeviceError
 
 @dataclass(frozen=True)
 class UsbIdentity:
-    """What a serial board is on the USB.
+    """Identity of a serial board on the USB.
 
     Attributes
     ----------
+    vendor, product
+        Vendor and product number.
+    serial_number
+        Serial number; empty if the board reports none.
     interface
-        Which of the board's ports, where it has several.
+        Interface of the board, where it has several ports.
     place
-        The plug on this PC; all that tells apart boards of one kind without serial numbers.
+        Plug on this PC, the only distinction of boards of one kind without serial numbers.
     """
 
     vendor: int
@@ -36,14 +40,14 @@ class UsbIdentity:
 
     @classmethod
     def of(cls, port: ListPortInfo) -> Self | None:
-        """None for a port that is not on the USB."""
+        """Return the identity of a port, None if it is not on the USB."""
         if port.vid is None or port.pid is None:
             return None
         place, _, interface = (port.location or "").partition(":")
         return cls(port.vid, port.pid, port.serial_number or "", interface, place)
 
     def is_like(self, other: "UsbIdentity") -> bool:
-        """Whether both may be the same board, in another place or not."""
+        """Return whether both may be the same board, possibly at another plug."""
         return (self.vendor, self.product, self.serial_number, self.interface) == (
             other.vendor, other.product, other.serial_number, other.interface
         )  # fmt: skip
@@ -51,17 +55,17 @@ class UsbIdentity:
 
 @dataclass
 class SerialPorts:
-    """The serial boards of a rig, recognised from when each was looked up first."""
+    """Serial boards of a rig, recognised by their identity at the first look-up."""
 
     _known: dict[str, UsbIdentity] = field(default_factory=dict)
 
     def look_up(self, address: str) -> str:
-        """Where the board is now that was at `address` when that was looked up first.
+        """Return the current port of the board that was at `address` at the first look-up.
 
         Raises
         ------
         DeviceError
-            It is nowhere, and another board is at `address`.
+            The board is missing, and another one is at `address`.
         """
         if "://" in address:
             return address
@@ -94,6 +98,6 @@ def _usb_ports() -> Iterable[tuple[str, UsbIdentity]]:
 
 
 def _same_port(address: str, ports: Iterable[str]) -> str | None:
-    """The port that `address` names, perhaps through a link or in small letters."""
+    """Return the port that `address` names, possibly through a link or in lower case."""
     named = os.path.normcase(os.path.realpath(address))
     return next((p for p in ports if os.path.normcase(os.path.realpath(p)) == named), None)

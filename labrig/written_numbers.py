@@ -1,4 +1,4 @@
-"""Numbers as a laboratory notebook has them: rounded by their uncertainty."""
+"""Formatting of numbers in reports, rounded according to their uncertainty."""
 
 import math
 
@@ -13,9 +13,9 @@ LONGEST_FRACTION_S = 0.3
 
 
 def plus_minus(value: float, sigma: float) -> str:
-    """`0.03208 ± 0.00027`: σ to two digits, the value to the same place.
+    """Format value and σ as `0.03208 ± 0.00027`: σ to two digits, the value to the same place.
 
-    `σ = 0` means that the value was held, a σ that is not finite that nothing is known of it.
+    `σ = 0` marks a fixed value, a σ that is not finite an unknown uncertainty.
     """
     if not math.isfinite(value):
         return "–"
@@ -34,7 +34,7 @@ def plus_minus(value: float, sigma: float) -> str:
 
 
 def rounded(value: float, digits: int = 4) -> str:
-    """`value` to `digits` significant ones, with a power of ten if very large or small."""
+    """Format `value` to `digits` significant digits, with a power of ten if very large or small."""
     if not math.isfinite(value):
         return "–"
     if value == 0:
@@ -50,14 +50,14 @@ def rounded(value: float, digits: int = 4) -> str:
 
 
 def exposure_text(exposure_s: float) -> str:
-    """`1/64 s`, `0.5 s`, `30 s`."""
+    """Format an exposure time, such as `1/64 s`, `0.5 s` or `30 s`."""
     if 0 < exposure_s < LONGEST_FRACTION_S:
         return f"1/{1 / exposure_s:.0f} s"
     return f"{rounded(exposure_s, 3)} s"
 
 
 def power_of_ten(exponent: int) -> str:
-    """`10⁻³`."""
+    """Format a power of ten, such as `10⁻³`."""
     return "10" + str(exponent).translate(_SUPERSCRIPT)
 
 

@@ -1,8 +1,8 @@
-"""YAML files a person writes, read into models, with errors a person understands.
+"""YAML files written by users, read into models with understandable errors.
 
-PyYAML's safe loader with YAML 1.2 scalars (`1:30` and `0100` are not numbers in disguise, `1e-3`
-is one, `no` is a word) that refuses what no such file needs: duplicate keys, tags, numbers that are
-not finite, characters that are none, and aliases that stand for more than anybody would write.
+PyYAML's safe loader with YAML 1.2 scalars (`1:30` and `0100` are not numbers, `1e-3` is one, `no`
+is a word) that rejects what no such file needs: duplicate keys, tags, numbers that are not finite,
+invalid characters, and aliases that expand to excessive size.
 """
 
 import difflib
@@ -95,15 +95,15 @@ class _Loader(SafeLoader, Composer):
 
 
 def _problem(text: str, at: Any) -> yaml.MarkedYAMLError:
-    """What to raise about a node or an event."""
+    """Return the error about a node or an event."""
     return yaml.MarkedYAMLError(problem=text, problem_mark=at.start_mark)
 
 
 def _extent(node: yaml.Node, known: dict[yaml.Node, tuple[int, int]]) -> tuple[int, int]:
-    """How many nodes there are in `node`, and how deep, with its aliases written out.
+    """Return the number of nodes in `node` and their depth, with its aliases expanded.
 
-    `known` has those that were counted before: all that an alias may stand for. Of a node that is
-    still being counted it has (0, 0).
+    `known` has the extents of the nodes counted before, which an alias may refer to; (0, 0) marks a
+    node that is still being counted.
     """
     if node in known:
         if not known[node][0]:
@@ -143,7 +143,7 @@ _Loader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(str(no
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes what PyYAML's own reader or this one would take for anything but text."""
+    """Dumper that quotes every text that PyYAML's own reader or this one would not read as text."""
 
     yaml_implicit_resolvers = {  # noqa: RUF012
         first: [
@@ -155,20 +155,20 @@ class _Dumper(yaml.SafeDumper):
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """The mapping in the file at `path`.
+    """Read the mapping in the file at `path`.
 
     Raises
     ------
     UsageError
-        Not readable, not YAML, a duplicate key, or not a mapping.
+        The file is not readable, not YAML, has a duplicate key, or is not a mapping.
     DiskError
-        The disk does not give it back.
+        The disk cannot be read.
     """
     return parse_yaml(read_text(path, MOST_BYTES), str(path))
 
 
 def parse_yaml(text: str, source: str) -> dict[str, Any]:
-    """As `read_yaml`, from text; `source` names it in messages."""
+    """Parse the mapping in a text like `read_yaml`; `source` names it in messages."""
     try:
         content = yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
@@ -187,27 +187,28 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
 
 
 def write_yaml(path: Path, model: BaseModel) -> None:
-    """Write `model` so that `read_model` gives it back; nothing half-written stays."""
+    """Write `model` so that `read_model` reads it."""
     path.write_text(yaml_text(model.model_dump(mode="json", exclude_none=False)), encoding="utf-8")
 
 
 def yaml_text(content: Mapping[str, Any]) -> str:
-    """YAML text of plain values, keys in the given order."""
+    """Return YAML text of plain values, keys in the given order."""
     return yaml.dump(dict(content), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
 
 
 def read_model(path: Path, model: type[ModelT]) -> ModelT:
-    """The file at `path` as `model`; errors are one line and name the file and the key."""
+    """Read the file at `path` as `model`; errors are one line and name the file and the key."""
     return validate(read_yaml(path), model, str(path))
 
 
 def validate(content: Mapping[str, Any], model: type[ModelT], source: str) -> ModelT:
-    """`content` as `model`.
+    """Validate `content` as `model`.
 
     Raises
     ------
     UsageError
-        The first thing that is wrong, with a suggestion where a key is misspelt.
+        The content is invalid; the message names the first problem, with a suggestion for a
+        misspelt key.
     """
     try:
         return model.model_validate(content)
@@ -216,7 +217,7 @@ def validate(content: Mapping[str, Any], model: type[ModelT], source: str) -> Mo
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """A hint at what `word` may have been meant to be, or the list of what is known."""
+    """Return a suggestion for a misspelt `word`, or the list of known words."""
     close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(sorted(known))}"
 
@@ -237,7 +238,7 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> str:
 
 
 def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> Iterator[str]:
-    """Keys that a mapping at `location` may have, over all models it may be."""
+    """Yield the keys that a mapping at `location` may have, over all possible models."""
     models: list[type[BaseModel]] = [model]
     for part in location[:-1]:
         inner = [

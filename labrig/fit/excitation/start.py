@@ -51,7 +51,7 @@ def _irradiances(problem: ExcitationProblem) -> FloatArray:
 
 
 def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: int) -> FloatArray:
-    """Return the κ (P,) of each site that fits its glow best, for one state of amplitude `total`."""
+    """Return the κ (P,) of each site that fits its glow best for one state of amplitude `total`."""
     bands = series.irradiance.shape[1]
     grid = ChargingSeries(
         series.name,
