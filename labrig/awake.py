@@ -68,8 +68,8 @@ def _systemd_inhibit() -> Iterator[None]:
             if not answers:
                 raise OSError("systemd-inhibit does not answer")
             if not process.stdout.read(1):
-                said = process.stderr.read().decode(errors="replace")
-                raise OSError(f"systemd-inhibit: {' '.join(said.split())}")
+                message = process.stderr.read().decode(errors="replace")
+                raise OSError(f"systemd-inhibit: {' '.join(message.split())}")
             yield
         finally:
             process.terminate()

@@ -198,7 +198,7 @@ class _Connections:
         self._stack = stack
         self._names = names
         self._ports: dict[tuple[str, ...], SerialPort] = {}
-        self._held: set[str] = set()
+        self._locked: set[str] = set()
 
     def serial(self, address: str, baudrate: int) -> SerialPort:
         try:
@@ -212,7 +212,7 @@ class _Connections:
             )
             devices = tuple(serial_devices(str(port.port)))
             if devices not in self._ports:
-                self._hold(devices, address)
+                self._lock(devices, address)
                 port.open()
                 self._stack.callback(port.close)
                 self._ports[devices] = port
@@ -227,25 +227,25 @@ class _Connections:
         url = urlsplit(address)
         if url.scheme == "sim":
             backend = None if self._room is None else self._room.usb(url.path.strip("/"))
-            found = None if backend is None else usb.core.find(backend=backend)
+            device = None if backend is None else usb.core.find(backend=backend)
         elif url.scheme == "usb":
-            found = self._find(address, serial_of)
+            device = self._find(address, serial_of)
         else:
             raise UsageError(
                 f"'{address}' is no USB address; write usb://VENDOR:PRODUCT in hexadecimal, such "
                 "as usb://04a9:3199, with /SERIAL behind it if there are several"
             )
-        if found is None:
+        if device is None:
             raise DeviceError(
                 f"no device at {address}; switch it on and check its cable (a camera that went to "
                 "sleep is off, too)"
             )
-        return found
+        return device
 
     def tcp(self, address: str, default_port: int) -> socket.socket:
         host, port = _host_and_port(address, default_port)
         try:
-            self._hold(network_devices(host, port), address)
+            self._lock(network_devices(host, port), address)
             connected = socket.create_connection((host, port), TCP_CONNECT_TIMEOUT_S)
             # commands are small, and somebody waits for the answer to each
             connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -268,14 +268,14 @@ class _Connections:
             ) from None
         serial = url.path.strip("/")
         try:
-            alike = list(usb.core.find(find_all=True, idVendor=vendor, idProduct=product))
+            candidates = list(usb.core.find(find_all=True, idVendor=vendor, idProduct=product))
             if serial:
-                found = _with_serial(alike, serial, address, serial_of)
+                device = _with_serial(candidates, serial, address, serial_of)
             else:
-                found = alike[0] if alike else None
-            if found is not None:
-                self._hold([usb_device(found)], address)
-            return found
+                device = candidates[0] if candidates else None
+            if device is not None:
+                self._lock([usb_device(device)], address)
+            return device
         except usb.core.NoBackendError:
             raise DeviceError(
                 "libusb is not installed, so USB cameras cannot be reached; install libusb-1.0 "
@@ -288,40 +288,41 @@ class _Connections:
                 "give the camera the WinUSB driver"
             ) from None
 
-    def _hold(self, devices: Iterable[str], address: str) -> None:
+    def _lock(self, devices: Iterable[str], address: str) -> None:
         """Lock real devices against other labrigs; a simulated room is private to its process."""
         for device in devices:
-            if device not in self._held and not address.startswith("sim://"):
+            if device not in self._locked and not address.startswith("sim://"):
                 self._stack.enter_context(held(device, address))
-                self._held.add(device)
+                self._locked.add(device)
 
 
 def _with_serial(
-    alike: list[Any], serial: str, address: str, serial_of: Callable[[Any], str] | None
+    candidates: list[Any], serial: str, address: str, serial_of: Callable[[Any], str] | None
 ) -> Any:
     """Return the device with that serial number; devices without one on the bus are queried."""
-    others = []
+    other_numbers = []
     problem: LabrigError | None = None
-    for device in sorted(alike, key=lambda device: not device.iSerialNumber):
+    for device in sorted(candidates, key=lambda device: not device.iSerialNumber):
         try:
             if device.iSerialNumber:
-                said = device.serial_number
+                serial_number = device.serial_number
             elif serial_of:
                 with held(usb_device(device), address):
-                    said = serial_of(device)
+                    serial_number = serial_of(device)
             else:
-                said = ""
+                serial_number = ""
         except (DeviceError, UsageError) as failure:
             problem = failure
             continue
-        if said.strip().lstrip("0") == serial.lstrip("0"):
+        if serial_number.strip().lstrip("0") == serial.lstrip("0"):
             return device
-        others.append(said or "unknown")
+        other_numbers.append(serial_number or "unknown")
     if problem:
         raise problem
-    if others:
+    if other_numbers:
         raise DeviceError(
-            f"no device with the serial number {serial}; of this kind there are {', '.join(others)}"
+            f"no device with the serial number {serial}; of this kind there are "
+            f"{', '.join(other_numbers)}"
         )
     return None
 

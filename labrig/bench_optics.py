@@ -39,8 +39,10 @@ def camera_curves(
         No curves are named, or there are none of that name.
     """
     if instead is None and lvf is not None and lvf.camera is not None:
-        found = lvf.camera.response()
-        return replace(found, name=f"{found.name}, as the filter's calibration found them")
+        calibrated = lvf.camera.response()
+        return replace(
+            calibrated, name=f"{calibrated.name}, as the filter's calibration found them"
+        )
     return read_camera(instead or _named(rig.optics.camera, "camera"))
 
 

@@ -69,10 +69,10 @@ class Clock(ABC):
 
     def sleep_until(self, deadline_s: float) -> None:
         """Wait until an absolute time; raise `Interrupted` if a stop was requested."""
-        self._look_up()
+        self._check_interruption()
         while self.now() < deadline_s:
             self._pause_until(deadline_s)
-            self._look_up()
+            self._check_interruption()
 
     def sleep(self, duration_s: float) -> None:
         """Wait for `duration_s` seconds."""
@@ -107,7 +107,7 @@ class Clock(ABC):
         finally:
             self._slept_before_s = None
 
-    def _look_up(self) -> None:
+    def _check_interruption(self) -> None:
         if self._shields:
             return
         if self._signum is not None:

@@ -80,15 +80,15 @@ def _locked(path: Path) -> Iterator[None]:
             yield
         return
     with suppress(FileExistsError):
-        made = os.open(path, os.O_CREAT | os.O_EXCL)
-        os.fchmod(made, 0o444)
-        os.close(made)
-    lock = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+        created = os.open(path, os.O_CREAT | os.O_EXCL)
+        os.fchmod(created, 0o444)
+        os.close(created)
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield
     finally:
-        os.close(lock)
+        os.close(descriptor)
 
 
 def serial_devices(port: str, platform: str = sys.platform) -> list[str]:
@@ -126,11 +126,13 @@ def network_devices(host: str, port: int) -> list[str]:
     OSError
         The name cannot be resolved.
     """
-    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-    return sorted({f"{_number(str(peer[0]))}:{port}" for *_, peer in found})
+    addresses = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    return sorted(
+        {f"{_shortest(str(socket_address[0]))}:{port}" for *_, socket_address in addresses}
+    )
 
 
-def _number(number: str) -> str:
+def _shortest(number: str) -> str:
     """Return the shortest form of an IP address; IPv4 written as IPv6 becomes IPv4."""
     plain = ipaddress.ip_address(number)
     return str(getattr(plain, "ipv4_mapped", None) or plain)

@@ -159,21 +159,21 @@ def _started(order: dict[str, Any]) -> "subprocess.Popen[bytes]":
         raise _cannot_start(str(error)) from None
     assert process.stdin is not None
     assert process.stdout is not None
-    said = "it ended at once"
-    with process.stdout, suppress(OSError), ThreadPoolExecutor(1) as beside:
+    answer = "it ended at once"
+    with process.stdout, suppress(OSError), ThreadPoolExecutor(1) as reader:
         process.stdin.write(json.dumps(order).encode() + b"\n")
-        line = beside.submit(process.stdout.readline)
+        line = reader.submit(process.stdout.readline)
         try:
-            said = line.result(STARTS_WITHIN_S).decode(errors="replace").strip()
+            answer = line.result(STARTS_WITHIN_S).decode(errors="replace").strip()
         except TooSlow:
             process.kill()  # which ends its line, too
-            said = f"no answer within {STARTS_WITHIN_S:g} s"
-    if said == READY:
+            answer = f"no answer within {STARTS_WITHIN_S:g} s"
+    if answer == READY:
         return process
     process.kill()
     process.wait()
     process.stdin.close()
-    raise _cannot_start(said)
+    raise _cannot_start(answer)
 
 
 def _cannot_start(why: str) -> DeviceError:

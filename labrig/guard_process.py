@@ -51,12 +51,12 @@ def main() -> None:
 
 def labrig_is_gone(source: BinaryIO, pid: int) -> bool:
     """Wait until labrig has ended or was killed as hung; return whether a light may be on."""
-    heard: queue.Queue[bytes] = queue.Queue()
-    threading.Thread(target=_listen, args=(source, heard), daemon=True).start()
+    messages: queue.Queue[bytes] = queue.Queue()
+    threading.Thread(target=_listen, args=(source, messages), daemon=True).start()
     state, silent_s = ALL_OFF, 0.0
     while True:
         try:
-            said = heard.get(timeout=BEAT_S)
+            message = messages.get(timeout=BEAT_S)
         except queue.Empty:
             # Counted, not looked up on a clock: a PC that slept has not been silent.
             silent_s += BEAT_S
@@ -64,9 +64,9 @@ def labrig_is_gone(source: BinaryIO, pid: int) -> bool:
                 _kill(pid)
                 return True
             continue
-        if not said:
+        if not message:
             return state == MAY_BE_ON
-        state, silent_s = said, 0.0
+        state, silent_s = message, 0.0
 
 
 class Lights:
@@ -92,13 +92,13 @@ class Lights:
         for key, entry in file.devices.items():
             plugins.load(plugins.DRIVERS, entry.driver, source)  # imported now, not in an emergency
             ports.look_up(entry.address)
-            alone = file.model_copy(update={"devices": {key: entry}})
-            self._benches.append(Bench(alone, source, self._clock, None, ports=ports))
+            single = file.model_copy(update={"devices": {key: entry}})
+            self._benches.append(Bench(single, source, self._clock, None, ports=ports))
 
     def switch_off(self) -> None:
         """Switch all lights off in parallel, trying for up to `TRIES_FOR_S`."""
-        with ThreadPoolExecutor(len(self._benches)) as each:
-            list(each.map(self._switch_off, self._benches))
+        with ThreadPoolExecutor(len(self._benches)) as pool:
+            list(pool.map(self._switch_off, self._benches))
 
     def _switch_off(self, bench: Bench) -> None:
         deadline_s, pause_s = self._clock.now() + TRIES_FOR_S, FIRST_PAUSE_S
@@ -112,10 +112,10 @@ class Lights:
                 pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
 
 
-def _listen(source: BinaryIO, heard: "queue.Queue[bytes]") -> None:
-    while said := source.read(1):
-        heard.put(said)
-    heard.put(b"")
+def _listen(source: BinaryIO, messages: "queue.Queue[bytes]") -> None:
+    while message := source.read(1):
+        messages.put(message)
+    messages.put(b"")
 
 
 def _kill(pid: int) -> None:

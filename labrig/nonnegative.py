@@ -37,23 +37,25 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
     # Dot products of m terms carry this much rounding.
     rounding = max(len(target), 1) * float(np.finfo(np.float64).eps)
     least_gain = 10 * rounding * float(np.linalg.norm(target))
-    solution = _quickly(columns, target, least_gain)
+    solution = _by_scipy(columns, target, least_gain)
     if solution is None:
         solution = _by_active_sets(columns, target, least_gain)
     return solution / lengths
 
 
-def _quickly(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray | None:
+def _by_scipy(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray | None:
     """Return SciPy's solution if it is the minimum, else None."""
     if not columns.size:
         return None
     try:
-        found: FloatArray = nnls(columns, target)[0]
+        solution: FloatArray = nnls(columns, target)[0]
     except RuntimeError:  # too many steps
         return None
-    gain = columns.T @ (target - columns @ found)
-    is_minimum = gain.max() <= least_gain and np.abs(gain[found > 0]).max(initial=0) <= least_gain
-    return found if is_minimum else None
+    gain = columns.T @ (target - columns @ solution)
+    is_minimum = (
+        gain.max() <= least_gain and np.abs(gain[solution > 0]).max(initial=0) <= least_gain
+    )
+    return solution if is_minimum else None
 
 
 def _by_active_sets(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray:

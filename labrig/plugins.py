@@ -40,15 +40,17 @@ def load(group: str, name: str, source: str) -> Any:
     UsageError
         There is none of that name, or it cannot be imported.
     """
-    found = _registered(group)
+    registered = _registered(group)
     kind = _KINDS[group]
-    if name not in found:
-        raise UsageError(f"{source}: unknown {kind} '{name}'; {did_you_mean(name, list(found))}")
+    if name not in registered:
+        raise UsageError(
+            f"{source}: unknown {kind} '{name}'; {did_you_mean(name, list(registered))}"
+        )
     try:
-        return found[name].load()
+        return registered[name].load()
     except (ImportError, AttributeError) as error:
         raise UsageError(
-            f"{source}: the {kind} '{name}' ({found[name].value}) cannot be imported ({error})"
+            f"{source}: the {kind} '{name}' ({registered[name].value}) cannot be imported ({error})"
         ) from None
 
 

@@ -56,8 +56,8 @@ def duration_text(seconds: float) -> str:
         minutes = round(seconds / 60)
         return f"{minutes // 60} h" + (f" {minutes % 60} min" if minutes % 60 else "")
     if seconds >= 60:
-        whole = round(seconds)
-        return f"{whole // 60} min" + (f" {whole % 60} s" if whole % 60 else "")
+        total_s = round(seconds)
+        return f"{total_s // 60} min" + (f" {total_s % 60} s" if total_s % 60 else "")
     if seconds >= 1:
         return f"{seconds:.4g} s"
     return f"{seconds * 1e3:.4g} ms"
@@ -75,16 +75,17 @@ def _validator(units: dict[str, float], bare: bool) -> BeforeValidator:
     return BeforeValidator(validate)
 
 
-def _written(unit: str) -> PlainSerializer:
+def _serializer(unit: str) -> PlainSerializer:
     return PlainSerializer(lambda value: f"{value!r} {unit}", return_type=str)
 
 
 def _schema(units: dict[str, float], bare: bool) -> WithJsonSchema:
     """Return the JSON Schema of the accepted texts, for editors."""
-    known = "|".join(sorted(units, key=len, reverse=True))
+    unit_pattern = "|".join(sorted(units, key=len, reverse=True))
+    number_pattern = r"(\d+(\.\d*)?([eE][-+]?\d+)?|\.\d+)(\s*/\s*\d+(\.\d+)?)?"
     text = {
         "type": "string",
-        "pattern": rf"^\s*(\d+(\.\d*)?([eE][-+]?\d+)?|\.\d+)(\s*/\s*\d+(\.\d+)?)?\s*({known})\s*$",
+        "pattern": rf"^\s*{number_pattern}\s*({unit_pattern})\s*$",
         "description": f"a number with its unit: {', '.join(units)}",
     }
     return WithJsonSchema({"anyOf": [text, {"type": "number"}]} if bare else text, "validation")
@@ -132,11 +133,11 @@ MOST_COUNT = 1000
 Count = Annotated[int, Field(le=MOST_COUNT)]
 #: Seconds, written with a unit of time.
 DurationS = Annotated[
-    float, _validator(TIME_S, bare=False), _written("s"), _schema(TIME_S, bare=False)
+    float, _validator(TIME_S, bare=False), _serializer("s"), _schema(TIME_S, bare=False)
 ]
 #: A fraction, written as `0.7 %` or as a bare 0.007.
 Fraction = Annotated[float, _validator(FRACTION, bare=True), _schema(FRACTION, bare=True)]
 #: Bytes.
 SizeBytes = Annotated[
-    float, _validator(SIZE_BYTES, bare=False), _written("B"), _schema(SIZE_BYTES, bare=False)
+    float, _validator(SIZE_BYTES, bare=False), _serializer("B"), _schema(SIZE_BYTES, bare=False)
 ]

@@ -36,18 +36,18 @@ def find(place: str, kind: str, name_or_path: str | os.PathLike[str]) -> Path:
     UsageError
         There is neither a shipped file of that name nor a file at that path.
     """
-    given = Path(name_or_path)
-    if given.suffix in SUFFIXES or len(given.parts) > 1:
-        if not given.is_file():
-            raise UsageError(f"{given}: no such {kind} file")
-        return given
-    known = names(place)
-    if str(given) not in known:
+    path = Path(name_or_path)
+    if path.suffix in SUFFIXES or len(path.parts) > 1:
+        if not path.is_file():
+            raise UsageError(f"{path}: no such {kind} file")
+        return path
+    shipped = names(place)
+    if str(path) not in shipped:
         raise UsageError(
-            f"no shipped {kind} is called '{given}'; {did_you_mean(str(given), list(known))}; a "
-            f"file of your own is given with its suffix, such as {given}.yaml"
+            f"no shipped {kind} is called '{path}'; {did_you_mean(str(path), list(shipped))}; a "
+            f"file of your own is given with its suffix, such as {path}.yaml"
         )
-    return known[str(given)]
+    return shipped[str(path)]
 
 
 def names(place: str) -> dict[str, Path]:

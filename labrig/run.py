@@ -39,19 +39,19 @@ class Recording:
         DiskError
             The disk has no room for the frames.
         """
-        asked = read_protocol(protocol_path)
+        requested = read_protocol(protocol_path)
         rig = read_rig_file(rig_path)
-        protocol = asked.suited_to(rig)
+        protocol = requested.suited_to(rig)
         if rig.optics.camera is not None:
             read_camera(rig.optics.camera)  # a misspelt name is found now, not after the run
-        laid_out = plan(protocol, rig, str(rig_path))
-        free_bytes = shutil.disk_usage(_existing(runs)).free
-        if laid_out.size_bytes + SPARE_BYTES > free_bytes:
+        run_plan = plan(protocol, rig, str(rig_path))
+        free_bytes = shutil.disk_usage(_existing_parent(runs)).free
+        if run_plan.size_bytes + SPARE_BYTES > free_bytes:
             raise DiskError(
-                f"{runs}: {laid_out.frames} frames need {laid_out.size_bytes / 1e9:.2f} GB, "
+                f"{runs}: {run_plan.frames} frames need {run_plan.size_bytes / 1e9:.2f} GB, "
                 f"{free_bytes / 1e9:.2f} GB are free; free some space or give another --runs"
             )
-        return cls(protocol, rig, rig_path, runs, laid_out)
+        return cls(protocol, rig, rig_path, runs, run_plan)
 
     def summary(self) -> str:
         """Return the number of units, the duration, the frames and the bytes in one line."""
@@ -77,23 +77,23 @@ class Recording:
         Interrupted, LabrigError
             The run ended early, in the safe state; the text tells what is kept and how to continue.
         """
-        with open_bench(self.rig, str(self.rig_source)) as stand:
+        with open_bench(self.rig, str(self.rig_source)) as bench:
             folder = RunFolder.create(
                 self.runs,
                 f"{self.protocol.protocol}_{self.protocol.sample.name}",
-                stand.clock.wall(),
+                bench.clock.wall(),
                 {
                     "protocol.yaml": yaml_text(
                         self.protocol.model_dump(mode="json", by_alias=True)
                     ),
                     "rig.yaml": yaml_text(self.rig.model_dump(mode="json", exclude_none=True)),
                 },
-                stand.seed,
-                stand.disk,
+                bench.seed,
+                bench.disk,
             )
             try:
                 with folder:
-                    execute(folder, self.protocol, stand, self.plan, watch)
+                    execute(folder, self.protocol, bench, self.plan, watch)
             except BaseException:
                 if not folder.read().attempts:  # no device was reached, nothing happened
                     folder.discard()
@@ -114,16 +114,16 @@ def resume_run(path: Path, watch: Watch) -> Path:
     protocol = read_protocol(path / "protocol.yaml")
     rig = read_rig_file(path / "rig.yaml")
     last_time = read_run(path).last_time if (path / "journal.jsonl").exists() else 0.0
-    laid_out = plan(protocol, rig, str(path / "rig.yaml"))
+    run_plan = plan(protocol, rig, str(path / "rig.yaml"))
     with (
-        open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as stand,
-        RunFolder(path, stand.seed, stand.disk) as folder,
+        open_bench(rig, str(path / "rig.yaml"), not_before_s=last_time) as bench,
+        RunFolder(path, bench.seed, bench.disk) as folder,
     ):
-        execute(folder, protocol, stand, laid_out, watch)
+        execute(folder, protocol, bench, run_plan, watch)
     return path
 
 
-def _existing(path: Path) -> Path:
+def _existing_parent(path: Path) -> Path:
     path = path.absolute()
     while not path.exists():
         path = path.parent

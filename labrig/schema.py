@@ -31,9 +31,9 @@ def schema(kind: str) -> dict[str, Any]:
     if kind not in KINDS:
         raise UsageError(f"there is no schema of '{kind}'; {did_you_mean(kind, KINDS)}")
     makers: dict[str, Callable[[], Any]] = {"protocol": _protocol, "rig": _rig}
-    written = makers[kind]() if kind in makers else Material
-    made = TypeAdapter(written).json_schema(by_alias=True, schema_generator=_Described)
-    return {"$schema": _Described.schema_dialect, **made, "title": f"labrig {kind}"}
+    model = makers[kind]() if kind in makers else Material
+    json_schema = TypeAdapter(model).json_schema(by_alias=True, schema_generator=_Described)
+    return {"$schema": _Described.schema_dialect, **json_schema, "title": f"labrig {kind}"}
 
 
 def _protocol() -> Any:
@@ -86,27 +86,27 @@ class _Described(GenerateJsonSchema):
     """Schema generator with the models' docstrings as descriptions and defaults as written."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
-        made = super().model_schema(schema)
-        documented = inspect.cleandoc(schema["cls"].__doc__ or "")
-        made["description"] = documented.partition("\n\n")[0]
-        texts = dict(_attributes(documented))
+        json_schema = super().model_schema(schema)
+        docstring = inspect.cleandoc(schema["cls"].__doc__ or "")
+        json_schema["description"] = docstring.partition("\n\n")[0]
+        texts = dict(_attributes(docstring))
         for name, field in schema["cls"].model_fields.items():
-            place: dict[str, Any] = made.get("properties", {}).get(field.alias or name, {})
+            entry: dict[str, Any] = json_schema.get("properties", {}).get(field.alias or name, {})
             if name in texts:
-                place["description"] = texts[name]
-        return made
+                entry["description"] = texts[name]
+        return json_schema
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
-        made = super().default_schema(schema)
-        default = made.get("default")
-        if default is None or (made.get("type") == "string") != isinstance(default, str):
-            made.pop("default", None)
-        return made
+        json_schema = super().default_schema(schema)
+        default = json_schema.get("default")
+        if default is None or (json_schema.get("type") == "string") != isinstance(default, str):
+            json_schema.pop("default", None)
+        return json_schema
 
 
-def _attributes(documented: str) -> Iterator[tuple[str, str]]:
+def _attributes(docstring: str) -> Iterator[tuple[str, str]]:
     """Yield name and text of each entry in the Attributes section of a numpy docstring."""
-    _, _, section = documented.partition("Attributes\n----------\n")
+    _, _, section = docstring.partition("Attributes\n----------\n")
     for names, text in re.findall(r"^(\w[\w, ]*)\n((?:    .*\n?|\n(?=    ))+)", section, re.M):
         for name in names.split(","):
             yield name.strip(), " ".join(text.split())

@@ -57,7 +57,7 @@ class UsbIdentity:
 class SerialPorts:
     """Serial boards of a rig, recognised by their identity at the first look-up."""
 
-    _known: dict[str, UsbIdentity] = field(default_factory=dict)
+    _identities: dict[str, UsbIdentity] = field(default_factory=dict)
 
     def look_up(self, address: str) -> str:
         """Return the current port of the board that was at `address` at the first look-up.
@@ -70,20 +70,20 @@ class SerialPorts:
         if "://" in address:
             return address
         present = dict(_usb_ports())
-        here = _same_port(address, present)
-        if address not in self._known:
-            if here is not None:
-                self._known[address] = present[here]
+        current = _same_port(address, present)
+        if address not in self._identities:
+            if current is not None:
+                self._identities[address] = present[current]
             return address
-        wanted = self._known[address]
-        alike = [port for port, identity in present.items() if identity.is_like(wanted)]
-        in_place = [port for port in alike if present[port].place == wanted.place]
-        if here in (in_place or alike):
+        expected = self._identities[address]
+        matching = [port for port, identity in present.items() if identity.is_like(expected)]
+        at_same_plug = [port for port in matching if present[port].place == expected.place]
+        if current in (at_same_plug or matching):
             return address
         # Several of a kind, none where the board was: nobody can tell which of them it is.
-        if len(found := in_place or alike) == 1:
-            return found[0]
-        if here is not None:
+        if len(candidates := at_same_plug or matching) == 1:
+            return candidates[0]
+        if current is not None:
             raise DeviceError(
                 f"another board is at {address} now, and the one that was there before is gone; "
                 "plug that in again"

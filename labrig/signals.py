@@ -45,18 +45,18 @@ def interrupting(clock: Clock) -> Iterator[None]:
     def ask(signum: int, frame: FrameType | None) -> None:
         clock.interrupt(signum)
 
-    before = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
-    stopped = False
+    old_handlers = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
+    is_interrupted = False
     try:
         with _closing_console(clock):
             yield
     except Interrupted:
-        stopped = True
+        is_interrupted = True
         raise
     finally:
-        for signum, handler in before.items():
-            ending = stopped and handler is raise_interrupted
-            signal.signal(signum, signal.SIG_IGN if ending else handler)
+        for signum, handler in old_handlers.items():
+            is_ending = is_interrupted and handler is raise_interrupted
+            signal.signal(signum, signal.SIG_IGN if is_ending else handler)
     clock.sleep(0.0)
 
 
@@ -74,15 +74,17 @@ def pausing(clock: Clock) -> Iterator[None]:
     def ask(signum: int, frame: FrameType | None) -> None:
         clock.interrupt(signum)
 
-    before = {}
+    old_handlers = {}
     for name in ("SIGTSTP", "SIGTTIN", "SIGTTOU"):
         signum = getattr(signal, name, None)  # Windows has none of them
         if signum is not None and signal.getsignal(signum) != signal.SIG_IGN:
-            before[signum] = signal.signal(signum, ask if name == "SIGTSTP" else signal.SIG_IGN)
+            old_handlers[signum] = signal.signal(
+                signum, ask if name == "SIGTSTP" else signal.SIG_IGN
+            )
     try:
         yield
     finally:
-        for signum, handler in before.items():
+        for signum, handler in old_handlers.items():
             signal.signal(signum, handler)
 
 

@@ -28,9 +28,9 @@ def plus_minus(value: float, sigma: float) -> str:
     scale = 1.0 if plain else 10.0**exponent
     decimals = 1 - _exponent(float(f"{sigma / scale:.1e}"))
     places = max(decimals, 0)
-    both = (f"{round(number / scale, decimals):.{places}f}" for number in (value, sigma))
-    written = " ± ".join(both).replace("-", "−")
-    return written if plain else f"({written}) × {power_of_ten(exponent)}"
+    numbers = (f"{round(number / scale, decimals):.{places}f}" for number in (value, sigma))
+    text = " ± ".join(numbers).replace("-", "−")
+    return text if plain else f"({text}) × {power_of_ten(exponent)}"
 
 
 def rounded(value: float, digits: int = 4) -> str:
@@ -42,9 +42,9 @@ def rounded(value: float, digits: int = 4) -> str:
     exponent = _exponent(float(f"{value:.{digits - 1}e}"))
     if SMALLEST_PLAIN <= 10.0**exponent < LARGEST_PLAIN:
         decimals = digits - 1 - exponent
-        written = f"{round(value, decimals):.{max(decimals, 0)}f}"
-        written = written.rstrip("0").rstrip(".") if "." in written else written
-        return written.replace("-", "−")
+        text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+        text = text.rstrip("0").rstrip(".") if "." in text else text
+        return text.replace("-", "−")
     mantissa = f"{value / 10.0**exponent:.{digits - 1}f}".rstrip("0").rstrip(".")
     return f"{mantissa.replace('-', '−')} × {power_of_ten(exponent)}"
 

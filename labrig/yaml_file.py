@@ -59,19 +59,21 @@ class _Loader(SafeLoader, Composer):
         # Not libyaml's own composer, which would pass `compose_node` by.
         node = Composer.get_single_node(self)
         if node is not None:
-            known: dict[yaml.Node, tuple[int, int]] = {}
-            nodes, depth = _extent(node, known)
-            if nodes - len(known) > MOST_ALIASED or depth > MOST_DEPTH + 1:
+            extents: dict[yaml.Node, tuple[int, int]] = {}
+            nodes, depth = _extent(node, extents)
+            if nodes - len(extents) > MOST_ALIASED or depth > MOST_DEPTH + 1:
                 raise _problem("its aliases stand for more than fits such a file", node)
         return node
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         if (tag := getattr(event, "tag", None)) is not None:
-            written = tag.replace("tag:yaml.org,2002:", "!!")
-            raise _problem(f"the tag '{_shown(written)}' has no meaning here; leave it out", event)
+            tag_text = tag.replace("tag:yaml.org,2002:", "!!")
+            raise _problem(
+                f"the tag '{_shortened(tag_text)}' has no meaning here; leave it out", event
+            )
         if isinstance(event, yaml.ScalarEvent) and _NO_TEXT.search(event.value):
-            raise _problem(f"expected text, got {_shown(ascii(event.value))}", event)
+            raise _problem(f"expected text, got {_shortened(ascii(event.value))}", event)
         if self._depth > MOST_DEPTH:
             raise _problem(f"nested more than {MOST_DEPTH} deep", event)
         self._depth += 1
@@ -80,53 +82,54 @@ class _Loader(SafeLoader, Composer):
         return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: dict[str, int] = {}
+        key_lines: dict[str, int] = {}
         for key_node, _ in node.value:
             if not isinstance(key_node, yaml.ScalarNode):
                 raise _problem("expected a word as key, got a list or a mapping", key_node)
             key, line = str(key_node.value), key_node.start_mark.line + 1
-            if key in seen:
+            if key in key_lines:
                 raise _problem(
-                    f"the key '{_shown(key)}' stands twice (also in line {seen[key]}); keep one",
+                    f"the key '{_shortened(key)}' stands twice (also in line {key_lines[key]}); "
+                    "keep one",
                     key_node,
                 )
-            seen[key] = line
+            key_lines[key] = line
         return super().construct_mapping(node, deep)
 
 
-def _problem(text: str, at: Any) -> yaml.MarkedYAMLError:
+def _problem(text: str, source: Any) -> yaml.MarkedYAMLError:
     """Return the error about a node or an event."""
-    return yaml.MarkedYAMLError(problem=text, problem_mark=at.start_mark)
+    return yaml.MarkedYAMLError(problem=text, problem_mark=source.start_mark)
 
 
-def _extent(node: yaml.Node, known: dict[yaml.Node, tuple[int, int]]) -> tuple[int, int]:
+def _extent(node: yaml.Node, extents: dict[yaml.Node, tuple[int, int]]) -> tuple[int, int]:
     """Return the number of nodes in `node` and their depth, with its aliases expanded.
 
-    `known` has the extents of the nodes counted before, which an alias may refer to; (0, 0) marks a
+    `extents` has those of the nodes counted before, which an alias may refer to; (0, 0) marks a
     node that is still being counted.
     """
-    if node in known:
-        if not known[node][0]:
+    if node in extents:
+        if not extents[node][0]:
             raise _problem("an alias stands within what it stands for", node)
-        return known[node]
-    known[node] = 0, 0
+        return extents[node]
+    extents[node] = 0, 0
     inner: list[yaml.Node] = []
     if isinstance(node, yaml.MappingNode):
         inner = [part for pair in node.value for part in pair]
     elif isinstance(node, yaml.SequenceNode):
         inner = node.value
-    extents = [_extent(part, known) for part in inner]
-    known[node] = (
-        1 + sum(nodes for nodes, _ in extents),
-        1 + max((depth for _, depth in extents), default=0),
+    inner_extents = [_extent(part, extents) for part in inner]
+    extents[node] = (
+        1 + sum(nodes for nodes, _ in inner_extents),
+        1 + max((depth for _, depth in inner_extents), default=0),
     )
-    return known[node]
+    return extents[node]
 
 
 def _construct_float(loader: _Loader, node: yaml.ScalarNode) -> float:
     text = str(node.value)
     if not text.lstrip("+-.")[:1].isdigit() or math.isinf(float(text)):
-        raise _problem(f"expected a finite number, got {_shown(text)}", node)
+        raise _problem(f"expected a finite number, got {_shortened(text)}", node)
     return float(text)
 
 
@@ -136,8 +139,8 @@ for _tag, _pattern, _first in (
     ("int", _INT, "-+0123456789"),
     ("float", _FLOAT, "-+.0123456789"),
 ):
-    _whole = re.compile(f"(?:{_pattern.pattern})\\Z")
-    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _whole, list(_first))
+    _full_pattern = re.compile(f"(?:{_pattern.pattern})\\Z")
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _full_pattern, list(_first))
 _Loader.add_constructor("tag:yaml.org,2002:float", _construct_float)
 _Loader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(str(node.value)))
 
@@ -229,12 +232,12 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> str:
     place = ".".join(str(part) for part in problem["loc"])
     if problem["type"] == "extra_forbidden":
         keys = list(_sibling_keys(model, problem["loc"]))
-        return f"unknown key '{_shown(place)}'; {did_you_mean(str(problem['loc'][-1]), keys)}"
+        return f"unknown key '{_shortened(place)}'; {did_you_mean(str(problem['loc'][-1]), keys)}"
     if problem["type"] == "missing":
         return f"the key '{place}' is missing; it is required"
-    said = problem["msg"].removeprefix("Value error, ")
-    came = "" if "got " in said else f", got {_kind(problem['input'])}"
-    return f"{place}: {said}{came}" if place else f"{said}{came}"
+    message = problem["msg"].removeprefix("Value error, ")
+    received = "" if "got " in message else f", got {_kind(problem['input'])}"
+    return f"{place}: {message}{received}" if place else f"{message}{received}"
 
 
 def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> Iterator[str]:
@@ -265,9 +268,9 @@ def _kind(value: Any) -> str:
         return "nothing"
     if isinstance(value, (dict, list)):
         return "a mapping" if isinstance(value, dict) else "a list"
-    return f"'{_shown(str(value))}'"
+    return f"'{_shortened(str(value))}'"
 
 
-def _shown(text: str) -> str:
+def _shortened(text: str) -> str:
     text = " ".join(text.split())
     return text if len(text) <= MOST_SHOWN else text[:MOST_SHOWN] + "…"

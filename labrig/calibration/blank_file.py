@@ -94,19 +94,20 @@ class BlankFile(BaseModel):
 
     def leaks(self) -> tuple[str, ...]:
         """Return a message for each source of constant stray light."""
-        said = []
-        for what, level, sigma in (
+        messages = []
+        for occasion, level, sigma in (
             ("after lamp-off, but not in dark frames", self.constant_dn_per_s,
              self.constant_sigma_dn_per_s),
             ("all the time", self.ambient_dn_per_s, self.ambient_sigma_dn_per_s),
         ):  # fmt: skip
-            most = int(np.argmax(level))
-            if level[most] > SIGNIFICANT * sigma[most]:
-                said.append(
-                    f"light of {level[most]:.3g} ± {sigma[most]:.2g} DN/s in {self.channels[most]} "
-                    f"falls on the blank {what}: find where it leaks in"
+            brightest = int(np.argmax(level))
+            if level[brightest] > SIGNIFICANT * sigma[brightest]:
+                messages.append(
+                    f"light of {level[brightest]:.3g} ± {sigma[brightest]:.2g} DN/s in "
+                    f"{self.channels[brightest]} falls on the blank {occasion}: find where it "
+                    "leaks in"
                 )
-        return tuple(said)
+        return tuple(messages)
 
 
 def read_blank_file(path: Path) -> BlankFile:

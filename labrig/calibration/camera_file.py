@@ -119,10 +119,11 @@ class CameraFile(CameraModel):
                 f"{lens}; calibrate this one, or leave optics.camera_file out"
             )
         if self.flat_at(f_number) is None:
-            known = ", ".join(stop_text(flat.f_number) for flat in self.flats)
+            calibrated = ", ".join(stop_text(flat.f_number) for flat in self.flats)
             raise DataError(
-                f"calibration of another lens or aperture: expected {known}, the frames were taken "
-                f"at {stop_text(f_number)}; calibrate that, too, or leave optics.camera_file out"
+                f"calibration of another lens or aperture: expected {calibrated}, the frames were "
+                f"taken at {stop_text(f_number)}; calibrate that, too, or leave "
+                "optics.camera_file out"
             )
 
 

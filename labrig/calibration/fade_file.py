@@ -97,14 +97,18 @@ class FadeFile(_Part):
         if any(right <= left for left, right in pairwise(self.bands_nm)):
             raise ValueError("expected rising edges in 'bands_nm'")
         bands = len(self.bands_nm) - 1
-        if any(len(one.fraction[0]) != bands for one in (self.fade, self.rise) if one is not None):
+        if any(
+            len(change.fraction[0]) != bands
+            for change in (self.fade, self.rise)
+            if change is not None
+        ):
             raise ValueError(f"expected {bands} numbers in each row of 'fraction', one a band")
         return self
 
     def in_bands(self, change: Change, edges_nm: ArrayLike) -> tuple[FloatArray, FloatArray]:
         """Return times (n,) and fractions (n, bands) of a transient at other bands' middles."""
-        edges, own = np.asarray(edges_nm, dtype=np.float64), np.array(self.bands_nm)
-        middles, measured = (edges[1:] + edges[:-1]) / 2, (own[1:] + own[:-1]) / 2
+        edges, own_edges = np.asarray(edges_nm, dtype=np.float64), np.array(self.bands_nm)
+        middles, measured = (edges[1:] + edges[:-1]) / 2, (own_edges[1:] + own_edges[:-1]) / 2
         fraction = [np.interp(middles, measured, row) for row in change.fraction]
         return np.array(change.t_s), np.array(fraction)
 

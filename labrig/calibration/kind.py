@@ -45,13 +45,13 @@ class CalibrationKind(Generic[FileT]):
         """
         if not path.is_dir():
             return self.read(path)
-        found = [*path.glob(f"result/{self.file_name}"), *path.glob(f"result/*/{self.file_name}")]
-        if len(found) != 1:
+        paths = [*path.glob(f"result/{self.file_name}"), *path.glob(f"result/*/{self.file_name}")]
+        if len(paths) != 1:
             raise UsageError(
                 f"{path}: expected a run with one {self.file_name} in its result, got "
-                f"{len(found)}; process it first, or name the file itself"
+                f"{len(paths)}; process it first, or name the file itself"
             )
-        return self.read(found[0])
+        return self.read(paths[0])
 
     def write_into(self, folder: Path, file: FileT) -> None:
         """Write `file` into a result's folder under the kind's file name."""

@@ -48,8 +48,8 @@ class WavelengthColumns(_Part):
     def of(cls, wavelengths: WavelengthMap) -> Self:
         """Convert from arrays."""
         count = len(wavelengths.coefficients)
-        known = wavelengths.covariance
-        covariance = np.zeros((count, count)) if known is None else known
+        map_covariance = wavelengths.covariance
+        covariance = np.zeros((count, count)) if map_covariance is None else map_covariance
         return cls(
             coefficients=tuple(wavelengths.coefficients.tolist()),
             span=wavelengths.span,

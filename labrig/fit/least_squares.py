@@ -164,10 +164,10 @@ def least_squares(
         point, step = _polish(residuals, point, low, high, tolerance)
         if step >= CONVERGED_STEP > tolerance and iterations < max_iterations:
             # Along a flat, curved valley damped steps are short long before its lowest place.
-            left = max_iterations - iterations
-            point, more = _damped_search(residuals, point, low, high, left, 0.0)
+            remaining = max_iterations - iterations
+            point, extra = _damped_search(residuals, point, low, high, remaining, 0.0)
             point, step = _polish(residuals, point, low, high, tolerance)
-            iterations += more
+            iterations += extra
         return _result(point, low, high, iterations, step < CONVERGED_STEP)
 
 
@@ -217,7 +217,7 @@ class _Linearised:
     def __init__(self, factors: FloatArray) -> None:
         p = factors.shape[1] - 1
         self.triangle: FloatArray = factors[:, :p] * _upper(len(factors), p)
-        self.turned: FloatArray = factors[:, p]
+        self.rotated: FloatArray = factors[:, p]
         self.norms = _column_norms(self.triangle)
 
     @classmethod
@@ -257,7 +257,7 @@ class _Linearised:
         u, s, vt, _ = lapack.dgesdd(scaled[:, free], full_matrices=0)
         in_parameters = np.zeros((len(s), len(scale)))
         in_parameters[:, free] = vt
-        return s, in_parameters / scale, self.turned @ u
+        return s, in_parameters / scale, self.rotated @ u
 
 
 def _damped_search(
@@ -274,10 +274,10 @@ def _damped_search(
         free = _free(point, low, high)
         if not free.any():
             break
-        local = _Linearised.roughly(point)
+        linearised = _Linearised.roughly(point)
         # Moré: scales never shrink, so that a flat stretch does not set a parameter loose.
-        scale = np.maximum(scale, local.norms)
-        s, directions, along = local.directions(free, scale)
+        scale = np.maximum(scale, linearised.norms)
+        s, directions, along = linearised.directions(free, scale)
         length = _length(point.x * scale) + EPSILON
         accepted = False
         while not accepted and evaluations < max_iterations:
@@ -289,9 +289,9 @@ def _damped_search(
                 return point, evaluations
             trial = _evaluate(residuals, trial_x)
             evaluations += 1
-            change = local.triangle @ step
-            promised = -float((2 * local.turned + change) @ change)
-            gain = (point.chi2 - trial.chi2) / promised if promised > 0 else -1.0
+            change = linearised.triangle @ step
+            predicted = -float((2 * linearised.rotated + change) @ change)
+            gain = (point.chi2 - trial.chi2) / predicted if predicted > 0 else -1.0
             accepted = (
                 trial.chi2 < point.chi2 and gain > 1e-4 and bool(np.isfinite(trial.jacobian).all())
             )
@@ -320,11 +320,11 @@ def _polish(
         free = _free(point, low, high)
         if not free.any():
             return point, 0.0
-        local = _Linearised.exactly(point)
-        s, directions, along = local.directions(free, local.norms)
+        linearised = _Linearised.exactly(point)
+        s, directions, along = linearised.directions(free, linearised.norms)
         kept = s > _rank_tolerance(point.jacobian) * s[0]
         step = -(along[kept] / s[kept]) @ directions[kept]
-        size = _length(step * local.norms) / (_length(point.x * local.norms) + EPSILON)
+        size = _length(step * linearised.norms) / (_length(point.x * linearised.norms) + EPSILON)
         idle = 0 if size < 0.9 * least else idle + 1
         least = min(least, size)
         if idle == POLISH_PATIENCE or size < max(tolerance, EPSILON):
@@ -353,11 +353,11 @@ def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
     inverse = vt[kept].T / s[kept]
     covariance = (inverse @ inverse.T) / np.outer(scale, scale)
     if not kept.all() or len(kept) < len(scale):
-        seen = np.einsum("ij,ij->j", vt[kept], vt[kept])
-        unseen = seen < 1 - np.sqrt(EPSILON)
-        covariance[unseen, :] = 0.0
-        covariance[:, unseen] = 0.0
-        covariance[unseen, unseen] = np.inf
+        resolved = np.einsum("ij,ij->j", vt[kept], vt[kept])
+        unresolved = resolved < 1 - np.sqrt(EPSILON)
+        covariance[unresolved, :] = 0.0
+        covariance[:, unresolved] = 0.0
+        covariance[unresolved, unresolved] = np.inf
     return covariance, s
 
 

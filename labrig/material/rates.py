@@ -42,8 +42,8 @@ def phi1(x: ArrayLike) -> FloatArray:
     [1.0, 1.0, 0.632121, 0.02]
     """
     x = np.asarray(x, dtype=np.float64)
-    away = np.where(x == 0, 1.0, x)
-    return np.where(x == 0, 1.0, -np.expm1(-away) / away)
+    nonzero = np.where(x == 0, 1.0, x)
+    return np.where(x == 0, 1.0, -np.expm1(-nonzero) / nonzero)
 
 
 def phi2(x: ArrayLike) -> FloatArray:
@@ -105,13 +105,13 @@ def exponential_means(
     return decayed * phi1(x)
 
 
-def _phi1_and_phi2(x: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _phi1_and_phi2(x: FloatArray, exp_minus_x: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return φ₁ and φ₂ of x, given e⁻ˣ."""
-    near = x < _SERIES_BELOW
+    small = x < _SERIES_BELOW
     series = np.polyval(_PHI2_SERIES, np.minimum(x, _SERIES_BELOW))
-    away = np.maximum(x, _SERIES_BELOW)
-    first = (1 - left) / away
-    return np.where(near, 1 - x * series, first), np.where(near, series, (1 - first) / away)
+    large = np.maximum(x, _SERIES_BELOW)
+    first = (1 - exp_minus_x) / large
+    return np.where(small, 1 - x * series, first), np.where(small, series, (1 - first) / large)
 
 
 class Relaxation(NamedTuple):

@@ -52,10 +52,10 @@ class CameraResponse:
 
     def at(self, wavelength_nm: ArrayLike) -> FloatArray:
         """Return the sensitivity at (q,) wavelengths in nm, shape (q, channels)."""
-        wanted = np.asarray(wavelength_nm, dtype=np.float64)
+        target_nm = np.asarray(wavelength_nm, dtype=np.float64)
         return np.stack(
             [
-                np.interp(wanted, self.wavelength_nm, column, left=0.0, right=0.0)
+                np.interp(target_nm, self.wavelength_nm, column, left=0.0, right=0.0)
                 for column in self.sensitivity.T
             ],
             axis=1,
@@ -104,7 +104,7 @@ def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
             f"{file.path}: expected the channels R, G and B, the channels are "
             f"{', '.join(list(file.curves)[:6])}; a monochrome camera is read as such"
         )
-    return checked(file.path, lambda known: _camera(known, CHANNELS), file)
+    return checked(file.path, lambda curve_file: _camera(curve_file, CHANNELS), file)
 
 
 def read_monochrome_camera(
@@ -140,8 +140,8 @@ def read_monochrome_camera(
     """
     file = read_curve_file(path)
     name, columns = file.pick(curve)
-    one = CurveFile(file.path, file.title, {name: columns})
-    return checked(file.path, lambda known: _camera(known, (name,)), one)
+    selected = CurveFile(file.path, file.title, {name: columns})
+    return checked(file.path, lambda curve_file: _camera(curve_file, (name,)), selected)
 
 
 def read_sound_curves(

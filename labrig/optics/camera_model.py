@@ -109,7 +109,7 @@ class CameraModel(_Part):
     aperture: tuple[Factor, ...] = ()
     flats: Annotated[tuple[Flat, ...], Field(min_length=1)]
 
-    def exposure_s(self, told_s: float) -> tuple[float, float]:
+    def exposure_s(self, nominal_s: float) -> tuple[float, float]:
         """Return the actual exposure time of a nominal one in s, and its relative σ.
 
         The factor is interpolated in the logarithm of the nominal time and constant below the
@@ -117,14 +117,16 @@ class CameraModel(_Part):
         error is of milliseconds.
         """
         if not self.shutter:
-            return told_s, 0.0
-        told = np.log([one.setting for one in self.shutter])
-        at = math.log(told_s)
+            return nominal_s, 0.0
+        log_nominal = np.log([factor.setting for factor in self.shutter])
+        log_time = math.log(nominal_s)
         longest = self.shutter[-1].setting
-        sigma = float(np.interp(at, told, [one.sigma for one in self.shutter]))
-        if told_s > longest * (1 + SAME_SETTING):
-            return told_s, sigma * longest / told_s
-        return told_s * float(np.interp(at, told, [one.factor for one in self.shutter])), sigma
+        sigma = float(np.interp(log_time, log_nominal, [factor.sigma for factor in self.shutter]))
+        if nominal_s > longest * (1 + SAME_SETTING):
+            return nominal_s, sigma * longest / nominal_s
+        return nominal_s * float(
+            np.interp(log_time, log_nominal, [factor.factor for factor in self.shutter])
+        ), sigma
 
     def scale(self, iso: float, f_number: float | None) -> tuple[float, float]:
         """Return the signal at these settings over that at the model's own, and its relative σ.
@@ -132,10 +134,10 @@ class CameraModel(_Part):
         The σ is common to all frames at these settings. A setting that was not calibrated takes its
         nominal value.
         """
-        gain, gain_sigma = _found(self.iso_gain, iso)
+        gain, gain_sigma = _factor_at(self.iso_gain, iso)
         scale, sigma = gain * iso / self.iso, gain_sigma
         if f_number is not None and self.f_number is not None:
-            light, light_sigma = _found(self.aperture, f_number)
+            light, light_sigma = _factor_at(self.aperture, f_number)
             scale *= light * (self.f_number / f_number) ** 2
             sigma = math.hypot(sigma, light_sigma)
         return scale, sigma
@@ -164,7 +166,7 @@ class CameraModel(_Part):
 
     def flat_at(self, f_number: float | None) -> Flat | None:
         """Return the flat field of an aperture, or None if it was not calibrated."""
-        return next((flat for flat in self.flats if _same(flat.f_number, f_number)), None)
+        return next((flat for flat in self.flats if _is_same(flat.f_number, f_number)), None)
 
 
 def rho_squared(x: FloatArray, y: FloatArray, width: int, height: int) -> FloatArray:
@@ -194,17 +196,17 @@ def rho_squared(x: FloatArray, y: FloatArray, width: int, height: int) -> FloatA
     return (across**2 + down**2) / ((width / 2) ** 2 + (height / 2) ** 2)
 
 
-def _found(factors: tuple[Factor, ...], setting: float) -> tuple[float, float]:
-    for one in factors:
-        if _same(one.setting, setting):
-            return one.factor, one.sigma
+def _factor_at(factors: tuple[Factor, ...], setting: float) -> tuple[float, float]:
+    for factor in factors:
+        if _is_same(factor.setting, setting):
+            return factor.factor, factor.sigma
     return 1.0, 0.0
 
 
-def _same(one: float | None, other: float | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return abs(math.log(one / other)) < SAME_SETTING
+def _is_same(first: float | None, second: float | None) -> bool:
+    if first is None or second is None:
+        return first is second
+    return abs(math.log(first / second)) < SAME_SETTING
 
 
 def stop_text(f_number: float | None) -> str:

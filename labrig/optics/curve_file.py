@@ -51,11 +51,11 @@ def curves_from_text(text: str) -> tuple[str, Curves]:
     if _is_number(header[0]):
         if len(header) not in _UNNAMED:
             raise ValueError(f"{_EXPECTED_TEXT}; got {len(header)} columns")
-        return title, _side_by_side(_UNNAMED[len(header)], rows)
+        return title, _from_columns(_UNNAMED[len(header)], rows)
     if header[0] == WAVELENGTH and len(header) > 1:
-        return title, _side_by_side(tuple(header[1:]), rows[1:])
+        return title, _from_columns(tuple(header[1:]), rows[1:])
     if header[:2] == ["name", WAVELENGTH] and len(header) == 3:
-        return title, _one_below_the_other(rows[1:])
+        return title, _from_long_form(rows[1:])
     raise ValueError(f"{_EXPECTED_TEXT}; got '{','.join(header[:3])}'")
 
 
@@ -75,18 +75,18 @@ def _rows(lines: list[str]) -> list[list[str]]:
     except csv.Error as error:
         raise ValueError(f"not a table ({error})") from None
     rows = [[cell.strip() for cell in row] for row in rows]
-    odd = next((number for number, row in enumerate(rows) if len(row) != len(rows[0])), None)
-    if odd is not None:
+    ragged = next((number for number, row in enumerate(rows) if len(row) != len(rows[0])), None)
+    if ragged is not None:
         raise ValueError(
-            f"row {odd + 1} has {len(rows[odd])} columns, the first has {len(rows[0])}"
+            f"row {ragged + 1} has {len(rows[ragged])} columns, the first has {len(rows[0])}"
         )
     return rows
 
 
-def _side_by_side(names: tuple[str, ...], rows: list[list[str]]) -> Curves:
+def _from_columns(names: tuple[str, ...], rows: list[list[str]]) -> Curves:
     if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"the column '{twice}' stands twice")
+        duplicate = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the column '{duplicate}' stands twice")
     table = _numbers(rows)
     wavelength_nm, values, _ = sorted_columns(table[:, 0], table[:, 1:])
     if names in (("value",), ("value", "sigma")):
@@ -95,11 +95,11 @@ def _side_by_side(names: tuple[str, ...], rows: list[list[str]]) -> Curves:
     return {name: (wavelength_nm, values[:, k], None) for k, name in enumerate(names)}
 
 
-def _one_below_the_other(rows: list[list[str]]) -> Curves:
-    of_name: dict[str, list[list[str]]] = {}
+def _from_long_form(rows: list[list[str]]) -> Curves:
+    rows_by_name: dict[str, list[list[str]]] = {}
     for row in rows:
-        of_name.setdefault(row[0], []).append(row[1:])
-    tables = {name: _numbers(part) for name, part in of_name.items()}
+        rows_by_name.setdefault(row[0], []).append(row[1:])
+    tables = {name: _numbers(part) for name, part in rows_by_name.items()}
     return {name: sorted_columns(table[:, 0], table[:, 1]) for name, table in tables.items()}
 
 
@@ -248,17 +248,18 @@ class CurveFile:
         if name is None:
             if len(self.curves) == 1:
                 return next(iter(self.curves.items()))
-            some = ", ".join(list(self.curves)[:LISTED])
-            more = ", …" if len(self.curves) > LISTED else ""
+            listed = ", ".join(list(self.curves)[:LISTED])
+            ellipsis = ", …" if len(self.curves) > LISTED else ""
             raise UsageError(
-                f"{self.path}: expected one curve, got {len(self.curves)} ({some}{more}); name one"
+                f"{self.path}: expected one curve, got {len(self.curves)} "
+                f"({listed}{ellipsis}); name one"
             )
         if name not in self.curves:
-            known = list(self.curves)
+            names = list(self.curves)
             hint = (
-                did_you_mean(name, known)
-                if len(known) <= LISTED or _close(name, known)
-                else (f"it has {len(known)}, such as {', '.join(known[:LISTED])}")
+                did_you_mean(name, names)
+                if len(names) <= LISTED or _has_close_match(name, names)
+                else (f"it has {len(names)}, such as {', '.join(names[:LISTED])}")
             )
             raise UsageError(f"{self.path}: no curve is called '{name}'; {hint}")
         return name, self.curves[name]
@@ -293,18 +294,18 @@ def read_curve_file(path: str | os.PathLike[str]) -> CurveFile:
     >>> file.curves["red"].value.tolist()
     [0.0, 0.2, 1.0]
     """
-    place = Path(path)
-    text = read_text(place)
-    if place.suffix.lower() == ".json":
+    file_path = Path(path)
+    text = read_text(file_path)
+    if file_path.suffix.lower() == ".json":
         try:
             content = json.loads(text)
         except (ValueError, RecursionError) as error:
-            raise UsageError(f"{place}: not JSON ({' '.join(str(error).split())})") from None
-        title, curves = checked(place, curves_from_json, content)
+            raise UsageError(f"{file_path}: not JSON ({' '.join(str(error).split())})") from None
+        title, curves = checked(file_path, curves_from_json, content)
     else:
-        title, curves = checked(place, curves_from_text, text)
-    sorted_curves = {(name or place.stem): Curve(*columns) for name, columns in curves.items()}
-    return CurveFile(place, title or place.stem, sorted_curves)
+        title, curves = checked(file_path, curves_from_text, text)
+    sorted_curves = {(name or file_path.stem): Curve(*columns) for name, columns in curves.items()}
+    return CurveFile(file_path, title or file_path.stem, sorted_curves)
 
 
 def read_spectrum(path: str | os.PathLike[str], name: str | None = None) -> Spectrum:
@@ -337,8 +338,8 @@ def read_spectrum(path: str | os.PathLike[str], name: str | None = None) -> Spec
     ('lamp', [0.75, 1.1, 0.0])
     """
     file = read_curve_file(path)
-    found, curve = file.pick(name)
-    return checked(f"{file.path}: {found}", lambda c: Spectrum(found, *c), curve)
+    curve_name, curve = file.pick(name)
+    return checked(f"{file.path}: {curve_name}", lambda c: Spectrum(curve_name, *c), curve)
 
 
 def read_transmittance(path: str | os.PathLike[str], name: str | None = None) -> Transmittance:
@@ -371,8 +372,8 @@ def read_transmittance(path: str | os.PathLike[str], name: str | None = None) ->
     [0.175, 0.18]
     """
     file = read_curve_file(path)
-    found, curve = file.pick(name)
-    return checked(f"{file.path}: {found}", lambda c: Transmittance(found, *c), curve)
+    curve_name, curve = file.pick(name)
+    return checked(f"{file.path}: {curve_name}", lambda c: Transmittance(curve_name, *c), curve)
 
 
 ContentT = TypeVar("ContentT")
@@ -386,5 +387,5 @@ def checked(place: object, make: Callable[[ContentT], T], content: ContentT) -> 
         raise UsageError(f"{place}: {error}") from None
 
 
-def _close(name: str, known: list[str]) -> bool:
-    return "did you mean" in did_you_mean(name, known)
+def _has_close_match(name: str, names: list[str]) -> bool:
+    return "did you mean" in did_you_mean(name, names)

@@ -92,10 +92,13 @@ class Bands:
         shape = peak_shape(distance, self.fwhm_nm[:, np.newaxis], self.skew[:, np.newaxis])
         return self.leakage[:, np.newaxis] + self.peak[:, np.newaxis] * shape
 
-    def between(self, position: FloatArray, wanted: FloatArray) -> Self:
+    def between(self, position: FloatArray, new_position: FloatArray) -> Self:
         """Return the bands at other positions, each parameter interpolated along `position`."""
         return type(self)(
-            *(np.interp(wanted, position, getattr(self, field.name)) for field in fields(self))
+            *(
+                np.interp(new_position, position, getattr(self, field.name))
+                for field in fields(self)
+            )
         )
 
 
@@ -160,18 +163,18 @@ class WavelengthMap:
         ValueError
             A wavelength is not on the strip.
         """
-        wanted = np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
-        places = np.linspace(*self.span, _SAMPLES)
-        known = self.wavelength_nm(places)
-        if wanted.min() < known.min() or wanted.max() > known.max():
+        target_nm = np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
+        positions = np.linspace(*self.span, _SAMPLES)
+        table_nm = self.wavelength_nm(positions)
+        if target_nm.min() < table_nm.min() or target_nm.max() > table_nm.max():
             raise ValueError(
-                f"expected wavelengths from {known.min():.1f} to {known.max():.1f} nm, which the "
-                f"strip shows, got {wanted.min():.1f} to {wanted.max():.1f}"
+                f"expected wavelengths from {table_nm.min():.1f} to {table_nm.max():.1f} nm, which "
+                f"the strip shows, got {target_nm.min():.1f} to {target_nm.max():.1f}"
             )
         order = slice(None) if self.rising else slice(None, None, -1)
-        position = np.interp(wanted, known[order], places[order])
+        position = np.interp(target_nm, table_nm[order], positions[order])
         for _ in range(2):
-            position = position - (self.wavelength_nm(position) - wanted) / self._slope(position)
+            position = position - (self.wavelength_nm(position) - target_nm) / self._slope(position)
         return position
 
     def _scaled(self, position: ArrayLike) -> FloatArray:
@@ -240,17 +243,17 @@ class Lvf:
 
     def at(self, position: ArrayLike) -> "Lvf":
         """Return the filter at other rising positions within its own, linearly interpolated."""
-        wanted = np.asarray(position, dtype=np.float64)
-        if wanted.min() < self.position[0] or wanted.max() > self.position[-1]:
+        new_position = np.asarray(position, dtype=np.float64)
+        if new_position.min() < self.position[0] or new_position.max() > self.position[-1]:
             raise ValueError(
                 f"expected positions from {self.position[0]:g} to {self.position[-1]:g}, where the "
-                f"filter is known, got {wanted.min():g} to {wanted.max():g}"
+                f"filter is known, got {new_position.min():g} to {new_position.max():g}"
             )
-        rows = [np.interp(wanted, self.position, column) for column in self.remainder.T]
+        rows = [np.interp(new_position, self.position, column) for column in self.remainder.T]
         return Lvf(
-            wanted,
-            self.bands.between(self.position, wanted),
-            None if self.sigma is None else self.sigma.between(self.position, wanted),
+            new_position,
+            self.bands.between(self.position, new_position),
+            None if self.sigma is None else self.sigma.between(self.position, new_position),
             self.remainder_nm,
             np.array(rows).T if rows else np.empty((0, 0)),
         )
@@ -299,8 +302,8 @@ def nominal_lvf(
     """
     position = np.sort(wavelengths.position(centre_nm))
     centre = wavelengths.wavelength_nm(position)
-    same = np.ones_like(centre)
-    return Lvf(position, Bands(centre, fwhm_nm * same, 0 * same, same, leakage * same))
+    ones = np.ones_like(centre)
+    return Lvf(position, Bands(centre, fwhm_nm * ones, 0 * ones, ones, leakage * ones))
 
 
 def seen_through(lvf: Lvf, camera: CameraResponse, light: Spectrum) -> FloatArray:
@@ -333,7 +336,7 @@ def seen_through(lvf: Lvf, camera: CameraResponse, light: Spectrum) -> FloatArra
     """
     low, high = camera.wavelength_nm[0], camera.wavelength_nm[-1]
     nodes, weights = quadrature(low, high, camera.wavelength_nm, light.wavelength_nm)
-    seen: FloatArray = lvf.transmission(nodes) @ (
+    signal: FloatArray = lvf.transmission(nodes) @ (
         (weights * light.at(nodes))[:, np.newaxis] * camera.at(nodes)
     )
-    return seen
+    return signal

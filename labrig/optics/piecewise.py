@@ -46,16 +46,16 @@ def band_integrals(
     """
     edges = np.asarray(edges_nm, dtype=np.float64)
     step = np.diff(wavelength_nm).reshape(-1, *[1] * (values.ndim - 1))
-    until = np.concatenate(
+    cumulative = np.concatenate(
         [np.zeros_like(values[:1]), np.cumsum(step * (values[1:] + values[:-1]) / 2, axis=0)]
     )
     inside = np.clip(edges, wavelength_nm[0], wavelength_nm[-1])
-    left = np.clip(
+    cell = np.clip(
         np.searchsorted(wavelength_nm, inside, side="right") - 1, 0, len(wavelength_nm) - 2
     )
-    x = (inside - wavelength_nm[left]).reshape(-1, *[1] * (values.ndim - 1))
-    slope = (values[left + 1] - values[left]) / step[left]
-    integrals: FloatArray = np.diff(until[left] + x * values[left] + x**2 / 2 * slope, axis=0)
+    x = (inside - wavelength_nm[cell]).reshape(-1, *[1] * (values.ndim - 1))
+    slope = (values[cell + 1] - values[cell]) / step[cell]
+    integrals: FloatArray = np.diff(cumulative[cell] + x * values[cell] + x**2 / 2 * slope, axis=0)
     return integrals
 
 
@@ -177,11 +177,11 @@ def hats(knots_nm: FloatArray, wavelength_nm: FloatArray) -> FloatArray:
     >>> hats(np.array([400.0, 500.0, 600.0]), np.array([425.0, 500.0, 650.0])).tolist()
     [[0.75, 0.25, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
     """
-    left = np.clip(np.searchsorted(knots_nm, wavelength_nm, side="right") - 1, 0, len(knots_nm) - 2)
-    fraction = (wavelength_nm - knots_nm[left]) / (knots_nm[left + 1] - knots_nm[left])
+    cell = np.clip(np.searchsorted(knots_nm, wavelength_nm, side="right") - 1, 0, len(knots_nm) - 2)
+    fraction = (wavelength_nm - knots_nm[cell]) / (knots_nm[cell + 1] - knots_nm[cell])
     inside = (fraction >= 0) & (fraction <= 1)
     values = np.zeros((len(wavelength_nm), len(knots_nm)))
     rows = np.flatnonzero(inside)
-    values[rows, left[rows]] = 1 - fraction[rows]
-    values[rows, left[rows] + 1] += fraction[rows]
+    values[rows, cell[rows]] = 1 - fraction[rows]
+    values[rows, cell[rows] + 1] += fraction[rows]
     return values

@@ -112,8 +112,8 @@ class Transmittance:
         knots = self.wavelength_nm
         # The outermost values go on until beyond the outermost edges.
         low, high = min(edges[0], knots[0]) - 1.0, max(edges[-1], knots[-1]) + 1.0
-        wider = np.concatenate([[low], knots, [high]])
-        return band_means(wider, self.at(wider), edges)
+        extended_nm = np.concatenate([[low], knots, [high]])
+        return band_means(extended_nm, self.at(extended_nm), edges)
 
 
 def check_curve(wavelength_nm: FloatArray, value: FloatArray, sigma: FloatArray | None) -> None:

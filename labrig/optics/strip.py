@@ -69,12 +69,14 @@ class Strip(BaseModel):
 
         A frame of `width` × `height` pixels resolves no other positions.
         """
-        found = []
+        fractions = []
         for region in self.slices(count).values():
-            x, _, wide, _ = region_pixels(region, width, height)
-            fraction = ((x + wide / 2) / width - self.left[0]) / (self.right[0] - self.left[0])
-            found.append(fraction if self.rising else 1 - fraction)
-        return tuple(found)
+            x, _, region_width, _ = region_pixels(region, width, height)
+            fraction = ((x + region_width / 2) / width - self.left[0]) / (
+                self.right[0] - self.left[0]
+            )
+            fractions.append(fraction if self.rising else 1 - fraction)
+        return tuple(fractions)
 
     def tilt_degrees(self, width: int, height: int) -> float:
         """Return the tilt of the strip in a frame in degrees, > 0 if it falls to the right."""

@@ -93,12 +93,12 @@ def _outlier_warnings(misfit: Misfit) -> list[str]:
     if len(size) < FEWEST_FOR_ORDER:
         return []
     # The median does not mind the outlier, whatever σ and flicker were made of it.
-    usual = 1.4826 * float(np.median(size))
-    far = np.flatnonzero((size > OUTLIER_SIGMAS * usual) & (size > OUTLIER_OWN_SIGMAS))
+    typical = 1.4826 * float(np.median(size))
+    outliers = np.flatnonzero((size > OUTLIER_SIGMAS * typical) & (size > OUTLIER_OWN_SIGMAS))
     return [
-        f"the frame at {misfit.t_s[row]:.4g} s lies {size[row] / max(usual, 1e-3):.0f} times as "
+        f"the frame at {misfit.t_s[row]:.4g} s lies {size[row] / max(typical, 1e-3):.0f} times as "
         "far off the curve as the others do: look at it, leave it out if something disturbed it"
-        for row in far[np.argsort(-size[far])][:MOST_NAMED]
+        for row in outliers[np.argsort(-size[outliers])][:MOST_NAMED]
     ]
 
 
@@ -178,8 +178,8 @@ def state_warnings(
             warnings.append(
                 f"k{number} and k{number + 1} cannot be told apart: ask for one state fewer"
             )
-    held = states[-1].k_r_sigma_per_s == 0
-    if lifetime_s > span_s and not held and sigma[-1] <= ILL_DETERMINED:
+    is_fixed = states[-1].k_r_sigma_per_s == 0
+    if lifetime_s > span_s and not is_fixed and sigma[-1] <= ILL_DETERMINED:
         warnings.append(
             f"the slowest state lives {lifetime_s:.3g} s, longer than the {span_s:.4g} s recorded: "
             "record longer to be sure of it"

@@ -95,8 +95,8 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
     weights = _first_weights(series)
     offsets = np.zeros_like(weights)
     signal = np.zeros_like(series.values)
-    lone = len(weights) == len(series.repeats) == 1
-    if lone and flicker == 0 and series.sigma_given:
+    is_single = len(weights) == len(series.repeats) == 1
+    if is_single and flicker == 0 and series.sigma_given:
         n_frames = series.n_frames
         return Envelope(series, signal, weights, offsets, n_frames, 0.0, 0.0, np.zeros(1), 1.0)
     rho, rho_sigma, noise_scale = 0.0, 0.0, 1.0
@@ -118,8 +118,8 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
         else:
             rho = flicker
     if not series.sigma_given:
-        left = series.inverse_sigma * (series.values - signal - offsets)
-        noise_scale = float(np.sqrt((left**2).sum() / dof))
+        residual = series.inverse_sigma * (series.values - signal - offsets)
+        noise_scale = float(np.sqrt((residual**2).sum() / dof))
     return Envelope(series, signal, weights, offsets, dof, rho, rho_sigma, likely, noise_scale)
 
 
@@ -146,13 +146,13 @@ def _monotone_curve(
         used = amplitudes > 0
         if refinement < ROUNDS:
             step /= REFINEMENT
-            around = step * np.arange(-REFINEMENT, REFINEMENT + 1)
-            log_rates = np.unique(np.add.outer(log_rates[used], around).round(12))
+            refinements = step * np.arange(-REFINEMENT, REFINEMENT + 1)
+            log_rates = np.unique(np.add.outer(log_rates[used], refinements).round(12))
             log_rates = np.clip(log_rates, low, high)
     design = data.signal_design(problem.unit, means[:, used])
     offsets = np.zeros_like(weights)
-    left = data.target - design @ amplitudes[used]
-    offsets[series.fitted_offsets] = np.linalg.lstsq(data.offset_design, left)[0]
+    residual = data.target - design @ amplitudes[used]
+    offsets[series.fitted_offsets] = np.linalg.lstsq(data.offset_design, residual)[0]
     along, _ = data.followed(weights, np.hstack([design, data.offset_design]))
     return means @ amplitudes, offsets, along
 
@@ -180,8 +180,8 @@ def _gains(
     """
     series = data.series
     model = data.constant(weights) * curve[:, None]
-    seen = (model * (data.values - data.constant(offsets))).sum(axis=1)
-    gains = np.bincount(series.repeat, seen) / np.maximum(
+    overlap = (model * (data.values - data.constant(offsets))).sum(axis=1)
+    gains = np.bincount(series.repeat, overlap) / np.maximum(
         np.bincount(series.repeat, (model**2).sum(axis=1)), np.finfo(float).tiny
     )
     levels = series.levels * np.where(gains > 0, gains, 1.0)
@@ -199,25 +199,25 @@ def _flicker(
     """
     u = np.einsum("fcd,fd->fc", series.whiteners, signal)
     brightness2 = np.einsum("fc,fc->f", u, u)
-    left = np.einsum("fcd,fd->fc", series.whiteners, series.values - signal - offsets)
-    along2 = np.einsum("fc,fc->f", u, left) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
-    spare = np.maximum(1 - leverage, 0.0)
-    if float(brightness2**2 @ spare) <= LEAST_SPARE * float(brightness2 @ brightness2):
+    residual = np.einsum("fcd,fd->fc", series.whiteners, series.values - signal - offsets)
+    along2 = np.einsum("fc,fc->f", u, residual) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
+    free = np.maximum(1 - leverage, 0.0)
+    if float(brightness2**2 @ free) <= LEAST_SPARE * float(brightness2 @ brightness2):
         raise FitError(
             "expected frames to spare to estimate flicker, got a curve through all bright ones; "
             "give the flicker, or record more frames"
         )
     variance = 0.0
     for _ in range(FLICKER_ITERATIONS):
-        told = brightness2 / (1 + variance * brightness2)
-        scatter = float((told**2 / np.where(brightness2 > 0, brightness2, 1.0)) @ (along2 - spare))
-        variance = min(max(scatter / float(told**2 @ spare), 0.0), MOST_FLICKER**2)
+        weight = brightness2 / (1 + variance * brightness2)
+        scatter = float((weight**2 / np.where(brightness2 > 0, brightness2, 1.0)) @ (along2 - free))
+        variance = min(max(scatter / float(weight**2 @ free), 0.0), MOST_FLICKER**2)
 
     def error(variance: float) -> tuple[float, float]:
         """Return σ(ρ²), and ν: 2/ν is the squared relative error of V where it matters most."""
-        told = brightness2 / (1 + variance * brightness2)
-        sigma = float(np.sqrt(2 / (told**2 @ spare)))
-        return sigma, 2 / (sigma**2 * float((told**3).sum() / told.sum()))
+        weight = brightness2 / (1 + variance * brightness2)
+        sigma = float(np.sqrt(2 / (weight**2 @ free)))
+        return sigma, 2 / (sigma**2 * float((weight**3).sum() / weight.sum()))
 
     variance_sigma, dof = error(variance)
     if dof < FEWEST_NOISE_DOF:
@@ -227,10 +227,10 @@ def _flicker(
     flicker = float(np.sqrt(variance))
     # Near zero the square root is not linear: then √σ(ρ²) is the scale of what ρ could be.
     sigma = min(variance_sigma / (2 * max(flicker, 1e-30)), float(np.sqrt(variance_sigma)))
-    return flicker, sigma, dof, _likely_flickers(brightness2, along2, spare)
+    return flicker, sigma, dof, _likely_flickers(brightness2, along2, free)
 
 
-def _likely_flickers(brightness2: FloatArray, along2: FloatArray, spare: FloatArray) -> FloatArray:
+def _likely_flickers(brightness2: FloatArray, along2: FloatArray, free: FloatArray) -> FloatArray:
     """Return values of ρ at equal steps of its posterior probability.
 
     The arguments are named as in `_flicker`.
@@ -238,7 +238,7 @@ def _likely_flickers(brightness2: FloatArray, along2: FloatArray, spare: FloatAr
     # Dense near zero, where a small ρ already tells.
     rho = MOST_FLICKER * np.linspace(0, 1, FLICKER_GRID) ** 2
     variance = 1 + np.multiply.outer(rho**2, brightness2)
-    log_likelihood = -0.5 * (np.log(variance) @ spare + (along2 / variance).sum(axis=1))
+    log_likelihood = -0.5 * (np.log(variance) @ free + (along2 / variance).sum(axis=1))
     density = np.exp(log_likelihood - log_likelihood.max()) / (1 + (rho / USUAL_FLICKER) ** 2)
     fraction = density * np.gradient(rho)
     below = np.cumsum(fraction) - fraction / 2

@@ -1,4 +1,4 @@
-"""From frames to rates: `fit_decay`."""
+"""Fit of rates and amplitudes to the frames of a decay: `fit_decay`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -133,7 +133,7 @@ def fit_decay(
     chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
     alternative_models = _alternatives(data, chosen)
     best = min(alternative_models, key=lambda alternative: alternative.bic)
-    best_wins = best.bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
+    is_better = best.bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
     data, chosen = _reweighted(data, chosen, smooth.flicker)
     refuse_if_constant(chosen, data)
     return assemble(
@@ -144,7 +144,7 @@ def fit_decay(
             noise_dof=noise_dof,
             candidates=tuple(tried),
             alternative_models=alternative_models,
-            better_model=best if best_wins else None,
+            better_model=best if is_better else None,
             asked=n_states,
             max_states=max_states,
             n_fixed=len(fixed),
@@ -187,8 +187,8 @@ def _numbers_of_states(
             "record more frames or ask for fewer states"
         )
     # Choosing takes frames to spare.
-    enough = [n for n in range(fewest, most + 1) if n == fewest or frames > parameters(n) + 1]
-    return range(fewest, enough[-1] + 1)
+    affordable = [n for n in range(fewest, most + 1) if n == fewest or frames > parameters(n) + 1]
+    return range(fewest, affordable[-1] + 1)
 
 
 def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
@@ -211,8 +211,10 @@ def _supported_states(
 ) -> tuple[StatesFit, list[Candidate]]:
     """Return the selected states; fewer than requested if amplitudes vanish."""
     for fewest in range(numbers.start, max(len(fixed), 1) - 1, -1):
-        those = range(fewest, max(numbers.stop, fewest + 1))
-        chosen, tried = choose_states(data, those, fixed, smooth.weights, smooth.offsets, noise_dof)
+        n_states = range(fewest, max(numbers.stop, fewest + 1))
+        chosen, tried = choose_states(
+            data, n_states, fixed, smooth.weights, smooth.offsets, noise_dof
+        )
         if chosen is not None:
             return chosen, tried
     raise FitError(NO_DECAY)
@@ -236,9 +238,11 @@ def _reweighted(
         return data, refit(data, fit)
     for _ in range(REWEIGHTINGS):
         data = whitened(data.series, fit.signal(data.series), flicker)
-        before = fit.joint.shape
+        old_shape = fit.joint.shape
         fit = refit(data, fit)
-        after = fit.joint.shape
-        if len(after) == len(before) and np.allclose(after, before, REWEIGHTED_ENOUGH, 0.0):
+        new_shape = fit.joint.shape
+        if len(new_shape) == len(old_shape) and np.allclose(
+            new_shape, old_shape, REWEIGHTED_ENOUGH, 0.0
+        ):
             break
     return data, fit

@@ -122,10 +122,10 @@ def warnings_about(
             f"flicker was estimated from {max(evidence.noise_dof, 1):.0f} frames' worth of bright "
             "signal: give a flicker measured elsewhere, or record more frames while it is bright"
         )
-    wanted = evidence.asked or evidence.n_fixed
-    if fit.n_states < wanted:
+    requested = evidence.asked or evidence.n_fixed
+    if fit.n_states < requested:
         warnings.append(
-            f"{wanted} states were asked for, the data support {fit.n_states}: "
+            f"{requested} states were asked for, the data support {fit.n_states}: "
             "the others' amplitude is zero; ask for fewer or take more light"
         )
     alternative = evidence.better_model
@@ -136,13 +136,13 @@ def warnings_about(
             f"{'s' if n > 1 else ''}: the rates are descriptive only, "
             "do not extrapolate them beyond the times recorded"
         )
-    more = (
+    advice = (
         "allow more states"
         if fit.n_states < evidence.max_states
         else "look for another law of decay"
     )
     warnings += misfit_warnings(
-        _misfit(data, fit, evidence), fit.n_states, f"{more}, and check background and times"
+        _misfit(data, fit, evidence), fit.n_states, f"{advice}, and check background and times"
     )
     warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)

@@ -63,9 +63,9 @@ class Projection:
     def amplitudes(self, log_rates: FloatArray) -> tuple[FloatArray, float]:
         """Return the best amplitudes ≥ 0 and the remaining χ²."""
         columns = self.rate_columns(log_rates)
-        found = nonnegative(columns.T @ columns, columns.T @ self.target)
-        left = self.target - columns @ found
-        return found, float(left @ left)
+        values = nonnegative(columns.T @ columns, columns.T @ self.target)
+        residual = self.target - columns @ values
+        return values, float(residual @ residual)
 
 
 def projection(data: WhitenedSeries, weights: FloatArray) -> Projection:
@@ -131,11 +131,11 @@ def search_rates(problem: Projection, n_free: int, fixed: FloatArray) -> FloatAr
     try:
         # An exception must not pass through NLopt's C code.
         with np.errstate(all="ignore"):
-            found = np.asarray(optimiser.optimize(start), dtype=np.float64)
+            log_rates = np.asarray(optimiser.optimize(start), dtype=np.float64)
     except nlopt.RoundoffLimited:
         # Noise-free data: χ² is all rounding before the rates have settled. The grid will do.
         return start
-    return found
+    return log_rates
 
 
 def grid_size(n_free: int) -> int:
@@ -156,14 +156,14 @@ def _best_on_grid(
     columns = columns / np.where(norms > 0, norms, 1.0)
     gram, moments = columns.T @ columns, columns.T @ problem.target
     chosen = np.array(list(combinations(range(len(grid)), n_free)))
-    held = np.broadcast_to(np.arange(len(grid), len(log_rates)), (len(chosen), len(fixed)))
-    chosen = np.hstack([chosen, held])
+    fixed_columns = np.broadcast_to(np.arange(len(grid), len(log_rates)), (len(chosen), len(fixed)))
+    chosen = np.hstack([chosen, fixed_columns])
     matrices = gram[chosen[:, :, None], chosen[:, None, :]]
     # Neighbours on the grid are nearly alike; a hint of a ridge keeps the batch solvable.
     matrices = matrices + 1e-13 * np.eye(chosen.shape[1])
-    right = moments[chosen]
-    amplitudes = np.linalg.solve(matrices, right[:, :, None])[:, :, 0]
-    explained = np.einsum("ij,ij->i", amplitudes, right)
+    rhs = moments[chosen]
+    amplitudes = np.linalg.solve(matrices, rhs[:, :, None])[:, :, 0]
+    explained = np.einsum("ij,ij->i", amplitudes, rhs)
     explained[~np.all(amplitudes[:, :n_free] > 0, axis=1)] = -np.inf
     best = int(np.argmax(explained))
     return grid[chosen[best, :n_free]] if np.isfinite(explained[best]) else None

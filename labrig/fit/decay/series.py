@@ -91,10 +91,10 @@ class DecaySeries:
         """Matrices W with Wᵀ W the inverse covariance of each frame without flicker, (n, C, C)."""
         measured = self.inverse_sigma > 0
         roots = np.zeros((self.n_frames, *self.correlation.shape))
-        for seen in np.unique(measured, axis=0):
-            part = np.ix_(seen, seen)
-            roots[np.ix_((measured == seen).all(axis=1), seen, seen)] = np.linalg.inv(
-                np.linalg.cholesky(self.correlation[part])
+        for pattern in np.unique(measured, axis=0):
+            block = np.ix_(pattern, pattern)
+            roots[np.ix_((measured == pattern).all(axis=1), pattern, pattern)] = np.linalg.inv(
+                np.linalg.cholesky(self.correlation[block])
             )
         whiteners: FloatArray = roots * self.inverse_sigma[:, None, :]
         return whiteners
@@ -102,21 +102,23 @@ class DecaySeries:
     @cached_property
     def offset_prior(self) -> FloatArray:
         """Rows that, times the fitted offsets, have unit variance by their prior, shape (p, m)."""
-        known = np.flatnonzero(np.isfinite(self.offset_sigma) & (self.offset_sigma > 0))
-        sigma = self.offset_sigma[known]
-        covariance = self.offset_correlation[np.ix_(known, known)] * np.outer(sigma, sigma)
-        rows = np.zeros((len(known), len(self.fitted_offsets)))
-        places = np.searchsorted(self.fitted_offsets, known)
-        rows[:, places] = np.linalg.inv(np.linalg.cholesky(covariance))
+        constrained = np.flatnonzero(np.isfinite(self.offset_sigma) & (self.offset_sigma > 0))
+        sigma = self.offset_sigma[constrained]
+        covariance = self.offset_correlation[np.ix_(constrained, constrained)] * np.outer(
+            sigma, sigma
+        )
+        rows = np.zeros((len(constrained), len(self.fitted_offsets)))
+        columns = np.searchsorted(self.fitted_offsets, constrained)
+        rows[:, columns] = np.linalg.inv(np.linalg.cholesky(covariance))
         return rows
 
     def relevelled(self, gains: FloatArray) -> "DecaySeries":
         """Return the series with the values after each charge divided by their gain (r,) > 0."""
-        of_frame = gains[self.repeat][:, None]
+        frame_gains = gains[self.repeat][:, None]
         return replace(
             self,
-            values=self.values / of_frame,
-            inverse_sigma=self.inverse_sigma * of_frame,
+            values=self.values / frame_gains,
+            inverse_sigma=self.inverse_sigma * frame_gains,
             levels=self.levels * gains,
         )
 
@@ -165,10 +167,10 @@ def decay_series(
             f"expected values of {len(t)} frames in {len(names)} channel(s) "
             f"({', '.join(names)}), got shape {np.shape(values)}; give one row per frame"
         )
-    of_frame = [""] * len(t) if repeats is None else list(repeats)
-    if len(of_frame) != len(t):
-        raise FitError(f"expected {len(t)} repeats, got {len(of_frame)}; give one per frame")
-    repeat_names = tuple(dict.fromkeys(of_frame))
+    frame_repeats = [""] * len(t) if repeats is None else list(repeats)
+    if len(frame_repeats) != len(t):
+        raise FitError(f"expected {len(t)} repeats, got {len(frame_repeats)}; give one per frame")
+    repeat_names = tuple(dict.fromkeys(frame_repeats))
     inverse_sigma = _inverse_sigma(sigma, y)
     prior_sigma = _prior_sigma(offset_sigma, len(names))
     measured = inverse_sigma > 0
@@ -211,7 +213,7 @@ def decay_series(
         span_s=span,
         peak=peak,
         order=order,
-        repeat=np.array([repeat_names.index(name) for name in of_frame])[order],
+        repeat=np.array([repeat_names.index(name) for name in frame_repeats])[order],
         levels=np.ones(len(repeat_names)),
         channels=names,
         repeats=repeat_names,

@@ -127,8 +127,8 @@ def sigmas_apart(log_rates: FloatArray, covariance: FloatArray) -> FloatArray:
     fast, slow = falling[:-1], falling[1:]
     variance = covariance[fast, fast] + covariance[slow, slow] - 2 * covariance[fast, slow]
     apart: FloatArray = log_rates[fast] - log_rates[slow]
-    known = variance > 0
-    return np.where(known, apart / np.sqrt(np.where(known, variance, 1.0)), np.inf)
+    positive = variance > 0
+    return np.where(positive, apart / np.sqrt(np.where(positive, variance, 1.0)), np.inf)
 
 
 def exponentials(series: DecaySeries, n_free: int, fixed: FloatArray) -> Shape:
@@ -158,14 +158,14 @@ def fit_states(
     result.
     """
     problem = projection(data, weights)
-    found: FloatArray | None = np.empty(0)
+    log_rates: FloatArray | None = np.empty(0)
     if n_free:
-        found = search_rates(problem, n_free, fixed)
-    if found is None:
+        log_rates = search_rates(problem, n_free, fixed)
+    if log_rates is None:
         return None
-    amplitudes, _ = problem.amplitudes(np.concatenate([found, fixed]))
+    amplitudes, _ = problem.amplitudes(np.concatenate([log_rates, fixed]))
     start = np.empty(2 * n_free + len(fixed))
-    start[0 : 2 * n_free : 2] = found
+    start[0 : 2 * n_free : 2] = log_rates
     start[1 : 2 * n_free : 2] = amplitudes[:n_free]
     start[2 * n_free :] = amplitudes[n_free:]
     fit = _fit_from(data, start, fixed, weights, offsets, CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE)
@@ -180,10 +180,12 @@ def fit_states(
 
 def refit(data: WhitenedSeries, fit: StatesFit) -> StatesFit:
     """Fit the same states to full precision, perhaps whitened anew, without vanishing ones."""
-    return _to_all_digits(data, fit.joint.shape, fit.fixed, fit.joint.weights, fit.joint.offsets)
+    return _to_full_precision(
+        data, fit.joint.shape, fit.fixed, fit.joint.weights, fit.joint.offsets
+    )
 
 
-def _to_all_digits(
+def _to_full_precision(
     data: WhitenedSeries,
     start: FloatArray,
     fixed: FloatArray,
@@ -197,7 +199,7 @@ def _to_all_digits(
     if not kept.any():
         raise FitError(NO_DECAY)
     still_present = np.concatenate([np.repeat(kept[:n_free], 2), kept[n_free:]])
-    return _to_all_digits(
+    return _to_full_precision(
         data, fit.joint.shape[still_present], fixed[kept[n_free:]], weights, offsets
     )
 

@@ -87,10 +87,10 @@ class WhitenedSeries:
         flicker a second channel adds little.
         """
         unit = self.constant(weights)
-        together = np.einsum("fc,fc->f", unit, unit)
+        information = np.einsum("fc,fc->f", unit, unit)
         best = (weights**2 / self.variance).max(axis=1)
-        seen = best > 0
-        return float((together[seen] / best[seen]).sum())
+        informative = best > 0
+        return float((information[informative] / best[informative]).sum())
 
 
 def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> WhitenedSeries:
@@ -114,7 +114,7 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         shrink = u / (root * (1 + root))[:, None]
         along = np.einsum("fc,fcd->fd", u, matrices)
         matrices = matrices - shrink[:, :, None] * along[:, None, :]
-    alone = 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2
+    own_variance = 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2
     values = np.einsum("fcd,fd->fc", matrices, series.values)
     fitted = series.fitted_offsets
     prior = series.offset_prior
@@ -124,5 +124,5 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         values=values,
         target=np.append(values, np.zeros(len(prior))),
         offset_design=np.vstack([matrices[:, :, fitted].reshape(values.size, -1), prior]),
-        variance=np.where(measured, alone + (flicker * signal) ** 2, np.inf),
+        variance=np.where(measured, own_variance + (flicker * signal) ** 2, np.inf),
     )

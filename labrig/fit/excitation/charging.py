@@ -95,8 +95,10 @@ def closure(
         raise DataError("closure: expected as many levels and σ as charges, at least one")
     n, m = len(charge), len(sample.k_r_per_s)
     start = np.broadcast_to(_floats(r0), (n, m))
-    dark, exposure = (np.broadcast_to(_floats(one), n) for one in (dark_s, exposure_s))
-    if not all(np.isfinite(one).all() for one in (charge, measured, noise, start, dark, exposure)):
+    dark, exposure = (np.broadcast_to(_floats(column), n) for column in (dark_s, exposure_s))
+    if not all(
+        np.isfinite(column).all() for column in (charge, measured, noise, start, dark, exposure)
+    ):
         raise DataError("closure: expected finite numbers, got NaN or infinity")
     if not (noise > 0).all():
         raise DataError("closure: expected σ above 0")

@@ -44,12 +44,12 @@ class Levels(NamedTuple):
         """Return the levels in the dark, averaged over exposures that begin `t_s` later, (n,)."""
         t, x = t_s[:, None, None], exposure_s[:, None, None] * k_r_per_s
         mean = phi1(x)
-        left = np.exp(-k_r_per_s * t) * mean
+        decay = np.exp(-k_r_per_s * t) * mean
         slope = exposure_s[:, None, None] * (phi2(x) - mean) / mean - t
         return Levels(
-            self.value * left,
-            (self.by_k_r + self.value * slope) * left,
-            self.by_k_e * left[..., None],
+            self.value * decay,
+            (self.by_k_r + self.value * slope) * decay,
+            self.by_k_e * decay[..., None],
         )
 
 
@@ -83,14 +83,16 @@ def levels(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
         Re-radiation rates (N,) and excitation rates (N, B) in 1/s.
     """
     if series.across is not None:
-        every = levels(series.spread(), k_r_per_s, k_e_per_s)
-        return every.meaned(len(series.across))
+        spread_levels = levels(series.spread(), k_r_per_s, k_e_per_s)
+        return spread_levels.meaned(len(series.across))
     charges = series.charges
     shots = [len(charge.start_s) for charge in charges]
     start_s = np.concatenate([charge.start_s for charge in charges])
     exposure_s = np.concatenate([charge.exposure_s for charge in charges])
-    ended = _ended(series, k_r_per_s, k_e_per_s).of(np.repeat(np.arange(len(charges)), shots))
-    return ended.decayed(k_r_per_s, start_s - np.repeat(_dark_s(series), shots), exposure_s)
+    after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s).of(
+        np.repeat(np.arange(len(charges)), shots)
+    )
+    return after_charges.decayed(k_r_per_s, start_s - np.repeat(_dark_s(series), shots), exposure_s)
 
 
 def levels_at_off(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
@@ -99,9 +101,9 @@ def levels_at_off(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: Floa
     The turn-off transient itself charges a little: this is the r(0) to which the amplitude of a
     decay belongs.
     """
-    none = np.zeros(len(series.charges))
-    ended = _ended(series, k_r_per_s, k_e_per_s)
-    return ended.decayed(k_r_per_s, none - series.fade.total_s, none)
+    zeros = np.zeros(len(series.charges))
+    after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s)
+    return after_charges.decayed(k_r_per_s, zeros - series.fade.total_s, zeros)
 
 
 def _dark_s(series: ChargingSeries) -> FloatArray:
@@ -109,30 +111,34 @@ def _dark_s(series: ChargingSeries) -> FloatArray:
     return np.array([charge.off_s for charge in series.charges]) + series.fade.total_s
 
 
-def _ended(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
+def _levels_after_charges(
+    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
+) -> Levels:
     """Return the levels after every charge, when the lamp is dark, n = K."""
-    alone = _alone(series, k_r_per_s, k_e_per_s)
+    charges = _independent_charges(series, k_r_per_s, k_e_per_s)
     on_s = np.array([charge.on_s for charge in series.charges])
-    waited_s = on_s[1:] - _dark_s(series)[:-1]
-    value, by_k_r, by_k_e = alone.gained
+    dark_s = on_s[1:] - _dark_s(series)[:-1]
+    value, by_k_r, by_k_e = charges.gained
     for number, charge in enumerate(series.charges):
         if charge.saturated:
             value[number] = np.exp(-k_r_per_s * series.fade.total_s)
             by_k_r[number] = -series.fade.total_s * value[number]
             by_k_e[number] = 0.0
         elif number and not charge.fresh:
-            before, wait_s = number - 1, float(waited_s[number - 1])
-            left = alone.kept[number] * np.exp(-k_r_per_s * wait_s)
-            lasted_s = alone.lasted_s[number] + wait_s
-            value[number] += left * value[before]
-            by_k_r[number] += left * (by_k_r[before] - lasted_s * value[before])
-            by_k_e[number] += left[..., None] * (
-                by_k_e[before] - value[before, ..., None] * alone.dose[number, :, None]
+            previous, wait_s = number - 1, float(dark_s[number - 1])
+            decay = charges.kept[number] * np.exp(-k_r_per_s * wait_s)
+            lasted_s = charges.lasted_s[number] + wait_s
+            value[number] += decay * value[previous]
+            by_k_r[number] += decay * (by_k_r[previous] - lasted_s * value[previous])
+            by_k_e[number] += decay[..., None] * (
+                by_k_e[previous] - value[previous, ..., None] * charges.dose[number, :, None]
             )
-    return alone.gained
+    return charges.gained
 
 
-def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> _Charges:
+def _independent_charges(
+    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
+) -> _Charges:
     """Compute the effect of every charge on its own."""
     duration_s, fraction = _steps(series)
     brightness = np.array([charge.brightness for charge in series.charges])
@@ -140,8 +146,8 @@ def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
     shape = (len(brightness), sites, len(k_r_per_s))
     # Sites and states in one axis, and all charges' steps side by side: long rows for numpy.
     k_r = np.tile(k_r_per_s, sites)
-    of_steady = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
-    kappa = brightness[:, None] * (fraction @ of_steady.T)[:, None, :]
+    steady_rates = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
+    kappa = brightness[:, None] * (fraction @ steady_rates.T)[:, None, :]
     tau = duration_s[:, :, None]
     step, slopes = relaxation_with_slopes(kappa, k_r, tau)
     before = np.zeros((len(tau) + 1, *kappa.shape[1:]))

@@ -136,9 +136,9 @@ class Parameters:
         self.states, self.bands, self._series = states, bands_of(series), len(series)
         channels = series[0].values.shape[2]
         self.others = [channel for channel in range(channels) if channel != reference]
-        self._first_charge = _begins([len(one.charges) for one in series])
+        self._first_charge = _begins([len(charging.charges) for charging in series])
         self._first_mode = _begins(
-            [0 if one.site_modes is None else len(one.site_modes) for one in series]
+            [0 if charging.site_modes is None else len(charging.site_modes) for charging in series]
         )
         counts = [
             len(series) - 1 if uncertain.scale > 0 else 0,
@@ -146,11 +146,11 @@ class Parameters:
             1 if uncertain.cold > 0 else 0,
             self._first_mode[-1],
         ]
-        each = [uncertain.scale, uncertain.lamp, uncertain.cold, 1.0]
-        self.prior_sigma: FloatArray = np.concatenate([np.repeat(each, counts), uncertain.offset])
-        known = [states, states, states * self.bands, len(self.others)]
-        ends = _begins([*known, *counts, len(uncertain.offset)])
-        self.columns = ParameterLayout(*(slice(*both) for both in pairwise(ends)))
+        sigmas = [uncertain.scale, uncertain.lamp, uncertain.cold, 1.0]
+        self.prior_sigma: FloatArray = np.concatenate([np.repeat(sigmas, counts), uncertain.offset])
+        free_counts = [states, states, states * self.bands, len(self.others)]
+        ends = _begins([*free_counts, *counts, len(uncertain.offset)])
+        self.columns = ParameterLayout(*(slice(*limits) for limits in pairwise(ends)))
         self.count = ends[-1]
 
     def charges(self, number: int) -> slice:
@@ -214,7 +214,7 @@ def bands_of(series: Sequence[ChargingSeries]) -> int:
     FitError
         There is no series, or they differ in bands or channels.
     """
-    shapes = {(one.irradiance.shape[1], one.values.shape[2]) for one in series}
+    shapes = {(charging.irradiance.shape[1], charging.values.shape[2]) for charging in series}
     if len(shapes) != 1:
         raise FitError(
             f"expected series with the same bands and channels, got {sorted(shapes) or 'none'}"

@@ -30,12 +30,12 @@ def starts(
         Index of the brightest channel.
     """
     fractions = fractions / fractions.sum()
-    peak = max(float(np.nanmax(one.values[..., reference])) for one in problem.series)
+    peak = max(float(np.nanmax(charging.values[..., reference])) for charging in problem.series)
     mean_rate = float(fractions @ k_r_per_s)
     for guess in GUESSED_LEVELS:
         total = peak / guess
-        found = [_kappa(one, mean_rate, total, reference) for one in problem.series]
-        kappa, design = np.concatenate(found), _irradiances(problem)
+        site_kappas = [_kappa(charging, mean_rate, total, reference) for charging in problem.series]
+        kappa, design = np.concatenate(site_kappas), _irradiances(problem)
         k_e = nonnegative_least_squares(design, kappa)
         # A state that decays faster charges no further by the same light.
         yield problem.parameters.as_stated(
@@ -47,7 +47,7 @@ def starts(
 
 
 def _irradiances(problem: ExcitationProblem) -> FloatArray:
-    return np.concatenate([one.irradiance for one in problem.series])
+    return np.concatenate([charging.irradiance for charging in problem.series])
 
 
 def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: int) -> FloatArray:
@@ -74,6 +74,6 @@ def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: in
 
 def _weights(problem: ExcitationProblem, reference: int) -> FloatArray:
     """Estimate channel weights (C,) over the reference from all values."""
-    totals = sum(np.nansum(one.values, axis=(0, 1)) for one in problem.series)
+    totals = sum(np.nansum(charging.values, axis=(0, 1)) for charging in problem.series)
     weights: FloatArray = np.maximum(totals / totals[reference], 0)
     return weights

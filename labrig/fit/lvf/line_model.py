@@ -74,13 +74,17 @@ class LineModel:
     """Profile as a sum of lines; heights and background are eliminated at every step."""
 
     def __init__(
-        self, u: FloatArray, values: FloatArray, lines: tuple[Line, ...], way: Assignment
+        self, u: FloatArray, values: FloatArray, lines: tuple[Line, ...], assignment: Assignment
     ) -> None:
-        self.u, self.values, self.way = u, values, way
-        expected = [(line.wavelength_nm[0] - way.offset_nm) / way.slope_nm for line in lines]
-        inside = [u[0] < at < u[-1] for at in expected]
-        self.lines = [line for line, there in zip(lines, inside, strict=True) if there]
-        self.start = [at for at, there in zip(expected, inside, strict=True) if there]
+        self.u, self.values, self.way = u, values, assignment
+        expected = [
+            (line.wavelength_nm[0] - assignment.offset_nm) / assignment.slope_nm for line in lines
+        ]
+        inside = [u[0] < position < u[-1] for position in expected]
+        self.lines = [line for line, is_inside in zip(lines, inside, strict=True) if is_inside]
+        self.start = [
+            position for position, is_inside in zip(expected, inside, strict=True) if is_inside
+        ]
         self.middle, self.reach = float(u.mean()), float(np.ptp(u)) / 2
 
     def located(self) -> LocatedLines:
@@ -98,10 +102,14 @@ class LineModel:
                     f"no lines of mercury: {clear.sum()} could be located, {FEWEST_LINES} are "
                     "needed; expose longer, or check the lamp"
                 )
-            self.lines = [line for line, ok in zip(self.lines, clear, strict=True) if ok]
-            self.start = [float(at) for at, ok in zip(position, clear, strict=True) if ok]
-        left = self.values - self._fit_values(x)
-        explained = 1 - float(left.var() / (self.values - self.values.mean(axis=0)).var())
+            self.lines = [
+                line for line, is_clear in zip(self.lines, clear, strict=True) if is_clear
+            ]
+            self.start = [
+                float(start) for start, is_clear in zip(position, clear, strict=True) if is_clear
+            ]
+        residual = self.values - self._fit_values(x)
+        explained = 1 - float(residual.var() / (self.values - self.values.mean(axis=0)).var())
         if explained < LEAST_EXPLAINED:
             raise FitError(
                 f"no lines of mercury: lines explain {explained:.0%} of the profile, expected "
@@ -118,7 +126,7 @@ class LineModel:
         start = np.array(
             [*self.start, np.log(self.way.fwhm), 0.0, 0.0, *(fraction for fraction, _ in fractions)]
         )
-        prior = np.array([known for _, known in fractions])
+        prior = np.array([sigma for _, sigma in fractions])
         low, high = np.full(len(start), -np.inf), np.full(len(start), np.inf)
         n = len(self.lines)
         near = NEAR * self.way.fwhm
@@ -134,8 +142,8 @@ class LineModel:
                 return self._with_derivatives(x, start, noise, prior)
 
             fit = least_squares(residuals, start, lower=low, upper=high, tolerance=1e-6)
-            start_left = self.values - self._fit_values(fit.parameters)
-            noise = float(np.sqrt((start_left**2).sum() / (start_left.size - len(start))))
+            residual = self.values - self._fit_values(fit.parameters)
+            noise = float(np.sqrt((residual**2).sum() / (residual.size - len(start))))
         covariance = np.linalg.pinv(fit.jacobian.T @ fit.jacobian, hermitian=True)
         variance = np.maximum(np.diag(covariance), 0.0)
         variance[:n] += self._blend_variance(fit.parameters)
@@ -144,9 +152,9 @@ class LineModel:
     def _blend_variance(self, x: FloatArray) -> FloatArray:
         """Return the positions' variance from the fractions of unresolved blends, (lines,)."""
         per_nm, fwhm = abs(self._per_nm(x[: len(self.lines)])), np.exp(x[len(self.lines)])
-        apart = np.array([per_nm * np.ptp(line.wavelength_nm) for line in self.lines])
-        unsure = np.array([line.second_fraction[1] for line in self.lines])
-        variance: FloatArray = np.where(apart < fwhm, (apart * unsure) ** 2, 0.0)
+        distance = np.array([per_nm * np.ptp(line.wavelength_nm) for line in self.lines])
+        fraction_sigma = np.array([line.second_fraction[1] for line in self.lines])
+        variance: FloatArray = np.where(distance < fwhm, (distance * fraction_sigma) ** 2, 0.0)
         return variance
 
     def _with_derivatives(
@@ -162,29 +170,31 @@ class LineModel:
 
     def _residuals(self, x: FloatArray, noise: float, prior: FloatArray) -> FloatArray:
         """Return residuals (..., residuals) of parameters (..., parameters)."""
-        left = (self.values - self._fit_values(x)) / noise
+        misfit = (self.values - self._fit_values(x)) / noise
         fractions = [line.second_fraction[0] for line in self.lines if len(line.wavelength_nm) == 2]
-        pulled = (x[..., len(self.lines) + 3 :] - fractions) / prior
-        return np.concatenate([left.reshape(*x.shape[:-1], -1), pulled], axis=-1)
+        prior_residuals = (x[..., len(self.lines) + 3 :] - fractions) / prior
+        return np.concatenate([misfit.reshape(*x.shape[:-1], -1), prior_residuals], axis=-1)
 
     def _shapes(self, x: FloatArray) -> FloatArray:
         """Return every line at height 1, and the background, shape (..., n, lines + 2)."""
         n = len(self.lines)
-        positions, of_all = x[..., :n], x[..., n : n + 3, np.newaxis]
-        log_width, change, skew = of_all[..., 0, :], of_all[..., 1, :], of_all[..., 2:, :]
+        positions, common = x[..., :n], x[..., n : n + 3, np.newaxis]
+        log_width, change, skew = common[..., 0, :], common[..., 1, :], common[..., 2:, :]
         width = np.exp(log_width + change * (positions - self.middle) / self.reach)
 
-        def peaks(at: FloatArray, width: FloatArray) -> FloatArray:
-            distance = self.u[:, np.newaxis] - at[..., np.newaxis, :]
+        def peaks(centre: FloatArray, width: FloatArray) -> FloatArray:
+            distance = self.u[:, np.newaxis] - centre[..., np.newaxis, :]
             return peak_shape(distance, width[..., np.newaxis, :], skew)
 
         lines = peaks(positions, width)
         blends = [k for k, line in enumerate(self.lines) if len(line.wavelength_nm) == 2]
         if blends:
             fraction = x[..., np.newaxis, n + 3 :]
-            apart_nm = np.array([np.ptp(self.lines[k].wavelength_nm) for k in blends])
-            second_at = positions[..., blends] + apart_nm * self._per_nm(positions)[..., np.newaxis]
-            second = peaks(second_at, width[..., blends])
+            distance_nm = np.array([np.ptp(self.lines[k].wavelength_nm) for k in blends])
+            second_position = (
+                positions[..., blends] + distance_nm * self._per_nm(positions)[..., np.newaxis]
+            )
+            second = peaks(second_position, width[..., blends])
             lines[..., blends] = (1 - fraction) * lines[..., blends] + fraction * second
         slope = (self.u - self.middle) / self.reach
         background = np.stack([np.ones_like(slope), slope], axis=-1)

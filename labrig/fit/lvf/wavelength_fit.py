@@ -67,14 +67,16 @@ def fit_wavelengths(lines: LocatedLines, span: tuple[float, float]) -> Wavelengt
     else:
         coefficients = bent
     try:
-        found = WavelengthMap(coefficients, span, covariance)
+        wavelength_map = WavelengthMap(coefficients, span, covariance)
     except ValueError as error:
         raise FitError(str(error)) from None
-    return WavelengthFit(found, found.wavelength_nm(lines.position) - lines.wavelength_nm, order)
+    return WavelengthFit(
+        wavelength_map, wavelength_map.wavelength_nm(lines.position) - lines.wavelength_nm, order
+    )
 
 
 def _weighted(
-    powers: FloatArray, wanted: FloatArray, sigma: FloatArray, bend_sigma: float
+    powers: FloatArray, wavelength_nm: FloatArray, sigma: FloatArray, bend_sigma: float
 ) -> tuple[FloatArray, FloatArray, float]:
     """Return coefficients, covariance and χ²; the last of three has the prior 0 ± `bend_sigma`."""
     rows = powers / sigma[:, np.newaxis]
@@ -82,6 +84,6 @@ def _weighted(
     if np.isfinite(bend_sigma):
         precision[-1, -1] += 1 / bend_sigma**2
     covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
-    coefficients = covariance @ (rows.T @ (wanted / sigma))
-    chi2 = float((((wanted - powers @ coefficients) / sigma) ** 2).sum())
+    coefficients = covariance @ (rows.T @ (wavelength_nm / sigma))
+    chi2 = float((((wavelength_nm - powers @ coefficients) / sigma) ** 2).sum())
     return coefficients, covariance, chi2

@@ -198,14 +198,14 @@ def fit_spectrum(
         There are too few values, or none above its noise.
     """
     used, part, y, s = measured(value, sigma, system)
-    of_white = part.design.sum(axis=1)
-    scale = float(y @ of_white) / float(of_white @ of_white)
+    white_response = part.design.sum(axis=1)
+    scale = float(y @ white_response) / float(white_response @ white_response)
     roughness = _second_differences(part.knots_nm)
     x, misfit = np.full(len(part.knots_nm), scale), 1.0
     for _ in range(ROUNDS):
         whitened, target = _whitened(part, y, misfit * s, x / scale, scale)
-        x, more = _likeliest(whitened, target, roughness)
-        x, misfit = x * scale, max(1.0, misfit * more)
+        x, ratio = _likeliest(whitened, target, roughness)
+        x, misfit = x * scale, max(1.0, misfit * ratio)
     rng = np.random.default_rng(seed)
     draws, weights = _draw(whitened, target, roughness, samples, rng)
     return SpectrumFit(
@@ -220,8 +220,8 @@ def _whitened(
     """Return design and values in units of their total error, for a spectrum of about 1."""
     covariance = np.diag((s / scale) ** 2) + system.covariance(spectrum)
     lower = np.linalg.cholesky(covariance)
-    both = np.linalg.solve(lower, np.column_stack([system.design, y / scale]))
-    return both[:, :-1], both[:, -1]
+    solution = np.linalg.solve(lower, np.column_stack([system.design, y / scale]))
+    return solution[:, :-1], solution[:, -1]
 
 
 def _second_differences(knots_nm: FloatArray) -> FloatArray:
@@ -252,12 +252,14 @@ def _likeliest(
     prior = roughness.T @ roughness
     weight = float(WEIGHTS[np.argmax(_weights(design, target, prior))])
     curvature = design.T @ design + weight * prior + _ridge(prior)
-    everywhere = np.ones(len(prior), dtype=np.bool_)
-    x = nonnegative_minimum(curvature, design.T @ target, everywhere)
+    all_free = np.ones(len(prior), dtype=np.bool_)
+    x = nonnegative_minimum(curvature, design.T @ target, all_free)
     free = x > 0
-    seen = np.linalg.solve(curvature[np.ix_(free, free)], (design.T @ design)[np.ix_(free, free)])
+    followed = np.linalg.solve(
+        curvature[np.ix_(free, free)], (design.T @ design)[np.ix_(free, free)]
+    )
     residual = target - design @ x
-    dof = max(len(target) - float(np.trace(seen)), 1.0)
+    dof = max(len(target) - float(np.trace(followed)), 1.0)
     return x, float(np.sqrt(residual @ residual / dof))
 
 

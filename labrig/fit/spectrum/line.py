@@ -79,27 +79,27 @@ def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm
     def minus_two_log_likelihood(wavelength_nm: float) -> float:
         return line_at(wavelength_nm).minus_two_log_likelihood
 
-    tried = np.linspace(knots[0], knots[-1], TRIED_PER_KNOT * (len(knots) - 1) + 1)
-    best = int(np.argmin([minus_two_log_likelihood(wavelength) for wavelength in tried]))
-    if best in (0, len(tried) - 1) or not line_at(tried[best]).strength > 0:
+    trial_nm = np.linspace(knots[0], knots[-1], TRIED_PER_KNOT * (len(knots) - 1) + 1)
+    best = int(np.argmin([minus_two_log_likelihood(wavelength) for wavelength in trial_nm]))
+    if best in (0, len(trial_nm) - 1) or not line_at(trial_nm[best]).strength > 0:
         raise FitError(
             f"expected a line between {knots[0]:g} and {knots[-1]:g} nm, got values that none "
             "there explains; look at the whole spectrum"
         )
-    between = (float(tried[best - 1]), float(tried[best + 1]))
+    bracket = (float(trial_nm[best - 1]), float(trial_nm[best + 1]))
     h = TOLERANCE * step
     # Not least squares: the covariance, and its determinant with it, changes along the search.
     centre_nm = float(
-        minimize_scalar(minus_two_log_likelihood, bounds=between, options={"xatol": h}).x
+        minimize_scalar(minus_two_log_likelihood, bounds=bracket, options={"xatol": h}).x
     )
-    at = line_at(centre_nm)
+    line = line_at(centre_nm)
     shift = (line_at(centre_nm + h).shape - line_at(centre_nm - h).shape) / (2 * h)
-    by_wavelength = at.strength * solve_triangular(at.lower, shift, lower=True)
-    along = at.whitened / np.linalg.norm(at.whitened)
+    by_wavelength = line.strength * solve_triangular(line.lower, shift, lower=True)
+    along = line.whitened / np.linalg.norm(line.whitened)
     # What another strength would explain as well says nothing about the wavelength.
-    told = float(np.linalg.norm(by_wavelength - (by_wavelength @ along) * along))
-    misfit = float(np.sqrt(at.chi2 / max(len(y) - 2, 1)))
-    return LineFit(centre_nm, max(1.0, misfit) / told, at.strength, misfit)
+    information = float(np.linalg.norm(by_wavelength - (by_wavelength @ along) * along))
+    misfit = float(np.sqrt(line.chi2 / max(len(y) - 2, 1)))
+    return LineFit(centre_nm, max(1.0, misfit) / information, line.strength, misfit)
 
 
 @dataclass(frozen=True)
@@ -128,13 +128,13 @@ def _line_at(
     system: SpectralSystem, y: FloatArray, s: FloatArray, hat_functions: FloatArray
 ) -> _LineAt:
     shape, noise, strength = system.design @ hat_functions, np.diag(s**2), 0.0
-    wrong = system.covariance(hat_functions)
-    for _ in range(ROUNDS if wrong.any() else 1):
-        lower = cholesky(noise + strength**2 * wrong, lower=True)
-        both = solve_triangular(lower, np.column_stack([shape, y]), lower=True)
-        whitened, target = both[:, 0], both[:, 1]
-        seen = float(whitened @ whitened)
-        strength = max(float(whitened @ target) / seen, 0.0) if seen > 0 else 0.0
+    system_covariance = system.covariance(hat_functions)
+    for _ in range(ROUNDS if system_covariance.any() else 1):
+        lower = cholesky(noise + strength**2 * system_covariance, lower=True)
+        solution = solve_triangular(lower, np.column_stack([shape, y]), lower=True)
+        whitened, target = solution[:, 0], solution[:, 1]
+        norm2 = float(whitened @ whitened)
+        strength = max(float(whitened @ target) / norm2, 0.0) if norm2 > 0 else 0.0
     residual = target - strength * whitened
     chi2 = float(residual @ residual)
     minus_two_log_likelihood = chi2 + 2 * float(np.log(np.diag(lower)).sum())

@@ -62,8 +62,8 @@ class SpectralSystem:
 
     def covariance(self, spectrum: FloatArray) -> FloatArray:
         """Return the covariance (m, m) of the values from the errors of the design alone."""
-        wrong = self.modes @ spectrum if len(self.modes) else np.zeros((0, len(self.design)))
-        result: FloatArray = wrong.T @ wrong
+        deviations = self.modes @ spectrum if len(self.modes) else np.zeros((0, len(self.design)))
+        result: FloatArray = deviations.T @ deviations
         return result
 
 
@@ -124,13 +124,16 @@ def curve_modes(
     """
     if error is None:
         return []
-    smooth = _smooth_modes(nodes, error.correlation_nm)
+    smooth_modes = _smooth_modes(nodes, error.correlation_nm)
     modes = []
     for channel, peak in enumerate(peaks):
-        for fraction, of in ((error.relative, sensitivity[:, channel]), (error.added * peak, 1.0)):
-            for mode in smooth if fraction > 0 else ():
+        for fraction, shape in (
+            (error.relative, sensitivity[:, channel]),
+            (error.added * peak, 1.0),
+        ):
+            for mode in smooth_modes if fraction > 0 else ():
                 change = np.zeros_like(sensitivity)
-                change[:, channel] = fraction * mode * of
+                change[:, channel] = fraction * mode * shape
                 modes.append(change)
     return modes
 
@@ -149,7 +152,7 @@ def _filter_changes(lvf: Lvf, nodes: FloatArray) -> Iterator[tuple[int, FloatArr
         return
     for name in (f.name for f in fields(Bands)):
         step = _STEP * getattr(lvf.sigma, name)
-        moved = replace(lvf.bands, **{name: getattr(lvf.bands, name) + step})
-        change = (moved.transmission(nodes) - lvf.bands.transmission(nodes)) / _STEP
+        shifted = replace(lvf.bands, **{name: getattr(lvf.bands, name) + step})
+        change = (shifted.transmission(nodes) - lvf.bands.transmission(nodes)) / _STEP
         for position in np.flatnonzero(step > 0).tolist():
             yield position, change[position]
