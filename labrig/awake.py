@@ -9,16 +9,16 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
-#: The desktop's service answers in less, or not at all.
+#: Timeout for the answer of the desktop's service.
 ANSWER_S = 5.0
-#: `cat` holds the lock for as long as labrig lives: then its input ends, however labrig does.
+#: `cat` holds the lock until its input ends, which is when labrig ends, however it does.
 SYSTEMD_INHIBIT = (
     *("systemd-inhibit", "--what=sleep:idle:handle-lid-switch", "--mode=block"),
     *("--who=labrig", "--why=a measurement is running", "cat"),
 )
-#: Neither idle nor, on mains, at all, until the process with the number that follows has ended.
+#: Prevents idle sleep and, on mains, all sleep until the process with the given number has ended.
 CAFFEINATE = ("caffeinate", "-i", "-s", "-w")
-#: Of SetThreadExecutionState.
+#: Flags of SetThreadExecutionState.
 ES_SYSTEM_REQUIRED, ES_CONTINUOUS = 0x00000001, 0x80000000
 
 

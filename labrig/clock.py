@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-#: A sleeping PC looks up this often, so that Ctrl-C is answered at once on every system.
+#: Interval of checks for an interruption during a wait, so that Ctrl-C acts at once everywhere.
 LOOK_UP_S = 0.05
-#: Clocks of a PC that is awake agree within much less.
+#: Difference of clocks that means sleep; on a PC that is awake they agree much better.
 SLEPT_S = 0.3
-#: A clock that goes on while the PC sleeps, and one that stands still, by `sys.platform`.
+#: A clock that includes sleep of the PC, and one that does not, by `sys.platform`.
 SLEEP_CLOCKS = {
     "linux": ("CLOCK_BOOTTIME", "CLOCK_MONOTONIC"),
     "darwin": ("CLOCK_MONOTONIC_RAW", "CLOCK_UPTIME_RAW"),

@@ -22,7 +22,7 @@ from labrig.errors import UsageError
 if sys.platform != "win32":
     import fcntl
 
-#: In memory and never tidied up; open to everybody on Debian, Ubuntu and Arch, not on Fedora.
+#: Folder in memory that is never cleaned up; writable for all on Debian, Ubuntu, Arch, not Fedora.
 RUN_LOCK = Path("/run/lock")
 
 

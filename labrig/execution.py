@@ -35,12 +35,12 @@ from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
 
-#: How long a lost device is waited for: somebody has to notice and walk to the bench.
+#: Time to wait for a lost device: the user has to notice and walk to the bench.
 COMES_BACK_S = 300.0
 LOOK_PERIOD_S = 2.0
-#: A unit that has lost a device so often is not going to get through.
+#: Number of lost devices in one unit at which the run ends.
 MOST_LOSSES = 3
-#: Files named in a warning.
+#: Largest number of files named in a warning.
 MOST_NAMED = 4
 
 

@@ -20,16 +20,16 @@ from labrig.acquire import LIGHTS, RigFile
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 
-#: What it is told: a light may be on, or all are off.
+#: Messages to the guard: a light may be on, or all are off.
 MAY_BE_ON, ALL_OFF = b"+", b"-"
-#: What it says when it is ready.
+#: Message of the guard when it is ready.
 READY = "ready"
 BEAT_S = 1.0
-#: Longer than any call that holds the interpreter.
+#: Silence after which labrig counts as hung, longer than any call that holds the interpreter.
 HANGS_S = 30
-#: For so long the guard tries to switch a light off: somebody may have to plug its board in again.
+#: Duration of the attempts to switch a light off: its board may have to be plugged in again.
 TRIES_FOR_S = 300.0
-#: Importing the drivers takes a second, on a PC that is busy with other things several.
+#: Importing the drivers takes a second, or several on a busy PC.
 STARTS_WITHIN_S = 60.0
 ENDS_WITHIN_S = 10.0
 
@@ -176,8 +176,8 @@ def _started(order: dict[str, Any]) -> "subprocess.Popen[bytes]":
     raise _cannot_start(answer)
 
 
-def _cannot_start(why: str) -> DeviceError:
+def _cannot_start(reason: str) -> DeviceError:
     return DeviceError(
-        f"the guard, which switches the lights off if labrig dies, cannot start ({why}); without "
-        "it no light is lit"
+        f"the guard, which switches the lights off if labrig dies, cannot start ({reason}); "
+        "without it no light is lit"
     )

@@ -24,8 +24,8 @@ from labrig.errors import LabrigError
 from labrig.guard import ALL_OFF, BEAT_S, HANGS_S, MAY_BE_ON, READY, TRIES_FOR_S
 from labrig.serial_ports import SerialPorts
 
-#: Between two tries. The first ones come quickly: the port of a process that was killed is free
-#: some milliseconds after its end.
+#: Pauses between two attempts. The first ones are short: the port of a killed process is free some
+#: milliseconds after its end.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 2.0
 
 

@@ -5,10 +5,10 @@ from pathlib import Path
 
 from labrig.errors import DiskError, UsageError
 
-#: What no other name and no permission would mend.
+#: Errors of the disk, which no other name and no permission would resolve.
 DISK_ERRORS = {errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.ETIMEDOUT}
 
-#: A table of a year's measurements is smaller; `/dev/zero` is not.
+#: Limit that a table of a year's measurements does not reach, but `/dev/zero` does.
 MOST_TEXT_BYTES = 50_000_000
 
 
@@ -28,8 +28,8 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     except FileNotFoundError:
         raise UsageError(f"{path}: no such file") from None
     except OSError as error:
-        kind = DiskError if error.errno in DISK_ERRORS else UsageError
-        raise kind(f"{path}: cannot be read ({error.strerror})") from None
+        error_class = DiskError if error.errno in DISK_ERRORS else UsageError
+        raise error_class(f"{path}: cannot be read ({error.strerror})") from None
     if len(content) > most_bytes:
         raise UsageError(f"{path}: expected a file of at most {most_bytes} bytes, got more")
     return content

@@ -24,7 +24,7 @@ from labrig.errors import DiskError, LabrigError, UsageError
 
 LOOPBACK = "127.0.0.1"
 MOST_BODY_BYTES = 64 * 1024
-#: Nothing from anywhere else, and not inside another page.
+#: No content from other origins, and no embedding in another page.
 CONTENT_POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'"
 KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -86,9 +86,9 @@ class LocalConversation(BaseHTTPRequestHandler):
 
     server: LocalServer
     protocol_version = "HTTP/1.1"
-    #: A connection on which nothing is asked for so long is given up.
+    #: Seconds without a request after which a connection is closed.
     timeout: ClassVar[int] = 60
-    #: Path → file beside the class's module.
+    #: Files beside the class's module by path.
     pages: ClassVar[Mapping[str, Path]] = {}
 
     def answer(self, path: str) -> None:

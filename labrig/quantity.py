@@ -128,7 +128,7 @@ class WordOrDuration:
             raise ValueError(f"expected {expected}, or a duration; {error}") from None
 
 
-#: How often something is done; nobody waits for more.
+#: Largest number of repetitions in a protocol.
 MOST_COUNT = 1000
 Count = Annotated[int, Field(le=MOST_COUNT)]
 #: Seconds, written with a unit of time.
@@ -137,7 +137,7 @@ DurationS = Annotated[
 ]
 #: A fraction, written as `0.7 %` or as a bare 0.007.
 Fraction = Annotated[float, _validator(FRACTION, bare=True), _schema(FRACTION, bare=True)]
-#: Bytes.
+#: Bytes, written with a unit such as `MB`.
 SizeBytes = Annotated[
     float, _validator(SIZE_BYTES, bare=False), _serializer("B"), _schema(SIZE_BYTES, bare=False)
 ]

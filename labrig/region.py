@@ -6,7 +6,7 @@ from pydantic import AfterValidator, Field, TypeAdapter
 
 from labrig.errors import UsageError
 
-#: No sensor is as wide; infinity is wider.
+#: Limit above the width of any sensor, which excludes infinity.
 MOST_PIXELS = 1_000_000
 Corner = Annotated[float, Field(ge=0, le=MOST_PIXELS)]
 Extent = Annotated[float, Field(gt=0, le=MOST_PIXELS)]
@@ -24,7 +24,7 @@ def _whole_or_fractions(region: tuple[float, float, float, float]) -> tuple[floa
 #: `[x, y, width, height]`: whole pixels, or fractions of the frame when all four are ≤ 1.
 Region = Annotated[tuple[Corner, Corner, Extent, Extent], AfterValidator(_whole_or_fractions)]
 
-#: Where the sample is when nobody says: the middle quarter of the frame.
+#: Default position of the sample: the middle quarter of the frame.
 CENTRE: Region = (0.25, 0.25, 0.5, 0.5)
 
 

@@ -7,7 +7,7 @@ from labrig.errors import UsageError
 from labrig.yaml_file import did_you_mean
 
 _PACKAGE = Path(__file__).parent
-#: What names stand for: a YAML file, or measured curves in JSON.
+#: Suffixes of shipped files: YAML, or measured curves in JSON.
 SUFFIXES = (".yaml", ".yml", ".json")
 
 

@@ -14,7 +14,7 @@ from labrig.quantity import duration_text
 from labrig.record import RunFolder, read_run
 from labrig.yaml_file import yaml_text
 
-#: Room left on the disk beyond what the frames need: journal, results, report.
+#: Free disk space required besides the frames: journal, results, report.
 SPARE_BYTES = 200e6
 
 

@@ -69,11 +69,11 @@ def _rig() -> Any:
 
 def _entry(driver: str, settings: type[BaseModel]) -> type[BaseModel]:
     """Return the model of a device entry of one driver."""
-    shared: dict[str, Any] = {
+    shared_fields: dict[str, Any] = {
         name: (field.annotation, field) for name, field in DeviceEntry.model_fields.items()
     }
-    own: dict[str, Any] = shared | {"driver": (Literal[driver], ...)}
-    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **own)
+    fields: dict[str, Any] = shared_fields | {"driver": (Literal[driver], ...)}
+    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **fields)
 
 
 def _one_of(key: str, models: list[type[BaseModel]]) -> Any:

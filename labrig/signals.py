@@ -11,21 +11,21 @@ from typing import NoReturn
 
 from labrig.clock import Clock, Interrupted
 
-#: Signals that end nothing, and faults in the program's own machine code, in which nothing that is
-#: written in Python is called any more (the lights are the guard's then). All others end a process.
+#: Signals that end no process, and faults of machine code, after which no Python code runs (the
+#: guard switches the lights off). All others end a process.
 _OTHERS = {
     *("SIGKILL", "SIGSTOP", "SIGTSTP", "SIGTTIN", "SIGTTOU", "SIGCONT"),
     *("SIGCHLD", "SIGURG", "SIGWINCH", "SIGINFO", "SIGPIPE", "SIGXFSZ"),
     *("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL"),
 }
-#: What ends labrig, with the exit code 128 + number: Ctrl-C, SIGTERM, a terminal that is closed, a
-#: limit of the system. What was ignored when labrig began (`nohup`) stays so.
+#: Signals that end labrig, with the exit code 128 + number: Ctrl-C, SIGTERM, a closed terminal, a
+#: limit of the system. Signals that were ignored at the start (`nohup`) stay ignored.
 STOP_SIGNALS = [
     signum
     for signum in sorted(signal.valid_signals() - {getattr(signal, n, 0) for n in _OTHERS})
     if signal.getsignal(signum) != signal.SIG_IGN
 ]
-#: Ctrl-Z.
+#: Signal of Ctrl-Z, None on Windows.
 PAUSE_SIGNAL = getattr(signal, "SIGTSTP", None)
 
 

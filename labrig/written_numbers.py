@@ -3,12 +3,12 @@
 import math
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-#: Without a power of ten are written values from here …
+#: Smallest value written without a power of ten.
 SMALLEST_PLAIN = 1e-3
-#: … to here.
+#: Values from here on are written with a power of ten.
 LARGEST_PLAIN = 1e6
 
-#: Exposures up to here are said as fractions.
+#: Exposure times below this are written as fractions.
 LONGEST_FRACTION_S = 0.3
 
 

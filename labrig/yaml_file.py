@@ -21,15 +21,15 @@ from labrig.input_file import read_text
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
-#: More than any such file has; the longest are the calibrations that labrig writes, 0.1 MB.
+#: Size limit; the longest files are the calibrations that labrig writes, 0.1 MB.
 MOST_BYTES = 5_000_000
-#: Deeper than any such file goes, and more values than anybody leaves to aliases.
+#: Limits of the depth, and of the values that aliases expand to.
 MOST_DEPTH = 30
 MOST_ALIASED = 100_000
-#: Of a text that is shown in a message.
+#: Largest length of a text quoted in a message.
 MOST_SHOWN = 80
 
-#: A text that holds them is neither a name nor a path: NUL, and halves of surrogate pairs.
+#: Characters that no name or path contains: NUL, and halves of surrogate pairs.
 _NO_TEXT = re.compile("[\0\ud800-\udfff]")
 _INT = re.compile(r"[-+]?(?:0|[1-9][0-9]*)")
 _FLOAT = re.compile(

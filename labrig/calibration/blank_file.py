@@ -14,9 +14,9 @@ from labrig.yaml_file import read_model, write_yaml
 
 Row = tuple[Finite, ...]
 
-#: A constant level is worth a word from so many σ on.
+#: Number of σ from which a constant level is reported.
 SIGNIFICANT = 4.0
-#: By which begins of frames scatter: relays and shutters have their jitter.
+#: Scatter of the begins of frames in s, by jitter of relays and shutters.
 SAME_TIME_S = 0.02
 
 

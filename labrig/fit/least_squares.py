@@ -34,10 +34,10 @@ SEARCH_STEP = 1e-7
 #: Relative step above which a stopped search has not converged.
 CONVERGED_STEP = 1e-6
 INITIAL_DAMPING = 1e-3
-#: The damping falls to this fraction at most after a step that does what it promised; Nielsen's 1/3
-#: takes half as many steps again.
+#: Smallest factor of the damping after a step as good as predicted; Nielsen's 1/3 takes 50 % more
+#: steps.
 LEAST_RELIEF = 1 / 10
-#: Entries of the Jacobian from which the search goes by the normal equations.
+#: Number of entries of the Jacobian from which the search uses the normal equations.
 LARGE_JACOBIAN = 100_000
 POLISH_STEPS = 60
 POLISH_PATIENCE = 3
@@ -182,8 +182,8 @@ def _free(point: _Point, low: FloatArray, high: FloatArray) -> NDArray[np.bool_]
     if inside.all():
         return inside
     gradient = point.jacobian.T @ point.residuals
-    held = ((point.x <= low) & (gradient >= 0)) | ((point.x >= high) & (gradient <= 0))
-    return ~held
+    is_held = ((point.x <= low) & (gradient >= 0)) | ((point.x >= high) & (gradient <= 0))
+    return ~is_held
 
 
 def _column_norms(columns: FloatArray) -> FloatArray:
@@ -221,7 +221,7 @@ class _Linearised:
         self.norms = _column_norms(self.triangle)
 
     @classmethod
-    def exactly(cls, point: _Point) -> "_Linearised":
+    def by_qr(cls, point: _Point) -> "_Linearised":
         """Linearise by an orthogonal factorisation."""
         m, p = point.jacobian.shape
         columns = np.empty((m, p + 1), order="F")
@@ -229,18 +229,18 @@ class _Linearised:
         return cls(lapack.dgeqrf(columns, overwrite_a=True)[0][: min(m, p)])
 
     @classmethod
-    def roughly(cls, point: _Point) -> "_Linearised":
+    def by_normal_equations(cls, point: _Point) -> "_Linearised":
         """Linearise by the normal equations if the problem is large and they can be solved."""
         m, p = point.jacobian.shape
         if m <= p or m * p < LARGE_JACOBIAN:
-            return cls.exactly(point)
+            return cls.by_qr(point)
         products = np.empty((p + 1, p + 1))
         products[:p, :p] = point.jacobian.T @ point.jacobian
         products[:p, p] = point.jacobian.T @ point.residuals
         products[p, p] = point.chi2
         lengths = np.sqrt(np.where(np.diag(products) > 0, np.diag(products), 1.0))
         factors, failed = lapack.dpotrf(products / np.outer(lengths, lengths))
-        return cls.exactly(point) if failed else cls((factors * lengths)[:p])
+        return cls.by_qr(point) if failed else cls((factors * lengths)[:p])
 
     def directions(
         self, free: NDArray[np.bool_], scale: FloatArray
@@ -274,7 +274,7 @@ def _damped_search(
         free = _free(point, low, high)
         if not free.any():
             break
-        linearised = _Linearised.roughly(point)
+        linearised = _Linearised.by_normal_equations(point)
         # Moré: scales never shrink, so that a flat stretch does not set a parameter loose.
         scale = np.maximum(scale, linearised.norms)
         s, directions, along = linearised.directions(free, scale)
@@ -320,7 +320,7 @@ def _polish(
         free = _free(point, low, high)
         if not free.any():
             return point, 0.0
-        linearised = _Linearised.exactly(point)
+        linearised = _Linearised.by_qr(point)
         s, directions, along = linearised.directions(free, linearised.norms)
         kept = s > _rank_tolerance(point.jacobian) * s[0]
         step = -(along[kept] / s[kept]) @ directions[kept]

@@ -19,7 +19,7 @@ Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Concentration = Annotated[float, Field(ge=0, le=1)]
 Series = tuple[NotNegative, ...]
 
-#: What an uncertainty belongs to, field by field of a state.
+#: Fields of a state that may have an uncertainty.
 MEASURED = ("k_r_per_s", "amplitude", "r0", "k_e_per_s", "reradiation")
 
 

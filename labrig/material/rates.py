@@ -16,9 +16,9 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
-#: Below this φ₂ is summed as a series: the difference 1 − φ₁ loses digits.
+#: Argument below which φ₂ is summed as a series: the difference 1 − φ₁ loses digits.
 _SERIES_BELOW = 0.5
-#: Σ (−x)ⁿ/(n + 2)!, highest power first; the first one left out is 2e-17 at 0.5.
+#: Σ (−x)ⁿ/(n + 2)!, highest power first; the first omitted term is 2e-17 at 0.5.
 _PHI2_SERIES = [(-1) ** n / math.factorial(n + 2) for n in range(13, -1, -1)]
 
 

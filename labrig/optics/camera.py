@@ -16,9 +16,9 @@ from labrig.optics.spectrum import check_curve
 
 CHANNELS = ("R", "G", "B")
 MONOCHROME = ("L",)
-#: What is called "a little below zero" in measured curves: noise of the measurement.
+#: Lowest value of a measured curve, relative to its maximum, that counts as noise.
 _NOISE_BELOW_ZERO = -0.05
-#: Suffixes of tables; names shipped with labrig have none.
+#: Suffixes of tables; names of shipped cameras have none.
 _TABLES = (".csv", ".dat", ".txt")
 
 

@@ -14,9 +14,9 @@ from labrig.region import Region, region_pixels
 FloatArray = NDArray[np.float64]
 Numbers = tuple[Finite, ...]
 
-#: Two settings are the same if they differ by less: a Canon's dial says 1/60 s for 1/64 s.
+#: Relative difference below which settings are the same: a Canon's dial shows 1/60 s for 1/64 s.
 SAME_SETTING = 0.02
-#: Points across a region whose mean is taken.
+#: Number of points along each side of a region over which a flat field is averaged.
 POINTS = 24
 
 

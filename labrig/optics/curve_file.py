@@ -23,7 +23,7 @@ from labrig.yaml_file import did_you_mean
 
 #: Wavelengths, values and σ of a curve.
 Columns: TypeAlias = tuple[FloatArray, FloatArray, FloatArray | None]
-#: Name → columns; the only curve of a file without names is called "".
+#: Columns by the name of the curve; the only curve of a file without names is called "".
 Curves: TypeAlias = dict[str, Columns]
 
 WAVELENGTH = "wavelength_nm"
@@ -32,7 +32,7 @@ _EXPECTED_TEXT = (
     "expected a header that begins with wavelength_nm or name,wavelength_nm; or, without a header, "
     "wavelength and value, or wavelength, R, G and B"
 )
-#: Wavelengths of a table in µm or in Hz lie outside.
+#: Range of wavelengths in nm, which excludes tables in µm or in Hz.
 PLAUSIBLE_NM = (100.0, 20_000.0)
 
 
@@ -207,7 +207,7 @@ def _entry(content: dict[str, Any], section: str, key: str) -> Any:
 
 T = TypeVar("T")
 
-#: Names listed in a message.
+#: Largest number of names listed in a message.
 LISTED = 8
 
 

@@ -10,7 +10,7 @@ from labrig.optics.camera import CameraResponse
 from labrig.optics.piecewise import FloatArray, hats, quadrature
 from labrig.optics.spectrum import Spectrum
 
-#: Below this skewness the limit, a Gaussian, is as exact.
+#: Asymmetry below which the limit, a Gaussian, is equally exact.
 _GAUSSIAN = 1e-9
 _LN2 = float(np.log(2.0))
 
@@ -102,7 +102,7 @@ class Bands:
         )
 
 
-#: Points at which a map is tested, and between which it is inverted.
+#: Number of points at which a map is validated, and between which it is inverted.
 _SAMPLES = 2049
 
 
@@ -193,7 +193,7 @@ class WavelengthMap:
         return slope
 
 
-#: Of an LVF of which nothing else is known (paper, section 4.1).
+#: Full width at half maximum of an LVF without a calibration, in nm (paper, section 4.1).
 NOMINAL_FWHM_NM = 25.0
 
 

@@ -8,7 +8,7 @@ from numpy.typing import ArrayLike
 
 from labrig.optics.piecewise import FloatArray, band_means, edges_about
 
-#: Measured fractions stray this far below 0 and above 1.
+#: Tolerance of measured fractions below 0 and above 1.
 FRACTION_SLACK = 0.02
 
 

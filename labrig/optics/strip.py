@@ -10,7 +10,7 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from labrig.finite import UnitFraction
 from labrig.region import Region, region_pixels
 
-#: Places along a strip at which pictures through it are read (paper, section 4.2).
+#: Number of positions along a strip at which pictures are read (paper, section 4.2).
 SLICES = 31
 
 

@@ -18,7 +18,7 @@ from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.results import AlternativeModel
 
-#: Gauss–Legendre on [0, 1] for what has no elementary integral.
+#: Gauss–Legendre nodes and weights on [0, 1], for functions without an elementary integral.
 _NODES, _FRACTIONS = np.polynomial.legendre.leggauss(8)
 NODES, FRACTIONS = (_NODES + 1) / 2, _FRACTIONS / 2
 
@@ -101,9 +101,9 @@ def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     return psi, slope
 
 
-#: τ from this fraction of the shortest step between frames …
+#: Smallest τ as a fraction of the shortest step between frames.
 SHORTEST_STEPS = 0.01
-#: … to this many spans.
+#: Largest τ in spans.
 LONGEST_SPANS = 100.0
 GRID = (24, 12)
 MAX_ITERATIONS = 60

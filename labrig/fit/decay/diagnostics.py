@@ -9,16 +9,16 @@ from labrig.fit.decay.states import APART_SIGMAS, sigmas_apart
 from labrig.fit.least_squares import FloatArray
 from labrig.results import DecayState
 
-#: Chance at which data that are as assumed get a misfit warning, per test.
+#: Significance level of each misfit test.
 MISFIT_LEVEL = 5e-4
-#: Frames below which residuals' order tells nothing.
+#: Number of frames below which the order of residuals is not tested.
 FEWEST_FOR_ORDER = 8
 ILL_DETERMINED = 0.3
 BELOW_ZERO_SIGMAS = 5.0
 OFFSET_SIGMAS = 4.0
-#: A frame is named that lies this many robust standard deviations off the others …
+#: Distance of an outlier from the curve in robust standard deviations of the frames.
 OUTLIER_SIGMAS = 7.0
-#: … and that many of what the noise allows; so many frames at most.
+#: Distance of an outlier in σ of its own noise, and the largest number of outliers reported.
 OUTLIER_OWN_SIGMAS = 3.0
 MOST_NAMED = 2
 

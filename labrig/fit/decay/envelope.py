@@ -20,28 +20,28 @@ from labrig.material import exponential_means
 from labrig.nonnegative import nonnegative_least_squares
 
 COARSE_RATES = 48
-#: Each round puts this many rates between two former neighbours.
+#: Number of steps into which each iteration divides the distance of two rates.
 REFINEMENT = 4
-#: Rounds: grid ratio 1.2 → 1.003, curve off by < 1e−5.
+#: Iterations: the grid ratio falls from 1.2 to 1.003, the error of the curve below 1e−5.
 ROUNDS = 3
-#: No shutter, aperture or lamp flickers more: what scatters more is a dark level or a model that is
-#: wrong, and must not pass for flicker.
+#: Upper limit of the flicker of shutters, apertures and lamps: a larger scatter is due to a wrong
+#: dark level or model.
 MOST_FLICKER = 0.1
-#: Turns of curve, channel weights and flicker; of curve and weights if the flicker is given.
+#: Alternations of curve, channel weights and flicker; of curve and weights if flicker is given.
 ALTERNATIONS = 5
 ALTERNATIONS_IF_GIVEN = 2
 FLICKER_ITERATIONS = 12
-#: All frames' signal in σ below which it is nothing but noise.
+#: Signal of all frames in σ below which it is noise.
 LEAST_BRIGHTNESS = 4.0
 #: Fraction of the bright frames' information that the curve must leave to the flicker.
 LEAST_SPARE = 1e-6
-#: Scale of what is known of any flicker beforehand, a half-Cauchy distribution (A. Gelman, Bayesian
-#: Analysis 1, 2006): shutters, apertures and lamps scatter by 0.5-1 %, some by a multiple of it.
+#: Scale of the half-Cauchy prior of the flicker (A. Gelman, Bayesian Analysis 1, 2006): shutters,
+#: apertures and lamps scatter by 0.5-1 %, some by a multiple of it.
 USUAL_FLICKER = 0.01
-#: Values of ρ by which its uncertainty is propagated, and the grid they are taken from.
+#: Number of values of ρ that propagate its uncertainty, and size of their grid.
 LIKELY_FLICKERS = 16
 FLICKER_GRID = 200
-#: Degrees of freedom below which the estimated flicker is not to be relied on.
+#: Degrees of freedom below which the estimated flicker is unreliable.
 FEWEST_NOISE_DOF = 4.0
 
 

@@ -18,10 +18,10 @@ from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
 from labrig.results import AlternativeModel, Candidate
 
-#: Rounds in which the flicker's weights follow the model; each gains two digits or more.
+#: Iterations in which the flicker's weights follow the model; each gains two digits or more.
 REWEIGHTINGS = 8
 REWEIGHTED_ENOUGH = 1e-9
-#: Scatter below which data are taken for exact: rounding.
+#: Scatter below which data are exact up to rounding.
 EXACT = 1e-13
 FEWEST_FOR_FLICKER = 6
 MOST_STATES = 8

@@ -20,7 +20,7 @@ from labrig.fit.least_squares import FloatArray
 from labrig.results import AlternativeModel, Candidate, DecayState
 
 RISING_SIGMAS = 5.0
-#: A rate this close to the slowest one searched, in log k, has come to rest there.
+#: Distance in log k from the slowest rate searched below which a rate is at that bound.
 AT_BOUND = 1e-3
 
 

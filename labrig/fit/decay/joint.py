@@ -22,7 +22,7 @@ from labrig.fit.least_squares import (
 Shape = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
-#: Tries to find out which channel is the brightest.
+#: Largest number of attempts to identify the brightest channel.
 CHANGES_OF_LEAD = 3
 
 

@@ -21,10 +21,10 @@ from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.material import exponential_means
 
-#: Combinations of rates looked at; decides how fine the grid can be.
+#: Largest number of combinations of rates, which limits the grid.
 COMBINATIONS = 4000
 FINEST_GRID = 36
-#: Precision in log k at which the search hands over.
+#: Precision in log k at which the search ends and the joint fit starts.
 LOG_RATE_TOLERANCE = 3e-2
 MAX_EVALUATIONS = 200
 

@@ -15,10 +15,10 @@ from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.results import Candidate
 
-#: Chance of a state too many, were its rate known. It is searched for, which multiplies chances;
-#: the BIC divides them again: ≤ 0.3 % of single exponentials come out double (tests/acceptance).
+#: Significance level of a further state of known rate. Searching the rate adds false positives,
+#: the BIC removes some: ≤ 0.3 % of single exponentials come out double (tests/acceptance).
 F_TEST_LEVEL = 0.002
-#: How much lower a power law's BIC must be: odds of e^3 = 20 : 1.
+#: Difference in BIC from which an alternative model is preferred: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
 
 
@@ -86,9 +86,9 @@ def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit, noise_dof: flo
     dof = len(frames) - more.followed(data)[0]
     if dof < 1 or added <= 0:
         return 1.0
-    spare = dof / len(frames)
-    bright = float(brightness2 @ frames**2) / float(brightness2.sum())
-    scatter = max(float(frames @ frames) / len(frames), bright) / spare
+    free_fraction = dof / len(frames)
+    bright_scatter = float(brightness2 @ frames**2) / float(brightness2.sum())
+    scatter = max(float(frames @ frames) / len(frames), bright_scatter) / free_fraction
     if scatter == 0:
         return 0.0
     gain = max(fewer.chi2 - more.chi2, 0.0) / added

@@ -14,7 +14,7 @@ from labrig.fit.least_squares import FloatArray
 SLOWEST_SPANS = 50.0
 #: Fastest rate searched: this many decays within the shortest step between frames.
 FASTEST_DECAYS = 10.0
-#: A fast state's signal must not have vanished e^300-fold before the first frame: squares overflow.
+#: Largest decay exponent k t before the first frame: squares overflow beyond e^300.
 LARGEST_PHASE = 300.0
 
 NO_DECAY = (
@@ -274,10 +274,10 @@ def _prior_sigma(offset_sigma: ArrayLike, n_channels: int) -> FloatArray:
     return np.broadcast_to(s, n_channels)
 
 
-def _refuse_unless_finite(what: str, numbers: FloatArray) -> None:
-    bad = np.count_nonzero(~np.isfinite(numbers))
-    if bad:
+def _refuse_unless_finite(quantity: str, values: FloatArray) -> None:
+    n_bad = np.count_nonzero(~np.isfinite(values))
+    if n_bad:
         raise FitError(
-            f"expected finite {what}, got {bad} that are NaN or infinite; "
+            f"expected finite {quantity}, got {n_bad} that are NaN or infinite; "
             "leave those frames out (or give the value σ = inf)"
         )

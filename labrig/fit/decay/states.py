@@ -13,7 +13,7 @@ from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.material import phi1
 
-#: Below this k T the difference of two nearly equal numbers gives way to its Taylor series.
+#: Value of k T below which a difference of nearly equal numbers is replaced by its Taylor series.
 SERIES_BELOW = 0.03
 
 
@@ -38,16 +38,16 @@ def _mean_slope(x: FloatArray, mean: FloatArray) -> FloatArray:
     return np.where(x < SERIES_BELOW, series, np.exp(-x) - mean)
 
 
-#: A state dimmer than this fraction of the brightest at the first frame is none.
+#: Amplitude at the first frame, relative to the largest, below which a state is dropped.
 NEGLIGIBLE_AMPLITUDE = 1e-9
-#: Two rates closer than this in log k are one.
+#: Distance in log k below which two rates are merged.
 MERGED_LOG_RATE = 1e-2
-#: Two rates less than so many σ apart cannot be told apart.
+#: Distance in σ below which two rates are not distinct.
 APART_SIGMAS = 3.0
-#: A candidate is only compared by its χ²: evaluations and relative step that will do for that.
+#: Evaluations and relative step of a candidate, which is only compared by its χ².
 CANDIDATE_ITERATIONS = 100
 CANDIDATE_TOLERANCE = 1e-8
-#: The answer is given to all digits.
+#: Evaluations of the final fit, to full precision.
 FINAL_ITERATIONS = 1000
 
 

@@ -9,7 +9,7 @@ from labrig.errors import DataError
 from labrig.material import concentration, phi1
 from labrig.results import Closure, FloatArray, spans_decades
 
-#: Of the curve.
+#: Number of points of the predicted curve.
 POINTS = 200
 
 

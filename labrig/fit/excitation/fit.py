@@ -18,14 +18,14 @@ from labrig.fit.excitation.start import starts
 from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
 from labrig.results import ChargingSeries, ExcitedState, FittedExcitation, LevelAtOff
 
-#: The flicker's covariance is taken from the fit so often; the second changes nothing visible.
+#: Number of updates of the flicker's covariance; the second one has hardly any effect.
 WHITENINGS = 2
-#: Relative step small enough, of a start and of the end.
+#: Tolerance of the relative step, for the starting points and for the result.
 ROUGH, FINE = 1e-3, 1e-6
 MAX_ITERATIONS = 60
-#: Known worse than this, an amplitude is an order of magnitude.
+#: Relative σ of an amplitude above which a warning is given.
 LEVEL_KNOWN = 0.3
-#: χ² above this says that something is not as assumed.
+#: Reduced χ² above which a warning is given.
 LARGE_CHI2 = 1.5
 
 

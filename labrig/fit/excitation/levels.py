@@ -58,7 +58,7 @@ class _Charges(NamedTuple):
 
     Attributes
     ----------
-    lasted_s, dose
+    elapsed_s, dose
         Derivatives −∂ ln kept by k_r in s (K,) and by k_e in s (K, P, B).
     kept
         Fraction of the initial concentration that is kept, shape (K, P, N).
@@ -66,7 +66,7 @@ class _Charges(NamedTuple):
         Levels reached from 0, n = K.
     """
 
-    lasted_s: FloatArray
+    elapsed_s: FloatArray
     dose: FloatArray
     kept: FloatArray
     gained: Levels
@@ -127,9 +127,9 @@ def _levels_after_charges(
         elif number and not charge.fresh:
             previous, wait_s = number - 1, float(dark_s[number - 1])
             decay = charges.kept[number] * np.exp(-k_r_per_s * wait_s)
-            lasted_s = charges.lasted_s[number] + wait_s
+            elapsed_s = charges.elapsed_s[number] + wait_s
             value[number] += decay * value[previous]
-            by_k_r[number] += decay * (by_k_r[previous] - lasted_s * value[previous])
+            by_k_r[number] += decay * (by_k_r[previous] - elapsed_s * value[previous])
             by_k_e[number] += decay[..., None] * (
                 by_k_e[previous] - value[previous, ..., None] * charges.dose[number, :, None]
             )
@@ -150,15 +150,15 @@ def _independent_charges(
     kappa = brightness[:, None] * (fraction @ steady_rates.T)[:, None, :]
     tau = duration_s[:, :, None]
     step, slopes = relaxation_with_slopes(kappa, k_r, tau)
-    before = np.zeros((len(tau) + 1, *kappa.shape[1:]))
+    r_before = np.zeros((len(tau) + 1, *kappa.shape[1:]))
     for number in range(len(tau)):
-        np.multiply(step.kept[number], before[number], out=before[number + 1])
-        before[number + 1] += step.gained[number]
+        np.multiply(step.kept[number], r_before[number], out=r_before[number + 1])
+        r_before[number + 1] += step.gained[number]
     # What is left at the end of a change after each step, and of one before the first.
-    after = np.ones_like(before)
+    after = np.ones_like(r_before)
     np.cumprod(step.kept[::-1], axis=0, out=after[-2::-1])
-    by_kappa = after[1:] * (slopes.kept * before[:-1] + slopes.gained_by_kappa)
-    by_k_r = (after[1:] * (slopes.kept * before[:-1] + slopes.gained_by_k_r)).sum(axis=0)
+    by_kappa = after[1:] * (slopes.kept * r_before[:-1] + slopes.gained_by_kappa)
+    by_k_r = (after[1:] * (slopes.kept * r_before[:-1] + slopes.gained_by_k_r)).sum(axis=0)
     by_fraction = (by_kappa.reshape(len(tau), -1).T @ fraction).reshape(*shape, bands)
     light = brightness[:, None, None] * series.irradiance
     return _Charges(
@@ -166,7 +166,7 @@ def _independent_charges(
         light * (duration_s.T @ fraction)[:, None, :],
         after[0].reshape(shape),
         Levels(
-            before[-1].reshape(shape),
+            r_before[-1].reshape(shape),
             by_k_r.reshape(shape),
             by_fraction * light[:, :, None, :],
         ),

@@ -52,7 +52,7 @@ class ExcitationProblem:
             [_flat(common_mode * inverse)] if len(common_mode) else []
             for inverse in self._inverse_sigma
         ]
-        #: Along which all values of a photograph scatter together, by series.
+        #: Common-mode directions of each exposure's values, by series.
         self._common = [_successive_whitenings(vectors) for vectors in self._common_mode]
 
     @property
@@ -182,8 +182,8 @@ class ExcitationProblem:
         """Multiply by a W with Wᵀ W = (1 + Σ u uᵀ)⁻¹, exposure by exposure."""
         misfit, jacobian = misfit[..., None], jacobian.reshape(*misfit.shape, -1)
         for common in self._common[number]:
-            common.take_from(misfit)
-            common.take_from(jacobian)
+            common.whiten(misfit)
+            common.whiten(jacobian)
         return misfit.ravel(), jacobian.reshape(-1, jacobian.shape[-1])
 
 
@@ -199,7 +199,7 @@ class _Common(NamedTuple):
         root = np.sqrt(1 + np.einsum("fv,fv->f", u, u))
         return cls(u, u / (root * (1 + root))[:, None])
 
-    def take_from(self, columns: FloatArray) -> None:
+    def whiten(self, columns: FloatArray) -> None:
         """Whiten columns (n, PC, k) in place."""
         columns -= self.shrunk[..., None] * (self.u[:, None, :] @ columns)
 
@@ -210,7 +210,7 @@ def _successive_whitenings(vectors: Sequence[FloatArray]) -> list[_Common]:
     for vector in vectors:
         column = vector[..., None].copy()
         for common in whitenings:
-            common.take_from(column)
+            common.whiten(column)
         whitenings.append(_Common.along(column[..., 0]))
     return whitenings
 

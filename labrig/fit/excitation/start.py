@@ -9,9 +9,9 @@ from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.nonnegative import nonnegative_least_squares
 from labrig.results import ChargingSeries, FloatArray
 
-#: Level of the brightest site: how far charging has gone is what the fit knows least at first.
+#: Guesses of the concentration of the brightest site, the least certain start value.
 GUESSED_LEVELS = (0.05, 0.2, 0.5, 0.9)
-#: Decades of κ over k_r looked at, and how many.
+#: Grid of κ over k_r.
 KAPPA_OVER_K_R = np.geomspace(1e-5, 1e3, 65)
 
 

@@ -27,16 +27,16 @@ from labrig.optics import (
     WavelengthMap,
 )
 
-#: What is known of a band before it is measured: mean and σ. Leakage and remainder in units of the
-#: peak, the width as its logarithm.
+#: Prior mean and σ of a band. Leakage and remainder are in units of the peak, the width is its
+#: logarithm.
 LOG_FWHM = (float(np.log(NOMINAL_FWHM_NM)), 0.3)
 SKEW = (0.0, 0.2)
 LEAKAGE = (0.002, 0.01)
-#: The remainder is that of a band's shape; so far from the band it is what blocking is uneven by.
+#: Prior σ of the remainder near a band and, beyond a distance in nm, of the uneven blocking.
 REMAINDER, BLOCKING, SHAPE_NM = 0.01, 0.001, 60.0
-#: Of a logarithm of which nothing is known but that of all positions it is the same order.
+#: Prior σ of the logarithm of the peak: all positions have the same order of magnitude.
 ANY_PEAK = 2.0
-#: How figures run along a strip: order of a polynomial, and scatter about it.
+#: Run of the parameters along a strip: order of a polynomial, and scatter about it.
 ALONG_THE_STRIP = {
     strip_problem.CENTRE: (3, 0.3),
     strip_problem.LOG_WIDTH: (2, 0.02),
@@ -44,12 +44,12 @@ ALONG_THE_STRIP = {
     strip_problem.LOG_PEAK: (2, 0.04),
     strip_problem.LEAKAGE: (1, 0.0005),
 }
-#: The map's σ is not believed below this: strips are not smooth to a tenth of a nanometre.
+#: Lower limit of the map's σ: strips are not smooth to a tenth of a nanometre.
 CENTRE_FLOOR_NM = 0.5
-#: Errors of a gel's transmittance are alike over so much: positions closer than that repeat them.
+#: Correlation length of errors of a gel's transmittance, which closer positions share.
 ALIKE_NM = 40.0
 FEWEST_FILTERS = 6
-#: How often the others have their say, and steps in between.
+#: Number of updates of the prior from the other positions, and steps in between.
 ROUNDS, STEPS = 4, 4
 
 

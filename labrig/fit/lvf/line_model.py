@@ -10,17 +10,17 @@ from labrig.optics import peak_shape
 from labrig.results import LocatedLines
 
 FEWEST_LINES = 3
-#: Fraction of the profile's variance that lines and background explain, if there are lines.
+#: Smallest fraction of the profile's variance that lines and background must explain.
 LEAST_EXPLAINED = 0.9
-#: Fractions of a blend stay this near to what is known of them: a shape that is not quite the
-#: filter's would otherwise pull them along.
+#: Largest deviation, in σ, of a blend's fraction from its prior: an imperfect shape would bias it
+#: otherwise.
 FRACTION_SIGMAS = 2.0
-#: A line is there if its height is this many of its σ.
+#: Height of a line in σ from which it is significant.
 SIGNIFICANT = 6.0
-#: A line is located if its σ is below this fraction of its width.
+#: σ of the position, in widths, below which a line is located.
 LOCATED = 0.2
-#: A line is no farther from where the assignment has it, in widths: 405 and 436 nm are 1.2 apart,
-#: and one must not take the other's place.
+#: Largest distance of a line from its assigned position, in widths: 405 and 436 nm are 1.2 apart,
+#: and must not be exchanged.
 NEAR = 0.6
 _STEP = 1e-5
 
@@ -129,8 +129,8 @@ class LineModel:
         prior = np.array([sigma for _, sigma in fractions])
         low, high = np.full(len(start), -np.inf), np.full(len(start), np.inf)
         n = len(self.lines)
-        near = NEAR * self.way.fwhm
-        low[:n], high[:n] = start[:n] - near, start[:n] + near
+        reach = NEAR * self.way.fwhm
+        low[:n], high[:n] = start[:n] - reach, start[:n] + reach
         low[n], high[n] = start[n] - 1, start[n] + 1
         low[n + 1 : n + 3], high[n + 1 : n + 3] = -0.5, 0.5
         low[n + 3 :] = np.maximum(start[n + 3 :] - FRACTION_SIGMAS * prior, 0.0)
@@ -162,11 +162,11 @@ class LineModel:
     ) -> tuple[FloatArray, FloatArray]:
         """Return residuals and their Jacobian by central differences."""
         steps = np.diag(_STEP * np.maximum(np.abs(scale), 1.0))
-        here, up, down = np.split(
+        centre, up, down = np.split(
             self._residuals(np.concatenate([x[np.newaxis], x + steps, x - steps]), noise, prior),
             [1, 1 + len(x)],
         )
-        return here[0], ((up - down) / (2 * np.diag(steps)[:, np.newaxis])).T
+        return centre[0], ((up - down) / (2 * np.diag(steps)[:, np.newaxis])).T
 
     def _residuals(self, x: FloatArray, noise: float, prior: FloatArray) -> FloatArray:
         """Return residuals (..., residuals) of parameters (..., parameters)."""

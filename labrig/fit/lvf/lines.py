@@ -20,15 +20,15 @@ from labrig.fit.lvf.line_model import (
 from labrig.optics import NOMINAL_FWHM_NM
 from labrig.results import LocatedLines
 
-#: Prominence in units of the noise that is left after smoothing.
+#: Smallest prominence in units of the noise.
 LEAST_PROMINENCE = 10.0
-#: And as a fraction of the channel's highest peak, and of the highest of all.
+#: Smallest prominence as a fraction of the channel's range, and of the largest range.
 LEAST_FRACTION, LEAST_OF_ALL = 0.03, 0.003
 MOST_PEAKS = 8
 MOST_SAMPLES = 20_000
-#: Peaks of two channels this fraction of their width apart are one.
+#: Distance, in widths, below which peaks of two channels are one.
 SAME = 0.5
-#: Fraction of the strip over which noise is smoothed away.
+#: Width of the smoothing as a fraction of the profile.
 SMOOTHING = 0.002
 #: Median absolute third difference over σ, for normal noise; a smooth profile has hardly any, even
 #: if a line is but a few samples wide.
@@ -98,14 +98,14 @@ def _distinct(peaks: list[Peak]) -> list[Peak]:
     return sorted(kept[:MOST_PEAKS], key=lambda peak: peak.position)
 
 
-#: Lines of the model agree with what was found to this fraction of their width.
+#: Largest deviation of peaks from an assignment, in widths.
 TOLERANCE = 0.4
-#: Assignments whose scores differ by less took the same peaks for lines; so many are fitted.
+#: Difference of scores below which assignments are ambiguous, and the number of them fitted.
 AMBIGUOUS = 1.0
 MOST_CANDIDATES = 4
-#: Strips are bent by some nm, in their middle against their ends.
+#: Largest bend of a strip in nm, in its middle against its ends.
 MOST_BEND_NM = 20.0
-#: Of such two, one is right if the other leaves this many times as much unexplained.
+#: Ratio of the unexplained variances at which the better orientation is accepted.
 CLEARLY = 1.3
 
 

@@ -14,18 +14,18 @@ from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.system import CurveError, curve_modes
 from labrig.optics import CameraResponse, Spectrum, Transmittance, hats, peak_shape, quadrature
 
-#: Figures of a position: centre, log width, skew, log peak, and leakage in units of the peak; then
-#: the remainder in units of the peak, at knots so far apart.
+#: Parameters of a position: centre, log width, skew, log peak, and leakage in units of the peak;
+#: then the remainder in units of the peak, at knots with a distance of `REMAINDER_STEP_NM`.
 CENTRE, LOG_WIDTH, SKEW, LOG_PEAK, LEAKAGE = range(5)
 FIGURES = 5
 REMAINDER_STEP_NM = 20.0
-#: T_p is straight between wavelengths so far apart: a band of 25 nm loses 0.1 % of its height.
+#: Step of the grid on which T_p is linear: a band of 25 nm loses 0.1 % of its height.
 GRID_NM = 1.0
 MOST_SKEW = 1.0
 _STEP = 1e-4
-#: Damping to begin with, by how much it changes, and when nothing helps any more.
+#: Initial damping, its factor of change, and the value at which the search stops.
 _DAMPING, _FACTOR, _HOPELESS = 1e-3, 8.0, 1e6
-#: A decrease of χ² that is not worth another step.
+#: Decrease of χ² below which the search stops.
 _ENOUGH = 0.1
 
 
@@ -51,9 +51,9 @@ class _Step:
 
     figures: FloatArray
     curves: FloatArray
-    #: Of every position: R of its own columns, and what the curves' columns are in its Q.
+    #: For every position, R of its own columns, and the curves' columns rotated by its Q.
     triangles: list[tuple[FloatArray, FloatArray]]
-    #: Inverse covariance of the curves.
+    #: Inverse covariance of the curves' modes.
     information: FloatArray
 
 

@@ -10,11 +10,11 @@ from labrig.fit.least_squares import FloatArray
 from labrig.optics import WavelengthMap
 from labrig.results import LocatedLines
 
-#: A bend is believed if chance gives so good a one this rarely (F-test with known σ).
+#: Significance level of a bend (F-test with known σ).
 RARE = 0.01
-#: Least σ of a line, in nm: shapes of bands are not quite alike.
+#: Smallest σ of a line in nm: shapes of bands differ slightly.
 FLOOR_NM = 0.1
-#: Bend that strips have where nothing is known, in nm between their middle and their ends.
+#: Prior σ of the bend of a strip in nm, between its middle and its ends.
 USUAL_BEND_NM = 5.0
 
 

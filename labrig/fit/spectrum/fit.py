@@ -53,9 +53,9 @@ def measured(
     return used, part, values[used], sigmas[used]
 
 
-#: Exchanges after which it goes round in circles.
+#: Number of exchanges after which block pivoting counts as cycling.
 MOST_EXCHANGES = 25
-#: Slopes, and coordinates relative to the largest, this far on the wrong side are rounding.
+#: Rounding errors of slopes, and of coordinates relative to the largest.
 ROUNDING = 100 * EPSILON
 SMALLEST = 1e-9
 
@@ -108,9 +108,9 @@ def _solved(curvature: FloatArray, linear: FloatArray) -> FloatArray:
 
 
 SAMPLES = 400
-#: Rounds in which the covariance of a wrong design follows the spectrum.
+#: Iterations in which the covariance of the design's errors follows the spectrum.
 ROUNDS = 3
-#: Weights of the prior that are possible, for a spectrum of about 1.
+#: Grid of weights of the prior, for a spectrum of about 1.
 WEIGHTS = np.geomspace(1e-4, 1e8, 73)
 #: Added to the curvature of the fit, for a spectrum of about 1.
 LEAST_CURVATURE = 1e-6

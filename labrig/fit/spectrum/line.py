@@ -21,11 +21,11 @@ from labrig.fit.spectrum.system import SpectralSystem
 
 #: Full width at half maximum over σ of a Gaussian.
 FWHM_OVER_SIGMA = 2 * np.sqrt(2 * np.log(2))
-#: Wavelengths tried first, per distance of the knots.
+#: Number of wavelengths on the first grid, per distance of the knots.
 TRIED_PER_KNOT = 4
-#: Rounds in which the covariance of a wrong system follows the line's strength.
+#: Iterations in which the covariance of the system's errors follows the line's strength.
 ROUNDS = 3
-#: Of the search, over the distance of the knots; also the step of derivatives.
+#: Tolerance of the search, in distances of the knots; also the step of derivatives.
 TOLERANCE = 1e-4
 
 

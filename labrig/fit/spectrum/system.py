@@ -10,7 +10,7 @@ from labrig.optics import Bands, CameraResponse, Lvf, hats, quadrature
 
 FloatArray = NDArray[np.float64]
 
-#: Steps of the derivatives by an LVF's figures, relative to their σ.
+#: Steps of the derivatives by an LVF's parameters, relative to their σ.
 _STEP = 0.1
 
 
