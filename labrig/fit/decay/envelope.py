@@ -214,7 +214,7 @@ def _flicker(
         variance = min(max(scatter / float(weight**2 @ free), 0.0), MOST_FLICKER**2)
 
     def error(variance: float) -> tuple[float, float]:
-        """Return σ(ρ²), and ν: 2/ν is the squared relative error of V where it matters most."""
+        """Return σ(ρ²), and ν: 2/ν is V's squared relative error, weighted by information."""
         weight = brightness2 / (1 + variance * brightness2)
         sigma = float(np.sqrt(2 / (weight**2 @ free)))
         return sigma, 2 / (sigma**2 * float((weight**3).sum() / weight.sum()))
