@@ -1,6 +1,6 @@
-"""labrig: from a lab bench to a measured phosphorescent or fluorescent material.
+"""labrig: control of a lab bench and photometry of phosphorescent and fluorescent materials.
 
-All that a notebook needs is here::
+The functions that a notebook needs are exported here::
 
     import labrig
 
@@ -14,5 +14,5 @@ Names are listed in `__init__.pyi`, and loaded when first used.
 
 import lazy_loader
 
-# So that `labrig --help` answers at once.
+# Lazy loading lets `labrig --help` answer at once.
 __getattr__, __dir__, __all__ = lazy_loader.attach_stub(__name__, __file__)

@@ -1,4 +1,4 @@
-"""The command `labrig`."""
+"""Entry point of the command `labrig`."""
 
 import os
 import signal
@@ -12,7 +12,7 @@ os.environ.setdefault("OPENBLAS_NUM_THREADS", "1")
 
 
 def main() -> None:
-    """Run the command line; every ending has its exit code and at most one line of complaint."""
+    """Run the command line; every ending has its exit code and at most one line of error."""
     for signum in STOP_SIGNALS:
         signal.signal(signum, end_at_once)
     from labrig.cli import guarded

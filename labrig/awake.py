@@ -1,4 +1,4 @@
-"""Keeps this PC from falling asleep, by each system's own means; untried on macOS and Windows."""
+"""Prevention of sleep of this PC, by each system's own means; not tested on macOS and Windows."""
 
 import ctypes
 import os
@@ -9,29 +9,29 @@ from collections.abc import Callable, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from typing import Any
 
-#: The desktop's service answers in less, or not at all.
+#: Timeout for the answer of the desktop's service.
 ANSWER_S = 5.0
-#: `cat` holds the lock for as long as labrig lives: then its input ends, however labrig does.
+#: `cat` holds the lock until its input ends, which is when labrig ends, however it does.
 SYSTEMD_INHIBIT = (
     *("systemd-inhibit", "--what=sleep:idle:handle-lid-switch", "--mode=block"),
     *("--who=labrig", "--why=a measurement is running", "cat"),
 )
-#: Neither idle nor, on mains, at all, until the process with the number that follows has ended.
+#: Prevents idle sleep and, on mains, all sleep until the process with the given number has ended.
 CAFFEINATE = ("caffeinate", "-i", "-s", "-w")
-#: Of SetThreadExecutionState.
+#: Flags of SetThreadExecutionState.
 ES_SYSTEM_REQUIRED, ES_CONTINUOUS = 0x00000001, 0x80000000
 
 
 @contextmanager
 def kept_awake(warn: Callable[[str], None], platform: str = sys.platform) -> Iterator[None]:
-    """Keep this PC awake meanwhile; where that cannot be, say so and go on.
+    """Keep this PC awake in the context; warn and continue where that is impossible.
 
     Parameters
     ----------
     warn
-        Tells a person that the PC may fall asleep, and why.
+        Callback that warns that the PC may fall asleep, and why.
     platform
-        As `sys.platform`.
+        Platform, with the values of `sys.platform`.
     """
     with ExitStack() as stack:
         try:
@@ -48,7 +48,7 @@ def kept_awake(warn: Callable[[str], None], platform: str = sys.platform) -> Ite
 
 @contextmanager
 def _systemd_inhibit() -> Iterator[None]:
-    """A lock of the desktop's service, logind; refused to somebody who came by ssh."""
+    """Hold a lock of the desktop's service, logind; it is refused to a user connected by ssh."""
     with subprocess.Popen(
         SYSTEMD_INHIBIT,
         bufsize=0,
@@ -68,8 +68,8 @@ def _systemd_inhibit() -> Iterator[None]:
             if not answers:
                 raise OSError("systemd-inhibit does not answer")
             if not process.stdout.read(1):
-                said = process.stderr.read().decode(errors="replace")
-                raise OSError(f"systemd-inhibit: {' '.join(said.split())}")
+                message = process.stderr.read().decode(errors="replace")
+                raise OSError(f"systemd-inhibit: {' '.join(message.split())}")
             yield
         finally:
             process.terminate()
@@ -77,7 +77,7 @@ def _systemd_inhibit() -> Iterator[None]:
 
 @contextmanager
 def _caffeinate() -> Iterator[None]:
-    """The assertion that macOS' own command makes."""
+    """Hold the power assertion of macOS' own command."""
     with subprocess.Popen(
         [*CAFFEINATE, str(os.getpid())],
         stdin=subprocess.DEVNULL,
@@ -93,7 +93,7 @@ def _caffeinate() -> Iterator[None]:
 
 @contextmanager
 def _execution_state() -> Iterator[None]:
-    """The state of this thread that Windows looks at before it falls asleep."""
+    """Set the thread state that keeps Windows from sleeping."""
     windll: Any = vars(ctypes)["windll"]
     if not windll.kernel32.SetThreadExecutionState(ES_CONTINUOUS | ES_SYSTEM_REQUIRED):
         raise OSError("SetThreadExecutionState was refused")

@@ -1,4 +1,4 @@
-"""Opens a rig: the one place where drivers, clock and, in a simulated rig, the room meet."""
+"""Opening of a rig: here drivers and clock meet the simulated room, if there is one."""
 
 import socket
 from collections.abc import Callable, Iterable, Iterator
@@ -31,7 +31,7 @@ TCP_CONNECT_TIMEOUT_S = 5.0
 
 @dataclass(frozen=True)
 class Bench:
-    """A rig before its devices are opened: which clock it runs on, which room it stands in."""
+    """A rig before its devices are opened: file, clock, simulated room, guard and ports."""
 
     file: RigFile
     source: str
@@ -42,7 +42,7 @@ class Bench:
 
     @property
     def guarded_by(self) -> str:
-        """What switches the lights off if this process cannot, as the run's record says it."""
+        """Description for the record of what switches the lights off if this process cannot."""
         if self.guard is not None:
             return self.guard.described
         return "nothing: no light of this rig outlives the process that runs it"
@@ -54,27 +54,27 @@ class Bench:
 
     @property
     def disk(self) -> Disk:
-        """The disk of the PC that the rig hangs on."""
+        """Disk of the PC to which the rig is connected."""
         return REAL_DISK if self.room is None else self.room.disk
 
     def kept_awake(self, warn: Callable[[str], None]) -> AbstractContextManager[None]:
-        """Keep the PC from falling asleep meanwhile; time in a simulated room would sleep, too."""
+        """Keep the PC awake; not for a simulated room, whose time stops while the PC sleeps."""
         return kept_awake(warn) if self.room is None else nullcontext()
 
     @contextmanager
     def devices(self) -> Iterator[Rig]:
-        """Open all devices, each at once brought to its safe state; safe again at the end.
+        """Open all devices, each at once brought to its safe state, and make them safe at the end.
 
-        Ctrl-C and its like are answered at waits, and never keep the safe state from being reached.
+        Ctrl-C and similar signals are handled at waits, and never prevent the safe state.
 
         Raises
         ------
         DeviceError
-            A device is missing, or cannot confirm that it is safe; the guard cannot be started.
+            A device is missing, or cannot confirm that it is safe; or the guard cannot be started.
         UsageError
             Another labrig holds one of the addresses.
         Interrupted
-            Somebody asked to stop.
+            A stop was requested.
         """
         with ExitStack() as stack:
             stack.enter_context(interrupting(self.clock))
@@ -94,7 +94,7 @@ class Bench:
             yield rig
 
     def _make_safe(self, rig: Rig) -> None:
-        """As the rig's; the guard may go when all lights are off, and not before."""
+        """Make the rig safe; the guard stands down only when all lights are off."""
         try:
             rig.make_safe()
         except DeviceError as error:
@@ -107,15 +107,32 @@ class Bench:
 
 @contextmanager
 def open_bench(file: RigFile, source: str, not_before_s: float = 0.0) -> Iterator[Bench]:
-    """The bench that a rig file describes; nothing is opened yet.
+    """Open the bench that a rig file describes, without connecting a device yet.
 
     Parameters
     ----------
+    file
+        The validated rig file.
     source
         Path of the rig file, for messages.
     not_before_s
-        Seconds since 1970 at which a simulated room's clock starts at the earliest: a resumed run
-        goes on after its last journal line.
+        Earliest time, in seconds since 1970, at which the clock of a simulated room starts: a
+        resumed run continues after its last journal line.
+
+    Yields
+    ------
+    Bench
+        The bench with its clock; `Bench.devices` opens the devices.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> path = Path("runs/decay/rig.yaml")
+    >>> opened = labrig.open_bench(labrig.read_rig_file(path), str(path))
+    >>> with opened as bench, bench.devices() as rig:
+    ...     print(sorted(rig.devices))
+    ['camera', 'changer', 'door', 'lamp', 'shield', 'thermometer']
     """
     if file.simulation is None:
         with guarding(file, source) as guard:
@@ -132,19 +149,21 @@ def serve_camera(file: RigFile, source: str, port: int, tell: Callable[[str], No
 
     Parameters
     ----------
+    file
+        The validated rig file.
     source
         Path of the rig file, for messages.
     port
-        TCP port on the loopback network; 0 for any that is free.
+        TCP port on the loopback network; 0 for any free one.
     tell
-        Called with the address once it can be reached.
+        Callback that receives the address once it can be reached.
 
     Raises
     ------
     UsageError
-        No simulated rig, or the port is taken.
+        The rig is not simulated, or the port is taken.
     Interrupted
-        Somebody asked to stop: the only way to end.
+        A stop was requested, which is the only way to end.
     """
     if file.simulation is None:
         raise UsageError(
@@ -169,7 +188,7 @@ def _open(key: str, entry: DeviceEntry, connections: "_Connections", source: str
 
 
 class _Connections:
-    """Opens each port once, by whatever name; what is real under a lock that labrigs respect."""
+    """Opener of ports, each once by whatever name; real devices are locked for this labrig."""
 
     def __init__(
         self, clock: Clock, room: "OpenRoom | None", stack: ExitStack, names: SerialPorts
@@ -179,7 +198,7 @@ class _Connections:
         self._stack = stack
         self._names = names
         self._ports: dict[tuple[str, ...], SerialPort] = {}
-        self._held: set[str] = set()
+        self._locked: set[str] = set()
 
     def serial(self, address: str, baudrate: int) -> SerialPort:
         try:
@@ -193,7 +212,7 @@ class _Connections:
             )
             devices = tuple(serial_devices(str(port.port)))
             if devices not in self._ports:
-                self._hold(devices, address)
+                self._lock(devices, address)
                 port.open()
                 self._stack.callback(port.close)
                 self._ports[devices] = port
@@ -208,25 +227,25 @@ class _Connections:
         url = urlsplit(address)
         if url.scheme == "sim":
             backend = None if self._room is None else self._room.usb(url.path.strip("/"))
-            found = None if backend is None else usb.core.find(backend=backend)
+            device = None if backend is None else usb.core.find(backend=backend)
         elif url.scheme == "usb":
-            found = self._find(address, serial_of)
+            device = self._find(address, serial_of)
         else:
             raise UsageError(
                 f"'{address}' is no USB address; write usb://VENDOR:PRODUCT in hexadecimal, such "
                 "as usb://04a9:3199, with /SERIAL behind it if there are several"
             )
-        if found is None:
+        if device is None:
             raise DeviceError(
                 f"no device at {address}; switch it on and check its cable (a camera that went to "
                 "sleep is off, too)"
             )
-        return found
+        return device
 
     def tcp(self, address: str, default_port: int) -> socket.socket:
         host, port = _host_and_port(address, default_port)
         try:
-            self._hold(network_devices(host, port), address)
+            self._lock(network_devices(host, port), address)
             connected = socket.create_connection((host, port), TCP_CONNECT_TIMEOUT_S)
             # commands are small, and somebody waits for the answer to each
             connected.setsockopt(socket.IPPROTO_TCP, socket.TCP_NODELAY, 1)
@@ -249,14 +268,14 @@ class _Connections:
             ) from None
         serial = url.path.strip("/")
         try:
-            alike = list(usb.core.find(find_all=True, idVendor=vendor, idProduct=product))
+            candidates = list(usb.core.find(find_all=True, idVendor=vendor, idProduct=product))
             if serial:
-                found = _with_serial(alike, serial, address, serial_of)
+                device = _with_serial(candidates, serial, address, serial_of)
             else:
-                found = alike[0] if alike else None
-            if found is not None:
-                self._hold([usb_device(found)], address)
-            return found
+                device = candidates[0] if candidates else None
+            if device is not None:
+                self._lock([usb_device(device)], address)
+            return device
         except usb.core.NoBackendError:
             raise DeviceError(
                 "libusb is not installed, so USB cameras cannot be reached; install libusb-1.0 "
@@ -269,40 +288,41 @@ class _Connections:
                 "give the camera the WinUSB driver"
             ) from None
 
-    def _hold(self, devices: Iterable[str], address: str) -> None:
-        """Keep other labrigs from real devices; a simulated room is private to its process."""
+    def _lock(self, devices: Iterable[str], address: str) -> None:
+        """Lock real devices against other labrigs; a simulated room is private to its process."""
         for device in devices:
-            if device not in self._held and not address.startswith("sim://"):
+            if device not in self._locked and not address.startswith("sim://"):
                 self._stack.enter_context(held(device, address))
-                self._held.add(device)
+                self._locked.add(device)
 
 
 def _with_serial(
-    alike: list[Any], serial: str, address: str, serial_of: Callable[[Any], str] | None
+    candidates: list[Any], serial: str, address: str, serial_of: Callable[[Any], str] | None
 ) -> Any:
-    """The device with that serial number; those that tell none on the bus are asked in turn."""
-    others = []
+    """Return the device with that serial number; devices without one on the bus are queried."""
+    other_numbers = []
     problem: LabrigError | None = None
-    for device in sorted(alike, key=lambda device: not device.iSerialNumber):
+    for device in sorted(candidates, key=lambda device: not device.iSerialNumber):
         try:
             if device.iSerialNumber:
-                said = device.serial_number
+                serial_number = device.serial_number
             elif serial_of:
                 with held(usb_device(device), address):
-                    said = serial_of(device)
+                    serial_number = serial_of(device)
             else:
-                said = ""
+                serial_number = ""
         except (DeviceError, UsageError) as failure:
             problem = failure
             continue
-        if said.strip().lstrip("0") == serial.lstrip("0"):
+        if serial_number.strip().lstrip("0") == serial.lstrip("0"):
             return device
-        others.append(said or "unknown")
+        other_numbers.append(serial_number or "unknown")
     if problem:
         raise problem
-    if others:
+    if other_numbers:
         raise DeviceError(
-            f"no device with the serial number {serial}; of this kind there are {', '.join(others)}"
+            f"no device with the serial number {serial}; of this kind there are "
+            f"{', '.join(other_numbers)}"
         )
     return None
 

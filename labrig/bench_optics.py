@@ -1,4 +1,4 @@
-"""What a rig file's `optics:` names: measured curves, and calibrations of the bench."""
+"""Optical data named under `optics:` in a rig file: measured curves and calibrations."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -27,47 +27,49 @@ _SUFFIX = ".csv"
 def camera_curves(
     rig: RigFile, instead: str | None = None, lvf: LvfFile | None = None
 ) -> CameraResponse:
-    """The camera's curves: those a person wants `instead`, else as the calibration of a filter
-    found them, else the rig's.
+    """Read the camera's curves: those of `instead`, of a filter's calibration, or of the rig.
 
-    Of a filter and a camera it is their product that a calibration knows best: whoever reads light
-    through the filter takes both from it. And it has measured this body, not another of its model.
+    The order is one of precedence. A filter's calibration determines the product of filter and
+    camera, so light read through the filter takes both from it; it has also measured this body, not
+    another one of its model.
 
     Raises
     ------
     UsageError
-        Nobody names any, or there are none of that name.
+        No curves are named, or there are none of that name.
     """
     if instead is None and lvf is not None and lvf.camera is not None:
-        found = lvf.camera.response()
-        return replace(found, name=f"{found.name}, as the filter's calibration found them")
+        calibrated = lvf.camera.response()
+        return replace(
+            calibrated, name=f"{calibrated.name}, as the filter's calibration found them"
+        )
     return read_camera(instead or _named(rig.optics.camera, "camera"))
 
 
 def calibration(rig: RigFile, kind: CalibrationKind[FileT]) -> FileT | None:
-    """What the rig file names as a calibration of that kind; None if it names none.
+    """Read the calibration of that kind named in the rig file; None if none is named.
 
     Raises
     ------
     UsageError
-        It is missing or malformed.
+        The file is missing or malformed.
     """
     named = rig.optics.named(kind)
     return None if named is None else kind.read_named(Path(named))
 
 
 def lamp_spectrum(rig: RigFile) -> Spectrum:
-    """The usual lamp's spectrum, relative."""
+    """Read the relative spectrum of the rig's lamp."""
     return read_spectrum(_path(_named(rig.optics.lamp, "lamp")))
 
 
 def card_reflectance(rig: RigFile) -> Transmittance:
-    """The grey card's reflectance."""
+    """Read the reflectance of the rig's grey card."""
     return read_transmittance(_path(_named(rig.optics.grey_card, "grey_card")))
 
 
 def filter_transmittances(rig: RigFile, names: Sequence[str]) -> list[Transmittance]:
-    """Of colour filters, in that order.
+    """Read the transmittances of colour filters, in the order of `names`.
 
     Raises
     ------
@@ -93,7 +95,7 @@ def _named(value: str | None, key: str) -> str:
 
 
 def _path(named: str) -> Path:
-    """A file as given, or the shipped one of that name."""
+    """Return a file as given, or the shipped one of that name."""
     path = Path(named)
     if path.suffix or len(path.parts) > 1:
         return path

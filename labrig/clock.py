@@ -1,7 +1,7 @@
-"""The one clock: everything that waits or stamps a time is given one of these.
+"""Clocks: everything that waits or records a time takes one of these.
 
 Times are seconds of the clock's own monotonic scale; `Clock.wall` turns them into seconds since
-1970, anchored once, so that a stepped PC clock cannot bend a measurement.
+1970, anchored once, so that a stepped PC clock does not distort a measurement.
 """
 
 import ctypes
@@ -13,11 +13,11 @@ from contextlib import contextmanager
 from functools import partial
 from typing import Any
 
-#: A sleeping PC looks up this often, so that Ctrl-C is answered at once on every system.
+#: Interval of checks for an interruption during a wait, so that Ctrl-C acts at once everywhere.
 LOOK_UP_S = 0.05
-#: Clocks of a PC that is awake agree within much less.
+#: Difference of clocks that means sleep; on a PC that is awake they agree much better.
 SLEPT_S = 0.3
-#: A clock that goes on while the PC sleeps, and one that stands still, by `sys.platform`.
+#: A clock that includes sleep of the PC, and one that does not, by `sys.platform`.
 SLEEP_CLOCKS = {
     "linux": ("CLOCK_BOOTTIME", "CLOCK_MONOTONIC"),
     "darwin": ("CLOCK_MONOTONIC_RAW", "CLOCK_UPTIME_RAW"),
@@ -27,7 +27,7 @@ Reading = Callable[[], float]
 
 
 class Interrupted(BaseException):
-    """Ctrl-C or another signal, delivered at a wait (never inside a device transaction)."""
+    """Ctrl-C or another signal, raised at a wait (never inside a device transaction)."""
 
     def __init__(self, signum: int, text: str = "interrupted") -> None:
         super().__init__(text)
@@ -35,7 +35,7 @@ class Interrupted(BaseException):
 
 
 class Slept(BaseException):
-    """The PC fell asleep and woke up again; delivered at a wait."""
+    """Sleep of the PC, raised at a wait after it woke up."""
 
     def __init__(self, slept_s: float) -> None:
         super().__init__(f"this PC slept for {slept_s:.1f} s")
@@ -43,7 +43,7 @@ class Slept(BaseException):
 
 
 class Clock(ABC):
-    """Time, and the only place where a run can be interrupted."""
+    """Source of time, and the only place where a run can be interrupted."""
 
     def __init__(self, epoch_s: float) -> None:
         self.epoch_s = epoch_s
@@ -53,38 +53,38 @@ class Clock(ABC):
 
     @abstractmethod
     def now(self) -> float:
-        """Seconds on the clock's own scale, never stepping back; goes on while the PC sleeps."""
+        """Return seconds on the clock's own scale, which never steps back and includes sleep."""
 
     @abstractmethod
     def slept_s(self) -> float:
-        """Seconds that the PC has slept since some time, as far as it tells."""
+        """Return for how many seconds the PC has slept since an arbitrary time, as far as known."""
 
     @abstractmethod
     def _pause_until(self, deadline_s: float) -> None:
-        """Let time pass until `deadline_s`; may return early to look for an interruption."""
+        """Let time pass until `deadline_s`; an early return allows a check for interruptions."""
 
     def wall(self, at_s: float | None = None) -> float:
-        """Seconds since 1970 at `at_s` (default: now)."""
+        """Return seconds since 1970 at `at_s` (default: now)."""
         return self.epoch_s + (self.now() if at_s is None else at_s)
 
     def sleep_until(self, deadline_s: float) -> None:
-        """Wait for an absolute time; raises `Interrupted` if somebody asked to stop."""
-        self._look_up()
+        """Wait until an absolute time; raise `Interrupted` if a stop was requested."""
+        self._check_interruption()
         while self.now() < deadline_s:
             self._pause_until(deadline_s)
-            self._look_up()
+            self._check_interruption()
 
     def sleep(self, duration_s: float) -> None:
         """Wait for `duration_s` seconds."""
         self.sleep_until(self.now() + duration_s)
 
     def interrupt(self, signum: int) -> None:
-        """Ask for an interruption at the next wait. Safe to call from a signal handler."""
+        """Request an interruption at the next wait. Safe to call from a signal handler."""
         self._signum = signum
 
     @contextmanager
     def shielded(self) -> Iterator[None]:
-        """Waits inside do not raise: the way to the safe state is walked to its end."""
+        """Suppress interruptions at waits, so that the safe state is reached."""
         self._shields += 1
         try:
             yield
@@ -93,7 +93,7 @@ class Clock(ABC):
 
     @contextmanager
     def noticing_sleep(self) -> Iterator[None]:
-        """What is timed inside must not be slept through: raises `Slept` at a wait, or at the end.
+        """Raise `Slept` at a wait, or at the end, if the PC slept meanwhile.
 
         Raises
         ------
@@ -107,7 +107,7 @@ class Clock(ABC):
         finally:
             self._slept_before_s = None
 
-    def _look_up(self) -> None:
+    def _check_interruption(self) -> None:
         if self._shields:
             return
         if self._signum is not None:
@@ -129,8 +129,8 @@ class SystemClock(Clock):
     Parameters
     ----------
     platform
-        As `sys.platform`. Whether the PC slept is known on Linux, and, though not tried there, on
-        macOS and Windows.
+        Platform, with the values of `sys.platform`. Sleep of the PC is detected on Linux, and, not
+        tested, on macOS and Windows.
     """
 
     def __init__(self, platform: str = sys.platform) -> None:
@@ -150,7 +150,7 @@ class SystemClock(Clock):
 
 
 def _readings(platform: str) -> tuple[Reading, Reading, Reading]:
-    """The clock that measures, one that goes on while the PC sleeps, one that stands still."""
+    """Return the measuring clock, one that includes sleep, and one that does not."""
     if platform == "win32":
         kernel32 = vars(ctypes)["windll"].kernel32
         # The performance counter goes on, too, but runs apart from the other two by 0.3 s an hour.
@@ -175,7 +175,7 @@ def _unbiased_s(kernel32: Any) -> float:
 
 
 class VirtualClock(Clock):
-    """Time that passes only when somebody waits: planning and simulated rooms.
+    """Clock whose time passes only by waiting, for planning and simulated rooms.
 
     Parameters
     ----------
@@ -194,7 +194,7 @@ class VirtualClock(Clock):
         return 0.0
 
     def spend(self, duration_s: float) -> None:
-        """Let a simulated transaction cost time; no interruption inside a transaction."""
+        """Let a simulated transaction take time, without interruption."""
         self._now_s += duration_s
 
     def _pause_until(self, deadline_s: float) -> None:

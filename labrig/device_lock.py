@@ -1,6 +1,6 @@
-"""One bench, one labrig: a lock on each device, by whatever name it is called.
+"""Locks that keep other labrigs from a bench's devices, by whatever name a device is called.
 
-The lock is an advisory one on a file. It ends with the process that has it, however that ends, and
+A lock is an advisory one on a file. It ends with the process that holds it, however that ends, and
 no child of that process inherits it.
 """
 
@@ -22,25 +22,25 @@ from labrig.errors import UsageError
 if sys.platform != "win32":
     import fcntl
 
-#: In memory and never tidied up; open to everybody on Debian, Ubuntu and Arch, not on Fedora.
+#: Folder in memory that is never cleaned up; writable for all on Debian, Ubuntu, Arch, not Fedora.
 RUN_LOCK = Path("/run/lock")
 
 
 @contextmanager
 def held(device: str, address: str) -> Iterator[None]:
-    """Keep every other labrig on this PC from `device`; nothing is sent to it.
+    """Lock `device` against every other labrig on this PC; nothing is sent to it.
 
     Parameters
     ----------
     device
-        As `serial_devices`, `usb_device` or `network_devices` name it.
+        Identifier from `serial_devices`, `usb_device` or `network_devices`.
     address
-        As the rig file calls it, for messages.
+        Address in the rig file, for messages.
 
     Raises
     ------
     UsageError
-        Another labrig has it.
+        Another labrig holds the device.
     """
     path = lock_folder() / f"labrig-{quote(os.fsencode(device), safe='')}.lock"
     with ExitStack() as stack:
@@ -59,7 +59,7 @@ def held(device: str, address: str) -> Iterator[None]:
 
 
 def lock_folder(platform: str = sys.platform) -> Path:
-    """The one folder of this PC that has the locks, whoever asks and whatever TMPDIR says."""
+    """Return the folder of the locks, the same for all users and independent of TMPDIR."""
     if platform == "win32":
         return Path(os.environ["PROGRAMDATA"]) / "labrig"
     is_for_everybody = RUN_LOCK.is_dir() and RUN_LOCK.stat().st_mode & stat.S_IWOTH
@@ -68,10 +68,11 @@ def lock_folder(platform: str = sys.platform) -> Path:
 
 @contextmanager
 def _locked(path: Path) -> Iterator[None]:
-    """A lock on a file that any user may have made.
+    """Lock a file that any user may have created.
 
-    Of such a file in a folder for everybody, Linux forbids others to open it as if to make it
-    (fs.protected_regular), and filelock does not trust it: hence both steps are done here.
+    In a folder that everybody can write, Linux forbids opening another user's file with the flag
+    that creates it (fs.protected_regular), and filelock does not trust such a file: hence both
+    steps are separate here.
     """
     if sys.platform == "win32":
         path.parent.mkdir(exist_ok=True)
@@ -79,19 +80,19 @@ def _locked(path: Path) -> Iterator[None]:
             yield
         return
     with suppress(FileExistsError):
-        made = os.open(path, os.O_CREAT | os.O_EXCL)
-        os.fchmod(made, 0o444)
-        os.close(made)
-    lock = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
+        created = os.open(path, os.O_CREAT | os.O_EXCL)
+        os.fchmod(created, 0o444)
+        os.close(created)
+    descriptor = os.open(path, os.O_RDONLY | os.O_NOFOLLOW)
     try:
-        fcntl.flock(lock, fcntl.LOCK_EX | fcntl.LOCK_NB)
+        fcntl.flock(descriptor, fcntl.LOCK_EX | fcntl.LOCK_NB)
         yield
     finally:
-        os.close(lock)
+        os.close(descriptor)
 
 
 def serial_devices(port: str, platform: str = sys.platform) -> list[str]:
-    """What is behind the name of a serial port: by a link, a relative path, a URL of pyserial's.
+    """Return the devices behind a serial port given by a link, a relative path or a pyserial URL.
 
     Raises
     ------
@@ -112,24 +113,26 @@ def serial_devices(port: str, platform: str = sys.platform) -> list[str]:
 
 
 def usb_device(device: Any) -> str:
-    """The place of a `usb.core.Device` on the bus: many cameras have no serial number there."""
+    """Return the place of a `usb.core.Device` on the bus; many have no serial number."""
     place = device.port_numbers or (f"address-{device.address}",)
     return f"usb-{device.bus}-{'.'.join(map(str, place))}"
 
 
 def network_devices(host: str, port: int) -> list[str]:
-    """Every number that a name in the network stands for, with the port.
+    """Return every address of a host name, with the port.
 
     Raises
     ------
     OSError
-        Nobody knows the name.
+        The name cannot be resolved.
     """
-    found = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
-    return sorted({f"{_number(str(peer[0]))}:{port}" for *_, peer in found})
+    addresses = socket.getaddrinfo(host, port, type=socket.SOCK_STREAM)
+    return sorted(
+        {f"{_shortest(str(socket_address[0]))}:{port}" for *_, socket_address in addresses}
+    )
 
 
-def _number(number: str) -> str:
-    """An address as short as it can be; IPv4 written as IPv6 is IPv4."""
+def _shortest(number: str) -> str:
+    """Return the shortest form of an IP address; IPv4 written as IPv6 becomes IPv4."""
     plain = ipaddress.ip_address(number)
     return str(getattr(plain, "ipv4_mapped", None) or plain)

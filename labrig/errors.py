@@ -1,30 +1,30 @@
-"""What can go wrong, by whose hand it is mended.
+"""Exceptions, divided by who can resolve them, each with its exit code.
 
-Every message says what was expected, what came and what to do, in one line; the command line
-shows that line and leaves with the class's exit code.
+Every message states what was expected, what was received and what to do, in one line; the command
+line prints that line and ends with the class's exit code.
 """
 
 from typing import ClassVar
 
 
 class LabrigError(Exception):
-    """Base of everything labrig raises on purpose."""
+    """Base class of all errors that labrig raises deliberately."""
 
     exit_code: ClassVar[int] = 2
 
 
 class UsageError(LabrigError):
-    """The user's input: a malformed file, an unknown name, a rig in use."""
+    """Invalid input of the user: a malformed file, an unknown name, a rig in use."""
 
     exit_code = 2
 
 
 class ProtocolError(UsageError):
-    """A plan that cannot work on this rig; nothing has moved."""
+    """A plan that cannot work on this rig, found before anything has moved."""
 
 
 class DeviceError(LabrigError):
-    """A device that did not answer, or answered something else.
+    """A device that did not answer, or gave an unexpected answer.
 
     Attributes
     ----------
@@ -37,28 +37,28 @@ class DeviceError(LabrigError):
 
 
 class DeviceLostError(DeviceError):
-    """A device that is gone: unplugged, switched off, asleep; it may come back."""
+    """A lost device (unplugged, switched off, asleep), which may come back."""
 
 
 class UnclearAnswerError(DeviceLostError):
-    """A device that is there but silent or not to be understood; asked again, it may answer."""
+    """A device that is present but silent or unintelligible; a second query may succeed."""
 
 
 class DataError(LabrigError):
-    """Data that cannot be used; what was recorded is kept."""
+    """Data that cannot be used; recorded data are kept."""
 
     exit_code = 4
 
 
 class FrameError(DataError):
-    """A photograph that cannot be reduced."""
+    """A frame that cannot be reduced."""
 
 
 class FitError(DataError):
-    """Data from which no parameter can be had."""
+    """Data that do not constrain the parameters of a fit."""
 
 
 class DiskError(LabrigError):
-    """The disk is full, slow beyond use or gone."""
+    """A disk that is full, too slow or gone."""
 
     exit_code = 5

@@ -1,4 +1,4 @@
-"""Fills a run folder: unit after unit, and once more where a device was lost and came back."""
+"""Execution of a protocol into a run folder, unit by unit, with recovery from lost devices."""
 
 from collections import Counter
 from collections.abc import Callable, Iterator, Sequence
@@ -35,48 +35,48 @@ from labrig.signals import PAUSE_SIGNAL, interrupting, name_of, stop_here
 
 ErrorT = TypeVar("ErrorT", bound=BaseException)
 
-#: How long a lost device is waited for: somebody has to notice and walk to the bench.
+#: Time to wait for a lost device: the user has to notice and walk to the bench.
 COMES_BACK_S = 300.0
 LOOK_PERIOD_S = 2.0
-#: A unit that has lost a device so often is not going to get through.
+#: Number of lost devices in one unit at which the run ends.
 MOST_LOSSES = 3
-#: Files named in a warning.
+#: Largest number of files named in a warning.
 MOST_NAMED = 4
 
 
 class Watch(Protocol):
-    """Tells a person what is going on: given the plan, the units already complete, the clock."""
+    """Factory of a run's observer, from the plan, the units already complete and the clock."""
 
     def __call__(
         self, plan: Plan, done: Sequence[str], clock: Clock
     ) -> AbstractContextManager[RunObserver]:
-        """The observer of one run."""
+        """Return the observer of one run."""
 
 
 def execute(
-    folder: RunFolder, protocol: ProtocolModel, stand: Bench, laid_out: Plan, watch: Watch
+    folder: RunFolder, protocol: ProtocolModel, bench: Bench, laid_out: Plan, watch: Watch
 ) -> None:
-    """Do all units that `folder` lacks, with this PC kept awake.
+    """Record all units that `folder` lacks, with this PC kept awake.
 
-    A unit that was cut off by a crash or a lost device, or in which the PC slept, is done again.
+    A unit that was cut off by a crash or a lost device, or in which the PC slept, is repeated.
 
     Raises
     ------
     Interrupted, LabrigError
-        After the safe state was reached; the text says what is kept and how to go on.
+        The run ended early, in the safe state; the text tells what is kept and how to continue.
     """
-    dead = folder.close_open_attempts(
-        stand.clock.wall, "abort", "labrig ended before this attempt did; closed at resume"
+    interrupted_units = folder.close_open_attempts(
+        bench.clock.wall, "abort", "labrig ended before this attempt did; closed at resume"
     )
     record = folder.read()
     done = record.completed()
     # More signals while the attempt is being closed must not cut that short.
-    with interrupting(stand.clock), watch(laid_out, list(done), stand.clock) as observer:
-        for unit in dead:
+    with interrupting(bench.clock), watch(laid_out, list(done), bench.clock) as observer:
+        for unit in interrupted_units:
             observer.warn(f"the unit {unit} was cut off and is done again")
         for oddity in _oddities(folder, record):
             observer.warn(oddity)
-        if record.last_time > stand.clock.wall():
+        if record.last_time > bench.clock.wall():
             observer.warn(
                 "the clock of this PC was set back since the run began: times of day in its "
                 "journal go back, durations are right"
@@ -88,56 +88,60 @@ def execute(
             "protocol": protocol.protocol,
             "sample": protocol.sample.name,
             "labrig_version": version("labrig"),
-            "guard": stand.guarded_by,
+            "guard": bench.guarded_by,
         }
 
-        left = [action for attempt in record.attempts for action in attempt.actions if action.task]
+        manual_actions = [
+            action for attempt in record.attempts for action in attempt.actions if action.task
+        ]
 
         def use(rig: Rig) -> None:
             _refuse_what_spoils(rig)
             devices = rig.identities()
-            _arrange_again(left, rig, observer)
+            _arrange_again(manual_actions, rig, observer)
             _report_exchanged_camera(folder, devices, observer)
-            told = {"rig": rig.name, "devices": devices} | {
-                f"{key}_reads_back": tells for key, tells in lights_that_read_back(rig).items()
+            rig_metadata = {"rig": rig.name, "devices": devices} | {
+                f"{key}_reads_back": reads_back
+                for key, reads_back in lights_that_read_back(rig).items()
             }
-            run_units(units, rig, folder, observer, {**metadata, **told})
+            run_units(units, rig, folder, observer, {**metadata, **rig_metadata})
 
         try:
-            with stand.kept_awake(observer.warn):
-                _Reconnecting(stand, folder, observer).run(use)
-        except Interrupted as stop:
-            _close(folder, stand, "abort", f"signal {stop.signum}")
+            with bench.kept_awake(observer.warn):
+                _Reconnecting(bench, folder, observer).run(use)
+        except Interrupted as interruption:
+            _close(folder, bench, "abort", f"signal {interruption.signum}")
             raise Interrupted(
-                stop.signum,
-                f"stopped by {name_of(stop.signum)}, safe state reached; {_kept(folder, units)}",
+                interruption.signum,
+                f"stopped by {name_of(interruption.signum)}, safe state reached; "
+                f"{_kept_summary(folder, units)}",
             ) from None
         except LabrigError as error:
-            _close(folder, stand, "fail", str(error))
-            error.args = (f"{error}; {_kept(folder, units)}",)
+            _close(folder, bench, "fail", str(error))
+            error.args = (f"{error}; {_kept_summary(folder, units)}",)
             raise
 
 
 @dataclass
 class _Reconnecting:
-    """Connects, and connects again when a device was lost: unplugged, asleep, switched off.
+    """Connection to the devices, restored when a device was lost: unplugged, asleep, switched off.
 
-    The devices of a PC that slept were without it, and often without power: they are lost, too.
+    While a PC sleeps its devices have no connection, and often no power: they count as lost, too.
     """
 
-    stand: Bench
+    bench: Bench
     folder: RunFolder
     observer: RunObserver
     losses: Counter[str] = field(default_factory=Counter)
 
     def run(self, use: Callable[[Rig], None]) -> None:
-        """Have `use` do what is left to do, on devices that are all there.
+        """Call `use` with all devices connected until it completes.
 
         Raises
         ------
         DeviceError
-            A device was missing from the start, did not come back, or was lost too often; or
-            somebody stopped waiting for it.
+            A device was missing from the start, did not come back, or was lost too often; or the
+            wait for it was interrupted.
         """
         lost: DeviceLostError | None = None
         back_by_s = 0.0
@@ -145,69 +149,72 @@ class _Reconnecting:
             connected = False
             try:
                 if lost is not None:
-                    self.stand.clock.sleep(LOOK_PERIOD_S)
-                with self.stand.devices() as rig:
+                    self.bench.clock.sleep(LOOK_PERIOD_S)
+                with self.bench.devices() as rig:
                     connected = True
                     use(rig)
                 return
-            except Interrupted as stop:
+            except Interrupted as interruption:
                 if not (connected or lost is None or LIGHTS.isdisjoint(lost.unsafe)):
                     raise lost from None  # nobody knows whether the light is off
-                if stop.signum != PAUSE_SIGNAL:
+                if interruption.signum != PAUSE_SIGNAL:
                     raise
                 self._pause()
             except (DeviceError, Slept) as error:
                 if connected and (loss := _loss(error)):
-                    lost, back_by_s = loss, self.stand.clock.now() + COMES_BACK_S
+                    lost, back_by_s = loss, self.bench.clock.now() + COMES_BACK_S
                     self._give_up_units(loss)
                 elif connected or lost is None:
                     raise
-                elif self.stand.clock.now() >= back_by_s:
+                elif self.bench.clock.now() >= back_by_s:
                     raise lost from error
 
     def _pause(self) -> None:
-        """Ctrl-Z: all is safe, so this process may stop; what was under way is done again."""
-        units = self.folder.close_open_attempts(self.stand.clock.wall, "abort", "paused by Ctrl-Z")
-        again = "".join(f"; the unit {unit} is done again" for unit in units)
-        self.observer.warn(f"paused, safe state reached{again} when it goes on (fg)")
+        """Stop at Ctrl-Z in the safe state; open units are repeated."""
+        units = self.folder.close_open_attempts(self.bench.clock.wall, "abort", "paused by Ctrl-Z")
+        repeated = "".join(f"; the unit {unit} is done again" for unit in units)
+        self.observer.warn(f"paused, safe state reached{repeated} when it goes on (fg)")
         stop_here()
 
     def _give_up_units(self, error: DeviceLostError) -> None:
-        """Close what was under way, so that it is done again; not for ever."""
-        units = self.folder.close_open_attempts(self.stand.clock.wall, "fail", str(error))
+        """Close the open units, so that they are repeated, up to `MOST_LOSSES` times."""
+        units = self.folder.close_open_attempts(self.bench.clock.wall, "fail", str(error))
         self.losses.update(units or ["between units"])
         if max(self.losses.values()) >= MOST_LOSSES:
             raise error
-        again = "".join(f"; the unit {unit} is done again" for unit in units)
+        repeated = "".join(f"; the unit {unit} is done again" for unit in units)
         self.observer.warn(
-            f"{error}; waiting up to {duration_text(COMES_BACK_S)} for all devices to answer{again}"
+            f"{error}; waiting up to {duration_text(COMES_BACK_S)} for all devices to "
+            f"answer{repeated}"
         )
 
 
 def _loss(error: DeviceError | Slept) -> DeviceLostError | None:
-    """What may come back, where that can be waited for: nobody asked to stop."""
-    if _met(error, Interrupted):
+    """Return the loss to wait for, None if there is none or a stop was requested."""
+    if _first_of_kind(error, Interrupted):
         return None
-    nap = _met(error, Slept)
-    said = nap and f"this PC slept for {duration_text(nap.slept_s)} (switch its energy saving off)"
+    sleep = _first_of_kind(error, Slept)
+    reason = (
+        sleep and f"this PC slept for {duration_text(sleep.slept_s)} (switch its energy saving off)"
+    )
     if isinstance(error, Slept):
-        return DeviceLostError(said)
+        return DeviceLostError(reason)
     if not isinstance(error, DeviceLostError):
         return None
-    if said:
-        error.args = (f"{said}; {error}",)
+    if reason:
+        error.args = (f"{reason}; {error}",)
     return error
 
 
-def _met(error: BaseException | None, kind: type[ErrorT]) -> ErrorT | None:
-    """`error`, or what was raised before it on the way to the safe state, if of that kind."""
+def _first_of_kind(error: BaseException | None, kind: type[ErrorT]) -> ErrorT | None:
+    """Return `error` or its first predecessor on the way to the safe state of that kind."""
     while error is not None and not isinstance(error, kind):
         error = error.__context__
     return error
 
 
 def _refuse_what_spoils(rig: Rig) -> None:
-    """Raise `ProtocolError` if a device is set so that its data could not be trusted."""
+    """Raise `ProtocolError` if a device's settings would invalidate the data."""
     spoilers = [
         f"{key}: {finding}"
         for key, device in rig.devices.items()
@@ -219,45 +226,45 @@ def _refuse_what_spoils(rig: Rig) -> None:
         raise ProtocolError("this would spoil the measurement: " + "; ".join(spoilers))
 
 
-def _arrange_again(left: Sequence[ActionRecord], rig: Rig, observer: RunObserver) -> None:
-    """What was put on the bench by hand before the run was interrupted lies there, or must again.
+def _arrange_again(manual_actions: Sequence[ActionRecord], rig: Rig, observer: RunObserver) -> None:
+    """Restore what was put on the bench by hand before the interruption.
 
-    Hands that are a device do it all once more; a person is told what was last.
+    A changer repeats all actions; otherwise the user is reminded of the last one.
     """
-    if left and CHANGER in rig:
-        for action in left:
+    if manual_actions and CHANGER in rig:
+        for action in manual_actions:
             rig[CHANGER].do(action.task)
-    elif left:
+    elif manual_actions:
         observer.warn(
-            f"the bench has to be as it was left; last done by hand: {left[-1].action} "
-            f"({left[-1].unit})"
+            f"the bench has to be as it was left; last done by hand: {manual_actions[-1].action} "
+            f"({manual_actions[-1].unit})"
         )
 
 
 def _report_exchanged_camera(
     folder: RunFolder, devices: dict[str, str], observer: RunObserver
 ) -> None:
-    """Dark frames of one camera are none for another."""
-    before: dict[str, Any] = {}
+    """Warn if a camera was exchanged: dark frames of one camera do not apply to another."""
+    previous: dict[str, Any] = {}
     for attempt in folder.read().completed().values():
-        before |= attempt.start.get("devices", {})
+        previous |= attempt.start.get("devices", {})
     for key, identity in devices.items():
-        if before.get(key, identity) != identity:
+        if previous.get(key, identity) != identity:
             observer.warn(
-                f"{key}: completed units of this run were made with {before[key]}, now it is "
+                f"{key}: completed units of this run were made with {previous[key]}, now it is "
                 f"{identity}; their frames do not belong together"
             )
 
 
 def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
-    """What is not as the journal says among the frames of a run that goes on, in lines."""
+    """Yield warnings about frames of a resumed run that disagree with the journal."""
     if unknown := folder.unknown_files():
         yield (
             f"{folder.path / 'frames'}: the journal does not tell of {_listed(unknown)}, which a "
             "crash or a failing disk left; they are kept, and nothing is made of them"
         )
     frames = [frame for attempt in record.completed().values() for frame in attempt.frames]
-    if damaged := [f"{frame.path.name} {said}" for frame in frames if (said := frame.damage())]:
+    if damaged := [f"{frame.path.name} {damage}" for frame in frames if (damage := frame.damage())]:
         yield (
             f"{folder.path / 'frames'}: {_listed(damaged)}; restore from a copy, or begin a new "
             "run: labrig process refuses them"
@@ -265,19 +272,19 @@ def _oddities(folder: RunFolder, record: RunRecord) -> Iterator[str]:
 
 
 def _listed(names: Sequence[str]) -> str:
-    more = len(names) - MOST_NAMED
-    return ", ".join(names[:MOST_NAMED]) + (f" and {more} more" if more > 0 else "")
+    n_more = len(names) - MOST_NAMED
+    return ", ".join(names[:MOST_NAMED]) + (f" and {n_more} more" if n_more > 0 else "")
 
 
-def _close(folder: RunFolder, stand: Bench, exit_status: str, reason: str) -> None:
+def _close(folder: RunFolder, bench: Bench, exit_status: str, reason: str) -> None:
     """Close the attempt; a full disk must not hide why the run ended."""
     try:
-        folder.close_open_attempts(stand.clock.wall, exit_status, reason)
+        folder.close_open_attempts(bench.clock.wall, exit_status, reason)
     except (DiskError, DataError):
         return
 
 
-def _kept(folder: RunFolder, units: Sequence[Unit]) -> str:
+def _kept_summary(folder: RunFolder, units: Sequence[Unit]) -> str:
     record = folder.read()
     if not record.attempts:
         return "nothing was recorded"

@@ -1,4 +1,4 @@
-"""Numbers in files and results: finite, and of a sign."""
+"""Annotated types of numbers in files and results: finite, positive, not negative."""
 
 from typing import Annotated
 

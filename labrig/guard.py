@@ -1,9 +1,9 @@
-"""The guard: a process of its own that switches the lights off when this one no longer can.
+"""The guard: a separate process that switches the lights off when this one no longer can.
 
-It is told once a second whether a light may be on. If this process ends without having said that
-all lights are off (kill -9, out of memory, a crash of a library), or says nothing for `HANGS_S`
+It receives once a second whether a light may be on. If this process ends without a report that all
+lights are off (kill -9, out of memory, a crash of a library), or reports nothing for `HANGS_S`
 (stopped by a signal, hung in a call), the guard opens the lights' ports by the same drivers and
-switches them off, after having killed a process that hangs. What runs in it is `guard_process`.
+switches them off, after having killed a process that hangs. Its code is in `guard_process`.
 """
 
 import json
@@ -20,23 +20,23 @@ from labrig.acquire import LIGHTS, RigFile
 from labrig.errors import DeviceError
 from labrig.quantity import duration_text
 
-#: What it is told: a light may be on, or all are off.
+#: Messages to the guard: a light may be on, or all are off.
 MAY_BE_ON, ALL_OFF = b"+", b"-"
-#: What it says when it is ready.
+#: Message of the guard when it is ready.
 READY = "ready"
 BEAT_S = 1.0
-#: Longer than any call that holds the interpreter.
+#: Silence after which labrig counts as hung, longer than any call that holds the interpreter.
 HANGS_S = 30
-#: For so long the guard tries to switch a light off: somebody may have to plug its board in again.
+#: Duration of the attempts to switch a light off: its board may have to be plugged in again.
 TRIES_FOR_S = 300.0
-#: Importing the drivers takes a second, on a PC that is busy with other things several.
+#: Importing the drivers takes a second, or several on a busy PC.
 STARTS_WITHIN_S = 60.0
 ENDS_WITHIN_S = 10.0
 
 
 @contextmanager
 def guarding(file: RigFile, source: str) -> Iterator["Guard | None"]:
-    """A guard for a rig's lights, which is started when it is to watch; None without lights."""
+    """Provide a guard for a rig's lights, not started yet; None without lights."""
     lights = {key: entry for key, entry in file.devices.items() if key in LIGHTS}
     if not lights:
         yield None
@@ -49,12 +49,12 @@ def guarding(file: RigFile, source: str) -> Iterator["Guard | None"]:
 
 
 class Guard:
-    """Starts the guard and tells it, from a thread of its own, that this process is well.
+    """Starts the guard's process and reports to it, from a thread, that this process is alive.
 
     Parameters
     ----------
     file
-        The lights alone.
+        Rig file with the lights alone.
     source
         Path of the rig file, for messages.
     """
@@ -79,7 +79,7 @@ class Guard:
         self._beating = threading.Thread(target=self._beat, daemon=True)
 
     def watch(self) -> None:
-        """From now on a light may be on.
+        """Start the guard if necessary, and report that a light may be on.
 
         Raises
         ------
@@ -91,12 +91,12 @@ class Guard:
             self._beating.start()
 
     def stand_down(self) -> None:
-        """All lights are off, read back."""
+        """Report that all lights are off, as read back."""
         if self._process is not None:
             self._tell(ALL_OFF)
 
     def close(self) -> None:
-        """Let it go if all lights are off; else it switches them off as soon as it can."""
+        """End the guard if all lights are off; otherwise leave it to switch them off."""
         self._closed.set()
         if self._beating.is_alive():
             self._beating.join()
@@ -119,7 +119,7 @@ class Guard:
             self._send()
 
     def _send(self) -> None:
-        """Say how things are, to another guard if somebody has killed this one."""
+        """Report the state, to a new guard if the old one was killed."""
         if self._process is not None and self._process.poll() is not None:
             self._pipe.close()
             self._process = None
@@ -136,12 +136,12 @@ class Guard:
 
 
 def _started(order: dict[str, Any]) -> "subprocess.Popen[bytes]":
-    """The guard's process, once it says that it is ready.
+    """Start the guard's process and return it once it is ready.
 
     Raises
     ------
     DeviceError
-        It does not, or cannot be started at all.
+        The process cannot be started, or does not get ready.
     """
     try:
         process = subprocess.Popen(
@@ -159,25 +159,25 @@ def _started(order: dict[str, Any]) -> "subprocess.Popen[bytes]":
         raise _cannot_start(str(error)) from None
     assert process.stdin is not None
     assert process.stdout is not None
-    said = "it ended at once"
-    with process.stdout, suppress(OSError), ThreadPoolExecutor(1) as beside:
+    answer = "it ended at once"
+    with process.stdout, suppress(OSError), ThreadPoolExecutor(1) as reader:
         process.stdin.write(json.dumps(order).encode() + b"\n")
-        line = beside.submit(process.stdout.readline)
+        line = reader.submit(process.stdout.readline)
         try:
-            said = line.result(STARTS_WITHIN_S).decode(errors="replace").strip()
+            answer = line.result(STARTS_WITHIN_S).decode(errors="replace").strip()
         except TooSlow:
             process.kill()  # which ends its line, too
-            said = f"no answer within {STARTS_WITHIN_S:g} s"
-    if said == READY:
+            answer = f"no answer within {STARTS_WITHIN_S:g} s"
+    if answer == READY:
         return process
     process.kill()
     process.wait()
     process.stdin.close()
-    raise _cannot_start(said)
+    raise _cannot_start(answer)
 
 
-def _cannot_start(why: str) -> DeviceError:
+def _cannot_start(reason: str) -> DeviceError:
     return DeviceError(
-        f"the guard, which switches the lights off if labrig dies, cannot start ({why}); without "
-        "it no light is lit"
+        f"the guard, which switches the lights off if labrig dies, cannot start ({reason}); "
+        "without it no light is lit"
     )

@@ -1,9 +1,9 @@
-"""What runs in the guard's process: waits until labrig dies or hangs, then switches the lights off.
+"""The guard's process, which switches the lights off when labrig dies or hangs.
 
     python -P -m labrig.guard_process
 
-reads from its standard input what it is to switch off, a line of JSON, then a byte a second: may a
-light be on? The end of its input is the end of labrig.
+It reads from its standard input a line of JSON with the lights to switch off, then a byte per
+second that says whether a light may be on. The end of its input is the end of labrig.
 """
 
 import json
@@ -24,13 +24,13 @@ from labrig.errors import LabrigError
 from labrig.guard import ALL_OFF, BEAT_S, HANGS_S, MAY_BE_ON, READY, TRIES_FOR_S
 from labrig.serial_ports import SerialPorts
 
-#: Between two tries. The first ones come quickly: the port of a process that was killed is free
-#: some milliseconds after its end.
+#: Pauses between two attempts. The first ones are short: the port of a killed process is free some
+#: milliseconds after its end.
 FIRST_PAUSE_S, LONGEST_PAUSE_S = 0.02, 2.0
 
 
 def main() -> None:
-    """Serve one labrig; ends when all lights are off."""
+    """Serve one labrig until all lights are off."""
     # What ends labrig is what the guard is there for.
     for signum in signal.valid_signals():
         with suppress(OSError, ValueError):  # SIGKILL and SIGSTOP
@@ -50,13 +50,13 @@ def main() -> None:
 
 
 def labrig_is_gone(source: BinaryIO, pid: int) -> bool:
-    """Wait until labrig has ended, or hangs and is ended; may a light be on?"""
-    heard: queue.Queue[bytes] = queue.Queue()
-    threading.Thread(target=_listen, args=(source, heard), daemon=True).start()
+    """Wait until labrig has ended or was killed as hung; return whether a light may be on."""
+    messages: queue.Queue[bytes] = queue.Queue()
+    threading.Thread(target=_listen, args=(source, messages), daemon=True).start()
     state, silent_s = ALL_OFF, 0.0
     while True:
         try:
-            said = heard.get(timeout=BEAT_S)
+            message = messages.get(timeout=BEAT_S)
         except queue.Empty:
             # Counted, not looked up on a clock: a PC that slept has not been silent.
             silent_s += BEAT_S
@@ -64,25 +64,25 @@ def labrig_is_gone(source: BinaryIO, pid: int) -> bool:
                 _kill(pid)
                 return True
             continue
-        if not said:
+        if not message:
             return state == MAY_BE_ON
-        state, silent_s = said, 0.0
+        state, silent_s = message, 0.0
 
 
 class Lights:
-    """The lights of a rig that another process runs, for when that has ended.
+    """Lights of a rig that another process runs, to be switched off after its end.
 
     Parameters
     ----------
     file
-        The lights alone.
+        Rig file with the lights alone.
     source
         Path of the rig file, for messages.
 
     Raises
     ------
     UsageError
-        A driver is not installed here.
+        A driver is not installed.
     """
 
     def __init__(self, file: RigFile, source: str) -> None:
@@ -92,13 +92,13 @@ class Lights:
         for key, entry in file.devices.items():
             plugins.load(plugins.DRIVERS, entry.driver, source)  # imported now, not in an emergency
             ports.look_up(entry.address)
-            alone = file.model_copy(update={"devices": {key: entry}})
-            self._benches.append(Bench(alone, source, self._clock, None, ports=ports))
+            single = file.model_copy(update={"devices": {key: entry}})
+            self._benches.append(Bench(single, source, self._clock, None, ports=ports))
 
     def switch_off(self) -> None:
-        """Switch all of them off, none waiting for another one, for up to `TRIES_FOR_S`."""
-        with ThreadPoolExecutor(len(self._benches)) as each:
-            list(each.map(self._switch_off, self._benches))
+        """Switch all lights off in parallel, trying for up to `TRIES_FOR_S`."""
+        with ThreadPoolExecutor(len(self._benches)) as pool:
+            list(pool.map(self._switch_off, self._benches))
 
     def _switch_off(self, bench: Bench) -> None:
         deadline_s, pause_s = self._clock.now() + TRIES_FOR_S, FIRST_PAUSE_S
@@ -112,14 +112,14 @@ class Lights:
                 pause_s = min(2 * pause_s, LONGEST_PAUSE_S)
 
 
-def _listen(source: BinaryIO, heard: "queue.Queue[bytes]") -> None:
-    while said := source.read(1):
-        heard.put(said)
-    heard.put(b"")
+def _listen(source: BinaryIO, messages: "queue.Queue[bytes]") -> None:
+    while message := source.read(1):
+        messages.put(message)
+    messages.put(b"")
 
 
 def _kill(pid: int) -> None:
-    """End labrig where it hangs: by SIGKILL, or what Windows has in its place."""
+    """Kill a hung labrig by SIGKILL or the equivalent on Windows."""
     if sys.platform == "win32" or os.getppid() == pid:  # else it has ended, and the number is free
         with suppress(OSError):
             os.kill(pid, getattr(signal, "SIGKILL", signal.SIGTERM))

@@ -1,26 +1,26 @@
-"""Files that somebody hands in, read with an error that says what is wrong with them."""
+"""Reading of input files, with messages that name the problem."""
 
 import errno
 from pathlib import Path
 
 from labrig.errors import DiskError, UsageError
 
-#: What no other name and no permission would mend.
+#: Errors of the disk, which no other name and no permission would resolve.
 DISK_ERRORS = {errno.EIO, errno.ENODEV, errno.ENXIO, errno.ESTALE, errno.ETIMEDOUT}
 
-#: A table of a year's measurements is smaller; `/dev/zero` is not.
+#: Limit that a table of a year's measurements does not reach, but `/dev/zero` does.
 MOST_TEXT_BYTES = 50_000_000
 
 
 def read_bytes(path: Path, most_bytes: int) -> bytes:
-    """What is in the file at `path`.
+    """Read the bytes of the file at `path`.
 
     Raises
     ------
     UsageError
-        There is none that may be read, or it has more than `most_bytes`.
+        There is no readable file, or it has more than `most_bytes`.
     DiskError
-        The disk does not give it back.
+        The disk cannot be read.
     """
     try:
         with path.open("rb") as file:
@@ -28,20 +28,20 @@ def read_bytes(path: Path, most_bytes: int) -> bytes:
     except FileNotFoundError:
         raise UsageError(f"{path}: no such file") from None
     except OSError as error:
-        kind = DiskError if error.errno in DISK_ERRORS else UsageError
-        raise kind(f"{path}: cannot be read ({error.strerror})") from None
+        error_class = DiskError if error.errno in DISK_ERRORS else UsageError
+        raise error_class(f"{path}: cannot be read ({error.strerror})") from None
     if len(content) > most_bytes:
         raise UsageError(f"{path}: expected a file of at most {most_bytes} bytes, got more")
     return content
 
 
 def read_text(path: Path, most_bytes: int = MOST_TEXT_BYTES) -> str:
-    """The text in the file at `path`, without a byte-order mark.
+    """Read the text in the file at `path`, without a byte-order mark.
 
     Raises
     ------
     UsageError, DiskError
-        As of `read_bytes`; or it is not text in UTF-8.
+        The file is refused by `read_bytes`, or it is not text in UTF-8.
     """
     try:
         return read_bytes(path, most_bytes).decode("utf-8-sig")

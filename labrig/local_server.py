@@ -1,12 +1,12 @@
-"""Pages served to this PC alone: `labrig rig view`, `labrig watch`.
+"""Web pages served to this PC only: `labrig rig view`, `labrig watch`.
 
-Bound to 127.0.0.1; other programs' pages are kept out by a secret in the path, by the Host header
-(a foreign name that resolves to 127.0.0.1 would otherwise do) and by asking for JSON, which a
-foreign page cannot send without being allowed to.
+The server is bound to 127.0.0.1; pages of other programs are rejected by a secret in the path, by
+the Host header (a foreign name that resolves to 127.0.0.1 would otherwise pass) and by requiring
+JSON, which a foreign page cannot send without permission.
 
-Written on `http.server`: a library would save some fifty lines of this, and bring a server that is
-for development only (Werkzeug, Bottle) or an event loop beside the threads that hold the camera and
-the run (Starlette). The checks would stay ours.
+It is based on `http.server`: a library would save some fifty lines, and bring a server for
+development only (Werkzeug, Bottle) or an event loop besides the threads that hold the camera and
+the run (Starlette). The checks would be needed all the same.
 """
 
 import json
@@ -24,7 +24,7 @@ from labrig.errors import DiskError, LabrigError, UsageError
 
 LOOPBACK = "127.0.0.1"
 MOST_BODY_BYTES = 64 * 1024
-#: Nothing from anywhere else, and not inside another page.
+#: No content from other origins, and no embedding in another page.
 CONTENT_POLICY = "default-src 'self'; img-src 'self' data:; frame-ancestors 'none'"
 KINDS = {
     ".html": "text/html; charset=utf-8",
@@ -34,14 +34,14 @@ KINDS = {
 
 
 class LocalServer(ThreadingHTTPServer):
-    """Answers browsers on this PC.
+    """HTTP server for browsers on this PC.
 
     Parameters
     ----------
     port
-        0 for any free one.
+        TCP port; 0 for any free one.
     conversation
-        Answers on one connection.
+        Class that handles the requests of one connection.
 
     Raises
     ------
@@ -65,12 +65,12 @@ class LocalServer(ThreadingHTTPServer):
 
     @property
     def url(self) -> str:
-        """Where the page is, the secret included."""
+        """URL of the page, with the secret."""
         return f"http://{LOOPBACK}:{self.server_port}/{self.token}/"
 
     @contextmanager
     def running(self) -> Iterator[None]:
-        """Answer in a thread of its own."""
+        """Serve in a thread."""
         thread = threading.Thread(target=self.serve_forever, args=(0.05,), daemon=True)
         thread.start()
         try:
@@ -82,21 +82,21 @@ class LocalServer(ThreadingHTTPServer):
 
 
 class LocalConversation(BaseHTTPRequestHandler):
-    """One connection of a browser."""
+    """Connection of a browser."""
 
     server: LocalServer
     protocol_version = "HTTP/1.1"
-    #: A connection on which nothing is asked for so long is given up.
+    #: Seconds without a request after which a connection is closed.
     timeout: ClassVar[int] = 60
-    #: Path → file beside the class's module.
+    #: Files beside the class's module by path.
     pages: ClassVar[Mapping[str, Path]] = {}
 
     def answer(self, path: str) -> None:
-        """Answer a GET of what is no page."""
+        """Answer a GET of a path that is no page."""
         self.refuse(HTTPStatus.NOT_FOUND, "no such thing here")
 
     def do_GET(self) -> None:
-        """A page, or whatever else there is to get."""
+        """Send a page, or the answer to another path."""
         path = self.path_behind_secret()
         if path is None:
             return
@@ -110,11 +110,11 @@ class LocalConversation(BaseHTTPRequestHandler):
             self.refuse(HTTPStatus.BAD_REQUEST, str(error))
 
     def accept(self, path: str, body: bytes) -> None:
-        """Do what a POST asks for."""
+        """Handle a POST."""
         self.refuse(HTTPStatus.NOT_FOUND, "there is nothing to write here")
 
     def do_POST(self) -> None:
-        """Whatever can be written."""
+        """Check a POST and handle it."""
         body = self.body()
         path = self.path_behind_secret()
         if path is None:
@@ -127,7 +127,7 @@ class LocalConversation(BaseHTTPRequestHandler):
             self.refuse(HTTPStatus.BAD_REQUEST, str(error))
 
     def path_behind_secret(self) -> str | None:
-        """Path behind the secret, or None after having refused."""
+        """Return the path behind the secret, or None after a refusal."""
         if self.headers.get("Host", "") not in self.server.names:
             self.refuse(HTTPStatus.FORBIDDEN, f"this page is called {LOOPBACK} only")
             return None
@@ -138,12 +138,12 @@ class LocalConversation(BaseHTTPRequestHandler):
         return path
 
     def query(self, key: str) -> str | None:
-        """Value of a key behind the question mark, the last one if it stands several times."""
+        """Return the value of a query key, the last one if it occurs several times."""
         values = parse_qs(urlsplit(self.path).query).get(key)
         return values[-1] if values else None
 
     def body(self) -> bytes:
-        """What was sent along, read even if it is refused: the connection goes on."""
+        """Read the request's body, also of a refused request, to keep the connection usable."""
         length = self.headers.get("Content-Length", "")
         if not length.isdecimal() or int(length) > MOST_BODY_BYTES:
             self.close_connection = True
@@ -151,12 +151,12 @@ class LocalConversation(BaseHTTPRequestHandler):
         return self.rfile.read(int(length))
 
     def json_object(self, body: bytes) -> dict[str, Any]:
-        """The JSON object in `body`.
+        """Return the JSON object in `body`.
 
         Raises
         ------
         UsageError
-            It is none, or not sent as one.
+            The body is no JSON object, or not declared as JSON.
         """
         kind = self.headers.get("Content-Type", "").partition(";")[0].strip().lower()
         if kind != "application/json":
@@ -170,11 +170,11 @@ class LocalConversation(BaseHTTPRequestHandler):
         return content
 
     def refuse(self, status: HTTPStatus, text: str) -> None:
-        """Say in a line why not."""
+        """Send an error in one line."""
         self.send_json(status, {"error": " ".join(text.split())})
 
     def send_json(self, status: HTTPStatus, content: Mapping[str, Any]) -> None:
-        """Send `content`."""
+        """Send `content` as JSON."""
         self.send(status, "application/json", json.dumps(content).encode())
 
     def send(
@@ -184,7 +184,7 @@ class LocalConversation(BaseHTTPRequestHandler):
         data: bytes,
         more: Mapping[str, str] | None = None,
     ) -> None:
-        """Send `data` of that kind, with further headers."""
+        """Send `data` of a content type, with further headers."""
         self.send_response(status)
         for name, value in (
             ("Content-Type", kind),
@@ -200,11 +200,11 @@ class LocalConversation(BaseHTTPRequestHandler):
         self.wfile.write(data)
 
     def handle(self) -> None:
-        """As inherited; a browser that goes away in the middle is no fault."""
+        """Handle requests; a browser that disconnects is no error."""
         try:
             super().handle()
         except ConnectionError:
             self.close_connection = True
 
     def log_message(self, format: str, *args: Any) -> None:
-        """Nothing: the address, which has the secret in it, is not written anywhere."""
+        """Suppress logging: the address contains the secret."""

@@ -1,8 +1,8 @@
 """Linear least squares with coefficients ≥ 0.
 
 SciPy's `nnls` is fast, but aborts the process on an empty matrix and may stop short of the minimum
-(scipy issues 24861 and 25389), which a measurement cannot afford: its answer is taken only if it
-meets the conditions of Kuhn and Tucker, else the minimum is found here.
+(scipy issues 24861 and 25389), which a measurement cannot afford: its solution is used only if it
+satisfies the Kuhn–Tucker conditions, else the minimum is found here.
 
 References
 ----------
@@ -22,13 +22,14 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
     Parameters
     ----------
     design
-        (m, n) A; any shape, rank and scale of columns.
+        Matrix A of any rank and scale of columns, shape (m, n).
     target
-        (m,) b.
+        Right-hand side b, shape (m,).
 
     Returns
     -------
-    (n,) x, exactly 0 where the bound holds it.
+    ndarray
+        Minimum x, exactly 0 where the bound is active, shape (n,).
     """
     norms = np.sqrt(np.einsum("ij,ij->j", design, design))
     lengths = np.where(norms > 0, norms, 1.0)
@@ -36,27 +37,29 @@ def nonnegative_least_squares(design: FloatArray, target: FloatArray) -> FloatAr
     # Dot products of m terms carry this much rounding.
     rounding = max(len(target), 1) * float(np.finfo(np.float64).eps)
     least_gain = 10 * rounding * float(np.linalg.norm(target))
-    solution = _quickly(columns, target, least_gain)
+    solution = _by_scipy(columns, target, least_gain)
     if solution is None:
         solution = _by_active_sets(columns, target, least_gain)
     return solution / lengths
 
 
-def _quickly(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray | None:
-    """What SciPy finds, if it is the minimum."""
+def _by_scipy(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray | None:
+    """Return SciPy's solution if it is the minimum, else None."""
     if not columns.size:
         return None
     try:
-        found: FloatArray = nnls(columns, target)[0]
+        solution: FloatArray = nnls(columns, target)[0]
     except RuntimeError:  # too many steps
         return None
-    gain = columns.T @ (target - columns @ found)
-    is_minimum = gain.max() <= least_gain and np.abs(gain[found > 0]).max(initial=0) <= least_gain
-    return found if is_minimum else None
+    gain = columns.T @ (target - columns @ solution)
+    is_minimum = (
+        gain.max() <= least_gain and np.abs(gain[solution > 0]).max(initial=0) <= least_gain
+    )
+    return solution if is_minimum else None
 
 
 def _by_active_sets(columns: FloatArray, target: FloatArray, least_gain: float) -> FloatArray:
-    """Lawson and Hanson's algorithm for columns of length 1 (or 0), each set solved by itself."""
+    """Run Lawson and Hanson's algorithm for columns of length 1 (or 0), each set solved anew."""
     n = columns.shape[1]
     solution, used = np.zeros(n), np.zeros(n, dtype=np.bool_)
     empty = np.asarray(~columns.any(axis=0), dtype=np.bool_)

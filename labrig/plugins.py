@@ -1,8 +1,8 @@
-"""Drivers, protocols and what is made of their runs, by name: the shipped and those of packages.
+"""Registry of drivers, protocols, analyses, results and reports by name, shipped or from packages.
 
 A package adds its own by entry points: a driver in `labrig.drivers`; a protocol in
 `labrig.protocols`, and under the same name its analysis in `labrig.analyses`, the type of its
-result in `labrig.results` and, unless plain tables will do, its part of a report in
+result in `labrig.results` and, unless plain tables suffice, its part of a report in
 `labrig.reports`; a kind of calibration, which a protocol measures, in `labrig.calibrations`.
 """
 
@@ -30,31 +30,33 @@ _KINDS = {
 
 
 def names(group: str) -> list[str]:
-    """Names that can be used, sorted."""
+    """Return the registered names of a group, sorted."""
     return sorted(_registered(group))
 
 
 def load(group: str, name: str, source: str) -> Any:
-    """The class or function registered as `name`; `source` says in messages who asked for it.
+    """Load the class or function registered as `name`; `source` names the requester in messages.
 
     Raises
     ------
     UsageError
-        There is none, or it cannot be imported.
+        There is none of that name, or it cannot be imported.
     """
-    found = _registered(group)
+    registered = _registered(group)
     kind = _KINDS[group]
-    if name not in found:
-        raise UsageError(f"{source}: unknown {kind} '{name}'; {did_you_mean(name, list(found))}")
+    if name not in registered:
+        raise UsageError(
+            f"{source}: unknown {kind} '{name}'; {did_you_mean(name, list(registered))}"
+        )
     try:
-        return found[name].load()
+        return registered[name].load()
     except (ImportError, AttributeError) as error:
         raise UsageError(
-            f"{source}: the {kind} '{name}' ({found[name].value}) cannot be imported ({error})"
+            f"{source}: the {kind} '{name}' ({registered[name].value}) cannot be imported ({error})"
         ) from None
 
 
 @cache
 def _registered(group: str) -> dict[str, EntryPoint]:
-    """Reading them takes milliseconds, and what is installed does not change while labrig runs."""
+    """Return the entry points of a group; reading takes milliseconds, so the result is cached."""
     return {entry.name: entry for entry in entry_points(group=group)}

@@ -1,7 +1,7 @@
-"""Quantities as people write them: `90 min`, `320 ms`, `1/60 s`, `0.7 %`, `25 MB`.
+"""Quantities with units in files: `90 min`, `320 ms`, `1/60 s`, `0.7 %`, `25 MB`.
 
 Each annotated type below turns such a text into a plain float in the named unit, so that inside
-labrig a name such as `exposure_s` says everything.
+labrig a name such as `exposure_s` carries the unit.
 """
 
 import math
@@ -29,12 +29,12 @@ _PATTERN = re.compile(
 
 
 def parse(text: str, units: dict[str, float]) -> float:
-    """Value of `text` in the base unit of `units`.
+    """Return the value of `text` in the base unit of `units`.
 
     Raises
     ------
     ValueError
-        Not a number with one of the units, negative, or not finite.
+        The text is not a number with one of the units, or it is negative or not finite.
     """
     match = _PATTERN.fullmatch(text)
     if match is None or match["unit"] not in units:
@@ -51,13 +51,13 @@ def parse(text: str, units: dict[str, float]) -> float:
 
 
 def duration_text(seconds: float) -> str:
-    """`seconds` as a person says it: `1 h 30 min`, `5 s`, `1/60 s`, `320 ms`."""
+    """Format a duration, such as `1 h 30 min`, `5 s`, `320 ms`."""
     if seconds >= 3600:
         minutes = round(seconds / 60)
         return f"{minutes // 60} h" + (f" {minutes % 60} min" if minutes % 60 else "")
     if seconds >= 60:
-        whole = round(seconds)
-        return f"{whole // 60} min" + (f" {whole % 60} s" if whole % 60 else "")
+        total_s = round(seconds)
+        return f"{total_s // 60} min" + (f" {total_s % 60} s" if total_s % 60 else "")
     if seconds >= 1:
         return f"{seconds:.4g} s"
     return f"{seconds * 1e3:.4g} ms"
@@ -75,16 +75,17 @@ def _validator(units: dict[str, float], bare: bool) -> BeforeValidator:
     return BeforeValidator(validate)
 
 
-def _written(unit: str) -> PlainSerializer:
+def _serializer(unit: str) -> PlainSerializer:
     return PlainSerializer(lambda value: f"{value!r} {unit}", return_type=str)
 
 
 def _schema(units: dict[str, float], bare: bool) -> WithJsonSchema:
-    """For editors: what may be written, as a JSON Schema."""
-    known = "|".join(sorted(units, key=len, reverse=True))
+    """Return the JSON Schema of the accepted texts, for editors."""
+    unit_pattern = "|".join(sorted(units, key=len, reverse=True))
+    number_pattern = r"(\d+(\.\d*)?([eE][-+]?\d+)?|\.\d+)(\s*/\s*\d+(\.\d+)?)?"
     text = {
         "type": "string",
-        "pattern": rf"^\s*(\d+(\.\d*)?([eE][-+]?\d+)?|\.\d+)(\s*/\s*\d+(\.\d+)?)?\s*({known})\s*$",
+        "pattern": rf"^\s*{number_pattern}\s*({unit_pattern})\s*$",
         "description": f"a number with its unit: {', '.join(units)}",
     }
     return WithJsonSchema({"anyOf": [text, {"type": "number"}]} if bare else text, "validation")
@@ -127,16 +128,16 @@ class WordOrDuration:
             raise ValueError(f"expected {expected}, or a duration; {error}") from None
 
 
-#: How often something is done; nobody waits for more.
+#: Largest number of repetitions in a protocol.
 MOST_COUNT = 1000
 Count = Annotated[int, Field(le=MOST_COUNT)]
 #: Seconds, written with a unit of time.
 DurationS = Annotated[
-    float, _validator(TIME_S, bare=False), _written("s"), _schema(TIME_S, bare=False)
+    float, _validator(TIME_S, bare=False), _serializer("s"), _schema(TIME_S, bare=False)
 ]
 #: A fraction, written as `0.7 %` or as a bare 0.007.
 Fraction = Annotated[float, _validator(FRACTION, bare=True), _schema(FRACTION, bare=True)]
-#: Bytes.
+#: Bytes, written with a unit such as `MB`.
 SizeBytes = Annotated[
-    float, _validator(SIZE_BYTES, bare=False), _written("B"), _schema(SIZE_BYTES, bare=False)
+    float, _validator(SIZE_BYTES, bare=False), _serializer("B"), _schema(SIZE_BYTES, bare=False)
 ]

@@ -6,7 +6,7 @@ from pydantic import AfterValidator, Field, TypeAdapter
 
 from labrig.errors import UsageError
 
-#: No sensor is as wide; infinity is wider.
+#: Limit above the width of any sensor, which excludes infinity.
 MOST_PIXELS = 1_000_000
 Corner = Annotated[float, Field(ge=0, le=MOST_PIXELS)]
 Extent = Annotated[float, Field(gt=0, le=MOST_PIXELS)]
@@ -24,17 +24,17 @@ def _whole_or_fractions(region: tuple[float, float, float, float]) -> tuple[floa
 #: `[x, y, width, height]`: whole pixels, or fractions of the frame when all four are ≤ 1.
 Region = Annotated[tuple[Corner, Corner, Extent, Extent], AfterValidator(_whole_or_fractions)]
 
-#: Where the sample is when nobody says: the middle quarter of the frame.
+#: Default position of the sample: the middle quarter of the frame.
 CENTRE: Region = (0.25, 0.25, 0.5, 0.5)
 
 
 def parse_region(text: str) -> Region:
-    """The region in `x,y,width,height`, as given on a command line.
+    """Parse a region `x,y,width,height` from the command line.
 
     Raises
     ------
     UsageError
-        Not four numbers that can be a region.
+        The text is not four numbers of a valid region.
     """
     try:
         return TypeAdapter(Region).validate_python([float(part) for part in text.split(",")])
@@ -46,12 +46,12 @@ def parse_region(text: str) -> Region:
 
 
 def region_pixels(region: Region, width: int, height: int) -> tuple[int, int, int, int]:
-    """`(x, y, width, height)` in pixels of a `width` × `height` frame.
+    """Return `(x, y, width, height)` in pixels of a `width` × `height` frame.
 
     Raises
     ------
     UsageError
-        The region leaves the frame.
+        The region extends beyond the frame.
     """
     x, y, w, h = region
     if max(region) <= 1:

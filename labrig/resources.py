@@ -1,4 +1,4 @@
-"""The files that are shipped with labrig: protocols, rigs, materials, optical data."""
+"""Files shipped with labrig: protocols, rigs, materials, optical data."""
 
 import os
 from pathlib import Path
@@ -7,49 +7,51 @@ from labrig.errors import UsageError
 from labrig.yaml_file import did_you_mean
 
 _PACKAGE = Path(__file__).parent
-#: What names stand for: a YAML file, or measured curves in JSON.
+#: Suffixes of shipped files: YAML, or measured curves in JSON.
 SUFFIXES = (".yaml", ".yml", ".json")
 
 
 def folder(name: str) -> Path:
-    """Path of a shipped folder: `config`, `protocols`, …"""
+    """Return the path of a shipped folder such as `config` or `protocols`."""
     return (_PACKAGE / name).resolve()
 
 
 def find(place: str, kind: str, name_or_path: str | os.PathLike[str]) -> Path:
-    """File of a shipped name (`decay`, `sim`, `blue-paint`), or the path as given.
+    """Return the file of a shipped name (`decay`, `sim`, `blue-paint`), or the path as given.
 
-    A bare word is always a shipped name, whatever lies in the current folder; a file of one's own
-    has its suffix or a folder before it.
+    A bare word is always a shipped name, whatever lies in the current folder; a user's file is
+    given with its suffix or a folder before it.
 
     Parameters
     ----------
     place
-        Shipped folder where such names live, such as `config/materials`.
+        Shipped folder of such names, such as `config/materials`.
     kind
-        What to call it in messages: `material`.
+        Description in messages, such as `material`.
+    name_or_path
+        Name of a shipped file, or path of a file.
 
     Raises
     ------
     UsageError
-        Neither a shipped name nor a file.
+        There is neither a shipped file of that name nor a file at that path.
     """
-    given = Path(name_or_path)
-    if given.suffix in SUFFIXES or len(given.parts) > 1:
-        if not given.is_file():
-            raise UsageError(f"{given}: no such {kind} file")
-        return given
-    known = names(place)
-    if str(given) not in known:
-        suffix = next(iter(known.values())).suffix
+    path = Path(name_or_path)
+    if path.suffix in SUFFIXES or len(path.parts) > 1:
+        if not path.is_file():
+            raise UsageError(f"{path}: no such {kind} file")
+        return path
+    shipped = names(place)
+    if str(path) not in shipped:
+        suffix = next(iter(shipped.values())).suffix
         raise UsageError(
-            f"no shipped {kind} is called '{given}' (a file of your own is given with its suffix, "
-            f"such as {given}{suffix}); {did_you_mean(str(given), list(known))}"
+            f"no shipped {kind} is called '{path}' (a file of your own is given with its suffix, "
+            f"such as {path}{suffix}); {did_you_mean(str(path), list(shipped))}"
         )
-    return known[str(given)]
+    return shipped[str(path)]
 
 
 def names(place: str) -> dict[str, Path]:
-    """Name → file of all that is shipped in a folder, sorted."""
+    """Return the files that are shipped in a folder by name, sorted."""
     files = (path for path in folder(place).iterdir() if path.suffix in SUFFIXES)
     return {path.stem: path for path in sorted(files)}

@@ -1,4 +1,4 @@
-"""JSON Schemas of the files that people write, so that an editor completes and checks them."""
+"""JSON Schemas of the files that users write, with which an editor completes and checks them."""
 
 import inspect
 import operator
@@ -21,7 +21,7 @@ KINDS = ("protocol", "rig", "material")
 
 
 def schema(kind: str) -> dict[str, Any]:
-    """The JSON Schema of a `protocol`, a `rig` or a `material` file, as YAML loads it.
+    """Return the JSON Schema of a `protocol`, a `rig` or a `material` file, as YAML loads it.
 
     Raises
     ------
@@ -31,19 +31,19 @@ def schema(kind: str) -> dict[str, Any]:
     if kind not in KINDS:
         raise UsageError(f"there is no schema of '{kind}'; {did_you_mean(kind, KINDS)}")
     makers: dict[str, Callable[[], Any]] = {"protocol": _protocol, "rig": _rig}
-    written = makers[kind]() if kind in makers else Material
-    made = TypeAdapter(written).json_schema(by_alias=True, schema_generator=_Described)
-    return {"$schema": _Described.schema_dialect, **made, "title": f"labrig {kind}"}
+    model = makers[kind]() if kind in makers else Material
+    json_schema = TypeAdapter(model).json_schema(by_alias=True, schema_generator=_Described)
+    return {"$schema": _Described.schema_dialect, **json_schema, "title": f"labrig {kind}"}
 
 
 def _protocol() -> Any:
-    """One of the registered protocols; its key `protocol` says which."""
+    """Return the union of the registered protocols, discriminated by the key `protocol`."""
     names = plugins.names(plugins.PROTOCOLS)
     return _one_of("protocol", [plugins.load(plugins.PROTOCOLS, name, "schema") for name in names])
 
 
 def _rig() -> Any:
-    """A rig file whose devices have the keys of the driver that each names."""
+    """Return the model of a rig file whose devices have the keys of their drivers."""
     names = plugins.names(plugins.DRIVERS)
     drivers = {name: plugins.load(plugins.DRIVERS, name, "schema") for name in names}
     entries = {name: _entry(name, driver.Settings) for name, driver in drivers.items()}
@@ -68,12 +68,12 @@ def _rig() -> Any:
 
 
 def _entry(driver: str, settings: type[BaseModel]) -> type[BaseModel]:
-    """A device entry of one driver."""
-    shared: dict[str, Any] = {
+    """Return the model of a device entry of one driver."""
+    shared_fields: dict[str, Any] = {
         name: (field.annotation, field) for name, field in DeviceEntry.model_fields.items()
     }
-    own: dict[str, Any] = shared | {"driver": (Literal[driver], ...)}
-    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **own)
+    fields: dict[str, Any] = shared_fields | {"driver": (Literal[driver], ...)}
+    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **fields)
 
 
 def _one_of(key: str, models: list[type[BaseModel]]) -> Any:
@@ -83,30 +83,30 @@ def _one_of(key: str, models: list[type[BaseModel]]) -> Any:
 
 
 class _Described(GenerateJsonSchema):
-    """Keys are described as the models' docstrings do; a default has the written form or none."""
+    """Schema generator with the models' docstrings as descriptions and defaults as written."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
-        made = super().model_schema(schema)
-        documented = inspect.cleandoc(schema["cls"].__doc__ or "")
-        made["description"] = documented.partition("\n\n")[0]
-        texts = dict(_attributes(documented))
+        json_schema = super().model_schema(schema)
+        docstring = inspect.cleandoc(schema["cls"].__doc__ or "")
+        json_schema["description"] = docstring.partition("\n\n")[0]
+        texts = dict(_attributes(docstring))
         for name, field in schema["cls"].model_fields.items():
-            place: dict[str, Any] = made.get("properties", {}).get(field.alias or name, {})
+            entry: dict[str, Any] = json_schema.get("properties", {}).get(field.alias or name, {})
             if name in texts:
-                place["description"] = texts[name]
-        return made
+                entry["description"] = texts[name]
+        return json_schema
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
-        made = super().default_schema(schema)
-        default = made.get("default")
-        if default is None or (made.get("type") == "string") != isinstance(default, str):
-            made.pop("default", None)
-        return made
+        json_schema = super().default_schema(schema)
+        default = json_schema.get("default")
+        if default is None or (json_schema.get("type") == "string") != isinstance(default, str):
+            json_schema.pop("default", None)
+        return json_schema
 
 
-def _attributes(documented: str) -> Iterator[tuple[str, str]]:
-    """Name and text of each entry in a numpy docstring's section of attributes."""
-    _, _, section = documented.partition("Attributes\n----------\n")
+def _attributes(docstring: str) -> Iterator[tuple[str, str]]:
+    """Yield name and text of each entry in the Attributes section of a numpy docstring."""
+    _, _, section = docstring.partition("Attributes\n----------\n")
     for names, text in re.findall(r"^(\w[\w, ]*)\n((?:    .*\n?|\n(?=    ))+)", section, re.M):
         for name in names.split(","):
             yield name.strip(), " ".join(text.split())

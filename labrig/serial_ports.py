@@ -1,8 +1,8 @@
-"""Finds a serial board again that comes back under another name.
+"""Recognition of a serial board that comes back under another name.
 
 A USB board that loses its power for a moment, or resets itself when its own relay disturbs it,
-comes back as `/dev/ttyACM1` or COM4 while the rig file says `/dev/ttyACM0` or COM3. What it is on
-the USB stays the same.
+comes back as `/dev/ttyACM1` or COM4 while the rig file names `/dev/ttyACM0` or COM3. Its identity
+on the USB stays the same.
 """
 
 import os
@@ -18,14 +18,18 @@ from labrig.errors import DeviceError
 
 @dataclass(frozen=True)
 class UsbIdentity:
-    """What a serial board is on the USB.
+    """Identity of a serial board on the USB.
 
     Attributes
     ----------
+    vendor, product
+        Vendor and product number.
+    serial_number
+        Serial number; empty if the board reports none.
     interface
-        Which of the board's ports, where it has several.
+        Interface of the board, where it has several ports.
     place
-        The plug on this PC; all that tells apart boards of one kind without serial numbers.
+        Plug on this PC, the only distinction of boards of one kind without serial numbers.
     """
 
     vendor: int
@@ -36,14 +40,14 @@ class UsbIdentity:
 
     @classmethod
     def of(cls, port: ListPortInfo) -> Self | None:
-        """None for a port that is not on the USB."""
+        """Return the identity of a port, None if it is not on the USB."""
         if port.vid is None or port.pid is None:
             return None
         place, _, interface = (port.location or "").partition(":")
         return cls(port.vid, port.pid, port.serial_number or "", interface, place)
 
     def is_like(self, other: "UsbIdentity") -> bool:
-        """Whether both may be the same board, in another place or not."""
+        """Return whether both may be the same board, possibly at another plug."""
         return (self.vendor, self.product, self.serial_number, self.interface) == (
             other.vendor, other.product, other.serial_number, other.interface
         )  # fmt: skip
@@ -51,35 +55,35 @@ class UsbIdentity:
 
 @dataclass
 class SerialPorts:
-    """The serial boards of a rig, recognised from when each was looked up first."""
+    """Serial boards of a rig, recognised by their identity at the first look-up."""
 
-    _known: dict[str, UsbIdentity] = field(default_factory=dict)
+    _identities: dict[str, UsbIdentity] = field(default_factory=dict)
 
     def look_up(self, address: str) -> str:
-        """Where the board is now that was at `address` when that was looked up first.
+        """Return the current port of the board that was at `address` at the first look-up.
 
         Raises
         ------
         DeviceError
-            It is nowhere, and another board is at `address`.
+            The board is missing, and another one is at `address`.
         """
         if "://" in address:
             return address
         present = dict(_usb_ports())
-        here = _same_port(address, present)
-        if address not in self._known:
-            if here is not None:
-                self._known[address] = present[here]
+        current = _same_port(address, present)
+        if address not in self._identities:
+            if current is not None:
+                self._identities[address] = present[current]
             return address
-        wanted = self._known[address]
-        alike = [port for port, identity in present.items() if identity.is_like(wanted)]
-        in_place = [port for port in alike if present[port].place == wanted.place]
-        if here in (in_place or alike):
+        expected = self._identities[address]
+        matching = [port for port, identity in present.items() if identity.is_like(expected)]
+        at_same_plug = [port for port in matching if present[port].place == expected.place]
+        if current in (at_same_plug or matching):
             return address
         # Several of a kind, none where the board was: nobody can tell which of them it is.
-        if len(found := in_place or alike) == 1:
-            return found[0]
-        if here is not None:
+        if len(candidates := at_same_plug or matching) == 1:
+            return candidates[0]
+        if current is not None:
             raise DeviceError(
                 f"another board is at {address} now, and the one that was there before is gone; "
                 "plug that in again"
@@ -94,6 +98,6 @@ def _usb_ports() -> Iterable[tuple[str, UsbIdentity]]:
 
 
 def _same_port(address: str, ports: Iterable[str]) -> str | None:
-    """The port that `address` names, perhaps through a link or in small letters."""
+    """Return the port that `address` names, possibly through a link or in lower case."""
     named = os.path.normcase(os.path.realpath(address))
     return next((p for p in ports if os.path.normcase(os.path.realpath(p)) == named), None)

@@ -1,4 +1,4 @@
-"""Signals that would end or stop labrig, made to wait for a moment when that is safe."""
+"""Signals that would end or stop labrig, deferred until that is safe."""
 
 import os
 import signal
@@ -11,32 +11,32 @@ from typing import NoReturn
 
 from labrig.clock import Clock, Interrupted
 
-#: Signals that end nothing, and faults in the program's own machine code, in which nothing that is
-#: written in Python is called any more (the lights are the guard's then). All others end a process.
+#: Signals that end no process, and faults of machine code, after which no Python code runs (the
+#: guard switches the lights off). All others end a process.
 _OTHERS = {
     *("SIGKILL", "SIGSTOP", "SIGTSTP", "SIGTTIN", "SIGTTOU", "SIGCONT"),
     *("SIGCHLD", "SIGURG", "SIGWINCH", "SIGINFO", "SIGPIPE", "SIGXFSZ"),
     *("SIGSEGV", "SIGBUS", "SIGFPE", "SIGILL"),
 }
-#: What ends labrig, with the exit code 128 + number: Ctrl-C, SIGTERM, a terminal that is closed, a
-#: limit of the system. What was ignored when labrig began (`nohup`) stays so.
+#: Signals that end labrig, with the exit code 128 + number: Ctrl-C, SIGTERM, a closed terminal, a
+#: limit of the system. Signals that were ignored at the start (`nohup`) stay ignored.
 STOP_SIGNALS = [
     signum
     for signum in sorted(signal.valid_signals() - {getattr(signal, n, 0) for n in _OTHERS})
     if signal.getsignal(signum) != signal.SIG_IGN
 ]
-#: Ctrl-Z.
+#: Signal of Ctrl-Z, None on Windows.
 PAUSE_SIGNAL = getattr(signal, "SIGTSTP", None)
 
 
 @contextmanager
 def interrupting(clock: Clock) -> Iterator[None]:
-    """Stop signals are answered at the clock's next wait, never inside a device transaction.
+    """Defer stop signals to the clock's next wait, never inside a device transaction.
 
     Raises
     ------
     Interrupted
-        At a wait, or at the end if a signal came too late for one.
+        A signal arrived; it is raised at a wait, or at the end if there was none left.
     """
     if threading.current_thread() is not threading.main_thread():
         yield  # only the main thread gets signals
@@ -45,27 +45,27 @@ def interrupting(clock: Clock) -> Iterator[None]:
     def ask(signum: int, frame: FrameType | None) -> None:
         clock.interrupt(signum)
 
-    before = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
-    stopped = False
+    old_handlers = {signum: signal.signal(signum, ask) for signum in STOP_SIGNALS}
+    is_interrupted = False
     try:
         with _closing_console(clock):
             yield
     except Interrupted:
-        stopped = True
+        is_interrupted = True
         raise
     finally:
-        for signum, handler in before.items():
-            ending = stopped and handler is raise_interrupted
-            signal.signal(signum, signal.SIG_IGN if ending else handler)
+        for signum, handler in old_handlers.items():
+            is_ending = is_interrupted and handler is raise_interrupted
+            signal.signal(signum, signal.SIG_IGN if is_ending else handler)
     clock.sleep(0.0)
 
 
 @contextmanager
 def pausing(clock: Clock) -> Iterator[None]:
-    """With devices open, nothing stops this process where it stands.
+    """Keep this process from being stopped while devices are open.
 
-    Ctrl-Z is answered at the clock's next wait, as an interruption. In the background, reading
-    from the terminal fails and writing to it is done, where either would stop the process.
+    Ctrl-Z takes effect at the clock's next wait, as an interruption. In the background, reading
+    from the terminal fails and writing to it succeeds, where either would stop the process.
     """
     if threading.current_thread() is not threading.main_thread():
         yield
@@ -74,26 +74,28 @@ def pausing(clock: Clock) -> Iterator[None]:
     def ask(signum: int, frame: FrameType | None) -> None:
         clock.interrupt(signum)
 
-    before = {}
+    old_handlers = {}
     for name in ("SIGTSTP", "SIGTTIN", "SIGTTOU"):
         signum = getattr(signal, name, None)  # Windows has none of them
         if signum is not None and signal.getsignal(signum) != signal.SIG_IGN:
-            before[signum] = signal.signal(signum, ask if name == "SIGTSTP" else signal.SIG_IGN)
+            old_handlers[signum] = signal.signal(
+                signum, ask if name == "SIGTSTP" else signal.SIG_IGN
+            )
     try:
         yield
     finally:
-        for signum, handler in before.items():
+        for signum, handler in old_handlers.items():
             signal.signal(signum, handler)
 
 
 def stop_here() -> None:
-    """Stop as Ctrl-Z asks for; returns when somebody has this process go on."""
+    """Stop the process as Ctrl-Z does; return when it is continued."""
     if sys.platform != "win32":
         os.kill(os.getpid(), signal.SIGSTOP)
 
 
 def name_of(signum: int) -> str:
-    """Its name, of most of them."""
+    """Return the name of a signal, or its number where it has none."""
     try:
         return signal.Signals(signum).name
     except ValueError:  # most real-time signals have none
@@ -101,23 +103,24 @@ def name_of(signum: int) -> str:
 
 
 def raise_interrupted(signum: int, frame: FrameType | None) -> None:
-    """Handler for when nothing is connected: stop at once. One stop is enough for a command."""
+    """Handle a signal while nothing is connected by raising `Interrupted`; ignore further ones."""
     for ignored in STOP_SIGNALS:
         signal.signal(ignored, signal.SIG_IGN)
     raise Interrupted(signum)
 
 
 def end_at_once(signum: int, frame: FrameType | None) -> NoReturn:
-    """Handler for when nothing is open yet, and libraries that are being imported would stumble."""
+    """Handle a signal during imports, before anything is open, by ending the process."""
     os.write(2, b"labrig: interrupted\n")
     os._exit(128 + signum)
 
 
 @contextmanager
 def _closing_console(clock: Clock) -> Iterator[None]:
-    """Windows ends a process whose console is closed, or whose user logs off; not tried yet.
+    """Handle the closing of the console or a log-off on Windows; not tested yet.
 
-    It does so when the handler returns, and after 5 s in any case: time for the safe state.
+    Windows ends the process when the handler returns, and after 5 s in any case: time for the safe
+    state.
     """
     if sys.platform == "win32":
         import ctypes

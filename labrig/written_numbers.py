@@ -1,21 +1,21 @@
-"""Numbers as a laboratory notebook has them: rounded by their uncertainty."""
+"""Formatting of numbers in reports, rounded according to their uncertainty."""
 
 import math
 
 _SUPERSCRIPT = str.maketrans("-0123456789", "⁻⁰¹²³⁴⁵⁶⁷⁸⁹")
-#: Without a power of ten are written values from here …
+#: Smallest value written without a power of ten.
 SMALLEST_PLAIN = 1e-3
-#: … to here.
+#: Values from here on are written with a power of ten.
 LARGEST_PLAIN = 1e6
 
-#: Exposures up to here are said as fractions.
+#: Exposure times below this are written as fractions.
 LONGEST_FRACTION_S = 0.3
 
 
 def plus_minus(value: float, sigma: float) -> str:
-    """`0.03208 ± 0.00027`: σ to two digits, the value to the same place.
+    """Format value and σ as `0.03208 ± 0.00027`: σ to two digits, the value to the same place.
 
-    `σ = 0` means that the value was held, a σ that is not finite that nothing is known of it.
+    `σ = 0` marks a fixed value, a σ that is not finite an unknown uncertainty.
     """
     if not math.isfinite(value):
         return "–"
@@ -28,13 +28,13 @@ def plus_minus(value: float, sigma: float) -> str:
     scale = 1.0 if plain else 10.0**exponent
     decimals = 1 - _exponent(float(f"{sigma / scale:.1e}"))
     places = max(decimals, 0)
-    both = (f"{round(number / scale, decimals):.{places}f}" for number in (value, sigma))
-    written = " ± ".join(both).replace("-", "−")
-    return written if plain else f"({written}) × {power_of_ten(exponent)}"
+    numbers = (f"{round(number / scale, decimals):.{places}f}" for number in (value, sigma))
+    text = " ± ".join(numbers).replace("-", "−")
+    return text if plain else f"({text}) × {power_of_ten(exponent)}"
 
 
 def rounded(value: float, digits: int = 4) -> str:
-    """`value` to `digits` significant ones, with a power of ten if very large or small."""
+    """Format `value` to `digits` significant digits, with a power of ten if very large or small."""
     if not math.isfinite(value):
         return "–"
     if value == 0:
@@ -42,22 +42,22 @@ def rounded(value: float, digits: int = 4) -> str:
     exponent = _exponent(float(f"{value:.{digits - 1}e}"))
     if SMALLEST_PLAIN <= 10.0**exponent < LARGEST_PLAIN:
         decimals = digits - 1 - exponent
-        written = f"{round(value, decimals):.{max(decimals, 0)}f}"
-        written = written.rstrip("0").rstrip(".") if "." in written else written
-        return written.replace("-", "−")
+        text = f"{round(value, decimals):.{max(decimals, 0)}f}"
+        text = text.rstrip("0").rstrip(".") if "." in text else text
+        return text.replace("-", "−")
     mantissa = f"{value / 10.0**exponent:.{digits - 1}f}".rstrip("0").rstrip(".")
     return f"{mantissa.replace('-', '−')} × {power_of_ten(exponent)}"
 
 
 def exposure_text(exposure_s: float) -> str:
-    """`1/64 s`, `0.5 s`, `30 s`."""
+    """Format an exposure time, such as `1/64 s`, `0.5 s` or `30 s`."""
     if 0 < exposure_s < LONGEST_FRACTION_S:
         return f"1/{1 / exposure_s:.0f} s"
     return f"{rounded(exposure_s, 3)} s"
 
 
 def power_of_ten(exponent: int) -> str:
-    """`10⁻³`."""
+    """Format a power of ten, such as `10⁻³`."""
     return "10" + str(exponent).translate(_SUPERSCRIPT)
 
 

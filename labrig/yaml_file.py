@@ -1,8 +1,8 @@
-"""YAML files a person writes, read into models, with errors a person understands.
+"""YAML files written by users, read into models with understandable errors.
 
-PyYAML's safe loader with YAML 1.2 scalars (`1:30` and `0100` are not numbers in disguise, `1e-3`
-is one, `no` is a word) that refuses what no such file needs: duplicate keys, tags, numbers that are
-not finite, characters that are none, and aliases that stand for more than anybody would write.
+PyYAML's safe loader with YAML 1.2 scalars (`1:30` and `0100` are not numbers, `1e-3` is one, `no`
+is a word) that rejects what no such file needs: duplicate keys, tags, numbers that are not finite,
+invalid characters, and aliases that expand to excessive size.
 """
 
 import difflib
@@ -21,15 +21,15 @@ from labrig.input_file import read_text
 
 ModelT = TypeVar("ModelT", bound=BaseModel)
 
-#: More than any such file has; the longest are the calibrations that labrig writes, 0.1 MB.
+#: Size limit; the longest files are the calibrations that labrig writes, 0.1 MB.
 MOST_BYTES = 5_000_000
-#: Deeper than any such file goes, and more values than anybody leaves to aliases.
+#: Limits of the depth, and of the values that aliases expand to.
 MOST_DEPTH = 30
 MOST_ALIASED = 100_000
-#: Of a text that is shown in a message.
+#: Largest length of a text quoted in a message.
 MOST_SHOWN = 80
 
-#: A text that holds them is neither a name nor a path: NUL, and halves of surrogate pairs.
+#: Characters that no name or path contains: NUL, and halves of surrogate pairs.
 _NO_TEXT = re.compile("[\0\ud800-\udfff]")
 _INT = re.compile(r"[-+]?(?:0|[1-9][0-9]*)")
 _FLOAT = re.compile(
@@ -59,19 +59,21 @@ class _Loader(SafeLoader, Composer):
         # Not libyaml's own composer, which would pass `compose_node` by.
         node = Composer.get_single_node(self)
         if node is not None:
-            known: dict[yaml.Node, tuple[int, int]] = {}
-            nodes, depth = _extent(node, known)
-            if nodes - len(known) > MOST_ALIASED or depth > MOST_DEPTH + 1:
+            extents: dict[yaml.Node, tuple[int, int]] = {}
+            nodes, depth = _extent(node, extents)
+            if nodes - len(extents) > MOST_ALIASED or depth > MOST_DEPTH + 1:
                 raise _problem("its aliases stand for more than fits such a file", node)
         return node
 
     def compose_node(self, parent: yaml.Node | None, index: Any) -> yaml.Node | None:
         event: Any = self.peek_event()  # type: ignore[no-untyped-call]
         if (tag := getattr(event, "tag", None)) is not None:
-            written = tag.replace("tag:yaml.org,2002:", "!!")
-            raise _problem(f"the tag '{_shown(written)}' has no meaning here; leave it out", event)
+            tag_text = tag.replace("tag:yaml.org,2002:", "!!")
+            raise _problem(
+                f"the tag '{_shortened(tag_text)}' has no meaning here; leave it out", event
+            )
         if isinstance(event, yaml.ScalarEvent) and _NO_TEXT.search(event.value):
-            raise _problem(f"expected text, got {_shown(ascii(event.value))}", event)
+            raise _problem(f"expected text, got {_shortened(ascii(event.value))}", event)
         if self._depth > MOST_DEPTH:
             raise _problem(f"nested more than {MOST_DEPTH} deep", event)
         self._depth += 1
@@ -80,53 +82,54 @@ class _Loader(SafeLoader, Composer):
         return node
 
     def construct_mapping(self, node: yaml.MappingNode, deep: bool = False) -> dict[Any, Any]:
-        seen: dict[str, int] = {}
+        key_lines: dict[str, int] = {}
         for key_node, _ in node.value:
             if not isinstance(key_node, yaml.ScalarNode):
                 raise _problem("expected a word as key, got a list or a mapping", key_node)
             key, line = str(key_node.value), key_node.start_mark.line + 1
-            if key in seen:
+            if key in key_lines:
                 raise _problem(
-                    f"the key '{_shown(key)}' stands twice (also in line {seen[key]}); keep one",
+                    f"the key '{_shortened(key)}' stands twice (also in line {key_lines[key]}); "
+                    "keep one",
                     key_node,
                 )
-            seen[key] = line
+            key_lines[key] = line
         return super().construct_mapping(node, deep)
 
 
-def _problem(text: str, at: Any) -> yaml.MarkedYAMLError:
-    """What to raise about a node or an event."""
-    return yaml.MarkedYAMLError(problem=text, problem_mark=at.start_mark)
+def _problem(text: str, source: Any) -> yaml.MarkedYAMLError:
+    """Return the error about a node or an event."""
+    return yaml.MarkedYAMLError(problem=text, problem_mark=source.start_mark)
 
 
-def _extent(node: yaml.Node, known: dict[yaml.Node, tuple[int, int]]) -> tuple[int, int]:
-    """How many nodes there are in `node`, and how deep, with its aliases written out.
+def _extent(node: yaml.Node, extents: dict[yaml.Node, tuple[int, int]]) -> tuple[int, int]:
+    """Return the number of nodes in `node` and their depth, with its aliases expanded.
 
-    `known` has those that were counted before: all that an alias may stand for. Of a node that is
-    still being counted it has (0, 0).
+    `extents` has those of the nodes counted before, which an alias may refer to; (0, 0) marks a
+    node that is still being counted.
     """
-    if node in known:
-        if not known[node][0]:
+    if node in extents:
+        if not extents[node][0]:
             raise _problem("an alias stands within what it stands for", node)
-        return known[node]
-    known[node] = 0, 0
+        return extents[node]
+    extents[node] = 0, 0
     inner: list[yaml.Node] = []
     if isinstance(node, yaml.MappingNode):
         inner = [part for pair in node.value for part in pair]
     elif isinstance(node, yaml.SequenceNode):
         inner = node.value
-    extents = [_extent(part, known) for part in inner]
-    known[node] = (
-        1 + sum(nodes for nodes, _ in extents),
-        1 + max((depth for _, depth in extents), default=0),
+    inner_extents = [_extent(part, extents) for part in inner]
+    extents[node] = (
+        1 + sum(nodes for nodes, _ in inner_extents),
+        1 + max((depth for _, depth in inner_extents), default=0),
     )
-    return known[node]
+    return extents[node]
 
 
 def _construct_float(loader: _Loader, node: yaml.ScalarNode) -> float:
     text = str(node.value)
     if not text.lstrip("+-.")[:1].isdigit() or math.isinf(float(text)):
-        raise _problem(f"expected a finite number, got {_shown(text)}", node)
+        raise _problem(f"expected a finite number, got {_shortened(text)}", node)
     return float(text)
 
 
@@ -136,14 +139,14 @@ for _tag, _pattern, _first in (
     ("int", _INT, "-+0123456789"),
     ("float", _FLOAT, "-+.0123456789"),
 ):
-    _whole = re.compile(f"(?:{_pattern.pattern})\\Z")
-    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _whole, list(_first))
+    _full_pattern = re.compile(f"(?:{_pattern.pattern})\\Z")
+    _Loader.add_implicit_resolver(f"tag:yaml.org,2002:{_tag}", _full_pattern, list(_first))
 _Loader.add_constructor("tag:yaml.org,2002:float", _construct_float)
 _Loader.add_constructor("tag:yaml.org,2002:int", lambda loader, node: int(str(node.value)))
 
 
 class _Dumper(yaml.SafeDumper):
-    """Quotes what PyYAML's own reader or this one would take for anything but text."""
+    """Dumper that quotes every text that PyYAML's own reader or this one would not read as text."""
 
     yaml_implicit_resolvers = {  # noqa: RUF012
         first: [
@@ -155,20 +158,20 @@ class _Dumper(yaml.SafeDumper):
 
 
 def read_yaml(path: Path) -> dict[str, Any]:
-    """The mapping in the file at `path`.
+    """Read the mapping in the file at `path`.
 
     Raises
     ------
     UsageError
-        Not readable, not YAML, a duplicate key, or not a mapping.
+        The file is not readable, not YAML, has a duplicate key, or is not a mapping.
     DiskError
-        The disk does not give it back.
+        The disk cannot be read.
     """
     return parse_yaml(read_text(path, MOST_BYTES), str(path))
 
 
 def parse_yaml(text: str, source: str) -> dict[str, Any]:
-    """As `read_yaml`, from text; `source` names it in messages."""
+    """Parse the mapping in a text like `read_yaml`; `source` names it in messages."""
     try:
         content = yaml.load(text, Loader=_Loader)
     except yaml.MarkedYAMLError as error:
@@ -187,27 +190,28 @@ def parse_yaml(text: str, source: str) -> dict[str, Any]:
 
 
 def write_yaml(path: Path, model: BaseModel) -> None:
-    """Write `model` so that `read_model` gives it back; nothing half-written stays."""
+    """Write `model` so that `read_model` reads it."""
     path.write_text(yaml_text(model.model_dump(mode="json", exclude_none=False)), encoding="utf-8")
 
 
 def yaml_text(content: Mapping[str, Any]) -> str:
-    """YAML text of plain values, keys in the given order."""
+    """Return YAML text of plain values, keys in the given order."""
     return yaml.dump(dict(content), Dumper=_Dumper, sort_keys=False, allow_unicode=True, width=100)
 
 
 def read_model(path: Path, model: type[ModelT]) -> ModelT:
-    """The file at `path` as `model`; errors are one line and name the file and the key."""
+    """Read the file at `path` as `model`; errors are one line and name the file and the key."""
     return validate(read_yaml(path), model, str(path))
 
 
 def validate(content: Mapping[str, Any], model: type[ModelT], source: str) -> ModelT:
-    """`content` as `model`.
+    """Validate `content` as `model`.
 
     Raises
     ------
     UsageError
-        The first thing that is wrong, with a suggestion where a key is misspelt.
+        The content is invalid; the message names the first problem, with a suggestion for a
+        misspelt key.
     """
     try:
         return model.model_validate(content)
@@ -216,7 +220,7 @@ def validate(content: Mapping[str, Any], model: type[ModelT], source: str) -> Mo
 
 
 def did_you_mean(word: str, known: Sequence[str]) -> str:
-    """A hint at what `word` may have been meant to be, or the list of what is known."""
+    """Return a suggestion for a misspelt `word`, or the list of known words."""
     close = difflib.get_close_matches(word, known, n=1, cutoff=0.6)
     return f"did you mean '{close[0]}'?" if close else f"known: {', '.join(sorted(known))}"
 
@@ -228,18 +232,18 @@ def _first_problem(error: ValidationError, model: type[BaseModel]) -> str:
     place = ".".join(str(part) for part in problem["loc"])
     if problem["type"] == "extra_forbidden":
         keys = list(_sibling_keys(model, problem["loc"]))
-        return f"unknown key '{_shown(place)}'; {did_you_mean(str(problem['loc'][-1]), keys)}"
+        return f"unknown key '{_shortened(place)}'; {did_you_mean(str(problem['loc'][-1]), keys)}"
     if problem["type"] == "missing":
         return f"the key '{place}' is missing; it is required"
-    said = problem["msg"].removeprefix("Value error, ")
+    message = problem["msg"].removeprefix("Value error, ")
     # A rule of several keys names their values itself.
-    says_all = "got " in said or (problem["type"] == "value_error" and _is_block(problem["input"]))
-    came = "" if says_all else f", got {_kind(problem['input'])}"
-    return f"{place}: {said}{came}" if place else f"{said}{came}"
+    is_rule = problem["type"] == "value_error" and _is_block(problem["input"])
+    received = "" if "got " in message or is_rule else f", got {_kind(problem['input'])}"
+    return f"{place}: {message}{received}" if place else f"{message}{received}"
 
 
 def _sibling_keys(model: type[BaseModel], location: tuple[int | str, ...]) -> Iterator[str]:
-    """Keys that a mapping at `location` may have, over all models it may be."""
+    """Yield the keys that a mapping at `location` may have, over all possible models."""
     models: list[type[BaseModel]] = [model]
     for part in location[:-1]:
         inner = [
@@ -270,9 +274,9 @@ def _kind(value: Any) -> str:
         return "nothing"
     if _is_block(value):
         return "a mapping" if isinstance(value, dict) else "a list"
-    return f"'{_shown(str(value))}'"
+    return f"'{_shortened(str(value))}'"
 
 
-def _shown(text: str) -> str:
+def _shortened(text: str) -> str:
     text = " ".join(text.split())
     return text if len(text) <= MOST_SHOWN else text[:MOST_SHOWN] + "…"

@@ -1,4 +1,4 @@
-"""Calibrations of a bench as files: what its own protocols measure and later ones use.
+"""Calibrations of a bench as files, written by calibration protocols and read by later ones.
 
 To add a kind, write its file's module with its `CalibrationKind` and register that by an entry
 point in `labrig.calibrations`: rig files then have its key, and analyses find it by

@@ -1,4 +1,4 @@
-"""The blank file: what a decay's frames show where nothing glows."""
+"""The blank file: signal of a decay's frames without a glowing sample."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -14,30 +14,33 @@ from labrig.yaml_file import read_model, write_yaml
 
 Row = tuple[Finite, ...]
 
-#: A constant level is worth a word from so many σ on.
+#: Number of σ from which a constant level is reported.
 SIGNIFICANT = 4.0
-#: By which begins of frames scatter: relays and shutters have their jitter.
+#: Scatter of the begins of frames in s, by jitter of relays and shutters.
 SAME_TIME_S = 0.02
 
 
 class BlankFile(BaseModel):
-    """Light after lamp-off that is no glow, in DN/s above dark frames taken as the decay's are.
+    """Light after lamp off without a sample, in DN/s above dark frames taken as those of the decay.
 
     Attributes
     ----------
     iso, f_number
-        To which the numbers belong.
+        Settings to which the numbers belong.
+    channels
+        Names of the channels.
     t_s
-        Middles of the exposures after lamp-off, rising.
+        Rising middles of the exposures in seconds after lamp off.
     rate_dn_per_s, sigma_dn_per_s
-        A row for each of `t_s`, a number for each channel: the constant level not in it.
+        Signal without the constant level and its σ in DN/s, a row for each of `t_s`, a number for
+        each channel.
     constant_dn_per_s, constant_sigma_dn_per_s
-        What stays for good but is not in the dark frames.
+        Constant level after lamp off that the dark frames lack, in DN/s, and its σ.
     ambient_dn_per_s, ambient_sigma_dn_per_s
-        What is in frames and dark frames alike beyond dark current: light that leaks in. At least
-        so much; the channel that sees least of it is taken for dark.
+        Stray light in frames and dark frames alike, beyond dark current, in DN/s, and its σ. It is
+        a lower bound: the channel with the least signal is taken for dark.
     first_clean_s
-        From when on nothing but the constant level is seen; null: never.
+        Time after lamp off in seconds from which only the constant level remains; null if never.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -75,7 +78,7 @@ class BlankFile(BaseModel):
         return self
 
     def is_clean(self, t_s: float) -> bool:
-        """Whether a frame that begins `t_s` after lamp-off shows nothing that fades but the glow.
+        """Return whether a frame that begins `t_s` after lamp off has no fading light but the glow.
 
         Raises
         ------
@@ -90,35 +93,72 @@ class BlankFile(BaseModel):
         return t_s >= self.first_clean_s - SAME_TIME_S
 
     def leaks(self) -> tuple[str, ...]:
-        """What shines all the time, a line each."""
-        said = []
-        for what, level, sigma in (
+        """Return a message for each source of constant stray light."""
+        messages = []
+        for occasion, level, sigma in (
             ("after lamp-off, but not in dark frames", self.constant_dn_per_s,
              self.constant_sigma_dn_per_s),
             ("all the time", self.ambient_dn_per_s, self.ambient_sigma_dn_per_s),
         ):  # fmt: skip
-            most = int(np.argmax(level))
-            if level[most] > SIGNIFICANT * sigma[most]:
-                said.append(
-                    f"light of {level[most]:.3g} ± {sigma[most]:.2g} DN/s in {self.channels[most]} "
-                    f"falls on the blank {what}: find where it leaks in"
+            brightest = int(np.argmax(level))
+            if level[brightest] > SIGNIFICANT * sigma[brightest]:
+                messages.append(
+                    f"light of {level[brightest]:.3g} ± {sigma[brightest]:.2g} DN/s in "
+                    f"{self.channels[brightest]} falls on the blank {occasion}: find where it "
+                    "leaks in"
                 )
-        return tuple(said)
+        return tuple(messages)
 
 
 def read_blank_file(path: Path) -> BlankFile:
-    """The blank in the file at `path`.
+    """Read a blank: the stray light that remains after lamp off.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    BlankFile
+        The validated blank.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_blank_file
+    >>> blank = read_blank_file(Path("blank.yaml"))
+    >>> blank.channels, blank.is_clean(2.0)
+    (('R', 'G', 'B'), True)
     """
     return read_model(path, BlankFile)
 
 
 def write_blank_file(path: Path, file: BlankFile) -> None:
-    """Write `file` so that `read_blank_file` gives it back."""
+    """Write a blank to a file that `read_blank_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The blank.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_blank_file, write_blank_file
+    >>> blank = read_blank_file(Path("blank.yaml"))
+    >>> noted = blank.model_copy(update={"source": "remeasured with the shield in place"})
+    >>> write_blank_file(Path("shielded.yaml"), noted)
+    >>> read_blank_file(Path("shielded.yaml")).source
+    'remeasured with the shield in place'
+    """
     write_yaml(path, file)
 
 

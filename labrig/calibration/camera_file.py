@@ -1,4 +1,4 @@
-"""The camera file: how one body and lens turn light and settings into numbers."""
+"""The camera file: calibration of a camera body and lens."""
 
 from pathlib import Path
 from typing import Literal, Self
@@ -17,16 +17,18 @@ class _Part(BaseModel):
 
 
 class Noise(_Part):
-    """Of a pixel at one ISO; every σ is one standard deviation.
+    """Noise of a pixel at one ISO; every σ is one standard deviation.
 
     Attributes
     ----------
-    gain_e_per_dn
-        Electrons to a number, by photon transfer.
-    read_noise_e
-        Of one pixel, without what whole rows share.
+    iso
+        The ISO setting.
+    gain_e_per_dn, gain_e_per_dn_sigma
+        Electrons per DN from the photon transfer curve, and σ.
+    read_noise_e, read_noise_e_sigma
+        Read noise of one pixel in electrons without the row noise, and σ.
     row_noise_e
-        What reading adds to all pixels of a row alike.
+        Read noise in electrons that is common to all pixels of a row.
     """
 
     iso: Positive
@@ -38,12 +40,16 @@ class Noise(_Part):
 
 
 class Linearity(_Part):
-    """ln(signal over what it would be if the sensor were linear) at levels above dark.
+    """Deviation from linearity: ln(signal over that of a linear sensor) at levels above dark.
 
     Attributes
     ----------
+    level_dn
+        Signal levels above dark in DN.
+    deviation, sigma
+        Deviation from linearity at these levels, and one standard deviation.
     saturation_dn
-        Level above dark from which numbers say nothing; null: it was not reached.
+        Saturation level above dark in DN; null if it was not reached.
     """
 
     level_dn: tuple[Positive, ...]
@@ -59,20 +65,20 @@ class Linearity(_Part):
 
 
 class CameraFile(CameraModel):
-    """What `camera_calibration` found: a camera model, whose it is, and what else is known.
+    """Result of `camera_calibration`: camera model, identity, noise and linearity.
 
     Attributes
     ----------
     camera
-        The body that was calibrated, in the words with which it introduces itself.
+        Identity of the calibrated body as it reports it.
     lens
-        What the frames say of the lens; null: nothing.
+        Lens as recorded in the frames; null if they do not record it.
     noise
-        By ISO.
+        Noise of a pixel, one entry for each ISO.
     linearity
-        Common to all channels.
+        Deviation from linearity, common to all channels.
     flicker, flicker_sigma
-        Scatter of all light of a frame from frame to frame, relative.
+        Relative scatter of the light from frame to frame, common to all channels, and its σ.
     """
 
     kind: Literal["camera"] = "camera"
@@ -86,21 +92,21 @@ class CameraFile(CameraModel):
     run: str | None = None
 
     def require_match(self, camera: str, lens: str | None, f_number: float | None) -> None:
-        """Refuse frames that this calibration is not about.
+        """Refuse frames to which this calibration does not apply.
 
         Parameters
         ----------
         camera
-            In the words with which it introduced itself.
+            Identity of the camera as it reports it.
         lens
-            As the frames say; None if they do not.
+            Lens as recorded in the frames; None if they do not record it.
         f_number
-            At which they were taken.
+            The f-number of the frames; None if it is not known.
 
         Raises
         ------
         DataError
-            Another body, another lens, or an aperture that was not calibrated.
+            The frames are of another body or lens, or of an aperture that was not calibrated.
         """
         if _body(camera) != _body(self.camera):
             raise DataError(
@@ -113,26 +119,63 @@ class CameraFile(CameraModel):
                 f"{lens}; calibrate this one, or leave optics.camera_file out"
             )
         if self.flat_at(f_number) is None:
-            known = ", ".join(stop_text(flat.f_number) for flat in self.flats)
+            calibrated = ", ".join(stop_text(flat.f_number) for flat in self.flats)
             raise DataError(
-                f"calibration of another lens or aperture: expected {known}, the frames were taken "
-                f"at {stop_text(f_number)}; calibrate that, too, or leave optics.camera_file out"
+                f"calibration of another lens or aperture: expected {calibrated}, the frames were "
+                f"taken at {stop_text(f_number)}; calibrate that, too, or leave "
+                "optics.camera_file out"
             )
 
 
 def read_camera_file(path: Path) -> CameraFile:
-    """The calibration in the file at `path`.
+    """Read the calibration of a camera body and lens.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    CameraFile
+        The validated calibration.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_camera_file
+    >>> camera = read_camera_file(Path("camera.yaml"))
+    >>> exposure_s, relative_sigma = camera.exposure_s(1 / 64)
+    >>> f"{1e3 * exposure_s:.2f} ms ± {100 * relative_sigma:.1f} %"
+    '15.58 ms ± 0.5 %'
     """
     return read_model(path, CameraFile)
 
 
 def write_camera_file(path: Path, file: CameraFile) -> None:
-    """Write `file` so that `read_camera_file` gives it back."""
+    """Write the calibration of a camera to a file that `read_camera_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The calibration.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_camera_file, write_camera_file
+    >>> camera = read_camera_file(Path("camera.yaml"))
+    >>> write_camera_file(Path("no-lens.yaml"), camera.model_copy(update={"lens": None}))
+    >>> read_camera_file(Path("no-lens.yaml")).lens is None
+    True
+    """
     write_yaml(path, file)
 
 
@@ -147,5 +190,5 @@ CAMERA_KIND = CalibrationKind(
 
 
 def _body(identity: str) -> str:
-    """Without its firmware, which may have been renewed."""
+    """Return the identity without the firmware version, which may have been updated."""
     return identity.partition(", firmware")[0]

@@ -1,4 +1,4 @@
-"""The fade file: how the lamp goes dark and comes on, band by band."""
+"""The fade file: turn-off and turn-on transients of the lamp, band by band."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -21,14 +21,15 @@ class _Part(BaseModel):
 
 
 class Change(_Part):
-    """Irradiance over that of the steady lamp, after a switch.
+    """Irradiance over that of the steady lamp after a switch.
 
     Attributes
     ----------
     t_s
-        From the switch, 0 first, rising.
+        Rising times in seconds since the switch, the first one 0.
     fraction, sigma
-        A row for each time, a number for each band; straight in between.
+        Fraction of the steady irradiance and σ, a row for each time, a number for each band;
+        piecewise linear in between.
     """
 
     t_s: Annotated[tuple[NotNegative, ...], Field(min_length=2)]
@@ -46,21 +47,22 @@ class Change(_Part):
         return self
 
     def missing_s(self) -> FloatArray:
-        """∫ fraction dt of each band, (bands,): for how long the steady lamp would give as much."""
+        """Return the equivalent steady duration ∫ fraction dt in s, shape (bands,)."""
         steps, fraction = np.diff(self.t_s), np.array(self.fraction)
         total: FloatArray = steps @ (fraction[1:] + fraction[:-1]) / 2
         return total
 
 
 class Warming(_Part):
-    """Light of a lamp whose housing is cold, over the warm one's: 1 − d e^(−t/τ).
+    """Warm-up transient of a lamp: its light over that of the warm lamp is 1 − d e^(−t/τ).
 
     Attributes
     ----------
     deficit, deficit_sigma
-        Fraction of the warm lamp's light, all wavelengths alike.
+        Fraction d of the warm lamp's light that is missing at first, and σ, common to all
+        wavelengths.
     time_constant_s
-        Time constant of the housing.
+        Time constant τ of the housing in seconds.
     """
 
     deficit: Annotated[float, Field(ge=0, lt=1)]
@@ -69,16 +71,16 @@ class Warming(_Part):
 
 
 class FadeFile(_Part):
-    """What `fade` found.
+    """Result of the protocol `fade`: the transients of a lamp.
 
     Attributes
     ----------
     bands_nm
-        Edges of the bands, rising; one more than there are bands.
+        Rising edges of the bands in nm; one more than there are bands.
     fade, rise
-        After switching off and on; null: not measured.
+        Transients after switching off and on; null if not measured.
     warming
-        What comes later, with the housing's warmth; null: not measured.
+        Slow warm-up of the lamp's housing; null if not measured.
     """
 
     kind: Literal["fade"] = "fade"
@@ -95,31 +97,73 @@ class FadeFile(_Part):
         if any(right <= left for left, right in pairwise(self.bands_nm)):
             raise ValueError("expected rising edges in 'bands_nm'")
         bands = len(self.bands_nm) - 1
-        if any(len(one.fraction[0]) != bands for one in (self.fade, self.rise) if one is not None):
+        if any(
+            len(change.fraction[0]) != bands
+            for change in (self.fade, self.rise)
+            if change is not None
+        ):
             raise ValueError(f"expected {bands} numbers in each row of 'fraction', one a band")
         return self
 
     def in_bands(self, change: Change, edges_nm: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Times (n,) and fractions (n, bands) of a change in other bands, by their middles."""
-        edges, own = np.asarray(edges_nm, dtype=np.float64), np.array(self.bands_nm)
-        middles, measured = (edges[1:] + edges[:-1]) / 2, (own[1:] + own[:-1]) / 2
+        """Return times (n,) and fractions (n, bands) of a transient at other bands' middles."""
+        edges, own_edges = np.asarray(edges_nm, dtype=np.float64), np.array(self.bands_nm)
+        middles, measured = (edges[1:] + edges[:-1]) / 2, (own_edges[1:] + own_edges[:-1]) / 2
         fraction = [np.interp(middles, measured, row) for row in change.fraction]
         return np.array(change.t_s), np.array(fraction)
 
 
 def read_fade_file(path: Path) -> FadeFile:
-    """The fade in the file at `path`.
+    """Read the turn-off and warm-up transients of a lamp.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    FadeFile
+        The validated transients.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_fade_file
+    >>> lamp = read_fade_file(Path("fade.yaml"))
+    >>> t_s, fraction = lamp.in_bands(lamp.fade, [400, 500, 600, 700])
+    >>> fraction.shape == (len(t_s), 3)
+    True
+    >>> lamp.fade.missing_s()[:2].round(3).tolist()
+    [0.029, 0.031]
     """
     return read_model(path, FadeFile)
 
 
 def write_fade_file(path: Path, file: FadeFile) -> None:
-    """Write `file` so that `read_fade_file` gives it back."""
+    """Write the transients of a lamp to a file that `read_fade_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The transients.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_fade_file, write_fade_file
+    >>> transients = read_fade_file(Path("fade.yaml"))
+    >>> write_fade_file(Path("lamp-2.yaml"), transients.model_copy(update={"lamp": "lamp 2"}))
+    >>> read_fade_file(Path("lamp-2.yaml")).lamp
+    'lamp 2'
+    """
     write_yaml(path, file)
 
 

@@ -1,4 +1,4 @@
-"""The irradiance file: what the lamp does to the sample, directly and through the LVF."""
+"""The irradiance file: irradiance of the lamp on the sample, directly and through the LVF."""
 
 from itertools import pairwise
 from pathlib import Path
@@ -15,30 +15,30 @@ Numbers = tuple[NotNegative, ...]
 
 
 class IrradianceFile(BaseModel):
-    """E per band, in one scale for the lamp by itself and through every place of the LVF.
+    """Irradiance E per band on one scale, directly under the lamp and through the LVF.
 
     Attributes
     ----------
     lamp
-        Name of its spectrum.
+        Name of the lamp's spectrum.
     bands_nm
-        Edges of the bands, rising; one more than there are bands.
+        Rising edges of the bands in nm; one more than there are bands.
     vector_length
-        Euclidean length of `direct`: what excitation rates found with this file belong to.
+        Euclidean length of `direct`, to which excitation rates found with this file belong.
     direct, direct_sigma
-        E of every band, ∫ E dλ over it, of the lamp by itself.
+        Irradiance E = ∫ E dλ of each band directly under the lamp, and σ.
     position
         Middles of `strip.slices()`: 0 at the blue end, 1 at the red end.
     through, through_sigma
-        E of every band behind the LVF, a row for each position.
+        Irradiance of each band behind the LVF, a row for each position, and σ.
     scale_sigma
-        Relative standard uncertainty of all of `through` over `direct`, common to all positions.
+        Relative standard uncertainty of `through` over `direct`, common to all positions.
     ratio, ratio_sigma
-        Σ `direct` over Σ `through` of each position.
+        Ratio Σ `direct` over Σ `through` of each position, and σ.
     strip
-        Where the LVF lay on the sample, as the camera sees the sample.
+        Position of the LVF on the sample, as the camera sees the sample.
     source, run
-        Where the numbers come from.
+        Origin of the numbers.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -76,18 +76,56 @@ class IrradianceFile(BaseModel):
 
 
 def read_irradiance_file(path: Path) -> IrradianceFile:
-    """The irradiance in the file at `path`.
+    """Read the irradiance of a lamp on the sample, directly and through the LVF.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    IrradianceFile
+        The validated irradiance.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> from labrig.calibration import read_irradiance_file
+    >>> lamp = read_irradiance_file(Path("irradiance.yaml"))
+    >>> f"|E| = {np.linalg.norm(lamp.direct):.3f} in {len(lamp.direct)} bands"
+    '|E| = 1.000 in 8 bands'
+    >>> len(lamp.through) == len(lamp.position)
+    True
     """
     return read_model(path, IrradianceFile)
 
 
 def write_irradiance_file(path: Path, file: IrradianceFile) -> None:
-    """Write `file` so that `read_irradiance_file` gives it back."""
+    """Write an irradiance to a file that `read_irradiance_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The irradiance.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_irradiance_file, write_irradiance_file
+    >>> lamp = read_irradiance_file(Path("irradiance.yaml"))
+    >>> write_irradiance_file(Path("copy.yaml"), lamp.model_copy(update={"source": "a copy"}))
+    >>> read_irradiance_file(Path("copy.yaml")).source
+    'a copy'
+    """
     write_yaml(path, file)
 
 

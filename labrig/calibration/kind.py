@@ -1,4 +1,4 @@
-"""A kind of calibration: which protocol measures it, how its file is called, who names it."""
+"""A kind of calibration: its protocol, its file and its key in rig files."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -14,20 +14,20 @@ FileT = TypeVar("FileT")
 
 @dataclass(frozen=True)
 class CalibrationKind(Generic[FileT]):
-    """What labrig knows of one kind of calibration.
+    """Description of one kind of calibration.
 
     Parameters
     ----------
     name
-        As the file's `kind` says, and what analyses call it among their inputs.
+        Value of the file's key `kind`, and name of the input of analyses.
     protocol
-        Measures it. The analysis that is registered under that name fits it.
+        Name of the protocol that measures it; the analysis of that name fits it.
     optics_key
-        Names its file, or its run, under `optics:` in a rig file.
+        Key under `optics:` in a rig file that names its file or its run.
     file_name
-        In the result of a run.
+        Name of its file in the result of a run.
     read, write
-        Of its file.
+        Functions that read and write its file.
     """
 
     name: str
@@ -38,25 +38,25 @@ class CalibrationKind(Generic[FileT]):
     write: Callable[[Path, FileT], None]
 
     def read_named(self, path: Path) -> FileT:
-        """The file itself, or the one in a run folder's result, be it one part of a chain.
+        """Read the file at `path`, or the one in the result of a run or chained run at `path`.
 
         Raises
         ------
         UsageError
-            It is missing or malformed, or the run has none or several.
+            The file is missing or malformed, or the run has none or several.
         """
         if not path.is_dir():
             return self.read(path)
-        found = [*path.glob(f"result/{self.file_name}"), *path.glob(f"result/*/{self.file_name}")]
-        if len(found) != 1:
+        paths = [*path.glob(f"result/{self.file_name}"), *path.glob(f"result/*/{self.file_name}")]
+        if len(paths) != 1:
             raise UsageError(
                 f"{path}: expected a run with one {self.file_name} in its result, got "
-                f"{len(found)}; process it first, or name the file itself"
+                f"{len(paths)}; process it first, or name the file itself"
             )
-        return self.read(found[0])
+        return self.read(paths[0])
 
     def write_into(self, folder: Path, file: FileT) -> None:
-        """Write `file` into a result's folder, by the kind's name for it."""
+        """Write `file` into a result's folder under the kind's file name."""
         self.write(folder / self.file_name, file)
 
 

@@ -1,4 +1,4 @@
-"""The LVF file: what a linear variable filter lets through, and where it lies in the frame."""
+"""The LVF file: transmission of a linear variable filter, and its position in the frame."""
 
 from pathlib import Path
 from typing import Literal, Self
@@ -19,7 +19,7 @@ class _Part(BaseModel):
 
 
 class BandColumns(_Part):
-    """One number for every position; as in `labrig.optics.Bands`."""
+    """Parameters of `labrig.optics.Bands`, one number for each position."""
 
     centre_nm: Numbers
     fwhm_nm: Numbers
@@ -29,16 +29,16 @@ class BandColumns(_Part):
 
     @classmethod
     def of(cls, bands: Bands) -> Self:
-        """From arrays."""
+        """Convert from arrays."""
         return cls(**{name: tuple(getattr(bands, name).tolist()) for name in cls.model_fields})
 
     def bands(self) -> Bands:
-        """As arrays."""
+        """Convert to arrays."""
         return Bands(*(np.array(getattr(self, name)) for name in type(self).model_fields))
 
 
 class WavelengthColumns(_Part):
-    """Position → wavelength along the whole strip; as in `labrig.optics.WavelengthMap`."""
+    """Wavelength along the whole strip, as in `labrig.optics.WavelengthMap`."""
 
     coefficients: Numbers
     span: tuple[Finite, Finite]
@@ -46,10 +46,10 @@ class WavelengthColumns(_Part):
 
     @classmethod
     def of(cls, wavelengths: WavelengthMap) -> Self:
-        """From arrays."""
+        """Convert from arrays."""
         count = len(wavelengths.coefficients)
-        known = wavelengths.covariance
-        covariance = np.zeros((count, count)) if known is None else known
+        map_covariance = wavelengths.covariance
+        covariance = np.zeros((count, count)) if map_covariance is None else map_covariance
         return cls(
             coefficients=tuple(wavelengths.coefficients.tolist()),
             span=wavelengths.span,
@@ -57,12 +57,12 @@ class WavelengthColumns(_Part):
         )
 
     def map(self) -> WavelengthMap:
-        """As arrays."""
+        """Convert to arrays."""
         return WavelengthMap(np.array(self.coefficients), self.span, np.array(self.covariance))
 
 
 class CurveColumns(_Part):
-    """A camera's curves; as in `labrig.optics.CameraResponse`."""
+    """Sensitivity curves of a camera, as in `labrig.optics.CameraResponse`."""
 
     name: str
     wavelength_nm: Numbers
@@ -71,7 +71,7 @@ class CurveColumns(_Part):
 
     @classmethod
     def of(cls, camera: CameraResponse) -> Self:
-        """From arrays."""
+        """Convert from arrays."""
         return cls(
             name=camera.name,
             wavelength_nm=tuple(camera.wavelength_nm.tolist()),
@@ -90,7 +90,7 @@ class CurveColumns(_Part):
         return self
 
     def response(self) -> CameraResponse:
-        """As arrays."""
+        """Convert to arrays."""
         return CameraResponse(
             self.name, np.array(self.wavelength_nm), np.array(self.sensitivity), self.channels
         )
@@ -102,20 +102,20 @@ class LvfFile(_Part):
     Attributes
     ----------
     position
-        Of each of the bands along the strip: 0 at its blue end, 1 at its red end.
+        Position of each band along the strip: 0 at its blue end, 1 at its red end.
     bands, sigma
-        T_p(λ) and one standard deviation of its figures; all relative to one unknown factor.
+        Parameters of T_p(λ) and one standard deviation; all relative to one unknown factor.
     remainder_nm, remainder
-        What the bands' shape leaves of T_p(λ), a row for every position.
+        Deviation of T_p(λ) from the bands' shape at wavelengths in nm, a row for each position.
     wavelengths
-        From mercury lines, before the colour filters had their say.
+        Wavelength along the strip from the mercury lines alone, without the colour filters.
     before_camera, on_sample
-        Where the strip is seen when the camera looks through it, and where it lies on the sample
-        in the pose in which the camera sees the sample.
+        Strip in the frame when it is in front of the camera, and when it lies on the sample in the
+        pose in which the camera sees the sample.
     camera
-        Its curves as the colour filters tell them: what the strip lets through belongs to these.
+        Camera's curves as fitted with the colour filters; the transmission belongs to these.
     source, run
-        Where the numbers come from.
+        Origin of the numbers.
     """
 
     kind: Literal["lvf"] = "lvf"
@@ -148,7 +148,7 @@ class LvfFile(_Part):
 
     @property
     def lvf(self) -> Lvf:
-        """The filter, at positions from 0 (blue end) to 1 (red end)."""
+        """Filter at positions from 0 (blue end) to 1 (red end)."""
         nodes = np.array(self.remainder_nm)
         remainder = np.array(self.remainder).reshape(len(self.remainder), len(nodes))
         return Lvf(
@@ -160,18 +160,57 @@ _FIGURES = tuple(BandColumns.model_fields)
 
 
 def read_lvf_file(path: Path) -> LvfFile:
-    """The calibrated filter in the file at `path`.
+    """Read the calibration of a linear variable filter.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+
+    Returns
+    -------
+    LvfFile
+        The validated calibration.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        There is no such file, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_lvf_file
+    >>> file = read_lvf_file(Path("lvf.yaml"))
+    >>> wavelength_nm = file.wavelengths.map().wavelength_nm([0.0, 0.5, 1.0])
+    >>> [f"{nm:.0f} nm" for nm in wavelength_nm]
+    ['391 nm', '554 nm', '704 nm']
+    >>> file.lvf.transmission(wavelength_nm).shape
+    (31, 3)
     """
     return read_model(path, LvfFile)
 
 
 def write_lvf_file(path: Path, file: LvfFile) -> None:
-    """Write `file` so that `read_lvf_file` gives it back."""
+    """Write the calibration of a filter to a file that `read_lvf_file` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    file
+        The calibration.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.calibration import read_lvf_file, write_lvf_file
+    >>> filter_file = read_lvf_file(Path("lvf.yaml"))
+    >>> second = filter_file.model_copy(update={"source": "second filter"})
+    >>> write_lvf_file(Path("lvf-2.yaml"), second)
+    >>> read_lvf_file(Path("lvf-2.yaml")).source
+    'second filter'
+    """
     write_yaml(path, file)
 
 

@@ -1,4 +1,4 @@
-"""Fits: the least-squares core, and what is measured with it."""
+"""Fits: the least-squares core, and decays, spectra, filters and excitation fitted with it."""
 
 from labrig.fit.decay import DecayFit, fit_decay
 from labrig.fit.least_squares import EPSILON, FloatArray, LeastSquaresFit, least_squares

@@ -1,10 +1,10 @@
-"""The one nonlinear least-squares core under every fit.
+"""The nonlinear least-squares core of every fit.
 
 A Levenberg–Marquardt search with Moré's column scaling and Nielsen's damping finds the basin;
 undamped Gauss–Newton steps, each by an orthogonal factorisation of the scaled Jacobian (never the
 normal equations, which square its condition), then carry the minimum to the precision of the
-arithmetic. While it searches, a large problem is solved by its normal equations, in a third of the
-time: a step need not be exact to be tried.
+arithmetic. The search solves a large problem by its normal equations, in a third of the time: a
+trial step need not be exact.
 
 References
 ----------
@@ -34,10 +34,10 @@ SEARCH_STEP = 1e-7
 #: Relative step above which a stopped search has not converged.
 CONVERGED_STEP = 1e-6
 INITIAL_DAMPING = 1e-3
-#: The damping falls to this fraction at most after a step that does what it promised; Nielsen's 1/3
-#: takes half as many steps again.
+#: Smallest factor of the damping after a step as good as predicted; Nielsen's 1/3 takes 50 % more
+#: steps.
 LEAST_RELIEF = 1 / 10
-#: Entries of the Jacobian from which the search goes by the normal equations.
+#: Number of entries of the Jacobian from which the search uses the normal equations.
 LARGE_JACOBIAN = 100_000
 POLISH_STEPS = 60
 POLISH_PATIENCE = 3
@@ -45,26 +45,26 @@ POLISH_PATIENCE = 3
 
 @dataclass(frozen=True)
 class LeastSquaresFit:
-    """A minimum of ½‖r(x)‖² and what is known about it.
+    """A minimum of ½‖r(x)‖² with its covariance and diagnostics.
 
     Attributes
     ----------
     parameters
-        (p,) at the minimum.
+        Parameters at the minimum, shape (p,).
     covariance
-        (p, p) (JᵀJ)⁻¹: the parameters' covariance if the residuals have unit variance, else to be
-        multiplied by `reduced_chi2`. Bounds are ignored; a parameter on which no residual depends
-        independently of the others has an infinite variance.
+        Covariance (JᵀJ)⁻¹ of the parameters if the residuals have unit variance, else to be
+        multiplied by `reduced_chi2`, shape (p, p). Bounds are ignored; a parameter on which no
+        residual depends independently of the others has an infinite variance.
     residuals, jacobian
-        (m,) and (m, p) at the minimum.
+        Residuals (m,) and Jacobian (m, p) at the minimum.
     chi2, dof
-        Sum of squared residuals, and m − rank.
+        Sum of squared residuals, and degrees of freedom m − rank.
     rank, condition
         Numerical rank and 2-norm condition of the Jacobian with its columns scaled to length 1.
     at_bound
-        (p,) bool, parameters held by a bound.
+        Whether a bound holds the parameter, shape (p,), bool.
     iterations, converged
-        Evaluations of the residuals, and whether the last step was negligible.
+        Number of evaluations of the residuals, and whether the last step was negligible.
     """
 
     parameters: FloatArray
@@ -81,18 +81,18 @@ class LeastSquaresFit:
 
     @property
     def reduced_chi2(self) -> float:
-        """χ² per degree of freedom; NaN if there are none."""
+        """χ² per degree of freedom; NaN without any."""
         return self.chi2 / self.dof if self.dof > 0 else float("nan")
 
     @property
     def sigma(self) -> FloatArray:
-        """(p,) standard uncertainties for residuals of unit variance."""
+        """Standard uncertainties of the parameters for residuals of unit variance, shape (p,)."""
         return np.sqrt(np.diag(self.covariance))
 
 
 @dataclass
 class _Point:
-    """Where the search stands: parameters, residuals, Jacobian and χ²."""
+    """Current point of the search: parameters, residuals, Jacobian and χ²."""
 
     x: FloatArray
     residuals: FloatArray
@@ -114,21 +114,38 @@ def least_squares(
     Parameters
     ----------
     residuals
-        Function of the parameters (p,) that returns residuals (m,) over their σ and their
-        Jacobian (m, p). May overflow at a trial point: such a step is refused.
+        Function of the parameters (p,) that returns the residuals (m,) in units of their σ and
+        their Jacobian (m, p). It may overflow at a trial point, which is then rejected.
     start
-        (p,) finite; moved into the box if outside.
+        Finite start values, shape (p,), moved into the box if outside.
     lower, upper
-        Bounds, scalar or (p,).
+        Bounds, scalar or of shape (p,).
     max_iterations
-        Evaluations of `residuals` allowed to the damped search.
+        Largest number of evaluations of `residuals` in the damped search.
     tolerance
-        Relative step small enough to stop at; 0 goes on to the precision of the arithmetic.
+        Relative step at which to stop; 0 continues to the precision of the arithmetic.
+
+    Returns
+    -------
+    LeastSquaresFit
+        The minimum with covariance, residuals, Jacobian and convergence.
 
     Raises
     ------
     FitError
         The residuals or the Jacobian at `start` are not finite.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.fit import least_squares
+    >>> t, y = np.array([0.0, 1.0, 2.0, 3.0]), np.array([2.02, 1.21, 0.73, 0.45])
+    >>> def residuals(x):
+    ...     model = x[0] * np.exp(-x[1] * t)
+    ...     return (model - y) / 0.02, np.column_stack([model / x[0], -t * model]) / 0.02
+    >>> fit = least_squares(residuals, [1.0, 1.0], lower=0.0)
+    >>> fit.parameters.round(3).tolist(), fit.sigma.round(3).tolist()
+    ([2.017, 0.506], [0.019, 0.01])
     """
     x = np.array(start, dtype=np.float64)
     low = np.broadcast_to(np.asarray(lower, dtype=np.float64), x.shape)
@@ -147,10 +164,10 @@ def least_squares(
         point, step = _polish(residuals, point, low, high, tolerance)
         if step >= CONVERGED_STEP > tolerance and iterations < max_iterations:
             # Along a flat, curved valley damped steps are short long before its lowest place.
-            left = max_iterations - iterations
-            point, more = _damped_search(residuals, point, low, high, left, 0.0)
+            remaining = max_iterations - iterations
+            point, extra = _damped_search(residuals, point, low, high, remaining, 0.0)
             point, step = _polish(residuals, point, low, high, tolerance)
-            iterations += more
+            iterations += extra
         return _result(point, low, high, iterations, step < CONVERGED_STEP)
 
 
@@ -160,13 +177,13 @@ def _evaluate(residuals: Residuals, x: FloatArray) -> _Point:
 
 
 def _free(point: _Point, low: FloatArray, high: FloatArray) -> NDArray[np.bool_]:
-    """Parameters that no bound holds: inside the box, or pulled back into it by the gradient."""
+    """Return which parameters are free: inside the box, or pulled back into it by the gradient."""
     inside = (low < point.x) & (point.x < high)
     if inside.all():
         return inside
     gradient = point.jacobian.T @ point.residuals
-    held = ((point.x <= low) & (gradient >= 0)) | ((point.x >= high) & (gradient <= 0))
-    return ~held
+    is_held = ((point.x <= low) & (gradient >= 0)) | ((point.x >= high) & (gradient <= 0))
+    return ~is_held
 
 
 def _column_norms(columns: FloatArray) -> FloatArray:
@@ -180,66 +197,67 @@ def _length(vector: FloatArray) -> float:
 
 @cache
 def _upper(rows: int, columns: int) -> FloatArray:
-    """1 on the diagonal and above it, else 0."""
+    """Return a matrix of 1 on and above the diagonal, else 0."""
     return np.triu(np.ones((rows, columns)))
 
 
 class _Linearised:
-    """The linear problem about a point, turned so that p rows say what m rows of J and r said.
+    """Linear problem at a point, rotated so that p rows are equivalent to the m rows of J and r.
 
     Attributes
     ----------
     triangle
-        (p, p) R of J = Q R; fewer rows if m < p.
+        R of J = Q R, shape (p, p); fewer rows if m < p.
     turned
-        (p,) Qᵀ r.
+        Rotated residuals Qᵀ r, shape (p,).
     norms
-        (p,) lengths of the columns of J, 1 where they are 0.
+        Lengths of the columns of J, 1 where they are 0, shape (p,).
     """
 
     def __init__(self, factors: FloatArray) -> None:
         p = factors.shape[1] - 1
         self.triangle: FloatArray = factors[:, :p] * _upper(len(factors), p)
-        self.turned: FloatArray = factors[:, p]
+        self.rotated: FloatArray = factors[:, p]
         self.norms = _column_norms(self.triangle)
 
     @classmethod
-    def exactly(cls, point: _Point) -> "_Linearised":
-        """By an orthogonal factorisation."""
+    def by_qr(cls, point: _Point) -> "_Linearised":
+        """Linearise by an orthogonal factorisation."""
         m, p = point.jacobian.shape
         columns = np.empty((m, p + 1), order="F")
         columns[:, :p], columns[:, p] = point.jacobian, point.residuals
         return cls(lapack.dgeqrf(columns, overwrite_a=True)[0][: min(m, p)])
 
     @classmethod
-    def roughly(cls, point: _Point) -> "_Linearised":
-        """By the normal equations, if the problem is large and they can be solved."""
+    def by_normal_equations(cls, point: _Point) -> "_Linearised":
+        """Linearise by the normal equations if the problem is large and they can be solved."""
         m, p = point.jacobian.shape
         if m <= p or m * p < LARGE_JACOBIAN:
-            return cls.exactly(point)
+            return cls.by_qr(point)
         products = np.empty((p + 1, p + 1))
         products[:p, :p] = point.jacobian.T @ point.jacobian
         products[:p, p] = point.jacobian.T @ point.residuals
         products[p, p] = point.chi2
         lengths = np.sqrt(np.where(np.diag(products) > 0, np.diag(products), 1.0))
         factors, failed = lapack.dpotrf(products / np.outer(lengths, lengths))
-        return cls.exactly(point) if failed else cls((factors * lengths)[:p])
+        return cls.by_qr(point) if failed else cls((factors * lengths)[:p])
 
     def directions(
         self, free: NDArray[np.bool_], scale: FloatArray
     ) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """The free columns of J over `scale`, decomposed into singular values.
+        """Decompose the free columns of J over `scale` into singular values.
 
         Returns
         -------
-        (k,) the values s, (k, p) their directions v in units of the parameters, and (k,) r along
-        them: the undamped step is −Σ_i (r_i/s_i) v_i.
+        values, directions, along
+            Singular values s (k,), their directions v (k, p) in units of the parameters, and r
+            along them (k,): the undamped step is −Σ_i (r_i/s_i) v_i.
         """
         scaled = self.triangle * (free / scale)
         u, s, vt, _ = lapack.dgesdd(scaled[:, free], full_matrices=0)
         in_parameters = np.zeros((len(s), len(scale)))
         in_parameters[:, free] = vt
-        return s, in_parameters / scale, self.turned @ u
+        return s, in_parameters / scale, self.rotated @ u
 
 
 def _damped_search(
@@ -256,10 +274,10 @@ def _damped_search(
         free = _free(point, low, high)
         if not free.any():
             break
-        local = _Linearised.roughly(point)
+        linearised = _Linearised.by_normal_equations(point)
         # Moré: scales never shrink, so that a flat stretch does not set a parameter loose.
-        scale = np.maximum(scale, local.norms)
-        s, directions, along = local.directions(free, scale)
+        scale = np.maximum(scale, linearised.norms)
+        s, directions, along = linearised.directions(free, scale)
         length = _length(point.x * scale) + EPSILON
         accepted = False
         while not accepted and evaluations < max_iterations:
@@ -271,9 +289,9 @@ def _damped_search(
                 return point, evaluations
             trial = _evaluate(residuals, trial_x)
             evaluations += 1
-            change = local.triangle @ step
-            promised = -float((2 * local.turned + change) @ change)
-            gain = (point.chi2 - trial.chi2) / promised if promised > 0 else -1.0
+            change = linearised.triangle @ step
+            predicted = -float((2 * linearised.rotated + change) @ change)
+            gain = (point.chi2 - trial.chi2) / predicted if predicted > 0 else -1.0
             accepted = (
                 trial.chi2 < point.chi2 and gain > 1e-4 and bool(np.isfinite(trial.jacobian).all())
             )
@@ -292,20 +310,21 @@ def _damped_search(
 def _polish(
     residuals: Residuals, point: _Point, low: FloatArray, high: FloatArray, tolerance: float
 ) -> tuple[_Point, float]:
-    """Undamped steps for as long as they shrink; the least relative one tells the convergence.
+    """Take undamped steps while they shrink; return the point and the smallest relative step.
 
-    Where residuals are large the steps shrink by a constant factor, alternating; so patience.
+    Where residuals are large the steps shrink by a constant factor, alternating, hence the
+    patience.
     """
     least, idle = np.inf, 0
     for _ in range(POLISH_STEPS):
         free = _free(point, low, high)
         if not free.any():
             return point, 0.0
-        local = _Linearised.exactly(point)
-        s, directions, along = local.directions(free, local.norms)
+        linearised = _Linearised.by_qr(point)
+        s, directions, along = linearised.directions(free, linearised.norms)
         kept = s > _rank_tolerance(point.jacobian) * s[0]
         step = -(along[kept] / s[kept]) @ directions[kept]
-        size = _length(step * local.norms) / (_length(point.x * local.norms) + EPSILON)
+        size = _length(step * linearised.norms) / (_length(point.x * linearised.norms) + EPSILON)
         idle = 0 if size < 0.9 * least else idle + 1
         least = min(least, size)
         if idle == POLISH_PATIENCE or size < max(tolerance, EPSILON):
@@ -324,9 +343,9 @@ def _rank_tolerance(jacobian: FloatArray) -> float:
 
 
 def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(JᵀJ)⁻¹ of J (m, p), as in `LeastSquaresFit.covariance`.
+    """Return (JᵀJ)⁻¹ of J (m, p), defined as `LeastSquaresFit.covariance`, and singular values.
 
-    With it, (p,), the singular values of J with its columns scaled to length 1.
+    The singular values (p,) are those of J with its columns scaled to length 1.
     """
     scale = _column_norms(jacobian)
     _, s, vt = np.linalg.svd(jacobian / scale, full_matrices=False)
@@ -334,11 +353,11 @@ def parameter_covariance(jacobian: FloatArray) -> tuple[FloatArray, FloatArray]:
     inverse = vt[kept].T / s[kept]
     covariance = (inverse @ inverse.T) / np.outer(scale, scale)
     if not kept.all() or len(kept) < len(scale):
-        seen = np.einsum("ij,ij->j", vt[kept], vt[kept])
-        unseen = seen < 1 - np.sqrt(EPSILON)
-        covariance[unseen, :] = 0.0
-        covariance[:, unseen] = 0.0
-        covariance[unseen, unseen] = np.inf
+        resolved = np.einsum("ij,ij->j", vt[kept], vt[kept])
+        unresolved = resolved < 1 - np.sqrt(EPSILON)
+        covariance[unresolved, :] = 0.0
+        covariance[:, unresolved] = 0.0
+        covariance[unresolved, unresolved] = np.inf
     return covariance, s
 
 

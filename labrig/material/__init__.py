@@ -1,4 +1,4 @@
-"""Materials: their file, their rates and what follows from them."""
+"""Materials: their file, the rate equation and the comparison of two materials."""
 
 from labrig.material.comparison import MaterialComparison, Pair, compare_materials
 from labrig.material.file import (

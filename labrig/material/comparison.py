@@ -1,7 +1,7 @@
-"""A measured material beside another one, such as the same in Table 1 of Nalbach et al.
+"""Comparison of a measured material with a reference, such as Table 1 of Nalbach et al.
 
 Two scales are free: k_e belongs to the light of one lamp, scaled to a stated length, and Λ is
-relative. Each is multiplied by the factor that brings it closest.
+relative. Each is multiplied by the factor that brings it closest to the reference.
 """
 
 import math
@@ -19,7 +19,7 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class Pair:
-    """One quantity of both; σ NaN where it is not known, values NaN where there are none."""
+    """One quantity of both materials, NaN where a value or its σ is not known."""
 
     quantity: str
     unit: str
@@ -30,26 +30,30 @@ class Pair:
 
     @property
     def percent(self) -> float:
-        """Deviation of the measured value from the reference; NaN where that is 0."""
+        """Deviation of the measured value in per cent; NaN where the reference is 0."""
         return 100 * (self.measured / self.reference - 1) if self.reference else math.nan
 
     @property
     def in_sigma(self) -> float:
-        """Deviation in σ of the difference; a σ that is not known counts as 0."""
+        """Deviation in units of σ of the difference, in which an unknown σ counts as 0."""
         sigma = math.hypot(_or_zero(self.sigma), _or_zero(self.reference_sigma))
         return (self.measured - self.reference) / sigma if sigma > 0 else math.nan
 
 
 @dataclass(frozen=True)
 class MaterialComparison:
-    """All quantities that one of two materials has.
+    """All quantities that at least one of two materials has.
 
     Attributes
     ----------
+    names
+        Names of the measured material and of the reference.
+    pairs
+        Measured and reference value of each quantity.
     k_e_factor, reradiation_factor
-        By what k_e and Λ of the measured one were multiplied.
+        Factors by which k_e and Λ of the measured material were multiplied.
     notes
-        What could not be laid side by side, and why.
+        Quantities that could not be compared, and why.
     """
 
     names: tuple[str, str]
@@ -60,37 +64,70 @@ class MaterialComparison:
 
 
 def compare_materials(measured: Material, reference: Material) -> MaterialComparison:
-    """`measured` beside `reference`, state by state by falling rate, band by band."""
+    """Compare two materials state by state, by falling rate, and band by band.
+
+    Two scales are free: k_e belongs to the light of one lamp, and Λ is relative. Each is multiplied
+    by the factor that brings `measured` closest to `reference`.
+
+    Parameters
+    ----------
+    measured
+        The material to judge.
+    reference
+        The material to compare with, such as the same in Table 1 of Nalbach et al.
+
+    Returns
+    -------
+    MaterialComparison
+        A pair of values for each quantity that one of the two materials has.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.material import compare_materials
+    >>> measured = labrig.read_material("material.yaml")
+    >>> comparison = compare_materials(measured, labrig.read_material("double-wide"))
+    >>> for pair in comparison.pairs[::2]:
+    ...     print(f"{pair.quantity}: {pair.measured:.3f} {pair.unit}, {pair.percent:+.1f} %")
+    k_r 1: 0.205 s⁻¹, +2.4 %
+    """
     notes = []
-    ours, theirs = _by_falling_rate(measured), _by_falling_rate(reference)
-    if len(ours) != len(theirs):
+    measured_states, reference_states = _by_falling_rate(measured), _by_falling_rate(reference)
+    if len(measured_states) != len(reference_states):
         notes.append(
-            f"{measured.name} has {len(ours)} states, {reference.name} {len(theirs)}: their rows "
-            "stand beside each other, but do not mean the same; fit as many (--states)."
+            f"{measured.name} has {len(measured_states)} states, {reference.name} "
+            f"{len(reference_states)}: their rows stand beside each other, but do not "
+            "mean the same; fit as many (--states)."
         )
     same_bands = measured.bands_nm == reference.bands_nm
     if not same_bands and measured.bands_nm is not None and reference.bands_nm is not None:
         notes.append("Their bands differ, so k_e and Λ are left out.")
     for symbol, name in (("k_e", "k_e_per_s"), ("Λ", "reradiation")):
-        if all(getattr(state, name) is None for state in ours):
+        if all(getattr(state, name) is None for state in measured_states):
             notes.append(f"{symbol} was not measured.")
-        if all(getattr(state, name) is None for state in theirs):
+        if all(getattr(state, name) is None for state in reference_states):
             notes.append(f"The reference has no {symbol}.")
-    k_e_factor = _closest(ours, theirs, "k_e_per_s") if same_bands else 1.0
-    factor = _closest(ours, theirs, "reradiation") if same_bands else 1.0
+    k_e_factor = _closest(measured_states, reference_states, "k_e_per_s") if same_bands else 1.0
+    reradiation_factor = (
+        _closest(measured_states, reference_states, "reradiation") if same_bands else 1.0
+    )
     pairs = []
-    for number in range(max(len(ours), len(theirs))):
-        one = ours[number] if number < len(ours) else None
-        other = theirs[number] if number < len(theirs) else None
-        label = f" {number + 1}" if max(len(ours), len(theirs)) > 1 else ""
-        pairs += _pairs(one, other, label, "k_r", "s⁻¹", "k_r_per_s")
-        pairs += _pairs(one, other, label, "r(0)", "", "r0")
+    for number in range(max(len(measured_states), len(reference_states))):
+        state = measured_states[number] if number < len(measured_states) else None
+        reference_state = reference_states[number] if number < len(reference_states) else None
+        label = f" {number + 1}" if max(len(measured_states), len(reference_states)) > 1 else ""
+        pairs += _pairs(state, reference_state, label, "k_r", "s⁻¹", "k_r_per_s")
+        pairs += _pairs(state, reference_state, label, "r(0)", "", "r0")
         if same_bands and measured.bands_nm is not None:
             bands = measured.bands_nm
-            pairs += _pairs(one, other, label, "k_e", "s⁻¹", "k_e_per_s", bands, k_e_factor)
-            pairs += _pairs(one, other, label, "Λ", "", "reradiation", bands, factor)
+            pairs += _pairs(
+                state, reference_state, label, "k_e", "s⁻¹", "k_e_per_s", bands, k_e_factor
+            )
+            pairs += _pairs(
+                state, reference_state, label, "Λ", "", "reradiation", bands, reradiation_factor
+            )
     return MaterialComparison(
-        (measured.name, reference.name), tuple(pairs), k_e_factor, factor, tuple(notes)
+        (measured.name, reference.name), tuple(pairs), k_e_factor, reradiation_factor, tuple(notes)
     )
 
 
@@ -98,21 +135,23 @@ def _by_falling_rate(material: Material) -> Sequence[State]:
     return sorted(material.states, key=lambda state: -state.k_r_per_s)
 
 
-def _closest(ours: Sequence[State], theirs: Sequence[State], name: str) -> float:
-    """The c for which Σ (c x − x')² over states and bands of `name` is least; 1 without any."""
-    both = [
-        (np.array(getattr(one, name)), np.array(getattr(other, name)))
-        for one, other in zip(ours, theirs, strict=False)
-        if getattr(one, name) is not None and getattr(other, name) is not None
+def _closest(
+    measured_states: Sequence[State], reference_states: Sequence[State], name: str
+) -> float:
+    """Return the c that minimises Σ (c x − x')² over states and bands of `name`; 1 without any."""
+    values = [
+        (np.array(getattr(state, name)), np.array(getattr(reference_state, name)))
+        for state, reference_state in zip(measured_states, reference_states, strict=False)
+        if getattr(state, name) is not None and getattr(reference_state, name) is not None
     ]
-    square = sum(float(one @ one) for one, _ in both)
-    product = sum(float(one @ other) for one, other in both)
+    square = sum(float(value @ value) for value, _ in values)
+    product = sum(float(value @ reference) for value, reference in values)
     return product / square if square > 0 and product > 0 else 1.0
 
 
 def _pairs(
-    one: State | None,
-    other: State | None,
+    state: State | None,
+    reference_state: State | None,
     label: str,
     symbol: str,
     unit: str,
@@ -120,16 +159,16 @@ def _pairs(
     bands: Sequence[float] = (),
     factor: float = 1.0,
 ) -> list[Pair]:
-    """The quantity `name` of two states, one pair or one for each band; none if neither has it."""
-    value, sigma = _values(one, name)
-    reference, reference_sigma = _values(other, name)
+    """Return `name` of two states as one pair or one per band; none if both lack it."""
+    value, sigma = _values(state, name)
+    reference, reference_sigma = _values(reference_state, name)
     if value is None and reference is None:
         return []
     count = len(value if value is not None else reference if reference is not None else ())
-    nothing = np.full(count, math.nan)
+    missing = np.full(count, math.nan)
     places = [f" {low:g}–{high:g} nm" for low, high in pairwise(bands)] or [""]
     columns = [
-        nothing if column is None else column * scale
+        missing if column is None else column * scale
         for column, scale in (
             (value, factor),
             (sigma, factor),
@@ -144,9 +183,11 @@ def _pairs(
 
 
 def _values(state: State | None, name: str) -> tuple[FloatArray | None, FloatArray | None]:
-    """Value and σ of a quantity of `state`, (1,) or (bands,), None where not known."""
-    found = (getattr(state, name, None), getattr(state, f"{name}_sigma", None))
-    value, sigma = (None if one is None else np.atleast_1d(np.array(one, float)) for one in found)
+    """Return value and σ of a quantity of `state`, shape (1,) or (bands,), None where not known."""
+    quantity = (getattr(state, name, None), getattr(state, f"{name}_sigma", None))
+    value, sigma = (
+        None if column is None else np.atleast_1d(np.array(column, float)) for column in quantity
+    )
     return value, sigma
 
 

@@ -1,4 +1,4 @@
-"""The material file: what labrig measures of a phosphor, and what a simulated sample is made of.
+"""The material file: the result of measuring a phosphor, and the definition of a simulated sample.
 
 A state i has the rates of Nalbach et al., eq. 1 and 3:
 dr/dt = (1 − r) Σ_j k_e,j E_j − k_r r, and radiance L_j = Σ_i Λ_i,j k_r,i r_i.
@@ -19,7 +19,7 @@ Rate = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 Concentration = Annotated[float, Field(ge=0, le=1)]
 Series = tuple[NotNegative, ...]
 
-#: What an uncertainty belongs to, field by field of a state.
+#: Fields of a state that may have an uncertainty.
 MEASURED = ("k_r_per_s", "amplitude", "r0", "k_e_per_s", "reradiation")
 
 
@@ -28,7 +28,7 @@ class _Part(BaseModel):
 
 
 class IrradianceNorm(_Part):
-    """How the irradiance E was scaled to which the excitation rates belong.
+    """Normalisation of the irradiance E to which the excitation rates belong.
 
     `vector_length`: the lamp's E, one number a band, was scaled to this Euclidean length; Table 1
     of the paper uses 1.
@@ -39,20 +39,20 @@ class IrradianceNorm(_Part):
 
 
 class State(_Part):
-    """One excited state. What was not measured is null; every σ is one standard deviation.
+    """One excited state: what was not measured is null; every σ is one standard deviation.
 
     Attributes
     ----------
     k_r_per_s
-        Re-radiation rate.
+        Re-radiation rate in 1/s.
     amplitude
-        a = Λ* k_r r(0), as the decay shows it, in the camera's or the fit's own unit.
+        Amplitude a = Λ* k_r r(0) of the decay, in the camera's or the fit's own unit.
     r0
-        Concentration at lamp-off to which `amplitude` belongs, 0 to 1.
+        Concentration at lamp off to which `amplitude` belongs, 0 to 1.
     k_e_per_s
-        Excitation rate of every band, per unit of the normalised irradiance. Length: bands.
+        Excitation rate of each band in 1/s per unit of the normalised irradiance.
     reradiation
-        Λ of every band, relative radiance. Length: bands.
+        Relative radiance Λ of each band.
     """
 
     k_r_per_s: Rate
@@ -83,7 +83,7 @@ class State(_Part):
 
 
 class Spectrum(_Part):
-    """Emission on a finer grid than the bands, largest value 1 (Λ* of section 4.3)."""
+    """Emission on a finer grid than the bands, with largest value 1 (Λ* of section 4.3)."""
 
     wavelength_nm: tuple[Rate, ...]
     value: Series
@@ -102,12 +102,13 @@ class Spectrum(_Part):
 
 
 class Provenance(_Part):
-    """Where the numbers come from.
+    """Origin of the numbers.
 
     Attributes
     ----------
     temperature_c
-        Mean while the glow was measured, in degrees Celsius: rates belong to it.
+        Mean temperature of the sample while its glow was measured, in degrees Celsius; the rates
+        depend on it.
     """
 
     source: str
@@ -124,9 +125,9 @@ class Material(_Part):
     Attributes
     ----------
     bands_nm
-        Edges of the bands, rising; one more than there are bands.
+        Rising edges of the bands in nm; one more than there are bands.
     irradiance_norm
-        Needed as soon as a state has excitation rates: without it they mean nothing.
+        Normalisation of the irradiance; required if a state has excitation rates.
     """
 
     name: Annotated[str, Field(min_length=1)]
@@ -158,18 +159,54 @@ class Material(_Part):
 
 
 def read_material(name_or_path: str | os.PathLike[str]) -> Material:
-    """The material in a file, or the shipped one of that name, such as `blue-paint`.
+    """Read a material from a file, or a shipped one by its name.
+
+    Parameters
+    ----------
+    name_or_path
+        Path of a material file, or the name of a shipped material such as `blue-paint`.
+
+    Returns
+    -------
+    Material
+        The validated material.
 
     Raises
     ------
     UsageError
-        No such material, or its file is malformed.
+        There is no such material, or its file is malformed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> material = labrig.read_material("material.yaml")
+    >>> [round(state.k_r_per_s, 3) for state in material.states]
+    [0.205, 0.01]
+    >>> labrig.read_material("blue-paint").bands_nm
+    (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
     """
     return read_model(resources.find("config/materials", "material", name_or_path), Material)
 
 
 def write_material(path: Path, material: Material) -> None:
-    """Write `material` so that `read_material` gives it back."""
+    """Write a material to a file that `read_material` reads.
+
+    Parameters
+    ----------
+    path
+        Path of the file, which is overwritten.
+    material
+        The material.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> material = labrig.read_material("blue-paint")
+    >>> labrig.write_material(Path("mine.yaml"), material.model_copy(update={"name": "mine"}))
+    >>> labrig.read_material("mine.yaml").name
+    'mine'
+    """
     write_yaml(path, material)
 
 

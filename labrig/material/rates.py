@@ -5,7 +5,7 @@ dr/dt = (1 − r) κ − k_r r  (Nalbach et al., eq. 1, κ = Σ_j k_e,j E_j). Wi
 
     r(τ) = r(0) e⁻ˣ + κ τ φ₁(x),      ∫₀^τ r dt = r(0) τ φ₁(x) + κ τ² φ₂(x),
 
-which keeps all digits also where x, κ or k_r vanish. All functions broadcast.
+which is accurate to all digits even where x, κ or k_r vanish. All functions broadcast.
 """
 
 import math
@@ -16,21 +16,55 @@ from numpy.typing import ArrayLike, NDArray
 
 FloatArray = NDArray[np.float64]
 
-#: Below this φ₂ is summed as a series: the difference 1 − φ₁ loses digits.
+#: Argument below which φ₂ is summed as a series: the difference 1 − φ₁ loses digits.
 _SERIES_BELOW = 0.5
-#: Σ (−x)ⁿ/(n + 2)!, highest power first; the first one left out is 2e-17 at 0.5.
+#: Σ (−x)ⁿ/(n + 2)!, highest power first; the first omitted term is 2e-17 at 0.5.
 _PHI2_SERIES = [(-1) ** n / math.factorial(n + 2) for n in range(13, -1, -1)]
 
 
 def phi1(x: ArrayLike) -> FloatArray:
-    """(1 − e⁻ˣ)/x for x ≥ 0; 1 at 0. Also the mean of e⁻ˣᵗ over t from 0 to 1."""
+    """Return φ₁(x) = (1 − e⁻ˣ)/x, the mean of e⁻ˣᵗ over t from 0 to 1.
+
+    Parameters
+    ----------
+    x
+        Arguments ≥ 0, of any shape.
+
+    Returns
+    -------
+    ndarray
+        Values in (0, 1] in the shape of `x`; 1 at 0.
+
+    Examples
+    --------
+    >>> from labrig.material import phi1
+    >>> phi1([0.0, 1e-12, 1.0, 50.0]).round(6).tolist()
+    [1.0, 1.0, 0.632121, 0.02]
+    """
     x = np.asarray(x, dtype=np.float64)
-    away = np.where(x == 0, 1.0, x)
-    return np.where(x == 0, 1.0, -np.expm1(-away) / away)
+    nonzero = np.where(x == 0, 1.0, x)
+    return np.where(x == 0, 1.0, -np.expm1(-nonzero) / nonzero)
 
 
 def phi2(x: ArrayLike) -> FloatArray:
-    """(1 − φ₁(x))/x for x ≥ 0; 1/2 at 0."""
+    """Return φ₂(x) = (1 − φ₁(x))/x.
+
+    Parameters
+    ----------
+    x
+        Arguments ≥ 0, of any shape.
+
+    Returns
+    -------
+    ndarray
+        Values in (0, 1/2] in the shape of `x`; 1/2 at 0.
+
+    Examples
+    --------
+    >>> from labrig.material import phi2
+    >>> phi2([0.0, 1e-12, 1.0, 50.0]).round(6).tolist()
+    [0.5, 0.5, 0.367879, 0.0196]
+    """
     x = np.asarray(x, dtype=np.float64)
     return _phi1_and_phi2(x, np.exp(-x))[1]
 
@@ -38,18 +72,31 @@ def phi2(x: ArrayLike) -> FloatArray:
 def exponential_means(
     rates_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray
 ) -> FloatArray:
-    """Mean of e^(−k t) over each exposure, e^(−k t)(1 − e^(−k T))/(k T); its limit where T = 0.
+    """Average e^(−k t) over each exposure.
+
+    The mean is e^(−k t) (1 − e^(−k T))/(k T), and its limit where T = 0.
 
     Parameters
     ----------
     rates_per_s
-        (m,) k > 0.
-    t_s, exposure_s
-        (n,) start t and length T ≥ 0 of the exposures.
+        Rates k > 0 in 1/s, shape (m,).
+    t_s
+        Begin t of each exposure in seconds after lamp off, shape (n,).
+    exposure_s
+        Length T ≥ 0 of each exposure in seconds, shape (n,).
 
     Returns
     -------
-    (n, m), in (0, 1] for t ≥ 0.
+    ndarray
+        Means in (0, 1] for t ≥ 0, shape (n, m).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.material import exponential_means
+    >>> t_s, exposure_s = np.array([0.0, 5.0]), np.array([0.5, 0.5])
+    >>> exponential_means(np.array([0.2, 0.01]), t_s, exposure_s).round(4).tolist()
+    [[0.9516, 0.9975], [0.3501, 0.9489]]
     """
     decayed: FloatArray = np.exp(-np.multiply.outer(t_s, rates_per_s))
     if not exposure_s.any():
@@ -58,22 +105,22 @@ def exponential_means(
     return decayed * phi1(x)
 
 
-def _phi1_and_phi2(x: FloatArray, left: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Both, of x and e⁻ˣ."""
-    near = x < _SERIES_BELOW
+def _phi1_and_phi2(x: FloatArray, exp_minus_x: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return φ₁ and φ₂ of x, given e⁻ˣ."""
+    small = x < _SERIES_BELOW
     series = np.polyval(_PHI2_SERIES, np.minimum(x, _SERIES_BELOW))
-    away = np.maximum(x, _SERIES_BELOW)
-    first = (1 - left) / away
-    return np.where(near, 1 - x * series, first), np.where(near, series, (1 - first) / away)
+    large = np.maximum(x, _SERIES_BELOW)
+    first = (1 - exp_minus_x) / large
+    return np.where(small, 1 - x * series, first), np.where(small, series, (1 - first) / large)
 
 
 class Relaxation(NamedTuple):
-    """What a time of constant light does to a concentration: r → kept r + gained.
+    """Step r(τ) = kept · r(0) + gained of the rate equation.
 
     Attributes
     ----------
     kept
-        e⁻ˣ, ∂r(τ)/∂r(0).
+        Fraction e⁻ˣ = ∂r(τ)/∂r(0) of the initial concentration.
     gained
         Concentration reached from 0.
     """
@@ -83,7 +130,15 @@ class Relaxation(NamedTuple):
 
 
 class RelaxationSlopes(NamedTuple):
-    """Derivatives of a `Relaxation`'s parts: of `kept` (by κ and by k_r alike), of `gained`."""
+    """Derivatives of a `Relaxation` in seconds.
+
+    Attributes
+    ----------
+    kept
+        Derivative of `kept`, equal by κ and by k_r.
+    gained_by_kappa, gained_by_k_r
+        Derivatives of `gained` by κ and by k_r.
+    """
 
     kept: FloatArray
     gained_by_kappa: FloatArray
@@ -91,14 +146,14 @@ class RelaxationSlopes(NamedTuple):
 
 
 def relaxation(kappa_per_s: ArrayLike, k_r_per_s: ArrayLike, duration_s: ArrayLike) -> Relaxation:
-    """The exact step.
+    """Return the exact step of the rate equation under constant light.
 
     Parameters
     ----------
     kappa_per_s, k_r_per_s
-        Excitation κ ≥ 0 and re-radiation rate k_r ≥ 0, constant meanwhile.
+        Excitation κ ≥ 0 and re-radiation rate k_r ≥ 0 in 1/s, constant during the step.
     duration_s
-        τ ≥ 0.
+        Duration τ ≥ 0 in seconds.
     """
     kappa, tau = np.asarray(kappa_per_s, dtype=np.float64), np.asarray(duration_s)
     x = (kappa + np.asarray(k_r_per_s)) * tau
@@ -108,7 +163,33 @@ def relaxation(kappa_per_s: ArrayLike, k_r_per_s: ArrayLike, duration_s: ArrayLi
 def relaxation_with_slopes(
     kappa_per_s: ArrayLike, k_r_per_s: ArrayLike, duration_s: ArrayLike
 ) -> tuple[Relaxation, RelaxationSlopes]:
-    """The same and its derivatives by the rates, from one exponential; φ₁' = φ₂ − φ₁."""
+    """Return the exact step of the rate equation under constant light, with its derivatives.
+
+    The derivatives follow from one exponential by φ₁' = φ₂ − φ₁. All arguments broadcast.
+
+    Parameters
+    ----------
+    kappa_per_s, k_r_per_s
+        Excitation κ ≥ 0 and re-radiation rate k_r ≥ 0 in 1/s, constant during the step.
+    duration_s
+        Duration τ ≥ 0 in seconds.
+
+    Returns
+    -------
+    step : Relaxation
+        Coefficients of r(τ) = kept · r(0) + gained.
+    slopes : RelaxationSlopes
+        Derivatives of the coefficients by κ and k_r, in seconds.
+
+    Examples
+    --------
+    >>> from labrig.material import relaxation_with_slopes
+    >>> step, slopes = relaxation_with_slopes(0.03, 0.01, 60.0)
+    >>> f"r(60 s) = {step.kept * 0.2 + step.gained:.4f} from r(0) = 0.2"
+    'r(60 s) = 0.7001 from r(0) = 0.2'
+    >>> f"dr/dκ = {slopes.kept * 0.2 + slopes.gained_by_kappa:.3f} s"
+    'dr/dκ = 8.677 s'
+    """
     kappa, tau = np.asarray(kappa_per_s, dtype=np.float64), np.asarray(duration_s)
     x = (kappa + np.asarray(k_r_per_s)) * tau
     kept = np.exp(-x)
@@ -121,7 +202,35 @@ def relaxation_with_slopes(
 def concentration(
     start: ArrayLike, kappa_per_s: ArrayLike, k_r_per_s: ArrayLike, duration_s: ArrayLike
 ) -> FloatArray:
-    """Concentration r after `duration_s` from r = `start`, between 0 and 1."""
+    """Return the concentration of a state after constant light or darkness.
+
+    The rate equation dr/dt = (1 − r) κ − k_r r (Nalbach et al., eq. 1) is solved exactly. All
+    arguments broadcast.
+
+    Parameters
+    ----------
+    start
+        Concentration at the begin, 0 to 1.
+    kappa_per_s, k_r_per_s
+        Excitation κ ≥ 0 and re-radiation rate k_r ≥ 0 in 1/s.
+    duration_s
+        Duration in seconds.
+
+    Returns
+    -------
+    ndarray
+        Concentration at the end, 0 to 1, in the broadcast shape.
+
+    Examples
+    --------
+    Charge for a minute, then decay for a minute:
+
+    >>> from labrig.material import concentration
+    >>> charged = concentration(0.0, kappa_per_s=0.03, k_r_per_s=0.01, duration_s=60.0)
+    >>> decayed = concentration(charged, kappa_per_s=0.0, k_r_per_s=0.01, duration_s=60.0)
+    >>> f"{charged:.4f} {decayed:.4f}"
+    '0.6820 0.3743'
+    """
     step = relaxation(kappa_per_s, k_r_per_s, duration_s)
     after: FloatArray = step.kept * np.asarray(start) + step.gained
     return after
@@ -130,7 +239,7 @@ def concentration(
 def concentration_integral(
     start: ArrayLike, kappa_per_s: ArrayLike, k_r_per_s: ArrayLike, duration_s: ArrayLike
 ) -> FloatArray:
-    """∫ r dt over `duration_s`, in seconds; what a photograph of that length collects."""
+    """Return ∫ r dt over `duration_s`, in seconds: the signal of an exposure of that length."""
     kappa, tau = np.asarray(kappa_per_s, dtype=np.float64), np.asarray(duration_s)
     x = (kappa + np.asarray(k_r_per_s)) * tau
     total: FloatArray = np.asarray(start) * tau * phi1(x) + kappa * tau**2 * phi2(x)
@@ -138,7 +247,7 @@ def concentration_integral(
 
 
 def equilibrium(kappa_per_s: ArrayLike, k_r_per_s: ArrayLike) -> FloatArray:
-    """r∞ = κ/(κ + k_r), which constant light leads to; 0 without light."""
+    """Return the concentration r∞ = κ/(κ + k_r) under constant light; 0 without light."""
     kappa = np.asarray(kappa_per_s, dtype=np.float64)
     total = kappa + np.asarray(k_r_per_s)
     return np.where(total > 0, kappa / np.where(total > 0, total, 1.0), 0.0)

@@ -1,4 +1,4 @@
-"""Spectra and what light passes on its way to a number."""
+"""Spectra and the optical elements between light and camera signal."""
 
 from labrig.optics.camera import (
     CHANNELS,

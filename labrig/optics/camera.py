@@ -16,9 +16,9 @@ from labrig.optics.spectrum import check_curve
 
 CHANNELS = ("R", "G", "B")
 MONOCHROME = ("L",)
-#: What is called "a little below zero" in measured curves: noise of the measurement.
+#: Lowest value of a measured curve, relative to its maximum, that counts as noise.
 _NOISE_BELOW_ZERO = -0.05
-#: Suffixes of tables; names shipped with labrig have none.
+#: Suffixes of tables; names of shipped cameras have none.
 _TABLES = (".csv", ".dat", ".txt")
 
 
@@ -29,15 +29,15 @@ class CameraResponse:
     Parameters
     ----------
     name
-        Maker and model.
+        Maker and model of the camera.
     wavelength_nm
-        Shape (n,), rising.
+        Rising wavelengths in nm, shape (n,).
     sensitivity
-        Shape (n, channels), the highest of all 1. How high the channels stand relative to each
-        other is kept: it is what links raw numbers, not white balanced, to colours. Straight lines
-        in between, zero outside.
+        Sensitivities, shape (n, channels), the highest value of all 1, piecewise linear in between
+        and zero outside. The ratios between channels are kept: they link raw signals, which are not
+        white balanced, to colours.
     channels
-        Their names.
+        Names of the channels.
     """
 
     name: str
@@ -46,39 +46,57 @@ class CameraResponse:
     channels: tuple[str, ...] = CHANNELS
 
     def response(self, spectrum: FloatArray) -> FloatArray:
-        """Camera values of a spectrum given at `wavelength_nm`, shape (channels,), relative."""
+        """Return the relative signal of a spectrum given at `wavelength_nm`, shape (channels,)."""
         values: FloatArray = (spectrum * np.gradient(self.wavelength_nm)) @ self.sensitivity
         return values
 
     def at(self, wavelength_nm: ArrayLike) -> FloatArray:
-        """Sensitivity at (q,) wavelengths, shape (q, channels)."""
-        wanted = np.asarray(wavelength_nm, dtype=np.float64)
+        """Return the sensitivity at (q,) wavelengths in nm, shape (q, channels)."""
+        target_nm = np.asarray(wavelength_nm, dtype=np.float64)
         return np.stack(
             [
-                np.interp(wanted, self.wavelength_nm, column, left=0.0, right=0.0)
+                np.interp(target_nm, self.wavelength_nm, column, left=0.0, right=0.0)
                 for column in self.sensitivity.T
             ],
             axis=1,
         )
 
     def in_bands(self, edges_nm: ArrayLike) -> FloatArray:
-        """Mean over each band between neighbouring `edges_nm`, shape (edges − 1, channels)."""
+        """Average the sensitivity between neighbouring `edges_nm`, shape (edges − 1, channels)."""
         return band_means(self.wavelength_nm, self.sensitivity, edges_nm)
 
 
 def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
-    """The shipped camera of that name, or the one in a file.
+    """Read the spectral sensitivity of a colour camera, by its shipped name or from a file.
 
     Parameters
     ----------
     name_or_path
-        Such as `canon_eos_5d_mark_ii`, or a path: rawtoaces' JSON, or a table in CSV with
-        `wavelength_nm,R,G,B` or, as Jiang et al. have it, those four columns without a header.
+        Name of a shipped camera such as `canon_eos_5d_mark_ii`, or the path of a file: JSON as
+        rawtoaces writes it, or a CSV table with the columns `wavelength_nm,R,G,B`, or those four
+        columns without a header (Jiang et al. 2013).
+
+    Returns
+    -------
+    CameraResponse
+        Relative sensitivities of R, G and B; the highest value of all is 1.
 
     Raises
     ------
     UsageError
-        No such camera, or its file is malformed.
+        There is no such camera, or its file is malformed.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> camera = labrig.read_camera("canon_eos_5d_mark_ii")
+    >>> camera.name
+    'Canon EOS 5D Mark II'
+    >>> camera.sensitivity.max(axis=0).round(2).tolist()
+    [0.54, 1.0, 0.9]
+    >>> peak = camera.sensitivity.argmax(axis=0)
+    >>> camera.wavelength_nm[peak].tolist()
+    [600.0, 520.0, 460.0]
     """
     file = read_curve_file(camera_path(name_or_path))
     if set(file.curves) != set(CHANNELS):
@@ -86,34 +104,75 @@ def read_camera(name_or_path: str | os.PathLike[str]) -> CameraResponse:
             f"{file.path}: expected the channels R, G and B, the channels are "
             f"{', '.join(list(file.curves)[:6])}; a monochrome camera is read as such"
         )
-    return checked(file.path, lambda known: _camera(known, CHANNELS), file)
+    return checked(file.path, lambda curve_file: _camera(curve_file, CHANNELS), file)
 
 
 def read_monochrome_camera(
     path: str | os.PathLike[str], curve: str | None = None
 ) -> CameraResponse:
-    """A camera without colours, from a file as `read_spectrum` takes it.
+    r"""Read the spectral sensitivity of a monochrome camera from a file.
+
+    Parameters
+    ----------
+    path
+        Path of a curve file in any format of `read_curve_file`.
+    curve
+        Name of the curve in the file; not needed where there is only one.
+
+    Returns
+    -------
+    CameraResponse
+        Relative sensitivity of the channel `L`, with maximum 1.
 
     Raises
     ------
     UsageError
-        The file or the name of the curve is no good.
+        The file is malformed, or it has no curve of that name.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_monochrome_camera
+    >>> _ = Path("mono.csv").write_text("wavelength_nm,value\n400,0.2\n550,0.6\n700,0.3\n")
+    >>> camera = read_monochrome_camera("mono.csv")
+    >>> camera.channels, camera.at([550, 625]).round(2).ravel().tolist()
+    (('L',), [1.0, 0.75])
     """
     file = read_curve_file(path)
     name, columns = file.pick(curve)
-    one = CurveFile(file.path, file.title, {name: columns})
-    return checked(file.path, lambda known: _camera(known, (name,)), one)
+    selected = CurveFile(file.path, file.title, {name: columns})
+    return checked(file.path, lambda curve_file: _camera(curve_file, (name,)), selected)
 
 
 def read_sound_curves(
     name_or_path: str | os.PathLike[str], names: Sequence[str] | None = None
 ) -> CurveFile:
-    """A file with the curves of some names, all of them sound.
+    """Read curves from a file and check each of them.
+
+    Parameters
+    ----------
+    name_or_path
+        Name of a shipped camera, or the path of a curve file.
+    names
+        Names of the curves to keep; all curves by default.
+
+    Returns
+    -------
+    CurveFile
+        The file with the selected curves.
 
     Raises
     ------
     UsageError
-        No such file or curve, or a curve that makes no sense.
+        There is no such file or curve, or a curve has wavelengths that do not rise or values that
+        are not finite.
+
+    Examples
+    --------
+    >>> from labrig.optics import read_sound_curves
+    >>> file = read_sound_curves("canon_eos_5d_mark_ii", ["G"])
+    >>> list(file.curves), len(file.curves["G"].wavelength_nm)
+    (['G'], 81)
     """
     file = read_curve_file(camera_path(name_or_path))
     if names:
@@ -124,7 +183,7 @@ def read_sound_curves(
 
 
 def camera_path(name_or_path: str | os.PathLike[str]) -> Path:
-    """File of a shipped camera, or the path as given."""
+    """Return the file of a shipped camera, or the path as given."""
     path = Path(name_or_path)
     if path.suffix.lower() in _TABLES:
         return path
@@ -132,6 +191,7 @@ def camera_path(name_or_path: str | os.PathLike[str]) -> Path:
 
 
 def _camera(file: CurveFile, names: tuple[str, ...]) -> CameraResponse:
+    """Check curves and scale them to a maximum of 1."""
     curves = [file.curves[name] for name in names]
     wavelength_nm, values = curves[0].wavelength_nm, np.stack([c.value for c in curves], axis=1)
     check_curve(wavelength_nm, values, None)

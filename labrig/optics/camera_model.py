@@ -1,4 +1,4 @@
-"""How one body and lens turn light and settings into numbers: what a reduction applies."""
+"""Model of how a camera body and lens turn light and settings into signal, used by a reduction."""
 
 import math
 from typing import Annotated, Self
@@ -14,9 +14,9 @@ from labrig.region import Region, region_pixels
 FloatArray = NDArray[np.float64]
 Numbers = tuple[Finite, ...]
 
-#: Two settings are the same if they differ by less: a Canon's dial says 1/60 s for 1/64 s.
+#: Relative difference below which settings are the same: a Canon's dial shows 1/60 s for 1/64 s.
 SAME_SETTING = 0.02
-#: Points across a region whose mean is taken.
+#: Number of points along each side of a region over which a flat field is averaged.
 POINTS = 24
 
 
@@ -25,22 +25,24 @@ class _Part(BaseModel):
 
 
 class Flat(_Part):
-    """1 + Σ_k c_k ρ^(2k), k = 1, 2 …, ρ the distance from the middle over half the diagonal.
+    """Flat field 1 + Σ_k c_k ρ^(2k), k = 1, 2 …, ρ the distance from the centre per half diagonal.
 
-    What is even about the middle is the lens's. The odd part, `gradient`, is the lamp's: it is
-    kept for the record and not divided out. An even part of the lamp's light cannot be told from
-    the lens's.
+    The part even about the centre is taken for the lens's vignetting. The odd part, `gradient`, is
+    the lamp's: it is recorded, not divided out. An even part of the lamp's illumination cannot be
+    distinguished from the lens's vignetting.
 
     Attributes
     ----------
     f_number
-        Null for a lens that does not tell it.
+        The f-number; null for a lens that does not report it.
     falloff
-        c_k, a row for each channel.
+        Coefficients c_k, a row for each channel.
     gradient
-        Of the lit card along x and y, over half the diagonal, a row for each channel.
+        Relative slope of the illuminated card's signal along x and y, per half diagonal, a row for
+        each channel.
     sigma
-        What the card's light and these numbers differ by, relative, from place to place.
+        Relative scatter between the card's signal and this model over the frame, one standard
+        deviation.
     """
 
     f_number: Annotated[float, Field(gt=0)] | None
@@ -57,14 +59,14 @@ class Flat(_Part):
         return self
 
     def at(self, rho2: ArrayLike) -> FloatArray:
-        """At squared distances (…,) from the middle, shape (…, channels)."""
+        """Return the flat field at squared distances ρ² (…,), shape (…, channels)."""
         squared = np.asarray(rho2, dtype=np.float64)
         powers = squared[..., None] ** np.arange(1, len(self.falloff[0]) + 1)
         result: FloatArray = 1 + powers @ np.array(self.falloff).T
         return result
 
     def mean(self, region: Region, width: int, height: int) -> FloatArray:
-        """Over a region of a frame of `width` × `height` pixels, shape (channels,)."""
+        """Average the flat field over a region of a `width` × `height` frame, shape (channels,)."""
         left, top, wide, high = region_pixels(region, width, height)
         steps = (np.arange(POINTS) + 0.5) / POINTS
         x, y = np.meshgrid(left + steps * wide, top + steps * high)
@@ -73,7 +75,7 @@ class Flat(_Part):
 
 
 class Factor(_Part):
-    """What a setting does over what its label says, and one standard deviation."""
+    """Actual over nominal effect of a setting, with one standard deviation."""
 
     setting: Positive
     factor: Positive
@@ -81,22 +83,22 @@ class Factor(_Part):
 
 
 class CameraModel(_Part):
-    """A body and a lens, calibrated.
+    """A calibrated camera body and lens.
 
     Attributes
     ----------
     iso, f_number
-        Settings at which all factors are 1; `f_number` is null for a lens that does not tell it.
+        Settings at which all factors are 1; `f_number` is null for a lens that does not report it.
     channels
-        Of the sensor.
+        Names of the sensor's channels.
     shutter
-        True shutter time over the one the camera tells, by the latter in s. 1 at the longest.
+        Actual over nominal exposure time, by the nominal one in s; 1 at the longest.
     iso_gain
-        Signal of the same light over that at `iso` times the ratio of the labels.
+        Signal of the same light over that at `iso` times the ratio of the nominal values.
     aperture
-        Light over that at `f_number` times the squared ratio of the labels.
+        Light over that at `f_number` times the squared ratio of the nominal values.
     flats
-        By f-number.
+        Flat fields, one for each f-number.
     """
 
     iso: Positive
@@ -107,43 +109,50 @@ class CameraModel(_Part):
     aperture: tuple[Factor, ...] = ()
     flats: Annotated[tuple[Flat, ...], Field(min_length=1)]
 
-    def exposure_s(self, told_s: float) -> tuple[float, float]:
-        """True shutter time of one the camera tells, and its relative σ.
+    def exposure_s(self, nominal_s: float) -> tuple[float, float]:
+        """Return the actual exposure time of a nominal one in s, and its relative σ.
 
-        Between two that were measured straight in the logarithm; beyond the longest as the camera
-        tells, since a shutter's error is of milliseconds; below the shortest as that.
+        The factor is interpolated in the logarithm of the nominal time and constant below the
+        shortest calibrated one. Beyond the longest one the nominal time holds, since a shutter's
+        error is of milliseconds.
         """
         if not self.shutter:
-            return told_s, 0.0
-        told = np.log([one.setting for one in self.shutter])
-        at = math.log(told_s)
+            return nominal_s, 0.0
+        log_nominal = np.log([factor.setting for factor in self.shutter])
+        log_time = math.log(nominal_s)
         longest = self.shutter[-1].setting
-        sigma = float(np.interp(at, told, [one.sigma for one in self.shutter]))
-        if told_s > longest * (1 + SAME_SETTING):
-            return told_s, sigma * longest / told_s
-        return told_s * float(np.interp(at, told, [one.factor for one in self.shutter])), sigma
+        sigma = float(np.interp(log_time, log_nominal, [factor.sigma for factor in self.shutter]))
+        if nominal_s > longest * (1 + SAME_SETTING):
+            return nominal_s, sigma * longest / nominal_s
+        return nominal_s * float(
+            np.interp(log_time, log_nominal, [factor.factor for factor in self.shutter])
+        ), sigma
 
     def scale(self, iso: float, f_number: float | None) -> tuple[float, float]:
-        """Signal of some light at those settings over that at the file's own, and its relative σ.
+        """Return the signal at these settings over that at the model's own, and its relative σ.
 
-        The σ is common to all frames at those settings. A setting that was not calibrated counts
-        by its label.
+        The σ is common to all frames at these settings. A setting that was not calibrated takes its
+        nominal value.
         """
-        gain, gain_sigma = _found(self.iso_gain, iso)
+        gain, gain_sigma = _factor_at(self.iso_gain, iso)
         scale, sigma = gain * iso / self.iso, gain_sigma
         if f_number is not None and self.f_number is not None:
-            light, light_sigma = _found(self.aperture, f_number)
+            light, light_sigma = _factor_at(self.aperture, f_number)
             scale *= light * (self.f_number / f_number) ** 2
             sigma = math.hypot(sigma, light_sigma)
         return scale, sigma
 
     def flat(self, f_number: float | None, region: Region, width: int, height: int) -> FloatArray:
-        """Light in a region over that in the middle of the lens, (channels,).
+        """Return the light in a region over that at the centre of the lens, shape (channels,).
 
         Parameters
         ----------
+        f_number
+            The f-number; None for a lens that does not report it.
+        region
+            Region of the frame.
         width, height
-            Of the frame, in pixels.
+            Width and height of the frame in pixels.
 
         Raises
         ------
@@ -156,29 +165,69 @@ class CameraModel(_Part):
         return flat.mean(region, width, height)
 
     def flat_at(self, f_number: float | None) -> Flat | None:
-        """The flat field of an aperture; None if it was not calibrated."""
-        return next((flat for flat in self.flats if _same(flat.f_number, f_number)), None)
+        """Return the flat field of an aperture, or None if it was not calibrated."""
+        return next((flat for flat in self.flats if _is_same(flat.f_number, f_number)), None)
 
 
 def rho_squared(x: FloatArray, y: FloatArray, width: int, height: int) -> FloatArray:
-    """ρ² of places in pixels."""
+    """Return ρ², the squared distance from the image centre over that of a corner.
+
+    Parameters
+    ----------
+    x, y
+        Positions in pixels from the upper left corner, of any shape.
+    width, height
+        Width and height of the frame in pixels.
+
+    Returns
+    -------
+    ndarray
+        Values of ρ², in the shape of `x`: 0 at the centre, 1 in the corners.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import rho_squared
+    >>> x, y = np.array([320, 640, 640]), np.array([240, 240, 480])
+    >>> rho_squared(x, y, 640, 480).round(3).tolist()
+    [0.0, 0.64, 1.0]
+    """
     across, down = x - width / 2, y - height / 2
     return (across**2 + down**2) / ((width / 2) ** 2 + (height / 2) ** 2)
 
 
-def _found(factors: tuple[Factor, ...], setting: float) -> tuple[float, float]:
-    for one in factors:
-        if _same(one.setting, setting):
-            return one.factor, one.sigma
+def _factor_at(factors: tuple[Factor, ...], setting: float) -> tuple[float, float]:
+    for factor in factors:
+        if _is_same(factor.setting, setting):
+            return factor.factor, factor.sigma
     return 1.0, 0.0
 
 
-def _same(one: float | None, other: float | None) -> bool:
-    if one is None or other is None:
-        return one is other
-    return abs(math.log(one / other)) < SAME_SETTING
+def _is_same(first: float | None, second: float | None) -> bool:
+    if first is None or second is None:
+        return first is second
+    return abs(math.log(first / second)) < SAME_SETTING
 
 
 def stop_text(f_number: float | None) -> str:
-    """An aperture in words."""
+    """Format an aperture for messages and reports.
+
+    Parameters
+    ----------
+    f_number
+        The f-number; None for a lens that does not report it.
+
+    Returns
+    -------
+    str
+        The aperture, such as `f/4`.
+
+    Examples
+    --------
+    >>> from labrig.optics import stop_text
+    >>> stop_text(5.6)
+    'f/5.6'
+    >>> stop_text(None)
+    'an unknown aperture'
+    """
     return "an unknown aperture" if f_number is None else f"f/{f_number:g}"

@@ -1,8 +1,8 @@
-"""Files of measured curves, whatever their format: named curves over wavelength.
+"""Files of measured curves in several formats: named curves over wavelength.
 
-Read are JSON of rawtoaces, of LSPDD and of a gel catalogue (color-filter-sds), and tables in text:
-`wavelength_nm` and a column a curve, `name,wavelength_nm,value` one below the other, and without a
-header wavelength and R, G, B (Jiang et al. 2013) or wavelength and value.
+Supported formats are JSON of rawtoaces, of LSPDD and of a gel catalogue (color-filter-sds), and
+text tables: `wavelength_nm` followed by one column per curve, `name,wavelength_nm,value` in long
+form, and without a header wavelength and R, G, B (Jiang et al. 2013) or wavelength and value.
 """
 
 import csv
@@ -23,7 +23,7 @@ from labrig.yaml_file import did_you_mean
 
 #: Wavelengths, values and σ of a curve.
 Columns: TypeAlias = tuple[FloatArray, FloatArray, FloatArray | None]
-#: Name → columns; the only curve of a file without names is called "".
+#: Columns by the name of the curve; the only curve of a file without names is called "".
 Curves: TypeAlias = dict[str, Columns]
 
 WAVELENGTH = "wavelength_nm"
@@ -32,17 +32,17 @@ _EXPECTED_TEXT = (
     "expected a header that begins with wavelength_nm or name,wavelength_nm; or, without a header, "
     "wavelength and value, or wavelength, R, G and B"
 )
-#: Wavelengths of a table in µm or in Hz lie outside.
+#: Range of wavelengths in nm, which excludes tables in µm or in Hz.
 PLAUSIBLE_NM = (100.0, 20_000.0)
 
 
 def curves_from_text(text: str) -> tuple[str, Curves]:
-    """Title (may be empty) and name → columns.
+    """Return the title, which may be empty, and the curves of a table by name.
 
     Raises
     ------
     ValueError
-        Not such a table.
+        The text is no such table.
     """
     lines = [line for line in text.splitlines() if line.strip()]
     rows = _rows([line for line in lines if not line.startswith("#")])
@@ -51,16 +51,16 @@ def curves_from_text(text: str) -> tuple[str, Curves]:
     if _is_number(header[0]):
         if len(header) not in _UNNAMED:
             raise ValueError(f"{_EXPECTED_TEXT}; got {len(header)} columns")
-        return title, _side_by_side(_UNNAMED[len(header)], rows)
+        return title, _from_columns(_UNNAMED[len(header)], rows)
     if header[0] == WAVELENGTH and len(header) > 1:
-        return title, _side_by_side(tuple(header[1:]), rows[1:])
+        return title, _from_columns(tuple(header[1:]), rows[1:])
     if header[:2] == ["name", WAVELENGTH] and len(header) == 3:
-        return title, _one_below_the_other(rows[1:])
+        return title, _from_long_form(rows[1:])
     raise ValueError(f"{_EXPECTED_TEXT}; got '{','.join(header[:3])}'")
 
 
 def sorted_columns(wavelength_nm: FloatArray, values: FloatArray) -> Columns:
-    """Rows sorted by wavelength, no σ."""
+    """Return rows sorted by wavelength, without σ."""
     order = np.argsort(wavelength_nm, kind="stable")
     return wavelength_nm[order], values[order], None
 
@@ -75,18 +75,18 @@ def _rows(lines: list[str]) -> list[list[str]]:
     except csv.Error as error:
         raise ValueError(f"not a table ({error})") from None
     rows = [[cell.strip() for cell in row] for row in rows]
-    odd = next((number for number, row in enumerate(rows) if len(row) != len(rows[0])), None)
-    if odd is not None:
+    ragged = next((number for number, row in enumerate(rows) if len(row) != len(rows[0])), None)
+    if ragged is not None:
         raise ValueError(
-            f"row {odd + 1} has {len(rows[odd])} columns, the first has {len(rows[0])}"
+            f"row {ragged + 1} has {len(rows[ragged])} columns, the first has {len(rows[0])}"
         )
     return rows
 
 
-def _side_by_side(names: tuple[str, ...], rows: list[list[str]]) -> Curves:
+def _from_columns(names: tuple[str, ...], rows: list[list[str]]) -> Curves:
     if len(set(names)) < len(names):
-        twice = next(name for name in names if names.count(name) > 1)
-        raise ValueError(f"the column '{twice}' stands twice")
+        duplicate = next(name for name in names if names.count(name) > 1)
+        raise ValueError(f"the column '{duplicate}' stands twice")
     table = _numbers(rows)
     wavelength_nm, values, _ = sorted_columns(table[:, 0], table[:, 1:])
     if names in (("value",), ("value", "sigma")):
@@ -95,11 +95,11 @@ def _side_by_side(names: tuple[str, ...], rows: list[list[str]]) -> Curves:
     return {name: (wavelength_nm, values[:, k], None) for k, name in enumerate(names)}
 
 
-def _one_below_the_other(rows: list[list[str]]) -> Curves:
-    of_name: dict[str, list[list[str]]] = {}
+def _from_long_form(rows: list[list[str]]) -> Curves:
+    rows_by_name: dict[str, list[list[str]]] = {}
     for row in rows:
-        of_name.setdefault(row[0], []).append(row[1:])
-    tables = {name: _numbers(part) for name, part in of_name.items()}
+        rows_by_name.setdefault(row[0], []).append(row[1:])
+    tables = {name: _numbers(part) for name, part in rows_by_name.items()}
     return {name: sorted_columns(table[:, 0], table[:, 1]) for name, table in tables.items()}
 
 
@@ -131,12 +131,12 @@ _EXPECTED_JSON = (
 
 
 def curves_from_json(content: Any) -> tuple[str, Curves]:
-    """Title (may be empty) and name → columns.
+    """Return the title, which may be empty, and the curves of JSON content by name.
 
     Raises
     ------
     ValueError
-        None of the formats.
+        The content has none of the formats.
     """
     if isinstance(content, dict) and isinstance(content.get("spectraldata"), str):
         return _lspdd(content)
@@ -156,7 +156,7 @@ def _lspdd(content: dict[str, Any]) -> tuple[str, Curves]:
 
 
 def _gels(filters: dict[str, Any]) -> Curves:
-    """Those of which there is a spectrum."""
+    """Return the gels that have a spectrum."""
     return {
         name: _columns(gel["sd"])
         for name, gel in filters.items()
@@ -200,19 +200,19 @@ def _columns(table: dict[str, Any]) -> Columns:
 
 
 def _entry(content: dict[str, Any], section: str, key: str) -> Any:
-    """`content[section][key]`, None if it is not there."""
+    """Return `content[section][key]`, or None if it is missing."""
     part = content.get(section)
     return part.get(key) if isinstance(part, dict) else None
 
 
 T = TypeVar("T")
 
-#: Names listed in a message.
+#: Largest number of names listed in a message.
 LISTED = 8
 
 
 class Curve(NamedTuple):
-    """What a file says of one curve, sorted by wavelength, otherwise unchecked."""
+    """One curve of a file, sorted by wavelength, otherwise unchecked."""
 
     wavelength_nm: FloatArray
     value: FloatArray
@@ -221,16 +221,16 @@ class Curve(NamedTuple):
 
 @dataclass(frozen=True, eq=False)
 class CurveFile:
-    """A file's curves.
+    """Curves of a file.
 
     Attributes
     ----------
     path
-        Where it lies.
+        Path of the file.
     title
-        Maker and model, or what else the file calls itself; else its name.
+        Maker and model or another title in the file; else the file's name.
     curves
-        Name → curve, in the file's order.
+        Curves by name, in the file's order.
     """
 
     path: Path
@@ -238,91 +238,154 @@ class CurveFile:
     curves: Mapping[str, Curve]
 
     def pick(self, name: str | None) -> tuple[str, Curve]:
-        """The curve of a name, or the only one.
+        """Return the name and the curve of that name, or of the only one.
 
         Raises
         ------
         UsageError
-            No such curve, or several and no name.
+            There is no such curve, or there are several and no name is given.
         """
         if name is None:
             if len(self.curves) == 1:
                 return next(iter(self.curves.items()))
-            some = ", ".join(list(self.curves)[:LISTED])
-            more = ", …" if len(self.curves) > LISTED else ""
+            listed = ", ".join(list(self.curves)[:LISTED])
+            ellipsis = ", …" if len(self.curves) > LISTED else ""
             raise UsageError(
-                f"{self.path}: expected one curve, got {len(self.curves)} ({some}{more}); name one"
+                f"{self.path}: expected one curve, got {len(self.curves)} "
+                f"({listed}{ellipsis}); name one"
             )
         if name not in self.curves:
-            known = list(self.curves)
+            names = list(self.curves)
             hint = (
-                did_you_mean(name, known)
-                if len(known) <= LISTED or _close(name, known)
-                else (f"it has {len(known)}, such as {', '.join(known[:LISTED])}")
+                did_you_mean(name, names)
+                if len(names) <= LISTED or _has_close_match(name, names)
+                else (f"it has {len(names)}, such as {', '.join(names[:LISTED])}")
             )
             raise UsageError(f"{self.path}: no curve is called '{name}'; {hint}")
         return name, self.curves[name]
 
 
 def read_curve_file(path: str | os.PathLike[str]) -> CurveFile:
-    """All curves of a file.
-
-    Raises
-    ------
-    UsageError
-        It cannot be read, or is none of the formats.
-    """
-    place = Path(path)
-    text = read_text(place)
-    if place.suffix.lower() == ".json":
-        try:
-            content = json.loads(text)
-        except (ValueError, RecursionError) as error:
-            raise UsageError(f"{place}: not JSON ({' '.join(str(error).split())})") from None
-        title, curves = checked(place, curves_from_json, content)
-    else:
-        title, curves = checked(place, curves_from_text, text)
-    sorted_curves = {(name or place.stem): Curve(*columns) for name, columns in curves.items()}
-    return CurveFile(place, title or place.stem, sorted_curves)
-
-
-def read_spectrum(path: str | os.PathLike[str], name: str | None = None) -> Spectrum:
-    """A lamp, an emission … from a file.
+    r"""Read all curves of a file.
 
     Parameters
     ----------
     path
-        A file as `read_curve_file` takes it.
-    name
-        Which of its curves; not needed where there is only one.
+        Path of a JSON file (rawtoaces, LSPDD, color-filter-sds) or of a text table.
+
+    Returns
+    -------
+    CurveFile
+        The curves by name, each sorted by wavelength, otherwise unchecked.
 
     Raises
     ------
     UsageError
-        The file, the name or the curve is no good.
+        The file cannot be read, or it has none of these formats.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_curve_file
+    >>> _ = Path("leds.csv").write_text("wavelength_nm,blue,red\n450,1,0\n550,0.1,0.2\n650,0,1\n")
+    >>> file = read_curve_file("leds.csv")
+    >>> file.title, list(file.curves)
+    ('leds', ['blue', 'red'])
+    >>> file.curves["red"].value.tolist()
+    [0.0, 0.2, 1.0]
+    """
+    file_path = Path(path)
+    text = read_text(file_path)
+    if file_path.suffix.lower() == ".json":
+        try:
+            content = json.loads(text)
+        except (ValueError, RecursionError) as error:
+            raise UsageError(f"{file_path}: not JSON ({' '.join(str(error).split())})") from None
+        title, curves = checked(file_path, curves_from_json, content)
+    else:
+        title, curves = checked(file_path, curves_from_text, text)
+    sorted_curves = {(name or file_path.stem): Curve(*columns) for name, columns in curves.items()}
+    return CurveFile(file_path, title or file_path.stem, sorted_curves)
+
+
+def read_spectrum(path: str | os.PathLike[str], name: str | None = None) -> Spectrum:
+    r"""Read the spectrum of a lamp, an emission … from a file.
+
+    Parameters
+    ----------
+    path
+        Path of a curve file in any format of `read_curve_file`.
+    name
+        Name of the curve in the file; not needed where there is only one.
+
+    Returns
+    -------
+    Spectrum
+        The checked curve, with σ where the file has it.
+
+    Raises
+    ------
+    UsageError
+        The file is malformed, has no curve of that name, or the curve is invalid.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_spectrum
+    >>> _ = Path("lamp.csv").write_text("wavelength_nm,value\n400,0.5\n500,1.0\n600,1.2\n")
+    >>> lamp = read_spectrum("lamp.csv")
+    >>> lamp.name, lamp.at([450, 550, 700]).round(3).tolist()
+    ('lamp', [0.75, 1.1, 0.0])
     """
     file = read_curve_file(path)
-    found, curve = file.pick(name)
-    return checked(f"{file.path}: {found}", lambda c: Spectrum(found, *c), curve)
+    curve_name, curve = file.pick(name)
+    return checked(f"{file.path}: {curve_name}", lambda c: Spectrum(curve_name, *c), curve)
 
 
 def read_transmittance(path: str | os.PathLike[str], name: str | None = None) -> Transmittance:
-    """A filter or a grey card from a file; parameters and errors as `read_spectrum`."""
+    r"""Read the transmittance of a filter or the reflectance of a grey card from a file.
+
+    Parameters
+    ----------
+    path
+        Path of a curve file in any format of `read_curve_file`.
+    name
+        Name of the curve in the file; not needed where there is only one.
+
+    Returns
+    -------
+    Transmittance
+        The checked curve of fractions from 0 to 1.
+
+    Raises
+    ------
+    UsageError
+        The file is malformed, has no curve of that name, or its values are no fractions.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_transmittance
+    >>> _ = Path("card.csv").write_text("wavelength_nm,value\n400,0.17\n500,0.18\n700,0.18\n")
+    >>> card = read_transmittance("card.csv")
+    >>> card.at([450, 800]).round(3).tolist()
+    [0.175, 0.18]
+    """
     file = read_curve_file(path)
-    found, curve = file.pick(name)
-    return checked(f"{file.path}: {found}", lambda c: Transmittance(found, *c), curve)
+    curve_name, curve = file.pick(name)
+    return checked(f"{file.path}: {curve_name}", lambda c: Transmittance(curve_name, *c), curve)
 
 
 ContentT = TypeVar("ContentT")
 
 
 def checked(place: object, make: Callable[[ContentT], T], content: ContentT) -> T:
-    """`make(content)`, its ValueError said as one line about `place`."""
+    """Return `make(content)`; a ValueError becomes a UsageError in one line about `place`."""
     try:
         return make(content)
     except ValueError as error:
         raise UsageError(f"{place}: {error}") from None
 
 
-def _close(name: str, known: list[str]) -> bool:
-    return "did you mean" in did_you_mean(name, known)
+def _has_close_match(name: str, names: list[str]) -> bool:
+    return "did you mean" in did_you_mean(name, names)

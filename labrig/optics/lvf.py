@@ -1,4 +1,4 @@
-"""A linear variable filter (LVF): a band whose wavelength depends on the place along a strip."""
+"""A linear variable filter (LVF): its pass band depends on the position along a strip."""
 
 from dataclasses import dataclass, field, fields
 from typing import Self
@@ -10,25 +10,46 @@ from labrig.optics.camera import CameraResponse
 from labrig.optics.piecewise import FloatArray, hats, quadrature
 from labrig.optics.spectrum import Spectrum
 
-#: Below this skewness the limit, a Gaussian, is as exact.
+#: Asymmetry below which the limit, a Gaussian, is equally exact.
 _GAUSSIAN = 1e-9
 _LN2 = float(np.log(2.0))
 
 
 def peak_shape(distance_nm: FloatArray, fwhm_nm: ArrayLike, skew: ArrayLike) -> FloatArray:
-    """A skewed Gaussian of height 1.
+    """Return a skewed Gaussian of height 1.
 
-    exp(−ln 2 · [ln(1 + 2 a x / w) / a]²) with a = `skew` and w so that the full width at half
-    maximum is `fwhm_nm`; a > 0 reaches further to long wavelengths, a = 0 is a Gaussian (Fraser
-    and Suzuki, *Resolution of overlapping absorption bands by least squares procedures*, Anal.
-    Chem. 38, 1966).
+    The shape is exp(−ln 2 · [ln(1 + 2 a x / w) / a]²) with a = `skew` and w such that the full
+    width at half maximum is `fwhm_nm`. a > 0 extends the tail to long wavelengths, a = 0 is a
+    Gaussian.
 
     Parameters
     ----------
     distance_nm
-        λ minus that of the peak.
-    fwhm_nm, skew
-        Broadcast against `distance_nm`.
+        Wavelength minus that of the peak, in nm.
+    fwhm_nm
+        Full width at half maximum in nm, broadcast against `distance_nm`.
+    skew
+        Dimensionless asymmetry a, broadcast against `distance_nm`.
+
+    Returns
+    -------
+    ndarray
+        Values from 0 to 1 in the broadcast shape.
+
+    References
+    ----------
+    R. D. B. Fraser, E. Suzuki, *Resolution of overlapping absorption bands by least squares
+    procedures*, Anal. Chem. 38 (1966).
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import peak_shape
+    >>> distance_nm = np.array([-25.0, -12.5, 0.0, 12.5, 25.0])
+    >>> peak_shape(distance_nm, 25.0, 0.0).round(4).tolist()
+    [0.0625, 0.5, 1.0, 0.5, 0.0625]
+    >>> peak_shape(distance_nm, 25.0, 0.3).round(3).tolist()
+    [0.001, 0.362, 1.0, 0.58, 0.175]
     """
     a = np.asarray(skew, dtype=np.float64)
     skewed = np.abs(a) > _GAUSSIAN
@@ -48,15 +69,15 @@ class Bands:
     Attributes
     ----------
     centre_nm
-        Wavelength of highest transmission.
+        Wavelength of highest transmission in nm.
     fwhm_nm
-        Full width at half maximum, above the leakage.
+        Full width at half maximum above the leakage in nm.
     skew
-        As in `peak_shape`.
+        Dimensionless asymmetry, as defined in `peak_shape`.
     peak
         Transmission at the centre, above the leakage.
     leakage
-        Transmission everywhere else.
+        Transmission outside of the band.
     """
 
     centre_nm: FloatArray
@@ -66,39 +87,42 @@ class Bands:
     leakage: FloatArray
 
     def transmission(self, wavelength_nm: FloatArray) -> FloatArray:
-        """T_p(λ) at (q,) wavelengths, shape (positions, q)."""
+        """Return T_p(λ) at (q,) wavelengths in nm, shape (positions, q)."""
         distance = wavelength_nm - self.centre_nm[:, np.newaxis]
         shape = peak_shape(distance, self.fwhm_nm[:, np.newaxis], self.skew[:, np.newaxis])
         return self.leakage[:, np.newaxis] + self.peak[:, np.newaxis] * shape
 
-    def between(self, position: FloatArray, wanted: FloatArray) -> Self:
-        """The bands at `wanted` positions, every figure interpolated along `position`."""
+    def between(self, position: FloatArray, new_position: FloatArray) -> Self:
+        """Return the bands at other positions, each parameter interpolated along `position`."""
         return type(self)(
-            *(np.interp(wanted, position, getattr(self, field.name)) for field in fields(self))
+            *(
+                np.interp(new_position, position, getattr(self, field.name))
+                for field in fields(self)
+            )
         )
 
 
-#: Points at which a map is tested, and between which it is inverted.
+#: Number of points at which a map is validated, and between which it is inverted.
 _SAMPLES = 2049
 
 
 @dataclass(frozen=True, eq=False)
 class WavelengthMap:
-    """λ(u) = Σ_k c_k ((u − u_0)/s)^k along a strip.
+    """Centre wavelength λ(u) = Σ_k c_k ((u − u_0)/s)^k along a strip.
 
     Parameters
     ----------
     coefficients
-        c, shape (k,), in nm, the constant first.
+        Coefficients c in nm, shape (k,), the constant first.
     span
-        First and last position where the map holds: u_0 is their middle, s half their distance.
+        First and last position at which the map holds: u_0 is their middle, s half their distance.
     covariance
-        Of the coefficients, shape (k, k), in nm².
+        Covariance of the coefficients in nm², shape (k, k).
 
     Raises
     ------
     ValueError
-        A map that does not rise or fall all the way within `span`.
+        The map is not monotone within `span`.
     """
 
     coefficients: FloatArray
@@ -115,16 +139,16 @@ class WavelengthMap:
 
     @property
     def rising(self) -> bool:
-        """Whether the wavelength grows with the position."""
+        """Whether the wavelength increases with the position."""
         first, last = self.wavelength_nm(np.array(self.span))
         return bool(last > first)
 
     def wavelength_nm(self, position: ArrayLike) -> FloatArray:
-        """Centre wavelengths at some positions."""
+        """Return the centre wavelengths in nm at some positions."""
         return self._powers(position) @ self.coefficients
 
     def sigma_nm(self, position: ArrayLike) -> FloatArray:
-        """One standard deviation of `wavelength_nm`, 0 where no covariance is known."""
+        """Return one standard deviation of `wavelength_nm`, 0 without a covariance."""
         powers = self._powers(position)
         if self.covariance is None:
             return np.zeros(len(powers))
@@ -132,25 +156,25 @@ class WavelengthMap:
         return np.sqrt(np.maximum(variance, 0.0))
 
     def position(self, wavelength_nm: ArrayLike) -> FloatArray:
-        """Where some wavelengths are, by Newton's method from a table.
+        """Return the positions of some wavelengths, by Newton's method from a table.
 
         Raises
         ------
         ValueError
-            A wavelength that is not on the strip.
+            A wavelength is not on the strip.
         """
-        wanted = np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
-        places = np.linspace(*self.span, _SAMPLES)
-        known = self.wavelength_nm(places)
-        if wanted.min() < known.min() or wanted.max() > known.max():
+        target_nm = np.atleast_1d(np.asarray(wavelength_nm, dtype=np.float64))
+        positions = np.linspace(*self.span, _SAMPLES)
+        table_nm = self.wavelength_nm(positions)
+        if target_nm.min() < table_nm.min() or target_nm.max() > table_nm.max():
             raise ValueError(
-                f"expected wavelengths from {known.min():.1f} to {known.max():.1f} nm, which the "
-                f"strip shows, got {wanted.min():.1f} to {wanted.max():.1f}"
+                f"expected wavelengths from {table_nm.min():.1f} to {table_nm.max():.1f} nm, which "
+                f"the strip shows, got {target_nm.min():.1f} to {target_nm.max():.1f}"
             )
         order = slice(None) if self.rising else slice(None, None, -1)
-        position = np.interp(wanted, known[order], places[order])
+        position = np.interp(target_nm, table_nm[order], positions[order])
         for _ in range(2):
-            position = position - (self.wavelength_nm(position) - wanted) / self._slope(position)
+            position = position - (self.wavelength_nm(position) - target_nm) / self._slope(position)
         return position
 
     def _scaled(self, position: ArrayLike) -> FloatArray:
@@ -169,30 +193,32 @@ class WavelengthMap:
         return slope
 
 
-#: Of an LVF of which nothing else is known (paper, section 4.1).
+#: Full width at half maximum of an LVF without a calibration, in nm (paper, section 4.1).
 NOMINAL_FWHM_NM = 25.0
 
 
 @dataclass(frozen=True, eq=False)
 class Lvf:
-    """A filter's bands at rising positions along the strip.
+    """Pass bands of a filter at rising positions along the strip.
 
     Parameters
     ----------
     position
-        Shape (p,), p ≥ 2, rising, in the unit of whoever measured them (pixels, mm).
+        Rising positions, shape (p,), p ≥ 2, in any unit (pixels, mm).
     bands
-        At those positions.
+        Pass bands at these positions.
     sigma
-        One standard deviation of each of the bands' figures, where it is known.
+        One standard deviation of each of the bands' parameters, where it is known.
+    remainder_nm
+        Wavelengths of `remainder` in nm, shape (n,); n may be 0.
     remainder
-        (p, n) what the bands' shape leaves of T_p(λ), straight lines between `remainder_nm` (n,);
-        n may be 0.
+        Deviation of T_p(λ) from the bands' shape, shape (p, n), piecewise linear between
+        `remainder_nm`.
 
     Raises
     ------
     ValueError
-        Positions or centre wavelengths that do not rise or fall all the way.
+        Positions or centre wavelengths are not monotone.
     """
 
     position: FloatArray
@@ -209,25 +235,25 @@ class Lvf:
             raise ValueError("expected centre wavelengths that rise or fall along the filter")
 
     def transmission(self, wavelength_nm: FloatArray) -> FloatArray:
-        """T_p(λ) at (q,) wavelengths, shape (p, q), never negative."""
+        """Return T_p(λ) ≥ 0 at (q,) wavelengths in nm, shape (p, q)."""
         transmission = self.bands.transmission(wavelength_nm)
         if len(self.remainder_nm):
             transmission = transmission + self.remainder @ hats(self.remainder_nm, wavelength_nm).T
         return np.maximum(transmission, 0.0)
 
     def at(self, position: ArrayLike) -> "Lvf":
-        """The filter at other rising positions within its own, linear in between."""
-        wanted = np.asarray(position, dtype=np.float64)
-        if wanted.min() < self.position[0] or wanted.max() > self.position[-1]:
+        """Return the filter at other rising positions within its own, linearly interpolated."""
+        new_position = np.asarray(position, dtype=np.float64)
+        if new_position.min() < self.position[0] or new_position.max() > self.position[-1]:
             raise ValueError(
                 f"expected positions from {self.position[0]:g} to {self.position[-1]:g}, where the "
-                f"filter is known, got {wanted.min():g} to {wanted.max():g}"
+                f"filter is known, got {new_position.min():g} to {new_position.max():g}"
             )
-        rows = [np.interp(wanted, self.position, column) for column in self.remainder.T]
+        rows = [np.interp(new_position, self.position, column) for column in self.remainder.T]
         return Lvf(
-            wanted,
-            self.bands.between(self.position, wanted),
-            None if self.sigma is None else self.sigma.between(self.position, wanted),
+            new_position,
+            self.bands.between(self.position, new_position),
+            None if self.sigma is None else self.sigma.between(self.position, new_position),
             self.remainder_nm,
             np.array(rows).T if rows else np.empty((0, 0)),
         )
@@ -240,18 +266,77 @@ def nominal_lvf(
     fwhm_nm: float = NOMINAL_FWHM_NM,
     leakage: float = 0.0,
 ) -> Lvf:
-    """An LVF as its maker describes it: Gaussian bands, at the positions of some wavelengths."""
+    """Return a filter as its maker describes it, with equal Gaussian bands.
+
+    Parameters
+    ----------
+    wavelengths
+        Centre wavelength along the strip.
+    centre_nm
+        Centre wavelengths of the bands in nm, shape (p,), in any order.
+    fwhm_nm
+        Full width at half maximum of every band in nm.
+    leakage
+        Transmission outside of the bands, as a fraction of the peak's.
+
+    Returns
+    -------
+    Lvf
+        The filter at the p positions of these wavelengths, with peak transmission 1.
+
+    Raises
+    ------
+    ValueError
+        A wavelength is not on the strip.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import WavelengthMap, nominal_lvf
+    >>> wavelengths = WavelengthMap(np.array([550.0, 200.0]), span=(0.0, 1.0))
+    >>> lvf = nominal_lvf(wavelengths, [400.0, 500.0, 600.0], fwhm_nm=20.0)
+    >>> lvf.position.round(6).tolist()
+    [0.125, 0.375, 0.625]
+    >>> lvf.transmission(np.array([500.0, 510.0])).round(3).tolist()
+    [[0.0, 0.0], [1.0, 0.5], [0.0, 0.0]]
+    """
     position = np.sort(wavelengths.position(centre_nm))
     centre = wavelengths.wavelength_nm(position)
-    same = np.ones_like(centre)
-    return Lvf(position, Bands(centre, fwhm_nm * same, 0 * same, same, leakage * same))
+    ones = np.ones_like(centre)
+    return Lvf(position, Bands(centre, fwhm_nm * ones, 0 * ones, ones, leakage * ones))
 
 
 def seen_through(lvf: Lvf, camera: CameraResponse, light: Spectrum) -> FloatArray:
-    """What a camera sees of a light through the filter, ∫ T_p L S_c dλ, shape (p, channels)."""
+    """Return the signal of a light in a camera behind the filter, ∫ T_p L S_c dλ.
+
+    Parameters
+    ----------
+    lvf
+        The filter with its transmission T_p at p positions.
+    camera
+        The camera with the sensitivities S_c.
+    light
+        Spectrum L of the light, per nm.
+
+    Returns
+    -------
+    ndarray
+        Signal at each position in each channel, shape (p, channels), in the unit of the light times
+        nm.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import Spectrum, WavelengthMap, nominal_lvf, read_camera, seen_through
+    >>> wavelengths = WavelengthMap(np.array([550.0, 200.0]), span=(0.0, 1.0))
+    >>> lvf = nominal_lvf(wavelengths, [450.0, 530.0, 610.0])
+    >>> white = Spectrum("equal energy", np.array([380.0, 780.0]), np.ones(2))
+    >>> seen_through(lvf, read_camera("canon_eos_5d_mark_ii"), white).round(1).tolist()
+    [[0.2, 2.9, 22.3], [3.8, 25.9, 3.5], [12.5, 4.4, 0.2]]
+    """
     low, high = camera.wavelength_nm[0], camera.wavelength_nm[-1]
     nodes, weights = quadrature(low, high, camera.wavelength_nm, light.wavelength_nm)
-    seen: FloatArray = lvf.transmission(nodes) @ (
+    signal: FloatArray = lvf.transmission(nodes) @ (
         (weights * light.at(nodes))[:, np.newaxis] * camera.at(nodes)
     )
-    return seen
+    return signal

@@ -1,4 +1,4 @@
-"""Curves over wavelength, each on the grid it was measured on."""
+"""Curves over wavelength, each on the grid on which it was measured."""
 
 from dataclasses import dataclass
 from typing import Self
@@ -8,29 +8,29 @@ from numpy.typing import ArrayLike
 
 from labrig.optics.piecewise import FloatArray, band_means, edges_about
 
-#: Measured fractions stray this far below 0 and above 1.
+#: Tolerance of measured fractions below 0 and above 1.
 FRACTION_SLACK = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Spectrum:
-    """Light per nm over wavelength: irradiance, radiance, emission; zero outside of its grid.
+    """Light per nm over wavelength (irradiance, radiance, emission), zero outside of its grid.
 
     Parameters
     ----------
     name
-        Of the lamp, the dye …
+        Name of the lamp, the dye …
     wavelength_nm
-        Shape (n,), n ≥ 2, rising.
+        Rising wavelengths in nm, shape (n,), n ≥ 2.
     value
-        Shape (n,), finite; straight lines in between.
+        Finite values per nm, shape (n,), piecewise linear in between.
     sigma
-        Shape (n,), one standard deviation, where it is known.
+        One standard deviation of the values, shape (n,), where it is known.
 
     Raises
     ------
     ValueError
-        Shapes that disagree, wavelengths that do not rise, values that are not finite.
+        Shapes disagree, wavelengths do not rise, or values are not finite.
     """
 
     name: str
@@ -42,7 +42,7 @@ class Spectrum:
         check_curve(self.wavelength_nm, self.value, self.sigma)
 
     def at(self, wavelength_nm: ArrayLike) -> FloatArray:
-        """The value at some wavelengths."""
+        """Return the value at some wavelengths in nm."""
         return np.interp(
             np.asarray(wavelength_nm, dtype=np.float64),
             self.wavelength_nm,
@@ -52,14 +52,13 @@ class Spectrum:
         )
 
     def in_bands(self, edges_nm: ArrayLike) -> FloatArray:
-        """Mean over each band between neighbouring `edges_nm`, shape (edges − 1,)."""
+        """Average the spectrum between neighbouring `edges_nm`, shape (edges − 1,)."""
         return band_means(self.wavelength_nm, self.value, edges_nm)
 
     def resampled(self, wavelength_nm: ArrayLike) -> Self:
-        """Means about each of some rising wavelengths, half-way to its neighbours.
+        """Average the spectrum about each of some rising wavelengths, half-way to the next.
 
-        What lies between the new wavelengths is kept: the integral stays. σ is not carried over;
-        how the errors of neighbours hang together is not known.
+        The integral is kept. σ is dropped, since the correlation of neighbouring errors is unknown.
         """
         grid = np.asarray(wavelength_nm, dtype=np.float64)
         return type(self)(self.name, grid, self.in_bands(edges_about(grid)))
@@ -67,25 +66,25 @@ class Spectrum:
 
 @dataclass(frozen=True, eq=False)
 class Transmittance:
-    """Fraction of the light that a filter lets through, or a card throws back.
+    """Fraction of the light that a filter transmits or a card reflects.
 
-    Beyond its grid the outermost values go on: a filter does not end where its table does.
+    Beyond its grid the outermost values continue.
 
     Parameters
     ----------
     name
-        Of the filter or the card.
+        Name of the filter or the card.
     wavelength_nm
-        Shape (n,), n ≥ 2, rising.
+        Rising wavelengths in nm, shape (n,), n ≥ 2.
     value
-        Shape (n,), 0 to 1; straight lines in between.
+        Fractions from 0 to 1, shape (n,), piecewise linear in between.
     sigma
-        Shape (n,), one standard deviation, where it is known.
+        One standard deviation of the values, shape (n,), where it is known.
 
     Raises
     ------
     ValueError
-        As for `Spectrum`, or a value that is no fraction.
+        The curve is not valid as a `Spectrum`, or a value is no fraction.
     """
 
     name: str
@@ -102,23 +101,23 @@ class Transmittance:
             )
 
     def at(self, wavelength_nm: ArrayLike) -> FloatArray:
-        """The fraction at some wavelengths."""
+        """Return the fraction at some wavelengths in nm."""
         return np.interp(
             np.asarray(wavelength_nm, dtype=np.float64), self.wavelength_nm, self.value
         )
 
     def in_bands(self, edges_nm: ArrayLike) -> FloatArray:
-        """Mean over each band between neighbouring `edges_nm`, shape (edges − 1,)."""
+        """Average the fraction between neighbouring `edges_nm`, shape (edges − 1,)."""
         edges = np.asarray(edges_nm, dtype=np.float64)
         knots = self.wavelength_nm
         # The outermost values go on until beyond the outermost edges.
         low, high = min(edges[0], knots[0]) - 1.0, max(edges[-1], knots[-1]) + 1.0
-        wider = np.concatenate([[low], knots, [high]])
-        return band_means(wider, self.at(wider), edges)
+        extended_nm = np.concatenate([[low], knots, [high]])
+        return band_means(extended_nm, self.at(extended_nm), edges)
 
 
 def check_curve(wavelength_nm: FloatArray, value: FloatArray, sigma: FloatArray | None) -> None:
-    """Raise ValueError with what is wrong with a curve (n,) or several (n, k)."""
+    """Raise ValueError if one curve (n,) or several curves (n, k) are invalid."""
     if wavelength_nm.ndim != 1 or len(wavelength_nm) < 2:
         raise ValueError("expected two or more wavelengths")
     if len(value) != len(wavelength_nm) or (sigma is not None and sigma.shape != value.shape):

@@ -1,4 +1,4 @@
-"""Where the strip of a linear variable filter lies in the frame."""
+"""Position of a linear variable filter's strip in the frame."""
 
 import math
 from itertools import pairwise
@@ -10,19 +10,19 @@ from pydantic import BaseModel, ConfigDict, Field, model_validator
 from labrig.finite import UnitFraction
 from labrig.region import Region, region_pixels
 
-#: Places along a strip at which pictures through it are read (paper, section 4.2).
+#: Number of positions along a strip at which pictures are read (paper, section 4.2).
 SLICES = 31
 
 
 class Strip(BaseModel):
-    """Where the filter is in the frame, in fractions of its width and height.
+    """Position of the filter in the frame, in fractions of the frame's width and height.
 
     Attributes
     ----------
     left, right
-        (x, y) of the two ends of the centre line.
+        Coordinates (x, y) of the two ends of the centre line.
     height
-        Of the strip, less its blurred edges.
+        Height of the strip without its blurred edges.
     rising
         Whether the wavelength rises from left to right.
     """
@@ -47,12 +47,13 @@ class Strip(BaseModel):
         return self
 
     def slices(self, count: int = SLICES) -> dict[str, Region]:
-        """Upright regions side by side along the strip, from the blue end to the red end.
+        """Divide the strip into upright regions from the blue end to the red end.
 
         Returns
         -------
         dict
-            `p00`, `p01`, … → region; slice k reaches from position k/count to (k + 1)/count.
+            Regions by the names `p00`, `p01`, …; slice k reaches from position k/count to (k +
+            1)/count.
         """
         ends = np.linspace(self.left[0], self.right[0], count + 1)
         middles = np.linspace(self.left[1], self.right[1], 2 * count + 1)[1::2]
@@ -64,19 +65,21 @@ class Strip(BaseModel):
         return {f"p{number:02d}": region for number, region in enumerate(ordered)}
 
     def positions(self, width: int, height: int, count: int = SLICES) -> tuple[float, ...]:
-        """Position 0 (blue end) to 1 (red end) of the middle of each slice, in whole pixels.
+        """Return the middle of each slice in whole pixels, from 0 (blue end) to 1 (red end).
 
-        A frame of `width` × `height` pixels has no others: that is where a slice really lies.
+        A frame of `width` × `height` pixels resolves no other positions.
         """
-        found = []
+        fractions = []
         for region in self.slices(count).values():
-            x, _, wide, _ = region_pixels(region, width, height)
-            fraction = ((x + wide / 2) / width - self.left[0]) / (self.right[0] - self.left[0])
-            found.append(fraction if self.rising else 1 - fraction)
-        return tuple(found)
+            x, _, region_width, _ = region_pixels(region, width, height)
+            fraction = ((x + region_width / 2) / width - self.left[0]) / (
+                self.right[0] - self.left[0]
+            )
+            fractions.append(fraction if self.rising else 1 - fraction)
+        return tuple(fractions)
 
     def tilt_degrees(self, width: int, height: int) -> float:
-        """Of the strip in a frame of so many pixels; > 0 falls to the right."""
+        """Return the tilt of the strip in a frame in degrees, > 0 if it falls to the right."""
         across = (self.right[0] - self.left[0]) * width
         down = (self.right[1] - self.left[1]) * height
         return math.degrees(math.atan2(down, across))

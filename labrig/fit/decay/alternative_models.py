@@ -1,8 +1,8 @@
-"""Other models than exponentials: a power law A (1 + t/τ)^(−p), a stretched A exp(−(t/τ)^β).
+"""Alternative decay models: power law A (1 + t/τ)^(−p) and stretched exponential A exp(−(t/τ)^β).
 
-Traps of many depths, or electrons and holes that must meet, decay so (Nalbach et al. sec. 4.4,
+Traps of many depths and electron–hole recombination decay like this (Nalbach et al. sec. 4.4,
 after Jonscher and de Polignac 1984 and Lee et al. 2001). They are fitted to the same series with
-the same noise, to say so when one does better.
+the same noise, to report when one fits better than exponentials.
 """
 
 from collections.abc import Callable
@@ -18,7 +18,7 @@ from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.results import AlternativeModel
 
-#: Gauss–Legendre on [0, 1] for what has no elementary integral.
+#: Gauss–Legendre nodes and weights on [0, 1], for functions without an elementary integral.
 _NODES, _FRACTIONS = np.polynomial.legendre.leggauss(8)
 NODES, FRACTIONS = (_NODES + 1) / 2, _FRACTIONS / 2
 
@@ -26,23 +26,24 @@ NODES, FRACTIONS = (_NODES + 1) / 2, _FRACTIONS / 2
 def power_law_mean(
     tau_s: float, exponent: float, t_s: FloatArray, exposure_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean of (1 + t/τ)^(−p) over each exposure, and its derivatives.
+    """Average (1 + t/τ)^(−p) over each exposure, with derivatives.
 
-    With v = τ + t, Δ = log(1 + T/v) and ψ(x) = (e^x − 1)/x it is (v/τ)^(−p) (v/T) Δ ψ((1 − p) Δ),
-    which has no special case at p = 1.
+    With v = τ + t, Δ = log(1 + T/v) and ψ(x) = (e^x − 1)/x the mean is (v/τ)^(−p) (v/T) Δ ψ((1 − p)
+    Δ), which has no special case at p = 1.
 
     Parameters
     ----------
     tau_s
-        τ > 0.
+        Time scale τ > 0 in seconds.
     exponent
-        p > 0.
+        Exponent p > 0.
     t_s, exposure_s
-        (n,) start t > −τ and length T ≥ 0 of the exposures.
+        Begin t > −τ and length T ≥ 0 of the exposures in seconds, shape (n,).
 
     Returns
     -------
-    (n,) the means, and (n, 2) their derivatives with respect to log τ and p.
+    means, slopes
+        Means (n,), and their derivatives by log τ and p (n, 2).
     """
     v = tau_s + t_s
     stretch = np.log(v / tau_s)
@@ -63,20 +64,21 @@ def power_law_mean(
 def stretched_mean(
     tau_s: float, exponent: float, t_s: FloatArray, exposure_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Mean of exp(−(t/τ)^β) over each exposure, and its derivatives.
+    """Average exp(−(t/τ)^β) over each exposure, with derivatives.
 
     Parameters
     ----------
     tau_s
-        τ > 0.
+        Time scale τ > 0 in seconds.
     exponent
-        β > 0.
+        Exponent β > 0.
     t_s, exposure_s
-        (n,) start t ≥ 0 and length T ≥ 0 of the exposures.
+        Begin t ≥ 0 and length T ≥ 0 of the exposures in seconds, shape (n,).
 
     Returns
     -------
-    (n,) the means, and (n, 2) their derivatives with respect to log τ and β.
+    means, slopes
+        Means (n,), and their derivatives by log τ and β (n, 2).
     """
     time = t_s[:, None] + exposure_s[:, None] * NODES
     # t^β log t → 0 as t → 0.
@@ -89,7 +91,7 @@ def stretched_mean(
 
 
 def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """ψ(x) = (e^x − 1)/x and its logarithmic derivative 1/(1 − e^(−x)) − 1/x."""
+    """Return ψ(x) = (e^x − 1)/x and its logarithmic derivative 1/(1 − e^(−x)) − 1/x."""
     small = np.abs(x) < SERIES_BELOW
     safe = np.where(small, 1.0, x)
     series = 1 + x / 2 * (1 + x / 3 * (1 + x / 4 * (1 + x / 5 * (1 + x / 6))))
@@ -99,9 +101,9 @@ def _growth(x: FloatArray) -> tuple[FloatArray, FloatArray]:
     return psi, slope
 
 
-#: τ from this fraction of the shortest step between frames …
+#: Smallest τ as a fraction of the shortest step between frames.
 SHORTEST_STEPS = 0.01
-#: … to this many spans.
+#: Largest τ in spans.
 LONGEST_SPANS = 100.0
 GRID = (24, 12)
 MAX_ITERATIONS = 60
@@ -112,18 +114,19 @@ Mean = Callable[[float, float, FloatArray, FloatArray], tuple[FloatArray, FloatA
 
 @dataclass(frozen=True)
 class AlternativeShape:
-    """A decay of τ and one exponent.
+    """A decay model with a time scale τ and one exponent.
 
     Attributes
     ----------
     name, formula
-        As people say it; `formula` takes `tau` and `exponent`.
+        Name, and formula for people with fields `tau` and `exponent`.
     value
-        (t/τ, exponent) → value at a moment.
+        Function (t/τ, exponent) → value at a time.
     mean
-        (τ, exponent, t, T) → mean over the exposures, and derivatives by log τ and the exponent.
+        Function (τ, exponent, t, T) → means over the exposures, and derivatives by log τ and the
+        exponent.
     exponents
-        Least and largest considered: with an exponential as its limit it must end somewhere.
+        Smallest and largest exponent; a bound is needed since an exponential is the limit.
     """
 
     name: str
@@ -154,7 +157,7 @@ ALTERNATIVES = (
 def fit_alternative(
     data: WhitenedSeries, alternative: AlternativeShape, weights: FloatArray, offsets: FloatArray
 ) -> JointFit:
-    """Least squares from the best of a grid of τ and exponent; `shape` is [A, log τ, exponent]."""
+    """Fit from the best of a grid of τ and exponent; `shape` is [A, log τ, exponent]."""
     series = data.series
     time = series.t + series.start
     steps = np.diff(series.t)
@@ -187,7 +190,7 @@ def _best_on_grid(
     weights: FloatArray,
     log_taus: tuple[float, float],
 ) -> FloatArray:
-    """[A, log τ, exponent] of the grid's best, exposures taken for points in their middle."""
+    """Return the best [A, log τ, exponent] of the grid, with exposures taken as their middles."""
     series = data.series
     problem = projection(data, weights)
     middle = series.t + series.start + series.exposure / 2
@@ -208,7 +211,7 @@ def _best_on_grid(
 def fitted_alternative(
     alternative: AlternativeShape, fit: JointFit, series: DecaySeries, bic: float
 ) -> AlternativeModel:
-    """The fit in the user's units."""
+    """Convert the fit to the user's units."""
     amplitude, log_tau, exponent = (float(x) for x in fit.shape)
     tau_s = float(np.exp(log_tau)) * series.span_s
     return AlternativeModel(

@@ -1,4 +1,4 @@
-"""What to distrust in a decay fit, in one line each, with what to do about it."""
+"""Diagnostics of a decay fit: warnings in one line each, with a remedy."""
 
 from dataclasses import dataclass
 
@@ -9,36 +9,36 @@ from labrig.fit.decay.states import APART_SIGMAS, sigmas_apart
 from labrig.fit.least_squares import FloatArray
 from labrig.results import DecayState
 
-#: Chance at which data that are as assumed get a misfit warning, per test.
+#: Significance level of each misfit test.
 MISFIT_LEVEL = 5e-4
-#: Frames below which residuals' order tells nothing.
+#: Number of frames below which the order of residuals is not tested.
 FEWEST_FOR_ORDER = 8
 ILL_DETERMINED = 0.3
 BELOW_ZERO_SIGMAS = 5.0
 OFFSET_SIGMAS = 4.0
-#: A frame is named that lies this many robust standard deviations off the others …
+#: Distance of an outlier from the curve in robust standard deviations of the frames.
 OUTLIER_SIGMAS = 7.0
-#: … and that many of what the noise allows; so many frames at most.
+#: Distance of an outlier in σ of its own noise, and the largest number of outliers reported.
 OUTLIER_OWN_SIGMAS = 3.0
 MOST_NAMED = 2
 
 
 @dataclass(frozen=True)
 class Misfit:
-    """Residuals of the chosen fit, split into what frames share and what colours them.
+    """Residuals of the selected fit, split into common-mode and colour.
 
     Attributes
     ----------
     t_s
-        (n,) when the frames began, rising.
+        Rising begins of the exposures in seconds, shape (n,).
     frames
-        (n,) residual along the signal by rising time, unit variance.
+        Residual of each frame along the signal by rising time, of unit variance, shape (n,).
     frame_dof
         Degrees of freedom that the fit left to `frames`.
     colour_chi2, colour_dof
-        Of the residuals across the signal; 0 for one channel.
+        χ² and degrees of freedom of the residuals across the signal; 0 for one channel.
     noise_dof
-        Degrees of freedom of the noise's own estimate; inf if σ and flicker were given.
+        Degrees of freedom of the noise estimate; inf if σ and flicker were given.
     """
 
     t_s: FloatArray
@@ -50,16 +50,16 @@ class Misfit:
 
 
 def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
-    """Shape, scatter and colour against what the noise allows.
+    """Test the order, the scatter and the colour of the residuals against the noise.
 
     Parameters
     ----------
     misfit
         The residuals.
     n_states
-        Of the fit.
+        Number of states of the fit.
     remedy
-        What to try if the shape is wrong.
+        Advice if the shape is wrong.
     """
     warnings = _outlier_warnings(misfit)
     disturbed = bool(warnings)
@@ -88,24 +88,24 @@ def misfit_warnings(misfit: Misfit, n_states: int, remedy: str) -> list[str]:
 
 
 def _outlier_warnings(misfit: Misfit) -> list[str]:
-    """Single frames that the others do not explain."""
+    """Return a warning for each frame that is far from the curve compared with the others."""
     size = np.abs(misfit.frames)
     if len(size) < FEWEST_FOR_ORDER:
         return []
     # The median does not mind the outlier, whatever σ and flicker were made of it.
-    usual = 1.4826 * float(np.median(size))
-    far = np.flatnonzero((size > OUTLIER_SIGMAS * usual) & (size > OUTLIER_OWN_SIGMAS))
+    typical = 1.4826 * float(np.median(size))
+    outliers = np.flatnonzero((size > OUTLIER_SIGMAS * typical) & (size > OUTLIER_OWN_SIGMAS))
     return [
-        f"the frame at {misfit.t_s[row]:.4g} s lies {size[row] / max(usual, 1e-3):.0f} times as "
+        f"the frame at {misfit.t_s[row]:.4g} s lies {size[row] / max(typical, 1e-3):.0f} times as "
         "far off the curve as the others do: look at it, leave it out if something disturbed it"
-        for row in far[np.argsort(-size[far])][:MOST_NAMED]
+        for row in outliers[np.argsort(-size[outliers])][:MOST_NAMED]
     ]
 
 
 def order_p_value(residuals: FloatArray) -> float:
-    """Chance that independent residuals agree with their neighbours that much (n,).
+    """Return the chance that independent residuals (n,) agree with their neighbours that much.
 
-    The smaller of two: lag-1 autocorrelation and Wald and Wolfowitz's runs of signs.
+    It is the smaller one of lag-1 autocorrelation and Wald and Wolfowitz's runs of signs.
     """
     n = len(residuals)
     power = float(residuals @ residuals)
@@ -135,18 +135,18 @@ def state_warnings(
     span_s: float,
     rate_bounds_per_s: tuple[float, float],
 ) -> list[str]:
-    """Rates that the data do not hold.
+    """Return warnings about rates that the data do not constrain.
 
     Parameters
     ----------
     states
-        By falling rate.
+        States by falling rate.
     log_rate_covariance
-        (n, n) of log k.
+        Covariance of log k, shape (n, n).
     span_s
-        From the first frame to the last.
+        Time from the first frame to the last in seconds.
     rate_bounds_per_s
-        Slowest and fastest rate searched.
+        Slowest and fastest rate searched, in 1/s.
     """
     warnings = []
     sigma = np.sqrt(np.diag(log_rate_covariance))
@@ -178,8 +178,8 @@ def state_warnings(
             warnings.append(
                 f"k{number} and k{number + 1} cannot be told apart: ask for one state fewer"
             )
-    held = states[-1].k_r_sigma_per_s == 0
-    if lifetime_s > span_s and not held and sigma[-1] <= ILL_DETERMINED:
+    is_fixed = states[-1].k_r_sigma_per_s == 0
+    if lifetime_s > span_s and not is_fixed and sigma[-1] <= ILL_DETERMINED:
         warnings.append(
             f"the slowest state lives {lifetime_s:.3g} s, longer than the {span_s:.4g} s recorded: "
             "record longer to be sure of it"
@@ -190,7 +190,7 @@ def state_warnings(
 def offset_warnings(
     channels: tuple[str, ...], offsets: FloatArray, prior_sigma: FloatArray
 ) -> list[str]:
-    """Whether the fit had to pull offsets away from their priors; both (C,) in the same units."""
+    """Return warnings about fitted offsets (C,) far from their priors, both in the same unit."""
     return [
         f"the offset of {name} is {abs(offset) / sigma:.0f} times its prior σ from zero: "
         "a light may have come on, or the dark level is wrong; else widen offset_sigma"
@@ -200,12 +200,12 @@ def offset_warnings(
 
 
 def rise_in_sigmas(signal: FloatArray, information: FloatArray) -> float:
-    """How much brighter the last quarter of the frames is than the first.
+    """Return the rise from the first to the last quarter of the frames in σ.
 
     Parameters
     ----------
     signal, information
-        (n,) common signal of the channels by rising time, and its inverse variance.
+        Common signal of the channels by rising time, and its inverse variance, shape (n,).
     """
     quarter = max(len(signal) // 4, 1)
     first, first_variance = _mean(signal[:quarter], information[:quarter])
@@ -214,7 +214,10 @@ def rise_in_sigmas(signal: FloatArray, information: FloatArray) -> float:
 
 
 def below_zero_warnings(signal: FloatArray, information: FloatArray) -> list[str]:
-    """Whether the last quarter of the frames is darker than darkness; as `rise_in_sigmas`."""
+    """Return a warning if the last quarter of the frames is below zero.
+
+    The arguments are those of `rise_in_sigmas`.
+    """
     quarter = max(len(signal) // 4, 1)
     last, variance = _mean(signal[-quarter:], information[-quarter:])
     if last > -BELOW_ZERO_SIGMAS * np.sqrt(variance):
@@ -226,6 +229,6 @@ def below_zero_warnings(signal: FloatArray, information: FloatArray) -> list[str
 
 
 def _mean(signal: FloatArray, information: FloatArray) -> tuple[float, float]:
-    """Weighted mean and its variance."""
+    """Return the weighted mean and its variance."""
     total = float(information.sum())
     return (float(signal @ information) / total, 1 / total) if total else (0.0, np.inf)

@@ -1,10 +1,10 @@
-"""A smooth curve that no choice of model has shaped, to measure the noise against.
+"""A smooth model-independent curve to measure the noise against.
 
 Sums of positive exponentials with *any* number of rates are all the completely monotone functions
-(Bernstein's theorem): every sum of exponentials, and every power law and stretched exponential,
-too. Non-negative least squares over a grid of rates, refined where it puts weight, finds the best
-of them. What scatters about it is noise, whatever the number of states: so flicker measured here
-cannot hide a missing state or a power law.
+(Bernstein's theorem), which include power laws and stretched exponentials. Non-negative least
+squares over a grid of rates, refined where the weights are, finds the best of them. The scatter
+about it is noise, whatever the number of states: flicker measured like this cannot hide a missing
+state or a power law.
 """
 
 from dataclasses import dataclass
@@ -20,28 +20,28 @@ from labrig.material import exponential_means
 from labrig.nonnegative import nonnegative_least_squares
 
 COARSE_RATES = 48
-#: Each round puts this many rates between two former neighbours.
+#: Number of steps into which each iteration divides the distance of two rates.
 REFINEMENT = 4
-#: Rounds: grid ratio 1.2 → 1.003, curve off by < 1e−5.
+#: Iterations: the grid ratio falls from 1.2 to 1.003, the error of the curve below 1e−5.
 ROUNDS = 3
-#: No shutter, aperture or lamp flickers more: what scatters more is a dark level or a model that is
-#: wrong, and must not pass for flicker.
+#: Upper limit of the flicker of shutters, apertures and lamps: a larger scatter is due to a wrong
+#: dark level or model.
 MOST_FLICKER = 0.1
-#: Turns of curve, channel weights and flicker; of curve and weights if the flicker is given.
+#: Alternations of curve, channel weights and flicker; of curve and weights if flicker is given.
 ALTERNATIONS = 5
 ALTERNATIONS_IF_GIVEN = 2
 FLICKER_ITERATIONS = 12
-#: All frames' signal in σ below which it is nothing but noise.
+#: Signal of all frames in σ below which it is noise.
 LEAST_BRIGHTNESS = 4.0
 #: Fraction of the bright frames' information that the curve must leave to the flicker.
 LEAST_SPARE = 1e-6
-#: Scale of what is known of any flicker beforehand, a half-Cauchy distribution (A. Gelman, Bayesian
-#: Analysis 1, 2006): shutters, apertures and lamps scatter by 0.5-1 %, some by a multiple of it.
+#: Scale of the half-Cauchy prior of the flicker (A. Gelman, Bayesian Analysis 1, 2006): shutters,
+#: apertures and lamps scatter by 0.5-1 %, some by a multiple of it.
 USUAL_FLICKER = 0.01
-#: Values of ρ by which its uncertainty is propagated, and the grid they are taken from.
+#: Number of values of ρ that propagate its uncertainty, and size of their grid.
 LIKELY_FLICKERS = 16
 FLICKER_GRID = 200
-#: Degrees of freedom below which the estimated flicker is not to be relied on.
+#: Degrees of freedom below which the estimated flicker is unreliable.
 FEWEST_NOISE_DOF = 4.0
 
 
@@ -52,20 +52,20 @@ class Envelope:
     Attributes
     ----------
     series
-        What it is of, with the repeats of a decay brought to the same level.
+        The series, with the repeats of a decay scaled to the same level.
     signal
-        (n, C) without offset.
+        Curve without offset, shape (n, C).
     weights
-        (C,) maximum 1.
+        Weights of the channels with maximum 1, shape (C,).
     offsets
-        (C,).
+        Offsets of the channels, shape (C,).
     dof
-        Degrees of freedom of the noise's estimate: the frames that tell, less those the curve took.
+        Degrees of freedom of the noise estimate: effective frames less those that the curve took.
     flicker, flicker_sigma
-        Relative, common to the channels of a frame; with fewer than `FEWEST_NOISE_DOF` degrees of
-        freedom one σ(ρ²) more than the estimate.
+        Relative flicker common to the channels of a frame, and σ; with fewer than
+        `FEWEST_NOISE_DOF` degrees of freedom one σ(ρ²) above the estimate.
     likely_flickers
-        (m,) values of ρ equally likely after the measurement; the one given.
+        Equally probable values of ρ after the measurement, or the given one, shape (m,).
     noise_scale
         Scatter in units of σ; 1 unless σ was not given.
     """
@@ -82,20 +82,21 @@ class Envelope:
 
 
 def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
-    """Curve, channel weights, levels of the repeats and, if `flicker` is None, it; by turns.
+    """Alternate fits of the curve, the channel weights, the repeats' levels and the flicker.
 
-    One channel of one decay with noise given needs none of these: the envelope is then flat.
+    The flicker is fitted only if `flicker` is None. One channel of a single decay with given noise
+    needs no envelope, which then is zero.
 
     Raises
     ------
     FitError
-        Nothing that decays, or too few bright frames to estimate flicker.
+        The signal does not decay, or there are too few bright frames to estimate flicker.
     """
     weights = _first_weights(series)
     offsets = np.zeros_like(weights)
     signal = np.zeros_like(series.values)
-    lone = len(weights) == len(series.repeats) == 1
-    if lone and flicker == 0 and series.sigma_given:
+    is_single = len(weights) == len(series.repeats) == 1
+    if is_single and flicker == 0 and series.sigma_given:
         n_frames = series.n_frames
         return Envelope(series, signal, weights, offsets, n_frames, 0.0, 0.0, np.zeros(1), 1.0)
     rho, rho_sigma, noise_scale = 0.0, 0.0, 1.0
@@ -117,13 +118,13 @@ def envelope(series: DecaySeries, flicker: float | None) -> Envelope:
         else:
             rho = flicker
     if not series.sigma_given:
-        left = series.inverse_sigma * (series.values - signal - offsets)
-        noise_scale = float(np.sqrt((left**2).sum() / dof))
+        residual = series.inverse_sigma * (series.values - signal - offsets)
+        noise_scale = float(np.sqrt((residual**2).sum() / dof))
     return Envelope(series, signal, weights, offsets, dof, rho, rho_sigma, likely, noise_scale)
 
 
 def _first_weights(series: DecaySeries) -> FloatArray:
-    """Channels by the values where the signal is, relative to the brightest."""
+    """Estimate channel weights from the values where the signal is, relative to the brightest."""
     information = (series.values * series.inverse_sigma**2).sum(axis=1)
     common = np.maximum(information, 0) / np.maximum((series.inverse_sigma**2).sum(axis=1), 1e-300)
     weights = np.maximum(common @ series.values, 0)
@@ -133,7 +134,7 @@ def _first_weights(series: DecaySeries) -> FloatArray:
 def _monotone_curve(
     data: WhitenedSeries, weights: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """The curve (n,), offsets (C,), and how much of each frame's scatter (n,) they follow."""
+    """Return the curve (n,), the offsets (C,) and their leverage on each frame (n,)."""
     series = data.series
     problem = projection(data, weights)
     low, high = series.log_rate_bounds
@@ -145,13 +146,13 @@ def _monotone_curve(
         used = amplitudes > 0
         if refinement < ROUNDS:
             step /= REFINEMENT
-            around = step * np.arange(-REFINEMENT, REFINEMENT + 1)
-            log_rates = np.unique(np.add.outer(log_rates[used], around).round(12))
+            refinements = step * np.arange(-REFINEMENT, REFINEMENT + 1)
+            log_rates = np.unique(np.add.outer(log_rates[used], refinements).round(12))
             log_rates = np.clip(log_rates, low, high)
     design = data.signal_design(problem.unit, means[:, used])
     offsets = np.zeros_like(weights)
-    left = data.target - design @ amplitudes[used]
-    offsets[series.fitted_offsets] = np.linalg.lstsq(data.offset_design, left)[0]
+    residual = data.target - design @ amplitudes[used]
+    offsets[series.fitted_offsets] = np.linalg.lstsq(data.offset_design, residual)[0]
     along, _ = data.followed(weights, np.hstack([design, data.offset_design]))
     return means @ amplitudes, offsets, along
 
@@ -159,7 +160,7 @@ def _monotone_curve(
 def _channel_weights(
     data: WhitenedSeries, curve: FloatArray, offsets: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Weights (maximum 1) that explain the values by `curve`, and the curve in their units."""
+    """Return weights (maximum 1) that scale `curve` to the values, and the curve in their units."""
     design = (data.matrices * curve[:, None, None]).reshape(-1, data.matrices.shape[2])
     target = (data.values - data.constant(offsets)).ravel()
     weights = np.maximum(np.linalg.lstsq(design, target)[0], 0)
@@ -172,15 +173,15 @@ def _channel_weights(
 def _gains(
     data: WhitenedSeries, curve: FloatArray, weights: FloatArray, offsets: FloatArray
 ) -> FloatArray:
-    """What the values after each charge are to be divided by to follow one curve, mean level 1.
+    """Return the divisors that bring the values after each charge to one curve with mean level 1.
 
-    A lamp that ages or a sample that is warmer charges to another level, yet decays alike. Taken
-    for noise of the frames, the difference would be a flicker that there is not.
+    An ageing lamp or a warmer sample changes the level of a charge, not its decay. The difference
+    would otherwise count as flicker.
     """
     series = data.series
     model = data.constant(weights) * curve[:, None]
-    seen = (model * (data.values - data.constant(offsets))).sum(axis=1)
-    gains = np.bincount(series.repeat, seen) / np.maximum(
+    overlap = (model * (data.values - data.constant(offsets))).sum(axis=1)
+    gains = np.bincount(series.repeat, overlap) / np.maximum(
         np.bincount(series.repeat, (model**2).sum(axis=1)), np.finfo(float).tiny
     )
     levels = series.levels * np.where(gains > 0, gains, 1.0)
@@ -190,7 +191,7 @@ def _gains(
 def _flicker(
     series: DecaySeries, signal: FloatArray, offsets: FloatArray, leverage: FloatArray
 ) -> tuple[float, float, float, FloatArray]:
-    """ρ, its σ, its degrees of freedom and likely values, from the frames' common scatter.
+    """Return ρ, its σ, its degrees of freedom and likely values, from the frames' common scatter.
 
     Along the signal's direction a frame scatters with variance V = 1 + ρ² B, B = |s/σ|², of which
     the curve followed the fraction `leverage` (n,). ρ² is the restricted maximum of the likelihood
@@ -198,25 +199,25 @@ def _flicker(
     """
     u = np.einsum("fcd,fd->fc", series.whiteners, signal)
     brightness2 = np.einsum("fc,fc->f", u, u)
-    left = np.einsum("fcd,fd->fc", series.whiteners, series.values - signal - offsets)
-    along2 = np.einsum("fc,fc->f", u, left) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
-    spare = np.maximum(1 - leverage, 0.0)
-    if float(brightness2**2 @ spare) <= LEAST_SPARE * float(brightness2 @ brightness2):
+    residual = np.einsum("fcd,fd->fc", series.whiteners, series.values - signal - offsets)
+    along2 = np.einsum("fc,fc->f", u, residual) ** 2 / np.where(brightness2 > 0, brightness2, 1.0)
+    free = np.maximum(1 - leverage, 0.0)
+    if float(brightness2**2 @ free) <= LEAST_SPARE * float(brightness2 @ brightness2):
         raise FitError(
             "expected frames to spare to estimate flicker, got a curve through all bright ones; "
             "give the flicker, or record more frames"
         )
     variance = 0.0
     for _ in range(FLICKER_ITERATIONS):
-        told = brightness2 / (1 + variance * brightness2)
-        scatter = float((told**2 / np.where(brightness2 > 0, brightness2, 1.0)) @ (along2 - spare))
-        variance = min(max(scatter / float(told**2 @ spare), 0.0), MOST_FLICKER**2)
+        weight = brightness2 / (1 + variance * brightness2)
+        scatter = float((weight**2 / np.where(brightness2 > 0, brightness2, 1.0)) @ (along2 - free))
+        variance = min(max(scatter / float(weight**2 @ free), 0.0), MOST_FLICKER**2)
 
     def error(variance: float) -> tuple[float, float]:
-        """σ(ρ²), and ν: 2/ν is the squared relative error of V where frames tell of the decay."""
-        told = brightness2 / (1 + variance * brightness2)
-        sigma = float(np.sqrt(2 / (told**2 @ spare)))
-        return sigma, 2 / (sigma**2 * float((told**3).sum() / told.sum()))
+        """Return σ(ρ²), and ν: 2/ν is V's squared relative error, weighted by information."""
+        weight = brightness2 / (1 + variance * brightness2)
+        sigma = float(np.sqrt(2 / (weight**2 @ free)))
+        return sigma, 2 / (sigma**2 * float((weight**3).sum() / weight.sum()))
 
     variance_sigma, dof = error(variance)
     if dof < FEWEST_NOISE_DOF:
@@ -226,15 +227,18 @@ def _flicker(
     flicker = float(np.sqrt(variance))
     # Near zero the square root is not linear: then √σ(ρ²) is the scale of what ρ could be.
     sigma = min(variance_sigma / (2 * max(flicker, 1e-30)), float(np.sqrt(variance_sigma)))
-    return flicker, sigma, dof, _likely_flickers(brightness2, along2, spare)
+    return flicker, sigma, dof, _likely_flickers(brightness2, along2, free)
 
 
-def _likely_flickers(brightness2: FloatArray, along2: FloatArray, spare: FloatArray) -> FloatArray:
-    """Values of ρ at equal steps of its posterior probability, arguments as in `_flicker`."""
+def _likely_flickers(brightness2: FloatArray, along2: FloatArray, free: FloatArray) -> FloatArray:
+    """Return values of ρ at equal steps of its posterior probability.
+
+    The arguments are named as in `_flicker`.
+    """
     # Dense near zero, where a small ρ already tells.
     rho = MOST_FLICKER * np.linspace(0, 1, FLICKER_GRID) ** 2
     variance = 1 + np.multiply.outer(rho**2, brightness2)
-    log_likelihood = -0.5 * (np.log(variance) @ spare + (along2 / variance).sum(axis=1))
+    log_likelihood = -0.5 * (np.log(variance) @ free + (along2 / variance).sum(axis=1))
     density = np.exp(log_likelihood - log_likelihood.max()) / (1 + (rho / USUAL_FLICKER) ** 2)
     fraction = density * np.gradient(rho)
     below = np.cumsum(fraction) - fraction / 2

@@ -1,4 +1,4 @@
-"""From frames to rates: `fit_decay`."""
+"""Fit of rates and amplitudes to the frames of a decay: `fit_decay`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -18,10 +18,10 @@ from labrig.fit.decay.whitening import WhitenedSeries, whitened
 from labrig.fit.least_squares import FloatArray
 from labrig.results import AlternativeModel, Candidate
 
-#: Rounds in which the flicker's weights follow the model; each gains two digits or more.
+#: Iterations in which the flicker's weights follow the model; each gains two digits or more.
 REWEIGHTINGS = 8
 REWEIGHTED_ENOUGH = 1e-9
-#: Scatter below which data are taken for exact: rounding.
+#: Scatter below which data are exact up to rounding.
 EXACT = 1e-13
 FEWEST_FOR_FLICKER = 6
 MOST_STATES = 8
@@ -43,49 +43,69 @@ def fit_decay(
     correlation: ArrayLike | None = None,
     offset_correlation: ArrayLike | None = None,
 ) -> DecayFit:
-    """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al. sec. 4.4).
+    """Fit Σ_i a_i e^(−k_i t), a_i ≥ 0, to a decay in some channels (Nalbach et al., section 4.4).
 
-    Frame f, channel c: y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + b_c, g the mean of e^(−k t) over the
-    exposure. Cov = (σ_fc r_cd σ_fd) + ρ² s_f s_fᵀ within a frame, s the signal without b_c.
+    For frame f and channel c, y_fc = w_c Σ_i a_i g(k_i; t_f, T_f) + b_c with g the mean of e^(−k t)
+    over the exposure. The covariance within a frame is Cov = (σ_fc r_cd σ_fd) + ρ² s_f s_fᵀ, s the
+    signal without b_c.
 
     Parameters
     ----------
     t_s
-        (n,) start of the exposures after lamp off, ≥ 0, in any order.
+        Begin of each exposure in seconds after lamp off, shape (n,), ≥ 0, in any order.
     values
-        (n,) or (n, C), linear in light, dark subtracted.
+        Signals linear in light with the dark level subtracted, shape (n,) or (n, C), in any unit.
     sigma
-        Their standard uncertainties without flicker, > 0, broadcast to `values`; inf leaves a value
-        out. None, for one channel only: equal for all, estimated from the scatter.
+        Standard uncertainties of the values without flicker, > 0, broadcast to `values`; inf
+        excludes a value. None, for a single channel only, estimates one σ for all values from the
+        scatter.
     exposure_s
-        Length of the exposures ≥ 0, one for all or (n,).
+        Length of the exposures in seconds, ≥ 0, a scalar or of shape (n,).
     channels
-        C names.
+        Names of the C channels.
     n_states
-        Number of states, or None to choose up to `max_states`, by BIC and F-test.
+        Number of states; None selects it, up to `max_states`, by BIC and F-test.
     max_states
-        Most states tried.
+        Largest number of states tried.
     offset_sigma
-        Prior σ of the channels' independent constants b_c, such as the σ of the dark level
-        subtracted from each; in the values' units, one for all or (C,): 0 holds it at zero, inf
-        leaves it free.
+        Prior σ of the channels' constants b_c, such as the σ of the subtracted dark level, in the
+        unit of the values, a scalar or of shape (C,). 0 fixes b_c at zero, inf leaves it free.
     flicker
-        Relative noise ρ that all channels of a frame share; None estimates it from the scatter of
+        Relative noise ρ that all channels of a frame share. None estimates it from the scatter of
         the frames about the best monotone curve, whatever the number of states.
     fixed_rates
-        Rates in 1/s that take part and are held; they count as states.
+        Rates in 1/s that are held fixed; they count as states.
     repeats
-        (n,) name of the charge that each frame follows: all decay alike, each from a level of its
-        own. None: there was one.
+        Name of the charge that each frame follows, shape (n,): all decays have the same rates, each
+        its own level. None is a single charge.
     correlation
-        (C, C) r of the channels' noise in one frame without flicker; None: they are independent.
+        Correlation matrix r of the channels' noise within a frame without flicker, shape (C, C).
+        None is no correlation.
     offset_correlation
-        (C, C) of the offsets' priors, likewise: a sensor that warms does so in all channels.
+        Correlation matrix of the offsets' priors, shape (C, C): the dark level of a warming sensor
+        drifts in all channels. None is no correlation.
+
+    Returns
+    -------
+    DecayFit
+        States by falling rate with covariance, channel weights, offsets, warnings and residuals.
 
     Raises
     ------
     FitError
-        Data from which no decay can be had.
+        The data do not constrain a decay.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> [decay] = labrig.read_series("series.csv")
+    >>> G = decay.channels.index("G")
+    >>> y, sigma = decay.values[:, G], decay.sigma[:, G]
+    >>> fit = labrig.fit_decay(decay.t_s, y, sigma, exposure_s=decay.exposure_s, flicker=0.007)
+    >>> for state in fit.states:
+    ...     print(f"k = {state.k_r_per_s:.4f} ± {state.k_r_sigma_per_s:.4f} 1/s")
+    k = 0.2046 ± 0.0029 1/s
+    k = 0.0101 ± 0.0001 1/s
     """
     series = decay_series(
         t_s,
@@ -113,7 +133,7 @@ def fit_decay(
     chosen, tried = _supported_states(data, numbers, fixed, smooth, noise_dof)
     alternative_models = _alternatives(data, chosen)
     best = min(alternative_models, key=lambda alternative: alternative.bic)
-    best_wins = best.bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
+    is_better = best.bic < min(candidate.bic for candidate in tried) - CLEAR_BIC
     data, chosen = _reweighted(data, chosen, smooth.flicker)
     refuse_if_constant(chosen, data)
     return assemble(
@@ -124,7 +144,7 @@ def fit_decay(
             noise_dof=noise_dof,
             candidates=tuple(tried),
             alternative_models=alternative_models,
-            better_model=best if best_wins else None,
+            better_model=best if is_better else None,
             asked=n_states,
             max_states=max_states,
             n_fixed=len(fixed),
@@ -142,7 +162,7 @@ def _log_rates(rates_per_s: Sequence[float], span_s: float) -> FloatArray:
 def _numbers_of_states(
     series: DecaySeries, n_states: int | None, max_states: int, n_fixed: int
 ) -> range:
-    """Numbers of states to try: what was asked for, or as many as the frames can tell."""
+    """Return the numbers of states to try: the requested one, or all that the frames constrain."""
     fewest = max(1, n_fixed) if n_states is None else n_states
     most = max(max_states, fewest) if n_states is None else n_states
     if fewest < max(1, n_fixed):
@@ -167,8 +187,8 @@ def _numbers_of_states(
             "record more frames or ask for fewer states"
         )
     # Choosing takes frames to spare.
-    enough = [n for n in range(fewest, most + 1) if n == fewest or frames > parameters(n) + 1]
-    return range(fewest, enough[-1] + 1)
+    affordable = [n for n in range(fewest, most + 1) if n == fewest or frames > parameters(n) + 1]
+    return range(fewest, affordable[-1] + 1)
 
 
 def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
@@ -189,17 +209,19 @@ def _check_flicker(series: DecaySeries, flicker: float | None) -> None:
 def _supported_states(
     data: WhitenedSeries, numbers: range, fixed: FloatArray, smooth: Envelope, noise_dof: float
 ) -> tuple[StatesFit, list[Candidate]]:
-    """The states chosen; fewer than the fewest wanted if amplitudes vanish."""
+    """Return the selected states; fewer than requested if amplitudes vanish."""
     for fewest in range(numbers.start, max(len(fixed), 1) - 1, -1):
-        those = range(fewest, max(numbers.stop, fewest + 1))
-        chosen, tried = choose_states(data, those, fixed, smooth.weights, smooth.offsets, noise_dof)
+        n_states = range(fewest, max(numbers.stop, fewest + 1))
+        chosen, tried = choose_states(
+            data, n_states, fixed, smooth.weights, smooth.offsets, noise_dof
+        )
         if chosen is not None:
             return chosen, tried
     raise FitError(NO_DECAY)
 
 
 def _alternatives(data: WhitenedSeries, chosen: StatesFit) -> tuple[AlternativeModel, ...]:
-    """What is no sum of exponentials, fitted under the candidates' weights."""
+    """Fit the models that are no sum of exponentials, with the weights of the candidates."""
     joint = chosen.joint
     fits = [
         (shape, fit_alternative(data, shape, joint.weights, joint.offsets))
@@ -211,14 +233,16 @@ def _alternatives(data: WhitenedSeries, chosen: StatesFit) -> tuple[AlternativeM
 def _reweighted(
     data: WhitenedSeries, fit: StatesFit, flicker: float
 ) -> tuple[WhitenedSeries, StatesFit]:
-    """The fit whose flicker is a fraction of its own signal, and the data so whitened."""
+    """Refit with flicker as a fraction of the fit's own signal; return the whitened data, too."""
     if flicker == 0:
         return data, refit(data, fit)
     for _ in range(REWEIGHTINGS):
         data = whitened(data.series, fit.signal(data.series), flicker)
-        before = fit.joint.shape
+        old_shape = fit.joint.shape
         fit = refit(data, fit)
-        after = fit.joint.shape
-        if len(after) == len(before) and np.allclose(after, before, REWEIGHTED_ENOUGH, 0.0):
+        new_shape = fit.joint.shape
+        if len(new_shape) == len(old_shape) and np.allclose(
+            new_shape, old_shape, REWEIGHTED_ENOUGH, 0.0
+        ):
             break
     return data, fit

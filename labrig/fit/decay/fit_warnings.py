@@ -1,4 +1,4 @@
-"""What speaks for and against a fit: refusals, and the warnings in its result."""
+"""Refusals of a decay fit, and the warnings in its result."""
 
 from dataclasses import dataclass
 
@@ -20,24 +20,24 @@ from labrig.fit.least_squares import FloatArray
 from labrig.results import AlternativeModel, Candidate, DecayState
 
 RISING_SIGMAS = 5.0
-#: A rate this close to the slowest one searched, in log k, has come to rest there.
+#: Distance in log k from the slowest rate searched below which a rate is at that bound.
 AT_BOUND = 1e-3
 
 
 @dataclass(frozen=True)
 class Evidence:
-    """What led to the fit chosen.
+    """Steps that led to the selected fit.
 
     Attributes
     ----------
     noise, noise_dof
-        The envelope; its degrees of freedom if σ or flicker come from it, else inf.
-    candidates, alternative models
-        What was tried.
+        Envelope, and its degrees of freedom if σ or flicker were estimated from it, else inf.
+    candidates, alternative_models
+        Numbers of states and other models that were tried.
     better_model
-        The alternative model that does clearly better than exponentials, if one does.
+        Alternative model that fits clearly better than exponentials, if there is one.
     asked, max_states, n_fixed
-        As the user had it.
+        Requested number of states, largest number and number of fixed rates.
     """
 
     noise: Envelope
@@ -51,7 +51,7 @@ class Evidence:
 
 
 def refuse_if_rising(data: WhitenedSeries, weights: FloatArray) -> None:
-    """No fit of a decay to what grows.
+    """Refuse to fit a decay to a rising signal.
 
     Raises
     ------
@@ -67,7 +67,7 @@ def refuse_if_rising(data: WhitenedSeries, weights: FloatArray) -> None:
 
 
 def refuse_if_constant(fit: StatesFit, data: WhitenedSeries) -> None:
-    """No rate for what does not change.
+    """Refuse to fit a rate to a constant signal.
 
     Raises
     ------
@@ -90,18 +90,18 @@ def warnings_about(
     log_rate_covariance: FloatArray,
     evidence: Evidence,
 ) -> list[str]:
-    """What to distrust, in one line each.
+    """Return the warnings about a fit, one line each.
 
     Parameters
     ----------
     data
-        As whitened for `fit`.
+        Series whitened for `fit`.
     fit, states
         The fit, and its states in the user's units by falling rate.
     log_rate_covariance
-        (n, n) of log k of `states`.
+        Covariance of log k of `states`, shape (n, n).
     evidence
-        What led to the fit.
+        Steps that led to the fit.
     """
     series, joint = data.series, fit.joint
     warnings = []
@@ -122,10 +122,10 @@ def warnings_about(
             f"flicker was estimated from {max(evidence.noise_dof, 1):.0f} frames' worth of bright "
             "signal: give a flicker measured elsewhere, or record more frames while it is bright"
         )
-    wanted = evidence.asked or evidence.n_fixed
-    if fit.n_states < wanted:
+    requested = evidence.asked or evidence.n_fixed
+    if fit.n_states < requested:
         warnings.append(
-            f"{wanted} states were asked for, the data support {fit.n_states}: "
+            f"{requested} states were asked for, the data support {fit.n_states}: "
             "the others' amplitude is zero; ask for fewer or take more light"
         )
     alternative = evidence.better_model
@@ -136,13 +136,13 @@ def warnings_about(
             f"{'s' if n > 1 else ''}: the rates are descriptive only, "
             "do not extrapolate them beyond the times recorded"
         )
-    more = (
+    advice = (
         "allow more states"
         if fit.n_states < evidence.max_states
         else "look for another law of decay"
     )
     warnings += misfit_warnings(
-        _misfit(data, fit, evidence), fit.n_states, f"{more}, and check background and times"
+        _misfit(data, fit, evidence), fit.n_states, f"{advice}, and check background and times"
     )
     warnings += below_zero_warnings(*_common_signal(data, joint.weights, joint.offsets))
     warnings += offset_warnings(series.channels, joint.offsets, series.offset_sigma)
@@ -158,7 +158,7 @@ def warnings_about(
 def _common_signal(
     data: WhitenedSeries, weights: FloatArray, offsets: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(n,) what the channels together say of the signal without `offsets`, and its 1/variance."""
+    """Return the weighted signal of all channels without `offsets`, and its 1/variance, (n,)."""
     unit = data.constant(weights)
     information = np.einsum("fc,fc->f", unit, unit)
     values = data.values - data.constant(offsets)

@@ -1,7 +1,7 @@
-"""Everything at once: a decay's shape, the channels' weights and offsets, by least squares.
+"""Joint least-squares fit of a decay's shape, the channels' weights and their offsets.
 
 The model is w_c h(t; θ) + b_c: a shape h shared by all channels, times one weight per channel
-(rank one, Nalbach et al. sec. 4.3), plus what each channel's dark level is wrong by. The brightest
+(rank one, Nalbach et al. sec. 4.3), plus the error of each channel's dark level. The brightest
 channel's weight is held at 1, which fixes the scale of h.
 """
 
@@ -22,26 +22,26 @@ from labrig.fit.least_squares import (
 Shape = Callable[[FloatArray], tuple[FloatArray, FloatArray]]
 
 
-#: Tries to find out which channel is the brightest.
+#: Largest number of attempts to identify the brightest channel.
 CHANGES_OF_LEAD = 3
 
 
 @dataclass(frozen=True)
 class JointFit:
-    """Shape, weights and offsets together, in the series' own units.
+    """Fitted shape, weights and offsets in the series' own units.
 
     Attributes
     ----------
     shape
-        (q,) θ.
+        Parameters θ of the shape, shape (q,).
     weights
-        (C,) maximum 1.
+        Weights of the channels with maximum 1, shape (C,).
     offsets
-        (C,) 0 where held.
+        Offsets of the channels, 0 where held, shape (C,).
     least_squares
-        The solution of `[θ, weights of all but the brightest channel, offsets that are fitted]`.
+        Solution in `[θ, weights of all but the brightest channel, fitted offsets]`.
     brightest
-        The channel whose weight is held at 1.
+        Index of the channel whose weight is held at 1.
     """
 
     shape: FloatArray
@@ -57,11 +57,11 @@ class JointFit:
 
     @property
     def n_parameters(self) -> int:
-        """Parameters fitted."""
+        """Number of fitted parameters."""
         return len(self.least_squares.parameters)
 
     def frame_residuals(self, data: WhitenedSeries) -> tuple[FloatArray, FloatArray]:
-        """(n,) residuals along the signal, one of unit variance per frame; (n,) squared SNR."""
+        """Return each frame's residual of unit variance along the signal, and squared SNR, (n,)."""
         unit = data.constant(self.weights)
         length = np.linalg.norm(unit, axis=1)
         residuals = self.least_squares.residuals[: unit.size].reshape(unit.shape)
@@ -70,7 +70,7 @@ class JointFit:
         return along, np.einsum("fc,fc->f", signal, signal)
 
     def followed(self, data: WhitenedSeries) -> tuple[float, float]:
-        """Degrees of freedom that the fit took from the residuals along and across the signal."""
+        """Return the degrees of freedom that the fit took along and across the signal."""
         along, across = data.followed(self.weights, self.least_squares.jacobian)
         return float(along.sum()), float(across.sum())
 
@@ -86,22 +86,22 @@ def fit_jointly(
     max_iterations: int,
     tolerance: float,
 ) -> JointFit:
-    """Least squares over θ, weights and offsets.
+    """Fit θ, weights and offsets by least squares.
 
     Parameters
     ----------
     data
-        n frames of C channels.
+        Whitened series of n frames and C channels.
     shape
-        h and its Jacobian.
+        Function that returns h and its Jacobian.
     start, lower, upper
-        (q,) θ and its bounds.
+        Start values and bounds of θ, shape (q,).
     weights, offsets
-        (C,) to start from.
+        Start values of the channels, shape (C,).
     max_iterations
-        Evaluations after which a fit that still creeps is taken as it is.
+        Number of evaluations after which a slowly converging fit is accepted.
     tolerance
-        Relative step small enough; 0 for all digits.
+        Relative step at which to stop; 0 for full precision.
     """
     theta = start
     for _ in range(CHANGES_OF_LEAD):
@@ -125,7 +125,7 @@ def fit_jointly(
 
 @dataclass(frozen=True)
 class JointProblem:
-    """Residuals as a function of [θ, weights of the other channels, offsets that are fitted]."""
+    """Residuals as a function of [θ, weights of the other channels, fitted offsets]."""
 
     data: WhitenedSeries
     shape: Shape
@@ -133,12 +133,12 @@ class JointProblem:
     others: list[int]
 
     def pack(self, theta: FloatArray, weights: FloatArray, offsets: FloatArray) -> FloatArray:
-        """The parameters as one vector."""
+        """Return the parameters as one vector."""
         fitted = self.data.series.fitted_offsets
         return np.concatenate([theta, weights[self.others], offsets[fitted]])
 
     def unpack(self, x: FloatArray) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """θ, weights (C,) and offsets (C,) of all channels."""
+        """Return θ, weights (C,) and offsets (C,) of all channels."""
         first_offset = self.n_shape + len(self.others)
         weights, offsets = np.ones(len(self.others) + 1), np.zeros(len(self.others) + 1)
         weights[self.others] = x[self.n_shape : first_offset]
@@ -146,7 +146,7 @@ class JointProblem:
         return x[: self.n_shape], weights, offsets
 
     def residuals(self, x: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Whitened model − target (n C + p,) and its Jacobian; the last p rows are the priors."""
+        """Return whitened model − target (n C + p,), the last p rows priors, and its Jacobian."""
         data, q, others = self.data, self.n_shape, self.others
         theta, weights, _ = self.unpack(x)
         h, slopes = self.shape(theta)
@@ -163,7 +163,7 @@ class JointProblem:
 
 
 def covariance_under(data: WhitenedSeries, shape: Shape, fit: JointFit) -> FloatArray:
-    """Covariance of the parameters of `fit` if the noise is as in `data`."""
+    """Return the covariance of the parameters of `fit` for the noise of `data`."""
     others = [c for c in range(len(fit.weights)) if c != fit.brightest]
     problem = JointProblem(data, shape, len(fit.shape), others)
     _, jacobian = problem.residuals(fit.least_squares.parameters)
@@ -171,7 +171,7 @@ def covariance_under(data: WhitenedSeries, shape: Shape, fit: JointFit) -> Float
 
 
 def weight_sigma(fit: JointFit, covariance: FloatArray) -> FloatArray:
-    """σ of the channel weights (C,), 0 for the one that is held; `covariance` (p, p) of all."""
+    """Return σ of the channel weights (C,), 0 for the held one, from the full covariance (p, p)."""
     n_shape, others = len(fit.shape), np.arange(len(fit.weights)) != fit.brightest
     sigma = np.zeros(len(fit.weights))
     variances = np.diag(covariance)[n_shape : n_shape + np.count_nonzero(others)]

@@ -1,4 +1,4 @@
-"""From the fit's own units to the user's: rates, amplitudes, covariance, warnings."""
+"""Conversion of a fit from its own units to the user's: rates, amplitudes, covariance, warnings."""
 
 from dataclasses import dataclass
 
@@ -16,13 +16,13 @@ from labrig.results import DecayState, FittedDecay
 
 @dataclass(frozen=True)
 class DecayFit(FittedDecay):
-    """A decay's result with the residuals of its fit.
+    """Result of a decay fit with its residuals.
 
     Attributes
     ----------
     residuals, normalised_residuals
         Value − model, one row per frame in the order given, one column per channel: in the values'
-        units, and whitened (independent, unit variance if the noise is as assumed).
+        unit, and whitened (independent, of unit variance if the noise is as assumed).
     """
 
     residuals: FloatArray
@@ -30,10 +30,10 @@ class DecayFit(FittedDecay):
 
 
 def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayFit:
-    """The result in the user's units and order of frames."""
+    """Convert the fit to the user's units and order of frames."""
     series, joint = data.series, fit.joint
-    own = _own_covariance(fit, data, evidence.noise)
-    covariance, log_rate_covariance = _covariances(fit, data, own)
+    fitted_covariance = _fitted_covariance(fit, data, evidence.noise)
+    covariance, log_rate_covariance = _covariances(fit, data, fitted_covariance)
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates[order]) / series.span_s
     amplitudes = (fit.amplitudes * np.exp(np.exp(fit.log_rates) * series.start))[
@@ -46,11 +46,11 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         )
         for i in range(fit.n_states)
     )
-    weights_sigma = weight_sigma(joint, own)
+    weights_sigma = weight_sigma(joint, fitted_covariance)
     residuals = np.empty_like(series.values)
-    left = series.values - fit.signal(series) - joint.offsets
-    residuals[series.order] = left * series.frame_levels
-    brightest = [*range(2 * fit.n_states), 2 * fit.n_states + int(np.argmax(joint.weights))]
+    residual = series.values - fit.signal(series) - joint.offsets
+    residuals[series.order] = residual * series.frame_levels
+    kept = [*range(2 * fit.n_states), 2 * fit.n_states + int(np.argmax(joint.weights))]
     normalised = np.empty_like(series.values)
     n_values = series.values.size
     normalised[series.order] = -joint.least_squares.residuals[:n_values].reshape(
@@ -70,7 +70,7 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
         chi2=joint.chi2,
         dof=fit.dof(data),
         bic=bic(data, joint),
-        covariance=covariance[np.ix_(brightest, brightest)],
+        covariance=covariance[np.ix_(kept, kept)],
         warnings=tuple(
             warnings_about(data, fit, states, log_rate_covariance[np.ix_(order, order)], evidence)
         ),
@@ -82,18 +82,19 @@ def assemble(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> DecayF
     )
 
 
-def _own_covariance(fit: StatesFit, data: WhitenedSeries, noise: Envelope) -> FloatArray:
-    """Of the parameters fitted, (p, p); the noise's own uncertainty is in it.
+def _fitted_covariance(fit: StatesFit, data: WhitenedSeries, noise: Envelope) -> FloatArray:
+    """Return the covariance of the fitted parameters (p, p), with the noise's uncertainty in it.
 
-    An estimated flicker is marginalised: the mean over its likely values. Where it rules and is
-    known with ν degrees of freedom, that makes of the normal distribution Student's t.
+    An estimated flicker is marginalised: the covariance is the mean over its likely values. Where
+    flicker dominates and is known with ν degrees of freedom, the normal distribution becomes
+    Student's t.
     """
-    own = fit.joint.least_squares.covariance
+    covariance = fit.joint.least_squares.covariance
     if not data.series.sigma_given:
         dof = fit.dof(data)
-        return own * (fit.joint.chi2 / dof if dof > 0 else np.inf)
+        return covariance * (fit.joint.chi2 / dof if dof > 0 else np.inf)
     if len(noise.likely_flickers) == 1:
-        return own
+        return covariance
     signal = fit.signal(data.series)
     covariances = [
         fit.covariance_under(whitened(data.series, signal, flicker))
@@ -103,40 +104,45 @@ def _own_covariance(fit: StatesFit, data: WhitenedSeries, noise: Envelope) -> Fl
 
 
 def _covariances(
-    fit: StatesFit, data: WhitenedSeries, own: FloatArray
+    fit: StatesFit, data: WhitenedSeries, fitted_covariance: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Of k1, a1, … by falling rate and all offsets in the user's units; of log k, free first."""
+    """Return the covariance of k₁, a₁, … and all offsets in the user's units, and of log k.
+
+    The former is by falling rate, the latter has free rates first.
+    """
     series, n_free = data.series, fit.n_free
     n_states = fit.n_states
     order = np.argsort(-fit.log_rates, kind="stable")
     rates = np.exp(fit.log_rates)
     b = fit.amplitudes
     # Amplitudes are fitted at the first frame, given at lamp off: a = b e^(k t₀).
-    grown = np.exp(rates * series.start) * series.peak
-    transform = np.zeros((2 * n_states + len(series.channels), len(own)))
-    to_log_rates = np.zeros((n_states, len(own)))
-    for place, i in enumerate(order):
+    growth = np.exp(rates * series.start) * series.peak
+    transform = np.zeros((2 * n_states + len(series.channels), len(fitted_covariance)))
+    to_log_rates = np.zeros((n_states, len(fitted_covariance)))
+    for rank, i in enumerate(order):
         if i < n_free:
-            transform[2 * place, 2 * i] = rates[i] / series.span_s
-            transform[2 * place + 1, 2 * i] = b[i] * grown[i] * rates[i] * series.start
-            transform[2 * place + 1, 2 * i + 1] = grown[i]
+            transform[2 * rank, 2 * i] = rates[i] / series.span_s
+            transform[2 * rank + 1, 2 * i] = b[i] * growth[i] * rates[i] * series.start
+            transform[2 * rank + 1, 2 * i + 1] = growth[i]
             to_log_rates[i, 2 * i] = 1.0
         else:
-            transform[2 * place + 1, n_free + i] = grown[i]
+            transform[2 * rank + 1, n_free + i] = growth[i]
     fitted = series.fitted_offsets
-    transform[2 * n_states + fitted, len(own) - len(fitted) + np.arange(len(fitted))] = series.peak
-    return _propagated(own, transform), _propagated(own, to_log_rates)
+    transform[
+        2 * n_states + fitted, len(fitted_covariance) - len(fitted) + np.arange(len(fitted))
+    ] = series.peak
+    return _propagated(fitted_covariance, transform), _propagated(fitted_covariance, to_log_rates)
 
 
 def _propagated(covariance: FloatArray, transform: FloatArray) -> FloatArray:
-    """T Cov Tᵀ, where an infinite variance stays one and correlates with nothing."""
-    known = np.isfinite(np.diag(covariance))
-    finite = np.where(np.multiply.outer(known, known), covariance, 0.0)
+    """Return T Cov Tᵀ; an infinite variance stays infinite and correlates with nothing."""
+    is_finite = np.isfinite(np.diag(covariance))
+    finite = np.where(np.multiply.outer(is_finite, is_finite), covariance, 0.0)
     # What the data say nothing about may overflow: that is as good as infinite.
     with np.errstate(over="ignore", invalid="ignore"):
         result: FloatArray = transform @ finite @ transform.T
-    unknown = (transform[:, ~known] != 0).any(axis=1) | ~np.isfinite(np.diag(result))
-    result[unknown, :] = 0.0
-    result[:, unknown] = 0.0
-    result[unknown, unknown] = np.inf
+    unbounded = (transform[:, ~is_finite] != 0).any(axis=1) | ~np.isfinite(np.diag(result))
+    result[unbounded, :] = 0.0
+    result[:, unbounded] = 0.0
+    result[unbounded, unbounded] = np.inf
     return np.where(np.isfinite(result) | np.eye(len(result), dtype=bool), result, 0.0)

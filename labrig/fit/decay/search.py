@@ -1,8 +1,8 @@
-"""Variable projection: where in the space of rates to look, the amplitudes being linear.
+"""Variable projection: search in the space of rates, the amplitudes being linear.
 
 For given rates the amplitudes (≥ 0) and the offsets follow by linear least squares, so the search
 has one dimension per state: every combination of a grid of rates, then BOBYQA in log k from the
-best. Deterministic; the joint fit does the last digits.
+best. It is deterministic; the joint fit adds the last digits.
 
 References
 ----------
@@ -21,28 +21,28 @@ from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.material import exponential_means
 
-#: Combinations of rates looked at; decides how fine the grid can be.
+#: Largest number of combinations of rates, which limits the grid.
 COMBINATIONS = 4000
 FINEST_GRID = 36
-#: Precision in log k at which the search hands over.
+#: Precision in log k at which the search ends and the joint fit starts.
 LOG_RATE_TOLERANCE = 3e-2
 MAX_EVALUATIONS = 200
 
 
 @dataclass(frozen=True)
 class Projection:
-    """The linear half of the problem at given channel weights, the offsets already eliminated.
+    """Linear part of the problem at given channel weights, with the offsets eliminated.
 
     Attributes
     ----------
     data
         The whitened series.
     unit
-        (n, C) whitened signal of 1.
+        Whitened signal of 1, shape (n, C).
     offset_directions
-        (n C + p, m) orthonormal: what the offsets can explain.
+        Orthonormal basis of what the offsets explain, shape (n C + p, m).
     target
-        (n C + p,) the rest of the whitened values.
+        Whitened values without that part, shape (n C + p,).
     """
 
     data: WhitenedSeries
@@ -51,35 +51,35 @@ class Projection:
     target: FloatArray
 
     def rate_columns(self, log_rates: FloatArray) -> FloatArray:
-        """(n C + p, q) of exponentials (q,) of amplitude 1 at the first frame."""
+        """Return columns (n C + p, q) of exponentials (q,) of amplitude 1 at the first frame."""
         series = self.data.series
         return self.columns(exponential_means(np.exp(log_rates), series.t, series.exposure))
 
     def columns(self, shapes: FloatArray) -> FloatArray:
-        """(n C + p, q) what shapes (n, q) become, less what the offsets can explain of them."""
+        """Return columns (n C + p, q) of shapes (n, q) without what the offsets explain."""
         design = self.data.signal_design(self.unit, shapes)
         return design - self.offset_directions @ (self.offset_directions.T @ design)
 
     def amplitudes(self, log_rates: FloatArray) -> tuple[FloatArray, float]:
-        """Amplitudes ≥ 0 that fit best, and the χ² left."""
+        """Return the best amplitudes ≥ 0 and the remaining χ²."""
         columns = self.rate_columns(log_rates)
-        found = nonnegative(columns.T @ columns, columns.T @ self.target)
-        left = self.target - columns @ found
-        return found, float(left @ left)
+        values = nonnegative(columns.T @ columns, columns.T @ self.target)
+        residual = self.target - columns @ values
+        return values, float(residual @ residual)
 
 
 def projection(data: WhitenedSeries, weights: FloatArray) -> Projection:
-    """The linear problem of `data` at channel weights (C,)."""
+    """Return the linear problem of `data` at channel weights (C,)."""
     directions = np.linalg.qr(data.offset_design)[0]
     target = data.target - directions @ (directions.T @ data.target)
     return Projection(data, data.constant(weights), directions, target)
 
 
 def nonnegative(gram: FloatArray, moments: FloatArray) -> FloatArray:
-    """Minimise ½ aᵀGa − mᵀa over a ≥ 0 for a handful of columns, all sets of them tried.
+    """Minimise ½ aᵀGa − mᵀa over a ≥ 0 for a few columns by trying all active sets.
 
-    The search asks thousands of times for what need not be exact: `nonnegative_least_squares`,
-    which is, would make a whole decay fit take half as long again.
+    The search calls it thousands of times with no need of exact results: the exact
+    `nonnegative_least_squares` would make a decay fit take half as long again.
     """
     n = len(moments)
     best, best_cost = np.zeros(n), 0.0
@@ -100,16 +100,16 @@ def nonnegative(gram: FloatArray, moments: FloatArray) -> FloatArray:
 
 
 def search_rates(problem: Projection, n_free: int, fixed: FloatArray) -> FloatArray | None:
-    """Log rates (n_free,) near the global best, or None if fewer states always do as well.
+    """Return log rates (n_free,) near the global best, or None if fewer states always fit as well.
 
     Parameters
     ----------
     problem
-        At the channel weights to be used.
+        Linear problem at the channel weights to be used.
     n_free
-        Rates to find, ≥ 1.
+        Number of rates to find, ≥ 1.
     fixed
-        (f,) log rates that take part but stay.
+        Fixed log rates, shape (f,).
     """
     low, high = problem.data.series.log_rate_bounds
     start = _best_on_grid(problem, n_free, fixed, low, high)
@@ -131,15 +131,15 @@ def search_rates(problem: Projection, n_free: int, fixed: FloatArray) -> FloatAr
     try:
         # An exception must not pass through NLopt's C code.
         with np.errstate(all="ignore"):
-            found = np.asarray(optimiser.optimize(start), dtype=np.float64)
+            log_rates = np.asarray(optimiser.optimize(start), dtype=np.float64)
     except nlopt.RoundoffLimited:
         # Noise-free data: χ² is all rounding before the rates have settled. The grid will do.
         return start
-    return found
+    return log_rates
 
 
 def grid_size(n_free: int) -> int:
-    """Rates on the grid, so that no more than `COMBINATIONS` combinations arise."""
+    """Return the number of rates on the grid with at most `COMBINATIONS` combinations."""
     return max(
         size for size in range(n_free + 2, FINEST_GRID + 1) if comb(size, n_free) <= COMBINATIONS
     )
@@ -148,7 +148,7 @@ def grid_size(n_free: int) -> int:
 def _best_on_grid(
     problem: Projection, n_free: int, fixed: FloatArray, low: float, high: float
 ) -> FloatArray | None:
-    """The best combination in which every amplitude is positive."""
+    """Return the best combination with all amplitudes positive, None if there is none."""
     grid = np.linspace(low, high, grid_size(n_free))
     log_rates = np.concatenate([grid, fixed])
     columns = problem.rate_columns(log_rates)
@@ -156,14 +156,14 @@ def _best_on_grid(
     columns = columns / np.where(norms > 0, norms, 1.0)
     gram, moments = columns.T @ columns, columns.T @ problem.target
     chosen = np.array(list(combinations(range(len(grid)), n_free)))
-    held = np.broadcast_to(np.arange(len(grid), len(log_rates)), (len(chosen), len(fixed)))
-    chosen = np.hstack([chosen, held])
+    fixed_columns = np.broadcast_to(np.arange(len(grid), len(log_rates)), (len(chosen), len(fixed)))
+    chosen = np.hstack([chosen, fixed_columns])
     matrices = gram[chosen[:, :, None], chosen[:, None, :]]
     # Neighbours on the grid are nearly alike; a hint of a ridge keeps the batch solvable.
     matrices = matrices + 1e-13 * np.eye(chosen.shape[1])
-    right = moments[chosen]
-    amplitudes = np.linalg.solve(matrices, right[:, :, None])[:, :, 0]
-    explained = np.einsum("ij,ij->i", amplitudes, right)
+    rhs = moments[chosen]
+    amplitudes = np.linalg.solve(matrices, rhs[:, :, None])[:, :, 0]
+    explained = np.einsum("ij,ij->i", amplitudes, rhs)
     explained[~np.all(amplitudes[:, :n_free] > 0, axis=1)] = -np.inf
     best = int(np.argmax(explained))
     return grid[chosen[best, :n_free]] if np.isfinite(explained[best]) else None

@@ -1,9 +1,9 @@
-"""How many states, and whether exponentials at all.
+"""Selection of the number of states.
 
-One more state is believed only if both the Bayesian information criterion and an F-test want it,
-and if its rate can be told from the others'.
-The F-test's denominator is the frames' own scatter along the signal, so that neither an
-underestimated σ nor channels that flicker together can argue a state into being.
+One more state is accepted only if both the Bayesian information criterion and an F-test favour it,
+and if its rate is distinct from the others'. The F-test's denominator is the frames' own scatter
+along the signal, so that neither an underestimated σ nor common-mode flicker of the channels
+produces a spurious state.
 """
 
 import numpy as np
@@ -15,15 +15,15 @@ from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.results import Candidate
 
-#: Chance of a state too many, were its rate known. It is searched for, which multiplies chances;
-#: the BIC divides them again: ≤ 0.3 % of single exponentials come out double (tests/acceptance).
+#: Significance level of a further state of known rate. Searching the rate adds false positives,
+#: the BIC removes some: ≤ 0.3 % of single exponentials come out double (tests/acceptance).
 F_TEST_LEVEL = 0.002
-#: How much lower a power law's BIC must be: odds of e^3 = 20 : 1.
+#: Difference in BIC from which an alternative model is preferred: odds of e^3 = 20 : 1.
 CLEAR_BIC = 6.0
 
 
 def bic(data: WhitenedSeries, joint: JointFit) -> float:
-    """Bayesian information criterion; the common noise's constant left out."""
+    """Return the Bayesian information criterion, without the constant of the common noise."""
     independent = data.independent_data(joint.weights)
     return joint.chi2 + joint.n_parameters * float(np.log(independent))
 
@@ -36,24 +36,25 @@ def choose_states(
     offsets: FloatArray,
     noise_dof: float,
 ) -> tuple[StatesFit | None, list[Candidate]]:
-    """Fits with more and more states, `numbers` of them, until one more is not worth it.
+    """Fit more and more states, `numbers` of them, until one more is not supported.
 
     Parameters
     ----------
     data
-        Whitened by the envelope's signal, so that χ² compares.
+        Series whitened by the envelope's signal, so that χ² compares.
     numbers
-        States in all, the fixed ones included.
+        Total numbers of states, the fixed ones included.
     fixed
-        (f,) log of the rates held.
+        Logarithms of the fixed rates, shape (f,).
     weights, offsets
-        (C,) to start from.
+        Start values of the channels, shape (C,).
     noise_dof
-        Degrees of freedom of the noise's own estimate; inf if it was given.
+        Degrees of freedom of the noise estimate; inf if the noise was given.
 
     Returns
     -------
-    The fit chosen (None if not even the first is supported) and what was tried.
+    fit, candidates
+        The selected fit, None if not even the first is supported, and all candidates tried.
     """
     chosen: StatesFit | None = None
     tried: list[Candidate] = []
@@ -75,19 +76,19 @@ def choose_states(
 
 
 def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit, noise_dof: float) -> float:
-    """Chance of a gain in χ² as large as that from `fewer` to `more` parameters.
+    """Return the chance of a gain in χ² as large as that from `fewer` to `more` parameters.
 
-    The scatter it is compared with is that of all frames, or of the bright ones if that is larger:
-    these make the gain, and an unsuspected flicker shows in them only.
+    The gain is compared with the scatter of all frames, or of the bright ones if that is larger:
+    these produce the gain, and an unmodelled flicker appears only in them.
     """
     added = more.n_parameters - fewer.n_parameters
     frames, brightness2 = more.frame_residuals(data)
     dof = len(frames) - more.followed(data)[0]
     if dof < 1 or added <= 0:
         return 1.0
-    spare = dof / len(frames)
-    bright = float(brightness2 @ frames**2) / float(brightness2.sum())
-    scatter = max(float(frames @ frames) / len(frames), bright) / spare
+    free_fraction = dof / len(frames)
+    bright_scatter = float(brightness2 @ frames**2) / float(brightness2.sum())
+    scatter = max(float(frames @ frames) / len(frames), bright_scatter) / free_fraction
     if scatter == 0:
         return 0.0
     gain = max(fewer.chi2 - more.chi2, 0.0) / added

@@ -1,4 +1,4 @@
-"""A decay as measured, checked and brought to order 1."""
+"""A measured decay, validated and scaled to order 1."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -14,7 +14,7 @@ from labrig.fit.least_squares import FloatArray
 SLOWEST_SPANS = 50.0
 #: Fastest rate searched: this many decays within the shortest step between frames.
 FASTEST_DECAYS = 10.0
-#: A fast state's signal must not have vanished e^300-fold before the first frame: squares overflow.
+#: Largest decay exponent k t before the first frame: squares overflow beyond e^300.
 LARGEST_PHASE = 300.0
 
 NO_DECAY = (
@@ -25,30 +25,31 @@ NO_DECAY = (
 
 @dataclass(frozen=True)
 class DecaySeries:
-    """n frames in C channels by rising time; times in spans, values in units of the largest one.
+    """Frames of C channels by rising time; times in spans, values in units of the largest one.
 
     Attributes
     ----------
     t, exposure
-        (n,) start since the first frame's and length of the exposures, in spans.
+        Begin since that of the first frame, and length of the exposures, in spans, shape (n,).
     start
-        The first frame's time, in spans.
+        Time of the first frame in spans.
     values, inverse_sigma
-        (n, C); an inverse σ of 0 marks a value that was not measured.
+        Values and inverse σ, shape (n, C); an inverse σ of 0 marks a missing value.
     correlation
-        (C, C) of the channels' noise in one frame, flicker apart.
+        Correlation of the channels' noise within a frame without flicker, shape (C, C).
     offset_sigma
-        (C,) prior σ of the channels' offsets: 0 held at zero, inf free.
+        Prior σ of the channels' offsets, shape (C,): 0 held at zero, inf free.
     offset_correlation
-        (C, C) of the same.
+        Correlation of the offsets' priors, shape (C, C).
     span_s, peak
-        What times and values were divided by.
+        Units of the times, in s, and of the values.
     order
-        (n,) the frames as given, by rising time.
+        Indices that sort the frames as given by time, shape (n,).
     repeat, levels
-        (n,) number of the charge a frame follows, (r,) what the values after each were divided by.
+        Index of the charge that a frame follows, shape (n,), and divisor of the values after each
+        charge, shape (r,).
     channels, repeats
-        C and r names.
+        Names of the C channels and of the r charges.
     sigma_given
         False if σ is a scale still to be estimated.
     """
@@ -72,61 +73,63 @@ class DecaySeries:
 
     @property
     def n_frames(self) -> int:
-        """Frames."""
+        """Number of frames."""
         return len(self.t)
 
     @cached_property
     def n_values(self) -> int:
-        """Values measured."""
+        """Number of values measured."""
         return int(np.count_nonzero(self.inverse_sigma))
 
     @cached_property
     def frame_levels(self) -> FloatArray:
-        """(n, 1) what the values of each frame were divided by."""
+        """Divisor of the values of each frame, shape (n, 1)."""
         return self.levels[self.repeat][:, None]
 
     @cached_property
     def whiteners(self) -> FloatArray:
-        """(n, C, C) W with Wᵀ W the inverse covariance of each frame's noise without flicker."""
+        """Matrices W with Wᵀ W the inverse covariance of each frame without flicker, (n, C, C)."""
         measured = self.inverse_sigma > 0
         roots = np.zeros((self.n_frames, *self.correlation.shape))
-        for seen in np.unique(measured, axis=0):
-            part = np.ix_(seen, seen)
-            roots[np.ix_((measured == seen).all(axis=1), seen, seen)] = np.linalg.inv(
-                np.linalg.cholesky(self.correlation[part])
+        for pattern in np.unique(measured, axis=0):
+            block = np.ix_(pattern, pattern)
+            roots[np.ix_((measured == pattern).all(axis=1), pattern, pattern)] = np.linalg.inv(
+                np.linalg.cholesky(self.correlation[block])
             )
         whiteners: FloatArray = roots * self.inverse_sigma[:, None, :]
         return whiteners
 
     @cached_property
     def offset_prior(self) -> FloatArray:
-        """(p, m) rows that, times the offsets fitted, have unit variance by their prior."""
-        known = np.flatnonzero(np.isfinite(self.offset_sigma) & (self.offset_sigma > 0))
-        sigma = self.offset_sigma[known]
-        covariance = self.offset_correlation[np.ix_(known, known)] * np.outer(sigma, sigma)
-        rows = np.zeros((len(known), len(self.fitted_offsets)))
-        places = np.searchsorted(self.fitted_offsets, known)
-        rows[:, places] = np.linalg.inv(np.linalg.cholesky(covariance))
+        """Rows that, times the fitted offsets, have unit variance by their prior, shape (p, m)."""
+        constrained = np.flatnonzero(np.isfinite(self.offset_sigma) & (self.offset_sigma > 0))
+        sigma = self.offset_sigma[constrained]
+        covariance = self.offset_correlation[np.ix_(constrained, constrained)] * np.outer(
+            sigma, sigma
+        )
+        rows = np.zeros((len(constrained), len(self.fitted_offsets)))
+        columns = np.searchsorted(self.fitted_offsets, constrained)
+        rows[:, columns] = np.linalg.inv(np.linalg.cholesky(covariance))
         return rows
 
     def relevelled(self, gains: FloatArray) -> "DecaySeries":
-        """With the values after each charge divided by their gain (r,) > 0."""
-        of_frame = gains[self.repeat][:, None]
+        """Return the series with the values after each charge divided by their gain (r,) > 0."""
+        frame_gains = gains[self.repeat][:, None]
         return replace(
             self,
-            values=self.values / of_frame,
-            inverse_sigma=self.inverse_sigma * of_frame,
+            values=self.values / frame_gains,
+            inverse_sigma=self.inverse_sigma * frame_gains,
             levels=self.levels * gains,
         )
 
     @cached_property
     def fitted_offsets(self) -> NDArray[np.intp]:
-        """(m,) channels whose offset is fitted."""
+        """Indices of the channels whose offset is fitted, shape (m,)."""
         return np.flatnonzero(self.offset_sigma)
 
     @cached_property
     def log_rate_bounds(self) -> tuple[float, float]:
-        """Log of the slowest and the fastest rate these times can tell, in 1/spans."""
+        """Logarithms of the slowest and the fastest rate that the times resolve, in 1/spans."""
         steps = np.diff(self.t)
         shortest = float(steps[steps > 0].min())
         fastest = FASTEST_DECAYS / shortest
@@ -146,12 +149,12 @@ def decay_series(
     correlation: ArrayLike | None = None,
     offset_correlation: ArrayLike | None = None,
 ) -> DecaySeries:
-    """Check, sort and scale; arguments as `labrig.fit.decay.fit_decay` takes them.
+    """Validate, sort and scale; the arguments are those of `labrig.fit.decay.fit_decay`.
 
     Raises
     ------
     FitError
-        Shapes that do not agree, values that are not finite, nothing but zeros, no passing of time.
+        Shapes disagree, values are not finite or all zero, or all frames have the same time.
     """
     t = np.asarray(t_s, dtype=np.float64)
     if t.ndim != 1 or len(t) < 2:
@@ -164,10 +167,10 @@ def decay_series(
             f"expected values of {len(t)} frames in {len(names)} channel(s) "
             f"({', '.join(names)}), got shape {np.shape(values)}; give one row per frame"
         )
-    of_frame = [""] * len(t) if repeats is None else list(repeats)
-    if len(of_frame) != len(t):
-        raise FitError(f"expected {len(t)} repeats, got {len(of_frame)}; give one per frame")
-    repeat_names = tuple(dict.fromkeys(of_frame))
+    frame_repeats = [""] * len(t) if repeats is None else list(repeats)
+    if len(frame_repeats) != len(t):
+        raise FitError(f"expected {len(t)} repeats, got {len(frame_repeats)}; give one per frame")
+    repeat_names = tuple(dict.fromkeys(frame_repeats))
     inverse_sigma = _inverse_sigma(sigma, y)
     prior_sigma = _prior_sigma(offset_sigma, len(names))
     measured = inverse_sigma > 0
@@ -210,7 +213,7 @@ def decay_series(
         span_s=span,
         peak=peak,
         order=order,
-        repeat=np.array([repeat_names.index(name) for name in of_frame])[order],
+        repeat=np.array([repeat_names.index(name) for name in frame_repeats])[order],
         levels=np.ones(len(repeat_names)),
         channels=names,
         repeats=repeat_names,
@@ -271,10 +274,10 @@ def _prior_sigma(offset_sigma: ArrayLike, n_channels: int) -> FloatArray:
     return np.broadcast_to(s, n_channels)
 
 
-def _refuse_unless_finite(what: str, numbers: FloatArray) -> None:
-    bad = np.count_nonzero(~np.isfinite(numbers))
-    if bad:
+def _refuse_unless_finite(quantity: str, values: FloatArray) -> None:
+    n_bad = np.count_nonzero(~np.isfinite(values))
+    if n_bad:
         raise FitError(
-            f"expected finite {what}, got {bad} that are NaN or infinite; "
+            f"expected finite {quantity}, got {n_bad} that are NaN or infinite; "
             "leave those frames out (or give the value σ = inf)"
         )

@@ -1,4 +1,4 @@
-"""n exponentials fitted to a whitened series."""
+"""Fit of n exponentials to a whitened series."""
 
 from dataclasses import dataclass
 
@@ -13,14 +13,14 @@ from labrig.fit.decay.whitening import WhitenedSeries
 from labrig.fit.least_squares import FloatArray
 from labrig.material import phi1
 
-#: Below this k T the difference of two nearly equal numbers gives way to its Taylor series.
+#: Value of k T below which a difference of nearly equal numbers is replaced by its Taylor series.
 SERIES_BELOW = 0.03
 
 
 def exponential_means_and_slopes(
     rates_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """`labrig.material.rates.exponential_means` and their derivatives by log k, both (n, m)."""
+    """Return `labrig.material.exponential_means` and their derivatives by log k, both (n, m)."""
     phase = np.multiply.outer(t_s, rates_per_s)
     decayed: FloatArray = np.exp(-phase)
     if not exposure_s.any():
@@ -31,36 +31,37 @@ def exponential_means_and_slopes(
 
 
 def _mean_slope(x: FloatArray, mean: FloatArray) -> FloatArray:
-    """Give x φ₁′(x) = e^(−x) − φ₁(x)."""
+    """Return x φ₁′(x) = e^(−x) − φ₁(x), given φ₁(x)."""
     # Σ_j j (−x)^j / (j + 1)!, j = 1 … 6; cut off, since powers of what is not small overflow.
     y = np.minimum(x, SERIES_BELOW)
     series = -y * (1 / 2 - y * (1 / 3 - y * (1 / 8 - y * (1 / 30 - y * (1 / 144 - y / 840)))))
     return np.where(x < SERIES_BELOW, series, np.exp(-x) - mean)
 
 
-#: A state dimmer than this fraction of the brightest at the first frame is none.
+#: Amplitude at the first frame, relative to the largest, below which a state is dropped.
 NEGLIGIBLE_AMPLITUDE = 1e-9
-#: Two rates closer than this in log k are one.
+#: Distance in log k below which two rates are merged.
 MERGED_LOG_RATE = 1e-2
-#: Two rates less than so many σ apart cannot be told apart.
+#: Distance in σ below which two rates are not distinct.
 APART_SIGMAS = 3.0
-#: A candidate is only compared by its χ²: evaluations and relative step that will do for that.
+#: Evaluations and relative step of a candidate, which is only compared by its χ².
 CANDIDATE_ITERATIONS = 100
 CANDIDATE_TOLERANCE = 1e-8
-#: The answer is given to all digits.
+#: Evaluations of the final fit, to full precision.
 FINAL_ITERATIONS = 1000
 
 
 @dataclass(frozen=True)
 class StatesFit:
-    """Some states, free rates first; rates per span, amplitudes at the first frame over the peak.
+    """Fitted states, free rates first; rates per span, amplitudes at the first frame over the peak.
 
     Attributes
     ----------
     joint
-        Its `shape` is [log k₁, b₁, log k₂, b₂, … of the free rates, b … of the fixed ones].
+        Joint fit; its `shape` is [log k₁, b₁, log k₂, b₂, … of the free rates, b … of the fixed
+        ones].
     fixed
-        (f,) log of the rates held.
+        Logarithms of the fixed rates, shape (f,).
     """
 
     joint: JointFit
@@ -68,33 +69,33 @@ class StatesFit:
 
     @property
     def n_free(self) -> int:
-        """States whose rate was fitted."""
+        """Number of states whose rate was fitted."""
         return (len(self.joint.shape) - len(self.fixed)) // 2
 
     @property
     def n_states(self) -> int:
-        """States present."""
+        """Number of states."""
         return self.n_free + len(self.fixed)
 
     @property
     def log_rates(self) -> FloatArray:
-        """(n,) log k, free ones first."""
+        """Logarithms of the rates, free ones first, shape (n,)."""
         return np.concatenate([self.joint.shape[0 : 2 * self.n_free : 2], self.fixed])
 
     @property
     def amplitudes(self) -> FloatArray:
-        """(n,) in the order of `log_rates`."""
+        """Amplitudes in the order of `log_rates`, shape (n,)."""
         shape = self.joint.shape
         return np.concatenate([shape[1 : 2 * self.n_free : 2], shape[2 * self.n_free :]])
 
     def dof(self, data: WhitenedSeries) -> int:
-        """Values measured, and the offsets' priors, minus parameters and levels of repeats."""
+        """Return the number of values and offset priors minus parameters and levels of repeats."""
         n_priors = len(data.target) - data.values.size
         n_levels = len(data.series.repeats) - 1
         return data.series.n_values + n_priors - self.joint.n_parameters - n_levels
 
     def covariance_under(self, data: WhitenedSeries) -> FloatArray:
-        """Of the parameters of `joint`, if the noise is as in `data`."""
+        """Return the covariance of the parameters of `joint` for the noise of `data`."""
         shape = exponentials(data.series, self.n_free, self.fixed)
         return covariance_under(data, shape, self.joint)
 
@@ -108,30 +109,30 @@ class StatesFit:
 
     @property
     def vanished(self) -> NDArray[np.bool_]:
-        """(n,) states without amplitude, in the order of `log_rates`."""
+        """Which states have no amplitude, in the order of `log_rates`, shape (n,)."""
         vanished: NDArray[np.bool_] = (
             self.amplitudes <= NEGLIGIBLE_AMPLITUDE * self.amplitudes.max()
         )
         return vanished
 
     def signal(self, series: DecaySeries) -> FloatArray:
-        """(n, C) without offset."""
+        """Return the model without offset, shape (n, C)."""
         h, _ = exponentials(series, self.n_free, self.fixed)(self.joint.shape)
         return np.multiply.outer(h, self.joint.weights)
 
 
 def sigmas_apart(log_rates: FloatArray, covariance: FloatArray) -> FloatArray:
-    """(n − 1,) distance in σ of neighbours among log rates (n,) of covariance (n, n)."""
+    """Return the (n − 1,) distances in σ of neighbouring log rates (n,) with covariance (n, n)."""
     falling = np.argsort(-log_rates)
     fast, slow = falling[:-1], falling[1:]
     variance = covariance[fast, fast] + covariance[slow, slow] - 2 * covariance[fast, slow]
     apart: FloatArray = log_rates[fast] - log_rates[slow]
-    known = variance > 0
-    return np.where(known, apart / np.sqrt(np.where(known, variance, 1.0)), np.inf)
+    positive = variance > 0
+    return np.where(positive, apart / np.sqrt(np.where(positive, variance, 1.0)), np.inf)
 
 
 def exponentials(series: DecaySeries, n_free: int, fixed: FloatArray) -> Shape:
-    """Signal Σ b_i g(k_i; t, T) as a function of the parameters `StatesFit.joint` lists."""
+    """Return Σ b_i g(k_i; t, T) as a function of the parameters of `StatesFit.joint`."""
     paired = 2 * n_free
 
     def shape(theta: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -150,20 +151,21 @@ def exponentials(series: DecaySeries, n_free: int, fixed: FloatArray) -> Shape:
 def fit_states(
     data: WhitenedSeries, n_free: int, fixed: FloatArray, weights: FloatArray, offsets: FloatArray
 ) -> StatesFit | None:
-    """The best `n_free` exponentials besides those of `fixed` log rates (f,).
+    """Fit `n_free` exponentials besides those of the `fixed` log rates (f,).
 
-    Returns None if the data do not support that many: an amplitude vanishes or two rates merge, so
-    that fewer states do as well. A fixed rate without amplitude is left out of the result.
+    The result is None if the data do not support that many: an amplitude vanishes or two rates
+    merge, so that fewer states fit as well. A fixed rate without amplitude is dropped from the
+    result.
     """
     problem = projection(data, weights)
-    found: FloatArray | None = np.empty(0)
+    log_rates: FloatArray | None = np.empty(0)
     if n_free:
-        found = search_rates(problem, n_free, fixed)
-    if found is None:
+        log_rates = search_rates(problem, n_free, fixed)
+    if log_rates is None:
         return None
-    amplitudes, _ = problem.amplitudes(np.concatenate([found, fixed]))
+    amplitudes, _ = problem.amplitudes(np.concatenate([log_rates, fixed]))
     start = np.empty(2 * n_free + len(fixed))
-    start[0 : 2 * n_free : 2] = found
+    start[0 : 2 * n_free : 2] = log_rates
     start[1 : 2 * n_free : 2] = amplitudes[:n_free]
     start[2 * n_free :] = amplitudes[n_free:]
     fit = _fit_from(data, start, fixed, weights, offsets, CANDIDATE_ITERATIONS, CANDIDATE_TOLERANCE)
@@ -177,11 +179,13 @@ def fit_states(
 
 
 def refit(data: WhitenedSeries, fit: StatesFit) -> StatesFit:
-    """The same states to all digits, perhaps under other whitening, less those that vanish."""
-    return _to_all_digits(data, fit.joint.shape, fit.fixed, fit.joint.weights, fit.joint.offsets)
+    """Fit the same states to full precision, perhaps whitened anew, without vanishing ones."""
+    return _to_full_precision(
+        data, fit.joint.shape, fit.fixed, fit.joint.weights, fit.joint.offsets
+    )
 
 
-def _to_all_digits(
+def _to_full_precision(
     data: WhitenedSeries,
     start: FloatArray,
     fixed: FloatArray,
@@ -195,7 +199,7 @@ def _to_all_digits(
     if not kept.any():
         raise FitError(NO_DECAY)
     still_present = np.concatenate([np.repeat(kept[:n_free], 2), kept[n_free:]])
-    return _to_all_digits(
+    return _to_full_precision(
         data, fit.joint.shape[still_present], fixed[kept[n_free:]], weights, offsets
     )
 

@@ -1,8 +1,8 @@
-"""Noise of a frame: of each value, as they correlate, plus flicker that its channels share.
+"""Noise model of a frame: noise of each value with its correlation, plus common-mode flicker.
 
 Lamp, shutter and aperture make a whole frame brighter or darker by a relative ρ, so that the values
 of one frame scatter together: Cov = N + ρ² s sᵀ with s the frame's signal and N = (σ_c r_cd σ_d)
-what reading and photons do, r the channels' correlation. Residuals and models are multiplied by a
+the read and photon noise, r the channels' correlation. Residuals and models are multiplied by a
 W with Wᵀ W = Cov⁻¹, frame by frame, after which they are independent with unit variance.
 """
 
@@ -16,23 +16,24 @@ from labrig.fit.least_squares import EPSILON, FloatArray
 
 @dataclass(frozen=True)
 class WhitenedSeries:
-    """A series multiplied by its noise's W.
+    """A series multiplied by the whitening matrices W of its noise.
 
     Attributes
     ----------
     series
-        What was whitened.
+        The original series.
     matrices
-        (n, C, C) one W per frame, with Wᵀ W = Cov⁻¹.
+        One W per frame, with Wᵀ W = Cov⁻¹, shape (n, C, C).
     values
-        (n, C) whitened.
+        Whitened values, shape (n, C).
     target
-        (n C + p,) the same in one row, then 0 for each of the p offsets whose prior σ is finite.
+        Whitened values in one row, then 0 for each of the p offsets with a finite prior σ, shape
+        (n C + p,).
     offset_design
-        (n C + p, m) what an offset of 1 in each channel that has one adds to the target, its prior
-        included.
+        Effect of an offset of 1 in each channel with a fitted offset on the target, its prior
+        included, shape (n C + p, m).
     variance
-        (n, C) of each value alone, flicker included; inf where not measured.
+        Variance of each value alone, flicker included, shape (n, C); inf where missing.
     """
 
     series: DecaySeries
@@ -43,29 +44,31 @@ class WhitenedSeries:
     variance: FloatArray
 
     def constant(self, levels: FloatArray) -> FloatArray:
-        """(n, C) what the same signal (C,) in all frames becomes."""
+        """Return the whitened signal (n, C) of the same levels (C,) in all frames."""
         constant: FloatArray = self.matrices @ levels
         return constant
 
     def signal_design(self, unit: FloatArray, shapes: FloatArray) -> FloatArray:
-        """(n C + p, q) what shapes (n, q) become that multiply a whitened signal `unit` (n, C)."""
+        """Return the design (n C + p, q) of shapes (n, q) times a whitened signal `unit` (n, C)."""
         design = np.zeros((len(self.target), shapes.shape[1]))
         design[: unit.size] = (unit[:, :, None] * shapes[:, None, :]).reshape(unit.size, -1)
         return design
 
     def followed(self, weights: FloatArray, design: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Degrees of freedom that a linear model takes from each frame: parts of its hat matrix.
+        """Return the degrees of freedom a linear model takes from each frame, by its hat matrix.
 
         Parameters
         ----------
         weights
-            (C,) of the channels.
+            Weights of the channels, shape (C,).
         design
-            (n C + p, q) its columns.
+            Columns of the model, shape (n C + p, q).
 
         Returns
         -------
-        (n,) along the signal, at most 1 each, and (n,) across it, at most C − 1.
+        along, across
+            Degrees of freedom along the signal, at most 1 each, and across it, at most C − 1, both
+            (n,).
         """
         unit = self.constant(weights)
         length = np.linalg.norm(unit, axis=1)
@@ -78,29 +81,29 @@ class WhitenedSeries:
         return along, (frames**2).sum(axis=(1, 2)) - along
 
     def independent_data(self, weights: FloatArray) -> float:
-        """Values' worth of independent information on the common signal, between n and n C.
+        """Return the effective number of independent values of the common signal, n to n C.
 
-        The ratio of the information in all channels to that in the best one: flicker, which the
-        channels share, makes a second channel say little new.
+        It is the ratio of the information in all channels to that in the best one: with common-mode
+        flicker a second channel adds little.
         """
         unit = self.constant(weights)
-        together = np.einsum("fc,fc->f", unit, unit)
+        information = np.einsum("fc,fc->f", unit, unit)
         best = (weights**2 / self.variance).max(axis=1)
-        seen = best > 0
-        return float((together[seen] / best[seen]).sum())
+        informative = best > 0
+        return float((information[informative] / best[informative]).sum())
 
 
 def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> WhitenedSeries:
-    """The series in units of its noise.
+    """Return the series in units of its noise.
 
     Parameters
     ----------
     series
-        n frames, C channels.
+        Series of n frames and C channels.
     signal
-        (n, C) model of the signal without offset, for the flicker's covariance.
+        Model of the signal without offset, for the flicker's covariance, shape (n, C).
     flicker
-        Relative ρ ≥ 0.
+        Relative flicker ρ ≥ 0.
     """
     measured = series.inverse_sigma > 0
     matrices = series.whiteners
@@ -111,7 +114,7 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         shrink = u / (root * (1 + root))[:, None]
         along = np.einsum("fc,fcd->fd", u, matrices)
         matrices = matrices - shrink[:, :, None] * along[:, None, :]
-    alone = 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2
+    own_variance = 1 / np.where(measured, series.inverse_sigma, 1.0) ** 2
     values = np.einsum("fcd,fd->fc", matrices, series.values)
     fitted = series.fitted_offsets
     prior = series.offset_prior
@@ -121,5 +124,5 @@ def whitened(series: DecaySeries, signal: FloatArray, flicker: float) -> Whitene
         values=values,
         target=np.append(values, np.zeros(len(prior))),
         offset_design=np.vstack([matrices[:, :, fitted].reshape(values.size, -1), prior]),
-        variance=np.where(measured, alone + (flicker * signal) ** 2, np.inf),
+        variance=np.where(measured, own_variance + (flicker * signal) ** 2, np.inf),
     )

@@ -1,4 +1,4 @@
-"""Excitation rates, jointly with decays."""
+"""Excitation rates, fitted jointly with decays."""
 
 from labrig.fit.excitation.charging import Charging, closure
 from labrig.fit.excitation.fit import fit_excitation

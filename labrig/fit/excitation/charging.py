@@ -1,4 +1,4 @@
-"""Charging from rates, band by band; does it predict what was measured under the whole lamp?"""
+"""Closure: charging predicted from the rates of each band against that measured under the lamp."""
 
 from dataclasses import dataclass
 
@@ -9,13 +9,23 @@ from labrig.errors import DataError
 from labrig.material import concentration, phi1
 from labrig.results import Closure, FloatArray, spans_decades
 
-#: Of the curve.
+#: Number of points of the predicted curve.
 POINTS = 200
 
 
 @dataclass(frozen=True, eq=False)
 class Charging:
-    """A sample under the lamp: (m, b) and (m,) rates, (m,) levels at r = 1, (b,) irradiance."""
+    """Rates and levels of a sample under the lamp.
+
+    Attributes
+    ----------
+    k_e_per_s, k_r_per_s
+        Excitation rates (m, b) and re-radiation rates (m,) in 1/s.
+    full_level
+        Level of each state at r = 1, shape (m,).
+    irradiance
+        Normalised irradiance of each band, shape (b,).
+    """
 
     k_e_per_s: FloatArray
     k_r_per_s: FloatArray
@@ -33,7 +43,7 @@ class Charging:
     def level(
         self, charge_s: FloatArray, r0: FloatArray, dark_s: FloatArray, exposure_s: FloatArray
     ) -> FloatArray:
-        """After charges from `r0`, (n, m); all else (n,)."""
+        """Return levels after charges from `r0` (n, m); all other arguments are (n,)."""
         kappa, k_r = self.k_e_per_s @ self.irradiance, self.k_r_per_s
         charged = concentration(r0, kappa, k_r, charge_s[:, np.newaxis])
         faded = np.exp(-np.multiply.outer(dark_s, k_r)) * phi1(np.multiply.outer(exposure_s, k_r))
@@ -53,31 +63,31 @@ def closure(
     dark_s: ArrayLike = 0.0,
     exposure_s: ArrayLike = 0.0,
 ) -> Closure:
-    """Levels after charges of different lengths, each from the same concentrations.
+    """Predict levels after charges of different lengths and compare them with measured ones.
 
     With m states, b bands and n charges: κ_i = Σ_j k_e,ij E_j, r_i after the charge by the rate
-    equation, and level = Σ_i full_level_i r_i e^(−k_r,i d) over the mean of an exposure.
+    equation, and level = Σ_i full_level_i r_i e^(−k_r,i d) averaged over an exposure.
 
     Parameters
     ----------
     charge_s, level, sigma
-        Shape (n,): how long the lamp shone (its fade counts as so much longer at full light), what
-        was then photographed, and by how much it and the prediction may differ.
+        Durations of the charges in s (turn-off transients as equivalent time at full light), levels
+        measured after them, and σ of the difference to the prediction, shape (n,).
     irradiance
-        Shape (b,): of that lamp, in the norm to which `k_e_per_s` belongs.
+        Irradiance of the lamp in the norm to which `k_e_per_s` belongs, shape (b,).
     k_e_per_s, k_r_per_s
-        Shapes (m, b) and (m,).
+        Excitation rates (m, b) and re-radiation rates (m,) in 1/s.
     full_level
-        Shape (m,): level of each state at r = 1, as measured by Λ_i k_r,i.
+        Level of each state at r = 1, given by Λ_i k_r,i, shape (m,).
     r0
-        Concentrations before each charge, one number, (m,) or (n, m).
+        Concentrations before each charge: a scalar, (m,) or (n, m).
     dark_s, exposure_s
-        From lamp off to the begin of the exposure, and its length; one number or (n,).
+        Time from lamp off to the begin of the exposure, and its length, in s: a scalar or (n,).
 
     Raises
     ------
     DataError
-        Shapes that do not agree, numbers that are not finite, or a σ that is not above 0.
+        Shapes disagree, numbers are not finite, or a σ is not above 0.
     """
     sample = Charging(*map(_floats, (k_e_per_s, k_r_per_s, full_level, irradiance)))
     charge, measured, noise = map(_floats, (charge_s, level, sigma))
@@ -85,8 +95,10 @@ def closure(
         raise DataError("closure: expected as many levels and σ as charges, at least one")
     n, m = len(charge), len(sample.k_r_per_s)
     start = np.broadcast_to(_floats(r0), (n, m))
-    dark, exposure = (np.broadcast_to(_floats(one), n) for one in (dark_s, exposure_s))
-    if not all(np.isfinite(one).all() for one in (charge, measured, noise, start, dark, exposure)):
+    dark, exposure = (np.broadcast_to(_floats(column), n) for column in (dark_s, exposure_s))
+    if not all(
+        np.isfinite(column).all() for column in (charge, measured, noise, start, dark, exposure)
+    ):
         raise DataError("closure: expected finite numbers, got NaN or infinity")
     if not (noise > 0).all():
         raise DataError("closure: expected σ above 0")

@@ -1,8 +1,8 @@
-"""Excitation rates, re-radiation rates and how far the sample was charged, from all that glowed.
+"""Joint fit of excitation rates, re-radiation rates and the sample's level of charge.
 
-Nalbach et al. (sec. 4.6) fit k_e band by band with r_i(0) = 1 assumed. Here decay and excitation
-are fitted together, with nothing assumed about the level: how the charging curve bends tells how
-near it is to saturation, and so what is Λ and what is r(0).
+Nalbach et al. (sec. 4.6) fit k_e band by band under the assumption r_i(0) = 1. Here decay and
+excitation are fitted together without that assumption: the curvature of the charging curve measures
+the distance to saturation, and so separates Λ from r(0).
 """
 
 from collections.abc import Sequence
@@ -18,14 +18,14 @@ from labrig.fit.excitation.start import starts
 from labrig.fit.least_squares import FloatArray, LeastSquaresFit, least_squares
 from labrig.results import ChargingSeries, ExcitedState, FittedExcitation, LevelAtOff
 
-#: The flicker's covariance is taken from the fit so often; the second changes nothing visible.
+#: Number of updates of the flicker's covariance; the second one has hardly any effect.
 WHITENINGS = 2
-#: Relative step small enough, of a start and of the end.
+#: Tolerance of the relative step, for the starting points and for the result.
 ROUGH, FINE = 1e-3, 1e-6
 MAX_ITERATIONS = 60
-#: Known worse than this, an amplitude is an order of magnitude.
+#: Relative σ of an amplitude above which a warning is given.
 LEVEL_KNOWN = 0.3
-#: χ² above this says that something is not as assumed.
+#: Reduced χ² above which a warning is given.
 LARGE_CHI2 = 1.5
 
 
@@ -41,44 +41,44 @@ def fit_excitation(
     Parameters
     ----------
     series
-        The first one's irradiance is the E to which k_e belongs.
+        Charging series; k_e belongs to the irradiance E of the first one.
     k_r_per_s, fractions
-        (N,) rates to start from and each state's part of the glow, such as a decay fit found.
+        Start values of the rates in 1/s and each state's fraction of the glow, such as from a decay
+        fit, shape (N,).
     uncertain
-        What else scatters; nothing by default.
+        Further sources of scatter; none by default.
     near
-        A fit of nearly the same series, at which to start; by default a few levels of charge are
-        tried.
+        A fit of nearly the same series as start; by default several levels of charge are tried.
 
     Raises
     ------
     FitError
-        Series that do not go together, or no glow.
+        The series are inconsistent, or nothing glows.
     """
-    series = [one.checked() for one in series]
+    series = [charging.checked() for charging in series]
     bands_of(series)
     uncertain = uncertain or RelativeSigmas()
     rates = np.asarray(k_r_per_s, dtype=np.float64)
     reference = _brightest(series)
     problem = ExcitationProblem(series, len(rates), reference, uncertain)
     if near is None:
-        begin = starts(problem, rates, np.asarray(fractions, dtype=np.float64), reference)
+        starting_points = starts(problem, rates, np.asarray(fractions, dtype=np.float64), reference)
     else:
-        begin = iter([_as_fitted(problem, near, reference)])
-    found = min((_least(problem, start, ROUGH) for start in begin), key=_chi2)
+        starting_points = iter([_as_fitted(problem, near, reference)])
+    solution = min((_minimised(problem, start, ROUGH) for start in starting_points), key=_chi2)
     for _ in range(WHITENINGS):
-        problem.rewhiten(found.parameters)
-        found = _least(problem, found.parameters, FINE)
-    return _result(problem, found, reference, uncertain)
+        problem.rewhiten(solution.parameters)
+        solution = _minimised(problem, solution.parameters, FINE)
+    return _result(problem, solution, reference, uncertain)
 
 
 def _brightest(series: Sequence[ChargingSeries]) -> int:
-    """Channel that is brightest where every one is measured."""
+    """Return the brightest channel, where all channels are measured."""
     total = np.zeros(series[0].values.shape[2])
-    for one in series:
-        known = np.isfinite(one.values) & (one.sigma > 0)
-        everywhere = np.all(known, axis=2, keepdims=True)
-        total += np.where(everywhere, one.values, 0.0).sum(axis=(0, 1))
+    for charging in series:
+        is_measured = np.isfinite(charging.values) & (charging.sigma > 0)
+        everywhere = np.all(is_measured, axis=2, keepdims=True)
+        total += np.where(everywhere, charging.values, 0.0).sum(axis=(0, 1))
     if not total.max() > 0:
         raise FitError("expected sites that glow after a charge, got none; did the lamp light?")
     return int(np.argmax(total))
@@ -93,7 +93,7 @@ def _as_fitted(problem: ExcitationProblem, fit: FittedExcitation, reference: int
     )
 
 
-def _least(problem: ExcitationProblem, start: FloatArray, tolerance: float) -> LeastSquaresFit:
+def _minimised(problem: ExcitationProblem, start: FloatArray, tolerance: float) -> LeastSquaresFit:
     return least_squares(
         problem.residuals,
         start,
@@ -108,22 +108,22 @@ def _chi2(fit: LeastSquaresFit) -> float:
 
 
 def _result(
-    problem: ExcitationProblem, found: LeastSquaresFit, reference: int, uncertain: RelativeSigmas
+    problem: ExcitationProblem, solution: LeastSquaresFit, reference: int, uncertain: RelativeSigmas
 ) -> FittedExcitation:
     n, bands = problem.parameters.states, problem.parameters.bands
-    rates, theta = problem.parameters.unpack(found.parameters), found.parameters
-    own = 2 * n + n * bands
+    rates, theta = problem.parameters.unpack(solution.parameters), solution.parameters
+    n_own = 2 * n + n * bands
     scale = np.ones(len(theta))
     scale[:n] = rates.k_r_per_s
-    covariance = found.covariance * np.outer(scale, scale)
-    whole = covariance[:own, :own].copy()
+    covariance = solution.covariance * np.outer(scale, scale)
+    total_covariance = covariance[:n_own, :n_own].copy()
     # E enters k_e one to one, band by band, whatever is measured.
-    light = np.broadcast_to(uncertain.irradiance, bands)
+    light_sigma = np.broadcast_to(uncertain.irradiance, bands)
     for band in range(bands):
-        by_light = np.zeros(own)
+        by_light = np.zeros(n_own)
         by_light[2 * n + band :: bands] = rates.k_e_per_s[:, band]
-        whole += light[band] ** 2 * np.outer(by_light, by_light)
-    sigma = np.sqrt(np.diag(whole))
+        total_covariance += light_sigma[band] ** 2 * np.outer(by_light, by_light)
+    sigma = np.sqrt(np.diag(total_covariance))
     order = np.argsort(-rates.k_r_per_s, kind="stable")
     k_e_sigma = sigma[2 * n :].reshape(n, bands)
     states = tuple(
@@ -139,20 +139,20 @@ def _result(
     )
     weights_sigma = np.zeros(len(rates.weights))
     others = [c for c in range(len(rates.weights)) if c != reference]
-    weights_sigma[others] = np.sqrt(np.diag(covariance)[own : own + len(others)])
+    weights_sigma[others] = np.sqrt(np.diag(covariance)[n_own : n_own + len(others)])
     kept = np.concatenate(
         [order, n + order, *(2 * n + i * bands + np.arange(bands) for i in order)]
     )
-    at_off = _at_off(problem, rates, covariance[:own, :own], order)
+    at_off = _at_off(problem, rates, covariance[:n_own, :n_own], order)
     return FittedExcitation(
         states=states,
         channel_weights=rates.weights,
         channel_weights_sigma=weights_sigma,
         at_off=at_off,
-        chi2=found.chi2,
-        dof=problem.n_values + len(problem.parameters.prior_sigma) - found.rank,
-        covariance=whole[np.ix_(kept, kept)],
-        warnings=tuple(_warnings(problem, found, states)),
+        chi2=solution.chi2,
+        dof=problem.n_values + len(problem.parameters.prior_sigma) - solution.rank,
+        covariance=total_covariance[np.ix_(kept, kept)],
+        warnings=tuple(_warnings(problem, solution, states)),
         residuals=problem.plain_residuals(theta),
     )
 
@@ -160,11 +160,11 @@ def _result(
 def _at_off(
     problem: ExcitationProblem, rates: Rates, covariance: FloatArray, order: NDArray[np.intp]
 ) -> tuple[LevelAtOff, ...]:
-    """The brightest lamp-off of every series, σ by linear propagation."""
+    """Return the brightest lamp-off level of every series, σ by linear propagation."""
     n, bands = problem.parameters.states, problem.parameters.bands
-    found = []
-    for one in problem.lit(rates):
-        level = levels_at_off(one, rates.k_r_per_s, rates.k_e_per_s)
+    levels_at_charge = []
+    for charging in problem.lit(rates):
+        level = levels_at_off(charging, rates.k_r_per_s, rates.k_e_per_s)
         glow = level.value @ rates.amplitude
         charge, site = np.unravel_index(int(np.argmax(glow)), glow.shape)
         r0, a = level.value[charge, site], rates.amplitude
@@ -175,12 +175,12 @@ def _at_off(
         amplitude_gradient = a[:, None] * gradient
         amplitude_gradient[:, n : 2 * n] += np.diag(r0)
         sigmas = [
-            np.sqrt(np.einsum("ij,jk,ik->i", by, covariance, by))
-            for by in (gradient, amplitude_gradient)
+            np.sqrt(np.einsum("ij,jk,ik->i", jacobian, covariance, jacobian))
+            for jacobian in (gradient, amplitude_gradient)
         ]
-        found.append(
+        levels_at_charge.append(
             LevelAtOff(
-                one.name,
+                charging.name,
                 int(charge),
                 int(site),
                 r0[order],
@@ -189,25 +189,25 @@ def _at_off(
                 sigmas[1][order],
             )
         )
-    return tuple(found)
+    return tuple(levels_at_charge)
 
 
 def _warnings(
-    problem: ExcitationProblem, found: LeastSquaresFit, states: Sequence[ExcitedState]
+    problem: ExcitationProblem, solution: LeastSquaresFit, states: Sequence[ExcitedState]
 ) -> list[str]:
-    said = []
-    if not found.converged:
-        said.append("the fit still creeps: rates and levels may trade off; charge for longer")
+    messages = []
+    if not solution.converged:
+        messages.append("the fit still creeps: rates and levels may trade off; charge for longer")
     worst = max(state.amplitude_sigma / max(state.amplitude, 1e-300) for state in states)
     if worst > LEVEL_KNOWN:
-        said.append(
+        messages.append(
             f"how far the sample was charged is known to {100 * worst:.0f} % only, as are Λ and "
             "r(0): charge for longer or with more light, so that the glow stops growing"
         )
-    reduced = found.chi2 / max(problem.n_values - found.rank, 1)
+    reduced = solution.chi2 / max(problem.n_values - solution.rank, 1)
     if reduced > LARGE_CHI2:
-        said.append(
+        messages.append(
             f"reduced χ² is {reduced:.2g}: the rate equation or the noise is not as assumed; look "
             "at the residuals of each charge"
         )
-    return said
+    return messages

@@ -1,8 +1,8 @@
-"""How charged every site is at every photograph, with derivatives: exact steps, no integrator.
+"""Concentration of every site at every exposure, with derivatives: exact steps, no integrator.
 
-κ = Σ_j k_e,j E_j is constant within a step: the steady lamp is one, its rise and fade a few dozen.
-Steps are affine in r, and so is a charge: all charges of a series are worked out at once, each from
-r = 0, and only then follow one another.
+κ = Σ_j k_e,j E_j is constant within a step: the steady lamp is one, its turn-on and turn-off
+transients a few dozen. Steps are affine in r, and so is a charge: all charges of a series are
+computed at once, each from r = 0, and then chained.
 """
 
 from typing import NamedTuple
@@ -20,11 +20,11 @@ class Levels(NamedTuple):
     Attributes
     ----------
     value
-        (n, P, N) r, mean over each exposure.
+        Concentrations r, mean over each exposure, shape (n, P, N).
     by_k_r
-        (n, P, N) by the state's own k_r.
+        Derivatives by the state's own k_r in s, shape (n, P, N).
     by_k_e
-        (n, P, N, B) by the state's own k_e in every band.
+        Derivatives by the state's own k_e of every band in s, shape (n, P, N, B).
     """
 
     value: FloatArray
@@ -32,124 +32,133 @@ class Levels(NamedTuple):
     by_k_e: FloatArray
 
     def of(self, which: NDArray[np.intp]) -> "Levels":
-        """Some of them, in the order wanted."""
+        """Return the levels at some indices, in their order."""
         return Levels(self.value[which], self.by_k_r[which], self.by_k_e[which])
 
     def meaned(self, places: int) -> "Levels":
-        """Of sites that stand one after the other for each of so many places within them."""
+        """Average over `places` per site, given all sites for one place after the other."""
         parts = (part.reshape(len(part), places, -1, *part.shape[2:]) for part in self)
         return Levels(*(part.mean(axis=1) for part in parts))
 
     def decayed(self, k_r_per_s: FloatArray, t_s: FloatArray, exposure_s: FloatArray) -> "Levels":
-        """In the dark: means over exposures (n,) that begin `t_s` (n,) later."""
+        """Return the levels in the dark, averaged over exposures that begin `t_s` later, (n,)."""
         t, x = t_s[:, None, None], exposure_s[:, None, None] * k_r_per_s
         mean = phi1(x)
-        left = np.exp(-k_r_per_s * t) * mean
+        decay = np.exp(-k_r_per_s * t) * mean
         slope = exposure_s[:, None, None] * (phi2(x) - mean) / mean - t
         return Levels(
-            self.value * left,
-            (self.by_k_r + self.value * slope) * left,
-            self.by_k_e * left[..., None],
+            self.value * decay,
+            (self.by_k_r + self.value * slope) * decay,
+            self.by_k_e * decay[..., None],
         )
 
 
 class _Charges(NamedTuple):
-    """What K charges, from lamp-on to the end of the fade, do to r: r → kept r + gained.
+    """Effect of K charges on r, from lamp on until the lamp is dark: r → kept r + gained.
 
     Attributes
     ----------
-    lasted_s, dose
-        (K,) and (K, P, B) s, −∂ ln kept by k_r and by k_e.
+    elapsed_s, dose
+        Derivatives −∂ ln kept by k_r in s (K,) and by k_e in s (K, P, B).
     kept
-        (K, P, N).
+        Fraction of the initial concentration that is kept, shape (K, P, N).
     gained
-        Levels, n = K, reached from 0.
+        Levels reached from 0, n = K.
     """
 
-    lasted_s: FloatArray
+    elapsed_s: FloatArray
     dose: FloatArray
     kept: FloatArray
     gained: Levels
 
 
 def levels(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
-    """Of all photographs of a series.
+    """Return the levels of all exposures of a series.
 
     Parameters
     ----------
+    series
+        The charging series.
     k_r_per_s, k_e_per_s
-        (N,) and (N, B).
+        Re-radiation rates (N,) and excitation rates (N, B) in 1/s.
     """
     if series.across is not None:
-        every = levels(series.spread(), k_r_per_s, k_e_per_s)
-        return every.meaned(len(series.across))
+        spread_levels = levels(series.spread(), k_r_per_s, k_e_per_s)
+        return spread_levels.meaned(len(series.across))
     charges = series.charges
     shots = [len(charge.start_s) for charge in charges]
     start_s = np.concatenate([charge.start_s for charge in charges])
     exposure_s = np.concatenate([charge.exposure_s for charge in charges])
-    ended = _ended(series, k_r_per_s, k_e_per_s).of(np.repeat(np.arange(len(charges)), shots))
-    return ended.decayed(k_r_per_s, start_s - np.repeat(_dark_s(series), shots), exposure_s)
+    after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s).of(
+        np.repeat(np.arange(len(charges)), shots)
+    )
+    return after_charges.decayed(k_r_per_s, start_s - np.repeat(_dark_s(series), shots), exposure_s)
 
 
 def levels_at_off(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
-    """After every charge, traced back in the dark from the end of the fade to lamp-off.
+    """Return the levels after every charge, traced back in the dark to lamp off.
 
-    The fade itself charges a little: this is the r(0) to which the amplitude of a decay belongs.
+    The turn-off transient itself charges a little: this is the r(0) to which the amplitude of a
+    decay belongs.
     """
-    none = np.zeros(len(series.charges))
-    ended = _ended(series, k_r_per_s, k_e_per_s)
-    return ended.decayed(k_r_per_s, none - series.fade.total_s, none)
+    zeros = np.zeros(len(series.charges))
+    after_charges = _levels_after_charges(series, k_r_per_s, k_e_per_s)
+    return after_charges.decayed(k_r_per_s, zeros - series.fade.total_s, zeros)
 
 
 def _dark_s(series: ChargingSeries) -> FloatArray:
-    """(K,) when the lamp is dark after each charge."""
+    """Return the time at which the lamp is dark after each charge, in s, shape (K,)."""
     return np.array([charge.off_s for charge in series.charges]) + series.fade.total_s
 
 
-def _ended(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> Levels:
-    """After every charge, when the lamp is dark, n = K."""
-    alone = _alone(series, k_r_per_s, k_e_per_s)
+def _levels_after_charges(
+    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
+) -> Levels:
+    """Return the levels after every charge, when the lamp is dark, n = K."""
+    charges = _independent_charges(series, k_r_per_s, k_e_per_s)
     on_s = np.array([charge.on_s for charge in series.charges])
-    waited_s = on_s[1:] - _dark_s(series)[:-1]
-    value, by_k_r, by_k_e = alone.gained
+    dark_s = on_s[1:] - _dark_s(series)[:-1]
+    value, by_k_r, by_k_e = charges.gained
     for number, charge in enumerate(series.charges):
         if charge.saturated:
             value[number] = np.exp(-k_r_per_s * series.fade.total_s)
             by_k_r[number] = -series.fade.total_s * value[number]
             by_k_e[number] = 0.0
         elif number and not charge.fresh:
-            before, wait_s = number - 1, float(waited_s[number - 1])
-            left = alone.kept[number] * np.exp(-k_r_per_s * wait_s)
-            lasted_s = alone.lasted_s[number] + wait_s
-            value[number] += left * value[before]
-            by_k_r[number] += left * (by_k_r[before] - lasted_s * value[before])
-            by_k_e[number] += left[..., None] * (
-                by_k_e[before] - value[before, ..., None] * alone.dose[number, :, None]
+            previous, wait_s = number - 1, float(dark_s[number - 1])
+            decay = charges.kept[number] * np.exp(-k_r_per_s * wait_s)
+            elapsed_s = charges.elapsed_s[number] + wait_s
+            value[number] += decay * value[previous]
+            by_k_r[number] += decay * (by_k_r[previous] - elapsed_s * value[previous])
+            by_k_e[number] += decay[..., None] * (
+                by_k_e[previous] - value[previous, ..., None] * charges.dose[number, :, None]
             )
-    return alone.gained
+    return charges.gained
 
 
-def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray) -> _Charges:
-    """Every charge for itself."""
+def _independent_charges(
+    series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray
+) -> _Charges:
+    """Compute the effect of every charge on its own."""
     duration_s, fraction = _steps(series)
     brightness = np.array([charge.brightness for charge in series.charges])
     sites, bands = series.irradiance.shape
     shape = (len(brightness), sites, len(k_r_per_s))
     # Sites and states in one axis, and all charges' steps side by side: long rows for numpy.
     k_r = np.tile(k_r_per_s, sites)
-    of_steady = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
-    kappa = brightness[:, None] * (fraction @ of_steady.T)[:, None, :]
+    steady_rates = (series.irradiance[:, None, :] * k_e_per_s).reshape(-1, bands)
+    kappa = brightness[:, None] * (fraction @ steady_rates.T)[:, None, :]
     tau = duration_s[:, :, None]
     step, slopes = relaxation_with_slopes(kappa, k_r, tau)
-    before = np.zeros((len(tau) + 1, *kappa.shape[1:]))
+    r_before = np.zeros((len(tau) + 1, *kappa.shape[1:]))
     for number in range(len(tau)):
-        np.multiply(step.kept[number], before[number], out=before[number + 1])
-        before[number + 1] += step.gained[number]
+        np.multiply(step.kept[number], r_before[number], out=r_before[number + 1])
+        r_before[number + 1] += step.gained[number]
     # What is left at the end of a change after each step, and of one before the first.
-    after = np.ones_like(before)
+    after = np.ones_like(r_before)
     np.cumprod(step.kept[::-1], axis=0, out=after[-2::-1])
-    by_kappa = after[1:] * (slopes.kept * before[:-1] + slopes.gained_by_kappa)
-    by_k_r = (after[1:] * (slopes.kept * before[:-1] + slopes.gained_by_k_r)).sum(axis=0)
+    by_kappa = after[1:] * (slopes.kept * r_before[:-1] + slopes.gained_by_kappa)
+    by_k_r = (after[1:] * (slopes.kept * r_before[:-1] + slopes.gained_by_k_r)).sum(axis=0)
     by_fraction = (by_kappa.reshape(len(tau), -1).T @ fraction).reshape(*shape, bands)
     light = brightness[:, None, None] * series.irradiance
     return _Charges(
@@ -157,7 +166,7 @@ def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
         light * (duration_s.T @ fraction)[:, None, :],
         after[0].reshape(shape),
         Levels(
-            before[-1].reshape(shape),
+            r_before[-1].reshape(shape),
             by_k_r.reshape(shape),
             by_fraction * light[:, :, None, :],
         ),
@@ -165,7 +174,7 @@ def _alone(series: ChargingSeries, k_r_per_s: FloatArray, k_e_per_s: FloatArray)
 
 
 def _steps(series: ChargingSeries) -> tuple[FloatArray, FloatArray]:
-    """(m, K) durations of the steps, (m, B) irradiance of the bands in each over the steady one."""
+    """Return durations (m, K) in s and relative irradiance (m, B) of the steps of all charges."""
     rise, fade = series.rise, series.fade
     steady_s = [charge.off_s - charge.on_s - rise.total_s for charge in series.charges]
     changes = len(rise.duration_s), len(fade.duration_s)

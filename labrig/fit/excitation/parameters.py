@@ -1,4 +1,4 @@
-"""What an excitation fit looks for, and where each of it stands in θ."""
+"""Parameters of an excitation fit and their layout in θ."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,24 +12,26 @@ from labrig.results import ChargingSeries, FloatArray
 
 
 class Rates(NamedTuple):
-    """The parameters, apart.
+    """Parameters of the fit by name.
 
     Attributes
     ----------
     k_r_per_s, amplitude, k_e_per_s
-        (N,), (N,) and (N, B).
+        Re-radiation rates in 1/s (N,), amplitudes (N,) and excitation rates in 1/s (N, B).
     weights
-        (C,) of the channels; that of the one held is 1.
+        Weights of the channels, that of the reference 1, shape (C,).
     log_scale
-        (S,) ln of each series' irradiance over what was stated; 0 for the first, which defines E.
+        Logarithm of each series' irradiance over its nominal value, shape (S,); 0 for the first,
+        which defines E.
     log_brightness
-        (K,) ln of the lamp's brightness at every charge of every series over what was stated.
+        Logarithm of the lamp's brightness over its nominal value at every charge of every series,
+        (K,).
     lacking
-        (1,) what the cold lamp lacks, or (0,) if it is not fitted.
+        Relative deficit of the cold lamp, shape (1,), or (0,) if it is not fitted.
     off
-        (M,) z of `ChargingSeries.site_modes`, series by series.
+        Amplitudes z of `ChargingSeries.site_modes`, series by series, shape (M,).
     offset
-        (C,) level in the dark that was not subtracted, or (0,) if it is not fitted.
+        Dark level that was not subtracted, shape (C,), or (0,) if it is not fitted.
     """
 
     k_r_per_s: FloatArray
@@ -45,25 +47,26 @@ class Rates(NamedTuple):
 
 @dataclass(frozen=True)
 class RelativeSigmas:
-    """What else scatters, relative standard uncertainties.
+    """Further sources of scatter as relative standard uncertainties.
 
     Attributes
     ----------
     flicker
-        ρ common to all values of a photograph.
+        Relative flicker ρ common to all values of an exposure.
     lamp
-        Of its brightness from charge to charge.
+        Relative scatter of the lamp's brightness from charge to charge.
     cold
-        What a lamp lacks that was just switched on; 0 is expected.
+        Relative σ of the deficit of a lamp that was just switched on; 0 is expected.
     scale
-        Of the irradiance of every series but the first over that of the first.
+        Relative σ of the irradiance of every series but the first over that of the first.
     offset
-        (C,) of the dark level that was subtracted, in the values' unit; the same in all of them.
+        σ of the subtracted dark level in the values' unit, common to all of them, shape (C,).
     common_mode
-        (C,) by which the dark level scatters from photograph to photograph, in the values' unit:
-        a sensor that exposes warms.
+        Scatter of the dark level from exposure to exposure in the values' unit, shape (C,): an
+        exposing sensor warms.
     irradiance
-        Of E in every band, one number or (B,), in all series alike: nothing measured here tells.
+        Relative σ of E in every band, a scalar or (B,), common to all series: the fit cannot
+        constrain it.
     """
 
     flicker: float = 0.0
@@ -76,9 +79,9 @@ class RelativeSigmas:
 
 
 class ParameterLayout(NamedTuple):
-    """Where in θ = [ln k_r, A, k_e, weights, and what is half known] each stands.
+    """Slices of θ = [ln k_r, A, k_e, weights, parameters with a prior].
 
-    What is not fitted has no place: its slice is empty.
+    The slice of a parameter that is not fitted is empty.
     """
 
     k_r: slice
@@ -93,34 +96,34 @@ class ParameterLayout(NamedTuple):
 
 
 def is_fitted(place: slice) -> bool:
-    """Whether θ has it."""
+    """Return whether θ contains the parameter."""
     return bool(place.start < place.stop)
 
 
 class Parameters:
-    """Between `Rates` and θ.
+    """Conversion between `Rates` and θ.
 
     Parameters
     ----------
     series
-        The first one defines E.
+        Charging series; the first one defines E.
     states
-        N.
+        Number N of states.
     reference
-        Channel whose weight is 1.
+        Index of the channel whose weight is 1.
     uncertain
-        What else scatters.
+        Further sources of scatter.
 
     Attributes
     ----------
     states, bands
-        N and B.
+        Numbers N of states and B of bands.
     others
-        Channels whose weights are fitted.
+        Indices of the channels whose weights are fitted.
     columns
-        Of θ.
+        Layout of θ.
     prior_sigma
-        (h,) of what is half known, the last h of θ, all of it 0 as stated.
+        Prior σ of the last h parameters of θ, all expected to be 0, shape (h,).
     """
 
     def __init__(
@@ -133,9 +136,9 @@ class Parameters:
         self.states, self.bands, self._series = states, bands_of(series), len(series)
         channels = series[0].values.shape[2]
         self.others = [channel for channel in range(channels) if channel != reference]
-        self._first_charge = _begins([len(one.charges) for one in series])
+        self._first_charge = _begins([len(charging.charges) for charging in series])
         self._first_mode = _begins(
-            [0 if one.site_modes is None else len(one.site_modes) for one in series]
+            [0 if charging.site_modes is None else len(charging.site_modes) for charging in series]
         )
         counts = [
             len(series) - 1 if uncertain.scale > 0 else 0,
@@ -143,23 +146,23 @@ class Parameters:
             1 if uncertain.cold > 0 else 0,
             self._first_mode[-1],
         ]
-        each = [uncertain.scale, uncertain.lamp, uncertain.cold, 1.0]
-        self.prior_sigma: FloatArray = np.concatenate([np.repeat(each, counts), uncertain.offset])
-        known = [states, states, states * self.bands, len(self.others)]
-        ends = _begins([*known, *counts, len(uncertain.offset)])
-        self.columns = ParameterLayout(*(slice(*both) for both in pairwise(ends)))
+        sigmas = [uncertain.scale, uncertain.lamp, uncertain.cold, 1.0]
+        self.prior_sigma: FloatArray = np.concatenate([np.repeat(sigmas, counts), uncertain.offset])
+        free_counts = [states, states, states * self.bands, len(self.others)]
+        ends = _begins([*free_counts, *counts, len(uncertain.offset)])
+        self.columns = ParameterLayout(*(slice(*limits) for limits in pairwise(ends)))
         self.count = ends[-1]
 
     def charges(self, number: int) -> slice:
-        """Those of a series among all."""
+        """Return the slice of a series' charges among those of all series."""
         return slice(*self._first_charge[number : number + 2])
 
     def modes(self, number: int) -> slice:
-        """Ways in which the light on a series' sites may be off, among all."""
+        """Return the slice of a series' irradiance modes among those of all series."""
         return slice(*self._first_mode[number : number + 2])
 
     def lower(self) -> FloatArray:
-        """Bounds of θ: amplitudes, excitation rates and weights are not negative."""
+        """Return lower bounds of θ: amplitudes, excitation rates and weights are not negative."""
         bounds = np.full(self.count, -np.inf)
         bounds[self.columns.amplitude.start : self.columns.weights.stop] = 0.0
         return bounds
@@ -171,7 +174,7 @@ class Parameters:
         k_e_per_s: FloatArray,
         weights: FloatArray,
     ) -> FloatArray:
-        """θ of some rates, with all that is half known at 0."""
+        """Return θ of some rates, with all parameters that have a prior at 0."""
         theta = np.zeros(self.count)
         columns = self.columns
         theta[columns.k_r] = np.log(k_r_per_s)
@@ -181,7 +184,7 @@ class Parameters:
         return theta
 
     def unpack(self, theta: FloatArray) -> Rates:
-        """θ, part by part."""
+        """Return the parameters in θ by name."""
         columns = self.columns
         weights = np.ones(len(self.others) + 1)
         weights[self.others] = theta[columns.weights]
@@ -204,14 +207,14 @@ class Parameters:
 
 
 def bands_of(series: Sequence[ChargingSeries]) -> int:
-    """Number of bands, the same in all.
+    """Return the number of bands, equal in all series.
 
     Raises
     ------
     FitError
         There is no series, or they differ in bands or channels.
     """
-    shapes = {(one.irradiance.shape[1], one.values.shape[2]) for one in series}
+    shapes = {(charging.irradiance.shape[1], charging.values.shape[2]) for charging in series}
     if len(shapes) != 1:
         raise FitError(
             f"expected series with the same bands and channels, got {sorted(shapes) or 'none'}"
@@ -221,6 +224,6 @@ def bands_of(series: Sequence[ChargingSeries]) -> int:
 
 
 def _begins(counts: Sequence[int]) -> list[int]:
-    """Where each of several lots begins, and where the last one ends."""
+    """Return the begin of each of several blocks, and the end of the last one."""
     ends: list[int] = np.cumsum([0, *counts]).tolist()
     return ends

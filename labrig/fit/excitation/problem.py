@@ -1,4 +1,4 @@
-"""Residuals of all series together: of rates, amplitudes and what is only half known.
+"""Residuals of all series as a function of rates, amplitudes and parameters with a prior.
 
 The signal of a site is w_c Σ_i A_i r_i: one amplitude A_i = Λ* k_r,i for every state, the signal of
 a fully charged sample in the brightest channel, and one weight per channel.
@@ -21,13 +21,13 @@ class ExcitationProblem:
     Parameters
     ----------
     series
-        The first one defines E.
+        Charging series; the first one defines E.
     states
-        N.
+        Number N of states.
     reference
-        Channel whose weight is 1.
+        Index of the channel whose weight is 1.
     uncertain
-        What else scatters.
+        Further sources of scatter.
     """
 
     def __init__(
@@ -41,33 +41,37 @@ class ExcitationProblem:
         self.parameters = Parameters(series, states, reference, uncertain)
         self._flicker = uncertain.flicker
         self._inverse_sigma = [
-            np.where(np.isfinite(one.values) & np.isfinite(one.sigma), 1 / one.sigma, 0.0)
-            for one in self.series
+            np.where(
+                np.isfinite(charging.values) & np.isfinite(charging.sigma), 1 / charging.sigma, 0.0
+            )
+            for charging in self.series
         ]
-        self._values = [np.nan_to_num(one.values) for one in self.series]
+        self._values = [np.nan_to_num(charging.values) for charging in self.series]
         common_mode = np.array(uncertain.common_mode)
         self._common_mode = [
             [_flat(common_mode * inverse)] if len(common_mode) else []
             for inverse in self._inverse_sigma
         ]
-        #: Along which all values of a photograph scatter together, by series.
-        self._common = [_one_by_one(vectors) for vectors in self._common_mode]
+        #: Common-mode directions of each exposure's values, by series.
+        self._common = [_successive_whitenings(vectors) for vectors in self._common_mode]
 
     @property
     def n_values(self) -> int:
-        """Values measured."""
-        return sum(int(np.count_nonzero(one)) for one in self._inverse_sigma)
+        """Number of values measured."""
+        return sum(int(np.count_nonzero(inverse_sigma)) for inverse_sigma in self._inverse_sigma)
 
     def signal(self, theta: FloatArray) -> list[FloatArray]:
-        """(n, P, C) of every series."""
+        """Return the model of every series, shape (n, P, C) each."""
         rates = self.parameters.unpack(theta)
         return [
-            _signal(levels(one, rates.k_r_per_s, rates.k_e_per_s).value @ rates.amplitude, rates)
-            for one in self.lit(rates)
+            _signal(
+                levels(charging, rates.k_r_per_s, rates.k_e_per_s).value @ rates.amplitude, rates
+            )
+            for charging in self.lit(rates)
         ]
 
     def plain_residuals(self, theta: FloatArray) -> tuple[FloatArray, ...]:
-        """(n, P, C) of every series: value − model in σ, NaN where nothing was measured."""
+        """Return value − model in σ of every series, shape (n, P, C), NaN where not measured."""
         return tuple(
             np.where(inverse > 0, (values - signal) * inverse, np.nan)
             for values, inverse, signal in zip(
@@ -79,46 +83,51 @@ class ExcitationProblem:
         """Take the flicker's covariance from the signal at θ."""
         if self._flicker > 0:
             self._common = [
-                _one_by_one([_flat(self._flicker * signal * inverse), *common_mode])
+                _successive_whitenings([_flat(self._flicker * signal * inverse), *common_mode])
                 for signal, inverse, common_mode in zip(
                     self.signal(theta), self._inverse_sigma, self._common_mode, strict=True
                 )
             ]
 
     def residuals(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Whitened model − values, then priors; and the Jacobian."""
+        """Return whitened model − values, followed by priors, and the Jacobian."""
         rates = self.parameters.unpack(theta)
-        parts = [self._of_series(number, one, rates) for number, one in enumerate(self.lit(rates))]
+        parts = [
+            self._series_residuals(number, charging, rates)
+            for number, charging in enumerate(self.lit(rates))
+        ]
         sigma = self.parameters.prior_sigma
         if len(sigma):
-            known = len(theta) - len(sigma)
-            slopes = np.eye(len(sigma), len(theta), known) / sigma[:, None]
-            parts.append((theta[known:] / sigma, slopes))
+            first_prior = len(theta) - len(sigma)
+            slopes = np.eye(len(sigma), len(theta), first_prior) / sigma[:, None]
+            parts.append((theta[first_prior:] / sigma, slopes))
         residuals, jacobians = zip(*parts, strict=True)
         return np.concatenate(residuals), np.concatenate(jacobians)
 
     def lit(self, rates: Rates) -> list[ChargingSeries]:
-        """The series with irradiance and brightness as θ has them."""
-        lit = []
-        for number, (one, log_scale) in enumerate(zip(self.series, rates.log_scale, strict=True)):
-            cold = np.array([charge.cold for charge in one.charges])
-            own = rates.log_brightness[self.parameters.charges(number)]
-            brightness = np.exp(own - rates.lacking.sum() * cold)
+        """Return the series with the irradiance and the brightness of θ."""
+        illuminated = []
+        for number, (charging, log_scale) in enumerate(
+            zip(self.series, rates.log_scale, strict=True)
+        ):
+            cold = np.array([charge.cold for charge in charging.charges])
+            log_brightness = rates.log_brightness[self.parameters.charges(number)]
+            brightness = np.exp(log_brightness - rates.lacking.sum() * cold)
             charges = tuple(
                 replace(charge, brightness=charge.brightness * float(factor))
-                for charge, factor in zip(one.charges, brightness, strict=True)
+                for charge, factor in zip(charging.charges, brightness, strict=True)
             )
-            scaled = one.irradiance * float(np.exp(log_scale))
-            if one.site_modes is not None:
-                off = rates.off[self.parameters.modes(number)]
-                scaled = scaled * np.exp(np.tensordot(off, one.site_modes, axes=1))
-            lit.append(replace(one, charges=charges, irradiance=scaled))
-        return lit
+            scaled = charging.irradiance * float(np.exp(log_scale))
+            if charging.site_modes is not None:
+                amplitudes = rates.off[self.parameters.modes(number)]
+                scaled = scaled * np.exp(np.tensordot(amplitudes, charging.site_modes, axes=1))
+            illuminated.append(replace(charging, charges=charges, irradiance=scaled))
+        return illuminated
 
-    def _of_series(
-        self, number: int, one: ChargingSeries, rates: Rates
+    def _series_residuals(
+        self, number: int, charging: ChargingSeries, rates: Rates
     ) -> tuple[FloatArray, FloatArray]:
-        level = levels(one, rates.k_r_per_s, rates.k_e_per_s)
+        level = levels(charging, rates.k_r_per_s, rates.k_e_per_s)
         shots, sites = level.value.shape[:2]
         columns, bands = self.parameters.columns, self.parameters.bands
         glow = level.value @ rates.amplitude
@@ -128,7 +137,7 @@ class ExcitationProblem:
         slopes[..., columns.amplitude] = level.value
         slopes[..., columns.k_e] = level.by_k_e.reshape(shots, sites, -1)
         slopes[..., columns.k_e] *= np.repeat(rates.amplitude, bands)
-        self._by_light(number, one, rates, slopes)
+        self._set_light_derivatives(number, charging, rates, slopes)
         inverse = self._inverse_sigma[number]
         jacobian = slopes[:, :, None, :] * (rates.weights * inverse)[..., None]
         for place, channel in enumerate(self.parameters.others, start=columns.weights.start):
@@ -138,8 +147,10 @@ class ExcitationProblem:
         misfit = (_signal(glow, rates) - self._values[number]) * inverse
         return self._whitened(number, misfit.reshape(shots, -1), jacobian)
 
-    def _by_light(self, number: int, one: ChargingSeries, rates: Rates, slopes: FloatArray) -> None:
-        """Derivatives by all that changes the light, from those by k_e."""
+    def _set_light_derivatives(
+        self, number: int, charging: ChargingSeries, rates: Rates, slopes: FloatArray
+    ) -> None:
+        """Set the derivatives by all parameters of the light, from those by k_e."""
         columns, charges = self.parameters.columns, self.parameters.charges(number)
         by_k_e = slopes[..., columns.k_e].reshape(*slopes.shape[:2], *rates.k_e_per_s.shape)
         by_band = np.einsum("fpnb,nb->fpb", by_k_e, rates.k_e_per_s)
@@ -147,65 +158,69 @@ class ExcitationProblem:
         if is_fitted(columns.scale) and number:
             slopes[..., columns.scale.start + number - 1] = by_light
         shot = 0
-        for place, charge in enumerate(one.charges, start=columns.brightness.start + charges.start):
+        for place, charge in enumerate(
+            charging.charges, start=columns.brightness.start + charges.start
+        ):
             # The little that a charge leaves to the next one is neglected here.
-            own = slice(shot, shot + len(charge.start_s))
+            charge_shots = slice(shot, shot + len(charge.start_s))
             if is_fitted(columns.brightness):
-                slopes[own, :, place] = by_light[own]
+                slopes[charge_shots, :, place] = by_light[charge_shots]
             if is_fitted(columns.lacking):
-                slopes[own, :, columns.lacking.start] = -charge.cold * by_light[own]
-            shot = own.stop
-        if one.site_modes is not None:
+                slopes[charge_shots, :, columns.lacking.start] = (
+                    -charge.cold * by_light[charge_shots]
+                )
+            shot = charge_shots.stop
+        if charging.site_modes is not None:
             modes, first = self.parameters.modes(number), columns.off.start
             slopes[..., first + modes.start : first + modes.stop] = np.einsum(
-                "fpb,mpb->fpm", by_band, one.site_modes
+                "fpb,mpb->fpm", by_band, charging.site_modes
             )
 
     def _whitened(
         self, number: int, misfit: FloatArray, jacobian: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Multiplied by a W with Wᵀ W = (1 + Σ u uᵀ)⁻¹, photograph by photograph."""
+        """Multiply by a W with Wᵀ W = (1 + Σ u uᵀ)⁻¹, exposure by exposure."""
         misfit, jacobian = misfit[..., None], jacobian.reshape(*misfit.shape, -1)
         for common in self._common[number]:
-            common.take_from(misfit)
-            common.take_from(jacobian)
+            common.whiten(misfit)
+            common.whiten(jacobian)
         return misfit.ravel(), jacobian.reshape(-1, jacobian.shape[-1])
 
 
 class _Common(NamedTuple):
-    """u (n, PC) of each photograph, and u over √(1 + u²) (1 + √(1 + u²))."""
+    """Common-mode direction u (n, PC) of each exposure, and u over √(1 + u²) (1 + √(1 + u²))."""
 
     u: FloatArray
     shrunk: FloatArray
 
     @classmethod
     def along(cls, u: FloatArray) -> Self:
-        """(1 + u uᵀ)^(−1/2) = 1 − shrunk uᵀ."""
+        """Return the whitening along u: (1 + u uᵀ)^(−1/2) = 1 − shrunk uᵀ."""
         root = np.sqrt(1 + np.einsum("fv,fv->f", u, u))
         return cls(u, u / (root * (1 + root))[:, None])
 
-    def take_from(self, columns: FloatArray) -> None:
-        """Whiten (n, PC, k) in place."""
+    def whiten(self, columns: FloatArray) -> None:
+        """Whiten columns (n, PC, k) in place."""
         columns -= self.shrunk[..., None] * (self.u[:, None, :] @ columns)
 
 
-def _one_by_one(vectors: Sequence[FloatArray]) -> list[_Common]:
-    """Of a covariance 1 + Σ u uᵀ: each u as it is once those before it are whitened."""
-    every: list[_Common] = []
+def _successive_whitenings(vectors: Sequence[FloatArray]) -> list[_Common]:
+    """Factor a covariance 1 + Σ u uᵀ: each u is whitened by those before it."""
+    whitenings: list[_Common] = []
     for vector in vectors:
         column = vector[..., None].copy()
-        for common in every:
-            common.take_from(column)
-        every.append(_Common.along(column[..., 0]))
-    return every
+        for common in whitenings:
+            common.whiten(column)
+        whitenings.append(_Common.along(column[..., 0]))
+    return whitenings
 
 
 def _flat(values: FloatArray) -> FloatArray:
-    """(n, PC) of (n, P, C)."""
+    """Reshape (n, P, C) to (n, PC)."""
     return values.reshape(len(values), -1)
 
 
 def _signal(glow: FloatArray, rates: Rates) -> FloatArray:
-    """(n, P, C) of a glow (n, P) in the brightest channel."""
+    """Return the signal (n, P, C) of a glow (n, P) in the brightest channel."""
     signal: FloatArray = np.multiply.outer(glow, rates.weights)
     return signal + rates.offset if len(rates.offset) else signal

@@ -1,4 +1,4 @@
-"""Where the fit of an excitation starts: one state for all, charged by a few guesses."""
+"""Start values of an excitation fit: one state of the mean rate, charged to guessed levels."""
 
 from collections.abc import Iterator
 
@@ -9,31 +9,33 @@ from labrig.fit.excitation.problem import ExcitationProblem
 from labrig.nonnegative import nonnegative_least_squares
 from labrig.results import ChargingSeries, FloatArray
 
-#: Level of the brightest site: how far charging has gone is what the fit knows least at first.
+#: Guesses of the concentration of the brightest site, the least certain start value.
 GUESSED_LEVELS = (0.05, 0.2, 0.5, 0.9)
-#: Decades of κ over k_r looked at, and how many.
+#: Grid of κ over k_r.
 KAPPA_OVER_K_R = np.geomspace(1e-5, 1e3, 65)
 
 
 def starts(
     problem: ExcitationProblem, k_r_per_s: FloatArray, fractions: FloatArray, reference: int
 ) -> Iterator[FloatArray]:
-    """θ to start from, one per guessed level.
+    """Yield a start θ for each guessed level.
 
     Parameters
     ----------
+    problem
+        The least-squares problem.
     k_r_per_s, fractions
-        (N,) rates and what each state contributes to the glow, as a decay shows them.
+        Rates in 1/s and each state's fraction of the glow, from a decay, shape (N,).
     reference
-        The brightest channel.
+        Index of the brightest channel.
     """
     fractions = fractions / fractions.sum()
-    peak = max(float(np.nanmax(one.values[..., reference])) for one in problem.series)
+    peak = max(float(np.nanmax(charging.values[..., reference])) for charging in problem.series)
     mean_rate = float(fractions @ k_r_per_s)
     for guess in GUESSED_LEVELS:
         total = peak / guess
-        found = [_kappa(one, mean_rate, total, reference) for one in problem.series]
-        kappa, design = np.concatenate(found), _irradiances(problem)
+        site_kappas = [_kappa(charging, mean_rate, total, reference) for charging in problem.series]
+        kappa, design = np.concatenate(site_kappas), _irradiances(problem)
         k_e = nonnegative_least_squares(design, kappa)
         # A state that decays faster charges no further by the same light.
         yield problem.parameters.as_stated(
@@ -45,11 +47,11 @@ def starts(
 
 
 def _irradiances(problem: ExcitationProblem) -> FloatArray:
-    return np.concatenate([one.irradiance for one in problem.series])
+    return np.concatenate([charging.irradiance for charging in problem.series])
 
 
 def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: int) -> FloatArray:
-    """(P,) κ of every site that explains its glow best, of one state of amplitude `total`."""
+    """Return the κ (P,) of each site that fits its glow best for one state of amplitude `total`."""
     bands = series.irradiance.shape[1]
     grid = ChargingSeries(
         series.name,
@@ -71,7 +73,7 @@ def _kappa(series: ChargingSeries, k_r_per_s: float, total: float, reference: in
 
 
 def _weights(problem: ExcitationProblem, reference: int) -> FloatArray:
-    """(C,) of the channels over the reference, from all values."""
-    totals = sum(np.nansum(one.values, axis=(0, 1)) for one in problem.series)
+    """Estimate channel weights (C,) over the reference from all values."""
+    totals = sum(np.nansum(charging.values, axis=(0, 1)) for charging in problem.series)
     weights: FloatArray = np.maximum(totals / totals[reference], 0)
     return weights

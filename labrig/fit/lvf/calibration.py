@@ -1,10 +1,9 @@
-"""What a variable filter lets through at every position, from colour filters over a grey card.
+"""Transmission of a variable filter at every position, from colour filters over a grey card.
 
-I_pfc = ∫ T_p F_f L R S_c dλ (paper, section 4.2) says little about T_p by itself, so T_p is a
-skewed peak on a leakage, plus a remainder on a coarse grid that is held small. The mercury lines'
-map comes in as what is known of the centres beforehand, and how a strip's figures run along it as
-what its other positions let expect. The camera's curves are fitted along: they are wrong in the
-same way everywhere.
+I_pfc = ∫ T_p F_f L R S_c dλ (paper, section 4.2) constrains T_p weakly, so T_p is a skewed peak on
+a leakage, plus a remainder on a coarse grid with a narrow prior. The wavelength map of the mercury
+lines is the prior of the centres, and a smooth run of the parameters along the strip that of the
+other parameters. The camera's curves are fitted, too: their error is common to all positions.
 """
 
 from collections.abc import Sequence
@@ -15,7 +14,7 @@ from numpy.typing import ArrayLike
 
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
-from labrig.fit.lvf import strip_problem as of
+from labrig.fit.lvf import strip_problem
 from labrig.fit.lvf.strip_problem import Expected, StripProblem, StripSolution
 from labrig.fit.spectrum.system import CurveError
 from labrig.optics import (
@@ -28,29 +27,29 @@ from labrig.optics import (
     WavelengthMap,
 )
 
-#: What is known of a band before it is measured: mean and σ. Leakage and remainder in units of the
-#: peak, the width as its logarithm.
+#: Prior mean and σ of a band. Leakage and remainder are in units of the peak, the width is its
+#: logarithm.
 LOG_FWHM = (float(np.log(NOMINAL_FWHM_NM)), 0.3)
 SKEW = (0.0, 0.2)
 LEAKAGE = (0.002, 0.01)
-#: The remainder is that of a band's shape; so far from the band it is what blocking is uneven by.
+#: Prior σ of the remainder near a band and, beyond a distance in nm, of the uneven blocking.
 REMAINDER, BLOCKING, SHAPE_NM = 0.01, 0.001, 60.0
-#: Of a logarithm of which nothing is known but that of all positions it is the same order.
+#: Prior σ of the logarithm of the peak: all positions have the same order of magnitude.
 ANY_PEAK = 2.0
-#: How figures run along a strip: order of a polynomial, and scatter about it.
+#: Run of the parameters along a strip: order of a polynomial, and scatter about it.
 ALONG_THE_STRIP = {
-    of.CENTRE: (3, 0.3),
-    of.LOG_WIDTH: (2, 0.02),
-    of.SKEW: (1, 0.05),
-    of.LOG_PEAK: (2, 0.04),
-    of.LEAKAGE: (1, 0.0005),
+    strip_problem.CENTRE: (3, 0.3),
+    strip_problem.LOG_WIDTH: (2, 0.02),
+    strip_problem.SKEW: (1, 0.05),
+    strip_problem.LOG_PEAK: (2, 0.04),
+    strip_problem.LEAKAGE: (1, 0.0005),
 }
-#: The map's σ is not believed below this: strips are not smooth to a tenth of a nanometre.
+#: Lower limit of the map's σ: strips are not smooth to a tenth of a nanometre.
 CENTRE_FLOOR_NM = 0.5
-#: Errors of a gel's transmittance are alike over so much: positions closer than that repeat them.
+#: Correlation length of errors of a gel's transmittance, which closer positions share.
 ALIKE_NM = 40.0
 FEWEST_FILTERS = 6
-#: How often the others have their say, and steps in between.
+#: Number of updates of the prior from the other positions, and steps in between.
 ROUNDS, STEPS = 4, 4
 
 
@@ -61,12 +60,12 @@ class LvfCalibration:
     Attributes
     ----------
     lvf
-        Its bands with their σ, transmission relative to the same unknown factor at all positions.
+        Bands with σ, transmission relative to one unknown factor that is common to all positions.
     misfit
-        (p,) root mean square of what is left, in σ; where it is above 1 σ has been raised by it.
+        Root mean square of the residuals in σ, shape (p,); where it is above 1, σ was multiplied by
+        it.
     camera
-        The camera that was used, its curves as the filters tell them: what the strip lets through
-        belongs to these.
+        Camera with its curves as fitted with the filters; the transmission belongs to these.
     """
 
     lvf: Lvf
@@ -86,32 +85,32 @@ def calibrate_lvf(
     wavelengths: WavelengthMap,
     curve_error: CurveError | None = CurveError(),  # noqa: B008 (frozen)
 ) -> LvfCalibration:
-    """T_p(λ) at every position.
+    """Fit T_p(λ) at every position.
 
     Parameters
     ----------
     position
-        (p,) rising.
+        Rising positions, shape (p,).
     value, sigma
-        (p, filters, channels), every channel in units in which the card by itself, without filter
-        and strip, gives ∫ L R S_c dλ; NaN leaves a value out (clipped, missing).
+        Values and σ, shape (p, filters, channels), every channel in units in which the card without
+        filter and strip gives ∫ L R S_c dλ; NaN leaves a value out (clipped, missing).
     filters
-        One after the other over the grey card; a `Transmittance` of 1 is none.
+        Colour filters, in front of the grey card one at a time; a `Transmittance` of 1 is none.
     lamp, card, camera
-        Known irradiance (relative), reflectance and curves.
+        Relative irradiance of the lamp, reflectance of the card, and curves of the camera.
     wavelengths
-        Position → wavelength from mercury lines.
+        Wavelength along the strip from mercury lines.
     curve_error
-        How well the camera's curves are known.
+        Error of the camera's curves; None takes them for exact.
 
     Raises
     ------
     FitError
-        Too few filters, or a position with too few values or no light.
+        There are too few filters, or a position has too few values or no light.
     """
-    places = np.asarray(position, dtype=np.float64)
+    positions = np.asarray(position, dtype=np.float64)
     values, sigmas = np.asarray(value, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
-    shape = (len(places), len(filters), camera.sensitivity.shape[1])
+    shape = (len(positions), len(filters), camera.sensitivity.shape[1])
     if values.shape != shape or sigmas.shape != shape:
         raise FitError(
             f"expected values of shape {shape} (positions, filters, channels), got "
@@ -119,102 +118,111 @@ def calibrate_lvf(
         )
     if len(filters) < FEWEST_FILTERS:
         raise FitError(f"expected {FEWEST_FILTERS} or more filters, got {len(filters)}")
-    centre_nm = wavelengths.wavelength_nm(places)
-    alike = np.sqrt(max(1.0, ALIKE_NM / float(np.abs(np.diff(centre_nm)).mean())))
-    problem = StripProblem(values, sigmas * alike, filters, lamp, card, camera, curve_error)
-    first = _before(centre_nm, wavelengths.sigma_nm(places), problem.knots_nm)
-    begin = _begin(problem, first, places)
-    first.mean[:, of.LOG_PEAK] = np.median(begin.figures[:, of.LOG_PEAK])
-    expected, found = first, begin
-    for round_ in range(ROUNDS):
-        if round_:
-            expected = _from_the_others(places, found, problem.sigmas(found, expected), first)
-        found = problem.solve(found, expected, STEPS)
-    misfit = np.maximum(1.0, alike * problem.misfit(found))
-    unsure = problem.sigmas(found, expected) * misfit[:, np.newaxis]
+    centre_nm = wavelengths.wavelength_nm(positions)
+    repetition = np.sqrt(max(1.0, ALIKE_NM / float(np.abs(np.diff(centre_nm)).mean())))
+    problem = StripProblem(values, sigmas * repetition, filters, lamp, card, camera, curve_error)
+    prior = _prior(centre_nm, wavelengths.sigma_nm(positions), problem.knots_nm)
+    start = _start(problem, prior, positions)
+    prior.mean[:, strip_problem.LOG_PEAK] = np.median(start.figures[:, strip_problem.LOG_PEAK])
+    expected, solution = prior, start
+    for number in range(ROUNDS):
+        if number:
+            expected = _prior_from_others(
+                positions, solution, problem.sigmas(solution, expected), prior
+            )
+        solution = problem.solve(solution, expected, STEPS)
+    misfit = np.maximum(1.0, repetition * problem.misfit(solution))
+    sigma_figures = problem.sigmas(solution, expected) * misfit[:, np.newaxis]
     try:
-        lvf = _lvf(places, found.figures, unsure, problem.knots_nm)
+        lvf = _lvf(positions, solution.figures, sigma_figures, problem.knots_nm)
     except ValueError as error:
         raise FitError(f"{error}; check the order of the pictures") from None
-    return LvfCalibration(lvf, misfit, problem.camera(found.curves))
+    return LvfCalibration(lvf, misfit, problem.camera(solution.curves))
 
 
-def _before(centre_nm: FloatArray, sigma_nm: FloatArray, knots_nm: FloatArray) -> Expected:
-    """What is known before anything is measured."""
-    mean = np.zeros((len(centre_nm), of.FIGURES + len(knots_nm)))
+def _prior(centre_nm: FloatArray, sigma_nm: FloatArray, knots_nm: FloatArray) -> Expected:
+    """Return the prior of all parameters."""
+    mean = np.zeros((len(centre_nm), strip_problem.FIGURES + len(knots_nm)))
     sigma = np.empty_like(mean)
-    near = np.abs(knots_nm - centre_nm[:, np.newaxis]) < SHAPE_NM
-    sigma[:, of.FIGURES :] = np.where(near, REMAINDER, BLOCKING)
-    mean[:, of.CENTRE] = centre_nm
-    sigma[:, of.CENTRE] = np.maximum(sigma_nm, CENTRE_FLOOR_NM)
-    for figure, (usual, spread) in (
-        (of.LOG_WIDTH, LOG_FWHM),
-        (of.SKEW, SKEW),
-        (of.LOG_PEAK, (0.0, ANY_PEAK)),
-        (of.LEAKAGE, LEAKAGE),
+    is_near = np.abs(knots_nm - centre_nm[:, np.newaxis]) < SHAPE_NM
+    sigma[:, strip_problem.FIGURES :] = np.where(is_near, REMAINDER, BLOCKING)
+    mean[:, strip_problem.CENTRE] = centre_nm
+    sigma[:, strip_problem.CENTRE] = np.maximum(sigma_nm, CENTRE_FLOOR_NM)
+    for figure, (centre, spread) in (
+        (strip_problem.LOG_WIDTH, LOG_FWHM),
+        (strip_problem.SKEW, SKEW),
+        (strip_problem.LOG_PEAK, (0.0, ANY_PEAK)),
+        (strip_problem.LEAKAGE, LEAKAGE),
     ):
-        mean[:, figure], sigma[:, figure] = usual, spread
+        mean[:, figure], sigma[:, figure] = centre, spread
     return Expected(mean, sigma)
 
 
-def _begin(problem: StripProblem, first: Expected, places: FloatArray) -> StripSolution:
-    """The bands that are expected, as high as they are seen.
+def _start(problem: StripProblem, prior: Expected, positions: FloatArray) -> StripSolution:
+    """Return the expected bands, scaled to the measured light.
 
     Raises
     ------
     FitError
-        A position with too few values or no light.
+        A position has too few values or no light.
     """
-    for place, count in zip(places, problem.used.sum(axis=1), strict=True):
-        if count < of.FIGURES:
+    for place, count in zip(positions, problem.used.sum(axis=1), strict=True):
+        if count < strip_problem.FIGURES:
             raise FitError(
                 f"position {place:g}: only {count} values are neither clipped nor missing"
             )
-    scale = problem.scales(first.mean)
-    if (dark := ~(scale > 0)).any():
-        raise FitError(f"position {places[dark][0]:g}: no light above the noise; expose longer")
-    figures = first.mean.copy()
-    figures[:, of.LOG_PEAK] = np.log(scale)
+    scale = problem.scales(prior.mean)
+    if (is_dark := ~(scale > 0)).any():
+        raise FitError(
+            f"position {positions[is_dark][0]:g}: no light above the noise; expose longer"
+        )
+    figures = prior.mean.copy()
+    figures[:, strip_problem.LOG_PEAK] = np.log(scale)
     return StripSolution(figures, np.zeros(problem.modes))
 
 
-def _from_the_others(
-    places: FloatArray, found: StripSolution, sigmas: FloatArray, first: Expected
+def _prior_from_others(
+    positions: FloatArray, solution: StripSolution, sigmas: FloatArray, prior: Expected
 ) -> Expected:
-    """What all other positions let expect of each one, by polynomials along the strip, and σ.
+    """Return the prior of each position from all others, by polynomials along the strip, with σ.
 
-    A strip is coated in one go; what a position at the end says badly its neighbours say well.
+    A strip is coated in one process; at its ends, where a position is poorly constrained, the
+    neighbours constrain it.
     """
-    scaled = (places - places.mean()) / (np.ptp(places) / 2)
-    mean, unsure = first.mean.copy(), first.sigma.copy()
+    scaled = (positions - positions.mean()) / (np.ptp(positions) / 2)
+    mean, sigma = prior.mean.copy(), prior.sigma.copy()
     for figure, (order, floor) in ALONG_THE_STRIP.items():
-        powers = np.vander(scaled, min(order, len(places) - 2) + 1, increasing=True)
+        powers = np.vander(scaled, min(order, len(positions) - 2) + 1, increasing=True)
         spread = np.hypot(sigmas[:, figure], floor)
-        for k in range(len(places)):
-            others = np.arange(len(places)) != k
+        for k in range(len(positions)):
+            others = np.arange(len(positions)) != k
             rows = powers[others] / spread[others, np.newaxis]
             covariance = np.linalg.pinv(rows.T @ rows, hermitian=True)
-            coefficients = covariance @ (rows.T @ (found.figures[others, figure] / spread[others]))
+            coefficients = covariance @ (
+                rows.T @ (solution.figures[others, figure] / spread[others])
+            )
             mean[k, figure] = powers[k] @ coefficients
-            unsure[k, figure] = np.hypot(np.sqrt(powers[k] @ covariance @ powers[k]), floor)
-    mean[:, of.LEAKAGE] = np.maximum(mean[:, of.LEAKAGE], 0.0)
-    return Expected(mean, unsure)
+            sigma[k, figure] = np.hypot(np.sqrt(powers[k] @ covariance @ powers[k]), floor)
+    mean[:, strip_problem.LEAKAGE] = np.maximum(mean[:, strip_problem.LEAKAGE], 0.0)
+    return Expected(mean, sigma)
 
 
-def _lvf(places: FloatArray, figures: FloatArray, sigmas: FloatArray, knots_nm: FloatArray) -> Lvf:
-    centre, log_width, skew, log_peak, leakage = figures[:, : of.FIGURES].T
+def _lvf(
+    positions: FloatArray, figures: FloatArray, sigmas: FloatArray, knots_nm: FloatArray
+) -> Lvf:
+    centre, log_width, skew, log_peak, leakage = figures[:, : strip_problem.FIGURES].T
     width, peak = np.exp(log_width), np.exp(log_peak)
-    unsure = sigmas.T
+    sigma_columns = sigmas.T
     return Lvf(
-        places,
+        positions,
         Bands(centre, width, skew, peak, leakage * peak),
         Bands(
-            unsure[of.CENTRE],
-            width * unsure[of.LOG_WIDTH],
-            unsure[of.SKEW],
-            peak * unsure[of.LOG_PEAK],
-            peak * unsure[of.LEAKAGE],
+            sigma_columns[strip_problem.CENTRE],
+            width * sigma_columns[strip_problem.LOG_WIDTH],
+            sigma_columns[strip_problem.SKEW],
+            peak * sigma_columns[strip_problem.LOG_PEAK],
+            peak * sigma_columns[strip_problem.LEAKAGE],
         ),
         knots_nm,
-        figures[:, of.FIGURES :] * peak[:, np.newaxis],
+        figures[:, strip_problem.FIGURES :] * peak[:, np.newaxis],
     )

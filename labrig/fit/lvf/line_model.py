@@ -1,4 +1,4 @@
-"""The profile of a strip under a mercury lamp, as a sum of lines on a background."""
+"""Model of a strip's profile under a mercury lamp: a sum of lines on a background."""
 
 from dataclasses import dataclass
 
@@ -10,32 +10,32 @@ from labrig.optics import peak_shape
 from labrig.results import LocatedLines
 
 FEWEST_LINES = 3
-#: Fraction of the profile's variance that lines and background explain, if there are lines.
+#: Smallest fraction of the profile's variance that lines and background must explain.
 LEAST_EXPLAINED = 0.9
-#: Fractions of a blend stay this near to what is known of them: a shape that is not quite the
-#: filter's would otherwise pull them along.
+#: Largest deviation, in σ, of a blend's fraction from its prior: an imperfect shape would bias it
+#: otherwise.
 FRACTION_SIGMAS = 2.0
-#: A line is there if its height is this many of its σ.
+#: Height of a line in σ from which it is significant.
 SIGNIFICANT = 6.0
-#: A line is located if its σ is below this fraction of its width.
+#: σ of the position, in widths, below which a line is located.
 LOCATED = 0.2
-#: A line is no farther from where the assignment has it, in widths: 405 and 436 nm are 1.2 apart,
-#: and one must not take the other's place.
+#: Largest distance of a line from its assigned position, in widths: 405 and 436 nm are 1.2 apart,
+#: and must not be exchanged.
 NEAR = 0.6
 _STEP = 1e-5
 
 
 @dataclass(frozen=True)
 class Line:
-    """A spectral line, or two that are seen as one.
+    """A spectral line, or an unresolved pair.
 
     Attributes
     ----------
     wavelength_nm
-        In air; of the two, the shorter one first.
+        Wavelengths in air in nm; of a pair, the shorter one first.
     second_fraction
-        Fraction of the second one in the light of both, and how well that is known; it depends on
-        the lamp and on the camera.
+        Fraction of the second line in the light of a pair, and its σ; it depends on the lamp and on
+        the camera.
     """
 
     wavelength_nm: tuple[float, ...]
@@ -43,7 +43,7 @@ class Line:
 
     @property
     def centre_nm(self) -> float:
-        """Mean of the two by their fractions."""
+        """Mean wavelength weighted by the fractions, in nm."""
         if len(self.wavelength_nm) == 1:
             return self.wavelength_nm[0]
         fraction = self.second_fraction[0]
@@ -62,7 +62,7 @@ MERCURY = (
 
 @dataclass(frozen=True)
 class Assignment:
-    """λ ≈ offset + slope · position, and how well the peaks agree with it."""
+    """Assignment of peaks to lines, λ ≈ offset + slope · position, with a score."""
 
     offset_nm: float
     slope_nm: float
@@ -71,20 +71,24 @@ class Assignment:
 
 
 class LineModel:
-    """The profile as a sum of lines; heights and background are eliminated at every step."""
+    """Profile as a sum of lines; heights and background are eliminated at every step."""
 
     def __init__(
-        self, u: FloatArray, values: FloatArray, lines: tuple[Line, ...], way: Assignment
+        self, u: FloatArray, values: FloatArray, lines: tuple[Line, ...], assignment: Assignment
     ) -> None:
-        self.u, self.values, self.way = u, values, way
-        expected = [(line.wavelength_nm[0] - way.offset_nm) / way.slope_nm for line in lines]
-        inside = [u[0] < at < u[-1] for at in expected]
-        self.lines = [line for line, there in zip(lines, inside, strict=True) if there]
-        self.start = [at for at, there in zip(expected, inside, strict=True) if there]
+        self.u, self.values, self.way = u, values, assignment
+        expected = [
+            (line.wavelength_nm[0] - assignment.offset_nm) / assignment.slope_nm for line in lines
+        ]
+        inside = [u[0] < position < u[-1] for position in expected]
+        self.lines = [line for line, is_inside in zip(lines, inside, strict=True) if is_inside]
+        self.start = [
+            position for position, is_inside in zip(expected, inside, strict=True) if is_inside
+        ]
         self.middle, self.reach = float(u.mean()), float(np.ptp(u)) / 2
 
     def located(self) -> LocatedLines:
-        """Fit; lines too faint to be located are left out, and the rest fitted again."""
+        """Fit; lines too faint to be located are dropped, and the rest fitted again."""
         while True:
             x, sigma, noise = self._fitted()
             position, at_sigma = x[: len(self.lines)], sigma[: len(self.lines)]
@@ -98,10 +102,14 @@ class LineModel:
                     f"no lines of mercury: {clear.sum()} could be located, {FEWEST_LINES} are "
                     "needed; expose longer, or check the lamp"
                 )
-            self.lines = [line for line, ok in zip(self.lines, clear, strict=True) if ok]
-            self.start = [float(at) for at, ok in zip(position, clear, strict=True) if ok]
-        left = self.values - self._fit_values(x)
-        explained = 1 - float(left.var() / (self.values - self.values.mean(axis=0)).var())
+            self.lines = [
+                line for line, is_clear in zip(self.lines, clear, strict=True) if is_clear
+            ]
+            self.start = [
+                float(start) for start, is_clear in zip(position, clear, strict=True) if is_clear
+            ]
+        residual = self.values - self._fit_values(x)
+        explained = 1 - float(residual.var() / (self.values - self.values.mean(axis=0)).var())
         if explained < LEAST_EXPLAINED:
             raise FitError(
                 f"no lines of mercury: lines explain {explained:.0%} of the profile, expected "
@@ -113,16 +121,16 @@ class LineModel:
         )
 
     def _fitted(self) -> tuple[FloatArray, FloatArray, float]:
-        """Positions, log width and its change, skew, fractions; their σ; the noise."""
+        """Return positions, log width and its change, skew and fractions; their σ; the noise."""
         fractions = [line.second_fraction for line in self.lines if len(line.wavelength_nm) == 2]
         start = np.array(
             [*self.start, np.log(self.way.fwhm), 0.0, 0.0, *(fraction for fraction, _ in fractions)]
         )
-        prior = np.array([known for _, known in fractions])
+        prior = np.array([sigma for _, sigma in fractions])
         low, high = np.full(len(start), -np.inf), np.full(len(start), np.inf)
         n = len(self.lines)
-        near = NEAR * self.way.fwhm
-        low[:n], high[:n] = start[:n] - near, start[:n] + near
+        reach = NEAR * self.way.fwhm
+        low[:n], high[:n] = start[:n] - reach, start[:n] + reach
         low[n], high[n] = start[n] - 1, start[n] + 1
         low[n + 1 : n + 3], high[n + 1 : n + 3] = -0.5, 0.5
         low[n + 3 :] = np.maximum(start[n + 3 :] - FRACTION_SIGMAS * prior, 0.0)
@@ -134,77 +142,79 @@ class LineModel:
                 return self._with_derivatives(x, start, noise, prior)
 
             fit = least_squares(residuals, start, lower=low, upper=high, tolerance=1e-6)
-            start_left = self.values - self._fit_values(fit.parameters)
-            noise = float(np.sqrt((start_left**2).sum() / (start_left.size - len(start))))
+            residual = self.values - self._fit_values(fit.parameters)
+            noise = float(np.sqrt((residual**2).sum() / (residual.size - len(start))))
         covariance = np.linalg.pinv(fit.jacobian.T @ fit.jacobian, hermitian=True)
         variance = np.maximum(np.diag(covariance), 0.0)
         variance[:n] += self._blend_variance(fit.parameters)
         return fit.parameters, np.sqrt(variance), noise
 
     def _blend_variance(self, x: FloatArray) -> FloatArray:
-        """(lines,) of the positions, by the fractions of blends that are not resolved."""
+        """Return the positions' variance from the fractions of unresolved blends, (lines,)."""
         per_nm, fwhm = abs(self._per_nm(x[: len(self.lines)])), np.exp(x[len(self.lines)])
-        apart = np.array([per_nm * np.ptp(line.wavelength_nm) for line in self.lines])
-        unsure = np.array([line.second_fraction[1] for line in self.lines])
-        variance: FloatArray = np.where(apart < fwhm, (apart * unsure) ** 2, 0.0)
+        distance = np.array([per_nm * np.ptp(line.wavelength_nm) for line in self.lines])
+        fraction_sigma = np.array([line.second_fraction[1] for line in self.lines])
+        variance: FloatArray = np.where(distance < fwhm, (distance * fraction_sigma) ** 2, 0.0)
         return variance
 
     def _with_derivatives(
         self, x: FloatArray, scale: FloatArray, noise: float, prior: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Residuals and their Jacobian by central differences."""
+        """Return residuals and their Jacobian by central differences."""
         steps = np.diag(_STEP * np.maximum(np.abs(scale), 1.0))
-        here, up, down = np.split(
+        centre, up, down = np.split(
             self._residuals(np.concatenate([x[np.newaxis], x + steps, x - steps]), noise, prior),
             [1, 1 + len(x)],
         )
-        return here[0], ((up - down) / (2 * np.diag(steps)[:, np.newaxis])).T
+        return centre[0], ((up - down) / (2 * np.diag(steps)[:, np.newaxis])).T
 
     def _residuals(self, x: FloatArray, noise: float, prior: FloatArray) -> FloatArray:
-        """(..., residuals) of parameters of shape (..., parameters)."""
-        left = (self.values - self._fit_values(x)) / noise
+        """Return residuals (..., residuals) of parameters (..., parameters)."""
+        misfit = (self.values - self._fit_values(x)) / noise
         fractions = [line.second_fraction[0] for line in self.lines if len(line.wavelength_nm) == 2]
-        pulled = (x[..., len(self.lines) + 3 :] - fractions) / prior
-        return np.concatenate([left.reshape(*x.shape[:-1], -1), pulled], axis=-1)
+        prior_residuals = (x[..., len(self.lines) + 3 :] - fractions) / prior
+        return np.concatenate([misfit.reshape(*x.shape[:-1], -1), prior_residuals], axis=-1)
 
     def _shapes(self, x: FloatArray) -> FloatArray:
-        """(..., n, lines + 2): every line at height 1, and the background."""
+        """Return every line at height 1, and the background, shape (..., n, lines + 2)."""
         n = len(self.lines)
-        positions, of_all = x[..., :n], x[..., n : n + 3, np.newaxis]
-        log_width, change, skew = of_all[..., 0, :], of_all[..., 1, :], of_all[..., 2:, :]
+        positions, common = x[..., :n], x[..., n : n + 3, np.newaxis]
+        log_width, change, skew = common[..., 0, :], common[..., 1, :], common[..., 2:, :]
         width = np.exp(log_width + change * (positions - self.middle) / self.reach)
 
-        def peaks(at: FloatArray, width: FloatArray) -> FloatArray:
-            distance = self.u[:, np.newaxis] - at[..., np.newaxis, :]
+        def peaks(centre: FloatArray, width: FloatArray) -> FloatArray:
+            distance = self.u[:, np.newaxis] - centre[..., np.newaxis, :]
             return peak_shape(distance, width[..., np.newaxis, :], skew)
 
         lines = peaks(positions, width)
         blends = [k for k, line in enumerate(self.lines) if len(line.wavelength_nm) == 2]
         if blends:
             fraction = x[..., np.newaxis, n + 3 :]
-            apart_nm = np.array([np.ptp(self.lines[k].wavelength_nm) for k in blends])
-            second_at = positions[..., blends] + apart_nm * self._per_nm(positions)[..., np.newaxis]
-            second = peaks(second_at, width[..., blends])
+            distance_nm = np.array([np.ptp(self.lines[k].wavelength_nm) for k in blends])
+            second_position = (
+                positions[..., blends] + distance_nm * self._per_nm(positions)[..., np.newaxis]
+            )
+            second = peaks(second_position, width[..., blends])
             lines[..., blends] = (1 - fraction) * lines[..., blends] + fraction * second
         slope = (self.u - self.middle) / self.reach
         background = np.stack([np.ones_like(slope), slope], axis=-1)
         return np.concatenate([lines, np.broadcast_to(background, (*lines.shape[:-1], 2))], axis=-1)
 
     def _per_nm(self, positions: FloatArray) -> FloatArray:
-        """(...,) slope of the positions (..., lines) over the wavelengths."""
+        """Return the slope of the positions (..., lines) over the wavelengths, shape (...,)."""
         nm = np.array([line.wavelength_nm[0] for line in self.lines])
         nm -= nm.mean()
         slope: FloatArray = positions @ nm / (nm @ nm)
         return slope
 
     def _fit_values(self, x: FloatArray) -> FloatArray:
-        """(..., n, channels): what is nearest to the values."""
+        """Return the best fit to the values, shape (..., n, channels)."""
         basis, _ = np.linalg.qr(self._shapes(x))
         fitted: FloatArray = basis @ (np.swapaxes(basis, -1, -2) @ self.values)
         return fitted
 
     def _heights(self, x: FloatArray, noise: float) -> tuple[FloatArray, FloatArray]:
-        """(lines, channels) heights and their (lines, 1) σ."""
+        """Return the heights (lines, channels) and their σ (lines, 1)."""
         shapes, n = self._shapes(x), len(self.lines)
         heights = np.asarray(np.linalg.lstsq(shapes, self.values)[0][:n], dtype=np.float64)
         variance = np.diag(np.linalg.pinv(shapes.T @ shapes))[:n]

@@ -1,8 +1,8 @@
-"""A strip's bands at all positions and the camera's curves, fitted to all pictures together.
+"""Joint fit of a strip's bands at all positions and the camera's curves.
 
-The curves are wrong in the same way at every position, so that all positions together tell of it
-what one alone could take for light that leaks. Given the curves each position stands by itself: a
-step solves the positions one by one, and the curves from what that leaves (a Schur complement).
+The curves have the same error at every position, so that all positions together constrain what one
+alone could attribute to leakage. Given the curves the positions are independent: a step solves them
+one by one, and the curves from the rest (a Schur complement).
 """
 
 from collections.abc import Sequence
@@ -14,24 +14,24 @@ from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.system import CurveError, curve_modes
 from labrig.optics import CameraResponse, Spectrum, Transmittance, hats, peak_shape, quadrature
 
-#: Figures of a position: centre, log width, skew, log peak, and leakage in units of the peak; then
-#: the remainder in units of the peak, at knots so far apart.
+#: Parameters of a position: centre, log width, skew, log peak, and leakage in units of the peak;
+#: then the remainder in units of the peak, at knots with a distance of `REMAINDER_STEP_NM`.
 CENTRE, LOG_WIDTH, SKEW, LOG_PEAK, LEAKAGE = range(5)
 FIGURES = 5
 REMAINDER_STEP_NM = 20.0
-#: T_p is straight between wavelengths so far apart: a band of 25 nm loses 0.1 % of its height.
+#: Step of the grid on which T_p is linear: a band of 25 nm loses 0.1 % of its height.
 GRID_NM = 1.0
 MOST_SKEW = 1.0
 _STEP = 1e-4
-#: Damping to begin with, by how much it changes, and when nothing helps any more.
+#: Initial damping, its factor of change, and the value at which the search stops.
 _DAMPING, _FACTOR, _HOPELESS = 1e-3, 8.0, 1e6
-#: A decrease of χ² that is not worth another step.
+#: Decrease of χ² below which the search stops.
 _ENOUGH = 0.1
 
 
 @dataclass(frozen=True, eq=False)
 class Expected:
-    """What is known of every position's figures beforehand: (p, figures) each."""
+    """Prior of every position's parameters: mean and σ, shape (p, figures) each."""
 
     mean: FloatArray
     sigma: FloatArray
@@ -39,7 +39,7 @@ class Expected:
 
 @dataclass(frozen=True, eq=False)
 class StripSolution:
-    """Figures (p, figures) and z of the curves' modes (modes,), where χ² is least."""
+    """Parameters (p, figures) and amplitudes z of the curves' modes (modes,) at the minimum."""
 
     figures: FloatArray
     curves: FloatArray
@@ -47,13 +47,13 @@ class StripSolution:
 
 @dataclass(frozen=True, eq=False)
 class _Step:
-    """One of Gauss and Newton, damped."""
+    """Damped Gauss–Newton step."""
 
     figures: FloatArray
     curves: FloatArray
-    #: Of every position: R of its own columns, and what the curves' columns are in its Q.
+    #: For every position, R of its own columns, and the curves' columns rotated by its Q.
     triangles: list[tuple[FloatArray, FloatArray]]
-    #: Inverse covariance of the curves.
+    #: Inverse covariance of the curves' modes.
     information: FloatArray
 
 
@@ -63,12 +63,12 @@ class StripProblem:
     Parameters
     ----------
     value, sigma
-        (p, filters, channels), in units in which the card by itself gives ∫ L R S_c dλ; NaN leaves
-        a value out.
+        Values and σ, shape (p, filters, channels), in units in which the card alone gives ∫ L R S_c
+        dλ; NaN leaves a value out.
     filters, lamp, card, camera
-        Known.
+        Colour filters, irradiance of the lamp, reflectance of the card and curves of the camera.
     curve_error
-        How well the curves are; None takes them for exact.
+        Error of the curves; None takes them for exact.
     """
 
     def __init__(
@@ -88,32 +88,32 @@ class StripProblem:
         self.knots_nm = np.arange(low, high + REMAINDER_STEP_NM / 2, REMAINDER_STEP_NM)
         self._hat_functions = hats(self.knots_nm, self.grid_nm)
         sensitivity = camera.at(nodes)
-        lit = weights * lamp.at(nodes) * card.at(nodes)
+        illumination = weights * lamp.at(nodes) * card.at(nodes)
         peaks = camera.sensitivity.max(axis=0)
         modes = np.array(curve_modes(curve_error, nodes, sensitivity, peaks))
         modes = modes.reshape(-1, *sensitivity.shape)
         # The card by itself is as bright in every channel as was measured, however curves are bent.
-        fraction = np.einsum("q,mqc->mc", lit, modes) / (lit @ sensitivity)
+        fraction = np.einsum("q,mqc->mc", illumination, modes) / (illumination @ sensitivity)
         self._modes = modes - fraction[:, np.newaxis] * sensitivity
         self._camera, self._nodes = camera, nodes
         onto_grid = hats(self.grid_nm, nodes)
-        light = np.stack([lit * f.at(nodes) for f in filters])
+        light = np.stack([illumination * f.at(nodes) for f in filters])
         self._design = _on_grid(light, sensitivity, onto_grid)
-        self._bent = np.array([_on_grid(light, mode, onto_grid) for mode in self._modes])
-        self._bent = self._bent.reshape(-1, *self._design.shape)
-        flat, unsure = value.reshape(len(value), -1), sigma.reshape(len(sigma), -1)
-        used = np.isfinite(flat) & np.isfinite(unsure) & (unsure > 0)
+        self._mode_designs = np.array([_on_grid(light, mode, onto_grid) for mode in self._modes])
+        self._mode_designs = self._mode_designs.reshape(-1, *self._design.shape)
+        flat_value, flat_sigma = value.reshape(len(value), -1), sigma.reshape(len(sigma), -1)
+        used = np.isfinite(flat_value) & np.isfinite(flat_sigma) & (flat_sigma > 0)
         self.used = used
-        self._value = np.where(used, flat, 0.0)
-        self._inverse = np.where(used, 1 / np.where(used, unsure, 1.0), 0.0)
+        self._value = np.where(used, flat_value, 0.0)
+        self._inverse = np.where(used, 1 / np.where(used, flat_sigma, 1.0), 0.0)
 
     @property
     def modes(self) -> int:
-        """Ways in which the curves may be wrong."""
+        """Number of error modes of the curves."""
         return len(self._modes)
 
     def scales(self, figures: FloatArray) -> FloatArray:
-        """(p,) by which the light that these figures let through is to be multiplied."""
+        """Return the factors (p,) from the light of these parameters to the measured light."""
         expected = self._transmission(figures) @ self._design.T
         weight = expected * self.used
         total = (weight**2).sum(axis=1)
@@ -121,7 +121,7 @@ class StripProblem:
         return scales
 
     def camera(self, curves: FloatArray) -> CameraResponse:
-        """The camera with its curves as found; the highest of all is 1."""
+        """Return the camera with the fitted curves; the highest value of all is 1."""
         order = np.argsort(self._nodes)
         changes = np.tensordot(curves, self._modes, axes=1)[order]
         columns = [
@@ -131,116 +131,127 @@ class StripProblem:
         sensitivity = np.maximum(self._camera.sensitivity + np.stack(columns, axis=1), 0.0)
         return replace(self._camera, sensitivity=sensitivity / sensitivity.max())
 
-    def misfit(self, found: StripSolution) -> FloatArray:
-        """(p,) root mean square of what is left, in σ."""
-        left, _ = self._left(found)
-        rms: FloatArray = np.sqrt((left**2).sum(axis=1) / self.used.sum(axis=1))
+    def misfit(self, solution: StripSolution) -> FloatArray:
+        """Return the root mean square of the residuals in σ, shape (p,)."""
+        residuals, _ = self._residuals(solution)
+        rms: FloatArray = np.sqrt((residuals**2).sum(axis=1) / self.used.sum(axis=1))
         return rms
 
-    def solve(self, begin: StripSolution, expected: Expected, iterations: int) -> StripSolution:
-        """Levenberg–Marquardt from `begin` on; at most so many steps."""
-        found, chi2, damping = begin, self._chi2(begin, expected), _DAMPING
+    def solve(self, start: StripSolution, expected: Expected, iterations: int) -> StripSolution:
+        """Minimise χ² by Levenberg–Marquardt from `begin`, in at most `iterations` steps."""
+        solution, chi2, damping = start, self._chi2(start, expected), _DAMPING
         for _ in range(iterations):
-            better, after = self._better(found, chi2, expected, damping)
-            while after >= chi2 and damping < _HOPELESS:
+            trial, trial_chi2 = self._trial(solution, chi2, expected, damping)
+            while trial_chi2 >= chi2 and damping < _HOPELESS:
                 damping *= _FACTOR
-                better, after = self._better(found, chi2, expected, damping)
-            if after >= chi2:
-                return found
-            gained, found, chi2, damping = chi2 - after, better, after, damping / _FACTOR
-            if gained < _ENOUGH:
+                trial, trial_chi2 = self._trial(solution, chi2, expected, damping)
+            if trial_chi2 >= chi2:
+                return solution
+            decrease, solution, chi2, damping = (
+                chi2 - trial_chi2,
+                trial,
+                trial_chi2,
+                damping / _FACTOR,
+            )
+            if decrease < _ENOUGH:
                 break
-        return found
+        return solution
 
-    def sigmas(self, found: StripSolution, expected: Expected) -> FloatArray:
-        """(p, figures) standard uncertainties, those of the curves included."""
-        step = self._step(found, expected, 0.0)
+    def sigmas(self, solution: StripSolution, expected: Expected) -> FloatArray:
+        """Return standard uncertainties (p, figures), those of the curves included."""
+        step = self._step(solution, expected, 0.0)
         curves = np.linalg.inv(step.information)
         rows = []
         for triangle, by_curves in step.triangles:
-            own = np.linalg.inv(triangle)
-            moved = own @ by_curves
-            rows.append(np.sqrt(np.diag(own @ own.T + moved @ curves @ moved.T)))
+            inverse = np.linalg.inv(triangle)
+            coupled = inverse @ by_curves
+            rows.append(np.sqrt(np.diag(inverse @ inverse.T + coupled @ curves @ coupled.T)))
         return np.array(rows)
 
-    def _better(
-        self, found: StripSolution, chi2: float, expected: Expected, damping: float
+    def _trial(
+        self, solution: StripSolution, chi2: float, expected: Expected, damping: float
     ) -> tuple[StripSolution, float]:
-        step = self._step(found, expected, damping)
-        figures = found.figures + step.figures
+        step = self._step(solution, expected, damping)
+        figures = solution.figures + step.figures
         figures[:, SKEW] = np.clip(figures[:, SKEW], -MOST_SKEW, MOST_SKEW)
         figures[:, LEAKAGE] = np.maximum(figures[:, LEAKAGE], 0.0)
-        moved = StripSolution(figures, found.curves + step.curves)
+        trial = StripSolution(figures, solution.curves + step.curves)
         if not np.isfinite(figures).all():
-            return found, chi2
-        return moved, self._chi2(moved, expected)
+            return solution, chi2
+        return trial, self._chi2(trial, expected)
 
-    def _chi2(self, found: StripSolution, expected: Expected) -> float:
-        left, _ = self._left(found)
-        prior = (found.figures - expected.mean) / expected.sigma
-        return float((left**2).sum() + (prior**2).sum() + found.curves @ found.curves)
+    def _chi2(self, solution: StripSolution, expected: Expected) -> float:
+        residuals, _ = self._residuals(solution)
+        prior = (solution.figures - expected.mean) / expected.sigma
+        return float((residuals**2).sum() + (prior**2).sum() + solution.curves @ solution.curves)
 
-    def _left(self, found: StripSolution) -> tuple[FloatArray, FloatArray]:
-        """(p, values) measured − expected in σ, and the design (values, grid) with its curves."""
-        design = self._design + np.tensordot(found.curves, self._bent, axes=1)
-        expected = self._transmission(found.figures) @ design.T
+    def _residuals(self, solution: StripSolution) -> tuple[FloatArray, FloatArray]:
+        """Return measured − expected in σ (p, values), and the fitted design (values, grid)."""
+        design = self._design + np.tensordot(solution.curves, self._mode_designs, axes=1)
+        expected = self._transmission(solution.figures) @ design.T
         return (self._value - expected) * self._inverse, design
 
-    def _step(self, found: StripSolution, expected: Expected, damping: float) -> _Step:
-        left, design = self._left(found)
-        shape = self._transmission(found.figures)
-        slopes = self._derivatives(found.figures) @ design.T
-        by_curves = np.tensordot(shape, self._bent, axes=(1, 2))
-        information, target = np.eye(self.modes), -found.curves
+    def _step(self, solution: StripSolution, expected: Expected, damping: float) -> _Step:
+        residuals, design = self._residuals(solution)
+        shape = self._transmission(solution.figures)
+        slopes = self._derivatives(solution.figures) @ design.T
+        by_curves = np.tensordot(shape, self._mode_designs, axes=(1, 2))
+        information, target = np.eye(self.modes), -solution.curves
         solved = []
         for k, inverse in enumerate(self._inverse):
-            own = np.vstack([slopes[k].T * inverse[:, np.newaxis], np.diag(1 / expected.sigma[k])])
-            own = np.vstack([own, np.diag(np.sqrt(damping * (own**2).sum(axis=0)))])
-            missing = np.zeros(len(own))
-            missing[: len(inverse)] = left[k]
-            priors = slice(len(inverse), len(inverse) + len(found.figures[k]))
-            missing[priors] = (expected.mean[k] - found.figures[k]) / expected.sigma[k]
+            columns = np.vstack(
+                [slopes[k].T * inverse[:, np.newaxis], np.diag(1 / expected.sigma[k])]
+            )
+            columns = np.vstack([columns, np.diag(np.sqrt(damping * (columns**2).sum(axis=0)))])
+            misfit = np.zeros(len(columns))
+            misfit[: len(inverse)] = residuals[k]
+            priors = slice(len(inverse), len(inverse) + len(solution.figures[k]))
+            misfit[priors] = (expected.mean[k] - solution.figures[k]) / expected.sigma[k]
             shared = by_curves[k].T * inverse[:, np.newaxis]
-            q, triangle = np.linalg.qr(own)
-            seen = q[: len(inverse)].T @ shared
-            wanted = q.T @ missing
-            information += shared.T @ shared - seen.T @ seen
-            target = target + shared.T @ left[k] - seen.T @ wanted
-            solved.append((triangle, seen, wanted))
+            q, triangle = np.linalg.qr(columns)
+            coupling = q[: len(inverse)].T @ shared
+            projected = q.T @ misfit
+            information += shared.T @ shared - coupling.T @ coupling
+            target = target + shared.T @ residuals[k] - coupling.T @ projected
+            solved.append((triangle, coupling, projected))
         damped = information + damping * np.diag(np.diag(information))
         curves: FloatArray = np.asarray(np.linalg.solve(damped, target), dtype=np.float64)
-        figures = [np.linalg.solve(r, wanted - seen @ curves) for r, seen, wanted in solved]
-        triangles = [(r, seen) for r, seen, _ in solved]
+        figures = [
+            np.linalg.solve(r, projected - coupling @ curves) for r, coupling, projected in solved
+        ]
+        triangles = [(r, coupling) for r, coupling, _ in solved]
         return _Step(np.array(figures), curves, triangles, information)
 
     def _transmission(self, figures: FloatArray) -> FloatArray:
-        """(p, grid)."""
+        """Return T_p on the wavelength grid, shape (p, grid)."""
         relative = _shapes(self.grid_nm, figures) + figures[:, [LEAKAGE]]
         relative = relative + figures[:, FIGURES:] @ self._hat_functions.T
         transmission: FloatArray = np.exp(figures[:, [LOG_PEAK]]) * relative
         return transmission
 
     def _derivatives(self, figures: FloatArray) -> FloatArray:
-        """(p, figures, grid)."""
+        """Return the derivatives of T_p by the parameters, shape (p, figures, grid)."""
         peak = np.exp(figures[:, [LOG_PEAK]])
         columns = []
         for number in (CENTRE, LOG_WIDTH, SKEW):
             step = np.zeros(figures.shape[1])
             step[number] = _STEP
-            apart = _shapes(self.grid_nm, figures + step) - _shapes(self.grid_nm, figures - step)
-            columns.append(peak * apart / (2 * _STEP))
+            difference = _shapes(self.grid_nm, figures + step) - _shapes(
+                self.grid_nm, figures - step
+            )
+            columns.append(peak * difference / (2 * _STEP))
         columns += [self._transmission(figures), peak * np.ones_like(self.grid_nm)]
         hat_functions = peak[:, np.newaxis] * self._hat_functions.T
         return np.concatenate([np.stack(columns, axis=1), hat_functions], axis=1)
 
 
 def _on_grid(light: FloatArray, sensitivity: FloatArray, onto_grid: FloatArray) -> FloatArray:
-    """(filters · channels, grid): a value is this times the transmission on the grid."""
+    """Return the design (filters · channels, grid) from transmission on the grid to values."""
     rows = [light * column @ onto_grid for column in sensitivity.T]
     return np.stack(rows, axis=1).reshape(-1, onto_grid.shape[1])
 
 
 def _shapes(nm: FloatArray, figures: FloatArray) -> FloatArray:
-    """(p, grid) peaks of height 1."""
+    """Return peaks of height 1, shape (p, grid)."""
     centre, log_width, skew = (figures[:, [number]] for number in (CENTRE, LOG_WIDTH, SKEW))
     return peak_shape(nm - centre, np.exp(log_width), skew)

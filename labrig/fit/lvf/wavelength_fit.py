@@ -1,4 +1,4 @@
-"""The wavelength along a strip from lines that were located."""
+"""Wavelength along a strip from located lines."""
 
 from dataclasses import dataclass
 
@@ -10,27 +10,27 @@ from labrig.fit.least_squares import FloatArray
 from labrig.optics import WavelengthMap
 from labrig.results import LocatedLines
 
-#: A bend is believed if chance gives so good a one this rarely (F-test with known σ).
+#: Significance level of a bend (F-test with known σ).
 RARE = 0.01
-#: Least σ of a line, in nm: shapes of bands are not quite alike.
+#: Smallest σ of a line in nm: shapes of bands differ slightly.
 FLOOR_NM = 0.1
-#: Bend that strips have where nothing is known, in nm between their middle and their ends.
+#: Prior σ of the bend of a strip in nm, between its middle and its ends.
 USUAL_BEND_NM = 5.0
 
 
 @dataclass(frozen=True, eq=False)
 class WavelengthFit:
-    """A map along a strip, and what was left over.
+    """A wavelength map along a strip, and its residuals.
 
     Attributes
     ----------
     map
-        With the covariance of its coefficients; in it is what a bend that was not believed may
-        still do, so that σ grows honestly where the map is extrapolated.
+        Wavelength map with the covariance of its coefficients; it includes a bend that was not
+        significant, so that σ grows realistically where the map is extrapolated.
     residual_nm
-        (l,) wavelength of the map minus that of the line.
+        Wavelength of the map minus that of each line in nm, shape (l,).
     order
-        1 or 2: straight or bent.
+        Order of the polynomial: 1 straight, 2 bent.
     """
 
     map: WavelengthMap
@@ -39,19 +39,19 @@ class WavelengthFit:
 
 
 def fit_wavelengths(lines: LocatedLines, span: tuple[float, float]) -> WavelengthFit:
-    """Position → wavelength, straight or, where that is clearly better, bent.
+    """Fit the wavelength along a strip, linear or, where clearly better, quadratic.
 
     Parameters
     ----------
     lines
-        Three or more.
+        Three or more located lines.
     span
         First and last position of the strip.
 
     Raises
     ------
     FitError
-        The lines do not rise or fall along the strip.
+        The lines are not monotone along the strip.
     """
     middle, half = (span[0] + span[1]) / 2, (span[1] - span[0]) / 2
     powers = np.vander((lines.position - middle) / half, 3, increasing=True)
@@ -67,21 +67,23 @@ def fit_wavelengths(lines: LocatedLines, span: tuple[float, float]) -> Wavelengt
     else:
         coefficients = bent
     try:
-        found = WavelengthMap(coefficients, span, covariance)
+        wavelength_map = WavelengthMap(coefficients, span, covariance)
     except ValueError as error:
         raise FitError(str(error)) from None
-    return WavelengthFit(found, found.wavelength_nm(lines.position) - lines.wavelength_nm, order)
+    return WavelengthFit(
+        wavelength_map, wavelength_map.wavelength_nm(lines.position) - lines.wavelength_nm, order
+    )
 
 
 def _weighted(
-    powers: FloatArray, wanted: FloatArray, sigma: FloatArray, bend_sigma: float
+    powers: FloatArray, wavelength_nm: FloatArray, sigma: FloatArray, bend_sigma: float
 ) -> tuple[FloatArray, FloatArray, float]:
-    """Coefficients, covariance and χ²; the last of three is 0 ± `bend_sigma` beforehand."""
+    """Return coefficients, covariance and χ²; the last of three has the prior 0 ± `bend_sigma`."""
     rows = powers / sigma[:, np.newaxis]
     precision = rows.T @ rows
     if np.isfinite(bend_sigma):
         precision[-1, -1] += 1 / bend_sigma**2
     covariance = np.asarray(np.linalg.inv(precision), dtype=np.float64)
-    coefficients = covariance @ (rows.T @ (wanted / sigma))
-    chi2 = float((((wanted - powers @ coefficients) / sigma) ** 2).sum())
+    coefficients = covariance @ (rows.T @ (wavelength_nm / sigma))
+    chi2 = float((((wavelength_nm - powers @ coefficients) / sigma) ** 2).sum())
     return coefficients, covariance, chi2

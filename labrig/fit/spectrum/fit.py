@@ -1,16 +1,16 @@
-"""A spectrum from values that each see much of it: non-negative, smooth as the data say.
+"""A spectrum from broadband values: non-negative, with the smoothness that the data support.
 
-The values determine few figures well, so a prior is needed: p(x) ∝ exp(−w‖D x‖²/2), D the second
-differences. Its weight w is no choice: every draw takes another, by the evidence p(values | w). A
-spectrum with narrow lines therefore comes out rough and with a wide band, a smooth one smooth and
-with a narrow one. Values and prior are drawn anew, too, and every draw is the non-negative
-spectrum nearest to them: its values may be exactly zero (Bardsley and Hansen, *MCMC algorithms for
-computational UQ of nonnegativity constrained linear inverse problems*, SIAM J. Sci. Comput. 42,
-2020; Everink, Dong and Andersen, *Bayesian inference with projected densities*, 2023).
+The values constrain few parameters well, so a prior is needed: p(x) ∝ exp(−w‖D x‖²/2), D the
+second differences. Its weight w is not fixed: every draw takes another one, by the evidence
+p(values | w). A spectrum with narrow lines therefore comes out rough and with a wide band, a smooth
+one smooth and with a narrow one. Values and prior are drawn anew, too, and every draw is the
+non-negative spectrum nearest to them: its values may be exactly zero (Bardsley and Hansen, *MCMC
+algorithms for computational UQ of nonnegativity constrained linear inverse problems*, SIAM J. Sci.
+Comput. 42, 2020; Everink, Dong and Andersen, *Bayesian inference with projected densities*, 2023).
 
-The band holds for spectra that are not much narrower than what one value sees of them. Lines, such
-as a mercury lamp's through a filter of 25 nm, come out too broad, by more than their band says;
-`fit_line` finds where a single one is.
+The credible band holds for spectra that are not much narrower than the response of one value.
+Lines, such as a mercury lamp's through a filter of 25 nm, come out too broad, by more than their
+band; `fit_line` finds the wavelength of a single one.
 """
 
 from dataclasses import dataclass
@@ -31,12 +31,12 @@ FEWEST_VALUES = 3
 def measured(
     value: ArrayLike, sigma: ArrayLike, system: SpectralSystem
 ) -> tuple[NDArray[np.bool_], SpectralSystem, FloatArray, FloatArray]:
-    """Which of them take part, the system of those, their values and σ.
+    """Return which values are usable, the system of those, their values and σ.
 
     Raises
     ------
     FitError
-        Too few values, none above its noise, or a σ of 0.
+        There are too few values, none above its noise, or a σ of 0.
     """
     values, sigmas = np.asarray(value, dtype=np.float64), np.asarray(sigma, dtype=np.float64)
     used = np.isfinite(values) & np.isfinite(sigmas) & system.design.any(axis=1)
@@ -53,9 +53,9 @@ def measured(
     return used, part, values[used], sigmas[used]
 
 
-#: Exchanges after which it goes round in circles.
+#: Number of exchanges after which block pivoting counts as cycling.
 MOST_EXCHANGES = 25
-#: Slopes, and coordinates relative to the largest, this far on the wrong side are rounding.
+#: Rounding errors of slopes, and of coordinates relative to the largest.
 ROUNDING = 100 * EPSILON
 SMALLEST = 1e-9
 
@@ -63,23 +63,24 @@ SMALLEST = 1e-9
 def nonnegative_minimum(
     curvature: FloatArray, linear: FloatArray, free: NDArray[np.bool_]
 ) -> FloatArray:
-    """Minimise xᵀGx/2 − bᵀx over x ≥ 0, started from the answer to a neighbouring problem.
+    """Minimise xᵀGx/2 − bᵀx over x ≥ 0, started from the solution of a similar problem.
 
     Block principal pivoting: all coordinates on the wrong side change sides at once (Júdice and
     Pires, *A block principal pivoting algorithm for large-scale strictly monotone linear
-    complementarity problems*, Comput. Oper. Res. 21, 1994). Where it goes round in circles, Lawson
-    and Hanson's active sets find the way.
+    complementarity problems*, Comput. Oper. Res. 21, 1994). Where that cycles, Lawson and Hanson's
+    active sets are used.
 
     Parameters
     ----------
     curvature, linear
-        (n, n) G, positive definite, and (n,) b.
+        Positive definite G (n, n) and b (n,).
     free
-        (n,) guess which coordinates are not zero.
+        Initial guess of the coordinates that are not zero, shape (n,).
 
     Returns
     -------
-    (n,) x, exactly 0 where the bound holds it.
+    ndarray
+        Minimum x, exactly 0 where the bound is active, shape (n,).
     """
     free = free.copy()
     size = np.abs(curvature)
@@ -107,9 +108,9 @@ def _solved(curvature: FloatArray, linear: FloatArray) -> FloatArray:
 
 
 SAMPLES = 400
-#: Rounds in which the covariance of a wrong design follows the spectrum.
+#: Iterations in which the covariance of the design's errors follows the spectrum.
 ROUNDS = 3
-#: Weights of the prior that are possible, for a spectrum of about 1.
+#: Grid of weights of the prior, for a spectrum of about 1.
 WEIGHTS = np.geomspace(1e-4, 1e8, 73)
 #: Added to the curvature of the fit, for a spectrum of about 1.
 LEAST_CURVATURE = 1e-6
@@ -117,21 +118,21 @@ LEAST_CURVATURE = 1e-6
 
 @dataclass(frozen=True, eq=False)
 class SpectrumFit:
-    """A spectrum and how well it is known.
+    """A spectrum with its uncertainty.
 
     Attributes
     ----------
     knots_nm, value
-        (n,) the mean of the samples: straight lines between the knots.
+        Knots in nm and mean of the samples, shape (n,), piecewise linear in between.
     samples
-        (s, n) draws from what the values leave possible; all their spread is uncertainty.
+        Draws from the posterior, shape (s, n); all their spread is uncertainty.
     weight
-        Median weight of the smoothness, of a spectrum scaled to about 1.
+        Median weight of the smoothness prior, for a spectrum scaled to about 1.
     misfit
-        Root of χ² per degree of freedom: about 1 if the σ given and the design hold; more has
-        been taken into the samples' spread.
+        Root of χ² per degree of freedom: about 1 if the given σ and the design hold; a larger value
+        widens the samples' spread.
     used
-        (m,) bool, the values that took part.
+        Whether a value was used, shape (m,), bool.
     """
 
     knots_nm: FloatArray
@@ -142,14 +143,14 @@ class SpectrumFit:
     used: NDArray[np.bool_]
 
     def in_bands(self, edges_nm: ArrayLike, level: float = 0.6827) -> "BandedSpectrum":
-        """Means over neighbouring bands and their credible interval.
+        """Average over neighbouring bands, with their credible interval.
 
         Parameters
         ----------
         edges_nm
-            (b + 1,) rising.
+            Rising edges in nm, shape (b + 1,).
         level
-            Probability that the truth is in the interval, band by band.
+            Probability that the true value is in the interval, for each band.
         """
         draws = band_means(self.knots_nm, self.samples.T, edges_nm)
         low, high = np.quantile(draws, [(1 - level) / 2, (1 + level) / 2], axis=1)
@@ -160,7 +161,7 @@ class SpectrumFit:
 
 @dataclass(frozen=True, eq=False)
 class BandedSpectrum:
-    """Means over (b,) bands between (b + 1,) `edges_nm`, σ, and the ends of a credible interval."""
+    """Means over (b,) bands between (b + 1,) `edges_nm`, σ, and limits of a credible interval."""
 
     edges_nm: FloatArray
     value: FloatArray
@@ -177,34 +178,34 @@ def fit_spectrum(
     samples: int = SAMPLES,
     seed: int = 0,
 ) -> SpectrumFit:
-    """The spectrum behind some values.
+    """Fit the spectrum that explains some values.
 
     Parameters
     ----------
     value, sigma
-        (m,) as the system has them, and one standard deviation of their noise. A value that is
+        Values of the system and one standard deviation of their noise, shape (m,). A value that is
         NaN (clipped, missing) is left out.
     system
-        Design, and how it may be wrong.
+        Design matrix and its errors.
     samples
-        How many draws to make.
+        Number of draws.
     seed
-        Of the draws: the same values give the same spectrum.
+        Seed of the draws: the same values give the same spectrum.
 
     Raises
     ------
     FitError
-        Too few values, or none above its noise.
+        There are too few values, or none above its noise.
     """
     used, part, y, s = measured(value, sigma, system)
-    of_white = part.design.sum(axis=1)
-    scale = float(y @ of_white) / float(of_white @ of_white)
+    white_response = part.design.sum(axis=1)
+    scale = float(y @ white_response) / float(white_response @ white_response)
     roughness = _second_differences(part.knots_nm)
     x, misfit = np.full(len(part.knots_nm), scale), 1.0
     for _ in range(ROUNDS):
         whitened, target = _whitened(part, y, misfit * s, x / scale, scale)
-        x, more = _likeliest(whitened, target, roughness)
-        x, misfit = x * scale, max(1.0, misfit * more)
+        x, ratio = _likeliest(whitened, target, roughness)
+        x, misfit = x * scale, max(1.0, misfit * ratio)
     rng = np.random.default_rng(seed)
     draws, weights = _draw(whitened, target, roughness, samples, rng)
     return SpectrumFit(
@@ -216,21 +217,21 @@ def fit_spectrum(
 def _whitened(
     system: SpectralSystem, y: FloatArray, s: FloatArray, spectrum: FloatArray, scale: float
 ) -> tuple[FloatArray, FloatArray]:
-    """Design and values in units of all that may be wrong, for a spectrum of about 1."""
+    """Return design and values in units of their total error, for a spectrum of about 1."""
     covariance = np.diag((s / scale) ** 2) + system.covariance(spectrum)
     lower = np.linalg.cholesky(covariance)
-    both = np.linalg.solve(lower, np.column_stack([system.design, y / scale]))
-    return both[:, :-1], both[:, -1]
+    solution = np.linalg.solve(lower, np.column_stack([system.design, y / scale]))
+    return solution[:, :-1], solution[:, -1]
 
 
 def _second_differences(knots_nm: FloatArray) -> FloatArray:
-    """(n − 2, n) of values on an even grid."""
+    """Return the second differences of values on an even grid as a matrix (n − 2, n)."""
     n = len(knots_nm)
     return np.diff(np.eye(n), n=2, axis=0)
 
 
 def _weights(design: FloatArray, target: FloatArray, prior: FloatArray) -> FloatArray:
-    """Probability of each of `WEIGHTS`, all likely alike before; x ≥ 0 left aside."""
+    """Return the probability of each of `WEIGHTS` under a flat prior, ignoring x ≥ 0."""
     information, linear = design.T @ design, design.T @ target
     log_evidence = np.empty(len(WEIGHTS))
     for number, weight in enumerate(WEIGHTS):
@@ -247,16 +248,18 @@ def _weights(design: FloatArray, target: FloatArray, prior: FloatArray) -> Float
 def _likeliest(
     design: FloatArray, target: FloatArray, roughness: FloatArray
 ) -> tuple[FloatArray, float]:
-    """Spectrum at the likeliest weight, and root of χ² per degree of freedom."""
+    """Return the spectrum at the most probable weight, and the root of χ² per degree of freedom."""
     prior = roughness.T @ roughness
     weight = float(WEIGHTS[np.argmax(_weights(design, target, prior))])
     curvature = design.T @ design + weight * prior + _ridge(prior)
-    everywhere = np.ones(len(prior), dtype=np.bool_)
-    x = nonnegative_minimum(curvature, design.T @ target, everywhere)
+    all_free = np.ones(len(prior), dtype=np.bool_)
+    x = nonnegative_minimum(curvature, design.T @ target, all_free)
     free = x > 0
-    seen = np.linalg.solve(curvature[np.ix_(free, free)], (design.T @ design)[np.ix_(free, free)])
+    followed = np.linalg.solve(
+        curvature[np.ix_(free, free)], (design.T @ design)[np.ix_(free, free)]
+    )
     residual = target - design @ x
-    dof = max(len(target) - float(np.trace(seen)), 1.0)
+    dof = max(len(target) - float(np.trace(followed)), 1.0)
     return x, float(np.sqrt(residual @ residual / dof))
 
 
@@ -267,7 +270,7 @@ def _draw(
     samples: int,
     rng: np.random.Generator,
 ) -> tuple[FloatArray, FloatArray]:
-    """(s, n) spectra and the (s,) weights they were drawn with."""
+    """Return (s, n) spectra and the (s,) weights with which they were drawn."""
     information, prior = design.T @ design, roughness.T @ roughness
     probability = _weights(design, target, prior)
     weights = np.sort(rng.choice(WEIGHTS, samples, p=probability))
@@ -283,5 +286,5 @@ def _draw(
 
 
 def _ridge(prior: FloatArray) -> FloatArray:
-    """Holds what neither the values nor the prior know anything about."""
+    """Return a ridge that fixes what neither the values nor the prior constrain."""
     return LEAST_CURVATURE * np.eye(len(prior))

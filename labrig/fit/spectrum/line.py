@@ -1,9 +1,9 @@
-"""Where a narrow line is, told by values that each see much of the spectrum.
+"""Wavelength of a narrow line from broadband values.
 
-A spectrum that is only smooth (`fit_spectrum`) comes out as broad as what one value sees of it, and
-its highest point lies where the values' own curves draw it. Of light that is known to be narrow, a
-laser's, a monochromator's, one LED's, two numbers are unknown, wavelength and strength: they are
-found by likelihood, with the values' noise and with how the system itself may be wrong.
+A spectrum that is only smooth (`fit_spectrum`) comes out as broad as the response of one value, and
+its maximum depends on the shape of the responses. Light that is known to be narrow (a laser, a
+monochromator, an LED) has two unknowns, wavelength and strength: they are found by maximum
+likelihood, with the values' noise and the errors of the system.
 """
 
 from dataclasses import dataclass
@@ -21,11 +21,11 @@ from labrig.fit.spectrum.system import SpectralSystem
 
 #: Full width at half maximum over σ of a Gaussian.
 FWHM_OVER_SIGMA = 2 * np.sqrt(2 * np.log(2))
-#: Wavelengths tried first, per distance of the knots.
+#: Number of wavelengths on the first grid, per distance of the knots.
 TRIED_PER_KNOT = 4
-#: Rounds in which the covariance of a wrong system follows the line's strength.
+#: Iterations in which the covariance of the system's errors follows the line's strength.
 ROUNDS = 3
-#: Of the search, over the distance of the knots; also the step of derivatives.
+#: Tolerance of the search, in distances of the knots; also the step of derivatives.
 TOLERANCE = 1e-4
 
 
@@ -36,12 +36,12 @@ class LineFit:
     Attributes
     ----------
     wavelength_nm, sigma_nm
-        Centre and one standard deviation: the Cramér–Rao bound, times `misfit` where that is
-        above 1. Other wavelengths that explain the values nearly as well are not in it.
+        Centre in nm and one standard deviation: the Cramér–Rao bound, times `misfit` where that is
+        above 1. It does not cover other wavelengths that explain the values nearly as well.
     strength
         Integral over wavelength, in the unit of the system's spectrum times nm.
     misfit
-        Root of χ² per degree of freedom: about 1 if the σ given, the system and the line's shape
+        Root of χ² per degree of freedom: about 1 if the given σ, the system and the line's shape
         hold.
     """
 
@@ -52,21 +52,22 @@ class LineFit:
 
 
 def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm: float) -> LineFit:
-    """The line behind some values.
+    """Fit the line that explains some values.
 
     Parameters
     ----------
     value, sigma
-        (m,) as for `fit_spectrum`.
+        Values and σ as for `fit_spectrum`, shape (m,).
     system
-        Design on evenly spaced knots, and how it may be wrong.
+        Design matrix on evenly spaced knots, and its errors.
     fwhm_nm
-        Of the line, a Gaussian; 0 for one much narrower than what a value sees.
+        Full width at half maximum of the line, a Gaussian, in nm; 0 for one much narrower than the
+        response of a value.
 
     Raises
     ------
     FitError
-        Too few values, none above its noise, or no line between the outermost knots.
+        There are too few values, none above its noise, or no line between the outermost knots.
     """
     _, part, y, s = measured(value, sigma, system)
     knots = part.knots_nm
@@ -78,41 +79,41 @@ def fit_line(value: ArrayLike, sigma: ArrayLike, system: SpectralSystem, fwhm_nm
     def minus_two_log_likelihood(wavelength_nm: float) -> float:
         return line_at(wavelength_nm).minus_two_log_likelihood
 
-    tried = np.linspace(knots[0], knots[-1], TRIED_PER_KNOT * (len(knots) - 1) + 1)
-    best = int(np.argmin([minus_two_log_likelihood(wavelength) for wavelength in tried]))
-    if best in (0, len(tried) - 1) or not line_at(tried[best]).strength > 0:
+    trial_nm = np.linspace(knots[0], knots[-1], TRIED_PER_KNOT * (len(knots) - 1) + 1)
+    best = int(np.argmin([minus_two_log_likelihood(wavelength) for wavelength in trial_nm]))
+    if best in (0, len(trial_nm) - 1) or not line_at(trial_nm[best]).strength > 0:
         raise FitError(
             f"expected a line between {knots[0]:g} and {knots[-1]:g} nm, got values that none "
             "there explains; look at the whole spectrum"
         )
-    between = (float(tried[best - 1]), float(tried[best + 1]))
+    bracket = (float(trial_nm[best - 1]), float(trial_nm[best + 1]))
     h = TOLERANCE * step
     # Not least squares: the covariance, and its determinant with it, changes along the search.
     centre_nm = float(
-        minimize_scalar(minus_two_log_likelihood, bounds=between, options={"xatol": h}).x
+        minimize_scalar(minus_two_log_likelihood, bounds=bracket, options={"xatol": h}).x
     )
-    at = line_at(centre_nm)
+    line = line_at(centre_nm)
     shift = (line_at(centre_nm + h).shape - line_at(centre_nm - h).shape) / (2 * h)
-    by_wavelength = at.strength * solve_triangular(at.lower, shift, lower=True)
-    along = at.whitened / np.linalg.norm(at.whitened)
+    by_wavelength = line.strength * solve_triangular(line.lower, shift, lower=True)
+    along = line.whitened / np.linalg.norm(line.whitened)
     # What another strength would explain as well says nothing about the wavelength.
-    told = float(np.linalg.norm(by_wavelength - (by_wavelength @ along) * along))
-    misfit = float(np.sqrt(at.chi2 / max(len(y) - 2, 1)))
-    return LineFit(centre_nm, max(1.0, misfit) / told, at.strength, misfit)
+    information = float(np.linalg.norm(by_wavelength - (by_wavelength @ along) * along))
+    misfit = float(np.sqrt(line.chi2 / max(len(y) - 2, 1)))
+    return LineFit(centre_nm, max(1.0, misfit) / information, line.strength, misfit)
 
 
 @dataclass(frozen=True)
 class _LineAt:
-    """Values by a line at one wavelength, of the likeliest strength.
+    """Values of a line at one wavelength with its most likely strength.
 
     Attributes
     ----------
     shape, whitened
-        (m,) values of a line of strength 1, and over all that may be wrong.
+        Values of a line of strength 1, and the same whitened by their covariance, shape (m,).
     lower
-        (m, m) root of the values' covariance.
+        Cholesky factor of the values' covariance, shape (m, m).
     strength, chi2, minus_two_log_likelihood
-        Likeliest strength, χ² and −2 ln likelihood but for a constant.
+        Most likely strength, χ², and −2 ln likelihood up to a constant.
     """
 
     shape: FloatArray
@@ -127,13 +128,13 @@ def _line_at(
     system: SpectralSystem, y: FloatArray, s: FloatArray, hat_functions: FloatArray
 ) -> _LineAt:
     shape, noise, strength = system.design @ hat_functions, np.diag(s**2), 0.0
-    wrong = system.covariance(hat_functions)
-    for _ in range(ROUNDS if wrong.any() else 1):
-        lower = cholesky(noise + strength**2 * wrong, lower=True)
-        both = solve_triangular(lower, np.column_stack([shape, y]), lower=True)
-        whitened, target = both[:, 0], both[:, 1]
-        seen = float(whitened @ whitened)
-        strength = max(float(whitened @ target) / seen, 0.0) if seen > 0 else 0.0
+    system_covariance = system.covariance(hat_functions)
+    for _ in range(ROUNDS if system_covariance.any() else 1):
+        lower = cholesky(noise + strength**2 * system_covariance, lower=True)
+        solution = solve_triangular(lower, np.column_stack([shape, y]), lower=True)
+        whitened, target = solution[:, 0], solution[:, 1]
+        norm2 = float(whitened @ whitened)
+        strength = max(float(whitened @ target) / norm2, 0.0) if norm2 > 0 else 0.0
     residual = target - strength * whitened
     chi2 = float(residual @ residual)
     minus_two_log_likelihood = chi2 + 2 * float(np.log(np.diag(lower)).sum())
@@ -141,10 +142,10 @@ def _line_at(
 
 
 def _hat_functions(knots_nm: FloatArray, wavelength_nm: float, fwhm_nm: float) -> FloatArray:
-    """(n,) values at the knots of a line of integral 1, with its centre and its width.
+    """Return the values (n,) at the knots of a line of integral 1, with its centre and its width.
 
-    The straight lines between the knots make it wider by h²/3 in its variance, h the distance of
-    the knots: so much is taken off, if there is so much.
+    Linear interpolation between the knots adds h²/3 to its variance, h the distance of the knots:
+    that much is subtracted as far as possible.
     """
     h = float(knots_nm[1] - knots_nm[0])
     width = np.sqrt(max((fwhm_nm / FWHM_OVER_SIGMA) ** 2 - h**2 / 3, (TOLERANCE * h) ** 2))

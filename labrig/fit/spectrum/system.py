@@ -1,4 +1,4 @@
-"""What a spectrum adds to every value that was measured: the linear system, and its own errors."""
+"""The linear system from a spectrum to the measured values, and its errors."""
 
 from collections.abc import Iterator
 from dataclasses import dataclass, field, fields, replace
@@ -10,25 +10,25 @@ from labrig.optics import Bands, CameraResponse, Lvf, hats, quadrature
 
 FloatArray = NDArray[np.float64]
 
-#: Steps of the derivatives by an LVF's figures, relative to their σ.
+#: Steps of the derivatives by an LVF's parameters, relative to their σ.
 _STEP = 0.1
 
 
 @dataclass(frozen=True)
 class CurveError:
-    """How well a camera's curves are known; one standard deviation, smooth over wavelength.
+    """Error of a camera's curves as one standard deviation, smooth over wavelength.
 
-    The defaults are what two laboratories' curves of one Canon EOS 5D Mark II differ by, and cover
-    spectra from pictures taken with one and fitted with the other.
+    The defaults are the difference between two laboratories' curves of one Canon EOS 5D Mark II,
+    and cover spectra from pictures taken with one and fitted with the other.
 
     Attributes
     ----------
     relative
-        Fraction of the curve itself.
+        Error as a fraction of the curve itself.
     added
-        Fraction of the channel's peak, added to the curve: stray light, other infrared filters.
+        Error as a fraction of the channel's peak: stray light, other infrared filters.
     correlation_nm
-        Errors this far apart are independent.
+        Distance in nm at which errors are independent.
     """
 
     relative: float = 0.06
@@ -38,16 +38,17 @@ class CurveError:
 
 @dataclass(frozen=True, eq=False)
 class SpectralSystem:
-    """value = (design + Σ_k z_k modes_k) · spectrum, z_k independent and of unit variance.
+    """Linear system value = (design + Σ_k z_k modes_k) · spectrum, z_k of unit variance.
 
     Attributes
     ----------
     knots_nm
-        (n,) rising: the spectrum is straight lines between its values there, and zero outside.
+        Rising knots in nm, shape (n,): the spectrum is piecewise linear between them, and zero
+        outside.
     design
-        (m, n) values per unit of the spectrum at every knot.
+        Values per unit of the spectrum at every knot, shape (m, n).
     modes
-        (k, m, n) one standard deviation of the design in each independent way it may be wrong.
+        One standard deviation of the design in each independent error mode, shape (k, m, n).
     """
 
     knots_nm: FloatArray
@@ -55,32 +56,32 @@ class SpectralSystem:
     modes: FloatArray = field(default_factory=lambda: np.empty((0, 0, 0)))
 
     def of(self, rows: NDArray[np.bool_]) -> "SpectralSystem":
-        """The system of some of its values."""
+        """Return the system of a selection of its values."""
         modes = self.modes[:, rows] if len(self.modes) else self.modes
         return SpectralSystem(self.knots_nm, self.design[rows], modes)
 
     def covariance(self, spectrum: FloatArray) -> FloatArray:
-        """(m, m) of the values, by the errors of the design alone."""
-        wrong = self.modes @ spectrum if len(self.modes) else np.zeros((0, len(self.design)))
-        result: FloatArray = wrong.T @ wrong
+        """Return the covariance (m, m) of the values from the errors of the design alone."""
+        deviations = self.modes @ spectrum if len(self.modes) else np.zeros((0, len(self.design)))
+        result: FloatArray = deviations.T @ deviations
         return result
 
 
 def system_through_lvf(
     lvf: Lvf, camera: CameraResponse, knots_nm: FloatArray, curve_error: CurveError | None = None
 ) -> SpectralSystem:
-    """The system of a picture through a variable filter, values in the order (position, channel).
+    """Return the system of a picture through a variable filter, values by (position, channel).
 
     Parameters
     ----------
     lvf
-        At the positions that were read; where its σ is known it goes into the modes.
+        Filter at the positions that were read; its σ, where known, adds modes.
     camera
-        Its curves on their own wavelengths.
+        Camera with its curves on their own wavelengths.
     knots_nm
-        (n,) of the spectrum wanted.
+        Knots of the spectrum in nm, shape (n,).
     curve_error
-        Of the camera's curves; None takes them for exact.
+        Error of the camera's curves; None takes them for exact.
     """
     nodes, weights = quadrature(
         float(knots_nm[0]), float(knots_nm[-1]), camera.wavelength_nm, knots_nm
@@ -89,7 +90,7 @@ def system_through_lvf(
     sensitivity = camera.at(nodes)
 
     def design(transmission: FloatArray, curves: FloatArray) -> FloatArray:
-        """(positions · channels, n)."""
+        """Return the design matrix, shape (positions · channels, n)."""
         values = np.stack([(transmission * curve) @ hat_functions for curve in curves.T], axis=1)
         return values.reshape(-1, len(knots_nm))
 
@@ -110,30 +111,35 @@ def system_through_lvf(
 def curve_modes(
     error: CurveError | None, nodes: FloatArray, sensitivity: FloatArray, peaks: FloatArray
 ) -> list[FloatArray]:
-    """Changes of the curves (q, channels), each one σ of one channel about one wavelength.
+    """Return changes of the curves (q, channels), each one σ of one channel about one wavelength.
 
     Parameters
     ----------
+    error
+        Error of the curves; None for none.
     nodes, sensitivity
-        (q,) wavelengths and (q, channels) the curves there.
+        Wavelengths in nm (q,) and curves at them (q, channels).
     peaks
-        (channels,) highest of each curve.
+        Maximum of each curve, shape (channels,).
     """
     if error is None:
         return []
-    smooth = _smooth_modes(nodes, error.correlation_nm)
+    smooth_modes = _smooth_modes(nodes, error.correlation_nm)
     modes = []
     for channel, peak in enumerate(peaks):
-        for fraction, of in ((error.relative, sensitivity[:, channel]), (error.added * peak, 1.0)):
-            for mode in smooth if fraction > 0 else ():
+        for fraction, shape in (
+            (error.relative, sensitivity[:, channel]),
+            (error.added * peak, 1.0),
+        ):
+            for mode in smooth_modes if fraction > 0 else ():
                 change = np.zeros_like(sensitivity)
-                change[:, channel] = fraction * mode * of
+                change[:, channel] = fraction * mode * shape
                 modes.append(change)
     return modes
 
 
 def _smooth_modes(nodes: FloatArray, distance_nm: float) -> FloatArray:
-    """(k, q) functions whose sum with unit normal weights is smooth and of unit variance."""
+    """Return (k, q) functions whose sum with unit normal weights is smooth and of unit variance."""
     knots = np.arange(nodes[0] - distance_nm, nodes[-1] + 2 * distance_nm, distance_nm)
     fraction = np.clip(hats(knots, nodes), 0.0, 1.0)
     modes: FloatArray = np.sin(np.pi / 2 * fraction).T
@@ -141,12 +147,12 @@ def _smooth_modes(nodes: FloatArray, distance_nm: float) -> FloatArray:
 
 
 def _filter_changes(lvf: Lvf, nodes: FloatArray) -> Iterator[tuple[int, FloatArray]]:
-    """Changes of the transmission (q,) at one position, each by one of its figures."""
+    """Yield changes of the transmission (q,) at one position, each by one of its parameters."""
     if lvf.sigma is None:
         return
     for name in (f.name for f in fields(Bands)):
         step = _STEP * getattr(lvf.sigma, name)
-        moved = replace(lvf.bands, **{name: getattr(lvf.bands, name) + step})
-        change = (moved.transmission(nodes) - lvf.bands.transmission(nodes)) / _STEP
+        shifted = replace(lvf.bands, **{name: getattr(lvf.bands, name) + step})
+        change = (shifted.transmission(nodes) - lvf.bands.transmission(nodes)) / _STEP
         for position in np.flatnonzero(step > 0).tolist():
             yield position, change[position]
