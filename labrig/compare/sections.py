@@ -35,7 +35,7 @@ def sections(comparison: RunComparison) -> tuple[Section, ...]:
     >>> for section in sections(compare_run(Path("runs/decay"), refit)):
     ...     print(section.title)
     Glow, photographed and predicted
-    What more states gain
+    Improvement by further states
     Spectra in three channels
     """
     return tuple(_sections(comparison))
