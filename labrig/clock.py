@@ -14,7 +14,7 @@ from functools import partial
 from typing import Any
 
 #: Interval of checks for an interruption during a wait, so that Ctrl-C acts at once everywhere.
-LOOK_UP_S = 0.05
+CHECK_INTERVAL_S = 0.05
 #: Difference of clocks that means sleep; on a PC that is awake they agree much better.
 SLEPT_S = 0.3
 #: A clock that includes sleep of the PC, and one that does not, by `sys.platform`.
@@ -146,7 +146,7 @@ class SystemClock(Clock):
         return through_sleep_s - self._awake()
 
     def _pause_until(self, deadline_s: float) -> None:
-        time.sleep(min(max(deadline_s - self._now(), 0.0), LOOK_UP_S))
+        time.sleep(min(max(deadline_s - self._now(), 0.0), CHECK_INTERVAL_S))
 
 
 def _readings(platform: str) -> tuple[Reading, Reading, Reading]:

@@ -1,9 +1,10 @@
 """The guard: a separate process that switches the lights off when this one no longer can.
 
 It receives once a second whether a light may be on. If this process ends without a report that all
-lights are off (kill -9, out of memory, a crash of a library), or reports nothing for `HANGS_S`
-(stopped by a signal, hung in a call), the guard opens the lights' ports by the same drivers and
-switches them off, after having killed a process that hangs. Its code is in `guard_process`.
+lights are off (kill -9, out of memory, a crash of a library), or reports nothing for
+`HANG_TIMEOUT_S` (stopped by a signal, hung in a call), the guard opens the lights' ports by the
+same drivers and switches them off, after having killed a process that hangs. Its code is in
+`guard_process`.
 """
 
 import json
@@ -24,9 +25,9 @@ from labrig.quantity import duration_text
 MAY_BE_ON, ALL_OFF = b"+", b"-"
 #: Message of the guard when it is ready.
 READY = "ready"
-BEAT_S = 1.0
+HEARTBEAT_DURATION_S = 1.0
 #: Silence after which labrig counts as hung, longer than any call that holds the interpreter.
-HANGS_S = 30
+HANG_TIMEOUT_S = 30
 #: Duration of the attempts to switch a light off: its board may have to be plugged in again.
 TRIES_FOR_S = 300.0
 #: Importing the drivers takes a second, or several on a busy PC.
@@ -61,7 +62,7 @@ class Guard:
 
     described = (
         "a process of its own: it switches the lights off at once if labrig dies, and after "
-        f"{HANGS_S} s if labrig hangs"
+        f"{HANG_TIMEOUT_S} s if labrig hangs"
     )
     goes_on = f"its guard goes on trying for {duration_text(TRIES_FOR_S)}"
 
@@ -109,7 +110,7 @@ class Guard:
                 self._process.wait()
 
     def _beat(self) -> None:
-        while not self._closed.wait(BEAT_S):
+        while not self._closed.wait(HEARTBEAT_DURATION_S):
             with self._lock, suppress(DeviceError):  # tried again with the next beat
                 self._send()
 

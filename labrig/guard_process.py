@@ -21,7 +21,14 @@ from labrig.acquire import RigFile
 from labrig.bench import Bench
 from labrig.clock import SystemClock
 from labrig.errors import LabrigError
-from labrig.guard import ALL_OFF, BEAT_S, HANGS_S, MAY_BE_ON, READY, TRIES_FOR_S
+from labrig.guard import (
+    ALL_OFF,
+    HANG_TIMEOUT_S,
+    HEARTBEAT_DURATION_S,
+    MAY_BE_ON,
+    READY,
+    TRIES_FOR_S,
+)
 from labrig.serial_ports import SerialPorts
 
 #: Pauses between two attempts. The first ones are short: the port of a killed process is free some
@@ -56,11 +63,11 @@ def labrig_is_gone(source: BinaryIO, pid: int) -> bool:
     state, silent_s = ALL_OFF, 0.0
     while True:
         try:
-            message = messages.get(timeout=BEAT_S)
+            message = messages.get(timeout=HEARTBEAT_DURATION_S)
         except queue.Empty:
             # Counted, not looked up on a clock: a PC that slept has not been silent.
-            silent_s += BEAT_S
-            if state == MAY_BE_ON and silent_s >= HANGS_S:
+            silent_s += HEARTBEAT_DURATION_S
+            if state == MAY_BE_ON and silent_s >= HANG_TIMEOUT_S:
                 _kill(pid)
                 return True
             continue

@@ -18,7 +18,7 @@ from labrig.cli.exit_codes import guarded
 from tests.forked import forked
 
 #: A refusal takes no longer, in seconds of computing; nor does anything hang for longer than this.
-QUICK_S, HANGS_S = 2.0, 60.0
+QUICK_S, HANG_TIMEOUT_S = 2.0, 60.0
 #: Said beside the one line of complaint: progress, and what a person should know.
 _REMARKS = ("[", "note: ", "warning: ")
 
@@ -157,14 +157,14 @@ def try_one(victim: Victim, rng: random.Random, place: Path) -> Outcome:
 
 def _waited(pid: int) -> tuple[int, float]:
     """Exit code and seconds of computing; what hangs is killed."""
-    deadline = time.monotonic() + HANGS_S
+    deadline = time.monotonic() + HANG_TIMEOUT_S
     while True:
         done, status, used = os.wait4(pid, os.WNOHANG)
         if done:
             return os.waitstatus_to_exitcode(status), used.ru_utime + used.ru_stime
         if time.monotonic() > deadline:
             os.kill(pid, signal.SIGKILL)
-            deadline += HANGS_S
+            deadline += HANG_TIMEOUT_S
         time.sleep(0.002)
 
 

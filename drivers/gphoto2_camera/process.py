@@ -15,7 +15,7 @@ from multiprocessing.connection import Connection
 from pathlib import Path
 from typing import Any
 
-from labrig.clock import LOOK_UP_S, Clock
+from labrig.clock import CHECK_INTERVAL_S, Clock
 from labrig.errors import DeviceLostError, UsageError
 
 from .failures import failure
@@ -130,7 +130,7 @@ class HelperProcess:
         """Whether there is an answer; looks up for somebody who asks to stop."""
         assert self._pipe is not None
         deadline_s = self._clock.now() + within_s
-        while not self._pipe.poll(min(LOOK_UP_S, max(0.0, deadline_s - self._clock.now()))):
+        while not self._pipe.poll(min(CHECK_INTERVAL_S, max(0.0, deadline_s - self._clock.now()))):
             if self._clock.now() >= deadline_s:
                 return False
             self._clock.sleep(0.0)

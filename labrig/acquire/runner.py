@@ -12,7 +12,7 @@ from labrig.acquire.temperature import TemperatureLog
 from labrig.acquire.values import Frame
 from labrig.clock import Clock
 from labrig.record import (
-    TAKEN_BACK,
+    UNDONE,
     ActionRecord,
     AttemptWriter,
     FrameRecord,
@@ -190,7 +190,7 @@ class _Recorder:
         """Record that the unit of the last manual step no longer counts, and abort this attempt."""
         last, now_s = self._last_manual_step(), self._clock.now()
         assert last is not None, "only what was done is taken back"
-        self.acted(TAKEN_BACK, last.unit, now_s, now_s, 0.0)
+        self.acted(UNDONE, last.unit, now_s, now_s, 0.0)
         self._writer.stop("abort", f"taken back: '{last.action}'; {last.unit} is done again")
 
     def photographed(self, role: str, frame: Frame, late_s: float) -> None:

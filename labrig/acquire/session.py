@@ -24,9 +24,9 @@ RecordT = TypeVar("RecordT", FrameRecord, ActionRecord)
 #: Period of keeping devices awake; cameras switch off after one minute at the earliest.
 AWAKE_PERIOD_S = 30.0
 #: Time before an action without other commands: a busy camera may take seconds to answer.
-QUIET_BEFORE_S = 10.0
+QUIET_PERIOD_S = 10.0
 #: Longest duration of serving a watchdog.
-BEAT_S = 0.5
+HEARTBEAT_DURATION_S = 0.5
 #: Delay up to which an action is on time; a PC has tails of 5 ms, 10 ms under load.
 TOLERANCE_S = 0.02
 
@@ -253,13 +253,13 @@ class Session:
         needs_service = (
             self._kept_awake or self._guarded or self._temperature.is_kept or self._lights.is_told
         )
-        while needs_service and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_BEFORE_S:
+        while needs_service and deadline_s - self.clock.now() > AWAKE_PERIOD_S + QUIET_PERIOD_S:
             self.clock.sleep(AWAKE_PERIOD_S)
             self._serve_devices()
-        if deadline_s - self.clock.now() > QUIET_BEFORE_S:
+        if deadline_s - self.clock.now() > QUIET_PERIOD_S:
             self._lights.read_if_due()
             self._temperature.read_if_due(self._recorder.temperature)
-        if deadline_s - self.clock.now() > BEAT_S:
+        if deadline_s - self.clock.now() > HEARTBEAT_DURATION_S:
             self._heartbeat_if_due()
         self.clock.sleep_until(deadline_s)
 

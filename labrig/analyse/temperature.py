@@ -11,10 +11,10 @@ from labrig.record import (
     RunRecord,
     TemperatureHistory,
     degrees_text,
+    frames_in_roles,
     glow_temperature_c,
-    in_roles,
     relative_rate_change,
-    written_time,
+    time_text,
 )
 
 #: From here on it is said: rates then change by 4 %, more than their usual σ.
@@ -24,7 +24,7 @@ CHECK_IT = "check it before the next run (labrig rig check)"
 
 def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, ...]:
     """A temperature that moved while frames of these roles were taken; a silent thermometer."""
-    photographs = in_roles(run, roles)
+    photographs = frames_in_roles(run, roles)
     if not photographs or "thermometer" not in run.attempts[-1].start.get("devices", {}):
         return ()
     if not run.temperatures():
@@ -42,7 +42,7 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
             )
     if photographs[-1].end_time > course.time[-1] + KNOWN_FOR_S:
         warnings.append(
-            f"the thermometer told nothing after {written_time(course.time[-1])}: {CHECK_IT}"
+            f"the thermometer told nothing after {time_text(course.time[-1])}: {CHECK_IT}"
         )
     return tuple(warnings)
 

@@ -8,7 +8,7 @@ from pydantic import BaseModel, ConfigDict, model_validator
 from labrig.calibration.kind import CalibrationKind
 from labrig.errors import DataError
 from labrig.finite import Finite, NotNegative, Positive
-from labrig.optics import CameraModel, stop_text
+from labrig.optics import CameraModel, f_number_text
 from labrig.yaml_file import read_model, write_yaml
 
 
@@ -119,10 +119,10 @@ class CameraFile(CameraModel):
                 f"{lens}; calibrate this one, or leave optics.camera_file out"
             )
         if self.flat_at(f_number) is None:
-            calibrated = ", ".join(stop_text(flat.f_number) for flat in self.flats)
+            calibrated = ", ".join(f_number_text(flat.f_number) for flat in self.flats)
             raise DataError(
                 f"calibration of another lens or aperture: expected {calibrated}, the frames were "
-                f"taken at {stop_text(f_number)}; calibrate that, too, or leave "
+                f"taken at {f_number_text(f_number)}; calibrate that, too, or leave "
                 "optics.camera_file out"
             )
 

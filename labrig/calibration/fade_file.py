@@ -46,7 +46,7 @@ class Change(_Part):
             raise ValueError("expected as many numbers in each row as there are bands")
         return self
 
-    def missing_s(self) -> FloatArray:
+    def equivalent_s(self) -> FloatArray:
         """Return the equivalent steady duration ∫ fraction dt in s, shape (bands,)."""
         steps, fraction = np.diff(self.t_s), np.array(self.fraction)
         total: FloatArray = steps @ (fraction[1:] + fraction[:-1]) / 2

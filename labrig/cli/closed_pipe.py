@@ -4,7 +4,7 @@ import os
 from typing import Any, TextIO
 
 
-class ReaderMayLeave:
+class DetachableStream:
     """A stream that accepts text even when its reader has gone, so that a run continues."""
 
     def __init__(self, stream: TextIO) -> None:

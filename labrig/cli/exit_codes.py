@@ -6,7 +6,7 @@ import signal
 import sys
 from collections.abc import Sequence
 
-from labrig.cli.closed_pipe import ReaderMayLeave
+from labrig.cli.closed_pipe import DetachableStream
 from labrig.clock import Interrupted
 from labrig.errors import DiskError, LabrigError, UsageError
 from labrig.signals import STOP_SIGNALS, raise_interrupted
@@ -46,7 +46,7 @@ def guarded(arguments: Sequence[str]) -> int:
     except BrokenPipeError:
         code = 0  # the reader has ended with all it needs: head, less
     finally:
-        ReaderMayLeave(sys.stdout).flush()
+        DetachableStream(sys.stdout).flush()
         for signum in STOP_SIGNALS:
             signal.signal(signum, signal.SIG_IGN)
     return code
@@ -100,5 +100,5 @@ def _fault_message(error: Exception) -> str:
 
 
 def _print_error(text: str, code: int) -> int:
-    print(f"labrig: {' '.join(text.split())}", file=ReaderMayLeave(sys.stderr), flush=True)
+    print(f"labrig: {' '.join(text.split())}", file=DetachableStream(sys.stderr), flush=True)
     return code

@@ -22,7 +22,7 @@ class Ending:
 
 
 @contextmanager
-def printed_at_end(on_finish: str | Sequence[str] | None) -> Iterator[Ending]:
+def notify_at_end(on_finish: str | Sequence[str] | None) -> Iterator[Ending]:
     """Notify when the body has ended, however it ended; devices are safe by then.
 
     Parameters

@@ -19,10 +19,10 @@ def show(
     ] = None,
 ) -> None:
     """What is in a file of measured curves, and how they look."""
-    from labrig.optics import read_sound_curves
+    from labrig.optics import read_checked_curves
     from labrig.report import describe_curves, draw_curves
 
-    curves = read_sound_curves(file, curve)
+    curves = read_checked_curves(file, curve)
     typer.echo(describe_curves(curves))
     if picture is not None:
         draw_curves(curves, picture)

@@ -17,7 +17,7 @@ from rich.table import Table
 from rich.text import Text
 
 from labrig.acquire import ExposureSettings, ManualStep, Plan, RunObserver
-from labrig.cli.closed_pipe import ReaderMayLeave
+from labrig.cli.closed_pipe import DetachableStream
 from labrig.cli.prompt import Terminal
 from labrig.clock import Clock
 from labrig.errors import UsageError
@@ -68,7 +68,7 @@ def progress(
     if not sys.stderr.isatty():
         yield PlainProgress(state)
         return
-    console = Console(file=cast(TextIO, ReaderMayLeave(sys.stderr)))
+    console = Console(file=cast(TextIO, DetachableStream(sys.stderr)))
     with Live(console=console, refresh_per_second=4, transient=True) as live:
         observer = LiveProgress(state, live, console)
         try:
@@ -175,7 +175,7 @@ class PlainProgress:
 
     def _print(self, text: str) -> None:
         time_left = _countdown(self._state.left_s())
-        print(f"[{time_left} left] {text}", file=ReaderMayLeave(sys.stderr), flush=True)
+        print(f"[{time_left} left] {text}", file=DetachableStream(sys.stderr), flush=True)
 
 
 class LiveProgress:

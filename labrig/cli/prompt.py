@@ -14,7 +14,7 @@ from labrig.quantity import duration_text
 #: Answer that undoes the previous step.
 UNDO = "undo"
 #: Period in which an interruption is looked for.
-LOOK_UP_S = 0.05
+CHECK_INTERVAL_S = 0.05
 
 
 class Terminal:
@@ -75,7 +75,7 @@ class Terminal:
             meanwhile()
             ended = self._ended.is_set()  # read first, so that input before the end counts
             try:
-                return self._lines.get(timeout=LOOK_UP_S)
+                return self._lines.get(timeout=CHECK_INTERVAL_S)
             except queue.Empty:
                 if ended:
                     return None

@@ -39,11 +39,11 @@ def run(
     json: Json = False,
 ) -> None:
     """Run a protocol: record, reduce, fit, report. The last line is the run folder."""
-    from labrig.cli.on_finish import printed_at_end
+    from labrig.cli.on_finish import notify_at_end
     from labrig.cli.progress import progress
 
     recording = _prepared(protocol, rig, runs)
-    with printed_at_end(recording.rig.on_finish) as ending:
+    with notify_at_end(recording.rig.on_finish) as ending:
         has_changer = "changer" in recording.rig.devices
         folder = recording.record(partial(progress, yes=yes, has_changer=has_changer))
         _finish(folder, no_process, json)
@@ -93,7 +93,7 @@ def resume(
     """Go on with a run that was interrupted: completed units are kept, the rest is done."""
     from labrig.acquire import read_rig_file
     from labrig.catalogue import find_run
-    from labrig.cli.on_finish import printed_at_end
+    from labrig.cli.on_finish import notify_at_end
     from labrig.cli.progress import progress
     from labrig.run import resume_run
 
@@ -109,7 +109,7 @@ def resume(
             err=True,
         )
         command = None
-    with printed_at_end(command) as ending:
+    with notify_at_end(command) as ending:
         _finish(resume_run(folder, watch), no_process, json)
         ending.message = str(folder)
 

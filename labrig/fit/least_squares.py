@@ -36,7 +36,7 @@ CONVERGED_STEP = 1e-6
 INITIAL_DAMPING = 1e-3
 #: Smallest factor of the damping after a step as good as predicted; Nielsen's 1/3 takes 50 % more
 #: steps.
-LEAST_RELIEF = 1 / 10
+MIN_DAMPING_FACTOR = 1 / 10
 #: Number of entries of the Jacobian from which the search uses the normal equations.
 LARGE_JACOBIAN = 100_000
 POLISH_STEPS = 60
@@ -296,7 +296,7 @@ def _damped_search(
                 trial.chi2 < point.chi2 and gain > 1e-4 and bool(np.isfinite(trial.jacobian).all())
             )
             if accepted:
-                damping *= max(LEAST_RELIEF, 1 - (2 * min(gain, 1.0) - 1) ** 3)
+                damping *= max(MIN_DAMPING_FACTOR, 1 - (2 * min(gain, 1.0) - 1) ** 3)
                 growth = 2.0
                 point = trial
             else:

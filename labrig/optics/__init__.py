@@ -4,15 +4,15 @@ from labrig.optics.camera import (
     CHANNELS,
     CameraResponse,
     read_camera,
+    read_checked_curves,
     read_monochrome_camera,
-    read_sound_curves,
 )
 from labrig.optics.camera_model import (
     CameraModel,
     Factor,
     Flat,
+    f_number_text,
     rho_squared,
-    stop_text,
 )
 from labrig.optics.curve_file import (
     Curve,
@@ -28,9 +28,15 @@ from labrig.optics.lvf import (
     WavelengthMap,
     nominal_lvf,
     peak_shape,
-    seen_through,
+    signal_through,
 )
-from labrig.optics.piecewise import band_integrals, band_means, edges_about, hats, quadrature
+from labrig.optics.piecewise import (
+    band_integrals,
+    band_means,
+    edges_from_centres,
+    hat_functions,
+    quadrature,
+)
 from labrig.optics.spectrum import Spectrum, Transmittance
 from labrig.optics.strip import SLICES, Strip
 
@@ -52,18 +58,18 @@ __all__ = [
     "WavelengthMap",
     "band_integrals",
     "band_means",
-    "edges_about",
-    "hats",
+    "edges_from_centres",
+    "f_number_text",
+    "hat_functions",
     "nominal_lvf",
     "peak_shape",
     "quadrature",
     "read_camera",
+    "read_checked_curves",
     "read_curve_file",
     "read_monochrome_camera",
-    "read_sound_curves",
     "read_spectrum",
     "read_transmittance",
     "rho_squared",
-    "seen_through",
-    "stop_text",
+    "signal_through",
 ]

@@ -144,7 +144,7 @@ def read_monochrome_camera(
     return checked(file.path, lambda curve_file: _camera(curve_file, (name,)), selected)
 
 
-def read_sound_curves(
+def read_checked_curves(
     name_or_path: str | os.PathLike[str], names: Sequence[str] | None = None
 ) -> CurveFile:
     """Read curves from a file and check each of them.

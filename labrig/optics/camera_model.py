@@ -161,7 +161,7 @@ class CameraModel(_Part):
         """
         flat = self.flat_at(f_number)
         if flat is None:
-            raise DataError(f"the camera file has no flat field at {stop_text(f_number)}")
+            raise DataError(f"the camera file has no flat field at {f_number_text(f_number)}")
         return flat.mean(region, width, height)
 
     def flat_at(self, f_number: float | None) -> Flat | None:
@@ -209,7 +209,7 @@ def _is_same(first: float | None, second: float | None) -> bool:
     return abs(math.log(first / second)) < SAME_SETTING
 
 
-def stop_text(f_number: float | None) -> str:
+def f_number_text(f_number: float | None) -> str:
     """Format an aperture for messages and reports.
 
     Parameters

@@ -7,7 +7,7 @@ import numpy as np
 from numpy.typing import ArrayLike
 
 from labrig.optics.camera import CameraResponse
-from labrig.optics.piecewise import FloatArray, hats, quadrature
+from labrig.optics.piecewise import FloatArray, hat_functions, quadrature
 from labrig.optics.spectrum import Spectrum
 
 #: Asymmetry below which the limit, a Gaussian, is equally exact.
@@ -238,7 +238,9 @@ class Lvf:
         """Return T_p(λ) ≥ 0 at (q,) wavelengths in nm, shape (p, q)."""
         transmission = self.bands.transmission(wavelength_nm)
         if len(self.remainder_nm):
-            transmission = transmission + self.remainder @ hats(self.remainder_nm, wavelength_nm).T
+            transmission = (
+                transmission + self.remainder @ hat_functions(self.remainder_nm, wavelength_nm).T
+            )
         return np.maximum(transmission, 0.0)
 
     def at(self, position: ArrayLike) -> "Lvf":
@@ -306,7 +308,7 @@ def nominal_lvf(
     return Lvf(position, Bands(centre, fwhm_nm * ones, 0 * ones, ones, leakage * ones))
 
 
-def seen_through(lvf: Lvf, camera: CameraResponse, light: Spectrum) -> FloatArray:
+def signal_through(lvf: Lvf, camera: CameraResponse, light: Spectrum) -> FloatArray:
     """Return the signal of a light in a camera behind the filter, ∫ T_p L S_c dλ.
 
     Parameters

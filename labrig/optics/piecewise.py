@@ -90,7 +90,7 @@ def band_means(wavelength_nm: FloatArray, values: FloatArray, edges_nm: ArrayLik
     return means
 
 
-def edges_about(centre_nm: ArrayLike) -> FloatArray:
+def edges_from_centres(centre_nm: ArrayLike) -> FloatArray:
     """Return the edges half-way between rising centres.
 
     Parameters
@@ -152,7 +152,7 @@ def quadrature(
     return nodes.ravel(), (half * WEIGHTS).ravel()
 
 
-def hats(knots_nm: FloatArray, wavelength_nm: FloatArray) -> FloatArray:
+def hat_functions(knots_nm: FloatArray, wavelength_nm: FloatArray) -> FloatArray:
     """Evaluate the hat functions of a grid.
 
     A hat function is 1 at its own knot and 0 at all others; they span all piecewise-linear curves

@@ -6,7 +6,7 @@ from typing import Self
 import numpy as np
 from numpy.typing import ArrayLike
 
-from labrig.optics.piecewise import FloatArray, band_means, edges_about
+from labrig.optics.piecewise import FloatArray, band_means, edges_from_centres
 
 #: Tolerance of measured fractions below 0 and above 1.
 FRACTION_SLACK = 0.02
@@ -61,7 +61,7 @@ class Spectrum:
         The integral is kept. σ is dropped, since the correlation of neighbouring errors is unknown.
         """
         grid = np.asarray(wavelength_nm, dtype=np.float64)
-        return type(self)(self.name, grid, self.in_bands(edges_about(grid)))
+        return type(self)(self.name, grid, self.in_bands(edges_from_centres(grid)))
 
 
 @dataclass(frozen=True, eq=False)

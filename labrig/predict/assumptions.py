@@ -109,7 +109,9 @@ class Assumptions:
     notes: tuple[str, ...]
 
 
-def what_is_known(model: ProtocolModel, offers: CameraOffers, sources: Sources) -> Assumptions:
+def collect_assumptions(
+    model: ProtocolModel, offers: CameraOffers, sources: Sources
+) -> Assumptions:
     """Return camera, flicker and glows, from earlier runs or else typical ones.
 
     Raises

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 
 from labrig.acquire import Plan, ProtocolModel, RigFile
-from labrig.predict.assumptions import Sources, what_is_known
+from labrig.predict.assumptions import Sources, collect_assumptions
 from labrig.predict.expectation import expect, predictable
 from labrig.predict.patch import PatchPrediction, predicted_patches
 from labrig.predict.remedies import Remedy, Trials
@@ -125,7 +125,7 @@ def predict(
     'for: 3 min'
     """
     decay = predictable(protocol)
-    assumptions = what_is_known(protocol, laid_out.offers, sources)
+    assumptions = collect_assumptions(protocol, laid_out.offers, sources)
     expectation = expect(decay, laid_out.offers, assumptions.bench)
     base = predicted_patches(expectation)
     trials = Trials(protocol, rig, source, assumptions.bench, base, laid_out.duration_s)

@@ -13,7 +13,7 @@ from labrig.written_numbers import plus_minus, rounded
 from labrig.yaml_file import read_yaml
 
 #: Fraction of σ below which the change of a parameter, or of its σ, is not reported.
-WORTH_SAYING = 0.01
+REPORTED_SIGMAS = 0.01
 
 Parameters = dict[str, tuple[float, float]]
 
@@ -37,8 +37,8 @@ class _Move:
     @property
     def is_notable(self) -> bool:
         """Whether value or σ changed by more than rounding."""
-        resized = not math.isclose(self.before[1], self.after[1], rel_tol=WORTH_SAYING)
-        return resized or abs(self.in_sigma) >= WORTH_SAYING
+        resized = not math.isclose(self.before[1], self.after[1], rel_tol=REPORTED_SIGMAS)
+        return resized or abs(self.in_sigma) >= REPORTED_SIGMAS
 
     def __str__(self) -> str:
         """Return text such as `k_r 1 0.0320 ± 0.0001 → 0.0321 ± 0.0001 (+1.0 σ)`."""
@@ -167,7 +167,7 @@ def _parameter_changes(
             if moves:
                 yield prefix + "; ".join(_move_texts(moves))
             elif old != new:
-                yield f"{prefix}every parameter within {WORTH_SAYING:g} σ"
+                yield f"{prefix}every parameter within {REPORTED_SIGMAS:g} σ"
 
 
 def _move_texts(moves: list[_Move]) -> Iterator[str]:

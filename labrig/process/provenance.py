@@ -15,7 +15,7 @@ from labrig.record import (
     RunRecord,
     interruptions,
     read_notes,
-    written_time,
+    time_text,
 )
 from labrig.region import Region
 
@@ -113,8 +113,8 @@ def describe_run(run: RunRecord, protocol: ProtocolModel, rig: RigFile) -> RunDe
         title=protocol.sample.name,
         protocol=protocol.protocol,
         run=run.name,
-        started=written_time(start["time"]),
-        ended=written_time(run.last_time),
+        started=time_text(start["time"]),
+        ended=time_text(run.last_time),
         rig=rig.name,
         simulated=rig.simulation is not None,
         labrig_version=version("labrig"),

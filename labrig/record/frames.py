@@ -82,7 +82,7 @@ class FrameRecord:
 
 #: Devices of a person's actions: a step done by hand, and the undoing of a unit that was done
 #: wrongly.
-PERSON, TAKEN_BACK = "person", "taken back"
+PERSON, UNDONE = "person", "taken back"
 
 
 def unit_in(part: str, unit: str) -> str:
@@ -147,7 +147,7 @@ class ActionRecord:
     unit
         Name of the unit.
     device
-        Key of the device, `PERSON`, `TAKEN_BACK`, or `protocol` for a choice.
+        Key of the device, `PERSON`, `UNDONE`, or `protocol` for a choice.
     action
         Action as text.
     start_time, end_time

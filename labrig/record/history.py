@@ -92,14 +92,14 @@ def glow_temperature_c(run: RunRecord, roles: Collection[str]) -> float | None:
     >>> round(glow_temperature_c(run, [FrameRole.DECAY]), 1)
     20.7
     """
-    frames = in_roles(run, roles)
+    frames = frames_in_roles(run, roles)
     celsius = (
         TemperatureHistory(run).during(frames) if run.temperatures() and frames else np.array([])
     )
     return round(float(celsius.mean()), 2) if celsius.size else None
 
 
-def in_roles(run: RunRecord, roles: Collection[str]) -> list[FrameRecord]:
+def frames_in_roles(run: RunRecord, roles: Collection[str]) -> list[FrameRecord]:
     """Return the frames of given roles in completed units.
 
     Parameters
@@ -252,7 +252,7 @@ def interruptions(run: RunRecord) -> tuple[Interruption, ...]:
     return tuple(
         Interruption(
             attempt.unit,
-            written_time(attempt.start["time"]),
+            time_text(attempt.start["time"]),
             attempt.reason or "labrig was cut off",
         )
         for attempt in run.attempts
@@ -260,7 +260,7 @@ def interruptions(run: RunRecord) -> tuple[Interruption, ...]:
     )
 
 
-def written_time(seconds: float) -> str:
+def time_text(seconds: float) -> str:
     """Return a time as text for people.
 
     Parameters

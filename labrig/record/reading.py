@@ -10,7 +10,7 @@ from pydantic import TypeAdapter, ValidationError
 
 from labrig.errors import DataError, DiskError
 from labrig.record.frames import (
-    TAKEN_BACK,
+    UNDONE,
     ActionRecord,
     FrameRecord,
     TemperatureRecord,
@@ -21,7 +21,7 @@ from labrig.record.journal import JOURNAL, Document, JournalContent, read_journa
 #: End of the year 9999 in seconds since 1970, the limit of `datetime`.
 LATEST = 253_402_300_799.0
 #: Largest plausible magnitude of a reading in degrees Celsius.
-HOTTEST_C = 1000.0
+LARGEST_TEMPERATURE_C = 1000.0
 
 #: Names of frames as `AttemptWriter` gives them.
 _FRAME_NAME = re.compile(r"frames/\d{6,}[\w.-]*")
@@ -100,7 +100,7 @@ class RunRecord:
         completed: dict[str, Attempt] = {}
         for attempt in self.attempts:
             for action in attempt.actions:
-                if action.device == TAKEN_BACK:
+                if action.device == UNDONE:
                     completed.pop(action.action, None)
             if attempt.completed:
                 completed[attempt.unit] = attempt
@@ -275,7 +275,7 @@ def _check_times(record: Recorded) -> Recorded:
 
 def _check_reading(reading: TemperatureRecord) -> TemperatureRecord:
     _seconds(reading.time)
-    if not abs(reading.temperature_c) <= HOTTEST_C:
+    if not abs(reading.temperature_c) <= LARGEST_TEMPERATURE_C:
         raise ValueError(f"{reading.temperature_c} °C is no temperature")
     return reading
 

@@ -124,10 +124,10 @@ def _warming_figure(warm: Warming, seen: WarmingLight) -> Figure:
 
 def _lines(changes: list[tuple[str, Change, LampChange]]) -> Iterator[str]:
     for name, table, change in changes:
-        missing_s = table.missing_s()
+        equivalent_s = table.equivalent_s()
         if name == "rise":
-            missing_s = table.t_s[-1] - missing_s
-        first, last = 1e3 * missing_s[0], 1e3 * missing_s[-1]
+            equivalent_s = table.t_s[-1] - equivalent_s
+        first, last = 1e3 * equivalent_s[0], 1e3 * equivalent_s[-1]
         transient = "turn-on transient lacks" if name == "rise" else "turn-off transient is worth"
         yield (
             f"the {transient} {first:.1f} ms of the steady lamp in the first band, "

@@ -14,8 +14,8 @@ from labrig.record import (
     RunRecord,
     TemperatureHistory,
     degrees_text,
+    frames_in_roles,
     glow_temperature_c,
-    in_roles,
     relative_rate_change,
 )
 from labrig.report.figure_style import INK, LEFT_PT, MUTED, SHADE, new_figure, place, points
@@ -86,7 +86,7 @@ def temperature_sections(run: RunRecord, roles: Collection[str]) -> tuple[Sectio
     """Picture and words; nothing without a thermometer. Rates rest on frames of these roles."""
     if not run.temperatures():
         return ()
-    course, photographs = TemperatureHistory(run), in_roles(run, roles)
+    course, photographs = TemperatureHistory(run), frames_in_roles(run, roles)
     units = [list(group) for _, group in groupby(photographs, key=lambda frame: frame.unit)]
     began = run.attempts[0].start["time"]
     spans = [(one[0].start_time, one[-1].end_time) for one in units]

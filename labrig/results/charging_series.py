@@ -88,7 +88,7 @@ class Charge:
     start_s: FloatArray
     exposure_s: FloatArray
     brightness: float = 1.0
-    cold: float = 0.0
+    cold_deficit: float = 0.0
     fresh: bool = False
     saturated: bool = False
 

@@ -13,7 +13,7 @@ from scipy.interpolate import CubicSpline
 
 from labrig.finite import Finite, NotNegative
 from labrig.material import Spectrum
-from labrig.optics import band_means, edges_about
+from labrig.optics import band_means, edges_from_centres
 from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.yaml_file import read_model, write_yaml
@@ -92,7 +92,7 @@ class EmissionSpectrum(BaseModel):
         sample, lamp, run
             As the attributes.
         """
-        edges = edges_about(WAVELENGTH_NM)
+        edges = edges_from_centres(WAVELENGTH_NM)
         means = band_means(knots_nm, value, edges)
         shapes = band_means(knots_nm, draws.T, edges)
         shapes = shapes / shapes.sum(axis=0) * means.sum() / means.max()
@@ -130,7 +130,7 @@ class EmissionSpectrum(BaseModel):
         Values are means: a cubic spline through their running sum takes them apart where an edge
         of a band lies within one; straight lines between them would fill valleys.
         """
-        ends = edges_about(np.array(self.wavelength_nm))
+        ends = edges_from_centres(np.array(self.wavelength_nm))
         sums = np.vstack([np.zeros(len(ends) - 1), np.tril(np.ones((len(ends) - 1,) * 2))])
         sums[1:] *= np.diff(ends)
         edges = np.asarray(edges_nm, dtype=np.float64)

@@ -9,12 +9,12 @@ from labrig.acquire import CAMERA, VIEWFINDER, LiveView, Rig, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import Clock
 from labrig.errors import UsageError
-from labrig.setup.view_server import AimedProtocol, LivePictures, ViewServer
+from labrig.setup.view_server import EditableProtocol, LivePictures, ViewServer
 
 #: Period of the pictures: enough for focusing by hand, with pauses for the camera.
 PICTURE_PERIOD_S = 0.1
 #: Longest real time until Ctrl-C is answered.
-LOOK_UP_S = 0.1
+CHECK_INTERVAL_S = 0.1
 #: Keys of devices that may have a live view, in order of preference.
 _LIVE_VIEW_KEYS = (VIEWFINDER.key, CAMERA.key)
 
@@ -60,7 +60,7 @@ def view_rig(
     http
     devices are safe
     """
-    protocol = None if protocol_path is None else AimedProtocol(protocol_path)
+    protocol = None if protocol_path is None else EditableProtocol(protocol_path)
     file = read_rig_file(rig_path)
     pictures = LivePictures()
     with (
@@ -71,10 +71,10 @@ def view_rig(
     ):
         viewfinder = _viewfinder(rig, rig_path)
         tell(server.url)
-        hand_over(pictures, viewfinder, rig.clock)
+        serve_pictures(pictures, viewfinder, rig.clock)
 
 
-def hand_over(pictures: LivePictures, live_view: LiveView, clock: Clock) -> Never:
+def serve_pictures(pictures: LivePictures, live_view: LiveView, clock: Clock) -> Never:
     """Fetch a picture whenever a browser waits for one; only this thread uses the camera.
 
     Pictures are paced in real time whatever the rig's clock: browser and user are real even if the
@@ -89,7 +89,7 @@ def hand_over(pictures: LivePictures, live_view: LiveView, clock: Clock) -> Neve
     """
     pause = threading.Event()
     while True:
-        if pictures.wait_until_wanted(LOOK_UP_S):
+        if pictures.wait_until_wanted(CHECK_INTERVAL_S):
             pictures.show(live_view.preview())
             pause.wait(PICTURE_PERIOD_S)
         clock.sleep(0.0)  # where an interruption is answered

@@ -70,7 +70,7 @@ class LivePictures:
         return latest if latest is not None and latest.number > number else None
 
 
-class AimedProtocol:
+class EditableProtocol:
     """A user's protocol file.
 
     Parameters
@@ -214,7 +214,7 @@ class ViewServer(LocalServer):
     def __init__(
         self,
         pictures: LivePictures,
-        protocol: AimedProtocol | None,
+        protocol: EditableProtocol | None,
         rig_name: str,
         port: int = 0,
     ) -> None:

@@ -20,7 +20,7 @@ import numpy as np
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum import LineFit, SpectralSystem, fit_line, fit_spectrum
 from labrig.optics import Spectrum, read_curve_file
-from labrig.optics.piecewise import hats, quadrature
+from labrig.optics.piecewise import hat_functions, quadrature
 
 FOLDER = Path(__file__).parents[3] / "shared/data/light_sources/lightlogger"
 INTENSITIES_PCT = (5, 30, 90, 100)
@@ -106,7 +106,7 @@ def sensor(trained: list[Setting]) -> SpectralSystem:
 def _in_knots(light: Spectrum) -> FloatArray:
     """∫ light · tent dλ for every knot."""
     nodes, weights = quadrature(KNOTS_NM[0], KNOTS_NM[-1], light.wavelength_nm, KNOTS_NM)
-    result: FloatArray = (weights * light.at(nodes)) @ hats(KNOTS_NM, nodes)
+    result: FloatArray = (weights * light.at(nodes)) @ hat_functions(KNOTS_NM, nodes)
     return result
 
 

@@ -17,7 +17,7 @@ from labrig.calibration.lvf_file import BandColumns, WavelengthColumns
 from labrig.clock import Clock
 from labrig.material import read_material
 from labrig.optics import Bands, Strip
-from labrig.optics.piecewise import band_means, edges_about
+from labrig.optics.piecewise import band_means, edges_from_centres
 from labrig.region import region_pixels
 from labrig.results.emission_spectrum import WAVELENGTH_NM
 from labrig.run import Recording
@@ -108,5 +108,5 @@ def record(folder: Path, protocol: dict[str, Any], **simulation: Any) -> Path:
 def emitted(material: str) -> FloatArray:
     """A shipped or written material's emission in the bands of `WAVELENGTH_NM`, of sum 1."""
     light = emission(read_material(material)).sum(axis=0)
-    means = band_means(ROOM_NM, light, edges_about(WAVELENGTH_NM))
+    means = band_means(ROOM_NM, light, edges_from_centres(WAVELENGTH_NM))
     return np.asarray(means / means.sum())

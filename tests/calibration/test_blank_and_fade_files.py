@@ -85,8 +85,8 @@ def test_a_written_fade_reads_back_as_itself(
 def test_a_fade_is_what_the_excitation_fit_takes() -> None:
     file = fade()
     transient = Transient.sampled(*file.in_bands(file.fade, file.bands_nm))
-    assert transient.duration_s @ transient.fraction == pytest.approx(file.fade.missing_s())
-    assert file.fade.missing_s() == pytest.approx([0.08, 0.11])
+    assert transient.duration_s @ transient.fraction == pytest.approx(file.fade.equivalent_s())
+    assert file.fade.equivalent_s() == pytest.approx([0.08, 0.11])
     _, fraction = file.in_bands(file.fade, [450, 550])  # one band, about 500 nm
     assert fraction[1] == pytest.approx([0.3])
 

@@ -15,7 +15,7 @@ from labrig.optics import (
     read_camera,
     read_curve_file,
     read_spectrum,
-    seen_through,
+    signal_through,
 )
 
 DATA = Path(__file__).parents[3] / "shared" / "data"
@@ -56,7 +56,7 @@ def photographed(
     light: Spectrum, lvf: Lvf, camera: CameraResponse, rng: np.random.Generator, snr: float = 300.0
 ) -> Picture:
     """Photon noise, `snr` where it is brightest, and a floor as of read noise."""
-    seen = seen_through(lvf, camera, light)
+    seen = signal_through(lvf, camera, light)
     sigma = np.sqrt(seen * seen.max() + (0.02 * seen.max()) ** 2) / snr
     return Picture((seen + sigma * rng.standard_normal(seen.shape)).ravel(), sigma.ravel())
 

@@ -155,7 +155,7 @@ def test_values_not_measured_and_fresh_samples() -> None:
 def test_the_jacobian_is_that_of_the_residuals() -> None:
     bench = Bench(two_states())
     series = measured(bench)
-    charges = tuple(replace(one, cold=0.3) for one in series[0].charges)
+    charges = tuple(replace(one, cold_deficit=0.3) for one in series[0].charges)
     modes = np.random.default_rng(4).normal(0, 0.05, (3, *series[0].irradiance.shape))
     series = [replace(series[0], charges=charges, site_modes=modes), *series[1:]]
     problem = ExcitationProblem(
@@ -163,7 +163,12 @@ def test_the_jacobian_is_that_of_the_residuals() -> None:
         2,
         1,
         RelativeSigmas(
-            0.005, 0.01, cold=0.03, scale=0.02, offset=(0.1, 0.2, 0.3), common_mode=(0.2, 0.1, 0.3)
+            0.005,
+            0.01,
+            cold_deficit=0.03,
+            scale=0.02,
+            offset=(0.1, 0.2, 0.3),
+            common_mode=(0.2, 0.1, 0.3),
         ),
     )
     random = np.random.default_rng(3)

@@ -8,7 +8,7 @@ import pytest
 from labrig.errors import FitError
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.lvf import MERCURY, Line, fit_wavelengths, locate_lines
-from labrig.optics import Bands, CameraResponse, Lvf, WavelengthMap, read_spectrum, seen_through
+from labrig.optics import Bands, CameraResponse, Lvf, WavelengthMap, read_spectrum, signal_through
 from labrig.results.lvf_calibration import LocatedLines
 from tests.fit import lvf_pictures as made
 
@@ -27,7 +27,7 @@ def strip(bend_nm: float = 6.0) -> tuple[WavelengthMap, Lvf]:
 
 def picture(lvf: Lvf, camera: CameraResponse, seed: int = 0) -> FloatArray:
     rng = np.random.default_rng(seed)
-    seen = seen_through(lvf, camera, made.mercury_lamp(rng))
+    seen = signal_through(lvf, camera, made.mercury_lamp(rng))
     seen = seen / seen.max()
     noisy: FloatArray = seen + np.sqrt(seen + 0.001) / 200 * rng.standard_normal(seen.shape)
     return noisy
@@ -76,7 +76,7 @@ def test_pictures_without_lines() -> None:
     _, lvf = strip()
     lit = made.lines({}, continuum=1.0)
     noise = np.random.default_rng(0).standard_normal((len(PIXELS), 3))
-    for profile in (seen_through(lvf, made.of_the_house(), lit), noise, 0 * noise):
+    for profile in (signal_through(lvf, made.of_the_house(), lit), noise, 0 * noise):
         with pytest.raises(FitError, match="no lines of mercury"):
             locate_lines(PIXELS, profile)
     with pytest.raises(FitError, match="finite values"):

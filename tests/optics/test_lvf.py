@@ -11,7 +11,7 @@ from labrig.optics import (
     WavelengthMap,
     nominal_lvf,
     read_camera,
-    seen_through,
+    signal_through,
 )
 from labrig.optics.lvf import peak_shape
 
@@ -51,7 +51,7 @@ def test_a_narrow_line_draws_the_band() -> None:
     lvf = nominal_lvf(BENT, np.arange(400.0, 701.0, 2.0), leakage=0.01)
     line = Spectrum("line", np.array([549.9, 550.0, 550.1]), np.array([0.0, 10.0, 0.0]))
     camera = read_camera("canon_eos_5d_mark_ii")
-    seen = seen_through(lvf, camera, line)
+    seen = signal_through(lvf, camera, line)
     assert seen.shape == (151, 3)
     drawn = seen[:, 1] / camera.at([550.0])[0, 1]
     np.testing.assert_allclose(drawn, lvf.transmission(np.array([550.0]))[:, 0], rtol=1e-3)

@@ -5,7 +5,13 @@ import pytest
 from hypothesis import given, strategies as st
 
 from labrig.optics import Spectrum, Transmittance
-from labrig.optics.piecewise import band_integrals, band_means, edges_about, hats, quadrature
+from labrig.optics.piecewise import (
+    band_integrals,
+    band_means,
+    edges_from_centres,
+    hat_functions,
+    quadrature,
+)
 
 
 def made(seed: int, points: int = 12) -> Spectrum:
@@ -46,8 +52,8 @@ def test_products_of_four_curves_are_exact(seed: int) -> None:
 def test_tents_span_the_curves_of_their_grid() -> None:
     curve = made(3)
     wavelength_nm = np.linspace(380.0, 720.0, 341)
-    hat_functions = hats(curve.wavelength_nm, wavelength_nm)
-    np.testing.assert_allclose(hat_functions @ curve.value, curve.at(wavelength_nm), atol=1e-14)
+    hats = hat_functions(curve.wavelength_nm, wavelength_nm)
+    np.testing.assert_allclose(hats @ curve.value, curve.at(wavelength_nm), atol=1e-14)
 
 
 def test_a_filter_goes_on_beyond_its_table() -> None:
@@ -58,5 +64,5 @@ def test_a_filter_goes_on_beyond_its_table() -> None:
 
 def test_means_of_several_columns() -> None:
     values = np.stack([np.arange(3.0), np.ones(3)], axis=1)
-    means = band_means(np.array([400.0, 500.0, 600.0]), values, edges_about([450.0, 550.0]))
+    means = band_means(np.array([400.0, 500.0, 600.0]), values, edges_from_centres([450.0, 550.0]))
     np.testing.assert_allclose(means, [[0.5, 1.0], [1.5, 1.0]])

@@ -22,8 +22,8 @@ from labrig.errors import DeviceError, UsageError
 from labrig.local_server import KINDS
 from labrig.region import CENTRE
 from labrig.setup.picture_stats import decode, picture_stats, sharpness
-from labrig.setup.view import hand_over
-from labrig.setup.view_server import PAGES, AimedProtocol, LivePictures, ViewServer
+from labrig.setup.view import serve_pictures
+from labrig.setup.view_server import PAGES, EditableProtocol, LivePictures, ViewServer
 from tests.conftest import Ended
 
 BLUE = {"patches": [{"name": "blue paint", "region": [0.1, 0.2, 0.3, 0.4]}]}
@@ -100,11 +100,11 @@ class Browser:
 def browser(make_protocol: Callable[..., Path]) -> Iterator[Browser]:
     pictures, eye, clock = LivePictures(), Eye(), SystemClock()
     path = make_protocol()
-    server = ViewServer(pictures, AimedProtocol(path), "test rig")
+    server = ViewServer(pictures, EditableProtocol(path), "test rig")
 
     def look() -> None:
         with pytest.raises(Interrupted):
-            hand_over(pictures, eye, clock)
+            serve_pictures(pictures, eye, clock)
 
     looking = threading.Thread(target=look)
     with server.running():
@@ -244,7 +244,7 @@ def test_a_port_that_is_taken_is_named() -> None:
 
 def test_regions_in_pixels_are_told_apart(make_protocol: Callable[..., Path]) -> None:
     patches = {"a": [0, 0, 0.5, 1], "b": [700, 400, 64, 64]}
-    protocol = AimedProtocol(make_protocol(patches=patches))
+    protocol = EditableProtocol(make_protocol(patches=patches))
     assert [region["name"] for region in protocol.in_fractions()] == ["a"]
     assert protocol.in_pixels() == ["b"]
 

@@ -16,8 +16,8 @@ from selenium.webdriver.support.wait import WebDriverWait
 from labrig.acquire import CAMERA, LiveView, read_protocol, read_rig_file
 from labrig.bench import open_bench
 from labrig.clock import Interrupted
-from labrig.setup.view import hand_over
-from labrig.setup.view_server import AimedProtocol, LivePictures, ViewServer
+from labrig.setup.view import serve_pictures
+from labrig.setup.view_server import EditableProtocol, LivePictures, ViewServer
 
 #: Where screenshots are kept for a person to look at.
 SCREENSHOTS = os.environ.get("LABRIG_SCREENSHOTS")
@@ -28,7 +28,7 @@ PATIENCE_S = 30
 def page(make_rig: Callable[..., Path], make_protocol: Callable[..., Path]) -> Iterator[str]:
     """Address of the page for a simulated rig, whose camera another thread looks through."""
     rig_file = make_rig(base="sim-eleven", sensor={"width": 1404, "height": 936})
-    protocol = AimedProtocol(make_protocol(patches={"sample": [0.3, 0.3, 0.4, 0.4]}))
+    protocol = EditableProtocol(make_protocol(patches={"sample": [0.3, 0.3, 0.4, 0.4]}))
     pictures = LivePictures()
     with (
         open_bench(read_rig_file(rig_file), str(rig_file)) as bench,
@@ -41,7 +41,7 @@ def page(make_rig: Callable[..., Path], make_protocol: Callable[..., Path]) -> I
 
         def look() -> None:
             with pytest.raises(Interrupted):
-                hand_over(pictures, camera, rig.clock)
+                serve_pictures(pictures, camera, rig.clock)
 
         looking = threading.Thread(target=look)
         looking.start()

@@ -25,7 +25,7 @@ from labrig.cli.exit_codes import guarded
 from labrig.cli.progress import thumbnail
 from labrig.clock import Interrupted, SystemClock
 from labrig.errors import UsageError
-from labrig.record import TAKEN_BACK, ActionRecord, RunFolder, read_run
+from labrig.record import UNDONE, ActionRecord, RunFolder, read_run
 from labrig.run import resume_run
 from labrig.watch.previews import Previews
 from labrig.watch.run_follower import RunFollower, State
@@ -230,7 +230,7 @@ def test_what_is_taken_back_is_to_be_done_again(tmp_path: Path) -> None:
         assert unit_states(before)[:3] == ["done"] * 3
         unit = "emission_spectrum/put-back"
         writer = folder.attempt(unit, lambda: last_time, {})
-        writer.action(ActionRecord(unit, TAKEN_BACK, wrong, last_time, last_time, 0.0))
+        writer.action(ActionRecord(unit, UNDONE, wrong, last_time, last_time, 0.0))
         writer.stop("abort", f"taken back: 'put it there'; {wrong} is done again")
         state = settled(following)
     assert unit_states(state)[:5] == ["done", "again", "done", "again", "to do"]

@@ -113,7 +113,7 @@ def exercise_camera(camera: Camera, context: ExerciseContext) -> Exercised:
     offers = camera.offers()
     measured, suggestion = _timing(camera, offers, context)
     frame, _ = _shoot(camera, _settings(offers, LONG_S), context)
-    reduced = context.eyes.dark_frame(frame)
+    reduced = context.frame_reader.dark_frame(frame)
     return Exercised(
         (_measured_offers(offers), *measured, *reduced.measured),
         reduced.findings,

@@ -183,7 +183,7 @@ class ExerciseContext:
     """
 
     clock: Clock
-    eyes: FrameReader
+    frame_reader: FrameReader
 
     def timed_s(self, act: Callable[[], object]) -> float:
         """Call `act` and return its duration in seconds."""

@@ -28,7 +28,7 @@ def _exercise(viewfinder: LiveView, context: ExerciseContext) -> Exercised:
     duration_s = context.clock.now() - start_s
     return Exercised(
         (
-            context.eyes.live_picture(jpeg),
+            context.frame_reader.live_picture(jpeg),
             Measured("until it was shown", f"{duration_s * 1e3:.0f} ms"),
         )
     )

@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from labrig.calibration import Linearity
-from labrig.optics import hats
+from labrig.optics import hat_functions
 from labrig.results import FloatArray
 
 #: Knots of D, as fractions of the range up to saturation.
@@ -55,7 +55,7 @@ def fit_linearity(
     knots = np.array([0.0, *between, highest])
     frames, channels = level_dn.shape
     groups = int(group.max()) + 1
-    bends = hats(knots, level)[:, 1:]
+    bends = hat_functions(knots, level)[:, 1:]
     light = np.equal.outer(frame, np.arange(frames)).astype(np.float64)
     colour = np.zeros((len(level), groups * channels))
     colour[np.arange(len(level)), group[frame] * channels + channel] = 1.0

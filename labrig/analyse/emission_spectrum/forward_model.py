@@ -24,7 +24,7 @@ from labrig.optics import (
     Strip,
     Transmittance,
     read_monochrome_camera,
-    seen_through,
+    signal_through,
 )
 from labrig.reduce import LinearFrame, RawFrame, SeriesFrame, read_raw
 from labrig.region import Region
@@ -74,7 +74,7 @@ class ForwardModel:
     def expected_of(self, light: Spectrum) -> FloatArray:
         """(positions · channels,) what a light comes to."""
         columns = [
-            seen_through(lvf, one, light)[:, 0]
+            signal_through(lvf, one, light)[:, 0]
             for lvf, one in zip(self.lvfs, _channels(self.camera), strict=True)
         ]
         return np.stack(columns, axis=1).ravel()

@@ -79,7 +79,7 @@ def _of_patch(
     uncertain = RelativeSigmas(
         flicker=_flicker(part, decay),
         lamp=LAMP,
-        cold=warming.deficit_sigma,
+        cold_deficit=warming.deficit_sigma,
         offset=dark,
         # The sensor warms and cools over hours of long exposures, more than dark frames tell.
         common_mode=dark,

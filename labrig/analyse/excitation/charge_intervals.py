@@ -32,7 +32,7 @@ class ChargeInterval:
     unit: str
     on_s: float
     off_s: float
-    cold: float = 0.0
+    cold_deficit: float = 0.0
 
     @property
     def is_direct(self) -> bool:
@@ -123,7 +123,7 @@ def with_warmth(
             lacking = 1 - (1 - lacking) * math.exp(-(one.on_s - since_s) / time_constant_s)
         charge_s = one.off_s - one.on_s
         mean = -math.expm1(-charge_s / time_constant_s) * time_constant_s / charge_s
-        found.append(replace(one, cold=lacking * mean))
+        found.append(replace(one, cold_deficit=lacking * mean))
         lacking, since_s = lacking * math.exp(-charge_s / time_constant_s), one.off_s
     return found
 

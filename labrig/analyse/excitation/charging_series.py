@@ -163,8 +163,8 @@ def _charge(
         off_s=one.off_s - frames.zero_s,
         start_s=np.array([frame.start_time - frames.zero_s for frame in after]),
         exposure_s=np.array([frame.exposure_s for frame in after]),
-        brightness=1 - deficit * one.cold,
-        cold=one.cold,
+        brightness=1 - deficit * one.cold_deficit,
+        cold_deficit=one.cold_deficit,
         fresh=fresh,
         saturated=saturated,
     )

@@ -74,9 +74,9 @@ def predicted_charging(
     )
     unsure = np.sqrt(np.append(np.diag(fit.covariance), max(uncertain.scale, 1e-6) ** 2))
     slopes = _slopes(predicted, theta, unsure)
-    cold = np.array([charge.cold for charge in charges])
+    cold_deficit = np.array([charge.cold_deficit for charge in charges])
     of_charges = slopes[-1] ** 2 * (
-        uncertain.scale**2 + uncertain.lamp**2 + (uncertain.cold * cold) ** 2
+        uncertain.scale**2 + uncertain.lamp**2 + (uncertain.cold_deficit * cold_deficit) ** 2
     )
     of_rates = np.einsum("ic,ij,jc->c", slopes[:-1], fit.covariance, slopes[:-1])
     return closure(

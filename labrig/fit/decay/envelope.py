@@ -153,7 +153,7 @@ def _monotone_curve(
     offsets = np.zeros_like(weights)
     residual = data.target - design @ amplitudes[used]
     offsets[series.fitted_offsets] = np.linalg.lstsq(data.offset_design, residual)[0]
-    along, _ = data.followed(weights, np.hstack([design, data.offset_design]))
+    along, _ = data.leverage(weights, np.hstack([design, data.offset_design]))
     return means @ amplitudes, offsets, along
 
 

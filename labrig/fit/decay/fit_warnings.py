@@ -170,7 +170,7 @@ def _misfit(data: WhitenedSeries, fit: StatesFit, evidence: Evidence) -> Misfit:
     series, joint = data.series, fit.joint
     frames, _ = joint.frame_residuals(data)
     n_frames = int(np.count_nonzero(series.inverse_sigma.any(axis=1)))
-    along, across = joint.followed(data)
+    along, across = joint.leverage(data)
     residuals = joint.least_squares.residuals[: series.values.size]
     return Misfit(
         t_s=(series.t + series.start) * series.span_s,

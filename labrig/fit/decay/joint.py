@@ -69,9 +69,9 @@ class JointFit:
         signal = residuals + data.values - data.constant(self.offsets)
         return along, np.einsum("fc,fc->f", signal, signal)
 
-    def followed(self, data: WhitenedSeries) -> tuple[float, float]:
+    def leverage(self, data: WhitenedSeries) -> tuple[float, float]:
         """Return the degrees of freedom that the fit took along and across the signal."""
-        along, across = data.followed(self.weights, self.least_squares.jacobian)
+        along, across = data.leverage(self.weights, self.least_squares.jacobian)
         return float(along.sum()), float(across.sum())
 
 

@@ -67,7 +67,7 @@ def choose_states(
             Candidate(n_states, fit.joint.least_squares.reduced_chi2, bic(data, fit.joint), p_value)
         )
         if p_value is not None and (
-            p_value > F_TEST_LEVEL or tried[-1].bic > tried[-2].bic or not fit.told_apart
+            p_value > F_TEST_LEVEL or tried[-1].bic > tried[-2].bic or not fit.rates_are_distinct
         ):
             break
         chosen = fit
@@ -83,7 +83,7 @@ def f_test(data: WhitenedSeries, fewer: JointFit, more: JointFit, noise_dof: flo
     """
     added = more.n_parameters - fewer.n_parameters
     frames, brightness2 = more.frame_residuals(data)
-    dof = len(frames) - more.followed(data)[0]
+    dof = len(frames) - more.leverage(data)[0]
     if dof < 1 or added <= 0:
         return 1.0
     free_fraction = dof / len(frames)

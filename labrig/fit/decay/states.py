@@ -100,7 +100,7 @@ class StatesFit:
         return covariance_under(data, shape, self.joint)
 
     @property
-    def told_apart(self) -> bool:
+    def rates_are_distinct(self) -> bool:
         """Whether the free rates differ by more than their uncertainty."""
         free = slice(0, 2 * self.n_free, 2)
         covariance = self.joint.least_squares.covariance[free, free]

@@ -54,7 +54,7 @@ class WhitenedSeries:
         design[: unit.size] = (unit[:, :, None] * shapes[:, None, :]).reshape(unit.size, -1)
         return design
 
-    def followed(self, weights: FloatArray, design: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def leverage(self, weights: FloatArray, design: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Return the degrees of freedom a linear model takes from each frame, by its hat matrix.
 
         Parameters

@@ -71,7 +71,7 @@ class RelativeSigmas:
 
     flicker: float = 0.0
     lamp: float = 0.0
-    cold: float = 0.0
+    cold_deficit: float = 0.0
     scale: float = 0.0
     offset: tuple[float, ...] = ()
     common_mode: tuple[float, ...] = ()
@@ -143,10 +143,10 @@ class Parameters:
         counts = [
             len(series) - 1 if uncertain.scale > 0 else 0,
             self._first_charge[-1] if uncertain.lamp > 0 else 0,
-            1 if uncertain.cold > 0 else 0,
+            1 if uncertain.cold_deficit > 0 else 0,
             self._first_mode[-1],
         ]
-        sigmas = [uncertain.scale, uncertain.lamp, uncertain.cold, 1.0]
+        sigmas = [uncertain.scale, uncertain.lamp, uncertain.cold_deficit, 1.0]
         self.prior_sigma: FloatArray = np.concatenate([np.repeat(sigmas, counts), uncertain.offset])
         free_counts = [states, states, states * self.bands, len(self.others)]
         ends = _begins([*free_counts, *counts, len(uncertain.offset)])

@@ -110,9 +110,9 @@ class ExcitationProblem:
         for number, (charging, log_scale) in enumerate(
             zip(self.series, rates.log_scale, strict=True)
         ):
-            cold = np.array([charge.cold for charge in charging.charges])
+            cold_deficit = np.array([charge.cold_deficit for charge in charging.charges])
             log_brightness = rates.log_brightness[self.parameters.charges(number)]
-            brightness = np.exp(log_brightness - rates.lacking.sum() * cold)
+            brightness = np.exp(log_brightness - rates.lacking.sum() * cold_deficit)
             charges = tuple(
                 replace(charge, brightness=charge.brightness * float(factor))
                 for charge, factor in zip(charging.charges, brightness, strict=True)
@@ -167,7 +167,7 @@ class ExcitationProblem:
                 slopes[charge_shots, :, place] = by_light[charge_shots]
             if is_fitted(columns.lacking):
                 slopes[charge_shots, :, columns.lacking.start] = (
-                    -charge.cold * by_light[charge_shots]
+                    -charge.cold_deficit * by_light[charge_shots]
                 )
             shot = charge_shots.stop
         if charging.site_modes is not None:

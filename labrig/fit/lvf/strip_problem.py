@@ -12,7 +12,14 @@ import numpy as np
 
 from labrig.fit.least_squares import FloatArray
 from labrig.fit.spectrum.system import CurveError, curve_modes
-from labrig.optics import CameraResponse, Spectrum, Transmittance, hats, peak_shape, quadrature
+from labrig.optics import (
+    CameraResponse,
+    Spectrum,
+    Transmittance,
+    hat_functions,
+    peak_shape,
+    quadrature,
+)
 
 #: Parameters of a position: centre, log width, skew, log peak, and leakage in units of the peak;
 #: then the remainder in units of the peak, at knots with a distance of `REMAINDER_STEP_NM`.
@@ -86,7 +93,7 @@ class StripProblem:
         nodes, weights = quadrature(low, high, *knots, *(f.wavelength_nm for f in filters))
         self.grid_nm = np.append(np.arange(low, high, GRID_NM), high)
         self.knots_nm = np.arange(low, high + REMAINDER_STEP_NM / 2, REMAINDER_STEP_NM)
-        self._hat_functions = hats(self.knots_nm, self.grid_nm)
+        self._hat_functions = hat_functions(self.knots_nm, self.grid_nm)
         sensitivity = camera.at(nodes)
         illumination = weights * lamp.at(nodes) * card.at(nodes)
         peaks = camera.sensitivity.max(axis=0)
@@ -96,7 +103,7 @@ class StripProblem:
         fraction = np.einsum("q,mqc->mc", illumination, modes) / (illumination @ sensitivity)
         self._modes = modes - fraction[:, np.newaxis] * sensitivity
         self._camera, self._nodes = camera, nodes
-        onto_grid = hats(self.grid_nm, nodes)
+        onto_grid = hat_functions(self.grid_nm, nodes)
         light = np.stack([illumination * f.at(nodes) for f in filters])
         self._design = _on_grid(light, sensitivity, onto_grid)
         self._mode_designs = np.array([_on_grid(light, mode, onto_grid) for mode in self._modes])

@@ -255,11 +255,11 @@ def _likeliest(
     all_free = np.ones(len(prior), dtype=np.bool_)
     x = nonnegative_minimum(curvature, design.T @ target, all_free)
     free = x > 0
-    followed = np.linalg.solve(
+    leverage = np.linalg.solve(
         curvature[np.ix_(free, free)], (design.T @ design)[np.ix_(free, free)]
     )
     residual = target - design @ x
-    dof = max(len(target) - float(np.trace(followed)), 1.0)
+    dof = max(len(target) - float(np.trace(leverage)), 1.0)
     return x, float(np.sqrt(residual @ residual / dof))
 
 

@@ -6,7 +6,7 @@ from dataclasses import dataclass, field, fields, replace
 import numpy as np
 from numpy.typing import NDArray
 
-from labrig.optics import Bands, CameraResponse, Lvf, hats, quadrature
+from labrig.optics import Bands, CameraResponse, Lvf, hat_functions, quadrature
 
 FloatArray = NDArray[np.float64]
 
@@ -86,12 +86,12 @@ def system_through_lvf(
     nodes, weights = quadrature(
         float(knots_nm[0]), float(knots_nm[-1]), camera.wavelength_nm, knots_nm
     )
-    hat_functions = weights[:, np.newaxis] * hats(knots_nm, nodes)
+    onto_knots = weights[:, np.newaxis] * hat_functions(knots_nm, nodes)
     sensitivity = camera.at(nodes)
 
     def design(transmission: FloatArray, curves: FloatArray) -> FloatArray:
         """Return the design matrix, shape (positions · channels, n)."""
-        values = np.stack([(transmission * curve) @ hat_functions for curve in curves.T], axis=1)
+        values = np.stack([(transmission * curve) @ onto_knots for curve in curves.T], axis=1)
         return values.reshape(-1, len(knots_nm))
 
     transmission = lvf.transmission(nodes)
@@ -102,7 +102,7 @@ def system_through_lvf(
     ]
     for position, change in _filter_changes(lvf, nodes):
         mode = np.zeros((len(transmission), sensitivity.shape[1], len(knots_nm)))
-        mode[position] = (change[:, np.newaxis] * sensitivity).T @ hat_functions
+        mode[position] = (change[:, np.newaxis] * sensitivity).T @ onto_knots
         modes.append(mode.reshape(exact.shape))
     stacked = np.array(modes) if modes else np.empty((0, 0, 0))
     return SpectralSystem(knots_nm, exact, stacked)
@@ -141,7 +141,7 @@ def curve_modes(
 def _smooth_modes(nodes: FloatArray, distance_nm: float) -> FloatArray:
     """Return (k, q) functions whose sum with unit normal weights is smooth and of unit variance."""
     knots = np.arange(nodes[0] - distance_nm, nodes[-1] + 2 * distance_nm, distance_nm)
-    fraction = np.clip(hats(knots, nodes), 0.0, 1.0)
+    fraction = np.clip(hat_functions(knots, nodes), 0.0, 1.0)
     modes: FloatArray = np.sin(np.pi / 2 * fraction).T
     return modes[modes.any(axis=1)]
 

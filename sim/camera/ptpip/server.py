@@ -10,7 +10,7 @@ from collections.abc import Callable
 from dataclasses import dataclass
 from typing import NoReturn
 
-from labrig.clock import LOOK_UP_S, Clock
+from labrig.clock import CHECK_INTERVAL_S, Clock
 from labrig.errors import UsageError
 
 from ..responder import Responder
@@ -92,7 +92,7 @@ class PtpIpServer:
             Somebody has.
         """
         while True:
-            self.serve_once(LOOK_UP_S)
+            self.serve_once(CHECK_INTERVAL_S)
             clock.sleep(0.0)
 
     def serve_once(self, patience_s: float) -> None:

@@ -35,7 +35,7 @@ def test_what_is_told_of_a_place_is_what_its_modes_add_up_to() -> None:
 def test_a_lamp_is_warm_after_a_long_charge_and_cools_in_the_dark() -> None:
     times_s = {"a": (0.0, 10.0), "b": (20.0, 2000.0), "c": (2010.0, 2020.0), "d": (4000.0, 4010.0)}
     intervals = [ChargeInterval(unit, *both) for unit, both in times_s.items()]
-    cold = [one.cold for one in with_warmth(intervals, 150.0)]
-    assert cold[0] == pytest.approx(1 - 10 / 150 / 2, abs=0.002)
-    assert cold[2] < 0.1
-    assert cold[3] > 0.95
+    cold_deficit = [one.cold_deficit for one in with_warmth(intervals, 150.0)]
+    assert cold_deficit[0] == pytest.approx(1 - 10 / 150 / 2, abs=0.002)
+    assert cold_deficit[2] < 0.1
+    assert cold_deficit[3] > 0.95

@@ -71,9 +71,9 @@ def test_the_fade_is_the_lamps_in_every_band(fade: FadeFile) -> None:
     assert np.all(np.abs(fraction - true) < 3 * sigma + 1e-3)
     steps = np.diff(fade.fade.t_s)
     missing = steps @ (true[1:] + true[:-1]) / 2
-    assert fade.fade.missing_s() == pytest.approx(missing, abs=5e-3)
+    assert fade.fade.equivalent_s() == pytest.approx(missing, abs=5e-3)
     # The blue goes first.
-    assert np.all(np.diff(fade.fade.missing_s()) > 0)
+    assert np.all(np.diff(fade.fade.equivalent_s()) > 0)
 
 
 def test_the_rise_is_the_lamps_in_every_band(fade: FadeFile) -> None:

@@ -11,7 +11,7 @@ from labrig.optics import (
     WavelengthMap,
     nominal_lvf,
     read_camera,
-    seen_through,
+    signal_through,
 )
 from labrig.reduce import RawFrame
 from labrig.reduce.hdr import HdrFrame, hdr_frame
@@ -46,7 +46,7 @@ class Scene:
 
     def frame(self, light: Spectrum, exposure: float = 1.0) -> tuple[RawFrame, float]:
         """The strip under a light whose brightest colour fills the range at `exposure` 1."""
-        seen = seen_through(self.lvf(), read_camera("canon_eos_5d_mark_ii"), light)
+        seen = signal_through(self.lvf(), read_camera("canon_eos_5d_mark_ii"), light)
         along, aside = self.along()
         inside = (along >= 0) & (along <= 1) & (np.abs(aside) <= 0.5)
         position = along if self.rising else 1 - along
