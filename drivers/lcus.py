@@ -44,12 +44,12 @@ class LcusRelay:
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file.
+        """Keys of a relay of an LCUS board in a rig file.
 
         Attributes
         ----------
         relay
-            As printed on the board: the first one is 1.
+            Number of the relay that switches the lamp, as printed on the board: the first one is 1.
         """
 
         model_config = ConfigDict(frozen=True, extra="forbid")

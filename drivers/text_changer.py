@@ -29,14 +29,14 @@ class TextChanger:
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file.
+        """Keys of a changer that obeys lines of text in a rig file.
 
         Attributes
         ----------
         baud
-            Of the line; USB boards ignore it.
+            Baud rate of the serial line; USB boards ignore it.
         takes_at_most
-            Until they have answered `done`.
+            Time within which the changer must have answered `done`, for example `2 min`.
         """
 
         model_config = ConfigDict(frozen=True, extra="forbid")

@@ -33,7 +33,7 @@ class UvcPreview:
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file: none."""
+        """Keys of a video device for aiming in a rig file: none of its own."""
 
         model_config = ConfigDict(frozen=True, extra="forbid")
 

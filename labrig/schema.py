@@ -4,12 +4,14 @@ import inspect
 import operator
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from copy import copy
 from functools import reduce
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, TypeAdapter, create_model
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
-from pydantic_core import core_schema
+from pydantic_core import SchemaError, SchemaSerializer, core_schema
 
 from labrig import plugins
 from labrig.acquire import ROLES, DeviceEntry, RigFile
@@ -69,11 +71,13 @@ def _rig() -> Any:
 
 def _entry(driver: str, settings: type[BaseModel]) -> type[BaseModel]:
     """A device entry of one driver."""
-    shared: dict[str, Any] = {
-        name: (field.annotation, field) for name, field in DeviceEntry.model_fields.items()
-    }
-    own: dict[str, Any] = shared | {"driver": (Literal[driver], ...)}
-    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **own)
+    texts = _descriptions(DeviceEntry)
+    shared: dict[str, Any] = {}
+    for name, field in DeviceEntry.model_fields.items():
+        described = copy(field)
+        described.description = texts[name]
+        shared[name] = (Literal[driver] if name == "driver" else field.annotation, described)
+    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **shared)
 
 
 def _one_of(key: str, models: list[type[BaseModel]]) -> Any:
@@ -83,25 +87,37 @@ def _one_of(key: str, models: list[type[BaseModel]]) -> Any:
 
 
 class _Described(GenerateJsonSchema):
-    """Keys are described as the models' docstrings do; a default has the written form or none."""
+    """Describes keys as the models' docstrings do; defaults have the form that YAML has."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
         made = super().model_schema(schema)
-        documented = inspect.cleandoc(schema["cls"].__doc__ or "")
-        made["description"] = documented.partition("\n\n")[0]
-        texts = dict(_attributes(documented))
-        for name, field in schema["cls"].model_fields.items():
-            place: dict[str, Any] = made.get("properties", {}).get(field.alias or name, {})
-            if name in texts:
-                place["description"] = texts[name]
+        model = schema["cls"]
+        made["description"] = inspect.cleandoc(model.__doc__ or "").partition("\n\n")[0]
+        texts = _descriptions(model)
+        for branch in (made, *made.get("anyOf", [])):
+            for name, field in model.model_fields.items():
+                place: dict[str, Any] = branch.get("properties", {}).get(field.alias or name, {})
+                if name in texts:
+                    place["description"] = texts[name]
         return made
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
         made = super().default_schema(schema)
-        default = made.get("default")
-        if default is None or (made.get("type") == "string") != isinstance(default, str):
+        if made.get("default") is None:
             made.pop("default", None)
+            return made
+        with suppress(SchemaError):  # a model's own serializer has done it
+            written = SchemaSerializer(schema["schema"])
+            made["default"] = written.to_python(schema["default"], mode="json", by_alias=True)
         return made
+
+
+def _descriptions(model: type[BaseModel]) -> dict[str, str]:
+    """Description of every documented field of a model, of its base classes', too, by name."""
+    texts: dict[str, str] = {}
+    for part in reversed(model.__mro__):
+        texts.update(_attributes(inspect.cleandoc(part.__doc__ or "")))
+    return texts
 
 
 def _attributes(documented: str) -> Iterator[tuple[str, str]]:

@@ -43,8 +43,15 @@ EARLIEST_S = 0.1
 
 
 class Clean(BaseModel):
-    """From when on a blank counts as clean: less than so many σ, or than that fraction of the range
-    from black to white.
+    """Limits below which the signal of a blank counts as zero.
+
+    Attributes
+    ----------
+    sigmas
+        Signal in standard uncertainties below which the blank counts as clean, for example `4`.
+    fraction
+        Signal as a fraction of the camera's range from black to white below which the blank counts
+        as clean, whatever its uncertainty, for example `0.001 %`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -54,7 +61,35 @@ class Clean(BaseModel):
 
 
 class Blank(ProtocolModel):
-    """See `blank.yaml` for what each key means."""
+    """Settings of a blank; `blank.yaml` is the commented example.
+
+    Attributes
+    ----------
+    charge
+        Time for which the lamp shines before each sequence, for example `5 min`. The lamp's housing
+        should become as warm as in a decay.
+    every
+        Time between the begins of two photographs, for example `5 s`.
+    duration
+        Time after lamp off until which photographs begin, for example `60 s`; at least four times
+        `every`.
+    first
+        Time from lamp off to the first photograph, for example `500 ms`. `auto` is as soon as the
+        trap door is open, or 100 ms without a door.
+    later_by
+        Further delay of each sequence's first photograph, one sequence for each, so that the time
+        just after lamp off is sampled in small steps, for example `[0 s, 100 ms]`.
+    exposure
+        Shutter time of the first photograph of each sequence, for example `500 ms`. All others are
+        as long as fits between two begins.
+    camera
+        Sensitivity and aperture of the camera: those of the decays to which the blank belongs.
+    region
+        Place of the blank in the frame, where the sample will be: `[x, y, width, height]` in
+        pixels, or all four as fractions of the frame.
+    clean
+        Limits below which the signal of the blank counts as zero.
+    """
 
     protocol: Literal["blank"] = "blank"
     charge: DurationS = Field(300.0, gt=0)

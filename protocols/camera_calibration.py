@@ -254,7 +254,37 @@ def _interleaved(
 
 
 class CameraCalibration(ProtocolModel):
-    """See `camera_calibration.yaml` for what each key means."""
+    """Settings of a camera calibration; `camera_calibration.yaml` is the commented example.
+
+    Attributes
+    ----------
+    camera
+        Reference sensitivity and aperture, at which all correction factors are 1; the lower the
+        ISO, the less noise. Both stand in `isos` and `f_numbers`, too.
+    isos
+        Sensitivities to calibrate, for example `[100, 200, 400]`. Others are later taken by their
+        labels.
+    f_numbers
+        Apertures to calibrate, for example `[2.8, 4, 5.6]`. Frames at other apertures are refused
+        later. Empty for a lens that reports no aperture, with `f_number: null` in `camera`.
+    card
+        Place of the lit grey card in the frame: `[x, y, width, height]` in pixels, or all four as
+        fractions of the frame. The larger it is, the better the flat field is known towards the
+        corners.
+    levels
+        Number of signal levels of the photon transfer curve at every ISO, two frames each.
+    repeats
+        Number of frames of the same exposure, for the flicker of shutter, aperture and lamp.
+    cycles
+        Number of passes through each bracket. The uncertainty of a factor is about flicker /
+        √cycles.
+    every_nth_shutter_time
+        Step through the camera's shutter times: 1 calibrates every one for which the lamp is bright
+        enough, 3 every third. Those between are interpolated.
+    longest_dark
+        Longer of the two shutter times of the dark frames, for example `8 s`; the other one is the
+        camera's shortest.
+    """
 
     protocol: Literal["camera_calibration"] = "camera_calibration"
     camera: CameraSettings = CameraSettings(iso=100, f_number=4.0)

@@ -41,7 +41,19 @@ from .steps.sanity_checks import SanityChecks
 
 
 class Plateau(BaseModel):
-    """When `charge: plateau` ends: the glow grew by less than `growth` since the last look."""
+    """Criterion by which `charge: plateau` ends.
+
+    Attributes
+    ----------
+    growth
+        Growth of the glow since the last check, as a fraction, below which the sample counts as
+        charged, for example `1 %`.
+    check_every
+        Time of charging between two checks, for example `5 min`.
+    at_most
+        Time of charging after which the decay begins in any case, with a warning, for example
+        `2 h`.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -51,7 +63,45 @@ class Plateau(BaseModel):
 
 
 class DecaySettings(ProtocolModel):
-    """The keys; see `decay.yaml` for what each means."""
+    """Settings of a decay; `decay.yaml` is the commented example.
+
+    Attributes
+    ----------
+    charge
+        Time for which the lamp shines on the sample, for example `90 min`; `plateau` charges until
+        the glow stops growing.
+    plateau
+        Criterion by which `charge: plateau` ends.
+    every
+        Time between the begins of two photographs, for example `5 s`.
+    duration
+        Time after lamp off until which photographs begin, for example `180 s`.
+    first
+        Time from lamp off to the first photograph, for example `500 ms`. A halogen lamp needs about
+        320 ms to go dark, and a trap door must be open.
+    repeats
+        Number of charges, each with a decay after it.
+    camera
+        Sensitivity and aperture of the camera.
+    exposure
+        Shutter time of all photographs, for example `1 s`. `auto` meters a short charge first, so
+        that nothing clips; `grow` does so and exposes longer along the decay, to keep counts.
+    grow_at_most
+        Largest ratio of a shutter time to the first one with `exposure: grow`.
+    dark
+        Source of the level without light: `frames`, dark frames before charging, or `background`, a
+        region of every frame.
+    background
+        Region of every frame that never glows, for `dark: background`: `[x, y, width, height]` in
+        pixels, or all four as fractions of the frame.
+    patches
+        Regions of interest by name: `[x, y, width, height]` in pixels, or all four as fractions of
+        the frame. Each gets a fit of its own.
+    daylight
+        Whether the sample is also photographed under the lamp, for the report.
+    states
+        Number of excited states to fit: 1, 2 or 3; `auto` chooses it from the data.
+    """
 
     protocol: Literal["decay"] = "decay"
     charge: Annotated[float | Literal["plateau"], WordOrDuration("plateau")] = 5400.0
@@ -286,7 +336,7 @@ class DaylightUnit:
 
 
 class Decay(DecaySettings):
-    """The decay protocol; see `decay.yaml` for what each key means."""
+    """Decay protocol; `decay.yaml` is the commented example."""
 
     def units(self) -> Sequence[Unit]:
         """Darks, metering, the decays, daylight; what is not needed is left out."""

@@ -52,7 +52,29 @@ WHITE = "it tells what the camera's curves are off by"
 
 
 class EmissionSpectrum(GlowSettings):
-    """The protocol; see `emission_spectrum.yaml` for what each key means."""
+    """Settings of an emission spectrum; `emission_spectrum.yaml` is the commented example.
+
+    Attributes
+    ----------
+    camera
+        Sensitivity and aperture of the camera.
+    times
+        Begin of each photograph after lamp off, rising, for example `[2 s, 10 s]`. The spectrum is
+        to be the same at all of them (Nalbach et al., fig. 6), which is tested.
+    lamps
+        Lamps to charge with, one after the other: `halogen`, `mercury` or both. Whether the
+        spectrum depends on them is tested.
+    white
+        Whether a grey card under the halogen lamp is photographed through the same filter, which
+        corrects most of the error of camera curves from another laboratory.
+    region
+        Region of the frame in which the linear variable filter is to be seen, for metering only:
+        `[x, y, width, height]` in pixels, or all four as fractions of the frame.
+    patches
+        Rows of several materials seen through the filter, by name: `[x, y, width, height]`, one
+        above the other, each as long as the filter. They take the place of `region`, and each has a
+        spectrum of its own. Default: one material.
+    """
 
     rests_on = (LVF_KIND,)
 

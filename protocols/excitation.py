@@ -69,7 +69,20 @@ PLACES = 12
 
 
 class Rest(BaseModel):
-    """Darkness between two charges: at least and at most so long, until the glow is that low."""
+    """Rest in the dark between two charges, until the sample hardly glows.
+
+    Attributes
+    ----------
+    below
+        Glow, as a fraction of that just after the last charge, below which the next charge begins,
+        for example `2 %`.
+    at_least
+        Shortest rest, for example `1 min`.
+    check_every
+        Time between two photographs that check the glow, for example `3 min`.
+    at_most
+        Longest rest, for example `15 min`. The glow that is left is measured and accounted for.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -86,7 +99,55 @@ class Rest(BaseModel):
 
 
 class ExcitationSettings(ProtocolModel):
-    """The keys; see `excitation.yaml` for what each means."""
+    """Settings of excitation rates; `excitation.yaml` is the commented example.
+
+    Attributes
+    ----------
+    first_charge
+        Duration of the first charge through the variable filter, for example `8 s`. Each next one
+        is twice as long.
+    growth
+        Growth of the glow from one charge to the next, as a fraction, below which charges are not
+        doubled any more, for example `3 %`.
+    at_most
+        Largest number of charges that double.
+    refine
+        Number of charges after those, of durations that add most information on the rates.
+    direct
+        Durations of the charges by the lamp itself, without the filter, rising, for example
+        `[3 s, 1 min]`. They determine how far the sample is charged; the shortest ones that of
+        states that decay within seconds.
+    first
+        Time from lamp off to the first photograph, for example `1 s`. A trap door must be open by
+        then.
+    every
+        Time between the begins of the first two photographs after a charge, for example `4 s`. Each
+        further one is a quarter longer.
+    duration
+        Time after lamp off until which photographs begin, for example `90 s`.
+    last_decay
+        The same time for the last charge, which has the longest decay, for example `180 s`.
+    rest
+        Rest in the dark between two charges.
+    samples
+        Number of samples at hand. With more than one, a fresh sample is put in for every charge,
+        instead of a rest.
+    camera
+        Sensitivity and aperture of the camera.
+    sites
+        Place of the filter on the sample in the frame: `[x, y, width, height]` in pixels, or all
+        four as fractions of the frame. Only exposures and charge times depend on it; the fit uses
+        the place that `lvf_calibration` measured.
+    patches
+        Rows of several materials below the filter, by name: `[x, y, width, height]`, one above the
+        other, each as long as the filter. They take the place of `sites`, and each has a material
+        file of its own. Default: one material.
+    states
+        Number of excited states to fit: 1, 2 or 3; `auto` chooses it from the data.
+    saturated
+        Whether the longest charge is taken for a full one, r(0) = 1, as in the paper. If not, r(0)
+        is fitted to the data.
+    """
 
     rate_frames = tuple(ExcitationFrames)
     rests_on = (IRRADIANCE_KIND,)
@@ -461,7 +522,7 @@ class DirectUnit(_Charged):
 
 
 class Excitation(ExcitationSettings):
-    """The excitation protocol; see `excitation.yaml` for what each key means."""
+    """Excitation protocol; `excitation.yaml` is the commented example."""
 
     def units(self) -> Sequence[Unit]:
         """Darks; a metered charge and all others through the filter; the same without it."""

@@ -64,7 +64,40 @@ WARMING_SHOTS, WARMING_EVERY_S = 4, 2.0
 
 
 class Fade(ProtocolModel):
-    """See `fade.yaml` for what each key means."""
+    """Settings of a fade; `fade.yaml` is the commented example.
+
+    Attributes
+    ----------
+    camera
+        Sensitivity and aperture of the camera. A halogen lamp on mains fills the range within a few
+        milliseconds at the default.
+    every
+        Step of the delay from the switch to the release of the shutter, for example `30 ms`.
+    until
+        Longest delay, by which the lamp is dark, for example `450 ms`; at least four times `every`.
+    passes
+        Number of passes through all delays, each a part of a step later than the one before.
+    longest
+        Longest exposure of the fade, which should contain all that is left of it, for example
+        `1 s`.
+    rise
+        Whether the rise after switching on is measured, too.
+    repeat_late
+        Number of times that a delay is photographed again if something began late. The late
+        photograph is kept, with its actual times.
+    warming
+        Whether the warm-up of the lamp's housing is recorded, which takes 20 minutes. Short charges
+        are known to a part of the last per cents of light by it.
+    through_lvf
+        Whether the lamp is seen band by band through a calibrated variable filter before the
+        camera. If not, the camera's three channels are used and the lamp is taken for a black-body
+        emitter.
+    card
+        Place of the lit grey card in the frame: `[x, y, width, height]` in pixels, or all four as
+        fractions of the frame.
+    bands
+        Edges of the wavelength bands in nm, rising.
+    """
 
     protocol: Literal["fade"] = "fade"
     camera: CameraSettings = CameraSettings(iso=400, f_number=4.0)

@@ -36,7 +36,27 @@ _THROUGH = Arrangement("grey card", "on sample")
 
 
 class Irradiance(ProtocolModel):
-    """The irradiance protocol; see `irradiance.yaml` for what each key means."""
+    """Settings of an irradiance measurement; `irradiance.yaml` is the commented example.
+
+    Attributes
+    ----------
+    bands_nm
+        Edges of the wavelength bands in nm, rising. The default is that of Table 1 of Nalbach et
+        al.
+    vector_length
+        Euclidean length to which the lamp's irradiance, one number for each band, is scaled;
+        excitation rates belong to it. Table 1 of the paper has 1.
+    camera
+        Sensitivity and aperture of the camera.
+    longest
+        Longest exposure, for example `8 s`.
+    repeats
+        Number of photographs at each of two exposures of a scene; the longer exposure is for the
+        dim ends of the strip.
+    rounds
+        Number of times that the card is photographed by itself and through the filter in turn,
+        because the lamp drifts.
+    """
 
     rests_on = (LVF_KIND,)
 

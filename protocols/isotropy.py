@@ -24,7 +24,28 @@ Angle = Annotated[int, Field(ge=-85, le=85)]
 
 
 class Isotropy(GlowSettings):
-    """The protocol; see `isotropy.yaml` for what each key means."""
+    """Settings of an isotropy test; `isotropy.yaml` is the commented example.
+
+    Attributes
+    ----------
+    angles
+        Angles in whole degrees by which the sample is turned against the camera, by hand and in the
+        dark, for example `[20, 40]`. The straight view is photographed before and after all others.
+    first
+        Time from lamp off to the first photograph, for example `60 s`. The sample is turned before
+        it.
+    every
+        Time between the begins of two photographs, for example `10 s`.
+    frames
+        Number of photographs at each angle.
+    patch
+        Position of the patches: `inside` of the sample at every angle, so that its radiance is
+        measured, or `around` all of it with darkness about, so that its intensity is measured and
+        divided by the cosine of the angle.
+    patches
+        Regions of interest by name: `[x, y, width, height]` in pixels, or all four as fractions of
+        the frame.
+    """
 
     protocol: Literal["isotropy"] = "isotropy"
     angles: tuple[Angle, ...] = Field((20, 40, 60, 80), min_length=1)

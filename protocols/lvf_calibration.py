@@ -172,7 +172,35 @@ _Scene = tuple[type[SceneUnit], str, str, Arrangement, dict[str, Any]]
 
 
 class LvfCalibration(ProtocolModel):
-    """The calibration of an LVF; see `lvf_calibration.yaml` for what each key means."""
+    """Settings of the calibration of an LVF; `lvf_calibration.yaml` is the commented example.
+
+    Attributes
+    ----------
+    rising
+        Whether the wavelength rises from left to right when the camera looks through the filter. A
+        filter the other way round is then refused. Default: either way is accepted.
+    rising_on_sample
+        Whether the wavelength rises from left to right when the filter lies on the sample. A filter
+        the other way round is then refused. Default: either way is accepted.
+    filters
+        Colour filters by the names of their files, for example `[longpass-440, shortpass-620]`: six
+        or more, with edges all over the spectrum. `all` takes those in the rig file's folder of
+        filters, or without one those that labrig ships.
+    camera
+        Sensitivity and aperture of the camera.
+    longest
+        Longest exposure, for example `8 s`.
+    repeats
+        Number of photographs at each of two exposures of a scene; the longer exposure is for the
+        dim ends of the strip.
+    mercury_warm_up
+        Time until the mercury lamp is steady, for example `5 min`. That of the usual lamp stands in
+        the rig file.
+    stripes
+        Time for which the mercury lamp charges the sample through the filter, so that its lines
+        glow as stripes where the camera sees the sample, for example `10 min`. `none` leaves this
+        out.
+    """
 
     protocol: Literal["lvf_calibration"] = "lvf_calibration"
     rising: bool | None = None

@@ -22,7 +22,18 @@ OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation")
 
 
 class Phosphor(ProtocolModel):
-    """The chain; see `phosphor.yaml` for what each key means."""
+    """Settings of a chain of protocols; `phosphor.yaml` is the commented example.
+
+    Attributes
+    ----------
+    patches
+        Regions of several materials by name: `[x, y, width, height]` in pixels, or all four as
+        fractions of the frame, one above the other, each as long as the filter. Their results lie
+        in folders of these names. Default: one material.
+    parts
+        Protocols of the chain in order, each written as in a file of its own. `part: NAME` tells
+        two of one protocol apart.
+    """
 
     rate_frames = (*ProtocolModel.rate_frames, *ExcitationFrames)
 

@@ -45,7 +45,21 @@ WHY = "saturation in level shows only between two irradiances"
 
 
 class WeakerLight(BaseModel):
-    """How a person weakens the light, by a neutral filter or a distance; how much of it is left."""
+    """How the light is weakened by hand: by a neutral filter or by a distance.
+
+    Attributes
+    ----------
+    filter
+        Name of the neutral filter to put before the lamp, for example `neutral-50`. Either this or
+        `distance` is given.
+    distance
+        Distance from the sample to which the lamp is moved, for example `1.41 m`. Either this or
+        `filter` is given.
+    fraction
+        Fraction of the irradiance that is left, for example `50 %`.
+    fraction_sigma
+        Standard uncertainty of `fraction`, relative to it, for example `2 %`.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -75,7 +89,34 @@ class WeakerLight(BaseModel):
 
 
 class Saturation(ProtocolModel):
-    """The protocol; see `saturation.yaml` for what each key means."""
+    """Settings of a saturation test; `saturation.yaml` is the commented example.
+
+    Attributes
+    ----------
+    charges
+        Durations of the charges, rising, for example `[5 min, 45 min, 90 min]`. The last two show
+        saturation in time; the first one, much shorter, shows rates that depend on the level.
+    weaker
+        Second, weaker irradiance, which saturation in level takes. Default: none, and r(0) remains
+        unknown.
+    every
+        Time between the begins of two photographs, for example `5 s`.
+    duration
+        Time after lamp off until which photographs begin, for example `180 s`.
+    first
+        Time from lamp off to the first photograph, for example `800 ms`. A trap door must be open
+        by then.
+    camera
+        Sensitivity and aperture of the camera.
+    exposure
+        Shutter time of all photographs, for example `1 s`. `auto` meters a short charge first, so
+        that nothing clips.
+    patches
+        Regions of interest by name: `[x, y, width, height]` in pixels, or all four as fractions of
+        the frame.
+    states
+        Number of excited states to fit: 1, 2 or 3; `auto` chooses it from the data.
+    """
 
     protocol: Literal["saturation"] = "saturation"
     charges: tuple[Charge, ...] = Field((300.0, 2700.0, 5400.0), min_length=2)

@@ -108,18 +108,37 @@ def open_room(
 ) -> Iterator[OpenRoom]:
     """Build the room that a rig file's `simulation:` describes and make it reachable.
 
+    While the context is open, pyserial finds the room's boards at addresses such as
+    `sim://room/relays`, and the room's clock runs.
+
     Parameters
     ----------
+    content
+        Content of the rig file's `simulation:`, as YAML loads it.
     source
         Path of the rig file, for messages.
     not_before_s
-        Seconds since 1970; the room's epoch is moved there if it is earlier. Faults keep to their
-        time on the wall.
+        Earliest epoch of the room in seconds since 1970. A room whose epoch is earlier is opened at
+        this time, and its faults keep their times on the wall clock.
+
+    Yields
+    ------
+    OpenRoom
+        The room with its clock, its boards and its camera.
 
     Raises
     ------
     UsageError
-        The description does not fit.
+        The description does not fit the model `Simulation`.
+
+    Examples
+    --------
+    >>> from labrig.sim import open_room
+    >>> description = {"sample": "blue-paint", "faults": [{"lamp_dead": {"at": "5 min"}}]}
+    >>> with open_room(description, "my-rig.yaml") as room:
+    ...     room.clock.sleep(60.0)
+    ...     print(sorted(room.boards), room.clock.now())
+    ['changer', 'lcus', 'relays', 'servo'] 60.0
     """
     simulation = validate(content, Simulation, f"{source}, simulation").opened_at(not_before_s)
     naps = given(fault.pc_asleep for fault in simulation.faults)

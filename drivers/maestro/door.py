@@ -21,12 +21,14 @@ class MaestroDoor(Swung):
     what = "trap door"
 
     class Settings(ServoSettings):
-        """Keys of the rig file.
+        """Keys of a trap door on a Pololu Maestro in a rig file.
 
         Attributes
         ----------
-        closed, open
-            Length of the servo's pulse at either end, such as `1000 us`.
+        closed
+            Length of the servo's pulse with the door closed, for example `1000 us`.
+        open
+            Length of the servo's pulse with the door open, for example `2000 us`.
         """
 
         closed: PulseS

@@ -68,21 +68,23 @@ PulseS = Annotated[DurationS, Field(ge=64e-6, le=4080e-6)]
 
 
 class ServoSettings(BaseModel):
-    """Keys of the rig file that every servo has.
+    """Keys of a servo on a Pololu Maestro in a rig file.
 
     Attributes
     ----------
     channel
-        Of the Maestro, counted from 0.
+        Channel of the Maestro to which the servo is connected, counted from 0.
     travel
-        From the command until it has stopped ringing, the servo's frame of 20 ms included.
+        Time from the command until the door has stopped ringing, the servo's frame of up to 20 ms
+        included, for example `300 ms`.
     speed
-        Limit in 0.25 µs per 10 ms, as in the Maestro Control Center; 0: none.
+        Speed limit of the servo in 0.25 µs per 10 ms, as in the Maestro Control Center; 0: no
+        limit.
     acceleration
-        Limit in 0.25 µs per 10 ms per 80 ms; 0: none.
+        Acceleration limit of the servo in 0.25 µs per 10 ms per 80 ms; 0: no limit.
     device_number
-        Of one Maestro of several on a line, which is then spoken to by Pololu's protocol; null:
-        the only one, by the compact protocol.
+        Device number of the Maestro if several share the line, which are then addressed by Pololu's
+        protocol; null: the only one, addressed by the compact protocol.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

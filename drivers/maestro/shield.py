@@ -20,12 +20,15 @@ class MaestroShield(Swung):
     what = "lamp shield"
 
     class Settings(ServoSettings):
-        """Keys of the rig file.
+        """Keys of a lamp shield on a Pololu Maestro in a rig file.
 
         Attributes
         ----------
-        covering, uncovering
-            Length of the servo's pulse at either end, such as `1000 us`.
+        covering
+            Length of the servo's pulse with the shield before the lamp, for example `1000 us`.
+        uncovering
+            Length of the servo's pulse with the shield away from the lamp, its safe end, for
+            example `2000 us`.
         """
 
         covering: PulseS

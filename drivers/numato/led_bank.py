@@ -31,12 +31,13 @@ class NumatoLedBank:
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file.
+        """Keys of LEDs on relays of a Numato board in a rig file.
 
         Attributes
         ----------
         relays
-            Name of each LED, and the relay that it hangs on.
+            Relay of each LED by the LED's name, counted from 0, for example
+            `{"450 nm": 1, "525 nm": 2}`.
         """
 
         model_config = ConfigDict(frozen=True, extra="forbid")

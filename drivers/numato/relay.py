@@ -21,7 +21,13 @@ class NumatoRelay:
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file."""
+        """Keys of a relay of a Numato board in a rig file.
+
+        Attributes
+        ----------
+        relay
+            Number of the relay that switches the lamp, counted from 0.
+        """
 
         model_config = ConfigDict(frozen=True, extra="forbid")
 

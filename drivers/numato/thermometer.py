@@ -39,20 +39,21 @@ class NumatoThermometer:
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file; the defaults are a TMP36 on a board with 5 V.
+        """Keys of a thermometer on a Numato board in a rig file; by default a TMP36 at 5 V.
 
         Attributes
         ----------
         input
-            As in `adc read`, counted from 0.
+            Analogue input of the board to which the sensor is connected, as in `adc read`, counted
+            from 0.
         volts_per_degree
-            Of the sensor, per degree Celsius.
+            Sensitivity of the sensor in volts per degree Celsius: 0.01 for a TMP36 or an LM35.
         volts_at_zero
-            Of the sensor, at 0 °C: 0 for an LM35.
+            Voltage of the sensor at 0 °C, in volts: 0.5 for a TMP36, 0 for an LM35.
         reference_volts
-            What the board's largest number stands for: its supply.
+            Voltage at which the converter reads its largest number, in volts: the board's supply.
         bits
-            Of the board's converter.
+            Resolution of the board's converter in bits.
         """
 
         model_config = ConfigDict(frozen=True, extra="forbid")

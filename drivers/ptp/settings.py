@@ -12,28 +12,32 @@ from .eos.iso import NativeIsos, isos_of_model
 
 
 class PtpCameraSettings(BaseModel):
-    """Keys of the rig file beside `driver` and `address`.
+    """Keys of a camera on PTP in a rig file.
 
     Attributes
     ----------
     shutter_lag
-        From the release to the begin of the exposure, as `labrig rig check` measured it.
+        Time from the release to the begin of the exposure, as `labrig rig check` measures it, for
+        example `60 ms`.
     isos
-        The sensor's native sensitivities; the camera's others (gain after digitising) stay unused.
-        What is written here goes before what `eos.iso` knows of an EOS.
+        Native ISO sensitivities of the sensor. The camera's others, which are gain after
+        digitising, stay unused. Default: those known of the EOS model, else 100 to 1600.
     f_numbers
-        Apertures of the lens; read from the camera when there is one.
+        Apertures of the lens as f-numbers, for planning without the camera; with it, they are read
+        from it.
     longest_exposure
-        Longer ones are not used; a true 32 s is the dial's 30 s. From 64 s on an EOS exposes at
-        bulb: 64 s, 128 s, … up to this.
+        Longest shutter time to use, for example `32 s`. The dial's 30 s is an actual 32 s. From 64
+        s on an EOS exposes at bulb: 64 s, 128 s, … up to this time.
     frame_time
-        From the end of an exposure until its frame is on the PC and the next can begin.
+        Time from the end of an exposure until its frame is on the PC and the next can begin, for
+        example `2 s`.
     frame_size
-        Of one RAW file, for planning disk space.
+        Size of one RAW file, for planning disk space, for example `27 MB`.
     transfer_timeout
-        From the end of an exposure until the camera must have offered its frame.
+        Time from the end of an exposure within which the camera must have offered its frame, for
+        example `30 s`.
     answer_timeout
-        Until the camera must have taken a setting.
+        Time within which the camera must have taken a setting, for example `5 s`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

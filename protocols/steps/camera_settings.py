@@ -31,7 +31,15 @@ MARGIN_S = 0.5
 
 
 class CameraSettings(BaseModel):
-    """How the camera is set; the shutter time has a key of its own."""
+    """Sensitivity and aperture of the camera; the shutter time has a key of its own.
+
+    Attributes
+    ----------
+    iso
+        ISO sensitivity, one of those that the camera offers, for example `400`.
+    f_number
+        Aperture as f-number, for example `4`; null for a lens that reports none.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

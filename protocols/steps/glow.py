@@ -28,7 +28,18 @@ LATER = (1 / 16, 1)
 
 
 class GlowSettings(ProtocolModel):
-    """The keys of such a protocol, and the exposures that follow."""
+    """Settings of a protocol that photographs a glow, and the exposures that follow from them.
+
+    Attributes
+    ----------
+    charge
+        Time for which the lamp shines on the sample before each series of photographs, for example
+        `10 min`. A strong glow is enough; it need not be saturated.
+    longest
+        Longest exposure, for example `30 s`.
+    camera
+        Sensitivity and aperture of the camera.
+    """
 
     charge: DurationS = Field(600.0, gt=0)
     longest: DurationS = Field(30.0, gt=0)
