@@ -23,14 +23,16 @@ DRAIN_POLL_S = 0.01
 
 
 class SerialLine:
-    """Bytes out, bytes in, time-outs and one-line errors.
+    """Writing and reading with time-outs and one-line errors.
 
     Parameters
     ----------
     port
         Open port whose reads do not block.
+    clock
+        Clock of the time-outs.
     name
-        What to call the device in messages: `Numato board at COM3`.
+        Name of the device in messages, for example `Numato board at COM3`.
     """
 
     def __init__(self, port: SerialPort, clock: Clock, name: str) -> None:
@@ -58,27 +60,27 @@ class SerialLine:
             raise self._gone(error) from None
 
     def read_until(self, end: bytes, timeout_s: float) -> bytes:
-        """Bytes up to and including `end`.
+        """Return the bytes up to and including `end`.
 
         Raises
         ------
         UnclearAnswerError
-            `end` did not come in time; shows what came.
+            `end` did not come in time; the message shows the bytes that came.
         """
         return self._read(lambda came: came.endswith(end), f"{end!r} at the end", timeout_s)
 
     def read_exactly(self, count: int, timeout_s: float) -> bytes:
-        """The next `count` bytes.
+        """Return the next `count` bytes.
 
         Raises
         ------
         UnclearAnswerError
-            They did not come in time; shows what came.
+            They did not come in time; the message shows the bytes that came.
         """
         return self._read(lambda came: len(came) == count, f"{count} bytes", timeout_s)
 
     def drain(self, quiet_s: float = LATEST_ANSWER_S, timeout_s: float = DRAIN_S) -> bytes:
-        """What comes until the line is quiet for `quiet_s`."""
+        """Return all bytes that come until the line is quiet for `quiet_s`."""
         deadline_s = self._clock.now() + timeout_s
         quiet_since_s = self._clock.now()
         came = b""
@@ -91,14 +93,14 @@ class SerialLine:
         return came
 
     def read_burst(self, quiet_s: float) -> bytes:
-        """What comes in one go: begun within `LATEST_ANSWER_S`, ended by a pause of `quiet_s`."""
+        """Return one burst: begun within `LATEST_ANSWER_S`, ended by a pause of `quiet_s`."""
         deadline_s = self._clock.now() + LATEST_ANSWER_S
         while not self._waiting() and self._clock.now() < deadline_s:
             self._clock.sleep(POLL_S)
         return self.drain(quiet_s) if self._waiting() else b""
 
     def _read(self, is_all: Callable[[bytes], bool], expected: str, timeout_s: float) -> bytes:
-        """Bytes one by one, so that none is taken that comes after."""
+        """Read bytes one by one, so that later ones stay in the port."""
         deadline_s = self._clock.now() + timeout_s
         came = b""
         while not is_all(came):

@@ -1,7 +1,8 @@
-"""A blank: the decay's sequence on what does not glow, for the light that is no glow.
+"""A blank: the sequence of a decay on an inert card, for background and stray light.
 
 A lamp that is off still glows a little (Nalbach et al., section 4.4), light leaks in, a stray
-reflection finds its way. An inert card in the sample's place shows all of that and nothing else.
+reflection reaches the camera. An inert card in the sample's place shows all of that and nothing
+else.
 """
 
 from collections.abc import Sequence
@@ -112,34 +113,34 @@ class Blank(ProtocolModel):
         return self
 
     def units(self) -> Sequence[Unit]:
-        """Darks, the sequences, the bench as it was."""
+        """Return dark frames, the sequences, and the bench put back."""
         sequences = [SequenceUnit(self, number) for number in range(1, len(self.later_by) + 1)]
         return [BlankDarkUnit(self), *sequences, PutBackUnit(Arrangement("grey card"))]
 
     def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
+        """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def exposures_s(self, offers: CameraOffers) -> tuple[float, float]:
-        """Of the first frame of a sequence, and of all others."""
+        """Return the shutter times of a sequence's first frame and of all others, in seconds."""
         longest_s = offers.exposure_at_most(self.every - offers.overhead_s - MARGIN_S)
         return min(offers.exposure_at_most(self.exposure), longest_s), longest_s
 
     def times_s(self, earliest_s: float, later_s: float) -> list[float]:
-        """Begin of each frame of a sequence after lamp off."""
+        """Return the begin of each frame of a sequence in seconds after lamp off."""
         first_s = (earliest_s if self.first == "auto" else self.first) + later_s
         return frame_times_s(first_s, self.every, self.duration)
 
 
 @dataclass(frozen=True)
 class BlankDarkUnit:
-    """Dark frames in the pose of the sequences, the blank already there."""
+    """Dark frames in the pose of the sequences, with the blank in its place."""
 
     protocol: Blank
     name: str = "dark"
 
     def run(self, session: Session) -> None:
-        """At the shortest shutter time and at those to come; a lamp that burns is refused."""
+        """Photograph at the shortest shutter time and at the later ones; refuse a burning lamp."""
         session.ask(BLANK)
         session.wait_until_warm("camera")
         face_camera(session)
@@ -154,18 +155,18 @@ class BlankDarkUnit:
 
 @dataclass(frozen=True)
 class SequenceUnit:
-    """Lamp on for a while, off, then frames as in a decay."""
+    """A charge of the blank, lamp off, then frames as in a decay."""
 
     protocol: Blank
     number: int
 
     @property
     def name(self) -> str:
-        """`blank-1`, `blank-2`, …"""
+        """Name of the unit: `blank-1`, `blank-2`, …"""
         return f"blank-{self.number}"
 
     def run(self, session: Session) -> None:
-        """Later by a little in each sequence."""
+        """Charge and photograph, a little later in each sequence."""
         protocol = self.protocol
         session.wait_until_warm("camera")
         first_s, others_s = protocol.exposures_s(session.rig[CAMERA].offers())

@@ -139,25 +139,25 @@ class DecaySettings(ProtocolModel):
         return self
 
     def frame_times_s(self) -> list[float]:
-        """Planned begin of each frame, seconds after lamp off."""
+        """Return the planned begin of each frame in seconds after lamp off."""
         return frame_times_s(self.first, self.every, self.duration)
 
     def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
+        """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def longest_exposure_s(self, offers: CameraOffers) -> float:
-        """Longest offered shutter time that fits between two frames."""
+        """Return the longest offered shutter time that fits between two frames, in seconds."""
         return offers.exposure_at_most(self.every - offers.overhead_s - MARGIN_S)
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
-        """Shutter time of each dark frame."""
+        """Return the shutter time of each dark frame in seconds."""
         if isinstance(self.exposure, float):
             return [offers.exposure_near(self.exposure)] * DARKS_PER_EXPOSURE
         return dark_exposures_s(self.longest_exposure_s(offers), offers)
 
     def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
-        """Begin after lamp off and shutter time of each metering frame; for `grow`, to the end."""
+        """Return begin and shutter time of each metering frame; for `grow`, along the decay."""
         longest_s = self.longest_exposure_s(offers)
         pause_s = offers.overhead_s + MARGIN_S
         ladder, at_s = [], self.first
@@ -180,7 +180,7 @@ class DecaySettings(ProtocolModel):
         metering: Sequence[MeteringFrame],
         warn: Callable[[str], None],
     ) -> Schedule:
-        """Frames of a decay; their shutter times rest on the metering's, unless they are given."""
+        """Return the frames of a decay; their shutter times follow from metering, unless given."""
         times_s = self.frame_times_s()
         if isinstance(self.exposure, float):
             return Schedule.constant(times_s, offers.exposure_near(self.exposure))
@@ -194,35 +194,39 @@ class DecaySettings(ProtocolModel):
         expected: Callable[[float, float], Sequence[FrameMeasurement]],
         warn: Callable[[str], None],
     ) -> Schedule:
-        """What `schedule` will come to, before anything is measured.
+        """Return the expected result of `schedule`, before anything is measured.
 
         Parameters
         ----------
+        offers
+            Exposure settings that the camera offers.
         expected
-            What a frame of the glow will show in each patch, from its begin after lamp off and its
-            shutter time in seconds.
+            Function that predicts a frame of the glow in each patch, from its begin after lamp off
+            and its shutter time in seconds.
+        warn
+            Function that receives warnings.
         """
         metering = [MeteringFrame(*at, expected(*at)) for at in self.meter_ladder(offers)]
         return self.schedule(offers, metering, warn)
 
     def short_settings(self, session: Session) -> list[ExposureSettings]:
-        """For a closer look at what clips."""
+        """Return the settings of the shortest metering frames, for a check of clipped frames."""
         ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
         return [self.settings(exposure_s) for _, exposure_s in ladder]
 
     def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
-        """Holds a unit's frames against what should have happened, and what `metering` saw."""
+        """Return the sanity checks of a unit's frames, compared with those of `metering`."""
         background = self.background if self.dark == "background" else None
         regions = list(self.patches.values())
         return SanityChecks(session, unit, regions, background, metering=metering)
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
-        """Lamp on for that long, for its own warm-up at the least."""
+        """Charge for that long, and at least for the lamp's warm-up time."""
         charge(session, max(duration_s, session.rig.warm_up_s("lamp")))
 
 
 class DecayFrames(StrEnum):
-    """The glow between two charges, to see whether it still grows."""
+    """Role of frames of the glow between two charges, which show whether it still grows."""
 
     PLATEAU = "plateau"
 
@@ -234,14 +238,14 @@ LAMP_SETTLES_S = 5.0
 
 @dataclass(frozen=True)
 class DecayUnit:
-    """One charge and the decay after it, exposed as the unit `metering` found."""
+    """One charge and the decay after it, with exposures from the unit `metering`."""
 
     protocol: DecaySettings
     name: str
     metering: str = "meter"
 
     def run(self, session: Session) -> None:
-        """Charge, lamp off, one frame every `every` seconds."""
+        """Charge, switch the lamp off, take one frame every `every` seconds."""
         session.wait_until_warm("camera")
         schedule = self._schedule(session)
         check_visible(session, self.protocol.first)
@@ -297,7 +301,7 @@ class DecayUnit:
         )
 
     def _level(self, session: Session) -> bool:
-        """Whether every patch grew by less than the rule allows since the last look."""
+        """Return whether every patch grew by less than the criterion since the last check."""
         metering = [
             frame for frame in session.frames(DecayFrames.PLATEAU) if frame.unit == self.name
         ]
@@ -313,13 +317,13 @@ class DecayUnit:
 
 @dataclass(frozen=True)
 class DaylightUnit:
-    """What the samples look like under the lamp."""
+    """Photographs of the samples under the lamp."""
 
     protocol: DecaySettings
     name: str = "daylight"
 
     def run(self, session: Session) -> None:
-        """Lamp on, a ladder of short exposures, lamp off."""
+        """Switch the lamp on, take a ladder of short exposures, switch the lamp off."""
         if has_door(session):
             session.warn("no daylight photograph: behind a door the lamp lights the sample unseen")
             return
@@ -339,7 +343,7 @@ class Decay(DecaySettings):
     """Decay protocol; `decay.yaml` is the commented example."""
 
     def units(self) -> Sequence[Unit]:
-        """Darks, metering, the decays, daylight; what is not needed is left out."""
+        """Return darks, metering, decays and daylight, as far as needed."""
         units: list[Unit] = []
         if self.dark == "frames":
             units.append(DarkUnit(self))

@@ -1,6 +1,6 @@
 """The emission spectrum: the glow through the LVF at some times after lamp off.
 
-After Nalbach et al., sec. 4.3: it is to be the same at all times, and whatever lamp charged it.
+After Nalbach et al., sec. 4.3, the spectrum is the same at all times, and for every lamp.
 """
 
 from collections.abc import Sequence
@@ -28,12 +28,12 @@ _AFTER = "spectrum-"
 
 
 def lamp_of(unit: str) -> str:
-    """The lamp that charged in such a unit."""
+    """Return the lamp that charged the sample in such a unit."""
     return unit.removeprefix(_AFTER)
 
 
 class SpectrumFrames(StrEnum):
-    """The glow through the filter, and the lit card."""
+    """Roles of frames of the glow through the filter, and of the lit card."""
 
     GLOW = "spectrum"
     WHITE = "white"
@@ -100,19 +100,19 @@ class EmissionSpectrum(GlowSettings):
 
     @property
     def role(self) -> str:
-        """Of the frames of the glow."""
+        """Role of the frames of the glow."""
         return SpectrumFrames.GLOW
 
     def times_s(self) -> Sequence[float]:
-        """Begin of each frame, seconds after lamp off."""
+        """Return the begin of each frame in seconds after lamp off."""
         return self.times
 
     def regions(self) -> Sequence[Region]:
-        """All that the LVF may fill, or every patch; the brightest decides."""
+        """Return the region of the LVF, or every patch; the brightest decides."""
         return list(self.patches.values()) or [self.region]
 
     def units(self) -> Sequence[Unit]:
-        """Darks, then metering and spectrum for each lamp, the white, and all put back."""
+        """Return darks, metering and spectrum for each lamp, white card, the bench put back."""
         stands, now = Arrangement(), Arrangement(lvf="before camera")
         units: list[Unit] = [Arranged(DarkUnit(self), now, stands, THROUGH_IT)]
         for lamp in self.lamps:
@@ -134,11 +134,11 @@ class SpectrumUnit:
 
     @property
     def name(self) -> str:
-        """`spectrum-halogen`, `spectrum-mercury`."""
+        """Name of the unit: `spectrum-halogen`, `spectrum-mercury`."""
         return f"{_AFTER}{self.lamp}"
 
     def run(self, session: Session) -> None:
-        """Charge, lamp off, a frame at every time."""
+        """Charge, switch the lamp off, take a frame at every time."""
         session.wait_until_warm("camera")
         metering = f"meter-{self.lamp}"
         schedule = metered_schedule(session, self.protocol, metering)
@@ -167,7 +167,7 @@ class WhiteUnit:
     name: str = "white"
 
     def run(self, session: Session) -> None:
-        """Lamp on, a ladder of exposures, lamp off."""
+        """Switch the lamp on, take a ladder of exposures, switch the lamp off."""
         session.wait_until_warm("camera")
         light_card(session)
         offers = session.rig[CAMERA].offers()

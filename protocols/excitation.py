@@ -40,25 +40,25 @@ from .steps.sanity_checks import SanityChecks
 
 
 class ExcitationFrames(StrEnum):
-    """The glow after a charge through the filter, and after one by the lamp itself."""
+    """Roles of frames of the glow after a charge through the filter, and by the lamp itself."""
 
     STRIP = "strip"
     DIRECT = "direct"
 
 
 class UnitKind(StrEnum):
-    """Charges through the filter, each twice as long; those that tell most; those without it."""
+    """Kinds of charges: doubling ones through the filter, most informative ones, direct ones."""
 
     STRIP = "strip"
     REFINE = "refine"
     DIRECT = "direct"
 
     def numbered(self, number: int) -> str:
-        """The name of a unit of this kind."""
+        """Return the name of a unit of this kind."""
         return f"{self}-{number}"
 
     def has(self, unit: str) -> bool:
-        """Whether a unit is of this kind."""
+        """Return whether a unit is of this kind."""
         return unit.rpartition("-")[0] == self
 
 
@@ -182,11 +182,11 @@ class ExcitationSettings(ProtocolModel):
         return self
 
     def doubled_s(self, number: int) -> float:
-        """The charge of that number, from 1, while they double."""
+        """Return the duration of the doubling charge of that number, from 1, in seconds."""
         return self.first_charge * 2.0 ** (number - 1)
 
     def frame_times_s(self, lasting_s: float) -> list[float]:
-        """Planned begin of each frame after lamp off."""
+        """Return the planned begin of each frame in seconds after lamp off."""
         times_s, pause_s = [self.first], self.every
         while times_s[-1] + pause_s <= lasting_s:
             times_s.append(times_s[-1] + pause_s)
@@ -194,9 +194,9 @@ class ExcitationSettings(ProtocolModel):
         return times_s
 
     def longest_exposures_s(self, offers: CameraOffers, lasting_s: float) -> list[float]:
-        """Longest offered shutter time of each frame; the last one has the time of the one before.
+        """Return the longest offered shutter time of each frame; the last two are alike.
 
-        A camera must be ready again before the next.
+        A camera must be ready again before the next frame.
         """
         times_s = self.frame_times_s(lasting_s)
         pauses_s = [later - earlier for earlier, later in pairwise(times_s)]
@@ -204,15 +204,15 @@ class ExcitationSettings(ProtocolModel):
         return [offers.exposure_at_most(pause_s - spare_s) for pause_s in (*pauses_s, pauses_s[-1])]
 
     def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
+        """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
-        """Shutter time of each dark frame."""
+        """Return the shutter time of each dark frame in seconds."""
         return dark_exposures_s(max(self.longest_exposures_s(offers, self.last_decay)), offers)
 
     def ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
-        """Begin after lamp off and shutter time of each metering frame."""
+        """Return begin after lamp off and shutter time of each metering frame."""
         longest_s = max(self.longest_exposures_s(offers, self.duration))
         at_s, ladder = self.first, []
         for fraction in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
@@ -222,11 +222,11 @@ class ExcitationSettings(ProtocolModel):
         return ladder
 
     def regions(self) -> list[Region]:
-        """Where a glow is to be seen: every patch, or the strip on the sample."""
+        """Return the regions of the glow: every patch, or the strip on the sample."""
         return list(self.patches.values()) or [self.sites]
 
     def strip(self) -> list[Region]:
-        """Places along each of the regions, those of one after those of another."""
+        """Return places along each of the regions, region by region."""
         return [
             (x + width * k / PLACES, y, width / PLACES, height)
             for x, y, width, height in self.regions()
@@ -253,24 +253,24 @@ FRESH = ManualStep(
 
 @dataclass(frozen=True)
 class ExcitationUnit:
-    """What all units share."""
+    """Common part of all units."""
 
     protocol: ExcitationSettings
     frame_cache: FrameCache
 
     def darks(self, session: Session) -> list[MeteringFrame]:
-        """One dark frame of each shutter time."""
+        """Return one measured dark frame of each shutter time."""
         frames = {frame.exposure_s: frame for frame in session.frames(FrameRole.DARK)}
         return [self.frame_cache.measure_frame(frame) for frame in frames.values()]
 
     def rates(self, frame: FrameRecord, darks: Sequence[MeteringFrame]) -> FloatArray:
-        """(patches, places) along the strip, brightest channel above darkness, DN/s."""
+        """Return the brightest channel's rate along the strip in DN/s, shape (patches, places)."""
         seen = self.frame_cache.measure_frame(frame)
         above = levels(seen) - dark_level(darks, frame.exposure_s)
         return np.asarray(above.max(axis=1) / frame.exposure_s).reshape(-1, PLACES)
 
     def rest(self, session: Session) -> None:
-        """Darkness until hardly anything glows, or another sample."""
+        """Wait in the dark until the sample hardly glows, or have another sample put in."""
         rule = self.protocol.rest
         if self.protocol.samples > 1:
             session.ask(FRESH)
@@ -293,7 +293,7 @@ class ExcitationUnit:
             rested_s += rule.check_every
 
     def _is_dark(self, session: Session) -> bool:
-        """Whether the glow of every patch is low against that just after the last charge."""
+        """Return whether the glow of every patch is low against that after the last charge."""
         frames = [
             *session.frames(ExcitationFrames.STRIP),
             *session.frames(ExcitationFrames.DIRECT),
@@ -309,12 +309,12 @@ class ExcitationUnit:
 
 @dataclass(frozen=True)
 class DarkUnit(ExcitationUnit):
-    """Dark frames at the exposures to come, before anything glows."""
+    """Dark frames at the later exposures, before anything glows."""
 
     name: str = "dark"
 
     def run(self, session: Session) -> None:
-        """Warm the camera up, then photograph darkness."""
+        """Warm the camera up, then photograph in the dark."""
         session.wait_until_warm("camera")
         offers, regions = session.rig[CAMERA].offers(), self.protocol.regions()
         exposures_s = self.protocol.dark_exposures_s(offers)
@@ -326,7 +326,7 @@ class DarkUnit(ExcitationUnit):
 
 @dataclass(frozen=True)
 class _Meter(ExcitationUnit):
-    """A charge whose glow says how long to expose."""
+    """A charge whose glow determines the exposures."""
 
     def _meter(self, session: Session, unit: str, hand: ManualStep, charge_s: float) -> None:
         session.wait_until_warm("camera")
@@ -349,23 +349,23 @@ class _Meter(ExcitationUnit):
 
 @dataclass(frozen=True)
 class StripMeter(_Meter):
-    """Through the variable filter."""
+    """Metering charge through the variable filter."""
 
     name: str = "strip-meter"
 
     def run(self, session: Session) -> None:
-        """Lay the filter on, charge, a ladder of exposures."""
+        """Lay the filter on, charge, take a ladder of exposures."""
         self._meter(session, self.name, LVF_ON, self.protocol.first_charge)
 
 
 @dataclass(frozen=True)
 class DirectMeter(_Meter):
-    """Without the filter."""
+    """Metering charge without the filter."""
 
     name: str = "direct-meter"
 
     def run(self, session: Session) -> None:
-        """Take the filter away, charge, a ladder of exposures."""
+        """Take the filter away, charge, take a ladder of exposures."""
         self.rest(session)
         self._meter(session, self.name, LVF_AWAY, self.protocol.direct[0])
 
@@ -400,7 +400,7 @@ class _Charged(ExcitationUnit):
         )
 
     def _schedule(self, session: Session, role: str, charge_s: float, lasting_s: float) -> Schedule:
-        """Exposures by what was seen after the longest charge like this one, else by the meter."""
+        """Return exposures that follow from the longest similar charge, else from the metering."""
         protocol, offers = self.protocol, session.rig[CAMERA].offers()
         times_s = protocol.frame_times_s(lasting_s)
         longest_s = max(protocol.longest_exposures_s(offers, lasting_s))
@@ -417,7 +417,7 @@ class _Charged(ExcitationUnit):
         return session.choose("exposure", decide, Schedule.constant(times_s, longest_s))
 
     def _looked_at(self, session: Session, role: str) -> tuple[float, list[FrameRecord]]:
-        """Charge time and frames of the longest charge of the kind."""
+        """Return charge time and frames of the longest charge of the kind."""
         done = self._done(session, role)
         if done:
             return max(done, key=lambda one: one[0])
@@ -427,7 +427,7 @@ class _Charged(ExcitationUnit):
         ]
 
     def _done(self, session: Session, role: str) -> list[tuple[float, list[FrameRecord]]]:
-        """Charge time and frames of every charge of the kind so far."""
+        """Return charge time and frames of every charge of the kind so far."""
         units: dict[str, list[FrameRecord]] = {}
         for frame in session.frames(role):
             units.setdefault(frame.unit, []).append(frame)
@@ -436,7 +436,7 @@ class _Charged(ExcitationUnit):
     def _grown(
         self, session: Session, done: Sequence[tuple[float, list[FrameRecord]]]
     ) -> tuple[list[float], FloatArray]:
-        """Charge times, and the glow of every place in the first frame after each."""
+        """Return the charge times, and the glow of every place in the first frame after each."""
         darks = self.darks(session)
         return [one[0] for one in done], np.array(
             [self.rates(frames[0], darks) for _, frames in done]
@@ -444,24 +444,24 @@ class _Charged(ExcitationUnit):
 
 
 def _lit_s(session: Session, unit: str) -> float:
-    """For how long the lamp shone in a unit."""
+    """Return the time for which the lamp shone in a unit, in seconds."""
     times_s = [action.start_time for action in session.actions("lamp") if action.unit == unit]
     return times_s[1] - times_s[0]
 
 
 @dataclass(frozen=True)
 class DoublingUnit(_Charged):
-    """Through the filter, twice as long as the one before, unless the glow has stopped growing."""
+    """Charge through the filter, twice as long as the last, unless the glow has stopped growing."""
 
     number: int
 
     @property
     def name(self) -> str:
-        """`strip-1`, `strip-2`, …"""
+        """Name of the unit: `strip-1`, `strip-2`, …"""
         return UnitKind.STRIP.numbered(self.number)
 
     def run(self, session: Session) -> None:
-        """Charge and photograph, or find that it is enough."""
+        """Charge and photograph, unless the glow has stopped growing."""
 
         def grows() -> bool:
             done = self._done(session, ExcitationFrames.STRIP)
@@ -478,13 +478,13 @@ class DoublingUnit(_Charged):
 
 @dataclass(frozen=True)
 class RefiningUnit(_Charged):
-    """Through the filter, for as long as tells most."""
+    """Charge through the filter, of the most informative duration."""
 
     number: int
 
     @property
     def name(self) -> str:
-        """`refine-1`, `refine-2`, …"""
+        """Name of the unit: `refine-1`, `refine-2`, …"""
         return UnitKind.REFINE.numbered(self.number)
 
     def run(self, session: Session) -> None:
@@ -503,13 +503,13 @@ class RefiningUnit(_Charged):
 
 @dataclass(frozen=True)
 class DirectUnit(_Charged):
-    """Under the lamp itself; after the last one, a longer decay."""
+    """Charge by the lamp itself; after the last one, a longer decay."""
 
     number: int
 
     @property
     def name(self) -> str:
-        """`direct-1`, `direct-2`, …"""
+        """Name of the unit: `direct-1`, `direct-2`, …"""
         return UnitKind.DIRECT.numbered(self.number)
 
     def run(self, session: Session) -> None:
@@ -525,7 +525,7 @@ class Excitation(ExcitationSettings):
     """Excitation protocol; `excitation.yaml` is the commented example."""
 
     def units(self) -> Sequence[Unit]:
-        """Darks; a metered charge and all others through the filter; the same without it."""
+        """Return darks, then metering and charges through the filter, then the same without it."""
         frame_cache = FrameCache(self.strip())
         return [
             DarkUnit(self, frame_cache),

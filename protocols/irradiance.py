@@ -1,4 +1,4 @@
-"""What the lamp does to the sample: by itself, and through the LVF that lies on it.
+"""Irradiance of the lamp at the sample, by itself and through the LVF that lies on it.
 
 The map lamp × LVF at the sample's plane enters excitation rates one to one (Nalbach et al.,
 Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.6): it is measured.
@@ -21,7 +21,7 @@ from .steps.scenes import Arrangement, Bracketing, PutBackUnit, SceneUnit, Still
 
 
 class CardFrames(StrEnum):
-    """The card under the lamp by itself, and through the filter."""
+    """Roles of frames of the card under the lamp by itself, and through the filter."""
 
     DIRECT = "irradiance-direct"
     THROUGH = "irradiance-through"
@@ -78,11 +78,11 @@ class Irradiance(ProtocolModel):
 
     @property
     def bracketing(self) -> Bracketing:
-        """How the card is photographed."""
+        """Bracketing with which the card is photographed."""
         return Bracketing(self.camera, self.longest, self.repeats)
 
     def units(self) -> Sequence[Unit]:
-        """Darks, then the card by itself and through the LVF in turn: the lamp drifts."""
+        """Return darks, then the card by itself and through the LVF in turn, as the lamp drifts."""
         units: list[SceneUnit] = []
         for number in range(1, self.rounds + 1):
             before = units[-1].wanted if units else Arrangement()

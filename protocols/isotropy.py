@@ -1,4 +1,4 @@
-"""Isotropy: the glow seen at several angles, the charge always the same.
+"""Isotropy: the glow at several angles, always after the same charge.
 
 After Nalbach et al., sec. 4: 0° to 80° in 20° steps, the intensity fluctuated by less than 5 %.
 """
@@ -66,19 +66,19 @@ class Isotropy(GlowSettings):
 
     @property
     def role(self) -> str:
-        """Of the frames of the glow."""
+        """Role of the frames of the glow."""
         return "isotropy"
 
     def times_s(self) -> Sequence[float]:
-        """Begin of each frame, seconds after lamp off."""
+        """Return the begin of each frame in seconds after lamp off."""
         return [self.first + number * self.every for number in range(self.frames)]
 
     def regions(self) -> Sequence[Region]:
-        """The patches."""
+        """Return the regions of the patches."""
         return list(self.patches.values())
 
     def units(self) -> Sequence[Unit]:
-        """Darks, metering, every angle between two straight views."""
+        """Return darks, metering, and every angle between two straight views."""
         units: list[Unit] = [DarkUnit(self), MeterUnit(self, self.charge)]
         stands = 0
         for name, angle in [("before", 0), *((str(a), a) for a in self.angles), ("after", 0)]:
@@ -89,14 +89,14 @@ class Isotropy(GlowSettings):
 
 @dataclass(frozen=True)
 class AngleUnit:
-    """One charge, seen straight; then the glow at an angle.
+    """One charge at normal incidence; then the glow at an angle.
 
     Attributes
     ----------
     angle
-        Against the camera's axis, degrees.
+        Angle of the sample against the camera's axis, in degrees.
     stands
-        The angle that the unit before left it at.
+        Angle at which the unit before left the sample, in degrees.
     """
 
     protocol: Isotropy
@@ -105,7 +105,7 @@ class AngleUnit:
     stands: int
 
     def run(self, session: Session) -> None:
-        """Straight, charge, lamp off, turn, photograph."""
+        """Turn straight, charge, switch the lamp off, turn, photograph."""
         session.wait_until_warm("camera")
         schedule = metered_schedule(session, self.protocol, "meter")
         if self.stands:

@@ -37,7 +37,7 @@ from .steps.scenes import (
 
 
 class LvfFrames(StrEnum):
-    """The card; the strip looked through and on the sample; mercury lines there; their stripes."""
+    """Roles of frames of card, strip before camera and on sample, mercury lines and stripes."""
 
     CARD = "lvf-card"
     FILTER = "lvf-filter"
@@ -54,16 +54,16 @@ STRIPES_LADDER = (1 / 512, 1 / 64, 1 / 8, 1)
 
 
 def filter_unit(name: str | None) -> str:
-    """Name of the unit of a colour filter."""
+    """Return the name of the unit of a colour filter."""
     return f"filter-{name or NO_FILTER}"
 
 
 @dataclass(frozen=True)
 class StripUnit(SceneUnit):
-    """The strip under a halogen lamp, looked through or on the sample."""
+    """The strip under a halogen lamp, before the camera or on the sample."""
 
     def check(self, session: Session) -> None:
-        """It has to be seen, whole and straight."""
+        """Check that the strip is visible, whole and straight."""
         session.choose("strip", lambda: self._strip(session), worst="found")
 
     def _strip(self, session: Session) -> str:
@@ -80,16 +80,16 @@ class LinesUnit(SceneUnit):
     Attributes
     ----------
     strip
-        Purpose and unit of the strip under a halogen lamp.
+        Role and unit of the frames of the strip under a halogen lamp.
     rising
-        Whether wavelengths should rise from left to right.
+        Whether wavelengths should rise from left to right; None: either way.
     """
 
     strip: tuple[str, str] = ("", "")
     rising: bool | None = None
 
     def check(self, session: Session) -> None:
-        """Its lines have to be seen, the right way round."""
+        """Check that the mercury lines are visible, the right way round."""
         session.choose("mercury", lambda: self._lines(session), worst="lines found")
 
     def _lines(self, session: Session) -> str:
@@ -103,7 +103,7 @@ class FilterUnit(SceneUnit):
     """A colour filter, seen through the strip."""
 
     def check(self, session: Session) -> None:
-        """Tell at once of a filter that seems not to be in its place."""
+        """Warn of a filter that seems not to be in its place."""
         if session.choose("like the picture before", lambda: self._same(session), worst=False):
             session.warn(
                 f"the picture with the colour filter {self.wanted.filter} is like the one before "
@@ -125,14 +125,14 @@ class FilterUnit(SceneUnit):
 
 @dataclass(frozen=True)
 class StripesUnit(SceneUnit):
-    """The sample charged by mercury lines through the strip: where they glow, the map is pinned.
+    """The sample charged by mercury lines through the strip, whose glow fixes the map.
 
     Without a trap door the sample is seen where it lies.
 
     Attributes
     ----------
     charge_s
-        For how long.
+        Duration of the charge in seconds.
     """
 
     charge_s: float = 600.0
@@ -223,21 +223,21 @@ class LvfCalibration(ProtocolModel):
 
     @property
     def bracketing(self) -> Bracketing:
-        """How everything but the stripes is photographed."""
+        """Bracketing of all scenes but the stripes."""
         return Bracketing(self.camera, self.longest, self.repeats)
 
     def filter_names(self) -> tuple[str, ...]:
-        """The colour filters, one after the other; `suited_to` no rig, all are the shipped ones."""
+        """Return the names of the colour filters; before `suited_to`, `all` are those shipped."""
         return tuple(Optics().filter_files()) if self.filters == "all" else self.filters
 
     def suited_to(self, rig: RigFile) -> Self:
-        """With the names of all filters that the rig file has curves of."""
+        """Return the protocol with the names of all filters of which the rig file has curves."""
         if self.filters != "all":
             return self
         return self.model_copy(update={"filters": tuple(rig.optics.filter_files())})
 
     def units(self) -> Sequence[Unit]:
-        """All that can go wrong first: the strip and its lines; then filter by filter."""
+        """Return first what can go wrong, the strip and its lines, then filter by filter."""
         units: list[SceneUnit] = []
         for kind, name, role, wanted, more in self._scenes():
             before = units[-1].wanted if units else Arrangement()

@@ -1,4 +1,4 @@
-"""All that a phosphor's material file holds, in one afternoon: one protocol after the other.
+"""Measurement of a phosphor's whole material file, by one protocol after the other.
 
 After Nalbach et al., sections 4.2 to 4.7.
 """
@@ -58,18 +58,18 @@ class Phosphor(ProtocolModel):
         return self
 
     def chain(self) -> tuple["Part", ...]:
-        """The protocols in order, each with the sample and the patches of the chain."""
+        """Return the protocols in order, each with the sample and the patches of the chain."""
         return tuple(Part.read(content, self) for content in self.parts)
 
     def patches_of(self, unit: str) -> Mapping[str, Region]:
-        """Those of the part that the unit is of."""
+        """Return the patches of the part to which the unit belongs."""
         for part in self.chain():
             if (own := unit_within(part.name, unit)) is not None:
                 return part.protocol.patches_of(own)
         return self.patches
 
     def suited_to(self, rig: RigFile) -> Self:
-        """With what its parts leave to the rig file filled in."""
+        """Return the chain with the keys filled in that its parts leave to the rig file."""
         parts = [
             content | _changed(part.protocol, part.protocol.suited_to(rig))
             for content, part in zip(self.parts, self.chain(), strict=True)
@@ -77,7 +77,7 @@ class Phosphor(ProtocolModel):
         return self.model_copy(update={"parts": tuple(parts)})
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
-        """What neither the rig file names nor an earlier part measures."""
+        """Return the protocols that neither the rig file names nor an earlier part measures."""
         measured: set[str] = set()
         missing: list[str] = []
         for part in self.chain():
@@ -86,7 +86,7 @@ class Phosphor(ProtocolModel):
         return missing
 
     def units(self) -> Sequence[Unit]:
-        """Those of all parts, in order."""
+        """Return the units of all parts, in order."""
         return [
             PartUnit(part.name, unit) for part in self.chain() for unit in part.protocol.units()
         ]
@@ -101,12 +101,12 @@ class Part:
 
     @classmethod
     def read(cls, content: dict[str, Any], chain: Phosphor) -> Self:
-        """A protocol written as in a file of its own.
+        """Return a protocol that is written as in a file of its own.
 
         Raises
         ------
         ValueError
-            It names no protocol that may be a part, or other patches than the chain.
+            The content names no protocol that may be a part, or other patches than the chain.
         """
         keys = dict(content)
         kind = keys.get("protocol")
@@ -129,7 +129,7 @@ class Part:
 
 
 def _changed(before: ProtocolModel, after: ProtocolModel) -> dict[str, Any]:
-    """Keys, as written in YAML, that are other after than before."""
+    """Return the keys, as written in YAML, that differ between two protocols."""
     kept = before.model_dump(mode="json", by_alias=True)
     now = after.model_dump(mode="json", by_alias=True)
     return {key: value for key, value in now.items() if value != kept[key]}

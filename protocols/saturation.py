@@ -1,7 +1,7 @@
 """Saturation: decays after short and long charges, under the lamp and under a weaker light.
 
-Nalbach et al. take r(0) = 1 after a long charge (sec. 4.4). Saturation in time is not saturation
-in level: two irradiances tell the two apart. And the rates are to be the same whatever the charge.
+Nalbach et al. take r(0) = 1 after a long charge (sec. 4.4). Saturation in time is not saturation in
+level: two irradiances distinguish them. And the rates should not depend on the charge.
 """
 
 from collections.abc import Sequence
@@ -23,18 +23,18 @@ from .steps.scenes import Arranged, Arrangement, Prepared
 
 
 class Light(StrEnum):
-    """What charged the sample: the lamp as it is, or weakened."""
+    """Light that charged the sample: the lamp at full or weaker irradiance."""
 
     FULL = "full"
     WEAKER = "weaker"
 
     def numbered(self, number: int) -> str:
-        """The unit of a charge under this light."""
+        """Return the name of the unit of a charge under this light."""
         return f"{self}-{number}"
 
     @classmethod
     def of(cls, unit: str) -> Self:
-        """The light of such a unit."""
+        """Return the light of such a unit."""
         return cls(unit.rpartition("-")[0])
 
 
@@ -75,14 +75,14 @@ class WeakerLight(BaseModel):
         return self
 
     def begun(self, unit: Unit) -> Unit:
-        """`unit`, the light weakened before it."""
+        """Return `unit` with the light weakened before it."""
         if self.filter is not None:
             return Arranged(unit, Arrangement(filter=self.filter), Arrangement(), WHY)
         what = f"move the lamp to a distance of {self.distance} from the sample"
         return Prepared(unit, ManualStep(what, WHY, f"lamp at {self.distance}"))
 
     def ended(self, unit: Unit) -> Unit:
-        """`unit`, the light as it was before it."""
+        """Return `unit` with the light restored before it."""
         if self.filter is not None:
             return Arranged(unit, Arrangement(), Arrangement(filter=self.filter), WHY)
         return Prepared(unit, ManualStep("move the lamp back", WHY, "lamp back"))
@@ -141,7 +141,7 @@ class Saturation(ProtocolModel):
         return self
 
     def units(self) -> Sequence[Unit]:
-        """Darks, then metering and decays, weaker light first: each begins with less glow left."""
+        """Return darks, then metering and decays, weaker light first: each leaves less glow."""
         dark, full = DarkUnit(self._decay(self.charges[0])), self._decays(Light.FULL)
         if self.weaker is None:
             return [dark, *full]
@@ -166,7 +166,7 @@ class Saturation(ProtocolModel):
         return decays
 
     def _decay(self, charge_s: float) -> Decay:
-        """One of the decays as a protocol of its own."""
+        """Return one of the decays as a protocol of its own."""
         exposure = self.exposure if isinstance(self.exposure, str) else f"{self.exposure!r} s"
         return Decay.model_validate(
             {

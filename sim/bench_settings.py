@@ -1,4 +1,4 @@
-"""What stands between lamp, sample and camera, as a rig file's `simulation:` describes it."""
+"""Settings of the parts between lamp, sample and camera in a rig file's `simulation:`."""
 
 from typing import Annotated, Self
 
@@ -12,7 +12,7 @@ Nanometres = Annotated[float, Field(ge=300, le=900)]
 
 
 class Part(BaseModel):
-    """Of a simulated room; never changes."""
+    """Part of a simulated room; never changes."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -175,9 +175,9 @@ class TemperatureSettings(Part):
     drift_per_hour: Annotated[float, Field(ge=-10, le=10)] = 0.0
 
     def celsius(self, time_s: float) -> float:
-        """At a time after the epoch."""
+        """Return the temperature at a time after the epoch, in degrees Celsius."""
         return self.start + self.drift_per_hour * time_s / 3600.0
 
     def later(self, seconds: float) -> Self:
-        """The same of a room that opens so much later."""
+        """Return the settings of a room that opens later by that time."""
         return self.model_copy(update={"start": self.celsius(seconds)})

@@ -1,4 +1,4 @@
-"""What the changer lays before lamp and camera: a grey card, a ColorChecker."""
+"""Cards before lamp and camera: a grey card, a ColorChecker."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,10 @@ GREY = (0.972, 0.995, 1.003, 1.0, 0.998, 1.0, 1.008)
 
 
 def reflectances(card: Card, grey: float) -> FloatArray:
-    """Of all surfaces of a card, shape (surfaces, 160) on `WAVELENGTH_NM`.
+    """Return reflectances of all surfaces of a card, shape (surfaces, 160) on `WAVELENGTH_NM`.
 
-    Surface 0 is where the card is not, and 0. A grey card, or a blank of the same, is surface 1;
-    of a ColorChecker, row by row, 1 to 24, its frame is 25.
+    Surface 0 is outside of the card, and 0. A grey card, or a blank of the same, is surface 1; of a
+    ColorChecker, row by row, 1 to 24, its frame is 25.
     """
     nothing = np.zeros((1, len(WAVELENGTH_NM)))
     if card == "sample":
@@ -37,7 +37,7 @@ def reflectances(card: Card, grey: float) -> FloatArray:
 
 
 def surfaces(card: Card, chart: Region, width: int, height: int) -> IntArray:
-    """Which surface of a card that lies on top is in every pixel, shape (height, width).
+    """Return the surface of a card on top in every pixel, shape (height, width).
 
     A grey card fills the picture, a ColorChecker its region. A blank lies below.
     """
@@ -57,7 +57,7 @@ def surfaces(card: Card, chart: Region, width: int, height: int) -> IntArray:
 
 
 def _colorchecker() -> FloatArray:
-    """BabelColor's averages over 30 ColorCheckers, shape (24, 160); the ends go on."""
+    """Return BabelColor's means over 30 ColorCheckers, shape (24, 160), constant at the ends."""
     import colour  # takes seconds to load
 
     patches = colour.SDS_COLOURCHECKERS["BabelColor Average"].values()

@@ -1,4 +1,4 @@
-"""From the register of the relay board to the filament: a contact, a bulb, and what ails them."""
+"""The circuit from the relay board's register to the filament: contact and bulb, with faults."""
 
 from collections.abc import Sequence
 
@@ -14,19 +14,20 @@ from .simulation import LampSettings
 class LampCircuit:
     """The lamp behind its relay.
 
-    Nothing runs in the background: what has become of contact and bulb is worked out when
-    somebody asks.
+    Nothing runs in the background: the states of contact and bulb are computed when they are asked
+    for.
 
     Parameters
     ----------
     settings
-        Of the lamp.
+        Settings of the lamp.
     asked_on
-        What the register says when the room is opened.
+        State of the register when the room is opened.
     faults
-        `lamp_dead`, `mercury_dead`, `relay_dead` and `relay_welded` are the circuit's.
+        Faults of the room, of which `lamp_dead`, `mercury_dead`, `relay_dead` and `relay_welded`
+        are the circuit's.
     clock
-        The room's.
+        The room's clock.
     """
 
     def __init__(
@@ -53,7 +54,7 @@ class LampCircuit:
 
     @property
     def closed(self) -> bool:
-        """Whether the contact is closed now: whether the lamp has current, if its bulb is whole."""
+        """Whether the contact is closed now, so that the lamp has current if its bulb is whole."""
         self._follow()
         return self._closed
 
@@ -70,13 +71,13 @@ class LampCircuit:
         return self._mercury
 
     def plug(self, lamp: LampKind) -> None:
-        """Put one lamp instead of the other behind the relay, now."""
+        """Connect another lamp to the relay, now."""
         self._follow()
         self._plugged = lamp
         self._settle(self._clock.now())
 
     def ask(self, on: bool) -> None:
-        """The board's register changes now."""
+        """Change the board's register now."""
         self._follow()
         self._asked_on = on
         self._settle(self._clock.now())

@@ -15,7 +15,7 @@ class RoomClock(VirtualClock):
     epoch_s
         Seconds since 1970 at the clock's zero.
     naps
-        When the PC sleeps; those that began before the room was opened are over.
+        Times at which the PC sleeps; those that began before the room was opened are over.
     """
 
     def __init__(self, epoch_s: float, naps: Iterable[Nap] = ()) -> None:
@@ -27,7 +27,7 @@ class RoomClock(VirtualClock):
         return self._slept_s
 
     def spend(self, duration_s: float) -> None:
-        """As of a virtual clock; one that is slept through takes longer by that."""
+        """Spend time as a virtual clock does, prolonged by sleep."""
         super().spend(duration_s)
         self._sleep_if_tired()
 

@@ -1,4 +1,4 @@
-"""The disk of the PC in the simulated room: the real one, behind what ails it."""
+"""The disk of the PC in the simulated room: the real one, with faults."""
 
 import errno
 import os
@@ -11,16 +11,16 @@ from .faults import AfterBytes, Slowness
 
 
 class SimulatedDisk:
-    """Writes durably to the real disk, as slowly and as much as the faults allow.
+    """Durable writing to the real disk, limited by the faults.
 
     Parameters
     ----------
     clock
-        The room's.
+        The room's clock.
     full
-        When no byte more fits; with `after_bytes`, a write is cut off at that byte.
+        Times at which the disk is full; with `after_bytes`, a write is cut off at that byte.
     slow
-        When each write takes its time.
+        Times at which each write takes long.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class SimulatedDisk:
         Raises
         ------
         OSError
-            ENOSPC; what still fitted is in the file.
+            The disk is full (ENOSPC); the bytes that still fitted are in the file.
         """
         now_s = self._clock.now()
         self._clock.spend(sum(slow.takes for slow in self._slow if slow.is_on(now_s)))
@@ -49,7 +49,7 @@ class SimulatedDisk:
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
     def _fits(self, wanted: int) -> int:
-        """How many of so many bytes the disk has room for."""
+        """Return how many of that number of bytes the disk has room for."""
         now_s, fits = self._clock.now(), wanted
         for number, full in enumerate(self._full):
             if full.after_bytes is None:

@@ -1,7 +1,7 @@
 """The simulated camera's RAW file: an uncompressed Bayer DNG, with EXIF as a Canon writes it.
 
-Written here and not by tifffile, which cannot write an EXIF directory; cameras keep the exposure
-there. Make is `labrig`, so that LibRaw applies no quirks of a model it knows.
+tifffile is not used, since it cannot write an EXIF directory; cameras keep the exposure there. Make
+is `labrig`, so that LibRaw applies no quirks of a known model.
 """
 
 import struct
@@ -41,9 +41,9 @@ Entry = tuple[int, int, Values]
 
 @dataclass(frozen=True)
 class Shot:
-    """What the camera notes about an exposure; `start_s` counts from 1970.
+    """Metadata of an exposure; `start_s` counts from 1970.
 
-    `lens` is its name and focal length in mm; None: it tells nothing.
+    `lens` is its name and focal length in mm; None: it reports nothing.
     """
 
     start_s: float
@@ -54,7 +54,7 @@ class Shot:
 
 
 def exposure_label(exposure_s: float) -> Fraction:
-    """The exposure time that a Canon writes: the dial's label, 1/60 for 1/64 s.
+    """Return the exposure time that a Canon writes: the nominal time, 1/60 for 1/64 s.
 
     Bulb exposures beyond the dial are written in whole seconds.
     """
@@ -66,7 +66,7 @@ def exposure_label(exposure_s: float) -> Fraction:
 
 
 def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
-    """The file's bytes, of a 16-bit `mosaic` (height, width) and the notes in `shot`."""
+    """Return the file's bytes, of a 16-bit `mosaic` (height, width) and the metadata in `shot`."""
     height, width = mosaic.shape
     pixels = mosaic.astype("<u2").tobytes()
     # Whole microseconds first: the clock's seconds must not tip over by rounding twice.
@@ -122,7 +122,7 @@ def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
 
 
 def _directory(entries: list[Entry], at: int) -> bytes:
-    """A TIFF directory that stands at offset `at`, the values that do not fit in it behind it."""
+    """Return a TIFF directory at offset `at`, followed by the values that do not fit in it."""
     table, behind = struct.pack("<H", len(entries)), b""
     behind_at = at + 2 + 12 * len(entries) + 4
     for tag, kind, values in entries:

@@ -1,4 +1,4 @@
-"""What goes wrong in a simulated room, and when: `simulation.faults` of a rig file."""
+"""Faults of a simulated room and their times: `simulation.faults` of a rig file."""
 
 import math
 from collections.abc import Iterable
@@ -30,15 +30,15 @@ class FaultTime(_Part):
 
     @property
     def until(self) -> float:
-        """When it is over."""
+        """End of the fault in seconds; infinity if it lasts for ever."""
         return math.inf if self.lasting is None else self.at + self.lasting
 
     def is_on(self, now_s: float) -> bool:
-        """Whether the fault is there at `now_s`."""
+        """Return whether the fault is there at `now_s`."""
         return self.at <= now_s < self.until
 
     def seen_from(self, opening_s: float) -> Self:
-        """The same on the clock of a room that opens `opening_s` after the rig file's epoch."""
+        """Return the fault on the clock of a room that opens `opening_s` after its epoch."""
         return self.model_copy(update={"at": self.at - opening_s})
 
 
@@ -126,7 +126,7 @@ WhenT = TypeVar("WhenT", bound=FaultTime)
 
 
 def _or_its_name(schema: dict[str, Any]) -> None:
-    """For editors: a fault that is always there may be written as its name alone."""
+    """Allow the name alone in the schema: the fault is then always there."""
     when = {**schema, "minProperties": 1, "maxProperties": 1}
     schema.clear()
     name = {
@@ -238,11 +238,11 @@ class Fault(_Part):
         }
 
     def seen_from(self, opening_s: float) -> Self:
-        """The same on the clock of a room that opens `opening_s` after the rig file's epoch."""
+        """Return the fault on the clock of a room that opens `opening_s` after its epoch."""
         later = {name: when.seen_from(opening_s) for name, when in self if when is not None}
         return self.model_copy(update=later)
 
 
 def given(whens: Iterable[WhenT | None]) -> tuple[WhenT, ...]:
-    """Those that are there at all."""
+    """Return the time spans of the faults that are given."""
     return tuple(when for when in whens if when is not None)

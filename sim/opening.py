@@ -1,4 +1,4 @@
-"""A simulated room with its doors open: boards on serial lines, a camera on USB."""
+"""Opening of a simulated room: boards on serial lines, a camera on USB."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -36,7 +36,7 @@ TEMPERATURE_STREAM = 9
 
 
 class OpenRoom:
-    """The room, its clock and what stands in it."""
+    """The open room, its clock, its boards and its camera."""
 
     def __init__(self, simulation: Simulation, clock: VirtualClock) -> None:
         self.clock = clock
@@ -92,7 +92,7 @@ class OpenRoom:
         )
 
     def usb(self, device: str) -> usb.backend.IBackend | None:
-        """The USB bus on which `device` is alone; `None` if there is no such device."""
+        """Return the USB bus on which `device` is alone; None if there is no such device."""
         return self.camera.backend if device == "camera" else None
 
     def _relay_moved(self, board: str, relay: int, on: bool) -> None:
@@ -151,7 +151,7 @@ def open_room(
 
 
 def _servo_board(simulation: Simulation, clock: VirtualClock) -> MaestroBoard:
-    """The Maestro, its channels at home: trap door closed, shield open."""
+    """Return the Maestro, its channels at home: trap door closed, shield open."""
     homes = {}
     if simulation.shield is not None:
         homes[simulation.shield.channel] = simulation.shield.open
@@ -164,7 +164,7 @@ def _servo_board(simulation: Simulation, clock: VirtualClock) -> MaestroBoard:
 
 
 def _camera_faults(faults: Sequence[Fault]) -> CameraFaults:
-    """What befalls the camera; its cable can be pulled once."""
+    """Return the faults of the camera; its cable can be pulled once."""
     found = CameraFaults(
         busy_spans_s=_spans_s(given(fault.camera_busy for fault in faults)),
         full_spans_s=_spans_s(given(fault.camera_full for fault in faults)),

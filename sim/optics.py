@@ -1,7 +1,7 @@
 """From light to photo-electrons: the simulated camera's own curves, aperture and lens.
 
-The curves are the shipped ones of a Canon EOS 5D Mark II, bent smoothly by as much as three
-laboratories disagree about that camera: labrig, which has the shipped ones, must cope.
+The curves are the shipped ones of a Canon EOS 5D Mark II, changed smoothly by as much as three
+laboratories disagree about that camera: labrig, which has the shipped ones, must tolerate it.
 """
 
 import json
@@ -57,19 +57,19 @@ class CameraCurves:
     sensitivity: FloatArray
 
     def glow_electrons_per_s(self, emission: FloatArray, f_number: float) -> FloatArray:
-        """Of emission spectra (…, wavelengths) in Table 1's scale; shape (…, 3)."""
+        """Return electrons per second of spectra (…, wavelengths) in Table 1's scale, (…, 3)."""
         rate: FloatArray = (
             ELECTRONS_PER_S_NM / f_number**2 * CELL_NM * (emission @ self.sensitivity.T)
         )
         return rate
 
     def reflected_electrons(self, lamp_exposure: FloatArray, f_number: float) -> FloatArray:
-        """Of a white surface under ∫ irradiance dt (wavelengths,); shape (3,)."""
+        """Return electrons of a white surface under ∫ irradiance dt (wavelengths,), shape (3,)."""
         return self.glow_electrons_per_s(REFLECTED * lamp_exposure, f_number)
 
 
 def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
-    """A camera's curves as measured, on the simulator's grid; 0 where they were not.
+    """Return a camera's measured curves on the simulator's grid; 0 beyond the measurement.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
     Raises
     ------
     UsageError
-        No such file, or not such a file.
+        There is no such file, or it has another format.
     """
     path = resources.find("config/optics", "camera", name_or_path)
     try:
@@ -95,7 +95,7 @@ def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
 
 
 def bent_curves(rng: np.random.Generator) -> CameraCurves:
-    """The curves as this simulated camera has them."""
+    """Return the curves of this simulated camera."""
     return CameraCurves(np.array([_bent(row, rng) for row in measured_curves().sensitivity]))
 
 
@@ -122,7 +122,7 @@ def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
 
 
 def emission(material: Material) -> FloatArray:
-    """Λ of every state as a smooth spectrum, shape (states, wavelengths).
+    """Return Λ of every state as a smooth spectrum, shape (states, wavelengths).
 
     A spectrum in the file gives the shape; without one it is the slope of a monotone curve through
     the bands' running sum, so that its mean over each band is the file's number.
@@ -130,7 +130,7 @@ def emission(material: Material) -> FloatArray:
     Raises
     ------
     UsageError
-        The file does not say what the material radiates.
+        The file has no re-radiation.
     """
     if material.bands_nm is None or any(state.reradiation is None for state in material.states):
         raise UsageError(
@@ -155,7 +155,7 @@ def emission(material: Material) -> FloatArray:
 
 
 def vignetting(height: int, width: int, focal_mm: float = FOCAL_MM) -> FloatArray:
-    """Light of a pixel over that in the middle, cos⁴ of the field angle, shape (height, width)."""
+    """Return a pixel's light relative to the middle, cos⁴ of the field angle, (height, width)."""
     y = (np.arange(height) - (height - 1) / 2)[:, None]
     x = (np.arange(width) - (width - 1) / 2)[None, :]
     corner = CORNER_MM / focal_mm

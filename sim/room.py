@@ -49,16 +49,16 @@ class Room:
     Parameters
     ----------
     simulation
-        What the room is like.
+        Settings of the room.
     clock
-        The room's time; its zero is the epoch, at which the camera was switched on.
+        The room's clock; its zero is the epoch, at which the camera was switched on.
     pulses
-        What the doors' servos are sent.
+        Function of a channel that returns the pulses sent to its servo up to now.
 
     Raises
     ------
     UsageError
-        A material that does not exist or cannot glow, or a patch outside the frame.
+        A material does not exist or cannot glow, or a patch is outside the frame.
     """
 
     def __init__(
@@ -98,7 +98,7 @@ class Room:
 
     @property
     def lamp_on(self) -> bool:
-        """Whether the lamp has current, whatever register and bulb say."""
+        """Whether the lamp has current, whatever the states of register and bulb."""
         return self._circuit.closed
 
     @property
@@ -113,12 +113,12 @@ class Room:
 
     @property
     def tasks(self) -> Mapping[str, Callable[..., None]]:
-        """What the changer can do in the room, by the line that tells it."""
+        """Tasks of the changer in the room, by their command line."""
         return self._changer.tasks
 
     @property
     def arrangements(self) -> Arrangements:
-        """What the changer has arranged, up to now."""
+        """Arrangements of the bench up to now."""
         return self._changer.arrangements
 
     def switch_lamp(self, on: bool) -> None:
@@ -126,18 +126,18 @@ class Room:
         self._circuit.ask(on)
 
     def switch_led(self, relay: int, on: bool) -> None:
-        """The contact of a relay moves now; an LED may hang on it."""
+        """Move the contact of a relay now, to which an LED may be connected."""
         self._leds = self._leds.switched(relay, on, self._clock.now())
 
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
-        """The DNG of an exposure that is over.
+        """Return the DNG of an exposure that is over.
 
         Parameters
         ----------
         start_s, exposure_s
-            On the room's clock.
+            Begin and duration of the exposure on the room's clock, in seconds.
         iso, f_number
-            The camera's settings.
+            Sensitivity and aperture of the camera.
 
         Raises
         ------
@@ -171,9 +171,9 @@ class Room:
         return encode_dng(mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number, told))
 
     def preview(self, at_s: float) -> NDArray[np.uint8]:
-        """The viewfinder's picture: R, G, B for a display, with the room light on if there is one.
+        """Return the viewfinder's picture for a display, R, G, B, with the room light if any.
 
-        That light is for the eye only: it does not charge the samples.
+        That light is for display only: it does not charge the samples.
         """
         arrangement = self._changer.arrangements.at(at_s)
         start_s = max(at_s - LIVE_EXPOSURE_S, 0.0)
@@ -197,7 +197,7 @@ class Room:
         )
 
     def truth(self, iso: int = 400, f_number: float = 4.0) -> Truth:
-        """What a perfect fit of the decay after the last lamp-off would find."""
+        """Return the result of a perfect fit of the decay after the last lamp-off."""
         lamps = self._lamps()
         off_s = lamps.last_switch_off(self._clock.now())
         level = effective = None
@@ -233,7 +233,7 @@ class Room:
         )
 
     def write_truth(self, path: Path) -> None:
-        """`truth()` as a JSON file, next to a run, for tests."""
+        """Write `truth()` as a JSON file, next to a run, for tests."""
         self.truth().write(path)
 
     def _lamps(self) -> FilteredLamps:
@@ -267,7 +267,7 @@ class Room:
         seen: VisibleLight,
         f_number: float,
     ) -> NDArray[np.float32]:
-        """Expected electrons in the middle of the lens, shape (places, 3)."""
+        """Return the expected electrons in the middle of the lens, shape (places, 3)."""
         level = self._samples.level_at(start_s, lights, self._changer.arrangements)
         glow_s = self._samples.glow(level, start_s, end_s, arrangement, lights)
         radiance_s = self._view.radiance_s(arrangement, glow_s, seen)

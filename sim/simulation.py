@@ -1,4 +1,4 @@
-"""The `simulation:` section of a rig file: what stands in the simulated dark room."""
+"""The `simulation:` section of a rig file: settings of the simulated dark room."""
 
 from datetime import UTC, datetime
 from typing import Annotated, Any, Literal, Self
@@ -132,7 +132,7 @@ class LampSettings(Part):
 
 
 class InitialState(Part):
-    """How the room is found at the epoch: what a crash left behind, a sample that still glows.
+    """State of the room at the epoch: after a crash, or with a sample that still glows.
 
     Attributes
     ----------
@@ -274,7 +274,7 @@ class Simulation(Part):
         return self
 
     def opened_at(self, wall_s: float) -> Self:
-        """The same room opened at `wall_s`, seconds since 1970, if its epoch is earlier."""
+        """Return the room opened at `wall_s`, seconds since 1970, if its epoch is earlier."""
         later_s = wall_s - self.epoch.timestamp()
         if later_s <= 0:
             return self
@@ -288,7 +288,7 @@ class Simulation(Part):
 
     @property
     def wall_at_opening_s(self) -> float:
-        """What the PC's clock says when the room is opened, seconds since 1970."""
+        """Time of the PC's clock when the room is opened, in seconds since 1970."""
         ahead = given(fault.clock_ahead for fault in self.faults)
         back = given(fault.clock_back for fault in self.faults)
         return (

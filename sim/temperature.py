@@ -1,4 +1,4 @@
-"""The room's temperature, what re-radiation makes of it, and a sensor that shows it."""
+"""The room's temperature, its effect on re-radiation, and its sensor."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -26,12 +26,12 @@ OPEN_V = 5.0
 
 
 def celsius(settings: TemperatureSettings | None, time_s: float) -> float:
-    """Of the room; 21 where nothing is said, where materials were measured."""
+    """Return the temperature of the room, by default 21 °C, to which a material's rates belong."""
     return AMBIENT_C if settings is None else settings.celsius(time_s)
 
 
 def quickening(settings: TemperatureSettings | None) -> Callable[[float], float]:
-    """By how much re-radiation is faster at a time than at 21 °C, where materials were measured."""
+    """Return the factor by which re-radiation is faster than at 21 °C, at a time."""
     if settings is None:
         return lambda _: 1.0
 
@@ -48,13 +48,13 @@ class TemperatureSensor:
     Parameters
     ----------
     settings
-        Of the room.
+        Settings of the room's temperature.
     clock
-        The room's.
+        The room's clock.
     rng
-        Of the sensor's error and noise.
+        Random generator of the sensor's error and noise.
     off
-        When its wire has come off.
+        Times at which its wire has come off.
     """
 
     def __init__(
@@ -71,7 +71,7 @@ class TemperatureSensor:
         self._error_k = rng.normal(0.0, SENSOR_SIGMA_K)
 
     def volts(self) -> float:
-        """What it gives now."""
+        """Return the present voltage of the sensor."""
         now_s = self._clock.now()
         if any(when.is_on(now_s) for when in self._off):
             return OPEN_V

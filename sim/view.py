@@ -1,4 +1,4 @@
-"""What the camera sees of the bench: glow, and light thrown back by samples, cards, door, cloth."""
+"""The camera's view of the bench: glow, and light reflected by samples, cards, door, cloth."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,14 @@ FloatArray = NDArray[np.float64]
 
 
 class View:
-    """The way of the light from the bench into the lens.
+    """The path of the light from the bench into the lens.
 
     Parameters
     ----------
     simulation
-        What the room is like.
+        Settings of the room.
     layout
-        Where everything is.
+        Layout of the picture.
     """
 
     def __init__(self, simulation: Simulation, layout: Layout) -> None:
@@ -34,16 +34,16 @@ class View:
     def radiance_s(
         self, arrangement: Arrangement, glow_s: FloatArray, seen: VisibleLight
     ) -> FloatArray:
-        """∫ radiance dt of all places of an arrangement, shape (places, wavelengths).
+        """Return ∫ radiance dt of all places of an arrangement, shape (places, wavelengths).
 
         Parameters
         ----------
         arrangement
-            Of the bench, which does not change meanwhile.
+            Arrangement of the bench, which does not change meanwhile.
         glow_s : ndarray, shape (cells, wavelengths)
-            ∫ visible glow dt.
+            ∫ visible glow dt of each cell.
         seen
-            What the camera sees by reflection.
+            Light that the camera sees by reflection.
         """
         places = self._layout.places(arrangement)
         radiance = self._samples(arrangement, glow_s, seen)[places.cell]
@@ -58,7 +58,7 @@ class View:
     def _samples(
         self, arrangement: Arrangement, glow_s: FloatArray, seen: VisibleLight
     ) -> FloatArray:
-        """Of all cells with nothing before them, shape (cells, wavelengths); cell 0 is cloth."""
+        """Return the radiance of uncovered cells, shape (cells, wavelengths); cell 0 is cloth."""
         light = seen.sample + seen.sample_stray
         if arrangement.lvf == "on sample":
             passed = self._passed("on sample", arrangement.turned)[self._layout.piece]
@@ -93,11 +93,11 @@ class View:
             radiance[covered] += self._reflected * (card - CLOTH_REFLECTANCE) * seen.door
 
     def _turned_away(self, tilt_deg: int) -> float:
-        """Radiance of a sample over that of one that faces the camera."""
+        """Return the radiance of a sample relative to one that faces the camera."""
         return float(1 - self._simulation.anisotropy * (1 - np.cos(np.radians(tilt_deg))))
 
     def _passed(self, place: LvfPlace, turned: bool) -> FloatArray:
-        """What the pieces of the strip that lies there let through, shape (pieces, 160)."""
+        """Return the transmittance of the pieces of the strip there, shape (pieces, 160)."""
         settings = self._simulation.lvf
         assert settings is not None
         assert self._lvf is not None

@@ -1,4 +1,4 @@
-"""Shutter time, aperture and sensitivity: what the camera offers, what is set, setting it."""
+"""Shutter time, aperture and sensitivity: the camera's offers, settings in force, setting them."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -37,12 +37,12 @@ class Exposure:
         self._aperture = library.first_of(APERTURE)
 
     def offers(self) -> CameraOffers:
-        """The camera's own lists, less what the rig file excludes.
+        """Return the camera's own lists, less what the rig file excludes.
 
         Raises
         ------
         DeviceError
-            Nothing is left of them.
+            The rig file excludes all settings that the camera offers.
         """
         self._require_manual()
         exposures_s = self._times_s(self._library.get(self._shutter)).values()
@@ -62,19 +62,19 @@ class Exposure:
         Raises
         ------
         DeviceError
-            The camera does not offer it or did not take it.
+            The camera does not offer a setting or did not take it.
         """
         self._require_manual()
         for name, label in self._labels_of(wanted).items():
             self._library.set_surely(name, label, self._settings.answer_timeout)
 
     def in_force(self) -> ExposureSettings:
-        """What the camera says is set, with the true shutter time.
+        """Return the settings that the camera reports, with the actual shutter time.
 
         Raises
         ------
         DeviceError
-            It is at bulb, at automatic ISO, at something unknown, or its dial not at M.
+            The camera is at bulb, at automatic ISO, at something unknown, or its dial not at M.
         """
         self._require_manual()
         shutter, sensitivity = self._library.get(self._shutter), self._library.get(self._iso)
@@ -88,7 +88,7 @@ class Exposure:
         return ExposureSettings(exposure_s, value, None if aperture is None else f_number(aperture))
 
     def _labels_of(self, wanted: ExposureSettings) -> dict[str, str]:
-        """Setting → label."""
+        """Return the label of each exposure setting by the setting's name."""
         times_s = self._times_s(self._library.get(self._shutter))
         isos = _known(self._library.get(self._iso), iso)
         shutter = label_of_time(wanted.exposure_s, times_s) if wanted.exposure_s > 0 else None
@@ -136,7 +136,7 @@ class Exposure:
 
 
 def _known(setting: Setting, meaning: Callable[[str], T | None]) -> dict[str, T]:
-    """Label → value of those choices that have one."""
+    """Return the labels with a known value, and their values."""
     return {c: value for c in setting.choices if (value := meaning(c)) is not None}
 
 

@@ -1,4 +1,4 @@
-"""How libgphoto2 fails, and what to do about it; all of it is `DeviceError` to the outside."""
+"""Failures of libgphoto2 and their remedies; all of them are `DeviceError` to the outside."""
 
 from labrig.errors import DeviceError, DeviceLostError
 
@@ -26,15 +26,15 @@ class BusyError(DeviceError):
 
 
 class PerhapsReleasedError(DeviceError):
-    """The camera was busy before its release, or after it: nobody knows."""
+    """The camera was busy before its release or after it: whether it released is unknown."""
 
 
 class UnspecifiedError(DeviceError):
-    """Anything: also what is said first when the line breaks."""
+    """Unspecified error of libgphoto2, which is also its first one when the line breaks."""
 
 
 def failure(context: str, code: int, text: str) -> DeviceError:
-    """The error for what libgphoto2 answered; `context` says who it was and what for."""
+    """Return the error for libgphoto2's answer; `context` names the device and the purpose."""
     said = f"{context}: libgphoto2 says '{text}' ({code})"
     if code in _GONE:
         return DeviceLostError(f"{said}: {_LOOK}")

@@ -1,4 +1,4 @@
-"""What a camera is set to before a PC photographs with it: single RAW frames, to the PC alone."""
+"""Settings of a camera before a PC photographs with it: single RAW frames, to the PC alone."""
 
 from collections.abc import Callable
 
@@ -18,17 +18,17 @@ AUTOFOCUS = ("autofocus",)
 
 
 def prepare(library: Library, answer_s: float) -> None:
-    """Set all this, as far as the camera has it, read back.
+    """Apply all these settings, as far as the camera has them, and read them back.
 
     Parameters
     ----------
     answer_s
-        Seconds until it must have taken a setting.
+        Seconds until the camera must have taken a setting.
 
     Raises
     ------
     DeviceError
-        The camera offers no RAW, or did not take one of these.
+        The camera offers no RAW, or did not take one of the settings.
     """
     _send_frames_to_pc(library, answer_s)
     _set_where(library, DRIVE, lambda label: label.startswith("Single"), answer_s)
@@ -62,7 +62,7 @@ def _send_frames_to_pc(library: Library, answer_s: float) -> None:
 def _set_where(
     library: Library, names: tuple[str, ...], is_meant: Callable[[str], bool], answer_s: float
 ) -> bool:
-    """Set the first of `names` that there is to its first choice that is meant; whether it is."""
+    """Set the first of `names` that exists to its first suitable choice; return whether done."""
     name = library.first_of(names)
     if name is None:
         return False

@@ -20,31 +20,31 @@ class Release(Protocol):
 
     @property
     def words(self) -> str:
-        """What a person is told of it."""
+        """Description of the way of release, for people."""
 
     def get_ready(self) -> None:
         """Do what can be done before the release."""
 
     def press(self, exposure_s: float) -> Span:
-        """Begin an exposure of `exposure_s` seconds; between which times the camera obeyed.
+        """Begin an exposure of `exposure_s` seconds; return when, at the earliest and latest.
 
         Raises
         ------
         BusyError
             No exposure has begun.
         PerhapsReleasedError
-            Nobody knows whether one has.
+            Whether an exposure has begun is unknown.
         """
 
     def let_go_full(self, busy_s: float) -> None:
-        """Let go of the second stage; a camera that still exposes may be busy for `busy_s`."""
+        """Release the second stage; a camera that still exposes may be busy for `busy_s`."""
 
     def let_go(self, busy_s: float) -> None:
-        """Nothing is pressed any more, half or full."""
+        """Release both stages, half and full."""
 
 
 class ButtonRelease:
-    """Half and full press apart: the second is one short transaction."""
+    """Release by half and full press apart: the second is one short transaction."""
 
     words = "its remote button"
 
@@ -91,7 +91,7 @@ class ButtonRelease:
 
 
 class TriggerRelease:
-    """libgphoto2 presses by itself; when in the course of its call depends on the make.
+    """Release by libgphoto2 itself; the time of the release within its call depends on the make.
 
     Sources: `camera_trigger_capture` of libgphoto2 2.5.34; for Canon also measured, against the
     simulated camera, by `tests/acceptance/gphoto2_latency.py`.
@@ -126,7 +126,7 @@ class TriggerRelease:
 
 
 def release_of(library: Library, clock: Clock, maker: str, wanted: str | None) -> Release:
-    """The way that is wanted, by default the better one that the camera has.
+    """Return the way of release that the settings name, by default the better one of the camera.
 
     Raises
     ------

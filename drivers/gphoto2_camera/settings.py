@@ -1,4 +1,4 @@
-"""What a rig file can say about a camera behind libgphoto2."""
+"""Settings of a camera behind libgphoto2 in a rig file."""
 
 from collections.abc import Iterable
 from typing import Annotated, Literal
@@ -61,18 +61,18 @@ class Gphoto2CameraSettings(BaseModel):
     answer_timeout: Positive = 5.0
 
     def allows_exposure(self, exposure_s: float) -> bool:
-        """Whether `exposure_s` seconds are within `longest_exposure`."""
+        """Return whether `exposure_s` seconds are within `longest_exposure`."""
         return exposure_s <= self.longest_exposure * 1.0001
 
     def declared_offers(self) -> CameraOffers:
-        """What planning without the camera assumes: shutter times in thirds of a stop."""
+        """Return the offers assumed without the camera: shutter times in thirds of a stop."""
         times_s = (2.0 ** (n / 3) for n in range(_SHORTEST_THIRDS, _LONGEST_THIRDS + 1))
         return self.offers(filter(self.allows_exposure, times_s), self.isos, self.f_numbers)
 
     def offers(
         self, exposures_s: Iterable[float], isos: Iterable[int], f_numbers: Iterable[float]
     ) -> CameraOffers:
-        """Offers with this file's costs of a frame."""
+        """Return offers with this file's time and size of a frame."""
         return CameraOffers(
             exposures_s=tuple(sorted(set(exposures_s))),
             isos=tuple(sorted(set(isos))),

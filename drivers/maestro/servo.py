@@ -41,7 +41,7 @@ ERRORS = (
 
 
 def told(bits: int) -> str:
-    """All errors in the 16 bits that the command A1 reads, with what to do; empty for none."""
+    """Return all errors in the 16 bits that the command A1 reads, with remedies; empty for none."""
     known = [error for bit, error in enumerate(ERRORS) if bits >> bit & 1]
     unknown = [bit for bit in range(len(ERRORS), 16) if bits >> bit & 1]
     remedies = dict.fromkeys(remedy for _, remedy in known)
@@ -98,19 +98,19 @@ class ServoSettings(BaseModel):
 
 @dataclass(frozen=True)
 class Wire:
-    """How commands are written: by the compact protocol, or with a device number by Pololu's."""
+    """Encoding of commands: by the compact protocol, or with a device number by Pololu's."""
 
     device_number: int | None = None
 
     def command(self, code: int, *data: int) -> bytes:
-        """Bytes of a command; data bytes have 7 bits."""
+        """Return the bytes of a command; data bytes have 7 bits."""
         if self.device_number is None:
             return bytes((code, *data))
         return bytes((POLOLU_PROTOCOL, self.device_number, code & 0x7F, *data))
 
 
 def seven_bits(value: int) -> tuple[int, int]:
-    """A number below 2¹⁴ as the Maestro takes it: low seven bits first."""
+    """Return a number below 2¹⁴ in the Maestro's form: low seven bits first."""
     return value & 0x7F, value >> 7
 
 
@@ -120,11 +120,11 @@ class Servo:
     Parameters
     ----------
     address
-        Serial port.
+        Serial port of the Maestro.
     settings
         The servo's part of the rig file.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     def __init__(self, address: str, settings: ServoSettings, connections: Connections) -> None:
@@ -138,7 +138,7 @@ class Servo:
 
     @property
     def pulse_s(self) -> float:
-        """Length of the pulse that is being sent, 0 for none: what is commanded, not an angle."""
+        """Length of the pulse that is being sent, 0 for none: the command, not an angle."""
         came = self._ask(GET_POSITION, 2, self._settings.channel)
         return int.from_bytes(came, "little") * QUARTER_US
 
@@ -159,12 +159,12 @@ class Servo:
             self._clock.sleep(LOOK_AGAIN_S)
 
     def bring(self, pulse_s: float) -> None:
-        """Whatever was interrupted, turn, and return when the servo has had the time to stop.
+        """Turn, whatever was interrupted, and return when the servo has had the time to stop.
 
         Raises
         ------
         UnclearAnswerError
-            As `go`.
+            The Maestro reports an error, or sends another pulse and does not ramp to this one.
         """
         self._resynchronise()
         self._tell(SET_SPEED, *seven_bits(self._settings.speed))
@@ -186,7 +186,7 @@ class Servo:
         Raises
         ------
         UnclearAnswerError
-            Names each error that has happened since they were read last.
+            Errors have happened since the bits were read last; the message names each.
         """
         if bits := self._errors():
             raise UnclearAnswerError(
@@ -222,12 +222,12 @@ class Servo:
         return self._line.read_exactly(count, ANSWER_TIMEOUT_S)
 
     def _resynchronise(self) -> None:
-        """Forget old errors and a half-read answer; a half-written command is an error itself."""
+        """Discard old errors and a half-read answer; a half-written command is an error itself."""
         self._line.drain()
         for _ in range(2):
             self._errors()
 
 
 def quarters(pulse_s: float) -> int:
-    """A pulse in quarter microseconds, the Maestro's unit."""
+    """Return a pulse in quarter microseconds, the Maestro's unit."""
     return round(pulse_s / QUARTER_US)

@@ -19,14 +19,14 @@ CHANNELS = "0123456789ABCDEFGHIJKLMNOPQRSTUV"
 
 
 class Board:
-    """A Numato board; what hangs on it may share the port.
+    """A Numato board; its devices may share the port.
 
     Parameters
     ----------
     address
         Serial port of the board.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     def __init__(self, address: str, connections: Connections) -> None:
@@ -36,17 +36,17 @@ class Board:
         self.resynchronise()
 
     def identity(self) -> str:
-        """Firmware version and id, as the board says."""
+        """Return firmware version and id of the board."""
         version, board_id = self.ask("ver"), self.ask("id get")
         return f"firmware {version}, id {board_id}"
 
     def ask(self, command: str) -> str:
-        """What the board says to `command` between echo and prompt; mostly nothing.
+        """Return the board's answer to `command` between echo and prompt; mostly empty.
 
         Raises
         ------
         UnclearAnswerError
-            No answer in time, or no echo.
+            The board does not answer in time, or does not echo.
         """
         self._line.write(command.encode("ascii") + b"\r")
         came = self._line.read_until(b">", ANSWER_TIMEOUT_S)
@@ -81,7 +81,7 @@ class Board:
             )
 
     def is_on(self, relay: int) -> bool:
-        """What the board reads a relay as."""
+        """Return the state of a relay in the board's register."""
         state = self.ask(f"relay read {CHANNELS[relay]}")
         if state not in ("on", "off"):
             raise UnclearAnswerError(
@@ -90,6 +90,6 @@ class Board:
         return state == "on"
 
     def resynchronise(self) -> None:
-        """A bare return ends a half-typed command; whatever comes is of no interest."""
+        """End a half-typed command by a bare return, and discard the answer."""
         self._line.write(b"\r")
         self._line.drain()

@@ -35,7 +35,7 @@ class NumatoThermometer:
     settings
         The rig file's keys for this device.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     class Settings(BaseModel):
@@ -72,17 +72,17 @@ class NumatoThermometer:
         self._name = f"input {settings.input} of {self._board.name}"
 
     def identity(self) -> str:
-        """Maker, firmware version and id, as the board says; a sensor does not tell its kind."""
+        """Return maker, firmware version and id of the board, and the number of the input."""
         return f"Numato board, {self._board.identity()}, analogue input {self._settings.input}"
 
     def celsius(self) -> float:
-        """Mean of some conversions, in degrees Celsius.
+        """Return the mean of some conversions, in degrees Celsius.
 
         Raises
         ------
         DeviceError
-            No number, nothing connected, or a temperature that cannot be. The line is in step
-            again: a lamp's relay may be on it.
+            The answer is no number, no sensor is connected, or the temperature is implausible. The
+            line is resynchronised: a lamp's relay may be on it.
         """
         try:
             return self._celsius(self._steps())
@@ -92,12 +92,12 @@ class NumatoThermometer:
             raise
 
     def make_safe(self) -> None:
-        """Bring the line back into step; no thermometer is unsafe, not even one that is gone."""
+        """Resynchronise the line; no thermometer is unsafe, not even one that is gone."""
         with suppress(DeviceLostError):
             self._board.resynchronise()
 
     def disconnect(self) -> None:
-        """The port belongs to the connections, which close it."""
+        """Do nothing: the port belongs to the connections, which close it."""
 
     def _steps(self) -> float:
         deadline_s = self._clock.now() + CONVERTING_S

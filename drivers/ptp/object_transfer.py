@@ -1,4 +1,4 @@
-"""Fetching a file from a camera, in pieces if it can, so that Ctrl-C is heard between them."""
+"""Transfer of a file from a camera, in parts if possible, so that Ctrl-C is handled in between."""
 
 from enum import IntEnum
 
@@ -15,14 +15,14 @@ PATIENT = Timeouts(answer_s=10.0, busy_s=10.0)
 
 
 class ObjectTransfer:
-    """Fetches files.
+    """Transfer of files from a camera.
 
     Parameters
     ----------
     session
-        Over which they come.
+        Session with the camera.
     clock
-        On which is looked for Ctrl-C.
+        Clock that notices Ctrl-C.
     whole
         Operation that sends all of a file.
     part
@@ -38,7 +38,7 @@ class ObjectTransfer:
         self._part = part
 
     def fetch(self, handle: int, name: str, size_bytes: int) -> bytes:
-        """The file's bytes.
+        """Return the file's bytes.
 
         Raises
         ------

@@ -1,4 +1,4 @@
-"""What a rig file can say about a camera on PTP, and what planning without the camera assumes."""
+"""Settings of a camera on PTP in a rig file, and the offers that planning without it assumes."""
 
 from typing import Annotated
 
@@ -66,7 +66,7 @@ class PtpCameraSettings(BaseModel):
         return tuple(sorted(set(f_numbers)))
 
     def allows_exposure(self, exposure_s: float) -> bool:
-        """Whether `exposure_s` seconds are within `longest_exposure`."""
+        """Return whether `exposure_s` seconds are within `longest_exposure`."""
         return exposure_s <= self.longest_exposure * 1.0001
 
     @property
@@ -75,13 +75,13 @@ class PtpCameraSettings(BaseModel):
         return bulb_times_s(self.longest_exposure * 1.0001)
 
     def native_isos(self, model: str) -> NativeIsos:
-        """What the rig file says is native, else what is known of the model."""
+        """Return the rig file's native ISOs if it gives some, else those of the model."""
         if "isos" in self.model_fields_set:
             return NativeIsos(self.isos, "rig file")
         return isos_of_model(model)
 
     def declared_offers(self) -> CameraOffers:
-        """What a camera on these settings can be expected to offer, in thirds of a stop."""
+        """Return the expected offers of a camera with these settings, in thirds of a stop."""
         times_s = (shutter_time_s(code) for code in third_stop_codes())
         return CameraOffers(
             exposures_s=(

@@ -1,7 +1,7 @@
-"""Whether what is photographed after lamp off is a glow: seen, fading, as bright as expected.
+"""Checks that frames after lamp off show a glow: visible, fading, as bright as expected.
 
-The relay only says what its register holds. That the lamp lit, and that it went out, is seen in
-the frames.
+The relay reports its register only. Whether the lamp lit, and whether it went out, is seen in the
+frames.
 """
 
 from collections.abc import Callable, Sequence
@@ -41,7 +41,7 @@ WEAK = 0.5
 
 
 class Afterglow(Enum):
-    """What the frames after lamp off show."""
+    """Classification of the frames after lamp off."""
 
     FADING = "fading"
     LINGERING = "fading to a level that stays"
@@ -55,12 +55,12 @@ class Afterglow(Enum):
         return self.value
 
     def require(self, warn: Callable[[str], None]) -> None:
-        """Refuse what is no decay of a charged sample, and tell of what looks wrong.
+        """Refuse a series that is no decay of a charged sample, and warn of doubtful ones.
 
         Raises
         ------
         DeviceError
-            Says what to look at.
+            The series is refused; the message names what to check.
         """
         if self in _REFUSED:
             raise DeviceError(_REFUSED[self])
@@ -97,7 +97,13 @@ class Glow:
     Attributes
     ----------
     at_s
-        Middle of the exposure, after the planned begin of the first frame.
+        Middle of the exposure in seconds after the planned begin of the first frame.
+    exposure_s
+        Shutter time in seconds.
+    rate, sigma
+        Signal and its standard uncertainty in DN/s, shape (patches × channels,).
+    clips
+        Whether some channel of some patch clips.
     """
 
     at_s: float
@@ -108,18 +114,18 @@ class Glow:
 
     @property
     def brightest(self) -> float:
-        """Rate of the brightest channel of the brightest patch."""
+        """Rate of the brightest channel of the brightest patch, in DN/s."""
         return float(self.rate.max())
 
     @property
     def seen(self) -> bool:
-        """Whether there is any light."""
+        """Whether any light is detected."""
         least = np.maximum(SEEN_SIGMA * self.sigma, SEEN_DN / self.exposure_s)
         return self.clips or bool(np.any(self.rate > least))
 
 
 def glow(seen: MeteringFrame, dark: FloatArray, zero_s: float) -> Glow:
-    """What `seen` shows above the level `dark`, of shape (patches, channels), in DN."""
+    """Return a frame's signal above the level `dark`, of shape (patches, channels), in DN."""
     sigma = np.array([[c.sigma for c in patch.channels.values()] for patch in seen.patches])
     return Glow(
         at_s=seen.start_s + seen.exposure_s / 2 - zero_s,
@@ -131,7 +137,7 @@ def glow(seen: MeteringFrame, dark: FloatArray, zero_s: float) -> Glow:
 
 
 def dark_level(darks: Sequence[MeteringFrame], exposure_s: float) -> FloatArray:
-    """Level of dark frames of that shutter time, straight between those that were taken."""
+    """Return the level of dark frames at that shutter time, interpolated between those taken."""
     times_s = sorted({frame.exposure_s for frame in darks})
     mean = np.array(
         [
@@ -146,7 +152,7 @@ def dark_level(darks: Sequence[MeteringFrame], exposure_s: float) -> FloatArray:
 
 
 def metered(glows: Sequence[Glow]) -> Afterglow:
-    """What a ladder of exposures shows, by rising shutter time."""
+    """Classify a ladder of exposures, by rising shutter time."""
     if not any(glow.seen for glow in glows):
         return Afterglow.ABSENT
     if any(glow.clips for glow in glows[:SHORT]):
@@ -157,14 +163,14 @@ def metered(glows: Sequence[Glow]) -> Afterglow:
 def decayed(
     first: Sequence[Glow], middle: Glow, last: Sequence[Glow], before: Sequence[Glow]
 ) -> Afterglow:
-    """What some frames of a decay show.
+    """Classify some frames of a decay.
 
     Parameters
     ----------
     first, middle, last
-        Where in the decay they were taken.
+        Frames of the begin, the middle and the end of the decay.
     before
-        Of the metering, or of an earlier decay: what the first frame is held against.
+        Frames of the metering or of an earlier decay, with which the first frame is compared.
     """
     start, end = first[0], last[-1]
     if not any(glow.seen for glow in first):
@@ -184,7 +190,7 @@ def decayed(
 
 
 def looked_at(looks: Sequence[Glow], again: Sequence[Glow]) -> Afterglow:
-    """What looks in doubt show, and the same shutter times after a while."""
+    """Classify doubtful frames by repeating their shutter times after a while."""
     pairs = [pair for pair in zip(looks, again, strict=True) if not pair[0].clips]
     if not pairs:
         return Afterglow.STEADY
@@ -194,7 +200,7 @@ def looked_at(looks: Sequence[Glow], again: Sequence[Glow]) -> Afterglow:
 
 
 def went_out(lit: Glow, after: Glow) -> bool:
-    """Whether a frame after lamp off is darker than the same under the lamp."""
+    """Return whether a frame after lamp off is darker than the same under the lamp."""
     brightest = int(np.argmax(lit.rate))
     if lit.clips or not lit.seen:
         return not after.clips
@@ -202,7 +208,7 @@ def went_out(lit: Glow, after: Glow) -> bool:
 
 
 def _is_steady(first: Sequence[Glow], last: Sequence[Glow], faded: float) -> bool:
-    """Whether it is certain that the brightest channel has not faded by so much."""
+    """Return whether the brightest channel has certainly not faded by that fraction."""
     brightest = int(np.argmax(first[0].rate))
     before = float(np.mean([glow.rate[brightest] for glow in first]))
     after = float(np.mean([glow.rate[brightest] for glow in last]))
@@ -212,7 +218,7 @@ def _is_steady(first: Sequence[Glow], last: Sequence[Glow], faded: float) -> boo
 
 
 def _expected(first: Glow, before: Sequence[Glow]) -> float:
-    """Rate of the brightest channel at that time, log-linear between what was seen before; or 0."""
+    """Return the brightest channel's rate at that time, log-linear between earlier frames; or 0."""
     brightest = int(np.argmax(first.rate))
     seen = [glow for glow in before if glow.seen and not glow.clips and glow.rate[brightest] > 0]
     if not seen:

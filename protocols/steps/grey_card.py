@@ -1,4 +1,4 @@
-"""A grey card under the steady lamp: who puts it there, how bright it is, how long to expose."""
+"""A grey card under the steady lamp: placing, lighting and metering it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -39,14 +39,14 @@ DIM_PER_S = 0.5
 
 @dataclass(frozen=True)
 class CardLight:
-    """How fast the lit card fills the range from black to white, in its brightest pixels.
+    """Rate at which the lit card fills the range from black to white, in its brightest pixels.
 
     Attributes
     ----------
     per_s
-        Fraction of the range in a second.
+        Fraction of the range per second.
     settings
-        At which that is so; their shutter time means nothing.
+        Sensitivity and aperture to which `per_s` belongs; the shutter time has no meaning.
     """
 
     per_s: float
@@ -56,7 +56,7 @@ class CardLight:
         return f"fills the range in {duration_text(1 / self.per_s)}"
 
     def exposure_s(self, fraction: float, settings: ExposureSettings) -> float:
-        """Shutter time in which it fills that fraction of the range at an ISO and f-number."""
+        """Return the shutter time that fills that fraction of the range at an ISO and f-number."""
         gain = settings.iso / self.settings.iso
         if settings.f_number is not None and self.settings.f_number is not None:
             gain *= (self.settings.f_number / settings.f_number) ** 2
@@ -65,14 +65,14 @@ class CardLight:
     def exposed(
         self, fraction: float, settings: ExposureSettings, offers: CameraOffers
     ) -> ExposureSettings:
-        """`settings` with the longest offered shutter time that fills no more than that share."""
+        """Return `settings` with the longest offered shutter time within that fraction."""
         exposure_s = offers.exposure_at_most(self.exposure_s(fraction, settings))
         return ExposureSettings(exposure_s, settings.iso, settings.f_number)
 
 
 @dataclass(frozen=True)
 class CardMeterUnit:
-    """The lit card at a ladder of shutter times, for `card_light`."""
+    """Frames of the lit card at a ladder of shutter times, for `card_light`."""
 
     settings: ExposureSettings
     card: Region
@@ -91,7 +91,7 @@ class CardMeterUnit:
 
 
 def light_card(session: Session) -> None:
-    """Lamp on and warm, the sample turned to it; nothing is done where it burns already."""
+    """Switch the lamp on and warm it up, facing the sample, unless it burns already."""
     face_lamp(session)
     if not session.rig[LAMP].is_on():
         session.perform(LAMP_ON)
@@ -99,12 +99,12 @@ def light_card(session: Session) -> None:
 
 
 def card_light(session: Session, settings: ExposureSettings, card: Region) -> CardLight:
-    """How bright the lit card was when it was metered.
+    """Return the brightness of the lit card when it was metered.
 
     Raises
     ------
     DeviceError
-        It is dark, or clips at every shutter time.
+        The card is dark, or clips at every shutter time.
     """
 
     def decide() -> CardLight:
@@ -115,7 +115,7 @@ def card_light(session: Session, settings: ExposureSettings, card: Region) -> Ca
 
 
 def _per_s(looks: Sequence[MeteringFrame]) -> float:
-    """From the fullest look that does not clip."""
+    """Return the rate from the brightest frame that does not clip."""
     fitting = []
     for seen in looks:
         card = seen.patches[0]

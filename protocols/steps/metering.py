@@ -1,4 +1,4 @@
-"""How long to expose: from the frames of a metering unit to the shutter times of a decay."""
+"""Metering: from the frames of a metering unit to the shutter times of a decay."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -28,24 +28,24 @@ DIM = 0.002
 
 
 def glow(path: Path, region: Region) -> float:
-    """Mean black-subtracted value of the brightest channel in `region`, in DN."""
+    """Return the mean black-subtracted value of the brightest channel in `region`, in DN."""
     return max(channel.mean for channel in measure(read_raw(path), region).channels.values())
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """When each frame of a decay begins, in seconds after lamp off, and its shutter time."""
+    """Begin of each frame of a decay in seconds after lamp off, and its shutter time in seconds."""
 
     times_s: tuple[float, ...]
     exposures_s: tuple[float, ...]
 
     @classmethod
     def constant(cls, times_s: Sequence[float], exposure_s: float) -> Self:
-        """The same shutter time throughout."""
+        """Return a schedule with the same shutter time throughout."""
         return cls(tuple(times_s), (exposure_s,) * len(times_s))
 
     def frames(self) -> Iterator[tuple[float, float]]:
-        """Begin and shutter time of each frame."""
+        """Return begin and shutter time of each frame."""
         return zip(self.times_s, self.exposures_s, strict=True)
 
     def __str__(self) -> str:
@@ -55,7 +55,7 @@ class Schedule:
 
 @dataclass(frozen=True)
 class MeteringFrame:
-    """A frame of a metering unit, measured in every patch; `start_s` has any zero they share."""
+    """A frame of a metering unit, measured in every patch; the zero of `start_s` is arbitrary."""
 
     start_s: float
     exposure_s: float
@@ -63,7 +63,7 @@ class MeteringFrame:
 
 
 def measure_frame(frame: FrameRecord, regions: Sequence[Region]) -> MeteringFrame:
-    """Measure a frame that was taken."""
+    """Measure a frame in every region."""
     raw = read_raw(frame.path)
     return MeteringFrame(
         frame.start_time, frame.exposure_s, [measure(raw, region) for region in regions]
@@ -72,7 +72,7 @@ def measure_frame(frame: FrameRecord, regions: Sequence[Region]) -> MeteringFram
 
 @dataclass(frozen=True)
 class _Reading:
-    """One frame in which the glow is seen and nothing clips."""
+    """One frame in which the glow is detected and nothing clips."""
 
     time_s: float
     rate_dn_per_s: float
@@ -81,7 +81,7 @@ class _Reading:
 
 
 class DecayMeter:
-    """What a metering unit's frames say about the glow after lamp off.
+    """The glow after lamp off, from the frames of a metering unit.
 
     Parameters
     ----------
@@ -116,16 +116,20 @@ class DecayMeter:
         growth: float,
         warn: Callable[[str], None],
     ) -> Schedule:
-        """Shutter time for each frame, at most `growth` times the first one.
+        """Return a shutter time for each frame, at most `growth` times the first one.
 
         Parameters
         ----------
         times_s
-            Begin of each frame, seconds after lamp off.
+            Begin of each frame in seconds after lamp off.
+        offers
+            Exposure settings that the camera offers.
         longest_s
-            No exposure is longer.
+            Longest shutter time in seconds.
+        growth
+            Largest ratio of a shutter time to the first one.
         warn
-            Is told when the glow is too bright or too dim for these settings.
+            Function that receives a warning when the glow is too bright or too dim.
         """
         if not self._readings:
             if self._shortest_clipped:
@@ -146,11 +150,11 @@ class DecayMeter:
         return Schedule(tuple(times_s), tuple(exposures_s))
 
     def _peak_rates(self, times_s: FloatArray) -> FloatArray:
-        """Rate of the brightest pixels in DN/s at times after the first frame.
+        """Return the rate of the brightest pixels in DN/s at times after the first frame.
 
-        Log-linear between readings; before the first reading the glow was brighter, so the slope
-        of the first two is drawn back. How far the brightest pixels stand above the mean is taken
-        from the reading with most counts: in dim ones it is noise.
+        Log-linear between readings; before the first reading the glow was brighter, so the slope of
+        the first two is extrapolated. The ratio of the brightest pixels to the mean is taken from
+        the reading with most counts: in dim ones it is noise.
         """
         seen_s = np.array([reading.time_s for reading in self._readings])
         log_rate = np.log([reading.rate_dn_per_s for reading in self._readings])
@@ -165,19 +169,19 @@ class DecayMeter:
 
 @dataclass(frozen=True)
 class FrameCache:
-    """Looks at frames, always in the same regions.
+    """Measurements of frames, always in the same regions.
 
     Attributes
     ----------
     regions
-        Where to measure.
+        Regions to measure.
     """
 
     regions: Sequence[Region]
     _measured: dict[Path, MeteringFrame] = field(default_factory=dict, repr=False, compare=False)
 
     def measure_frame(self, frame: FrameRecord) -> MeteringFrame:
-        """What a frame shows."""
+        """Return the measurement of a frame."""
         if frame.path not in self._measured:
             self._measured[frame.path] = measure_frame(frame, self.regions)
         return self._measured[frame.path]

@@ -1,4 +1,4 @@
-"""What patches may be called, each name is a folder of the result; how they lie below a filter."""
+"""Names of patches, each of which is a folder of the result; their layout below a filter."""
 
 import re
 import unicodedata
@@ -17,7 +17,7 @@ _TAKEN = re.compile(r"figures|con|prn|aux|nul|(?:com|lpt)\d")
 
 
 def _in_words(patches: Any) -> dict[str, Any]:
-    """`1: […]` is the patch "1", though YAML reads a number there."""
+    """Return patches by names that are texts: YAML reads `1: […]` as a number."""
     if not isinstance(patches, dict) or not patches:
         raise ValueError("expected 'name: [x, y, width, height]' for each patch")
     return {"" if name is None else str(name): region for name, region in patches.items()}
@@ -34,7 +34,7 @@ def _can_be_folder(name: str) -> bool:
 
 
 def _folders(patches: dict[str, Region]) -> dict[str, Region]:
-    """Refuse what is no name of a folder on every disk, or of the same one twice."""
+    """Refuse a name that is no folder on every disk, or two names of the same folder."""
     seen: dict[str, str] = {}
     for name in patches:
         folder = unicodedata.normalize("NFC", name).casefold()
@@ -57,7 +57,7 @@ def _in_words_or_none(patches: Any) -> dict[str, Any]:
 
 
 def _one_above_the_other(patches: dict[str, Region]) -> dict[str, Region]:
-    """Refuse patches that share rows; pixels and fractions cannot be held against each other."""
+    """Refuse patches that share rows; pixels and fractions are not compared."""
     for (name, (_, y, _, high)), (other, (_, other_y, _, other_high)) in combinations(
         patches.items(), 2
     ):

@@ -1,4 +1,4 @@
-"""Holds the frames of a unit against what lamp, relay, room and disk should have done."""
+"""Sanity checks of a unit's frames against lamp, relay, room and disk."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -34,20 +34,22 @@ LATE_S = 0.1
 
 @dataclass(frozen=True)
 class SanityChecks:
-    """Judges by what was recorded and nothing else, so that a resumed run judges alike.
+    """Checks of recorded frames only, so that a resumed run is judged alike.
 
     Attributes
     ----------
-    session, unit
-        The unit's session, and its name.
+    session
+        Session of the unit.
+    unit
+        Name of the unit.
     patches
-        Where the samples lie.
+        Regions of the samples.
     background
-        A region that never glows, where it takes the place of dark frames.
+        Region that never glows, which takes the place of dark frames.
     role
-        Of the frames after lamp off.
+        Role of the frames after lamp off.
     metering
-        The unit that metered the same glow.
+        Name of the unit that metered the same glow.
     """
 
     session: Session
@@ -63,12 +65,14 @@ class SanityChecks:
         Parameters
         ----------
         shorter
-            For a closer look in doubt.
+            Settings of shorter exposures, for a repetition in doubt.
 
         Raises
         ------
-        DeviceError, DataError
-            As `Darkness.require`.
+        DeviceError
+            A light is on.
+        DataError
+            The sample still glows too brightly.
         """
 
         def decide() -> Darkness:
@@ -84,17 +88,33 @@ class SanityChecks:
         found.require(self.session.warn)
 
     def require_glow(self, shorter: Sequence[ExposureSettings]) -> None:
-        """Refuse a metering after which nothing glows, or something does not fade.
+        """Refuse a metering after which nothing glows, or the light does not fade.
+
+        Parameters
+        ----------
+        shorter
+            Settings of shorter exposures, for a repetition in doubt.
 
         Raises
         ------
         DeviceError
-            As `Afterglow.require`.
+            The frames show no glow; the message names what to check.
         """
         self._require(lambda: metered(self._glows(self._own(FrameRole.METER))), shorter)
 
     def require_decay(self, shorter: Sequence[ExposureSettings]) -> None:
-        """Refuse a decay that is none; as `require_glow`."""
+        """Refuse a series of frames that is no decay.
+
+        Parameters
+        ----------
+        shorter
+            Settings of shorter exposures, for a repetition in doubt.
+
+        Raises
+        ------
+        DeviceError
+            The frames show no decay; the message names what to check.
+        """
 
         def decide() -> Afterglow:
             frames = self._own(self.role)
@@ -107,17 +127,17 @@ class SanityChecks:
         self._require(decide, shorter)
 
     def switch_off(self, under_lamp: Sequence[ExposureSettings]) -> None:
-        """Switch the lamp off after photographs under it, and see that it has gone out.
+        """Switch the lamp off after photographs under it, and check that it has gone out.
 
         Parameters
         ----------
         under_lamp
-            Of the photographs, by rising exposure.
+            Settings of the photographs, by rising exposure.
 
         Raises
         ------
         DeviceError
-            It is as bright as before.
+            The frames are as bright as before.
         """
 
         def longest_open() -> ExposureSettings:
@@ -139,12 +159,12 @@ class SanityChecks:
             )
 
     def report_delays(self, times_s: Sequence[float]) -> None:
-        """Say if frames of the decay began late, and whether the disk was why.
+        """Warn if frames of the decay began late, and whether the disk was the reason.
 
         Parameters
         ----------
         times_s
-            When each was to begin after lamp off.
+            Planned begin of each frame in seconds after lamp off.
         """
         frames = self._own(self.role)
         if not frames:
@@ -176,7 +196,7 @@ class SanityChecks:
         found.require(self.session.warn)
 
     def _closer_look(self, shorter: Sequence[ExposureSettings]) -> Afterglow:
-        """Whether it fades: the same frames, and again after a while."""
+        """Return whether the light fades: the same frames are taken again after a while."""
 
         def decide() -> Afterglow:
             glows = self._glows(self._own(FrameRole.LOOK))
@@ -195,7 +215,7 @@ class SanityChecks:
         return [frame for frame in self.session.frames(role) if frame.unit == self.unit]
 
     def _before(self) -> list[Glow]:
-        """Of the metering, else the begin of the first decay that is complete."""
+        """Return the glow of the metering, else that at the begin of the first complete decay."""
         decays = self.session.frames(self.role)
         metering = [
             one for one in self.session.frames(FrameRole.METER) if one.unit == self.metering
@@ -205,7 +225,7 @@ class SanityChecks:
         return self._glows(metering or decays[:2])
 
     def _glows(self, frames: Sequence[FrameRecord]) -> list[Glow]:
-        """Times count from the planned begin of the first of them."""
+        """Return the glow of frames, at times from the planned begin of the first of them."""
         zero_s = frames[0].start_time - frames[0].late_s
         darks = [self._look(frame) for frame in _one_each(self.session.frames(FrameRole.DARK))]
         if darks and darkness(darks, frames[0].iso).light:
@@ -221,7 +241,7 @@ class SanityChecks:
         return glow(seen, dark, zero_s)
 
     def _look(self, frame: FrameRecord) -> MeteringFrame:
-        """At a frame, the background last if there is one."""
+        """Return the measurement of a frame, with the background last if there is one."""
         return self._frame_cache.measure_frame(frame)
 
     @cached_property
@@ -231,5 +251,5 @@ class SanityChecks:
 
 
 def _one_each(frames: Sequence[FrameRecord]) -> list[FrameRecord]:
-    """The first frame of each shutter time."""
+    """Return the first frame of each shutter time."""
     return list({frame.exposure_s: frame for frame in reversed(frames)}.values())

@@ -1,4 +1,4 @@
-"""What frames of a filter's strip are held against while the bench is still as it was."""
+"""Checks of frames of a filter's strip while the bench is still arranged for them."""
 
 from collections.abc import Sequence
 
@@ -16,12 +16,12 @@ BRIGHT = 0.05
 
 
 def strip_found(frames: Sequence[Exposure]) -> str:
-    """Where the strip is, in words.
+    """Return the place of the strip, in words.
 
     Raises
     ------
     DataError
-        As `find_strip`.
+        No strip is found, see `find_strip`.
     """
     return str(find_strip(read_hdr_frame(frames)))
 
@@ -29,12 +29,12 @@ def strip_found(frames: Sequence[Exposure]) -> str:
 def lines_found(
     frames: Sequence[Exposure], of_strip: Sequence[Exposure], rising: bool | None
 ) -> str:
-    """Which lines are seen, in words.
+    """Return the mercury lines that are found, in words.
 
     Raises
     ------
     FitError
-        As `locate_lines`: none are, or the filter is the wrong way round.
+        No lines are found, or the filter is the wrong way round, see `locate_lines`.
     """
     profile = _profile(frames, _strip(of_strip))
     return str(locate_lines(profile.position, profile.value_dn_per_s, rising=rising))
@@ -43,7 +43,7 @@ def lines_found(
 def look_alike(
     frames: Sequence[Exposure], others: Sequence[Exposure], of_strip: Sequence[Exposure]
 ) -> bool:
-    """Whether the strip looks the same in two sets of frames, brightness included."""
+    """Return whether the strip looks the same in two sets of frames, brightness included."""
     strip = _strip(of_strip)
     one, other = (_profile(some, strip).value_dn_per_s for some in (frames, others))
     bright = other > BRIGHT * other.max(axis=0)

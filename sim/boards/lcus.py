@@ -11,16 +11,16 @@ COMMAND_BYTES = 4
 
 
 class LcusBoard:
-    """Understands `A0 relay op sum`, relays counted from 1, and the query FF.
+    """Board that obeys `A0 relay op sum`, relays counted from 1, and the query FF.
 
     Parameters
     ----------
     relays
         Number of relays.
     on_change
-        Called with (relay, on) whenever a contact moves; the first relay is 1.
+        Function that is called with (relay, on) whenever a contact moves; the first relay is 1.
     answers
-        To the query. The first answer after a change is what was true before it.
+        Form of the answer to the query. The first answer after a change has the states before it.
     """
 
     def __init__(
@@ -33,7 +33,7 @@ class LcusBoard:
         self._told = tuple(self.states)
 
     def receive(self, data: bytes) -> bytes:
-        """What the board sends back, in order, for these bytes."""
+        """Return the board's answers to these bytes, in order."""
         answer = b""
         for byte in data:
             if self._command or byte == START:

@@ -1,6 +1,6 @@
 """A Pololu Maestro servo controller: binary commands in, pulses out, errors that send it home.
 
-Understands the commands of the compact and of Pololu's protocol that set and read one channel.
+The board obeys the commands of the compact and of Pololu's protocol that set and read one channel.
 """
 
 import math
@@ -24,7 +24,7 @@ PROTOCOL_ERROR, TIME_OUT_ERROR = 1 << 4, 1 << 5
 
 
 class Pulse(NamedTuple):
-    """From `at_s` on the channel goes to pulses of `width_s`, 0 for none, evenly in `ramp_s`."""
+    """Change of a channel to pulses of `width_s`, 0 for none, evenly in `ramp_s` from `at_s` on."""
 
     at_s: float
     width_s: float
@@ -32,17 +32,17 @@ class Pulse(NamedTuple):
 
 
 class MaestroBoard:
-    """Twenty-four channels.
+    """Board with twenty-four channels.
 
     Parameters
     ----------
     clock
-        The room's.
+        The room's clock.
     homes
-        Channel → pulse in seconds at which it starts and to which any error sends it; all others
-        send none.
+        Pulse in seconds by channel, at which the channel starts and to which any error sends it;
+        all others send none.
     time_out_s
-        An error, too, if no command comes for so long; None: never.
+        Time without a command after which there is an error, too, in seconds; None: never.
     """
 
     def __init__(
@@ -60,16 +60,16 @@ class MaestroBoard:
         }
 
     def start_at(self, channel: int, width_s: float) -> None:
-        """What a channel sends when the room is opened, instead of its home."""
+        """Set the pulse of a channel when the room is opened, instead of its home."""
         self._pulses[channel] = [Pulse(0.0, width_s, 0.0)]
 
     def pulses(self, channel: int) -> Sequence[Pulse]:
-        """All changes of a channel's pulse up to now."""
+        """Return all changes of a channel's pulse up to now."""
         self._look_at_the_time()
         return self._pulses[channel]
 
     def receive(self, data: bytes) -> bytes:
-        """What the board sends back, in order, for these bytes."""
+        """Return the board's answers to these bytes, in order."""
         self._look_at_the_time()
         answer = b""
         for byte in data:
@@ -126,7 +126,7 @@ class MaestroBoard:
         self._pulses[channel].append(Pulse(now_s, width_s, ramp_s))
 
     def _ramp_s(self, channel: int, change_s: float) -> float:
-        """Duration of a change: even, or speeding up and slowing down, or both."""
+        """Return the duration of a change: even, or speeding up and slowing down, or both."""
         quarters = change_s / QUARTER_US
         speed = self._limits.get((0x87, channel), 0) / SPEED_S or math.inf
         acceleration = self._limits.get((0x89, channel), 0) / ACCELERATION_S2 or math.inf

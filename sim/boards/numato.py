@@ -10,16 +10,16 @@ INPUTS = 4
 
 
 class NumatoBoard:
-    """Understands `relay on|off|read N`, `relay readall|writeall`, `adc read N`, `ver`, `id get`.
+    """Board with `relay on|off|read N`, `relay readall|writeall`, `adc read N`, `ver`, `id get`.
 
     Parameters
     ----------
     relays
         Number of relays.
     on_change
-        Called with (relay, on) whenever a contact moves.
+        Function that is called with (relay, on) whenever a contact moves.
     volts
-        Analogue input → what is there now; all others are open.
+        Function that returns the present voltage, by analogue input; all others are open.
     """
 
     def __init__(
@@ -34,7 +34,7 @@ class NumatoBoard:
         self._typed = ""
 
     def receive(self, data: bytes) -> bytes:
-        """What the board sends back, in order, for these bytes."""
+        """Return the board's answers to these bytes, in order."""
         answer = ""
         for character in data.decode("ascii", errors="replace"):
             if character == "\r":

@@ -1,4 +1,4 @@
-"""The USB cable between the PC and a serial board, and what can be wrong with it."""
+"""The USB cable between the PC and a serial board, with its faults."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -12,7 +12,7 @@ class Board(Protocol):
     """The far end of a serial line."""
 
     def receive(self, data: bytes) -> bytes:
-        """What it sends back for these bytes."""
+        """Return the board's answer to these bytes."""
 
 
 class SerialCable:
@@ -21,15 +21,15 @@ class SerialCable:
     Parameters
     ----------
     board
-        Has its own power supply: it does not notice that the cable is out.
+        Board with its own power supply, which does not notice that the cable is out.
     clock
-        The room's.
+        The room's clock.
     unplugged
-        When the cable is out.
+        Times at which the cable is out.
     silent
-        When the board neither hears nor answers.
+        Times at which the board neither receives nor answers.
     echo_lost
-        When the board's echo does not arrive; the rest of its answer does.
+        Times at which the board's echo does not arrive; the rest of its answer does.
     """
 
     def __init__(
@@ -54,16 +54,16 @@ class SerialCable:
 
     @property
     def plugging(self) -> int:
-        """How often the cable was pulled: a port that was open before that is dead for good."""
+        """Number of pulls of the cable: a port that was open before is dead for good."""
         now_s = self._clock.now()
         return sum(out.at <= now_s for out in self._unplugged)
 
     def has_held(self, plugging: int) -> bool:
-        """Whether the cable is in, and has been since it had been pulled so often."""
+        """Return whether the cable is in, and has been since that number of pulls."""
         return not self._unplugged or (self.is_plugged and self.plugging == plugging)
 
     def carry(self, data: bytes) -> bytes:
-        """Bytes to the board; what comes back for them."""
+        """Carry bytes to the board; return its answer."""
         if self._now(self._silent):
             return b""
         answer = self._board.receive(data)

@@ -1,4 +1,4 @@
-"""What somebody has set on the simulated camera's body by hand: `simulation.camera` of a rig."""
+"""Manual settings of the simulated camera's body: `simulation.camera` of a rig file."""
 
 from typing import Annotated, Literal, Self
 
@@ -18,13 +18,12 @@ def _on_the_dial(iso: object) -> object:
 
 
 class BodySettings(BaseModel):
-    """Dial, lens switch and menus of the simulated camera; by default as they should be for
-    photometry.
+    """Dial, lens switch and menus of the simulated camera; by default set for photometry.
 
     Attributes
     ----------
     body
-        Kind of the camera: `eos`, a Canon EOS, or `standard`, one that knows the PTP standard only.
+        Kind of the camera: `eos`, a Canon EOS, or `standard`, one that has the PTP standard only.
     exposure_mode
         Position of the mode dial; protocols need `M`.
     autofocus

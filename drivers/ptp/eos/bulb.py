@@ -1,7 +1,7 @@
 """Bulb: an exposure that the PC begins and ends, for times longer than the dial's 30 s.
 
-BulbStart and BulbEnd, where a camera has them; newer ones (an EOS M50, say) have the full stage of
-the release button held instead, with the shutter time at bulb. Sources: libgphoto2's
+BulbStart and BulbEnd, where a camera has them; newer ones (an EOS M50, for example) have the full
+stage of the release button held instead, with the shutter time at bulb. Sources: libgphoto2's
 `ptp_canon_eos_bulbstart`, its documentation for newer EOS, and its issues 193 and 413.
 """
 
@@ -20,12 +20,12 @@ _HIDDEN_MASK, _HIDDEN = 0x7000, 0x2000
 
 
 class EosBulb:
-    """Opens the shutter and closes it.
+    """Shutter that the PC opens and closes.
 
     Parameters
     ----------
     held
-        What is down while the shutter is open.
+        Command pair whose press keeps the shutter open.
     needs_half_press
         Whether the button's first stage goes first; BulbStart goes alone.
     """
@@ -35,14 +35,14 @@ class EosBulb:
         self.needs_half_press = needs_half_press
 
     def open(self) -> Reply:
-        """Begin the exposure; the reply tells when.
+        """Begin the exposure; the reply has the time.
 
         Raises
         ------
         RefusedError
-            None has begun.
+            No exposure has begun.
         DeviceError
-            Nobody knows whether one has.
+            Whether an exposure has begun is unknown.
         """
         try:
             reply = self._held.press(Timeouts(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
@@ -57,7 +57,7 @@ class EosBulb:
         return reply
 
     def close(self) -> Reply | None:
-        """End the exposure; None if certainly none was under way.
+        """End the exposure; return None if certainly none was under way.
 
         Raises
         ------
@@ -77,7 +77,7 @@ class EosBulb:
             ) from None
 
     def close_blindly(self) -> None:
-        """End what another program, or this one before a reset, may have begun.
+        """End an exposure that another program, or this one before a reset, may have begun.
 
         Raises
         ------
@@ -88,7 +88,7 @@ class EosBulb:
 
 
 def bulb_of(info: DeviceInfo, session: Session, release: Release) -> EosBulb | None:
-    """How a camera does bulb exposures; None if it cannot."""
+    """Return the camera's way of bulb exposures; None if it has none."""
     if {Eos.BulbStart, Eos.BulbEnd} <= info.operations:
         held = Held(session, (Eos.BulbStart,), (Eos.BulbEnd,))
         return EosBulb(held, needs_half_press=False)

@@ -1,8 +1,7 @@
-"""What of an EOS's own settings would spoil photometry, and where its menu has them.
+"""Checks of an EOS's own settings that would spoil photometry, and their places in its menu.
 
-Menus are named as a 5D Mark II shows them. Sources of codes: libgphoto2's ptp.h and config.c
-(exposure and focus modes, automatic switching-off in seconds); of custom functions:
-`custom_functions`.
+Menus are named as on a 5D Mark II. Sources of codes: libgphoto2's ptp.h and config.c (exposure and
+focus modes, automatic switching-off in seconds); of custom functions: `custom_functions`.
 """
 
 from collections.abc import Iterable, Iterator
@@ -29,14 +28,14 @@ _BY_HAND = "look for yourself in the camera's menu"
 def findings(
     state: EosState, settings: PtpCameraSettings, info: DeviceInfo, *, has_bulb: bool
 ) -> list[Finding]:
-    """All that can be told; the state's events must be fresh.
+    """Return all findings on the camera's settings; the state's events must be fresh.
 
     Parameters
     ----------
     settings
         The rig file's keys for this camera.
     info
-        Its model, and what it can do.
+        Model and abilities of the camera.
     has_bulb
         Whether the PC can end an exposure.
     """
@@ -98,7 +97,7 @@ def _iso_in_force(code: int | None, native: NativeIsos) -> Finding:
 
 
 def _native_isos(native: NativeIsos, model: str) -> Iterator[Finding]:
-    """Who says so, where that leaves a doubt."""
+    """Return a finding on the source of the native ISOs, where it leaves a doubt."""
     listed = _listed(native.values)
     if native.source == "assumed":
         yield Finding(
@@ -124,7 +123,7 @@ def _listed(isos: Iterable[int]) -> str:
 
 
 def _auto_power_off(after_s: int | None) -> Finding:
-    """It is kept awake, too, but a night's run is not staked on one of the two."""
+    """Return a finding on automatic switching-off, a second precaution beside keeping awake."""
     where = "Set-up 1 (yellow) → Auto power off → Off"
     if after_s is None:
         return Finding(

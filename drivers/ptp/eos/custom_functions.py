@@ -16,9 +16,10 @@ MOST_BYTES = 4096
 
 
 class CustomFunction(IntEnum):
-    """Functions that matter here. High ISO noise reduction and Auto Lighting Optimizer do not.
+    """Ids of the custom functions that matter here.
 
-    Those two change the camera's JPEGs only, never a RAW file.
+    High ISO noise reduction and Auto Lighting Optimizer change the camera's JPEGs only, never a RAW
+    file.
     """
 
     iso_expansion = 0x103
@@ -28,14 +29,14 @@ class CustomFunction(IntEnum):
 
 
 class CustomFunctions:
-    """What the camera has said so far, group by group."""
+    """Custom functions that the camera has reported so far, group by group."""
 
     def __init__(self) -> None:
         self._values: dict[int, tuple[int, ...]] = {}
         self._is_unknown = False
 
     def take(self, block: bytes) -> None:
-        """Take in one block; one of another layout leaves nothing to rely on."""
+        """Take in one block; a block of another layout invalidates all values."""
         parsed = parse_custom_functions(block)
         if parsed is None:
             self._is_unknown = True
@@ -43,13 +44,13 @@ class CustomFunctions:
             self._values |= parsed
 
     def value(self, function: CustomFunction) -> int | None:
-        """Its only value; None if the camera did not tell it in a known layout."""
+        """Return a function's only value; None if it was not reported in a known layout."""
         values = self._values.get(function, ())
         return values[0] if len(values) == 1 and not self._is_unknown else None
 
 
 def parse_custom_functions(block: bytes) -> dict[int, tuple[int, ...]] | None:
-    """Function id → values; None where any number does not fit the known layout."""
+    """Return the values by function id; None where any number does not fit the known layout."""
     if not 8 <= len(block) <= MOST_BYTES or len(block) % 4:
         return None
     numbers = struct.unpack(f"<{len(block) // 4}I", block)

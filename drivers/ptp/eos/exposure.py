@@ -1,4 +1,4 @@
-"""Shutter time, aperture and sensitivity of an EOS: what it offers, what is set, setting it."""
+"""Shutter time, aperture and sensitivity of an EOS: offers, settings in force, setting them."""
 
 import math
 from collections.abc import Collection
@@ -23,16 +23,16 @@ from .state import EosState
 
 
 class EosExposure:
-    """The exposure settings behind an `EosState`; that one's events must be fresh.
+    """The exposure settings behind an `EosState`, whose events must be fresh.
 
     Parameters
     ----------
     state
-        What the camera says.
+        State that the camera has reported.
     settings
-        The rig file's keys for it.
+        The rig file's keys for the camera.
     isos
-        Sensitivities that are native.
+        Native sensitivities.
     has_bulb
         Whether the PC can end an exposure.
     """
@@ -57,12 +57,13 @@ class EosExposure:
         return self._shutter() == BULB_TV
 
     def offers(self) -> CameraOffers:
-        """The camera's own lists, less what the rig file excludes, and bulb if that asks for it.
+        """Return the camera's own lists, less what the rig file excludes, plus bulb if it needs it.
 
         Raises
         ------
         DeviceError
-            The camera lets none be set, for its dial is not at M, or none that the rig file allows.
+            The camera offers no settings, for its dial is not at M, or none that the rig file
+            allows.
         """
         self._require_manual()
         dial_s = sorted(t for c in self._shutter_codes() if (t := shutter_time_s(c)))
@@ -89,7 +90,7 @@ class EosExposure:
         Raises
         ------
         DeviceError
-            The camera does not offer it or did not take it.
+            The camera does not offer a setting or did not take it.
         """
         self._require_manual()
         bulb_s = self._bulb_time_s(wanted.exposure_s)
@@ -105,12 +106,13 @@ class EosExposure:
                 )
 
     def in_force(self) -> ExposureSettings:
-        """What the camera says is set, with the true shutter time; at bulb the one asked for.
+        """Return the reported settings, with the actual shutter time; at bulb the nominal one.
 
         Raises
         ------
         DeviceError
-            It is at bulb unasked, at automatic ISO, at something unknown, or its dial not at M.
+            The camera is at bulb unasked, at automatic ISO, at something unknown, or its dial not
+            at M.
         """
         self._require_manual()
         tv = self._shutter()
@@ -162,7 +164,7 @@ class EosExposure:
         return BULB_TV if self._dial_is_at_b else self._state.value(Property.shutter_time)
 
     def _shutter_codes(self) -> tuple[int, ...]:
-        """Of times that the camera itself counts."""
+        """Return the codes of times that the camera itself counts."""
         allowed = self._settings.allows_exposure
         return tuple(
             code
@@ -178,7 +180,7 @@ class EosExposure:
         return self._settings.bulb_times_s if possible else ()
 
     def _bulb_time_s(self, exposure_s: float) -> float | None:
-        """The time offered at bulb that is meant by `exposure_s`."""
+        """Return the time offered at bulb that `exposure_s` stands for."""
         if not exposure_s > 0:
             raise DeviceError(
                 f"expected a shutter time longer than 0 s, asked for {exposure_s} s: "

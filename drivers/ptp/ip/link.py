@@ -1,7 +1,7 @@
 """The network side: PTP/IP (CIPA DC-005), two TCP connections to one camera.
 
-The first carries transactions; the second their cancellation, the camera's questions whether the
-PC is still there, and events.
+The first carries transactions; the second their cancellation, the camera's probes of the PC, and
+events.
 """
 
 import select
@@ -25,14 +25,14 @@ LOOK_AT_NETWORK = "check that it is on, in the network, and free of other progra
 
 
 class PacketStream:
-    """Packets over one socket, of which this object takes care.
+    """Packets over one socket, which this object owns.
 
     Parameters
     ----------
     connected
-        The socket.
+        Connected socket.
     name
-        What messages call it.
+        Name of the camera in messages.
     """
 
     def __init__(self, connected: socket.socket, name: str) -> None:
@@ -43,21 +43,21 @@ class PacketStream:
         self._gone: str | None = None
 
     def fileno(self) -> int:
-        """For `select`."""
+        """Return the socket's file descriptor, for `select`."""
         return self._socket.fileno()
 
     @property
     def beginning(self) -> bytes:
-        """What has come of a packet that is not all there."""
+        """Bytes that have come of an incomplete packet."""
         return bytes(self._received)
 
     def write(self, packets: bytes, doing: str) -> None:
-        """Send all of it.
+        """Send all of the data.
 
         Raises
         ------
         UnpluggedError
-            The camera does not take it, or is gone; `doing` says what for.
+            The camera does not take it, or is gone; `doing` is its purpose in the message.
         """
         self.check(doing)
         try:
@@ -67,7 +67,7 @@ class PacketStream:
             self.check(doing)
 
     def take_in(self) -> None:
-        """Receive what is there; should the camera be gone, what came before stays to be read."""
+        """Receive the bytes that have come; if the camera is gone, earlier bytes stay readable."""
         try:
             received = self._socket.recv(BLOCK_BYTES)
         except OSError as failure:
@@ -78,12 +78,12 @@ class PacketStream:
         self._received += received
 
     def check(self, doing: str) -> None:
-        """Nothing, if the camera is still there.
+        """Check that the camera is still there.
 
         Raises
         ------
         UnpluggedError
-            It is gone.
+            The camera is gone.
         """
         if self._gone is not None:
             raise UnpluggedError(
@@ -91,17 +91,17 @@ class PacketStream:
             )
 
     def next_packet(self, at_most_bytes: int) -> Packet | None:
-        """The next packet, if all of it has been taken in.
+        """Return the next packet, if all of it has been taken in.
 
         Raises
         ------
         MalformedError
-            What came is no packet, and nothing behind it can be understood any more.
+            The bytes are no packet; nothing behind them can be decoded any more.
         """
         return split(self._received, at_most_bytes)
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the socket."""
         self._socket.close()
 
 
@@ -133,16 +133,16 @@ class IpLink:
     Parameters
     ----------
     dial
-        Makes one TCP connection to the camera.
+        Function that makes one TCP connection to the camera.
     address
-        What messages call it.
+        Address of the camera, for messages.
     clock
-        On which time-outs count.
+        Clock of the time-outs.
 
     Raises
     ------
     DeviceError
-        Nobody there, not a camera, or it lets nobody in.
+        No camera is at the address, or it refuses the PC.
     """
 
     def __init__(self, dial: Callable[[], socket.socket], address: str, clock: Clock) -> None:
@@ -160,18 +160,18 @@ class IpLink:
         Raises
         ------
         DeviceError
-            The camera does not take it; `doing` says what for.
+            The camera does not take it; `doing` is its purpose in the message.
         """
         self._operation = request.code
         self._command(doing).write(packets.request(request, data), doing)
 
     def receive(self, doing: str, timeout_s: float, at_most_bytes: int) -> Container:
-        """The next data or response, each packet of it within `timeout_s`.
+        """Return the next data or response, each packet of it within `timeout_s`.
 
         Raises
         ------
         DeviceError
-            Nothing came, it is out of order, or longer than it says or than `at_most_bytes`.
+            Nothing came, it is out of order, or longer than announced or than `at_most_bytes`.
         """
         longest = at_most_bytes + _AROUND_DATA_BYTES + _SHORT_PACKET_BYTES
         packet = self._next(doing, timeout_s, longest)
@@ -199,12 +199,12 @@ class IpLink:
         return Container(Kind.DATA, self._operation, transaction_id, bytes(data))
 
     def event(self, timeout_s: float) -> Container | None:
-        """The next event, None if the camera reports none within `timeout_s`.
+        """Return the next event, None if the camera reports none within `timeout_s`.
 
         Raises
         ------
         DeviceError
-            The camera is gone, or what came is no event.
+            The camera is gone, or the packet is no event.
         """
         doing = "waiting for an event"
         deadline_s = self._clock.now() + timeout_s
@@ -215,12 +215,12 @@ class IpLink:
         return packets.event(self._events.popleft()) if self._events else None
 
     def cancel(self, transaction_id: int) -> None:
-        """Have the camera give up `transaction_id` and forget what it still sends.
+        """Make the camera cancel `transaction_id` and discard what it still sends.
 
         Raises
         ------
         DeviceError
-            The camera does not answer that it has.
+            The camera does not confirm it.
         """
         doing = "cancelling a transaction"
         deadline_s = self._clock.now() + CANCEL_TIMEOUT_S
@@ -235,18 +235,18 @@ class IpLink:
                 is_over = packets.response(answer).transaction_id == transaction_id
 
     def reset(self) -> None:
-        """Hang up, which ends the camera's session, and dial again.
+        """Close the connection, which ends the camera's session, and dial again.
 
         Raises
         ------
         DeviceError
-            The camera does not let this PC in again.
+            The camera refuses this PC.
         """
         self.close()
         self._introduce()
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         for stream in self._streams:
             stream.close()
         self._streams.clear()
@@ -306,7 +306,7 @@ class IpLink:
         return packet
 
     def _take_in(self, doing: str, deadline_s: float) -> bool:
-        """Receive what comes, on either connection; False if nothing does until then."""
+        """Receive bytes on either connection; return False if none come until then."""
         for stream in self._streams:
             stream.check(doing)
         left_s = deadline_s - self._clock.now()

@@ -1,7 +1,7 @@
 """Shutter time, aperture and sensitivity by the standard's own properties.
 
-The shutter time is a number of 0.1 ms, which the camera rounds, and most makers round to what the
-dial says (1/60 s is 16.6 ms), whatever the shutter does. The number is used as it comes.
+The shutter time is a number of 0.1 ms, which the camera rounds, and most makers round to the dial's
+nominal time (1/60 s is 16.6 ms), whatever the actual one. The number is used as it comes.
 """
 
 import math
@@ -36,9 +36,9 @@ class StandardExposure:
     Parameters
     ----------
     properties
-        What the camera says.
+        Properties that the camera reports.
     settings
-        The rig file's keys for it.
+        The rig file's keys for the camera.
     isos
         Sensitivities that may be used.
     """
@@ -54,12 +54,12 @@ class StandardExposure:
         self._isos = isos
 
     def offers(self) -> CameraOffers:
-        """The camera's own lists, less what the rig file excludes.
+        """Return the camera's own lists, less what the rig file excludes.
 
         Raises
         ------
         DeviceError
-            The camera does not tell its shutter time or ISO, or offers none that the rig allows.
+            The camera does not report its shutter time or ISO, or offers none that the rig allows.
         """
         units = self._shutter_choices(self._shutter())
         isos = self._iso_choices(self._iso())
@@ -83,7 +83,7 @@ class StandardExposure:
         Raises
         ------
         DeviceError
-            The camera does not offer it or did not take it.
+            The camera does not offer a setting or did not take it.
         """
         if not wanted.exposure_s > 0:
             raise DeviceError(
@@ -105,12 +105,12 @@ class StandardExposure:
             self._set_aperture(aperture, wanted.f_number, wanted)
 
     def in_force(self) -> ExposureSettings:
-        """What the camera says is set.
+        """Return the settings that the camera reports.
 
         Raises
         ------
         DeviceError
-            It does not tell, or stands at automatic ISO or at a shutter time without an end.
+            The camera reports none, or is at automatic ISO or at a shutter time without an end.
         """
         shutter, iso, aperture = self._shutter(), self._iso(), self._aperture()
         if not self._is_usable(shutter.value):
@@ -204,12 +204,12 @@ class StandardExposure:
 
 
 def _f_number(units: int) -> float | None:
-    """None where the lens tells nothing."""
+    """Return the f-number; None where the lens reports none."""
     return units / F_NUMBER_UNITS if 0 < units < 0xFFFF else None
 
 
 def _nearest(units: float, among: Iterable[int]) -> int | None:
-    """The shutter time that is meant by `units`, as offered or as on a dial."""
+    """Return the shutter time that `units` stands for, as offered or as on a dial."""
     off_stops = {each: abs(math.log2(each / units)) for each in among}
     nearest = min(off_stops, key=off_stops.__getitem__, default=None)
     return None if nearest is None or off_stops[nearest] > SAME_SHUTTER_STOPS else nearest

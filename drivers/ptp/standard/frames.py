@@ -31,20 +31,20 @@ class _Stored:
 
 
 class StandardFrames:
-    """Knows whether a frame is due, so that none is ever taken for another.
+    """Bookkeeping of the frame that is due, so that none is ever taken for another.
 
-    A camera reports ObjectAdded for every file of a capture (RAW, JPEG, a copy on a second card,
-    a new folder) and CaptureComplete before, between or after them, or never. Files that somebody
-    took by hand are left alone.
+    A camera reports ObjectAdded for every file of a capture (RAW, JPEG, a copy on a second card, a
+    new folder) and CaptureComplete before, between or after them, or never. Files that were taken
+    by hand are left alone.
 
     Parameters
     ----------
     session
-        Over which the camera reports and files come.
+        Session that reports and transfers the files.
     clock
-        On which is waited for them.
+        Clock of the waiting for frames.
     info
-        What the camera says it can do.
+        Abilities that the camera reports.
     timeout_s
         Seconds from the end of an exposure until its frame must have been reported.
     """
@@ -66,22 +66,22 @@ class StandardFrames:
         self._last: ObjectInfo | None = None
 
     def expect(self, exposure_end_s: float) -> None:
-        """An exposure has begun, or may have, that ends at this clock time at the latest."""
+        """Note that an exposure has begun, or may have, and ends at this clock time at latest."""
         self._due_after_s = exposure_end_s
         self._is_ended = self._is_full = False
 
     def expect_none(self) -> None:
-        """No exposure is under way."""
+        """Note that no exposure is under way."""
         self._due_after_s = None
         self._is_ended = True
 
     def fetch(self) -> tuple[bytes, str]:
-        """The frame that is due: its bytes and its suffix, such as `.nef`.
+        """Return the bytes of the frame that is due and its suffix, such as `.nef`.
 
         Raises
         ------
         DeviceError
-            None came, none that is a RAW file, or not as many bytes as announced.
+            No frame came, none that is a RAW file, or not as many bytes as announced.
         """
         frame = self._wait()
         if frame is None:
@@ -94,9 +94,9 @@ class StandardFrames:
         return data, frame.info.suffix
 
     def discard_abandoned(self) -> None:
-        """Wait for a frame that is due though nobody wants it, and clear the card of all.
+        """Wait for an abandoned frame that is due, and delete all frames from the card.
 
-        Also of the last one delivered: whoever goes on has it on disk by now.
+        The last one delivered is among them: a caller that goes on has it on disk by now.
 
         Raises
         ------
@@ -115,7 +115,7 @@ class StandardFrames:
         self._due_after_s = None
 
     def discard_reported(self) -> None:
-        """Clear the card of the files that were reported until now and that nobody wants.
+        """Delete the abandoned files that were reported until now from the card.
 
         Raises
         ------
@@ -129,7 +129,7 @@ class StandardFrames:
             self._delete(self._added.pop())
 
     def _wait(self) -> _Stored | None:
-        """The frame that is due; None if there is none, only others, or no room for one."""
+        """Return the frame that is due; None if there is none, only others, or no room for one."""
         latest_s = (self._due_after_s or self._clock.now()) + self._timeout_s
         deadline_s = latest_s
         while not self._is_full and (left_s := deadline_s - self._clock.now()) > 0:
@@ -150,7 +150,7 @@ class StandardFrames:
         self._tells_end = self._is_ended
 
     def _listen(self, timeout_s: float) -> int | None:
-        """Take in one event; its code, None if there was none."""
+        """Take in one event; return its code, None if there was none."""
         event = self._session.event(timeout_s)
         self._clock.sleep(0.0)
         if event is None:
@@ -177,12 +177,12 @@ class StandardFrames:
             self._added.append(_Stored(handle, info))
 
     def _is_ours(self, info: ObjectInfo) -> bool:
-        """Whether it can be of the capture that is due, or is one more file of the last one."""
+        """Return whether a file can be of the capture that is due, or a further one of the last."""
         is_due = self._due_after_s is not None
         return is_due or (self._last is not None and info.stem == self._last.stem)
 
     def _is_copy(self, info: ObjectInfo) -> bool:
-        """Whether it is the last frame once more, on another card."""
+        """Return whether a file is the last frame once more, on another card."""
         if self._last is None or not info.captured:
             return False
         is_same = (info.name, info.captured) == (self._last.name, self._last.captured)

@@ -1,4 +1,4 @@
-"""A still image device through pyusb: bytes in and out, and what went wrong in one line.
+"""A still image device through pyusb: bytes in and out, and errors in one line.
 
 pyusb carries no types, so `Any` ends here.
 """
@@ -28,7 +28,7 @@ def usb_errors_explained(context: str) -> Iterator[None]:
     Parameters
     ----------
     context
-        Which device, and what was being done.
+        Name of the device, and the purpose of the call.
 
     Raises
     ------
@@ -90,9 +90,9 @@ def claim_still_image(device: Any, address: str) -> StillImageInterface:
     Raises
     ------
     DeviceError
-        It has none, or none with bulk endpoints.
+        The device has no such interface, or none with bulk endpoints.
     usb.core.USBError
-        It cannot be claimed.
+        The interface cannot be claimed.
     """
     configuration = _configuration(device)
     interface = usb.util.find_descriptor(configuration, bInterfaceClass=STILL_IMAGE_CLASS)
@@ -147,14 +147,14 @@ class UsbDevice:
     """Endpoints and class requests of the still image interface, which it claims.
 
     Every method raises `DeviceError` alone: `NoAnswerError`, `StallError`, `UnpluggedError` or
-    plain. `doing` says in its message what for.
+    plain. `doing` is the purpose of the call in its message.
 
     Parameters
     ----------
     device
         The `usb.core.Device`.
     address
-        What messages call it.
+        Address of the device, for messages.
     """
 
     def __init__(self, device: Any, address: str) -> None:
@@ -171,27 +171,27 @@ class UsbDevice:
 
     @property
     def has_events(self) -> bool:
-        """Whether there is an endpoint on which it can report by itself."""
+        """Whether there is an endpoint for events."""
         return self._endpoints.interrupt_in is not None
 
     def write(self, data: bytes, doing: str) -> int:
-        """Send one transfer; returns how many bytes it took."""
+        """Send one transfer; return the number of bytes that the device took."""
         with self._named(doing):
             return int(self._device.write(self._endpoints.bulk_out, data, _ms(WRITE_TIMEOUT_S)))
 
     def read(self, most_bytes: int, timeout_s: float, doing: str) -> bytes:
-        """One transfer, of whole packets but the last."""
+        """Return one transfer, of whole packets but the last."""
         with self._named(f"{doing} within {timeout_s:g} s"):
             return bytes(self._device.read(self._endpoints.bulk_in, most_bytes, _ms(timeout_s)))
 
     def read_event_packet(self, timeout_s: float, doing: str) -> bytes:
-        """One packet of an event: a longer read would wait for more behind a full last one."""
+        """Return one packet of an event: a longer read would wait for more after a full one."""
         size = self._endpoints.event_packet_bytes
         with self._named(doing):
             return bytes(self._device.read(self._endpoints.interrupt_in, size, _ms(timeout_s)))
 
     def request(self, request: int, data: bytes, doing: str) -> None:
-        """A class request with data."""
+        """Send a class request with data."""
         with self._named(doing):
             self._device.ctrl_transfer(
                 HOST_TO_INTERFACE,
@@ -203,7 +203,7 @@ class UsbDevice:
             )
 
     def ask(self, request: int, doing: str) -> bytes:
-        """A class request that has an answer."""
+        """Send a class request and return its answer."""
         with self._named(doing):
             return bytes(
                 self._device.ctrl_transfer(
@@ -228,13 +228,13 @@ class UsbDevice:
             self._device.clear_halt(self._endpoints.interrupt_in)
 
     def close(self) -> None:
-        """Release the interface; says nothing if the device is gone already."""
+        """Release the interface; does not raise if the device is gone already."""
         with suppress(usb.core.USBError, NotImplementedError):
             usb.util.dispose_resources(self._device)
 
     @contextmanager
     def _named(self, doing: str) -> Iterator[None]:
-        """Name what pyusb could not do; a camera that is gone stays so."""
+        """Name pyusb's failed call in its error; a camera that is gone stays so."""
         context = f"camera {self._address}: {doing}"
         if self._is_gone:
             raise UnpluggedError(f"{context}: it is gone: {WAKE_UP}")

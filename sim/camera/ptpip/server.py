@@ -31,7 +31,7 @@ _MOST_NAME_BYTES = 512
 
 @dataclass
 class _Host:
-    """Who uses the camera."""
+    """Host that uses the camera."""
 
     number: int
     command: Connection
@@ -40,14 +40,14 @@ class _Host:
 
 
 class PtpIpServer:
-    """Serves one camera; close it at the end.
+    """Server of one camera, to be closed at the end.
 
     Parameters
     ----------
     responder
-        The camera.
+        Responder of the camera.
     catch_up
-        Lets the camera's time pass, and tells it.
+        Function that advances the camera's time and returns it.
     port
         TCP port on 127.0.0.1; 0 for any that is free.
 
@@ -74,29 +74,29 @@ class PtpIpServer:
 
     @property
     def port(self) -> int:
-        """TCP port on which it listens."""
+        """TCP port on which the server listens."""
         port: int = self._listener.getsockname()[1]
         return port
 
     @property
     def address(self) -> str:
-        """What a rig file says to reach this camera."""
+        """Address of this camera in a rig file."""
         return f"ptpip://{LOOPBACK}:{self.port}"
 
     def serve(self, clock: Clock) -> NoReturn:
-        """Serve until somebody asks `clock` to stop.
+        """Serve until `clock` is interrupted.
 
         Raises
         ------
         Interrupted
-            Somebody has.
+            A stop was requested.
         """
         while True:
             self.serve_once(LOOK_UP_S)
             clock.sleep(0.0)
 
     def serve_once(self, patience_s: float) -> None:
-        """Do what there is to do; wait at most so long for something."""
+        """Serve the waiting packets; wait for some at most for that time."""
         self._report_events(self._catch_up())
         connections = self._connections()
         sending = [connection for connection in connections if connection.is_sending]
@@ -118,7 +118,7 @@ class PtpIpServer:
             self._accept()
 
     def close(self) -> None:
-        """Hang up on everybody and stop listening."""
+        """Close all connections and stop listening."""
         for connection in self._connections():
             self._hang_up(connection)
         self._listener.close()
@@ -144,7 +144,7 @@ class PtpIpServer:
             self._send(host.event)
 
     def _advance(self, connection: Connection) -> None:
-        """Send what waits, then do what came, as long as both go on."""
+        """Send queued packets, then process received ones, as long as both go on."""
         try:
             while self._send(connection) and (packet := connection.next_packet()):
                 self._take(connection, packet)
@@ -152,7 +152,7 @@ class PtpIpServer:
             self._hang_up(connection)
 
     def _send(self, connection: Connection) -> bool:
-        """Whether all is sent and the other side is still there."""
+        """Return whether all is sent and the other side is still there."""
         if connection not in self._connections():
             return False
         if not connection.send():
@@ -211,7 +211,7 @@ class PtpIpServer:
         return ptpip.packet(PacketType.INIT_EVENT_ACK)
 
     def _hang_up(self, connection: Connection) -> None:
-        """Hang up; a host that loses one of its connections loses both and its session."""
+        """Close a connection; a host that loses one loses both of them and its session."""
         connection.close()
         if connection in self._strangers:
             self._strangers.remove(connection)
@@ -224,7 +224,7 @@ class PtpIpServer:
 
 
 def _check_introduction(packet: Packet) -> None:
-    """GUID, name with its closing zero, version; any version is welcome."""
+    """Check GUID, name with its closing zero, version; any version is accepted."""
     name_bytes = len(packet.payload) - _GUID_BYTES - 4
     if not 2 <= name_bytes <= _MOST_NAME_BYTES or name_bytes % 2:
         raise MalformedPacketError

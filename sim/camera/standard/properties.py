@@ -1,4 +1,4 @@
-"""Device properties of a camera that knows the PTP standard only: values, descriptions, setting.
+"""Device properties of a camera that implements the PTP standard only: values, choices, setting.
 
 Meanings of values: ISO 15740, clause 13.5.
 """
@@ -43,7 +43,7 @@ SHUTTER_TIMES = {
 
 @dataclass
 class _Property:
-    """One property: its size as a letter of `struct`, its value, what the host may set it to."""
+    """One property: its size as a letter of `struct`, its value, its choices."""
 
     letter: str
     value: int
@@ -68,14 +68,14 @@ class _Property:
 
 
 class StandardProperties:
-    """Present values.
+    """Present values of the properties.
 
     Parameters
     ----------
     settings
-        What somebody has set by hand.
+        Manual settings of the body.
     shutter_times
-        What the camera tells of each, in 0.1 ms → the true time in seconds.
+        Actual time in seconds by reported time, in 0.1 ms.
     """
 
     def __init__(self, settings: BodySettings, shutter_times: dict[int, float]) -> None:
@@ -100,42 +100,42 @@ class StandardProperties:
 
     @property
     def known(self) -> tuple[int, ...]:
-        """Codes of those that there are."""
+        """Codes of the existing properties."""
         return tuple(self._all)
 
     @property
     def exposure_s(self) -> float:
-        """True shutter time."""
+        """Actual shutter time in seconds."""
         return self._shutter_times[self._all[StandardProperty.EXPOSURE_TIME].value]
 
     @property
     def iso(self) -> int:
-        """Sensitivity; what the camera takes if that is left to it."""
+        """Sensitivity; if it is automatic, the camera's choice."""
         iso = self._all[StandardProperty.EXPOSURE_INDEX].value
         return codes.AUTO_AT_M if iso == AUTO_ISO else iso
 
     @property
     def f_number(self) -> float:
-        """True relative aperture."""
+        """Actual relative aperture."""
         return codes.true_f_number(self._all[StandardProperty.F_NUMBER].value / 100)
 
     @property
     def delay_s(self) -> float:
-        """Of the self-timer."""
+        """Delay of the self-timer in seconds."""
         return self._all[StandardProperty.CAPTURE_DELAY].value / 1000
 
     def description(self, code: int) -> bytes | None:
-        """DevicePropDesc."""
+        """Return the DevicePropDesc dataset of a property."""
         found = self._all.get(code)
         return None if found is None else found.describe(code)
 
     def value(self, code: int) -> bytes | None:
-        """The value alone."""
+        """Return the bytes of a property's value."""
         found = self._all.get(code)
         return None if found is None else found.pack(found.value)
 
     def set(self, code: int, data: bytes) -> ResponseCode:
-        """The host wants to change a property."""
+        """Change a property on behalf of the host."""
         found = self._all.get(code)
         if found is None:
             return ResponseCode.DEVICE_PROP_NOT_SUPPORTED

@@ -23,7 +23,7 @@ class ContainerType(IntEnum):
 
 
 class MalformedContainerError(Exception):
-    """Bytes that are no container, or not the one that this phase needs."""
+    """Bytes that are no container, or not the one of this phase."""
 
 
 @dataclass(frozen=True)
@@ -44,20 +44,20 @@ class Container:
 
 
 def encode(kind: ContainerType, code: int, transaction_id: int, payload: bytes) -> bytes:
-    """One container as bytes."""
+    """Return the bytes of one container."""
     return _HEADER.pack(HEADER_SIZE + len(payload), kind, code, transaction_id) + payload
 
 
 def encode_parameters(
     kind: ContainerType, code: int, transaction_id: int, parameters: tuple[int, ...]
 ) -> bytes:
-    """One container whose payload is parameters."""
+    """Return the bytes of one container whose payload is parameters."""
     payload = struct.pack(f"<{len(parameters)}I", *parameters)
     return encode(kind, code, transaction_id, payload)
 
 
 class Assembler:
-    """Puts one container together from the packets that the host sends.
+    """Assembler of one container from the packets that the host sends.
 
     Parameters
     ----------
@@ -70,11 +70,11 @@ class Assembler:
         self._received = bytearray()
 
     def discard(self) -> None:
-        """Forget a container that will not be finished."""
+        """Discard a container that will not be finished."""
         self._received.clear()
 
     def feed(self, transfer: bytes) -> Container | None:
-        """Take one transfer; the container if that was the last of it.
+        """Take one transfer; return the container if that was the last of it.
 
         An empty transfer between containers is the end of one that filled its last packet.
         """

@@ -30,11 +30,11 @@ class InPipe:
         self._transfers.append(memoryview(container))
 
     def discard(self) -> None:
-        """Forget everything that was not read."""
+        """Discard everything that was not read."""
         self._transfers.clear()
 
     def take(self, room: int) -> memoryview:
-        """What a read of `room` bytes gets of the container in front."""
+        """Return what a read of `room` bytes receives of the first container."""
         rest = self._transfers.popleft()
         whole_packets = room // self._packet_size * self._packet_size
         if room >= len(rest):
