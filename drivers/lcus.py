@@ -61,7 +61,7 @@ class LcusRelay:
         self._name = f"the LCUS board at {address}"
         self._clock = connections.clock
         self._line = SerialLine(connections.serial(address, BAUDRATE), self._clock, self._name)
-        self._asked_on = False
+        self._commanded_on = False
         self._send(on=False)
         self._answers = self._query() is not None
 
@@ -72,12 +72,12 @@ class LcusRelay:
     def identity(self) -> str:
         """Return the number of relays that the board reports, or that it never acknowledges."""
         states = self._query() if self._answers else None
-        told = (
+        description = (
             "never acknowledges: only the camera can verify it"
             if states is None
             else f"{len(states)} relays, read back by query"
         )
-        return f"LCUS relay board ({told}), relay {self._relay}"
+        return f"LCUS relay board ({description}), relay {self._relay}"
 
     def findings(self) -> Sequence[Finding]:
         """Return whether anything but the camera can verify that the lamp was switched."""
@@ -106,7 +106,7 @@ class LcusRelay:
         A board that never acknowledges may have missed the command, or its contact may be welded.
         The register does not show the contact, either.
         """
-        return self._read() if self._answers else self._asked_on
+        return self._read() if self._answers else self._commanded_on
 
     def make_safe(self) -> None:
         """Switch off twice, as the second command ends one that was cut off; read back if possible.
@@ -129,7 +129,7 @@ class LcusRelay:
 
     def _send(self, *, on: bool) -> None:
         self._line.write(command(self._relay, on=on))
-        self._asked_on = on
+        self._commanded_on = on
         self._clock.sleep(COMMAND_S)
 
     def _read(self) -> bool:
@@ -146,14 +146,14 @@ class LcusRelay:
         self._line.drain()
         for _ in range(2):
             self._line.write(QUERY)
-            came = self._line.read_burst(QUIET_S)
-        if not came:
+            answer = self._line.read_burst(QUIET_S)
+        if not answer:
             return None
-        states = relay_states(came)
+        states = relay_states(answer)
         if len(states) < self._relay:
             raise UnclearAnswerError(
                 f"{self._name} was asked for relay {self._relay}: expected 'CH{self._relay}: ON' "
-                f"or 'OFF', or a byte for each relay, got {came!r}; is it an LCUS board, and has "
+                f"or 'OFF', or a byte for each relay, got {answer!r}; is it an LCUS board, and has "
                 "it that many relays?"
             )
         return states

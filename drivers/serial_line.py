@@ -57,7 +57,7 @@ class SerialLine:
                 f"{self._name} does not take what is sent to it; check its power, cable and address"
             ) from None
         except (serial.SerialException, OSError) as error:
-            raise self._gone(error) from None
+            raise self._lost_error(error) from None
 
     def read_until(self, end: bytes, timeout_s: float) -> bytes:
         """Return the bytes up to and including `end`.
@@ -67,7 +67,7 @@ class SerialLine:
         UnclearAnswerError
             `end` did not come in time; the message shows the bytes that came.
         """
-        return self._read(lambda came: came.endswith(end), f"{end!r} at the end", timeout_s)
+        return self._read(lambda received: received.endswith(end), f"{end!r} at the end", timeout_s)
 
     def read_exactly(self, count: int, timeout_s: float) -> bytes:
         """Return the next `count` bytes.
@@ -77,20 +77,20 @@ class SerialLine:
         UnclearAnswerError
             They did not come in time; the message shows the bytes that came.
         """
-        return self._read(lambda came: len(came) == count, f"{count} bytes", timeout_s)
+        return self._read(lambda received: len(received) == count, f"{count} bytes", timeout_s)
 
     def drain(self, quiet_s: float = LATEST_ANSWER_S, timeout_s: float = DRAIN_S) -> bytes:
         """Return all bytes that come until the line is quiet for `quiet_s`."""
         deadline_s = self._clock.now() + timeout_s
         quiet_since_s = self._clock.now()
-        came = b""
+        received = b""
         while self._clock.now() - quiet_since_s < quiet_s and self._clock.now() < deadline_s:
             if self._waiting():
-                came += self._read_one()
+                received += self._read_one()
                 quiet_since_s = self._clock.now()
             else:
                 self._clock.sleep(DRAIN_POLL_S)
-        return came
+        return received
 
     def read_burst(self, quiet_s: float) -> bytes:
         """Return one burst: begun within `LATEST_ANSWER_S`, ended by a pause of `quiet_s`."""
@@ -102,31 +102,31 @@ class SerialLine:
     def _read(self, is_all: Callable[[bytes], bool], expected: str, timeout_s: float) -> bytes:
         """Read bytes one by one, so that later ones stay in the port."""
         deadline_s = self._clock.now() + timeout_s
-        came = b""
-        while not is_all(came):
+        received = b""
+        while not is_all(received):
             byte = self._read_one()
-            came += byte
-            if self._clock.now() >= deadline_s and not is_all(came):
+            received += byte
+            if self._clock.now() >= deadline_s and not is_all(received):
                 raise UnclearAnswerError(
                     f"{self._name} did not answer within {timeout_s:g} s: expected {expected}, "
-                    f"got {came!r}; check its power, cable and address"
+                    f"got {received!r}; check its power, cable and address"
                 )
             if not byte:
                 self._clock.sleep(POLL_S)
-        return came
+        return received
 
     def _read_one(self) -> bytes:
         try:
             return self._port.read(1) if self._port.in_waiting else b""
         except (serial.SerialException, OSError) as error:
-            raise self._gone(error) from None
+            raise self._lost_error(error) from None
 
     def _waiting(self) -> bool:
         try:
             return self._port.in_waiting > 0
         except (serial.SerialException, OSError) as error:
-            raise self._gone(error) from None
+            raise self._lost_error(error) from None
 
-    def _gone(self, error: Exception) -> DeviceLostError:
-        said = " ".join(str(error).split())
-        return DeviceLostError(f"{self._name} is gone ({said}); plug it in again")
+    def _lost_error(self, error: Exception) -> DeviceLostError:
+        reason = " ".join(str(error).split())
+        return DeviceLostError(f"{self._name} is gone ({reason}); plug it in again")

@@ -65,12 +65,12 @@ class TextChanger:
             The changer gives another answer, or none.
         """
         self._line.write(task.encode() + b"\n")
-        came = self._line.read_until(b"\n", self._settings.takes_at_most)
-        said = " ".join(came.decode(errors="replace").split())
-        if said != "done":
-            kind = DeviceError if said.startswith("cannot") else UnclearAnswerError
+        line = self._line.read_until(b"\n", self._settings.takes_at_most)
+        answer = " ".join(line.decode(errors="replace").split())
+        if answer != "done":
+            kind = DeviceError if answer.startswith("cannot") else UnclearAnswerError
             raise kind(
-                f"{self._name} were told '{task}': expected 'done', got '{said}'; do it by hand, "
+                f"{self._name} were told '{task}': expected 'done', got '{answer}'; do it by hand, "
                 "without 'changer:' in the rig file, or teach them"
             )
 

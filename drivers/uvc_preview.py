@@ -62,8 +62,10 @@ class UvcPreview:
         """
         if self._capture is None:
             self._capture = self._opened()
-        there, picture = self._capture.read()
-        encoded = there and cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        is_read, picture = self._capture.read()
+        encoded = is_read and cv2.imencode(
+            ".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+        )
         if not encoded:
             self.make_safe()
             raise DeviceError(

@@ -112,8 +112,8 @@ class PhotonUnit:
         light, offers = card_light(session, self.reference, self.card), session.rig[CAMERA].offers()
         settings = replace(self.reference, iso=self.iso)
         fractions = np.linspace(*PHOTON_FRACTIONS, self.levels)
-        wanted = [light.exposed(float(fraction), settings, offers) for fraction in fractions]
-        for shot in dict.fromkeys(wanted):
+        shots = [light.exposed(float(fraction), settings, offers) for fraction in fractions]
+        for shot in dict.fromkeys(shots):
             session.perform(Shoot(CardFrames.PHOTON, shot))
             session.perform(Shoot(CardFrames.PHOTON, shot))
 
@@ -216,8 +216,8 @@ def iso_bracket(isos: Sequence[int]) -> Bracket:
         light: CardLight, offers: CameraOffers, reference: ExposureSettings
     ) -> Sequence[ExposureSettings]:
         shot = light.exposed(MOST, replace(reference, iso=max(isos)), offers)
-        same = replace(reference, exposure_s=shot.exposure_s)
-        return [same, *(replace(same, iso=iso) for iso in isos if iso != reference.iso)]
+        settings = replace(reference, exposure_s=shot.exposure_s)
+        return [settings, *(replace(settings, iso=iso) for iso in isos if iso != reference.iso)]
 
     return bracket
 
@@ -230,9 +230,9 @@ def aperture_bracket(f_numbers: Sequence[float | None]) -> Bracket:
     ) -> Sequence[ExposureSettings]:
         widest = min(f_numbers, key=lambda f_number: f_number or 0.0)
         shot = light.exposed(MOST, replace(reference, f_number=widest), offers)
-        same = replace(reference, exposure_s=shot.exposure_s)
-        others = [one for one in f_numbers if one != reference.f_number]
-        return [same, *(replace(same, f_number=f_number) for f_number in others)]
+        settings = replace(reference, exposure_s=shot.exposure_s)
+        others = [f_number for f_number in f_numbers if f_number != reference.f_number]
+        return [settings, *(replace(settings, f_number=f_number) for f_number in others)]
 
     return bracket
 

@@ -268,7 +268,9 @@ class DecayUnit:
         regions = list(protocol.patches.values())
 
         def decide() -> Schedule:
-            frames = [one for one in session.frames(FrameRole.METER) if one.unit == self.metering]
+            frames = [
+                frame for frame in session.frames(FrameRole.METER) if frame.unit == self.metering
+            ]
             metering = [measure_frame(frame, regions) for frame in frames]
             return protocol.schedule(offers, metering, session.warn)
 
@@ -307,12 +309,15 @@ class DecayUnit:
         ]
         if len(metering) < 2:
             return False
-        before, now = (
+        previous_dn, present_dn = (
             [glow(frame.path, region) for region in self.protocol.patches.values()]
             for frame in metering[-2:]
         )
         limit = 1 + self.protocol.plateau.growth
-        return all(new <= old * limit for old, new in zip(before, now, strict=True))
+        return all(
+            present <= previous * limit
+            for previous, present in zip(previous_dn, present_dn, strict=True)
+        )
 
 
 @dataclass(frozen=True)
@@ -331,8 +336,8 @@ class DaylightUnit:
         session.perform(LAMP_ON)
         session.wait(LAMP_SETTLES_S, "lamp settles")
         under_lamp = [
-            self.protocol.settings(offers.exposure_at_most(wanted_s))
-            for wanted_s in DAYLIGHT_EXPOSURES_S
+            self.protocol.settings(offers.exposure_at_most(nominal_s))
+            for nominal_s in DAYLIGHT_EXPOSURES_S
         ]
         for settings in under_lamp:
             session.perform(Shoot(FrameRole.DAYLIGHT, settings))

@@ -113,16 +113,19 @@ class EmissionSpectrum(GlowSettings):
 
     def units(self) -> Sequence[Unit]:
         """Return darks, metering and spectrum for each lamp, white card, the bench put back."""
-        stands, now = Arrangement(), Arrangement(lvf="before camera")
-        units: list[Unit] = [Arranged(DarkUnit(self), now, stands, THROUGH_IT)]
+        previous, arrangement = Arrangement(), Arrangement(lvf="before camera")
+        units: list[Unit] = [Arranged(DarkUnit(self), arrangement, previous, THROUGH_IT)]
         for lamp in self.lamps:
-            stands, now = now, replace(now, lamp=lamp)
+            previous, arrangement = arrangement, replace(arrangement, lamp=lamp)
             metering = MeterUnit(self, self.charge, f"meter-{lamp}")
-            units += [Arranged(metering, now, stands, OTHER_LAMP), SpectrumUnit(self, lamp)]
+            units += [
+                Arranged(metering, arrangement, previous, OTHER_LAMP),
+                SpectrumUnit(self, lamp),
+            ]
         if self.white:
-            stands, now = now, Arrangement("grey card", "before camera")
-            units.append(Arranged(WhiteUnit(self), now, stands, WHITE))
-        return [*units, PutBackUnit(now)]
+            previous, arrangement = arrangement, Arrangement("grey card", "before camera")
+            units.append(Arranged(WhiteUnit(self), arrangement, previous, WHITE))
+        return [*units, PutBackUnit(arrangement)]
 
 
 @dataclass(frozen=True)
@@ -171,9 +174,9 @@ class WhiteUnit:
         session.wait_until_warm("camera")
         light_card(session)
         offers = session.rig[CAMERA].offers()
-        for wanted_s in WHITE_EXPOSURES_S:
+        for nominal_s in WHITE_EXPOSURES_S:
             shoot = Shoot(
-                SpectrumFrames.WHITE, self.protocol.settings(offers.exposure_at_most(wanted_s))
+                SpectrumFrames.WHITE, self.protocol.settings(offers.exposure_at_most(nominal_s))
             )
             for _ in range(WHITES_PER_EXPOSURE):
                 session.perform(shoot)

@@ -115,8 +115,8 @@ class ExcitationSettings(ProtocolModel):
         Number of charges after those, of durations that add most information on the rates.
     direct
         Durations of the charges by the lamp itself, without the filter, rising, for example
-        `[3 s, 1 min]`. They determine how far the sample is charged; the shortest ones that of
-        states that decay within seconds.
+        `[3 s, 1 min]`. They determine the level of the charge; the shortest ones, that of states
+        that decay within seconds.
     first
         Time from lamp off to the first photograph, for example `1 s`. A trap door must be open by
         then.
@@ -126,7 +126,8 @@ class ExcitationSettings(ProtocolModel):
     duration
         Time after lamp off until which photographs begin, for example `90 s`.
     last_decay
-        The same time for the last charge, which has the longest decay, for example `180 s`.
+        Time after lamp off until which photographs begin after the last charge, which has the
+        longest decay, for example `180 s`.
     rest
         Rest in the dark between two charges.
     samples
@@ -265,9 +266,9 @@ class ExcitationUnit:
 
     def rates(self, frame: FrameRecord, darks: Sequence[MeteringFrame]) -> FloatArray:
         """Return the brightest channel's rate along the strip in DN/s, shape (patches, places)."""
-        seen = self.frame_cache.measure_frame(frame)
-        above = levels(seen) - dark_level(darks, frame.exposure_s)
-        return np.asarray(above.max(axis=1) / frame.exposure_s).reshape(-1, PLACES)
+        measured = self.frame_cache.measure_frame(frame)
+        above_dark_dn = levels(measured) - dark_level(darks, frame.exposure_s)
+        return np.asarray(above_dark_dn.max(axis=1) / frame.exposure_s).reshape(-1, PLACES)
 
     def rest(self, session: Session) -> None:
         """Wait in the dark until the sample hardly glows, or have another sample put in."""
@@ -286,10 +287,10 @@ class ExcitationUnit:
             session.perform(look_now)
             face_lamp(session)
             dark = session.choose("dark again", lambda: self._is_dark(session), worst=False)
-            left_s = rule.at_most - rested_s
-            if dark or left_s <= 0:
+            remaining_s = rule.at_most - rested_s
+            if dark or remaining_s <= 0:
                 return
-            session.wait(min(rule.check_every, left_s), "resting in the dark")
+            session.wait(min(rule.check_every, remaining_s), "resting in the dark")
             rested_s += rule.check_every
 
     def _is_dark(self, session: Session) -> bool:
@@ -301,10 +302,10 @@ class ExcitationUnit:
         ]
         darks = self.darks(session)
         last_unit = max(frames, key=lambda frame: frame.start_time).unit
-        after = [frame for frame in frames if frame.unit == last_unit]
-        brightest = np.max([self.rates(frame, darks).max(axis=1) for frame in after], axis=0)
-        now = self.rates(session.frames(FrameRole.REST)[-1], darks).max(axis=1)
-        return bool((now < self.protocol.rest.below * brightest).all())
+        last_frames = [frame for frame in frames if frame.unit == last_unit]
+        brightest = np.max([self.rates(frame, darks).max(axis=1) for frame in last_frames], axis=0)
+        present = self.rates(session.frames(FrameRole.REST)[-1], darks).max(axis=1)
+        return bool((present < self.protocol.rest.below * brightest).all())
 
 
 @dataclass(frozen=True)
@@ -406,44 +407,46 @@ class _Charged(ExcitationUnit):
         longest_s = max(protocol.longest_exposures_s(offers, lasting_s))
 
         def decide() -> Schedule:
-            looked_s, frames = self._looked_at(session, role)
-            found = DecayMeter(
+            reference_s, frames = self._reference_charge(session, role)
+            schedule = DecayMeter(
                 [self.frame_cache.measure_frame(frame) for frame in frames]
             ).schedule(times_s, offers, longest_s, EXPOSURES_GROW, session.warn)
-            shorter = max(charge_s / looked_s / HEADROOM, 1.0)
-            exposures_s = [offers.exposure_at_most(one_s / shorter) for one_s in found.exposures_s]
-            return Schedule(found.times_s, tuple(exposures_s))
+            shorter = max(charge_s / reference_s / HEADROOM, 1.0)
+            exposures_s = [
+                offers.exposure_at_most(exposure_s / shorter) for exposure_s in schedule.exposures_s
+            ]
+            return Schedule(schedule.times_s, tuple(exposures_s))
 
         return session.choose("exposure", decide, Schedule.constant(times_s, longest_s))
 
-    def _looked_at(self, session: Session, role: str) -> tuple[float, list[FrameRecord]]:
+    def _reference_charge(self, session: Session, role: str) -> tuple[float, list[FrameRecord]]:
         """Return charge time and frames of the longest charge of the kind."""
-        done = self._done(session, role)
-        if done:
-            return max(done, key=lambda one: one[0])
+        charges = self._charges_so_far(session, role)
+        if charges:
+            return max(charges, key=lambda charge: charge[0])
         meter = f"{role}-meter"
-        return _lit_s(session, meter), [
-            f for f in session.frames(FrameRole.METER) if f.unit == meter
+        return _lamp_on_s(session, meter), [
+            frame for frame in session.frames(FrameRole.METER) if frame.unit == meter
         ]
 
-    def _done(self, session: Session, role: str) -> list[tuple[float, list[FrameRecord]]]:
+    def _charges_so_far(self, session: Session, role: str) -> list[tuple[float, list[FrameRecord]]]:
         """Return charge time and frames of every charge of the kind so far."""
         units: dict[str, list[FrameRecord]] = {}
         for frame in session.frames(role):
             units.setdefault(frame.unit, []).append(frame)
-        return [(_lit_s(session, unit), frames) for unit, frames in units.items()]
+        return [(_lamp_on_s(session, unit), frames) for unit, frames in units.items()]
 
-    def _grown(
-        self, session: Session, done: Sequence[tuple[float, list[FrameRecord]]]
+    def _glow_by_charge(
+        self, session: Session, charges: Sequence[tuple[float, list[FrameRecord]]]
     ) -> tuple[list[float], FloatArray]:
         """Return the charge times, and the glow of every place in the first frame after each."""
         darks = self.darks(session)
-        return [one[0] for one in done], np.array(
-            [self.rates(frames[0], darks) for _, frames in done]
+        return [charge_s for charge_s, _ in charges], np.array(
+            [self.rates(frames[0], darks) for _, frames in charges]
         )
 
 
-def _lit_s(session: Session, unit: str) -> float:
+def _lamp_on_s(session: Session, unit: str) -> float:
     """Return the time for which the lamp shone in a unit, in seconds."""
     times_s = [action.start_time for action in session.actions("lamp") if action.unit == unit]
     return times_s[1] - times_s[0]
@@ -464,9 +467,9 @@ class DoublingUnit(_Charged):
         """Charge and photograph, unless the glow has stopped growing."""
 
         def grows() -> bool:
-            done = self._done(session, ExcitationFrames.STRIP)
-            return len(done) == self.number - 1 and still_grows(
-                self._grown(session, done)[1], self.protocol.growth
+            charges = self._charges_so_far(session, ExcitationFrames.STRIP)
+            return len(charges) == self.number - 1 and still_grows(
+                self._glow_by_charge(session, charges)[1], self.protocol.growth
             )
 
         if self.number > 2 and not session.choose("the glow still grows", grows, worst=True):
@@ -493,7 +496,9 @@ class RefiningUnit(_Charged):
 
         def decide() -> float:
             return most_informative_s(
-                *self._grown(session, self._done(session, ExcitationFrames.STRIP))
+                *self._glow_by_charge(
+                    session, self._charges_so_far(session, ExcitationFrames.STRIP)
+                )
             )
 
         worst_s = self.protocol.doubled_s(self.protocol.at_most)

@@ -135,10 +135,10 @@ class Fade(ProtocolModel):
     def fade_exposure_s(self, delay_s: float, light: CardLight, offers: CameraOffers) -> float:
         """Return the longest shutter time in which even a slowly fading lamp does not clip."""
         steady_s = light.exposure_s(HALF, self.settings())
-        left_s = SLOWEST_S * math.exp(-delay_s / SLOWEST_S)
-        if left_s <= steady_s:
+        remaining_s = SLOWEST_S * math.exp(-delay_s / SLOWEST_S)
+        if remaining_s <= steady_s:
             return offers.exposure_at_most(self.longest)
-        filled_s = -SLOWEST_S * math.log1p(-steady_s / left_s)
+        filled_s = -SLOWEST_S * math.log1p(-steady_s / remaining_s)
         return offers.exposure_at_most(min(filled_s, self.longest))
 
     def units(self) -> Sequence[Unit]:

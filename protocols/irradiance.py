@@ -41,8 +41,7 @@ class Irradiance(ProtocolModel):
     Attributes
     ----------
     bands_nm
-        Edges of the wavelength bands in nm, rising. The default is that of Table 1 of Nalbach et
-        al.
+        Edges of the wavelength bands in nm, rising. The default is that of Table 1 of the paper.
     vector_length
         Euclidean length to which the lamp's irradiance, one number for each band, is scaled;
         excitation rates belong to it. Table 1 of the paper has 1.
@@ -85,14 +84,19 @@ class Irradiance(ProtocolModel):
         """Return darks, then the card by itself and through the LVF in turn, as the lamp drifts."""
         units: list[SceneUnit] = []
         for number in range(1, self.rounds + 1):
-            before = units[-1].wanted if units else Arrangement()
-            why = "how bright the lamp is by itself"
+            previous = units[-1].wanted if units else Arrangement()
+            reason = "how bright the lamp is by itself"
             units.append(
                 SceneUnit(
-                    self.bracketing, f"direct-{number}", CardFrames.DIRECT, _DIRECT, before, why
+                    self.bracketing,
+                    f"direct-{number}",
+                    CardFrames.DIRECT,
+                    _DIRECT,
+                    previous,
+                    reason,
                 )
             )
-            why = "how much of it the variable filter leaves"
+            reason = "how much of it the variable filter leaves"
             units.append(
                 StripUnit(
                     self.bracketing,
@@ -100,7 +104,7 @@ class Irradiance(ProtocolModel):
                     CardFrames.THROUGH,
                     _THROUGH,
                     _DIRECT,
-                    why,
+                    reason,
                 )
             )
         return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]

@@ -81,7 +81,11 @@ class Isotropy(GlowSettings):
         """Return darks, metering, and every angle between two straight views."""
         units: list[Unit] = [DarkUnit(self), MeterUnit(self, self.charge)]
         stands = 0
-        for name, angle in [("before", 0), *((str(a), a) for a in self.angles), ("after", 0)]:
+        for name, angle in [
+            ("before", 0),
+            *((str(degrees), degrees) for degrees in self.angles),
+            ("after", 0),
+        ]:
             units.append(AngleUnit(self, f"angle-{name}", angle, stands))
             stands = angle
         return units
@@ -115,8 +119,10 @@ class AngleUnit:
         session.run_sequence(lights_out(session))
         if self.angle:
             by = duration_text(self.protocol.first)
-            why = f"the glow is photographed {by} after lamp off, so in the dark and without delay"
-            session.ask(_turn(self.angle, why, TURNING_S))
+            reason = (
+                f"the glow is photographed {by} after lamp off, so in the dark and without delay"
+            )
+            session.ask(_turn(self.angle, reason, TURNING_S))
         first_s = lamp_off_s + self.protocol.first - session.clock.now()
         if first_s < 0:
             session.warn(
@@ -133,7 +139,7 @@ class AngleUnit:
         checks.require_decay(self.protocol.short_settings(session))
 
 
-def _turn(angle: int, why: str, takes_s: float) -> ManualStep:
+def _turn(angle: int, reason: str, duration_s: float) -> ManualStep:
     return ManualStep(
-        f"turn the sample by {angle}° against the camera", why, f"tilt {angle}", takes_s
+        f"turn the sample by {angle}° against the camera", reason, f"tilt {angle}", duration_s
     )

@@ -104,7 +104,9 @@ class FilterUnit(SceneUnit):
 
     def check(self, session: Session) -> None:
         """Warn of a filter that seems not to be in its place."""
-        if session.choose("like the picture before", lambda: self._same(session), worst=False):
+        if session.choose(
+            "like the picture before", lambda: self._is_like_previous(session), worst=False
+        ):
             session.warn(
                 f"the picture with the colour filter {self.wanted.filter} is like the one before "
                 f"it ({self._unit_before}): take the last step back if the filter is not in its "
@@ -115,12 +117,12 @@ class FilterUnit(SceneUnit):
     def _unit_before(self) -> str:
         return filter_unit(self.before.filter)
 
-    def _same(self, session: Session) -> bool:
+    def _is_like_previous(self, session: Session) -> bool:
         from .steps.strip_checks import look_alike
 
-        before = frames_of(session, self.role, self._unit_before)
+        previous = frames_of(session, self.role, self._unit_before)
         strip = frames_of(session, self.role, filter_unit(None))
-        return look_alike(self.own(session), before, strip)
+        return look_alike(self.own(session), previous, strip)
 
 
 @dataclass(frozen=True)
@@ -239,10 +241,12 @@ class LvfCalibration(ProtocolModel):
     def units(self) -> Sequence[Unit]:
         """Return first what can go wrong, the strip and its lines, then filter by filter."""
         units: list[SceneUnit] = []
-        for kind, name, role, wanted, more in self._scenes():
-            before = units[-1].wanted if units else Arrangement()
-            why, mercury_s = _WHY[role], self.mercury_warm_up
-            units.append(kind(self.bracketing, name, role, wanted, before, why, mercury_s, **more))
+        for kind, name, role, arrangement, keys in self._scenes():
+            previous = units[-1].wanted if units else Arrangement()
+            reason, mercury_s = _WHY[role], self.mercury_warm_up
+            units.append(
+                kind(self.bracketing, name, role, arrangement, previous, reason, mercury_s, **keys)
+            )
         return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]
 
     def _scenes(self) -> Iterator[_Scene]:
@@ -250,15 +254,15 @@ class LvfCalibration(ProtocolModel):
         yield SceneUnit, "card", LvfFrames.CARD, _CARD, {}
         yield StripUnit, "strip-on-sample", strip, _ON_SAMPLE, {}
         yield StripUnit, none, LvfFrames.FILTER, _BEFORE_CAMERA, {}
-        lit = replace(_BEFORE_CAMERA, lamp="mercury")
-        more = {"strip": (LvfFrames.FILTER, none), "rising": self.rising}
-        yield LinesUnit, "lines", LvfFrames.LINES, lit, more
-        lit = replace(_ON_SAMPLE, lamp="mercury")
-        more = {"strip": (strip, "strip-on-sample"), "rising": self.rising_on_sample}
-        yield LinesUnit, "lines-on-sample", LvfFrames.LINES_ON_SAMPLE, lit, more
+        arrangement = replace(_BEFORE_CAMERA, lamp="mercury")
+        keys = {"strip": (LvfFrames.FILTER, none), "rising": self.rising}
+        yield LinesUnit, "lines", LvfFrames.LINES, arrangement, keys
+        arrangement = replace(_ON_SAMPLE, lamp="mercury")
+        keys = {"strip": (strip, "strip-on-sample"), "rising": self.rising_on_sample}
+        yield LinesUnit, "lines-on-sample", LvfFrames.LINES_ON_SAMPLE, arrangement, keys
         if isinstance(self.stripes, float):
-            lit = replace(lit, stage="sample")
-            yield StripesUnit, "stripes", LvfFrames.STRIPES, lit, {"charge_s": self.stripes}
+            arrangement = replace(arrangement, stage="sample")
+            yield StripesUnit, "stripes", LvfFrames.STRIPES, arrangement, {"charge_s": self.stripes}
         for name in self.filter_names():
             yield (
                 FilterUnit,

@@ -50,9 +50,9 @@ class Phosphor(ProtocolModel):
                 "two alike a 'part:' name of its own"
             )
         folders = {name.casefold() for name in names}
-        if taken := [name for name in self.patches if name.casefold() in folders]:
+        if clashes := [name for name in self.patches if name.casefold() in folders]:
             raise ValueError(
-                f"expected patches that are not called like a part, got '{taken[0]}': both would "
+                f"expected patches that are not called like a part, got '{clashes[0]}': both would "
                 "be that folder of the result"
             )
         return self
@@ -64,8 +64,8 @@ class Phosphor(ProtocolModel):
     def patches_of(self, unit: str) -> Mapping[str, Region]:
         """Return the patches of the part to which the unit belongs."""
         for part in self.chain():
-            if (own := unit_within(part.name, unit)) is not None:
-                return part.protocol.patches_of(own)
+            if (part_unit := unit_within(part.name, unit)) is not None:
+                return part.protocol.patches_of(part_unit)
         return self.patches
 
     def suited_to(self, rig: RigFile) -> Self:
@@ -81,7 +81,7 @@ class Phosphor(ProtocolModel):
         measured: set[str] = set()
         missing: list[str] = []
         for part in self.chain():
-            missing += [one for one in part.protocol.unmeasured(rig) if one not in measured]
+            missing += [name for name in part.protocol.unmeasured(rig) if name not in measured]
             measured.add(part.protocol.protocol)
         return missing
 
@@ -115,21 +115,21 @@ class Part:
         name = str(keys.pop("part", kind))
         keys.setdefault("sample", chain.sample.model_dump(exclude_none=True))
         if chain.patches and kind in OF_PATCHES:
-            own = keys.get("patches")
-            if own is None:
+            patches = keys.get("patches")
+            if patches is None:
                 keys["patches"] = chain.patches
-            elif isinstance(own, dict) and set(map(str, own)) != set(chain.patches):
+            elif isinstance(patches, dict) and set(map(str, patches)) != set(chain.patches):
                 raise ValueError(
                     f"part {name}: expected the patches of the chain, {', '.join(chain.patches)}, "
-                    f"got {', '.join(map(str, own)) or 'none'}; leave 'patches:' out of the part, "
-                    "or give them the same names"
+                    f"got {', '.join(map(str, patches)) or 'none'}; leave 'patches:' out of the "
+                    "part, or give them the same names"
                 )
         model = plugins.load(plugins.PROTOCOLS, kind, f"part {name}")
         return cls(name, validate(keys, model, f"part {name}"))
 
 
-def _changed(before: ProtocolModel, after: ProtocolModel) -> dict[str, Any]:
+def _changed(original: ProtocolModel, completed: ProtocolModel) -> dict[str, Any]:
     """Return the keys, as written in YAML, that differ between two protocols."""
-    kept = before.model_dump(mode="json", by_alias=True)
-    now = after.model_dump(mode="json", by_alias=True)
-    return {key: value for key, value in now.items() if value != kept[key]}
+    original_keys = original.model_dump(mode="json", by_alias=True)
+    completed_keys = completed.model_dump(mode="json", by_alias=True)
+    return {key: value for key, value in completed_keys.items() if value != original_keys[key]}

@@ -78,8 +78,8 @@ class WeakerLight(BaseModel):
         """Return `unit` with the light weakened before it."""
         if self.filter is not None:
             return Arranged(unit, Arrangement(filter=self.filter), Arrangement(), WHY)
-        what = f"move the lamp to a distance of {self.distance} from the sample"
-        return Prepared(unit, ManualStep(what, WHY, f"lamp at {self.distance}"))
+        instruction = f"move the lamp to a distance of {self.distance} from the sample"
+        return Prepared(unit, ManualStep(instruction, WHY, f"lamp at {self.distance}"))
 
     def ended(self, unit: Unit) -> Unit:
         """Return `unit` with the light restored before it."""

@@ -55,7 +55,7 @@ def developed(electrons: FloatArray, rng: np.random.Generator) -> NDArray[np.uin
     light += scatter * rng.standard_normal(light.shape, dtype=np.float32)
     # The camera's own white balance, roughly: green counts most.
     balanced = light * np.array([1.9, 1.0, 1.6]) / WHITE_ELECTRONS
-    shown: NDArray[np.uint8] = np.clip(
+    picture: NDArray[np.uint8] = np.clip(
         255.0 * np.clip(balanced, 0.0, 1.0) ** (1 / 2.2) + 0.5, 0, 255
     ).astype(np.uint8)
-    return shown
+    return picture

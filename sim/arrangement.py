@@ -68,12 +68,12 @@ class Arrangements:
 
     def changed(self, now_s: float, **what: Any) -> "Arrangements":
         """Return the arrangements with one more change, of those fields of an `Arrangement`."""
-        after = replace(self.last, **what)
-        if after == self.last:
+        changed = replace(self.last, **what)
+        if changed == self.last:
             return self
         if now_s <= self.since_s[-1]:
-            return Arrangements(self.since_s, (*self.states[:-1], after))
-        return Arrangements((*self.since_s, now_s), (*self.states, after))
+            return Arrangements(self.since_s, (*self.states[:-1], changed))
+        return Arrangements((*self.since_s, now_s), (*self.states, changed))
 
     def at(self, time_s: float) -> Arrangement:
         """Return the state at a time; from the moment of a change on it is the new one."""
@@ -82,5 +82,5 @@ class Arrangements:
     def spans(self, start_s: float, end_s: float) -> Iterator[tuple[float, float, Arrangement]]:
         """Yield begin, end and state of every part of an interval in which nothing changes."""
         changes = [time_s for time_s in self.since_s if start_s < time_s < end_s]
-        for left, right in pairwise([start_s, *changes, end_s]):
-            yield left, right, self.at(left)
+        for begin_s, stop_s in pairwise([start_s, *changes, end_s]):
+            yield begin_s, stop_s, self.at(begin_s)

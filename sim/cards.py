@@ -41,9 +41,9 @@ def surfaces(card: Card, chart: Region, width: int, height: int) -> IntArray:
 
     A grey card fills the picture, a ColorChecker its region. A blank lies below.
     """
-    found = np.zeros((height, width), dtype=np.intp)
+    surface = np.zeros((height, width), dtype=np.intp)
     if card == "grey card":
-        found[:] = 1
+        surface[:] = 1
     elif card == "colorchecker":
         x, y, wide, high = region_pixels(chart, width, height)
         row, in_row = np.divmod((np.arange(high) + 0.5) / high * ROWS, 1)
@@ -52,8 +52,8 @@ def surfaces(card: Card, chart: Region, width: int, height: int) -> IntArray:
         inside = (np.abs(in_row - 0.5) < 0.5 - FRAME)[:, None] & (
             np.abs(in_column - 0.5) < 0.5 - FRAME
         )
-        found[y : y + high, x : x + wide] = np.where(inside, number, 1 + ROWS * COLUMNS)
-    return found
+        surface[y : y + high, x : x + wide] = np.where(inside, number, 1 + ROWS * COLUMNS)
+    return surface
 
 
 def _colorchecker() -> FloatArray:

@@ -86,7 +86,7 @@ class Changer:
     def _put_lvf(self, place: LvfPlace) -> None:
         if place != "away" and not self._has_lvf:
             raise UsageError("there is no LVF in this room, see 'simulation.lvf'")
-        turned = any(when.is_on(self._clock.now()) for when in self._turned)
+        turned = any(span.is_on(self._clock.now()) for span in self._turned)
         self._change(lvf=place, turned=turned and place != "away")
 
     def _put_filter(self, name: str | None) -> None:

@@ -40,13 +40,13 @@ class LampCircuit:
         self._welded = given(fault.relay_welded for fault in faults)
         changes = {
             time_s
-            for when in (*self._bulb_dead, *self._mercury_dead, *self._dead, *self._welded)
-            for time_s in (when.at, when.until)
+            for span in (*self._bulb_dead, *self._mercury_dead, *self._dead, *self._welded)
+            for time_s in (span.at, span.until)
         }
         self._changes_s = sorted(time_s for time_s in changes if time_s > 0)
-        self._asked_on = asked_on
+        self._register_on = asked_on
         # Welded before the room was opened: it was closed then, and has not let go.
-        self._closed = any(when.at < 0 and when.is_on(0.0) for when in self._welded)
+        self._closed = any(span.at < 0 and span.is_on(0.0) for span in self._welded)
         self._closed = self._contact(0.0)
         self._plugged: LampKind = "halogen"
         self._lamp = Lamp.found(settings, self._closed and not _any(self._bulb_dead, 0.0))
@@ -79,7 +79,7 @@ class LampCircuit:
     def ask(self, on: bool) -> None:
         """Change the board's register now."""
         self._follow()
-        self._asked_on = on
+        self._register_on = on
         self._settle(self._clock.now())
 
     def _follow(self) -> None:
@@ -96,8 +96,8 @@ class LampCircuit:
 
     def _contact(self, time_s: float) -> bool:
         stuck = self._closed and _any(self._welded, time_s)
-        return stuck or (self._asked_on and not _any(self._dead, time_s))
+        return stuck or (self._register_on and not _any(self._dead, time_s))
 
 
 def _any(whens: Sequence[FaultTime], time_s: float) -> bool:
-    return any(when.is_on(time_s) for when in whens)
+    return any(span.is_on(time_s) for span in whens)

@@ -48,14 +48,14 @@ class SimulatedDisk:
         if fits < len(data):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    def _fits(self, wanted: int) -> int:
+    def _fits(self, size: int) -> int:
         """Return how many of that number of bytes the disk has room for."""
-        now_s, fits = self._clock.now(), wanted
-        for number, full in enumerate(self._full):
-            if full.after_bytes is None:
-                fits = 0 if full.is_on(now_s) else fits
-            elif self._written_bytes + wanted > full.after_bytes:
-                fits = min(fits, full.after_bytes - self._written_bytes)
+        now_s, fits = self._clock.now(), size
+        for number, fault in enumerate(self._full):
+            if fault.after_bytes is None:
+                fits = 0 if fault.is_on(now_s) else fits
+            elif self._written_bytes + size > fault.after_bytes:
+                fits = min(fits, fault.after_bytes - self._written_bytes)
                 # From here on it is full until somebody makes room.
-                self._full[number] = full.model_copy(update={"at": now_s, "after_bytes": None})
+                self._full[number] = fault.model_copy(update={"at": now_s, "after_bytes": None})
         return fits

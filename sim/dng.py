@@ -71,14 +71,14 @@ def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
     pixels = mosaic.astype("<u2").tobytes()
     # Whole microseconds first: the clock's seconds must not tip over by rounding twice.
     seconds, microseconds = divmod(round(shot.start_s * 1e6), 1_000_000)
-    taken = datetime.fromtimestamp(seconds, UTC).strftime("%Y:%m:%d %H:%M:%S")
+    date_time = datetime.fromtimestamp(seconds, UTC).strftime("%Y:%m:%d %H:%M:%S")
     subsecond = f"{microseconds // 10_000:02d}"
     exif: list[Entry] = [
         (33434, _RATIONAL, [exposure_label(shot.exposure_s)]),
         (33437, _RATIONAL, [Fraction(shot.f_number).limit_denominator(10)]),
         (34855, _SHORT, [shot.iso]),
         (36864, _UNDEFINED, b"0230"),
-        (36867, _ASCII, taken),
+        (36867, _ASCII, date_time),
         (37521, _ASCII, subsecond),
     ]
     if shot.lens is not None:
@@ -99,7 +99,7 @@ def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
         (277, _SHORT, [1]),
         (278, _LONG, [height]),
         (279, _LONG, [len(pixels)]),
-        (306, _ASCII, taken),
+        (306, _ASCII, date_time),
         (33421, _SHORT, [2, 2]),
         (33422, _BYTE, BAYER_RGGB),
         (34665, _LONG, [0]),  # where EXIF begins; set below

@@ -70,8 +70,8 @@ class Door:
         if time_s >= swing.rest_s:
             return swing.end
         if time_s < swing.stop_s:
-            gone = (time_s - swing.start_s) / (swing.stop_s - swing.start_s)
-            return swing.begin + gone * (swing.end - swing.begin)
+            progress = (time_s - swing.start_s) / (swing.stop_s - swing.start_s)
+            return swing.begin + progress * (swing.end - swing.begin)
         rung_s = time_s - swing.stop_s
         fading = swing.overshoot * math.exp(-rung_s / self.settings.ringing)
         return swing.end + fading * math.sin(2 * math.pi * self.settings.ringing_hz * rung_s)
@@ -96,8 +96,8 @@ class Door:
         return self.swings[-1].rest_s
 
     def _with(self, swing: _Swing) -> "Door":
-        before = tuple(s for s in self.swings if s.start_s < swing.start_s)
-        return replace(self, swings=(*before, swing))
+        earlier = tuple(s for s in self.swings if s.start_s < swing.start_s)
+        return replace(self, swings=(*earlier, swing))
 
 
 class DoorDrive:
@@ -138,7 +138,7 @@ class DoorDrive:
         self._clock = clock
         self._stuck = stuck
         self._slow = slow
-        changes = {time_s for when in stuck for time_s in (when.at, when.until)}
+        changes = {time_s for span in stuck for time_s in (span.at, span.until)}
         self._changes_s = sorted(time_s for time_s in changes if time_s > 0)
         self._followed = len(pulses())
         self._goal = float(is_open)
@@ -174,9 +174,9 @@ class DoorDrive:
         if self._is_stuck(start_s):
             return
         takes = [slow.takes for slow in self._slow if slow.is_on(start_s)]
-        way = abs(self._goal - self._door.angle(start_s))
-        travel_s = max(max(takes, default=self._settings.travel) * way, at_least_s)
+        turn = abs(self._goal - self._door.angle(start_s))
+        travel_s = max(max(takes, default=self._settings.travel) * turn, at_least_s)
         self._door = self._door.sent(self._goal, start_s, travel_s)
 
     def _is_stuck(self, time_s: float) -> bool:
-        return any(when.is_on(time_s) for when in self._stuck)
+        return any(span.is_on(time_s) for span in self._stuck)

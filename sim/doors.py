@@ -41,8 +41,8 @@ class Doors:
         self._seed = simulation.seed
         self._clock = clock
         self._pulses = pulses
-        found_open = simulation.initial.door == "open"
-        self._trap_door = self._drive(simulation.door, simulation.faults, is_open=found_open)
+        is_open = simulation.initial.door == "open"
+        self._trap_door = self._drive(simulation.door, simulation.faults, is_open=is_open)
         self._shield = self._drive(simulation.shield, (), is_open=True)
 
     @property

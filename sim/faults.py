@@ -127,14 +127,14 @@ WhenT = TypeVar("WhenT", bound=FaultTime)
 
 def _or_its_name(schema: dict[str, Any]) -> None:
     """Allow the name alone in the schema: the fault is then always there."""
-    when = {**schema, "minProperties": 1, "maxProperties": 1}
+    with_span = {**schema, "minProperties": 1, "maxProperties": 1}
     schema.clear()
     name = {
         "description": "Name of a fault that is there from the epoch on and for ever.",
-        "enum": list(when["properties"]),
+        "enum": list(with_span["properties"]),
     }
-    when["description"] = "Name of a fault and its time span."
-    schema["anyOf"] = [name, when]
+    with_span["description"] = "Name of a fault and its time span."
+    schema["anyOf"] = [name, with_span]
 
 
 class Fault(_Part):
@@ -226,23 +226,23 @@ class Fault(_Part):
         if isinstance(item, dict):
             if len(item) != 1:
                 raise ValueError(f"expected one fault in each item of the list, got {len(item)}")
-            return {name: {} if when is None else when for name, when in item.items()}
+            return {name: {} if span is None else span for name, span in item.items()}
         return item
 
     @model_serializer
     def _to_name(self) -> dict[str, Any]:
         return {
-            name: when.model_dump(mode="json", by_alias=True, exclude_unset=True)
-            for name, when in self
-            if when is not None
+            name: span.model_dump(mode="json", by_alias=True, exclude_unset=True)
+            for name, span in self
+            if span is not None
         }
 
     def seen_from(self, opening_s: float) -> Self:
         """Return the fault on the clock of a room that opens `opening_s` after its epoch."""
-        later = {name: when.seen_from(opening_s) for name, when in self if when is not None}
+        later = {name: span.seen_from(opening_s) for name, span in self if span is not None}
         return self.model_copy(update=later)
 
 
-def given(whens: Iterable[WhenT | None]) -> tuple[WhenT, ...]:
+def given(spans: Iterable[WhenT | None]) -> tuple[WhenT, ...]:
     """Return the time spans of the faults that are given."""
-    return tuple(when for when in whens if when is not None)
+    return tuple(span for span in spans if span is not None)

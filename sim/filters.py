@@ -50,7 +50,7 @@ class Filters:
             raise UsageError(f"{place}: expected a {SUFFIX} file for each colour filter, got none")
         self._bent = bent
         self._seed = seed
-        self._known: dict[str | None, FloatArray] = {None: np.ones_like(WAVELENGTH_NM)}
+        self._transmissions: dict[str | None, FloatArray] = {None: np.ones_like(WAVELENGTH_NM)}
 
     def check(self, name: str) -> None:
         """Raise UsageError if there is no filter of that name."""
@@ -64,9 +64,9 @@ class Filters:
         """
         history: list[tuple[float, str | None, float]] = []
         for since_s, arrangement in zip(arrangements.since_s, arrangements.states, strict=True):
-            now = arrangement.filter, arrangement.lamp_m
-            if not history or history[-1][1:] != now:
-                history.append((since_s, *now))
+            state = arrangement.filter, arrangement.lamp_m
+            if not history or history[-1][1:] != state:
+                history.append((since_s, *state))
         return tuple(
             (since_s, self.transmission(name) * (USUAL_LAMP_M / lamp_m) ** 2)
             for since_s, name, lamp_m in history
@@ -74,9 +74,9 @@ class Filters:
 
     def transmission(self, name: str | None) -> FloatArray:
         """Return the filter's transmittance, shape (160,) on `WAVELENGTH_NM`; no filter: 1."""
-        if name is not None and name not in self._known:
-            self._known[name] = self._really(name)
-        return self._known[name]
+        if name is not None and name not in self._transmissions:
+            self._transmissions[name] = self._really(name)
+        return self._transmissions[name]
 
     def _really(self, name: str) -> FloatArray:
         self.check(name)

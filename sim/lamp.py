@@ -217,10 +217,10 @@ class Lamp:
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
         """Return ∫ irradiance dt over an interval, shape (160,)."""
         total = np.zeros_like(WAVELENGTH_NM)
-        for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
-            if not self.dark(left, right):
-                panel_s = PANEL_SETTLED_S if self._settled(left) else PANEL_FADING_S
-                at_s, part_s = nodes(left, right, panel_s)
+        for begin_s, stop_s in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
+            if not self.dark(begin_s, stop_s):
+                panel_s = PANEL_SETTLED_S if self._settled(begin_s) else PANEL_FADING_S
+                at_s, part_s = nodes(begin_s, stop_s, panel_s)
                 total += part_s @ self.irradiance(at_s)
         return total
 
@@ -238,12 +238,12 @@ class Lamp:
         if np.all(times_s >= self.phases[-1].start_s):
             return value(self.phases[-1], times_s)
         starts_s = [phase.start_s for phase in self.phases]
-        of_time = np.searchsorted(starts_s, times_s, side="right") - 1
-        first, last = of_time.min(), of_time.max()
-        found = value(self.phases[first], times_s)
+        phase_index = np.searchsorted(starts_s, times_s, side="right") - 1
+        first, last = phase_index.min(), phase_index.max()
+        values = value(self.phases[first], times_s)
         for index in range(first + 1, last + 1):
-            found = np.where(of_time < index, found, value(self.phases[index], times_s))
-        return found
+            values = np.where(phase_index < index, values, value(self.phases[index], times_s))
+        return values
 
     def _warmth(self, time_s: float | FloatArray) -> FloatArray:
         """Return the housing's warmth by Newton's law, 0 cold to 1 warm."""

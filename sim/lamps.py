@@ -71,11 +71,11 @@ class FilteredLamps:
         """Return ∫ irradiance dt over an interval, shape (160,)."""
         changes = [since_s for since_s, _ in self.filters if start_s < since_s < end_s]
         total = np.zeros_like(self.filters[0][1])
-        for left, right in pairwise([start_s, *changes, end_s]):
-            light = self.halogen.exposure(left, right)
+        for begin_s, stop_s in pairwise([start_s, *changes, end_s]):
+            light = self.halogen.exposure(begin_s, stop_s)
             if self.mercury.was_on:
-                light = light + self.mercury.exposure(left, right)
-            total += light * self._passed(left)
+                light = light + self.mercury.exposure(begin_s, stop_s)
+            total += light * self._passed(begin_s)
         return total + self.leds.exposure(start_s, end_s) if self.leds.were_lit else total
 
     def _passed(self, time_s: float | FloatArray) -> FloatArray:

@@ -73,19 +73,19 @@ class Layout:
             numbers += np.where(patch > 0, self._strips["on sample"], 0)
         # The cloth and every patch have a cell, even one that others hide.
         every = np.arange(len(simulation.patches) + 1) * (PIECES + 1)
-        found, counts = np.unique(np.concatenate([every, numbers.ravel()]), return_counts=True)
-        self._cells = np.searchsorted(found, numbers)
-        self.patch, self.piece = np.divmod(found, PIECES + 1)
-        self.pixels = counts - np.isin(found, every)
-        self._known: dict[tuple[Card, LvfPlace], Places] = {}
+        cells, counts = np.unique(np.concatenate([every, numbers.ravel()]), return_counts=True)
+        self._cells = np.searchsorted(cells, numbers)
+        self.patch, self.piece = np.divmod(cells, PIECES + 1)
+        self.pixels = counts - np.isin(cells, every)
+        self._places_by_arrangement: dict[tuple[Card, LvfPlace], Places] = {}
 
     def places(self, arrangement: Arrangement) -> Places:
         """Return all places that look different in an arrangement."""
         through = self.looked_through(arrangement)
         key = arrangement.card, through
-        if key not in self._known:
-            self._known[key] = self._places(*key)
-        return self._known[key]
+        if key not in self._places_by_arrangement:
+            self._places_by_arrangement[key] = self._places(*key)
+        return self._places_by_arrangement[key]
 
     def looked_through(self, arrangement: Arrangement) -> LvfPlace:
         """Return the LVF's place if the camera looks through it, else `away`.
@@ -101,9 +101,9 @@ class Layout:
         surface = surfaces(card, self._simulation.chart, width, height)
         piece = self._strips.get(through, np.zeros_like(surface))
         numbers = (self._cells * (surface.max() + 1) + surface) * (PIECES + 1) + piece
-        found, place = np.unique(numbers, return_inverse=True)
-        rest, pieces_found = np.divmod(found, PIECES + 1)
-        cells_found, surfaces_found = np.divmod(rest, surface.max() + 1)
+        distinct, place = np.unique(numbers, return_inverse=True)
+        remainder, pieces_found = np.divmod(distinct, PIECES + 1)
+        cells_found, surfaces_found = np.divmod(remainder, surface.max() + 1)
         bayer = np.tile(np.arange(len(BAYER_RGGB)).reshape(2, 2), (height // 2, width // 2))
         painted = place.reshape(height, width) * len(BAYER_RGGB) + bayer
         return Places(cells_found, surfaces_found, pieces_found, painted)

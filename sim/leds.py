@@ -53,10 +53,10 @@ class Leds:
 
     def switched(self, relay: int, on: bool, at_s: float) -> "Leds":
         """Return the bank after a relay has moved; one that has no LED does nothing."""
-        lit = self.lit | {relay} if on else self.lit - {relay}
-        if lit == self.lit or relay not in {led.relay for led in self.bank}:
+        relays = self.lit | {relay} if on else self.lit - {relay}
+        if relays == self.lit or relay not in {led.relay for led in self.bank}:
             return self
-        return replace(self, states=(*self.states, (at_s, lit)))
+        return replace(self, states=(*self.states, (at_s, relays)))
 
     def until(self, time_s: float) -> "Leds":
         """Return the bank without switches after `time_s`."""
@@ -64,7 +64,7 @@ class Leds:
 
     def last_switch_off(self, time_s: float) -> float | None:
         """Return the time at which an LED was last switched off, up to and including `time_s`."""
-        off = [at_s for (_, before), (at_s, after) in pairwise(self.states) if before - after]
+        off = [at_s for (_, previous), (at_s, relays) in pairwise(self.states) if previous - relays]
         return max((at_s for at_s in off if at_s <= time_s), default=None)
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
@@ -79,15 +79,15 @@ class Leds:
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
         """Return the relative spectral irradiance at the sample, shape (..., 160)."""
         since_s = [at_s for at_s, _ in self.states]
-        found: FloatArray = self._light[np.searchsorted(since_s, time_s, side="right") - 1]
-        return found
+        irradiance: FloatArray = self._light[np.searchsorted(since_s, time_s, side="right") - 1]
+        return irradiance
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
         """Return ∫ irradiance dt over an interval, shape (160,)."""
         edges_s = [start_s, *self.corners(start_s, end_s), end_s]
-        places = [self._place(left) for left in edges_s[:-1]]
-        found: FloatArray = np.diff(edges_s) @ self._light[places]
-        return found
+        places = [self._place(begin_s) for begin_s in edges_s[:-1]]
+        exposure: FloatArray = np.diff(edges_s) @ self._light[places]
+        return exposure
 
     def _place(self, time_s: float) -> int:
         return bisect_right(self.states, time_s, key=lambda state: state[0]) - 1
@@ -97,4 +97,6 @@ class Leds:
         """Return the irradiance of every state, shape (states, 160)."""
         spectra = {led.relay: led_spectrum(led) for led in self.bank}
         dark = np.zeros_like(WAVELENGTH_NM)
-        return np.array([sum((spectra[one] for one in lit), dark) for _, lit in self.states])
+        return np.array(
+            [sum((spectra[relay] for relay in relays), dark) for _, relays in self.states]
+        )

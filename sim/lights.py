@@ -67,7 +67,7 @@ class Stray:
 
     def is_on(self, time_s: float) -> bool:
         """Return whether the light is on at a time."""
-        return any(when.is_on(time_s) for when in self.whens)
+        return any(span.is_on(time_s) for span in self.whens)
 
 
 @dataclass(frozen=True)
@@ -86,8 +86,8 @@ class Lights:
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
         """Return the times strictly between at which light or door is not smooth."""
-        whens = [when for stray in self._strays for when in stray.whens]
-        switches = {time_s for when in whens for time_s in (when.at, when.until)}
+        spans = [span for stray in self._strays for span in stray.whens]
+        switches = {time_s for span in spans for time_s in (span.at, span.until)}
         inside = {time_s for time_s in switches if start_s < time_s < end_s}
         moving = [time_s for door in self._doors for time_s in door.corners(start_s, end_s)]
         return sorted(inside.union(self.lamp.corners(start_s, end_s), moving))
@@ -97,7 +97,7 @@ class Lights:
         if not self.lamp.dark(start_s, end_s):
             return False
         corners = [start_s, *self.corners(start_s, end_s), end_s]
-        middles = [(left + right) / 2 for left, right in pairwise(corners)]
+        middles = [(begin_s + stop_s) / 2 for begin_s, stop_s in pairwise(corners)]
         return not any(stray.is_on(at_s) for stray in self._strays for at_s in middles)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
@@ -162,14 +162,14 @@ class Lights:
     def _lamp(self, start_s: float, end_s: float, fractions: Sequence[UnitFraction]) -> FloatArray:
         """Return ∫ shares of the lamp dt, shape (shares, 160)."""
         total = np.zeros((len(fractions), len(WAVELENGTH_NM)))
-        for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
-            if self.lamp.dark(left, right):
+        for begin_s, stop_s in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
+            if self.lamp.dark(begin_s, stop_s):
                 continue
-            if self._is_still(left, right):
-                parts = [fraction((left + right) / 2) for fraction in fractions]
-                total += np.outer(parts, self.lamp.exposure(left, right))
+            if self._is_still(begin_s, stop_s):
+                parts = [fraction((begin_s + stop_s) / 2) for fraction in fractions]
+                total += np.outer(parts, self.lamp.exposure(begin_s, stop_s))
                 continue
-            times_s, part_s = nodes(left, right, PANEL_FADING_S)
+            times_s, part_s = nodes(begin_s, stop_s, PANEL_FADING_S)
             parts_s = part_s * np.array([_at(times_s, fraction) for fraction in fractions])
             total += parts_s @ self.lamp.irradiance(times_s)
         return total
@@ -180,15 +180,15 @@ class Lights:
         strays = self._strays
         if not strays:
             return total
-        for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
-            middle_s = (left + right) / 2
+        for begin_s, stop_s in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
+            middle_s = (begin_s + stop_s) / 2
             light = sum(stray.spectrum for stray in strays if stray.is_on(middle_s))
-            if self._is_still(left, right):
-                seen_s = fraction(middle_s) * (right - left)
+            if self._is_still(begin_s, stop_s):
+                share_s = fraction(middle_s) * (stop_s - begin_s)
             else:
-                times_s, part_s = nodes(left, right, PANEL_FADING_S)
-                seen_s = float(part_s @ _at(times_s, fraction))
-            total += light * seen_s
+                times_s, part_s = nodes(begin_s, stop_s, PANEL_FADING_S)
+                share_s = float(part_s @ _at(times_s, fraction))
+            total += light * share_s
         return total
 
     def _is_still(self, start_s: float, end_s: float) -> bool:

@@ -98,8 +98,8 @@ def pieces(strip: StripSettings, width: int, height: int) -> IntArray:
     u = (from_x * math.cos(along) + from_y * math.sin(along)) / wide + 0.5
     v = (from_y * math.cos(along) - from_x * math.sin(along)) / high + 0.5
     inside = (u >= 0) & (u < 1) & (v >= 0) & (v < 1)
-    found: IntArray = np.where(inside, 1 + np.floor(u * PIECES).astype(np.intp), 0)
-    return found
+    piece: IntArray = np.where(inside, 1 + np.floor(u * PIECES).astype(np.intp), 0)
+    return piece
 
 
 def in_pixels(region: Region, width: int, height: int) -> tuple[float, float, float, float]:

@@ -40,11 +40,11 @@ def line_spectrum() -> FloatArray:
     """
     spectrum = np.full_like(WAVELENGTH_NM, CONTINUUM * STRONGEST)
     for line_nm, strength in LINES:
-        left = int((line_nm - WAVELENGTH_NM[0]) // CELL_NM)
-        right_fraction = (line_nm - WAVELENGTH_NM[left]) / CELL_NM
+        cell = int((line_nm - WAVELENGTH_NM[0]) // CELL_NM)
+        right_fraction = (line_nm - WAVELENGTH_NM[cell]) / CELL_NM
         light = STRONGEST * strength / CELL_NM
-        spectrum[left] += (1 - right_fraction) * light
-        spectrum[left + 1] += right_fraction * light
+        spectrum[cell] += (1 - right_fraction) * light
+        spectrum[cell + 1] += right_fraction * light
     return spectrum
 
 
@@ -97,11 +97,11 @@ class Mercury:
         """Return ∫ irradiance dt over an interval, shape (160,)."""
         corners = [start_s, *self.corners(start_s, end_s), end_s]
         total_s = 0.0
-        for left, right in pairwise(corners):
-            at_s, on = self._switch(left)
+        for begin_s, stop_s in pairwise(corners):
+            at_s, on = self._switch(begin_s)
             if on:
-                cold = [math.exp(-(t - at_s) / WARM_UP_S) for t in (left, right)]
-                total_s += right - left - (1 - COLD) * WARM_UP_S * (cold[0] - cold[1])
+                cold = [math.exp(-(time_s - at_s) / WARM_UP_S) for time_s in (begin_s, stop_s)]
+                total_s += stop_s - begin_s - (1 - COLD) * WARM_UP_S * (cold[0] - cold[1])
         return total_s * line_spectrum()
 
     def dark(self, start_s: float, end_s: float) -> bool:

@@ -165,19 +165,19 @@ def _servo_board(simulation: Simulation, clock: VirtualClock) -> MaestroBoard:
 
 def _camera_faults(faults: Sequence[Fault]) -> CameraFaults:
     """Return the faults of the camera; its cable can be pulled once."""
-    found = CameraFaults(
+    camera_faults = CameraFaults(
         busy_spans_s=_spans_s(given(fault.camera_busy for fault in faults)),
         full_spans_s=_spans_s(given(fault.camera_full for fault in faults)),
     )
     for out in given(fault.camera_unplugged for fault in faults):
-        found = replace(
-            found,
+        camera_faults = replace(
+            camera_faults,
             unplug_at_s=out.at if out.after_bytes is None else None,
             unplug_after_bytes=out.after_bytes,
             replug_after_s=out.lasting,
         )
-    return found
+    return camera_faults
 
 
-def _spans_s(whens: Sequence[FaultTime]) -> tuple[tuple[float, float], ...]:
-    return tuple((when.at, when.until) for when in whens)
+def _spans_s(spans: Sequence[FaultTime]) -> tuple[tuple[float, float], ...]:
+    return tuple((span.at, span.until) for span in spans)

@@ -105,7 +105,7 @@ def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
     factor, added = CubicSpline(KNOTS_NM, rng.standard_normal((2, len(KNOTS_NM))), axis=1)(
         WAVELENGTH_NM
     )
-    seen = (WAVELENGTH_NM > 400.0) & (WAVELENGTH_NM < 700.0)
+    visible = (WAVELENGTH_NM > 400.0) & (WAVELENGTH_NM < 700.0)
 
     def normalised(strength: float) -> FloatArray:
         bent = curve / peak * np.exp(strength * factor) + strength * ADDED * added
@@ -113,11 +113,11 @@ def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
         return positive / float(positive.max())
 
     def excess(strength: float) -> float:
-        difference = (normalised(strength) - curve / peak)[seen]
+        difference = (normalised(strength) - curve / peak)[visible]
         return float(np.sqrt(np.mean(difference**2))) - goal
 
-    enough = next(strength for strength in STRENGTHS if excess(strength) > 0)
-    result: FloatArray = peak * normalised(brentq(excess, 0.0, enough, xtol=1e-6))
+    largest = next(strength for strength in STRENGTHS if excess(strength) > 0)
+    result: FloatArray = peak * normalised(brentq(excess, 0.0, largest, xtol=1e-6))
     return result
 
 
@@ -141,10 +141,10 @@ def emission(material: Material) -> FloatArray:
     if material.spectrum is not None:
         measured = material.spectrum
         shape = PchipInterpolator(measured.wavelength_nm, measured.value, extrapolate=False)
-        fine = np.nan_to_num(shape(WAVELENGTH_NM))
+        spectrum = np.nan_to_num(shape(WAVELENGTH_NM))
         cells = band_cells(material.bands_nm)
-        in_bands = (cells @ fine / np.maximum(cells.sum(axis=1), 1e-12)).sum()
-        return np.outer(bands.sum(axis=1) / in_bands, fine)
+        in_bands = (cells @ spectrum / np.maximum(cells.sum(axis=1), 1e-12)).sum()
+        return np.outer(bands.sum(axis=1) / in_bands, spectrum)
     edges = np.asarray(material.bands_nm)
     below = np.pad(np.cumsum(bands * np.diff(edges), axis=1), ((0, 0), (2, 1)), mode="edge")
     below[:, :2] = 0.0

@@ -45,8 +45,8 @@ def _collocation() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
     `weights @ f` or, from the integrals themselves, `extrapolation @ (integrals @ f)`.
     """
     nodes, weights = legendre.leggauss(STAGES)
-    of_values = np.linalg.inv(legendre.legvander(nodes, STAGES - 1))
-    below = legendre.legval(nodes, legendre.legint(of_values, lbnd=-1)).T
+    coefficients = np.linalg.inv(legendre.legvander(nodes, STAGES - 1))
+    below = legendre.legval(nodes, legendre.legint(coefficients, lbnd=-1)).T
     integrals = np.asarray(below, dtype=np.float64)
     extrapolation = weights @ np.linalg.inv(integrals)
     return (nodes + 1) / 2, weights / 2, integrals / 2, extrapolation
@@ -119,31 +119,31 @@ class Phosphor:
         """
         state = np.array([level, np.zeros_like(level)])
         corners = [start_s, *light.corners(start_s, end_s), end_s]
-        for left, right in pairwise(corners):
-            if right > left:
-                state = self._smooth(state, left, right, light, visible)
+        for begin_s, stop_s in pairwise(corners):
+            if stop_s > begin_s:
+                state = self._smooth(state, begin_s, stop_s, light, visible)
         return state[0], state[1]
 
     def _smooth(
         self,
         state: FloatArray,
-        left: float,
-        right: float,
+        begin_s: float,
+        stop_s: float,
         light: Light,
         visible: Callable[[float], float],
     ) -> FloatArray:
         """Return levels and exposures at `right`, shape (2, states), confirmed by half steps."""
-        shining = None if light.dark(left, right) else light
-        start_s, step_s = left, right - left
-        while math.nextafter(start_s, right) < right:
-            end_s = min(start_s + step_s, right)
+        shining = None if light.dark(begin_s, stop_s) else light
+        start_s, step_s = begin_s, stop_s - begin_s
+        while math.nextafter(start_s, stop_s) < stop_s:
+            end_s = min(start_s + step_s, stop_s)
             middle_s = (start_s + end_s) / 2
             if not start_s < middle_s < end_s:
                 raise ArithmeticError(f"the rate equations cannot be integrated at {start_s} s")
             spans = np.array([[start_s, end_s], [start_s, middle_s], [middle_s, end_s]])
-            whole, first, second = self._steps(spans, shining, visible)
-            rough, fine = whole(state), second(first(state))
-            error = np.max(np.abs(rough - fine) / (ATOL + RTOL * np.abs(fine)))
+            full_step, first_half, second_half = self._steps(spans, shining, visible)
+            coarse, fine = full_step(state), second_half(first_half(state))
+            error = np.max(np.abs(coarse - fine) / (ATOL + RTOL * np.abs(fine)))
             factor = 0.9 * max(error, TINY) ** (-1 / (2 * STAGES + 1))
             step_s = (end_s - start_s) * min(max(factor, SHORTER), LONGER)
             if error <= 1:
@@ -158,9 +158,9 @@ class Phosphor:
         times_s = spans[:, :1] + lasting_s * NODES
         each_s = times_s.ravel().tolist()
         faster = np.array([self.quickening(at_s) for at_s in each_s]).reshape(times_s.shape)
-        seen = np.array([visible(at_s) for at_s in each_s]).reshape(times_s.shape) * faster
+        visible_rate = np.array([visible(at_s) for at_s in each_s]).reshape(times_s.shape) * faster
         # In the dark states of one rate are alike, of which there may be hundreds.
-        k_r_per_s, alike = self._rates if light is None else (self.k_r_per_s, np.s_[:])
+        k_r_per_s, rate_index = self._rates if light is None else (self.k_r_per_s, np.s_[:])
         loss = faster[:, None, :] * k_r_per_s[:, None]
         charging = np.zeros_like(loss)
         if light is not None:
@@ -173,9 +173,9 @@ class Phosphor:
         levels = np.linalg.solve(matrix, np.stack([np.ones_like(charged), charged], axis=-1))
         end = EXTRAPOLATION @ levels
         end[..., 0] += 1 - EXTRAPOLATION.sum()
-        exposure_s = ((lasting_s * WEIGHTS * seen)[:, None, None, :] @ levels)[:, :, 0]
-        both = np.stack([end, exposure_s], axis=-1).transpose(0, 2, 3, 1)[..., alike]
-        return [_Step(*step) for step in both]
+        exposure_s = ((lasting_s * WEIGHTS * visible_rate)[:, None, None, :] @ levels)[:, :, 0]
+        columns = np.stack([end, exposure_s], axis=-1).transpose(0, 2, 3, 1)[..., rate_index]
+        return [_Step(*step) for step in columns]
 
     @cached_property
     def _rates(self) -> tuple[FloatArray, NDArray[np.intp]]:
@@ -200,9 +200,9 @@ class _Step:
 
     def __call__(self, state: FloatArray) -> FloatArray:
         """Return levels and exposures after the step."""
-        after: FloatArray = self.factor * state[0] + self.added
-        after[1] += state[1]
-        return after
+        end: FloatArray = self.factor * state[0] + self.added
+        end[1] += state[1]
+        return end
 
 
 def phosphor(
@@ -232,16 +232,18 @@ def _excitation(
     material: Material, state: State, charge: float | None, irradiance: float
 ) -> FloatArray:
     """Return a row of the excitation matrix: κ per unit of the lamp's irradiance, per cell."""
-    full = filament_spectrum(BURNING_K)
+    spectrum = filament_spectrum(BURNING_K)
     if charge is not None or state.k_e_per_s is None:
         level = UNKNOWN_CHARGE if charge is None else charge
         # κ/(κ + k_r) = level under the burning lamp, all wavelengths taking their part.
-        row: FloatArray = np.full_like(full, state.k_r_per_s * level / (1 - level) / full.sum())
+        row: FloatArray = np.full_like(
+            spectrum, state.k_r_per_s * level / (1 - level) / spectrum.sum()
+        )
         return row
     if material.bands_nm is None or material.irradiance_norm is None:
         raise UsageError(f"{material.name}: excitation rates need 'bands_nm', 'irradiance_norm'")
     cells = band_cells(material.bands_nm)
-    length = float(np.linalg.norm(cells @ full))
+    length = float(np.linalg.norm(cells @ spectrum))
     scale = irradiance * material.irradiance_norm.value / length
     row = scale * (np.asarray(state.k_e_per_s) @ cells)
     return row

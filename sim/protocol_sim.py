@@ -89,9 +89,9 @@ class Serial(serial.SerialBase):
         if self._is_gone:
             raise serial.SerialException(f"read failed: {_input_output_error()}")
         count = min(size, bisect_right(self._due_s, self._clock.now()))
-        taken = self._take(count)
+        received = self._take(count)
         self._clock.spend(BYTE_S * count)
-        return taken
+        return received
 
     def write(self, data: bytes, /) -> int:  # type: ignore[override]
         """Send `data`; the answer arrives byte by byte, a little later."""
@@ -112,9 +112,9 @@ class Serial(serial.SerialBase):
         self._take(self.in_waiting)
 
     def _take(self, count: int) -> bytes:
-        taken, self._incoming = self._incoming[:count], self._incoming[count:]
+        received, self._incoming = self._incoming[:count], self._incoming[count:]
         del self._due_s[:count]
-        return taken
+        return received
 
     @property
     def _is_gone(self) -> bool:

@@ -72,8 +72,11 @@ class Room:
         faults = simulation.faults
         self._circuit = LampCircuit(simulation.lamp, simulation.initial.lamp == "on", faults, clock)
         self._leds = Leds(simulation.leds)
-        self._left_on = given(fault.light_left_on for fault in faults)
-        leaks = [leak(one.level, [one]) for one in given(fault.ambient_light for fault in faults)]
+        self._room_light_spans = given(fault.light_left_on for fault in faults)
+        leaks = [
+            leak(fault_leak.level, [fault_leak])
+            for fault_leak in given(fault.ambient_light for fault in faults)
+        ]
         always = [leak(simulation.ambient, [FaultTime()])] if simulation.ambient else []
         self._leaks = (*always, *leaks)
         self._doors = Doors(simulation, clock, pulses)
@@ -152,9 +155,9 @@ class Room:
             )
         lights = self._lights()
         light: NDArray[np.float32] | None = None
-        for left, right, arrangement in self._changer.arrangements.spans(start_s, end_s):
-            seen = lights.seen(left, right)
-            rgb = self._electrons(left, right, arrangement, lights, seen, f_number)
+        for begin_s, stop_s, arrangement in self._changer.arrangements.spans(start_s, end_s):
+            reflected = lights.seen(begin_s, stop_s)
+            rgb = self._electrons(begin_s, stop_s, arrangement, lights, reflected, f_number)
             painted = self._layout.places(arrangement).painted
             part = rgb[:, BAYER_RGGB].reshape(-1)[painted]
             light = part if light is None else light + part
@@ -167,8 +170,10 @@ class Room:
             self._rng(FRAME_STREAM, round(self._clock.wall(start_s) * 1e6)),
         )
         lens = self._simulation.lens
-        told = None if lens is None else (lens.name, lens.focal_mm)
-        return encode_dng(mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number, told))
+        lens_notes = None if lens is None else (lens.name, lens.focal_mm)
+        return encode_dng(
+            mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number, lens_notes)
+        )
 
     def preview(self, at_s: float) -> NDArray[np.uint8]:
         """Return the viewfinder's picture for a display, R, G, B, with the room light if any.
@@ -178,16 +183,16 @@ class Room:
         arrangement = self._changer.arrangements.at(at_s)
         start_s = max(at_s - LIVE_EXPOSURE_S, 0.0)
         lights = self._lights()
-        seen = lights.seen(start_s, at_s)
+        reflected = lights.seen(start_s, at_s)
         if self._simulation.room_light:
             light, opened = (at_s - start_s) * room_light_spectrum(), lights.openness(at_s)
-            seen = VisibleLight(
-                seen.sample,
-                seen.sample_stray + opened * light,
-                seen.door + (1 - opened) * light,
-                seen.cloth + light,
+            reflected = VisibleLight(
+                reflected.sample,
+                reflected.sample_stray + opened * light,
+                reflected.door + (1 - opened) * light,
+                reflected.cloth + light,
             )
-        rgb = self._electrons(start_s, at_s, arrangement, lights, seen, LIVE_F_NUMBER)
+        rgb = self._electrons(start_s, at_s, arrangement, lights, reflected, LIVE_F_NUMBER)
         painted = self._layout.places(arrangement).painted
         step = 2 * live_stride(*painted.shape)
         place = painted[::step, ::step] // len(BAYER_RGGB)
@@ -205,13 +210,13 @@ class Room:
         faster = cells.quickening(self._clock.now() if off_s is None else off_s)
         if off_s is not None:
             arrangements = self._changer.arrangements
-            found = self._samples.level_at(off_s, self._lights(), arrangements)
-            after, _ = self._samples.evolve(
-                found, off_s, off_s + SETTLED_S, arrangements.at(off_s), lamps.until(off_s)
+            level_at_off = self._samples.level_at(off_s, self._lights(), arrangements)
+            level_later, _ = self._samples.evolve(
+                level_at_off, off_s, off_s + SETTLED_S, arrangements.at(off_s), lamps.until(off_s)
             )
-            level = self._samples.of_cells(found)
+            level = self._samples.of_cells(level_at_off)
             growth = np.exp(faster * cells.k_r_per_s * SETTLED_S)
-            effective = self._samples.of_cells(after) * growth
+            effective = self._samples.of_cells(level_later) * growth
         electrons_per_s = self._curves.glow_electrons_per_s(self._samples.radiance_at_one, f_number)
         return Truth(
             lamp_off_s=off_s,
@@ -246,7 +251,9 @@ class Room:
 
     def _lights(self) -> Lights:
         doors = self._doors
-        return Lights(self._lamps(), self._left_on, doors.trap_door, doors.shield, self._leaks)
+        return Lights(
+            self._lamps(), self._room_light_spans, doors.trap_door, doors.shield, self._leaks
+        )
 
     def _falloff(self, height: int, width: int) -> FloatArray:
         lens = self._simulation.lens
@@ -264,11 +271,11 @@ class Room:
         end_s: float,
         arrangement: Arrangement,
         lights: Lights,
-        seen: VisibleLight,
+        reflected: VisibleLight,
         f_number: float,
     ) -> NDArray[np.float32]:
         """Return the expected electrons in the middle of the lens, shape (places, 3)."""
         level = self._samples.level_at(start_s, lights, self._changer.arrangements)
         glow_s = self._samples.glow(level, start_s, end_s, arrangement, lights)
-        radiance_s = self._view.radiance_s(arrangement, glow_s, seen)
+        radiance_s = self._view.radiance_s(arrangement, glow_s, reflected)
         return self._curves.glow_electrons_per_s(radiance_s, f_number).astype(np.float32)

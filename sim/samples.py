@@ -51,18 +51,22 @@ class Samples:
             phosphor(self.materials, charges, simulation.lamp.irradiance),
             quickening=quickening(simulation.temperature),
         )
-        of_patch = [np.flatnonzero(self._patches.patch == n) for n in range(len(self.materials))]
-        states = [of_patch[patch - 1] for patch in layout.patch[1:]]
-        self._whole = np.concatenate(states)
+        patch_states = [
+            np.flatnonzero(self._patches.patch == n) for n in range(len(self.materials))
+        ]
+        states = [patch_states[patch - 1] for patch in layout.patch[1:]]
+        self._state_of_cells = np.concatenate(states)
         cell = np.repeat(np.arange(1, len(layout.patch)), [len(index) for index in states])
         self.cells = replace(
             self._patches,
-            k_r_per_s=self._patches.k_r_per_s[self._whole],
-            excitation=self._patches.excitation[self._whole],
+            k_r_per_s=self._patches.k_r_per_s[self._state_of_cells],
+            excitation=self._patches.excitation[self._state_of_cells],
             patch=cell,
         )
         emitted = np.concatenate([emission(material) for material in self.materials])
-        self.radiance_at_one: FloatArray = (emitted * self._patches.k_r_per_s[:, None])[self._whole]
+        self.radiance_at_one: FloatArray = (emitted * self._patches.k_r_per_s[:, None])[
+            self._state_of_cells
+        ]
         self._piece = layout.piece[cell]
         self._lvf = simulation.lvf
         self._has_door = simulation.door is not None
@@ -84,8 +88,8 @@ class Samples:
         """Return the concentrations of all states at a time, for `evolve` and `of_cells`."""
         last = bisect_right(self._known_s, time_s) - 1
         level = self._known_levels[last]
-        for left, right, arrangement in arrangements.spans(self._known_s[last], time_s):
-            level, _ = self.evolve(level, left, right, arrangement, lights)
+        for begin_s, stop_s, arrangement in arrangements.spans(self._known_s[last], time_s):
+            level, _ = self.evolve(level, begin_s, stop_s, arrangement, lights)
         self._known_s.insert(last + 1, time_s)
         self._known_levels.insert(last + 1, level)
         return level
@@ -104,15 +108,15 @@ class Samples:
         if arrangement.lvf == "on sample":
             level, states = self.of_cells(level), self._below(turned=arrangement.turned)
         else:
-            whole = len(level) == len(self._patches.k_r_per_s)
-            states = self._patches if whole else self.cells
+            are_patches = len(level) == len(self._patches.k_r_per_s)
+            states = self._patches if are_patches else self.cells
         if arrangement.card == "blank" or on_top:
             states = replace(states, excitation=np.zeros_like(states.excitation))
         return states.evolve(level, start_s, end_s, light, visible)
 
     def of_cells(self, level: FloatArray) -> FloatArray:
         """Return the concentrations for every state of every cell, shape (states,)."""
-        return level if len(level) == len(self._whole) else level[self._whole]
+        return level if len(level) == len(self._state_of_cells) else level[self._state_of_cells]
 
     def glow(
         self,
@@ -133,12 +137,12 @@ class Samples:
         arrangement
             Arrangement of the bench until `end_s`.
         """
-        _, seen_s = self.evolve(level, start_s, end_s, arrangement, lights, lights.openness)
-        radiance_s = self.of_cells(seen_s)[:, None] * self.radiance_at_one
+        _, exposure_s = self.evolve(level, start_s, end_s, arrangement, lights, lights.openness)
+        radiance_s = self.of_cells(exposure_s)[:, None] * self.radiance_at_one
         # States are in the order of their cells, and every cell but the cloth has some.
-        begin = np.searchsorted(self.cells.patch, np.arange(1, self.cells.patch[-1] + 1))
-        of_cloth = np.zeros((1, radiance_s.shape[1]))
-        return np.concatenate([of_cloth, np.add.reduceat(radiance_s, begin)])
+        first_states = np.searchsorted(self.cells.patch, np.arange(1, self.cells.patch[-1] + 1))
+        cloth = np.zeros((1, radiance_s.shape[1]))
+        return np.concatenate([cloth, np.add.reduceat(radiance_s, first_states)])
 
     def _below(self, *, turned: bool) -> Phosphor:
         """Return the cells' states with their excitation below the LVF."""

@@ -73,7 +73,7 @@ class TemperatureSensor:
     def volts(self) -> float:
         """Return the present voltage of the sensor."""
         now_s = self._clock.now()
-        if any(when.is_on(now_s) for when in self._off):
+        if any(span.is_on(now_s) for span in self._off):
             return OPEN_V
-        shown = celsius(self._settings, now_s) + self._error_k
-        return VOLTS_AT_25 + VOLTS_PER_K * (shown - 25.0) + self._rng.normal(0.0, NOISE_V)
+        celsius_shown = celsius(self._settings, now_s) + self._error_k
+        return VOLTS_AT_25 + VOLTS_PER_K * (celsius_shown - 25.0) + self._rng.normal(0.0, NOISE_V)

@@ -150,7 +150,7 @@ def true_patches(
     faster
         Factor of the room's temperature on their rates.
     """
-    found = []
+    patches = []
     k_r = samples.cells.k_r_per_s
     for number, (placed, material) in enumerate(
         zip(simulation.patches, samples.materials, strict=True), start=1
@@ -161,23 +161,23 @@ def true_patches(
         # One row a state, one column a cell.
         index = np.flatnonzero(np.isin(samples.cells.patch, cells)).reshape(len(cells), -1).T
         states = []
-        for of_state in np.argsort(-k_r[index[:, 0]], kind="stable"):
-            here, state = index[of_state], material.states[of_state]
+        for rank in np.argsort(-k_r[index[:, 0]], kind="stable"):
+            indices, state = index[rank], material.states[rank]
             amplitude = None
             if effective is not None:
-                red, green, blue = dn_per_s[here[0]] * float(weight @ effective[here])
+                red, green, blue = dn_per_s[indices[0]] * float(weight @ effective[indices])
                 amplitude = (red, green, blue)
             states.append(
                 TrueState(
-                    k_r_per_s=faster * k_r[here[0]],
+                    k_r_per_s=faster * k_r[indices[0]],
                     k_e_per_s=state.k_e_per_s,
                     reradiation=state.reradiation,
-                    emission=tuple(samples.radiance_at_one[here[0]] / k_r[here[0]]),
-                    concentration=None if level is None else float(weight @ level[here]),
+                    emission=tuple(samples.radiance_at_one[indices[0]] / k_r[indices[0]]),
+                    concentration=None if level is None else float(weight @ level[indices]),
                     amplitude_dn_per_s=amplitude,
                 )
             )
-        found.append(
+        patches.append(
             TruePatch(
                 material=material.name,
                 region=placed.region,
@@ -185,7 +185,7 @@ def true_patches(
                 states=tuple(states),
             )
         )
-    return tuple(found)
+    return tuple(patches)
 
 
 def true_lvf(simulation: Simulation) -> TrueLvf | None:

@@ -32,7 +32,7 @@ class View:
         self._lvf = None if simulation.lvf is None else Lvf(simulation.lvf)
 
     def radiance_s(
-        self, arrangement: Arrangement, glow_s: FloatArray, seen: VisibleLight
+        self, arrangement: Arrangement, glow_s: FloatArray, reflected: VisibleLight
     ) -> FloatArray:
         """Return ∫ radiance dt of all places of an arrangement, shape (places, wavelengths).
 
@@ -46,8 +46,8 @@ class View:
             Light that the camera sees by reflection.
         """
         places = self._layout.places(arrangement)
-        radiance = self._samples(arrangement, glow_s, seen)[places.cell]
-        self._cover(radiance, arrangement, places, seen)
+        radiance = self._samples(arrangement, glow_s, reflected)[places.cell]
+        self._cover(radiance, arrangement, places, reflected)
         through = self._layout.looked_through(arrangement)
         if through == "away":
             return radiance
@@ -56,26 +56,30 @@ class View:
         return radiance
 
     def _samples(
-        self, arrangement: Arrangement, glow_s: FloatArray, seen: VisibleLight
+        self, arrangement: Arrangement, glow_s: FloatArray, reflected: VisibleLight
     ) -> FloatArray:
         """Return the radiance of uncovered cells, shape (cells, wavelengths); cell 0 is cloth."""
-        light = seen.sample + seen.sample_stray
+        light = reflected.sample + reflected.sample_stray
         if arrangement.lvf == "on sample":
             passed = self._passed("on sample", arrangement.turned)[self._layout.piece]
-            light = passed * seen.sample + seen.sample_stray
+            light = passed * reflected.sample + reflected.sample_stray
         if arrangement.card == "blank":
             glow_s = np.zeros_like(glow_s)
             reflectance = reflectances("blank", self._simulation.grey_card)[1]
         else:
-            reflectance = np.full_like(seen.sample, SAMPLE_REFLECTANCE)
+            reflectance = np.full_like(reflected.sample, SAMPLE_REFLECTANCE)
             glow_s = glow_s * self._turned_away(arrangement.tilt_deg)
-        thrown_back = reflectance * light + CLOTH_REFLECTANCE * seen.door
+        thrown_back = reflectance * light + CLOTH_REFLECTANCE * reflected.door
         radiance: FloatArray = glow_s + self._reflected * thrown_back
-        radiance[0] = self._reflected * CLOTH_REFLECTANCE * seen.cloth
+        radiance[0] = self._reflected * CLOTH_REFLECTANCE * reflected.cloth
         return radiance
 
     def _cover(
-        self, radiance: FloatArray, arrangement: Arrangement, places: Places, seen: VisibleLight
+        self,
+        radiance: FloatArray,
+        arrangement: Arrangement,
+        places: Places,
+        reflected: VisibleLight,
     ) -> None:
         """Lay a card on the door's outside, or without a door on everything."""
         covered = places.surface > 0
@@ -87,10 +91,10 @@ class View:
             piece = self._layout.piece[places.cell[covered]]
             card = self._passed("on sample", arrangement.turned)[piece] * card
         if self._simulation.door is None:
-            radiance[covered] = self._reflected * card * seen.cloth
+            radiance[covered] = self._reflected * card * reflected.cloth
         else:
             # What the closed door hides is what the card hides, and the door's own outside.
-            radiance[covered] += self._reflected * (card - CLOTH_REFLECTANCE) * seen.door
+            radiance[covered] += self._reflected * (card - CLOTH_REFLECTANCE) * reflected.door
 
     def _turned_away(self, tilt_deg: int) -> float:
         """Return the radiance of a sample relative to one that faces the camera."""

@@ -214,9 +214,9 @@ class Gphoto2Camera:
                     problems.append(problem)
         if problems:
             is_lost = any(isinstance(problem, DeviceLostError) for problem in problems)
-            said = "; ".join(dict.fromkeys(map(str, problems)))
+            messages = "; ".join(dict.fromkeys(map(str, problems)))
             kind = DeviceLostError if is_lost else DeviceError
-            raise kind(f"camera not known to be safe: {said}")
+            raise kind(f"camera not known to be safe: {messages}")
 
     def disconnect(self) -> None:
         """Give the camera back to its own buttons and release it; never raises."""

@@ -35,8 +35,8 @@ class UnspecifiedError(DeviceError):
 
 def failure(context: str, code: int, text: str) -> DeviceError:
     """Return the error for libgphoto2's answer; `context` names the device and the purpose."""
-    said = f"{context}: libgphoto2 says '{text}' ({code})"
+    problem = f"{context}: libgphoto2 says '{text}' ({code})"
     if code in _GONE:
-        return DeviceLostError(f"{said}: {_LOOK}")
+        return DeviceLostError(f"{problem}: {_LOOK}")
     kind = {CAMERA_BUSY: BusyError, GENERAL: UnspecifiedError}.get(code, DeviceError)
-    return kind(f"{said}: {_ADVICE.get(code, _ELSE)}")
+    return kind(f"{problem}: {_ADVICE.get(code, _ELSE)}")

@@ -55,15 +55,15 @@ class Frames:
         DeviceError
             No frame came, or one that is no RAW file.
         """
-        found = self._wait()
-        if found is None:
+        file = self._wait()
+        if file is None:
             raise DeviceError(
                 f"expected a frame within {self._timeout_s:g} s of the exposure's end, libgphoto2 "
                 "reported none: set the lens to manual focus (MF), mirror lock-up and self-timer "
                 "off, and let the camera keep its frames for the PC"
             )
         self._due_after_s = None
-        folder, name = found
+        folder, name = file
         data = self._library.read(folder, name, self._timeout_s)
         return data, raw_suffix(name, data)
 
@@ -95,9 +95,9 @@ class Frames:
     def _wait(self) -> tuple[str, str] | None:
         deadline_s = (self._due_after_s or self._clock.now()) + self._timeout_s
         while True:
-            found = self._library.next_file(LISTEN_S, self._timeout_s)
-            if found is not None or self._clock.now() >= deadline_s:
-                return found
+            file = self._library.next_file(LISTEN_S, self._timeout_s)
+            if file is not None or self._clock.now() >= deadline_s:
+                return file
 
 
 def raw_suffix(name: str, data: bytes) -> str:

@@ -40,8 +40,11 @@ class Session:
         if path.startswith("ptpip:"):
             model = NETWORK_MODEL
         else:
-            found = abilities.detect(ports)
-            models = {found.get_value(i): found.get_name(i) for i in range(found.count())}
+            cameras = abilities.detect(ports)
+            models = {
+                cameras.get_value(index): cameras.get_name(index)
+                for index in range(cameras.count())
+            }
             if path not in models:
                 raise gphoto2.GPhoto2Error(gphoto2.GP_ERROR_MODEL_NOT_FOUND)
             model = models[path]
@@ -71,19 +74,19 @@ class Session:
 
     def trigger(self) -> tuple[float, float]:
         """Photograph; return the times at which libgphoto2 began and reported the end."""
-        asked_s = self._clock.now()
+        called_s = self._clock.now()
         self._camera.trigger_capture()
-        return asked_s, self._clock.now()
+        return called_s, self._clock.now()
 
     def next_file(self, within_s: float) -> tuple[str, str] | None:
         """Return folder and name of the next file that the camera reports; None without one."""
         deadline_s = self._clock.now() + within_s
         while True:
-            left_s = deadline_s - self._clock.now()
-            kind, event = self._camera.wait_for_event(max(1, round(left_s * 1e3)))
+            remaining_s = deadline_s - self._clock.now()
+            kind, event = self._camera.wait_for_event(max(1, round(remaining_s * 1e3)))
             if kind == FILE_ADDED:
                 return event.folder, event.name
-            if left_s <= 0:
+            if remaining_s <= 0:
                 return None
 
     def read(self, folder: str, name: str) -> bytes:
@@ -101,14 +104,14 @@ class Session:
         self._camera.exit()
 
 
-def _values(widget: Any, found: dict[str, str]) -> dict[str, str]:
+def _values(widget: Any, values: dict[str, str]) -> dict[str, str]:
     """Return all settings below `widget`; of several with one name the first."""
     if widget.get_type() in _GROUPS:
         for child in widget.get_children():
-            _values(child, found)
+            _values(child, values)
     elif widget.get_type() != gphoto2.GP_WIDGET_BUTTON:
-        found.setdefault(widget.get_name(), str(widget.get_value()))
-    return found
+        values.setdefault(widget.get_name(), str(widget.get_value()))
+    return values
 
 
 def serve(pipe: Connection) -> None:

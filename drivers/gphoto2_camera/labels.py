@@ -42,10 +42,10 @@ def true_times_s(labels: Iterable[str]) -> dict[str, float]:
 
     The number of labels shows whether a camera counts in thirds or in halves of a stop.
     """
-    named = {label: time_s for label in labels if (time_s := labelled_time_s(label)) is not None}
-    dial = {label: time_s for label, time_s in named.items() if time_s <= LONGEST_ON_DIAL_S}
+    nominal = {label: time_s for label in labels if (time_s := labelled_time_s(label)) is not None}
+    dial = {label: time_s for label, time_s in nominal.items() if time_s <= LONGEST_ON_DIAL_S}
     steps = _steps_of_a_stop(dial.values())
-    return named | {label: _true_time_s(time_s, steps) for label, time_s in dial.items()}
+    return nominal | {label: _true_time_s(time_s, steps) for label, time_s in dial.items()}
 
 
 def label_of_time(exposure_s: float, times_s: Mapping[str, float]) -> str | None:

@@ -126,11 +126,11 @@ class Library:
             return
         self.set(name, value)
         deadline_s = self._clock.now() + within_s
-        while (said := self.get(name).value) != value:
+        while (reported := self.get(name).value) != value:
             if self._clock.now() >= deadline_s:
                 raise DeviceError(
-                    f"camera {self._name}: asked for {name} {value}, it stays at {said}: turn its "
-                    "dial to M, leave its menus and try again"
+                    f"camera {self._name}: asked for {name} {value}, it stays at {reported}: turn "
+                    "its dial to M, leave its menus and try again"
                 )
             self._clock.sleep(POLL_PERIOD_S)
 
@@ -160,10 +160,10 @@ class Library:
         DeviceError
             The camera does not answer.
         """
-        found: tuple[str, str] | None = self._ask(
+        file: tuple[str, str] | None = self._ask(
             "waiting for its frame", within_s + transfer_s, "next_file", within_s
         )
-        return found
+        return file
 
     def read(self, folder: str, name: str, within_s: float) -> bytes:
         """Return the bytes of a file.

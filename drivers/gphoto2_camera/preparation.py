@@ -49,12 +49,12 @@ def _send_frames_to_pc(library: Library, answer_s: float) -> None:
         return
     target = library.get(name)
     to_pc = [label for label in target.choices if "ram" in label.lower() and "+" not in label]
-    others = [label for label in target.choices if label not in to_pc]
+    other_names = [label for label in target.choices if label not in to_pc]
     is_full = library.has(ROOM) and library.get(ROOM).value == "0"
-    if others and is_full:
+    if other_names and is_full:
         # a Canon is told of the PC's room only when the target changes, and forgets it
         # when a program dies
-        library.set_surely(name, others[0], answer_s)
+        library.set_surely(name, other_names[0], answer_s)
     if to_pc:
         library.set_surely(name, to_pc[0], answer_s)
 

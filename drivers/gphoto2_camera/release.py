@@ -52,41 +52,41 @@ class ButtonRelease:
         self._library = library
         self._clock = clock
         self._half, self._full = half, full
-        self._held: list[str] = []
+        self._pending_releases: list[str] = []
 
     def get_ready(self) -> None:
-        if _LET_GO_HALF not in self._held:
-            self._held.append(_LET_GO_HALF)
+        if _LET_GO_HALF not in self._pending_releases:
+            self._pending_releases.append(_LET_GO_HALF)
         self._library.set(BUTTON, self._half, RELEASE_S)
 
     def press(self, exposure_s: float) -> Span:
-        self._held.append(_LET_GO_FULL)
+        self._pending_releases.append(_LET_GO_FULL)
         try:
             # some cameras answer when the shutter has closed
             return self._library.set(BUTTON, self._full, RELEASE_S + exposure_s)
         except BusyError:
-            self._held.pop()
+            self._pending_releases.pop()
             raise
 
     def let_go_full(self, busy_s: float) -> None:
-        if _LET_GO_FULL in self._held:
+        if _LET_GO_FULL in self._pending_releases:
             self._let_go_last(busy_s)
 
     def let_go(self, busy_s: float) -> None:
-        while self._held:
+        while self._pending_releases:
             self._let_go_last(busy_s)
 
     def _let_go_last(self, busy_s: float) -> None:
         deadline_s = self._clock.now() + busy_s
         while True:
             try:
-                self._library.set(BUTTON, self._held[-1])
+                self._library.set(BUTTON, self._pending_releases[-1])
             except BusyError:
                 if self._clock.now() >= deadline_s:
                     raise
                 self._clock.sleep(POLL_PERIOD_S)
             else:
-                self._held.pop()
+                self._pending_releases.pop()
                 return
 
 
@@ -125,7 +125,7 @@ class TriggerRelease:
         pass
 
 
-def release_of(library: Library, clock: Clock, maker: str, wanted: str | None) -> Release:
+def release_of(library: Library, clock: Clock, maker: str, requested: str | None) -> Release:
     """Return the way of release that the settings name, by default the better one of the camera.
 
     Raises
@@ -135,11 +135,11 @@ def release_of(library: Library, clock: Clock, maker: str, wanted: str | None) -
     """
     offered = library.get(BUTTON).choices if library.has(BUTTON) else ()
     presses = next((pair for pair in _PRESSES if set(pair) <= set(offered)), None)
-    if presses is None and wanted == "button":
+    if presses is None and requested == "button":
         raise UsageError(
             "the rig file asks for 'release: button', which libgphoto2 has for Canon EOS alone: "
             "leave it out, or write 'release: trigger'"
         )
-    if presses is None or wanted == "trigger":
+    if presses is None or requested == "trigger":
         return TriggerRelease(library, maker)
     return ButtonRelease(library, clock, *presses)

@@ -42,11 +42,13 @@ ERRORS = (
 
 def told(bits: int) -> str:
     """Return all errors in the 16 bits that the command A1 reads, with remedies; empty for none."""
-    known = [error for bit, error in enumerate(ERRORS) if bits >> bit & 1]
-    unknown = [bit for bit in range(len(ERRORS), 16) if bits >> bit & 1]
-    remedies = dict.fromkeys(remedy for _, remedy in known)
-    what = [what for what, _ in known] + [f"error bit {bit}, unknown to labrig" for bit in unknown]
-    return ", and ".join(what) + (f" ({'; '.join(remedies)})" if remedies else "")
+    errors = [error for bit, error in enumerate(ERRORS) if bits >> bit & 1]
+    unknown_bits = [bit for bit in range(len(ERRORS), 16) if bits >> bit & 1]
+    remedies = dict.fromkeys(remedy for _, remedy in errors)
+    names = [name for name, _ in errors] + [
+        f"error bit {bit}, unknown to labrig" for bit in unknown_bits
+    ]
+    return ", and ".join(names) + (f" ({'; '.join(remedies)})" if remedies else "")
 
 
 #: The USB port ignores it; a Maestro's own default where it is wired to a UART adapter.
@@ -139,8 +141,8 @@ class Servo:
     @property
     def pulse_s(self) -> float:
         """Length of the pulse that is being sent, 0 for none: the command, not an angle."""
-        came = self._ask(GET_POSITION, 2, self._settings.channel)
-        return int.from_bytes(came, "little") * QUARTER_US
+        answer = self._ask(GET_POSITION, 2, self._settings.channel)
+        return int.from_bytes(answer, "little") * QUARTER_US
 
     def go(self, pulse_s: float) -> None:
         """Begin to turn; errors and the pulse are read back.

@@ -49,11 +49,11 @@ class Board:
             The board does not answer in time, or does not echo.
         """
         self._line.write(command.encode("ascii") + b"\r")
-        came = self._line.read_until(b">", ANSWER_TIMEOUT_S)
-        lines = re.split(r"[\r\n]+", came.decode("ascii", errors="replace").removesuffix(">"))
+        answer = self._line.read_until(b">", ANSWER_TIMEOUT_S)
+        lines = re.split(r"[\r\n]+", answer.decode("ascii", errors="replace").removesuffix(">"))
         if lines[0] != command:
             raise UnclearAnswerError(
-                f"{self.name} did not echo '{command}': got {came!r}; is it a Numato board, and "
+                f"{self.name} did not echo '{command}': got {answer!r}; is it a Numato board, and "
                 "its cable well?"
             )
         return " ".join(line for line in lines[1:] if line)
@@ -67,17 +67,17 @@ class Board:
             The board refuses, or the relay does not read as it was switched.
         """
         state, channel = "on" if on else "off", CHANNELS[relay]
-        said = self.ask(f"relay {state} {channel}")
-        if said:
+        answer = self.ask(f"relay {state} {channel}")
+        if answer:
             raise UnclearAnswerError(
                 f"{self.name} refused 'relay {state} {channel}': expected a bare prompt, got "
-                f"'{said}'; is relay {relay} on this board?"
+                f"'{answer}'; is relay {relay} on this board?"
             )
         if self.is_on(relay) != on:
-            read = "off" if on else "on"
+            opposite = "off" if on else "on"
             raise UnclearAnswerError(
-                f"relay {relay} of {self.name} was switched {state} but reads {read}; switch off "
-                "by hand and check the board"
+                f"relay {relay} of {self.name} was switched {state} but reads {opposite}; switch "
+                "off by hand and check the board"
             )
 
     def is_on(self, relay: int) -> bool:

@@ -102,13 +102,13 @@ class NumatoLedBank:
         DeviceError
             Several LEDs are on.
         """
-        lit = [name for name, relay in self._relays.items() if self._board.is_on(relay)]
-        if len(lit) > 1:
+        names = [name for name, relay in self._relays.items() if self._board.is_on(relay)]
+        if len(names) > 1:
             raise DeviceError(
-                f"{self._board.name}: {' and '.join(lit)} are lit at once; something else has "
+                f"{self._board.name}: {' and '.join(names)} are lit at once; something else has "
                 "switched them: leave the board to labrig while it measures"
             )
-        return lit[0] if lit else None
+        return names[0] if names else None
 
     def make_safe(self) -> None:
         """Resynchronise the line, then switch all LEDs off, whatever their states before."""

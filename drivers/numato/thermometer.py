@@ -66,7 +66,7 @@ class NumatoThermometer:
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._settings = settings
-        self._full = 2**settings.bits - 1
+        self._largest = 2**settings.bits - 1
         self._clock = connections.clock
         self._board = Board(address, connections)
         self._name = f"input {settings.input} of {self._board.name}"
@@ -107,14 +107,14 @@ class NumatoThermometer:
         return sum(steps) / len(steps)
 
     def _convert(self) -> int:
-        said = self._board.ask(f"adc read {CHANNELS[self._settings.input]}")
-        if not (said.isascii() and said.isdecimal() and int(said) <= self._full):
+        answer = self._board.ask(f"adc read {CHANNELS[self._settings.input]}")
+        if not (answer.isascii() and answer.isdecimal() and int(answer) <= self._largest):
             raise DeviceError(
-                f"{self._name}: expected a number from 0 to {self._full}, got '{said}'; has this "
-                "board that analogue input, and as many 'bits'?"
+                f"{self._name}: expected a number from 0 to {self._largest}, got '{answer}'; has "
+                "this board that analogue input, and as many 'bits'?"
             )
-        step = int(said)
-        if step in (0, self._full):
+        step = int(answer)
+        if step in (0, self._largest):
             raise DeviceError(
                 f"{self._name} reads {step}, the {'end' if step else 'beginning'} of its range; is "
                 "the sensor connected, the right way round, and fed?"
@@ -123,7 +123,7 @@ class NumatoThermometer:
 
     def _celsius(self, steps: float) -> float:
         settings = self._settings
-        volts = steps / self._full * settings.reference_volts
+        volts = steps / self._largest * settings.reference_volts
         celsius: float = (volts - settings.volts_at_zero) / settings.volts_per_degree
         low, high = PLAUSIBLE_C
         if not low <= celsius <= high:

@@ -42,12 +42,12 @@ class PtpCamera:
             link = open_link(address, connections)
             leaving.callback(link.close)
             self._session = Session(link, self._clock)
-            left_behind = open_session(self._session)
+            is_stale = open_session(self._session)
             leaving.callback(self._close_session)
             self._info = identify(self._session)
             self._body = self._body_for(address, settings)
             leaving.callback(self._give_back)
-            if left_behind:
+            if is_stale:
                 self._body.take_over()
             else:
                 self._body.take_control()
@@ -154,9 +154,9 @@ class PtpCamera:
         if problems:
             self._in_control = False
             is_lost = any(isinstance(problem, DeviceLostError) for problem in problems)
-            said = "; ".join(dict.fromkeys(map(str, problems)))
+            messages = "; ".join(dict.fromkeys(map(str, problems)))
             kind = DeviceLostError if is_lost else DeviceError
-            raise kind(f"camera not known to be safe: {said}")
+            raise kind(f"camera not known to be safe: {messages}")
 
     def disconnect(self) -> None:
         """Give the camera back to its own buttons and release it; never raises."""
@@ -164,16 +164,16 @@ class PtpCamera:
             self._leaving.close()
 
     def _body_for(self, address: str, settings: PtpCameraSettings) -> Body:
-        known = self._info.operations
-        if not (lacking := lacking_operations(known)):
+        operations = self._info.operations
+        if not (lacking := lacking_operations(operations)):
             return EosCamera(self._session, self._clock, self._info, settings)
-        if known >= NEEDED:
+        if operations >= NEEDED:
             return StandardCamera(self._session, self._clock, self._info, settings)
         raise DeviceError(
             f"camera {address}: expected a Canon EOS with remote release or a camera with "
             f"InitiateCapture, got {self._info} without {', '.join(lacking)}, and without "
-            f"{', '.join(f'0x{op:X}' for op in sorted(NEEDED - known))}: set its USB mode to PC "
-            "remote, or use a camera that has them"
+            f"{', '.join(f'0x{op:X}' for op in sorted(NEEDED - operations))}: set its USB mode to "
+            "PC remote, or use a camera that has them"
         )
 
     def _give_back(self) -> None:

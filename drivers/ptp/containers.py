@@ -85,10 +85,10 @@ def announced_length(beginning: bytes) -> int:
             f"expected a PTP container of at least {HEADER_BYTES} bytes from the camera", beginning
         )
     length, kind, _, _ = _HEADER.unpack_from(beginning)
-    most = HEADER_BYTES + 4 * MOST_PARAMETERS
+    longest = HEADER_BYTES + 4 * MOST_PARAMETERS
     plausible = length >= HEADER_BYTES and kind in iter(Kind)
     if plausible and kind != Kind.DATA:
-        plausible = length <= most and length % 4 == 0
+        plausible = length <= longest and length % 4 == 0
     if not plausible:
         raise MalformedError("expected a PTP container from the camera", beginning)
     return int(length)

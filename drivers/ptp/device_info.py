@@ -52,8 +52,8 @@ class DatasetReader:
     def text(self) -> str:
         """Return a string, without characters that cannot be printed."""
         units = self.take(2 * self.take(1)[0])
-        words = units.decode("utf-16-le", errors="replace").partition("\0")[0]
-        return "".join(letter for letter in words if letter.isprintable()).strip()
+        decoded = units.decode("utf-16-le", errors="replace").partition("\0")[0]
+        return "".join(letter for letter in decoded if letter.isprintable()).strip()
 
 
 @dataclass(frozen=True)

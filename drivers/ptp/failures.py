@@ -33,16 +33,16 @@ class MalformedError(DeviceError):
     ----------
     expected
         Begin of the message: the expected bytes.
-    came
+    received
         Bytes that came instead.
     remedy
         Remedy for the user.
     """
 
     def __init__(
-        self, expected: str, came: bytes, remedy: str = "switch the camera off and on"
+        self, expected: str, received: bytes, remedy: str = "switch the camera off and on"
     ) -> None:
-        super().__init__(f"{expected}, got {shown(came)}: {remedy}")
+        super().__init__(f"{expected}, got {shown(received)}: {remedy}")
 
 
 class RefusedError(DeviceError):

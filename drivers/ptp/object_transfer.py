@@ -67,7 +67,7 @@ class ObjectTransfer:
 
     def _piece(self, handle: int, offset: int, size: int) -> bytes:
         if self._part is None:
-            asked: tuple[IntEnum, *tuple[int, ...]] = (self._whole, handle)
+            request: tuple[IntEnum, *tuple[int, ...]] = (self._whole, handle)
         else:
-            asked = (self._part, handle, offset, size)
-        return self._session.transact(*asked, timeouts=PATIENT, most_bytes=size).data
+            request = (self._part, handle, offset, size)
+        return self._session.transact(*request, timeouts=PATIENT, most_bytes=size).data

@@ -62,13 +62,13 @@ class Afterglow(Enum):
         DeviceError
             The series is refused; the message names what to check.
         """
-        if self in _REFUSED:
-            raise DeviceError(_REFUSED[self])
-        if self in _TOLD:
-            warn(_TOLD[self])
+        if self in _ERRORS:
+            raise DeviceError(_ERRORS[self])
+        if self in _WARNINGS:
+            warn(_WARNINGS[self])
 
 
-_REFUSED = {
+_ERRORS = {
     Afterglow.ABSENT: "nothing glows after the charge: the lamp did not light (check its bulb, its "
     "plug and the contact of its relay), a trap door did not open, or the patches hold nothing "
     "that glows at these settings (raise camera.iso or open the aperture)",
@@ -81,7 +81,7 @@ _REFUSED = {
 }
 
 
-_TOLD = {
+_WARNINGS = {
     Afterglow.WEAK: "the glow is less than half of what it was before: the lamp may have gone out "
     "while charging or stayed on too long before (check its bulb and its relay), or lamp, sample "
     "or camera was moved; amplitudes are not to be trusted",
@@ -120,19 +120,21 @@ class Glow:
     @property
     def seen(self) -> bool:
         """Whether any light is detected."""
-        least = np.maximum(SEEN_SIGMA * self.sigma, SEEN_DN / self.exposure_s)
-        return self.clips or bool(np.any(self.rate > least))
+        limit = np.maximum(SEEN_SIGMA * self.sigma, SEEN_DN / self.exposure_s)
+        return self.clips or bool(np.any(self.rate > limit))
 
 
-def glow(seen: MeteringFrame, dark: FloatArray, zero_s: float) -> Glow:
+def glow(frame: MeteringFrame, dark: FloatArray, zero_s: float) -> Glow:
     """Return a frame's signal above the level `dark`, of shape (patches, channels), in DN."""
-    sigma = np.array([[c.sigma for c in patch.channels.values()] for patch in seen.patches])
+    sigma = np.array(
+        [[channel.sigma for channel in patch.channels.values()] for patch in frame.patches]
+    )
     return Glow(
-        at_s=seen.start_s + seen.exposure_s / 2 - zero_s,
-        exposure_s=seen.exposure_s,
-        rate=((levels(seen) - dark) / seen.exposure_s).ravel(),
-        sigma=(sigma / seen.exposure_s).ravel(),
-        clips=clips(seen),
+        at_s=frame.start_s + frame.exposure_s / 2 - zero_s,
+        exposure_s=frame.exposure_s,
+        rate=((levels(frame) - dark) / frame.exposure_s).ravel(),
+        sigma=(sigma / frame.exposure_s).ravel(),
+        clips=clips(frame),
     )
 
 
@@ -161,7 +163,7 @@ def metered(glows: Sequence[Glow]) -> Afterglow:
 
 
 def decayed(
-    first: Sequence[Glow], middle: Glow, last: Sequence[Glow], before: Sequence[Glow]
+    first: Sequence[Glow], middle: Glow, last: Sequence[Glow], reference: Sequence[Glow]
 ) -> Afterglow:
     """Classify some frames of a decay.
 
@@ -181,7 +183,7 @@ def decayed(
         return Afterglow.FADING
     if first[-1].brightest > (1 + RISEN) * start.brightest and first[-1].seen:
         return Afterglow.RISING
-    if start.brightest < WEAK * _expected(start, before):
+    if start.brightest < WEAK * _expected(start, reference):
         return Afterglow.WEAK
     if _is_steady(first, last, FADED):
         return Afterglow.STEADY
@@ -189,39 +191,41 @@ def decayed(
     return Afterglow.LINGERING if lingers else Afterglow.FADING
 
 
-def looked_at(looks: Sequence[Glow], again: Sequence[Glow]) -> Afterglow:
+def looked_at(frames: Sequence[Glow], repeats: Sequence[Glow]) -> Afterglow:
     """Classify doubtful frames by repeating their shutter times after a while."""
-    pairs = [pair for pair in zip(looks, again, strict=True) if not pair[0].clips]
+    pairs = [pair for pair in zip(frames, repeats, strict=True) if not pair[0].clips]
     if not pairs:
         return Afterglow.STEADY
-    before, after = pairs[-1]
-    steady = after.clips or _is_steady([before], [after], FADED_IN_DOUBT)
+    frame, repeat = pairs[-1]
+    steady = repeat.clips or _is_steady([frame], [repeat], FADED_IN_DOUBT)
     return Afterglow.STEADY if steady else Afterglow.FADING
 
 
-def went_out(lit: Glow, after: Glow) -> bool:
+def went_out(under_lamp: Glow, after_lamp_off: Glow) -> bool:
     """Return whether a frame after lamp off is darker than the same under the lamp."""
-    brightest = int(np.argmax(lit.rate))
-    if lit.clips or not lit.seen:
-        return not after.clips
-    return bool(after.rate[brightest] < (1 - FADED) * lit.rate[brightest])
+    brightest = int(np.argmax(under_lamp.rate))
+    if under_lamp.clips or not under_lamp.seen:
+        return not after_lamp_off.clips
+    return bool(after_lamp_off.rate[brightest] < (1 - FADED) * under_lamp.rate[brightest])
 
 
 def _is_steady(first: Sequence[Glow], last: Sequence[Glow], faded: float) -> bool:
     """Return whether the brightest channel has certainly not faded by that fraction."""
     brightest = int(np.argmax(first[0].rate))
-    before = float(np.mean([glow.rate[brightest] for glow in first]))
-    after = float(np.mean([glow.rate[brightest] for glow in last]))
+    first_rate = float(np.mean([glow.rate[brightest] for glow in first]))
+    last_rate = float(np.mean([glow.rate[brightest] for glow in last]))
     noise = max(float(glow.sigma[brightest]) for glow in (*first, *last))
     long_enough = last[-1].at_s - first[0].at_s > LEAST_S
-    return long_enough and noise < MOST_NOISE * before and after > (1 - faded) * before
+    return long_enough and noise < MOST_NOISE * first_rate and last_rate > (1 - faded) * first_rate
 
 
-def _expected(first: Glow, before: Sequence[Glow]) -> float:
+def _expected(first: Glow, reference: Sequence[Glow]) -> float:
     """Return the brightest channel's rate at that time, log-linear between earlier frames; or 0."""
     brightest = int(np.argmax(first.rate))
-    seen = [glow for glow in before if glow.seen and not glow.clips and glow.rate[brightest] > 0]
-    if not seen:
+    detected = [
+        glow for glow in reference if glow.seen and not glow.clips and glow.rate[brightest] > 0
+    ]
+    if not detected:
         return 0.0
-    log_rate = np.log([glow.rate[brightest] for glow in seen])
-    return float(np.exp(np.interp(first.at_s, [glow.at_s for glow in seen], log_rate)))
+    log_rate = np.log([glow.rate[brightest] for glow in detected])
+    return float(np.exp(np.interp(first.at_s, [glow.at_s for glow in detected], log_rate)))

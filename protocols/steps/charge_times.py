@@ -29,8 +29,8 @@ def still_grows(glows: FloatArray, growth: float) -> bool:
     growth
         Fraction below which growth does not count.
     """
-    before, last = _bright(glows)[-2:].sum(axis=2)
-    return bool((last > (1 + growth) * before).any())
+    previous, last = _bright(glows)[-2:].sum(axis=2)
+    return bool((last > (1 + growth) * previous).any())
 
 
 def most_informative_s(charges_s: Sequence[float], glows: FloatArray) -> float:
@@ -51,8 +51,8 @@ def most_informative_s(charges_s: Sequence[float], glows: FloatArray) -> float:
     gain = np.zeros(CANDIDATES)
     for place in bright.reshape(len(done_s), -1).T:
         s = _rate(done_s, place)
-        known = _slopes(done_s, s)
-        information = known.T @ known
+        done_slopes = _slopes(done_s, s)
+        information = done_slopes.T @ done_slopes
         for row, slope in enumerate(_slopes(candidates_s, s)):
             gain[row] += np.log(np.linalg.det(information + np.outer(slope, slope)))
     return float(candidates_s[np.argmax(gain)])
@@ -69,13 +69,13 @@ def _rate(charges_s: FloatArray, glow: FloatArray) -> float:
 
     def residuals(log_s: FloatArray) -> tuple[FloatArray, FloatArray]:
         s = float(np.exp(log_s[0]))
-        left = np.log(-np.expm1(-s * charges_s)) - np.log(glow)
+        difference = np.log(-np.expm1(-s * charges_s)) - np.log(glow)
         slope = _slopes(charges_s, s)[:, 1:]
-        return left - left.mean(), slope - slope.mean(axis=0)
+        return difference - difference.mean(), slope - slope.mean(axis=0)
 
     low, high = np.log(0.01 / charges_s.max()), np.log(10 / charges_s.min())
-    found = least_squares(residuals, [(low + high) / 2], lower=low, upper=high, tolerance=1e-6)
-    return float(np.exp(found.parameters[0]))
+    fit = least_squares(residuals, [(low + high) / 2], lower=low, upper=high, tolerance=1e-6)
+    return float(np.exp(fit.parameters[0]))
 
 
 def _slopes(charges_s: FloatArray, s: float) -> FloatArray:

@@ -111,10 +111,10 @@ def darkness(frames: Sequence[MeteringFrame], iso: int) -> Darkness:
     if not open_s:
         return Darkness(1.0, longest_s, fades=False)
     shortest = [frame for frame in frames if frame.exposure_s == shortest_s]
-    black = _black(shortest, others=shortest_s < open_s)
+    black = _black(shortest, has_longer=shortest_s < open_s)
     series = [levels(frame) - black for frame in frames if frame.exposure_s == open_s]
     brightest = np.argmax(series[0])
-    level = np.array([each.flat[brightest] for each in series]) / range_dn(frames[0])
+    level = np.array([level_dn.flat[brightest] for level_dn in series]) / range_dn(frames[0])
     half = max(len(level) // 2, 1)
     fades = bool(level[-half:].mean() < (1 - FADED) * level[:half].mean())
     light = float(level.mean()) if open_s == longest_s else 1.0
@@ -123,16 +123,18 @@ def darkness(frames: Sequence[MeteringFrame], iso: int) -> Darkness:
     return Darkness(light, longest_s, fades)
 
 
-def _black(shortest: Sequence[MeteringFrame], others: bool) -> FloatArray:
+def _black(shortest: Sequence[MeteringFrame], has_longer: bool) -> FloatArray:
     """Return the level without light, in DN above the file's black level."""
     mean: FloatArray = np.mean([levels(frame) for frame in shortest], axis=0)
-    told = max(shortest[0].patches[0].black) > 0
-    return mean if others or not told else np.zeros_like(mean)
+    has_black_level = max(shortest[0].patches[0].black) > 0
+    return mean if has_longer or not has_black_level else np.zeros_like(mean)
 
 
 def levels(frame: MeteringFrame) -> FloatArray:
     """Return means in DN above black, shape (patches, channels)."""
-    return np.array([[c.mean for c in patch.channels.values()] for patch in frame.patches])
+    return np.array(
+        [[channel.mean for channel in patch.channels.values()] for patch in frame.patches]
+    )
 
 
 def clips(frame: MeteringFrame) -> bool:

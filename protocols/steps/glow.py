@@ -169,35 +169,35 @@ def _rest_until_dark(
     face_lamp(session)
     session.perform(Shoot(FrameRole.REST, longest))
     face_camera(session)
-    before, rested_s = np.inf, 0.0
+    previous, rested_s = np.inf, 0.0
     while True:
         session.perform(Shoot(FrameRole.REST, longest))
         light = session.choose("light before", lambda: _light(session, unit, regions), worst=0.0)
-        fades = light < (1 - FADES) * before
+        fades = light < (1 - FADES) * previous
         if not light or not fades or rested_s >= AT_MOST_S:
             break
-        before = light
+        previous = light
         session.wait(CHECK_EVERY_S, "the sample still glows, resting in the dark")
         rested_s += CHECK_EVERY_S
     if light:
-        what = (
+        advice = (
             "a light is on in the room, or leaks in; it is subtracted as long as it stays the same"
             if not fades
             else "the sample glows from earlier; longer in the dark before a run is better"
         )
         session.warn(
             f"after {duration_text(rested_s)} in the dark the sample's place is not dark: "
-            f"{100 * light:.2g} % of the camera's range in {longest.exposure_s:.2g} s; {what}"
+            f"{100 * light:.2g} % of the camera's range in {longest.exposure_s:.2g} s; {advice}"
         )
 
 
 def _light(session: Session, unit: str, regions: Sequence[Region]) -> float:
     """Return the fraction of the range by which the last frame exceeds the closed door, or 0."""
-    closed, *_, seen = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
+    closed, *_, last = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
     dark = measure_frame(closed, regions)
-    found = glow(measure_frame(seen, regions), levels(dark), seen.start_time)
-    fraction = found.brightest * seen.exposure_s / range_dn(dark)
-    return fraction if found.clips or (found.seen and fraction > LEAST) else 0.0
+    signal = glow(measure_frame(last, regions), levels(dark), last.start_time)
+    fraction = signal.brightest * last.exposure_s / range_dn(dark)
+    return fraction if signal.clips or (signal.seen and fraction > LEAST) else 0.0
 
 
 #: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.

@@ -83,8 +83,8 @@ class CardMeterUnit:
         session.wait_until_warm("camera")
         light_card(session)
         offers = session.rig[CAMERA].offers()
-        for wanted_s in METERED_S:
-            exposure_s = offers.exposure_at_most(wanted_s)
+        for nominal_s in METERED_S:
+            exposure_s = offers.exposure_at_most(nominal_s)
             shot = ExposureSettings(exposure_s, self.settings.iso, self.settings.f_number)
             session.perform(Shoot(FrameRole.METER, shot))
         card_light(session, self.settings, self.card)
@@ -108,28 +108,28 @@ def card_light(session: Session, settings: ExposureSettings, card: Region) -> Ca
     """
 
     def decide() -> CardLight:
-        looks = [measure_frame(frame, [card]) for frame in session.frames(FrameRole.METER)]
-        return CardLight(_per_s(looks), settings)
+        frames = [measure_frame(frame, [card]) for frame in session.frames(FrameRole.METER)]
+        return CardLight(_per_s(frames), settings)
 
     return session.choose("light of the card", decide, CardLight(DIM_PER_S, settings))
 
 
-def _per_s(looks: Sequence[MeteringFrame]) -> float:
+def _per_s(frames: Sequence[MeteringFrame]) -> float:
     """Return the rate from the brightest frame that does not clip."""
-    fitting = []
-    for seen in looks:
-        card = seen.patches[0]
+    unclipped = []
+    for frame in frames:
+        card = frame.patches[0]
         if not card.clipped:
-            fitting.append((max(card.channels.values(), key=lambda channel: channel.mean), seen))
-    if not fitting:
+            unclipped.append((max(card.channels.values(), key=lambda channel: channel.mean), frame))
+    if not unclipped:
         raise DeviceError(
             "the lit card is too bright for the shortest shutter time: lower camera.iso or close "
             "the aperture"
         )
-    brightest, seen = max(fitting, key=lambda pair: pair[0].mean)
-    if brightest.mean < SEEN_SIGMA * brightest.sigma or brightest.mean < 0.001 * range_dn(seen):
+    brightest, frame = max(unclipped, key=lambda pair: pair[0].mean)
+    if brightest.mean < SEEN_SIGMA * brightest.sigma or brightest.mean < 0.001 * range_dn(frame):
         raise DeviceError(
             "the card is not lit: look whether the lamp burns, the card lies in its place and "
             "'card:' is its region in the frame"
         )
-    return brightest.peak / range_dn(seen) / seen.exposure_s
+    return brightest.peak / range_dn(frame) / frame.exposure_s

@@ -94,10 +94,10 @@ class DecayMeter:
         self._range_dn = math.inf
         self._readings: list[_Reading] = []
         self._shortest_clipped = False
-        for seen in metering:
-            self._range_dn = min(self._range_dn, seen.patches[0].range_dn)
-            channels = [channel for patch in seen.patches for channel in patch.channels.values()]
-            self._take(seen.start_s - metering[0].start_s, seen.exposure_s, channels)
+        for frame in metering:
+            self._range_dn = min(self._range_dn, frame.patches[0].range_dn)
+            channels = [channel for patch in frame.patches for channel in patch.channels.values()]
+            self._take(frame.start_s - metering[0].start_s, frame.exposure_s, channels)
 
     def _take(self, time_s: float, exposure_s: float, channels: list[ChannelStats]) -> None:
         if any(channel.clipped for channel in channels):
@@ -138,14 +138,14 @@ class DecayMeter:
             warn("no glow was seen while metering; raise camera.iso or open the aperture")
             return Schedule.constant(times_s, longest_s)
         rates = self._peak_rates(np.asarray(times_s) - times_s[0])
-        wanted_s = TARGET * self._range_dn / rates
-        first_s = offers.exposure_at_most(min(float(wanted_s[0]), longest_s))
+        target_s = TARGET * self._range_dn / rates
+        first_s = offers.exposure_at_most(min(float(target_s[0]), longest_s))
         if rates[0] * first_s < DIM * self._range_dn:
             warn("the glow is very dim at these settings; raise camera.iso or open the aperture")
         limit_s = min(first_s * growth, longest_s)
         exposures_s = (
-            max(first_s, offers.exposure_at_most(min(float(wish_s), limit_s)))
-            for wish_s in wanted_s
+            max(first_s, offers.exposure_at_most(min(float(exposure_s), limit_s)))
+            for exposure_s in target_s
         )
         return Schedule(tuple(times_s), tuple(exposures_s))
 
@@ -156,13 +156,13 @@ class DecayMeter:
         the first two is extrapolated. The ratio of the brightest pixels to the mean is taken from
         the reading with most counts: in dim ones it is noise.
         """
-        seen_s = np.array([reading.time_s for reading in self._readings])
+        reading_s = np.array([reading.time_s for reading in self._readings])
         log_rate = np.log([reading.rate_dn_per_s for reading in self._readings])
-        rates = np.interp(times_s, seen_s, log_rate)
-        if len(seen_s) > 1:
-            slope = min((log_rate[1] - log_rate[0]) / (seen_s[1] - seen_s[0]), 0.0)
-            early = times_s < seen_s[0]
-            rates[early] = log_rate[0] + slope * (times_s[early] - seen_s[0])
+        rates = np.interp(times_s, reading_s, log_rate)
+        if len(reading_s) > 1:
+            slope = min((log_rate[1] - log_rate[0]) / (reading_s[1] - reading_s[0]), 0.0)
+            is_early = times_s < reading_s[0]
+            rates[is_early] = log_rate[0] + slope * (times_s[is_early] - reading_s[0])
         fullest = max(self._readings, key=lambda reading: reading.mean_dn)
         return np.exp(rates) * fullest.peak_dn / fullest.mean_dn
 

@@ -76,16 +76,18 @@ class SanityChecks:
         """
 
         def decide() -> Darkness:
-            frames = self._own(FrameRole.DARK)
+            frames = self._unit_frames(FrameRole.DARK)
             longest_s = max(frame.exposure_s for frame in frames)
             longest = [frame for frame in frames if frame.exposure_s == longest_s]
-            looks = [self._look(frame) for frame in (*_one_each(frames), *longest[1:])]
-            return darkness(looks, frames[0].iso)
+            measured = [
+                self._measure(frame) for frame in (*_first_of_each_exposure(frames), *longest[1:])
+            ]
+            return darkness(measured, frames[0].iso)
 
-        found = self.session.choose("light before charging", decide, worst=DARK)
-        if found.is_doubtful:
-            found = replace(found, fades=self._closer_look(shorter) is Afterglow.FADING)
-        found.require(self.session.warn)
+        light = self.session.choose("light before charging", decide, worst=DARK)
+        if light.is_doubtful:
+            light = replace(light, fades=self._closer_look(shorter) is Afterglow.FADING)
+        light.require(self.session.warn)
 
     def require_glow(self, shorter: Sequence[ExposureSettings]) -> None:
         """Refuse a metering after which nothing glows, or the light does not fade.
@@ -100,7 +102,7 @@ class SanityChecks:
         DeviceError
             The frames show no glow; the message names what to check.
         """
-        self._require(lambda: metered(self._glows(self._own(FrameRole.METER))), shorter)
+        self._require(lambda: metered(self._glows(self._unit_frames(FrameRole.METER))), shorter)
 
     def require_decay(self, shorter: Sequence[ExposureSettings]) -> None:
         """Refuse a series of frames that is no decay.
@@ -117,12 +119,12 @@ class SanityChecks:
         """
 
         def decide() -> Afterglow:
-            frames = self._own(self.role)
+            frames = self._unit_frames(self.role)
             middle = len(frames) // 2
-            some = min(2, middle)
-            chosen = [*frames[:some], frames[middle], *frames[-some:]]
+            count = min(2, middle)
+            chosen = [*frames[:count], frames[middle], *frames[-count:]]
             glows = self._glows(chosen)
-            return decayed(glows[:some], glows[some], glows[some + 1 :], self._before())
+            return decayed(glows[:count], glows[count], glows[count + 1 :], self._reference_glows())
 
         self._require(decide, shorter)
 
@@ -141,13 +143,13 @@ class SanityChecks:
         """
 
         def longest_open() -> ExposureSettings:
-            lit = zip(under_lamp, self._glows(self._own(FrameRole.DAYLIGHT)), strict=True)
-            fitting = [settings for settings, seen in lit if not seen.clips]
-            return fitting[-1] if fitting else under_lamp[0]
+            glows = zip(under_lamp, self._glows(self._unit_frames(FrameRole.DAYLIGHT)), strict=True)
+            unclipped = [settings for settings, signal in glows if not signal.clips]
+            return unclipped[-1] if unclipped else under_lamp[0]
 
         def gone_out() -> bool:
-            lit = self._own(FrameRole.DAYLIGHT)[under_lamp.index(compared)]
-            return went_out(*self._glows([lit, *self._own(FrameRole.LOOK)]))
+            under_lamp_frame = self._unit_frames(FrameRole.DAYLIGHT)[under_lamp.index(compared)]
+            return went_out(*self._glows([under_lamp_frame, *self._unit_frames(FrameRole.LOOK)]))
 
         compared = self.session.choose("frame to compare with", longest_open, under_lamp[-1])
         look_again = Shoot(FrameRole.LOOK, compared)
@@ -166,7 +168,7 @@ class SanityChecks:
         times_s
             Planned begin of each frame in seconds after lamp off.
         """
-        frames = self._own(self.role)
+        frames = self._unit_frames(self.role)
         if not frames:
             return  # the plan takes none
         # A busy camera releases late, though it was asked in time: the begins themselves count.
@@ -175,31 +177,31 @@ class SanityChecks:
         late_s = lags_s - lamp_off_s
         if late_s.max() <= LATE_S:
             return
-        said = (
+        message = (
             f"{np.count_nonzero(late_s > LATE_S)} of {len(frames)} frames began late, up to "
             f"{duration_text(float(late_s.max()))}"
         )
         disk_s = max(frame.disk_s for frame in frames)
         if disk_s > LATE_S:
-            said += (
+            message += (
                 f": the disk cannot keep up, it took up to {duration_text(disk_s)} for a frame "
                 "(use another disk, or leave more time between frames)"
             )
-        self.session.warn(f"{said}; all are kept, with the times at which they were taken")
+        self.session.warn(f"{message}; all are kept, with the times at which they were taken")
 
     def _require(
         self, decide: Callable[[], Afterglow], shorter: Sequence[ExposureSettings]
     ) -> None:
-        found = self.session.choose("after lamp off", decide, worst=Afterglow.FADING)
-        if found is Afterglow.CLIPPED:
-            found = self._closer_look(shorter)
-        found.require(self.session.warn)
+        afterglow = self.session.choose("after lamp off", decide, worst=Afterglow.FADING)
+        if afterglow is Afterglow.CLIPPED:
+            afterglow = self._closer_look(shorter)
+        afterglow.require(self.session.warn)
 
     def _closer_look(self, shorter: Sequence[ExposureSettings]) -> Afterglow:
         """Return whether the light fades: the same frames are taken again after a while."""
 
         def decide() -> Afterglow:
-            glows = self._glows(self._own(FrameRole.LOOK))
+            glows = self._glows(self._unit_frames(FrameRole.LOOK))
             return looked_at(glows[: len(shorter)], glows[len(shorter) :])
 
         self._shoot(shorter)
@@ -208,17 +210,17 @@ class SanityChecks:
         return self.session.choose("a closer look", decide, worst=Afterglow.FADING)
 
     def _shoot(self, settings: Sequence[ExposureSettings]) -> None:
-        for one in settings:
-            self.session.perform(Shoot(FrameRole.LOOK, one))
+        for exposure in settings:
+            self.session.perform(Shoot(FrameRole.LOOK, exposure))
 
-    def _own(self, role: str) -> list[FrameRecord]:
+    def _unit_frames(self, role: str) -> list[FrameRecord]:
         return [frame for frame in self.session.frames(role) if frame.unit == self.unit]
 
-    def _before(self) -> list[Glow]:
+    def _reference_glows(self) -> list[Glow]:
         """Return the glow of the metering, else that at the begin of the first complete decay."""
         decays = self.session.frames(self.role)
         metering = [
-            one for one in self.session.frames(FrameRole.METER) if one.unit == self.metering
+            frame for frame in self.session.frames(FrameRole.METER) if frame.unit == self.metering
         ]
         if not metering and decays[0].unit == self.unit:
             return []
@@ -227,20 +229,25 @@ class SanityChecks:
     def _glows(self, frames: Sequence[FrameRecord]) -> list[Glow]:
         """Return the glow of frames, at times from the planned begin of the first of them."""
         zero_s = frames[0].start_time - frames[0].late_s
-        darks = [self._look(frame) for frame in _one_each(self.session.frames(FrameRole.DARK))]
+        darks = [
+            self._measure(frame)
+            for frame in _first_of_each_exposure(self.session.frames(FrameRole.DARK))
+        ]
         if darks and darkness(darks, frames[0].iso).light:
             darks = []  # they hold an earlier glow
         return [self._glow(frame, darks, zero_s) for frame in frames]
 
     def _glow(self, frame: FrameRecord, darks: Sequence[MeteringFrame], zero_s: float) -> Glow:
-        seen = self._look(frame)
+        measured = self._measure(frame)
         if self.background is not None:
-            without = MeteringFrame(seen.start_s, seen.exposure_s, seen.patches[:-1])
-            return glow(without, levels(seen)[-1], zero_s)
-        dark = dark_level(darks, frame.exposure_s) if darks else np.zeros(levels(seen).shape)
-        return glow(seen, dark, zero_s)
+            patches_only = MeteringFrame(
+                measured.start_s, measured.exposure_s, measured.patches[:-1]
+            )
+            return glow(patches_only, levels(measured)[-1], zero_s)
+        dark = dark_level(darks, frame.exposure_s) if darks else np.zeros(levels(measured).shape)
+        return glow(measured, dark, zero_s)
 
-    def _look(self, frame: FrameRecord) -> MeteringFrame:
+    def _measure(self, frame: FrameRecord) -> MeteringFrame:
         """Return the measurement of a frame, with the background last if there is one."""
         return self._frame_cache.measure_frame(frame)
 
@@ -250,6 +257,6 @@ class SanityChecks:
         return FrameCache([*self.patches, *background])
 
 
-def _one_each(frames: Sequence[FrameRecord]) -> list[FrameRecord]:
+def _first_of_each_exposure(frames: Sequence[FrameRecord]) -> list[FrameRecord]:
     """Return the first frame of each shutter time."""
     return list({frame.exposure_s: frame for frame in reversed(frames)}.values())

@@ -81,8 +81,8 @@ class Arrangement:
             session.perform(LAMP_OFF)
         for name in ("lamp", "stage", "lvf", "filter"):
             if before is None or getattr(self, name) != getattr(before, name):
-                what, task = self._step(name)
-                session.ask(ManualStep(what, why, task))
+                instruction, task = self._step(name)
+                session.ask(ManualStep(instruction, why, task))
 
     def _step(self, name: str) -> tuple[str, str]:
         """Return the text of a step for a person, and for a changer."""
@@ -96,8 +96,8 @@ class Arrangement:
             case _ if self.filter is None:
                 return "take the colour filter out", "no filter"
             case _:
-                what = f"put the colour filter {self.filter} before the lamp"
-                return what, f"filter {self.filter}"
+                instruction = f"put the colour filter {self.filter} before the lamp"
+                return instruction, f"filter {self.filter}"
 
 
 def light(session: Session, warm_up_s: float) -> None:
@@ -171,8 +171,8 @@ class PutBackUnit:
     def run(self, session: Session) -> None:
         """Switch the lamp off, have filters and card taken away."""
         session.perform(LAMP_OFF)
-        before = left_by(self.before, session)
-        Arrangement().set_up(session, before, "the next measurement finds the bench as usual")
+        arrangement = left_by(self.before, session)
+        Arrangement().set_up(session, arrangement, "the next measurement finds the bench as usual")
 
 
 #: Shutter times to look with, as fractions of the longest.
@@ -232,7 +232,9 @@ class Bracketing:
         offers = session.rig[CAMERA].offers()
         for exposure_s in self._ladder(offers):
             session.perform(Shoot(FrameRole.LOOK, self.settings(exposure_s)))
-            if session.choose("bright enough", lambda: self._enough(session, unit), worst=False):
+            if session.choose(
+                "bright enough", lambda: self._is_bright_enough(session, unit), worst=False
+            ):
                 break
         # That takes longest: both exposures of a bracket, and the longer one as long as it may be.
         worst_s = offers.exposure_at_most(self.longest_s / LONGER)
@@ -247,33 +249,33 @@ class Bracketing:
     def _ladder(self, offers: CameraOffers) -> Sequence[float]:
         return sorted({offers.exposure_at_most(self.longest_s * fraction) for fraction in LADDER})
 
-    def _enough(self, session: Session, unit: str) -> bool:
-        return _seen(_looks(session, unit)[-1]).fraction > ENOUGH
+    def _is_bright_enough(self, session: Session, unit: str) -> bool:
+        return _measure_brightness(_metering_frames(session, unit)[-1]).fraction > ENOUGH
 
     def _exposure_s(self, session: Session, unit: str, lamp: str) -> float:
         """Return the shutter time at which the brightest pixels fill the target fraction."""
-        offers, looks = session.rig[CAMERA].offers(), _looks(session, unit)
-        seen = [_seen(frame) for frame in looks]
-        visible = [one for one in seen if one.visible]
-        if not visible:
+        offers, frames = session.rig[CAMERA].offers(), _metering_frames(session, unit)
+        brightness = [_measure_brightness(frame) for frame in frames]
+        detected = [reading for reading in brightness if reading.visible]
+        if not detected:
             raise DeviceError(
-                f"{unit}: dark even in {duration_text(looks[-1].exposure_s)}: the {lamp} lamp did "
+                f"{unit}: dark even in {duration_text(frames[-1].exposure_s)}: the {lamp} lamp did "
                 "not light (check its bulb, its plug and the contact of its relay), or what should "
                 "be seen is not in its place"
             )
-        open_ones = [one for one in visible if not one.clips]
-        if not open_ones:
+        unclipped = [reading for reading in detected if not reading.clips]
+        if not unclipped:
             session.warn(
                 f"{unit}: even the shortest exposure clips; lower camera.iso or close the aperture"
             )
             return offers.exposures_s[0]
-        best = open_ones[-1]
-        wanted_s = best.exposure_s * TARGET / best.fraction
-        return offers.exposure_at_most(min(wanted_s, self.longest_s))
+        best = unclipped[-1]
+        target_s = best.exposure_s * TARGET / best.fraction
+        return offers.exposure_at_most(min(target_s, self.longest_s))
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _Brightness:
     """The brightest 0.5 % of a frame's pixels, as a fraction of the range."""
 
     exposure_s: float
@@ -282,12 +284,12 @@ class _Seen:
     clips: bool
 
 
-def _seen(frame: FrameRecord) -> _Seen:
+def _measure_brightness(frame: FrameRecord) -> _Brightness:
     measured = measure(read_raw(frame.path))
     channels = list(measured.channels.values())
     brightest = max(channels, key=lambda channel: channel.peak)
     noise_dn = SEEN_SIGMA * brightest.sigma * np.sqrt(brightest.n)
-    return _Seen(
+    return _Brightness(
         exposure_s=frame.exposure_s,
         fraction=brightest.peak / measured.range_dn,
         visible=brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN)
@@ -296,7 +298,7 @@ def _seen(frame: FrameRecord) -> _Seen:
     )
 
 
-def _looks(session: Session, unit: str) -> list[FrameRecord]:
+def _metering_frames(session: Session, unit: str) -> list[FrameRecord]:
     return [frame for frame in session.frames(FrameRole.LOOK) if frame.unit == unit]
 
 

@@ -27,7 +27,7 @@ def strip_found(frames: Sequence[Exposure]) -> str:
 
 
 def lines_found(
-    frames: Sequence[Exposure], of_strip: Sequence[Exposure], rising: bool | None
+    frames: Sequence[Exposure], strip_frames: Sequence[Exposure], rising: bool | None
 ) -> str:
     """Return the mercury lines that are found, in words.
 
@@ -36,19 +36,23 @@ def lines_found(
     FitError
         No lines are found, or the filter is the wrong way round, see `locate_lines`.
     """
-    profile = _profile(frames, _strip(of_strip))
+    profile = _profile(frames, _strip(strip_frames))
     return str(locate_lines(profile.position, profile.value_dn_per_s, rising=rising))
 
 
 def look_alike(
-    frames: Sequence[Exposure], others: Sequence[Exposure], of_strip: Sequence[Exposure]
+    frames: Sequence[Exposure],
+    previous_frames: Sequence[Exposure],
+    strip_frames: Sequence[Exposure],
 ) -> bool:
     """Return whether the strip looks the same in two sets of frames, brightness included."""
-    strip = _strip(of_strip)
-    one, other = (_profile(some, strip).value_dn_per_s for some in (frames, others))
-    bright = other > BRIGHT * other.max(axis=0)
-    apart = np.abs(one[bright] / other[bright] - 1)
-    return bool(np.percentile(apart, NEARLY_ALL) < ALIKE)
+    strip = _strip(strip_frames)
+    present, previous = (
+        _profile(exposures, strip).value_dn_per_s for exposures in (frames, previous_frames)
+    )
+    bright = previous > BRIGHT * previous.max(axis=0)
+    deviation = np.abs(present[bright] / previous[bright] - 1)
+    return bool(np.percentile(deviation, NEARLY_ALL) < ALIKE)
 
 
 def _strip(frames: Sequence[Exposure]) -> Strip:

@@ -30,7 +30,7 @@ class LcusBoard:
         self._on_change = on_change
         self._answers = answers
         self._command = b""
-        self._told = tuple(self.states)
+        self._reported = tuple(self.states)
 
     def receive(self, data: bytes) -> bytes:
         """Return the board's answers to these bytes, in order."""
@@ -47,22 +47,22 @@ class LcusBoard:
 
     def _obey(self, command: bytes) -> None:
         relay, operation, checksum = command[1:]
-        known = 1 <= relay <= len(self.states) and operation in (0, 1)
-        if known and sum(command[:3]) & 0xFF == checksum:
+        is_valid = 1 <= relay <= len(self.states) and operation in (0, 1)
+        if is_valid and sum(command[:3]) & 0xFF == checksum:
             on = operation == 1
             if self.states[relay - 1] != on:
                 self.states[relay - 1] = on
                 self._on_change(relay, on)
 
     def _answer(self) -> bytes:
-        told, self._told = self._told, tuple(self.states)
+        states, self._reported = self._reported, tuple(self.states)
         match self._answers:
             case "nothing":
                 return b""
             case "bytes":
-                return bytes(told)
+                return bytes(states)
             case "text":
                 return "".join(
                     f"CH{relay}: {'ON ' if on else 'OFF'}\r\n"
-                    for relay, on in enumerate(told, start=1)
+                    for relay, on in enumerate(states, start=1)
                 ).encode("ascii")

@@ -65,12 +65,12 @@ class MaestroBoard:
 
     def pulses(self, channel: int) -> Sequence[Pulse]:
         """Return all changes of a channel's pulse up to now."""
-        self._look_at_the_time()
+        self._check_time_out()
         return self._pulses[channel]
 
     def receive(self, data: bytes) -> bytes:
         """Return the board's answers to these bytes, in order."""
-        self._look_at_the_time()
+        self._check_time_out()
         answer = b""
         for byte in data:
             begins = byte >= 0x80
@@ -84,15 +84,17 @@ class MaestroBoard:
 
     def _completed(self) -> bytes:
         """Obey the command if it is complete."""
-        named = self._command[0] == 0xAA
-        if named and len(self._command) < 3:
+        is_addressed = self._command[0] == 0xAA
+        if is_addressed and len(self._command) < 3:
             return b""
-        code, *data = [self._command[2] | 0x80, *self._command[3:]] if named else self._command
+        code, *data = (
+            [self._command[2] | 0x80, *self._command[3:]] if is_addressed else self._command
+        )
         if code == 0xAA or len(data) < DATA_BYTES.get(code, 0):
             return b""
-        meant = not named or self._command[1] == DEVICE_NUMBER
+        is_own = not is_addressed or self._command[1] == DEVICE_NUMBER
         self._command = []
-        if not meant:
+        if not is_own:
             return b""
         if code not in DATA_BYTES or (data and data[0] >= CHANNELS):
             self._err(PROTOCOL_ERROR, self._clock.now())
@@ -137,17 +139,17 @@ class MaestroBoard:
         return quarters / speed + speed / acceleration
 
     def _width_s(self, channel: int) -> float:
-        *before, last = self._pulses[channel]
-        if not (before and self._is_ramping(channel)):
+        *earlier, last = self._pulses[channel]
+        if not (earlier and self._is_ramping(channel)):
             return last.width_s
-        gone = (self._clock.now() - last.at_s) / last.ramp_s
-        return before[-1].width_s + gone * (last.width_s - before[-1].width_s)
+        progress = (self._clock.now() - last.at_s) / last.ramp_s
+        return earlier[-1].width_s + progress * (last.width_s - earlier[-1].width_s)
 
     def _is_ramping(self, channel: int) -> bool:
         last = self._pulses[channel][-1]
         return self._clock.now() < last.at_s + last.ramp_s
 
-    def _look_at_the_time(self) -> None:
+    def _check_time_out(self) -> None:
         silent_until_s = self._heard_s + self._time_out_s
         if self._clock.now() > silent_until_s:
             self._err(TIME_OUT_ERROR, silent_until_s)

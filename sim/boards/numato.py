@@ -38,8 +38,8 @@ class NumatoBoard:
         answer = ""
         for character in data.decode("ascii", errors="replace"):
             if character == "\r":
-                said = self._obey(self._typed)
-                answer += "\n\r" + (f"{said}\n\r" if said else "") + ">"
+                result = self._obey(self._typed)
+                answer += "\n\r" + (f"{result}\n\r" if result else "") + ">"
                 self._typed = ""
             else:
                 self._typed += character

@@ -50,7 +50,7 @@ class SerialCable:
     @property
     def is_plugged(self) -> bool:
         """Whether the cable is in now."""
-        return not self._now(self._unplugged)
+        return not self._is_any_on(self._unplugged)
 
     @property
     def plugging(self) -> int:
@@ -64,11 +64,13 @@ class SerialCable:
 
     def carry(self, data: bytes) -> bytes:
         """Carry bytes to the board; return its answer."""
-        if self._now(self._silent):
+        if self._is_any_on(self._silent):
             return b""
         answer = self._board.receive(data)
-        return answer.removeprefix(data.rstrip(b"\r")) if self._now(self._echo_lost) else answer
+        return (
+            answer.removeprefix(data.rstrip(b"\r")) if self._is_any_on(self._echo_lost) else answer
+        )
 
-    def _now(self, whens: Sequence[FaultTime]) -> bool:
+    def _is_any_on(self, spans: Sequence[FaultTime]) -> bool:
         now_s = self._clock.now()
-        return any(when.is_on(now_s) for when in whens)
+        return any(span.is_on(now_s) for span in spans)

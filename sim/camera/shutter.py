@@ -62,7 +62,7 @@ class Shutter:
         self._jitter_s = jitter_s
         self._random = random.Random(seed)
         self._settled_s: float | None = None
-        self._held = False
+        self._is_held = False
         self._exposure = Exposure(-math.inf, -math.inf)
 
     @property
@@ -86,7 +86,7 @@ class Shutter:
         now_s = self._clock.now()
         exposing = now_s < self._exposure.end_s + READOUT_S
         focusing = self._settled_s is not None and now_s < self._settled_s
-        return not (exposing or focusing or self._held)
+        return not (exposing or focusing or self._is_held)
 
     def press_half(self, settling_s: float) -> None:
         """Focus and meter, which takes time; again only after the button was released."""
@@ -99,14 +99,14 @@ class Shutter:
         if self._settled_s is None:
             lag_s += settling_s
         start_s = self._clock.now() + lag_s
-        self._held = True
+        self._is_held = True
         self._exposure = Exposure(start_s, start_s + exposure_s)
         return self._exposure
 
     def let_go(self, stages: Stage) -> None:
         """Release stages of the button."""
         if Stage.FULL in stages:
-            self._held = False
+            self._is_held = False
         if Stage.HALF in stages:
             self._settled_s = None
 

@@ -24,14 +24,14 @@ class EosBulb:
 
     Parameters
     ----------
-    held
+    release
         Command pair whose press keeps the shutter open.
     needs_half_press
         Whether the button's first stage goes first; BulbStart goes alone.
     """
 
-    def __init__(self, held: Held, *, needs_half_press: bool) -> None:
-        self._held = held
+    def __init__(self, release: Held, *, needs_half_press: bool) -> None:
+        self._release = release
         self.needs_half_press = needs_half_press
 
     def open(self) -> Reply:
@@ -45,14 +45,14 @@ class EosBulb:
             Whether an exposure has begun is unknown.
         """
         try:
-            reply = self._held.press(Timeouts(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
+            reply = self._release.press(Timeouts(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
         except RefusedError as refusal:
             if refusal.code == _GENERAL_ERROR:
                 raise _refused(refusal.code) from None
             raise
         hidden = reply.params[0] & 0xFFFF if reply.params else 0
         if hidden & _HIDDEN_MASK == _HIDDEN and hidden != OK:
-            self._held.doubt()
+            self._release.doubt()
             raise _refused(hidden)
         return reply
 
@@ -65,7 +65,7 @@ class EosBulb:
             The shutter may still be open.
         """
         try:
-            return self._held.let_go(CLOSING_S)
+            return self._release.let_go(CLOSING_S)
         except RefusedError as refusal:
             if refusal.code != _GENERAL_ERROR:
                 raise
@@ -84,14 +84,14 @@ class EosBulb:
         DeviceError
             The shutter may still be open.
         """
-        self._held.let_go_blindly()
+        self._release.let_go_blindly()
 
 
 def bulb_of(info: DeviceInfo, session: Session, release: Release) -> EosBulb | None:
     """Return the camera's way of bulb exposures; None if it has none."""
     if {Eos.BulbStart, Eos.BulbEnd} <= info.operations:
-        held = Held(session, (Eos.BulbStart,), (Eos.BulbEnd,))
-        return EosBulb(held, needs_half_press=False)
+        commands = Held(session, (Eos.BulbStart,), (Eos.BulbEnd,))
+        return EosBulb(commands, needs_half_press=False)
     if isinstance(release, TwoStageRelease):
         return EosBulb(release.full, needs_half_press=True)
     return None

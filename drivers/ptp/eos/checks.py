@@ -91,8 +91,8 @@ def _iso_in_force(code: int | None, native: NativeIsos) -> Finding:
     if code == AUTO_ISO:
         return Finding("refuse", "automatic ISO is on: gain may change between frames", where)
     if ISOS.get(code) not in native.values:
-        said = f"ISO {ISOS[code]}" if code in ISOS else f"the ISO code 0x{code:X}"
-        return Finding("refuse", f"{said} is not native: computed after digitising", where)
+        name = f"ISO {ISOS[code]}" if code in ISOS else f"the ISO code 0x{code:X}"
+        return Finding("refuse", f"{name} is not native: computed after digitising", where)
     return Finding("fine", f"ISO {ISOS[code]} is native")
 
 
@@ -106,13 +106,13 @@ def _native_isos(native: NativeIsos, model: str) -> Iterator[Finding]:
             "is assumed",
             "write what you know into the camera's 'isos' in the rig file",
         )
-    of_model = isos_of_model(model)
-    others = sorted(set(native.values) - set(of_model.values))
-    if native.source == "rig file" and others:
-        known = "is not known to be native" if of_model.source == "assumed" else "is not native"
+    model_isos = isos_of_model(model)
+    foreign = sorted(set(native.values) - set(model_isos.values))
+    if native.source == "rig file" and foreign:
+        doubt = "is not known to be native" if model_isos.source == "assumed" else "is not native"
         yield Finding(
             "warn",
-            f"the rig file allows ISO {_listed(others)}, which {known} in a {model}: computed "
+            f"the rig file allows ISO {_listed(foreign)}, which {doubt} in a {model}: computed "
             "after digitising",
             "leave it out of the camera's 'isos' unless you have measured it",
         )
@@ -135,7 +135,7 @@ def _auto_power_off(after_s: int | None) -> Finding:
 
 
 def _custom_functions(state: EosState) -> Iterator[Finding]:
-    for function, words, spoils, where in (
+    for function, name, spoils, where in (
         (
             CustomFunction.long_exposure_noise_reduction,
             "long-exposure noise reduction",
@@ -157,11 +157,11 @@ def _custom_functions(state: EosState) -> Iterator[Finding]:
     ):
         value = state.custom_functions.value(function)
         if value is None:
-            yield Finding("warn", f"could not read {words}", f"{_BY_HAND}: {where}")
+            yield Finding("warn", f"could not read {name}", f"{_BY_HAND}: {where}")
         elif value:
-            yield Finding("refuse", f"{words} is on: {spoils}", where)
+            yield Finding("refuse", f"{name} is on: {spoils}", where)
         else:
-            yield Finding("fine", f"{words} is off")
+            yield Finding("fine", f"{name} is off")
     if state.custom_functions.value(CustomFunction.iso_expansion):
         yield Finding(
             "warn",

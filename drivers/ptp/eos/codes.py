@@ -61,10 +61,10 @@ ISOS = MappingProxyType(
 @cache
 def shutter_time_s(code: int) -> float | None:
     """Return the actual shutter time of a Tv code, in seconds; None for bulb and unknown codes."""
-    whole, eighths = divmod(code - _TV_ZERO, 8)
+    stops, eighths = divmod(code - _TV_ZERO, 8)
     if not LONGEST_TV <= code <= SHORTEST_TV or eighths not in _STEP:
         return None
-    return float(2.0 ** -float(whole + _STEP[eighths]))
+    return float(2.0 ** -float(stops + _STEP[eighths]))
 
 
 def third_stop_codes() -> tuple[int, ...]:

@@ -58,26 +58,26 @@ def parse_custom_functions(block: bytes) -> dict[int, tuple[int, ...]] | None:
     # events of some models are padded behind the block
     if size % 4 or not 8 <= size <= len(block) or any(numbers[size // 4 :]):
         return None
-    rest = numbers[2 : size // 4]
-    found: dict[int, tuple[int, ...]] = {}
+    remaining = numbers[2 : size // 4]
+    values: dict[int, tuple[int, ...]] = {}
     for _ in range(groups):
-        if len(rest) < 3 or rest[1] % 4 or not 2 <= rest[1] // 4 < len(rest):
+        if len(remaining) < 3 or remaining[1] % 4 or not 2 <= remaining[1] // 4 < len(remaining):
             return None
-        end = 1 + rest[1] // 4
-        functions = _functions(rest[3:end], rest[2])
+        end = 1 + remaining[1] // 4
+        functions = _functions(remaining[3:end], remaining[2])
         if functions is None:
             return None
-        found |= functions
-        rest = rest[end:]
-    return None if rest else found
+        values |= functions
+        remaining = remaining[end:]
+    return None if remaining else values
 
 
 def _functions(numbers: tuple[int, ...], count: int) -> dict[int, tuple[int, ...]] | None:
-    found = {}
+    values = {}
     for _ in range(count):
         if len(numbers) < 2 or len(numbers) < 2 + numbers[1]:
             return None
         end = 2 + numbers[1]
-        found[numbers[0]] = numbers[2:end]
+        values[numbers[0]] = numbers[2:end]
         numbers = numbers[end:]
-    return None if numbers else found
+    return None if numbers else values

@@ -84,7 +84,7 @@ class EosExposure:
             frame_bytes=round(self._settings.frame_size),
         )
 
-    def apply(self, wanted: ExposureSettings) -> None:
+    def apply(self, requested: ExposureSettings) -> None:
         """Set what is not in force already, read back.
 
         Raises
@@ -93,16 +93,17 @@ class EosExposure:
             The camera does not offer a setting or did not take it.
         """
         self._require_manual()
-        bulb_s = self._bulb_time_s(wanted.exposure_s)
-        codes = self._codes_of(wanted, None if bulb_s is None else BULB_TV)
+        bulb_s = self._bulb_time_s(requested.exposure_s)
+        codes = self._codes_of(requested, None if bulb_s is None else BULB_TV)
         self._bulb_s = bulb_s
         for prop, code in codes.items():
             self._state.set(prop, number(code))
         for prop, code in codes.items():
-            if (said := self._state.value(prop)) != code:
+            if (reported := self._state.value(prop)) != code:
                 raise DeviceError(
-                    f"asked the camera for {wanted}, it has changed its {_words(prop)} to "
-                    f"{value_text(prop, number(said or 0))} since: turn its dial to M and try again"
+                    f"asked the camera for {requested}, it has changed its {_name_of(prop)} to "
+                    f"{value_text(prop, number(reported or 0))} since: turn its dial to M and try "
+                    "again"
                 )
 
     def in_force(self) -> ExposureSettings:
@@ -127,25 +128,25 @@ class EosExposure:
         f_number = None if av is None else F_NUMBERS.get(av)
         return ExposureSettings(exposure_s, ISOS[iso], f_number)
 
-    def _codes_of(self, wanted: ExposureSettings, bulb: int | None) -> dict[Property, int]:
-        shutter = bulb or shutter_code(wanted.exposure_s, self._shutter_codes())
-        iso = iso_code(wanted.iso, self._iso_codes())
+    def _codes_of(self, requested: ExposureSettings, bulb: int | None) -> dict[Property, int]:
+        shutter = bulb or shutter_code(requested.exposure_s, self._shutter_codes())
+        iso = iso_code(requested.iso, self._iso_codes())
         if shutter is None or iso is None:
-            what = "shutter time" if shutter is None else "ISO"
-            dial = "B" if shutter is None and wanted.exposure_s >= SHORTEST_BULB_S else "M"
+            missing = "shutter time" if shutter is None else "ISO"
+            dial = "B" if shutter is None and requested.exposure_s >= SHORTEST_BULB_S else "M"
             raise DeviceError(
-                f"asked the camera for {wanted}, it does not offer this {what}: choose from what "
-                f"'labrig rig check' shows, or turn its dial to {dial}"
+                f"asked the camera for {requested}, it does not offer this {missing}: choose from "
+                f"what 'labrig rig check' shows, or turn its dial to {dial}"
             )
         # a dial at B leaves no shutter time to be set
         codes = {} if self._dial_is_at_b else {Property.shutter_time: shutter}
         codes[Property.iso] = iso
-        if wanted.f_number is not None:
-            aperture = aperture_code(wanted.f_number, self._aperture_codes())
+        if requested.f_number is not None:
+            aperture = aperture_code(requested.f_number, self._aperture_codes())
             if aperture is None:
                 offered = [f"f/{F_NUMBERS[c]:g}" for c in self._aperture_codes()]
                 raise DeviceError(
-                    f"asked the camera for {wanted}, "
+                    f"asked the camera for {requested}, "
                     + (
                         f"its lens offers {', '.join(offered)}: choose one of these"
                         if offered
@@ -208,13 +209,13 @@ class EosExposure:
             )
 
 
-def _words(prop: Property) -> str:
+def _name_of(prop: Property) -> str:
     return prop.name.replace("_", " ")
 
 
 def _unusable(prop: Property, value: int | None) -> DeviceError:
-    said = "nothing" if value is None else value_text(prop, number(value))
+    reported = "nothing" if value is None else value_text(prop, number(value))
     return DeviceError(
-        f"expected a {_words(prop)} that can be reduced, the camera says {said}: "
+        f"expected a {_name_of(prop)} that can be reduced, the camera says {reported}: "
         "turn its dial to M, neither bulb nor automatic ISO"
     )

@@ -51,7 +51,7 @@ class NativeIsos:
 
 def isos_of_model(model: str) -> NativeIsos:
     """Return whole stops from ISO 100 to the model's highest native one, or to an assumed one."""
-    known = model in _HIGHEST
+    is_listed = model in _HIGHEST
     highest = _HIGHEST.get(model, ASSUMED_HIGHEST)
     values = tuple(iso for iso in WHOLE_STOPS if iso <= highest)
-    return NativeIsos(values, "model" if known else "assumed")
+    return NativeIsos(values, "model" if is_listed else "assumed")

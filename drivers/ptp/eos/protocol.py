@@ -73,11 +73,11 @@ HOST_ROOM = (0x0FFFFFFF, 0x1000, 1)
 FEW_SHOTS = 100
 
 
-def lacking_operations(known: Collection[int]) -> list[str]:
+def lacking_operations(operations: Collection[int]) -> list[str]:
     """Return the operations that a camera lacks for being released by labrig."""
-    lacking = [f"0x{op:X}" for op in _NEEDED if op not in known]
-    two_stages = Eos.RemoteReleaseOn in known and Eos.RemoteReleaseOff in known
-    if not two_stages and Eos.RemoteRelease not in known:
+    lacking = [f"0x{op:X}" for op in _NEEDED if op not in operations]
+    two_stages = Eos.RemoteReleaseOn in operations and Eos.RemoteReleaseOff in operations
+    if not two_stages and Eos.RemoteRelease not in operations:
         lacking.append("0x9128 with 0x9129, or 0x910F")
     return lacking
 

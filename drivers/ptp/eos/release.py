@@ -82,8 +82,8 @@ class Held:
         DeviceError
             The stage may still be down.
         """
-        before = self._stage
-        if before is Stage.UP:
+        previous = self._stage
+        if previous is Stage.UP:
             return None
         self._stage = Stage.UNKNOWN
         reply = None
@@ -91,10 +91,10 @@ class Held:
             reply = self._session.transact(*self._let_go, timeouts=Timeouts(FOCUS_S, busy_s))
         except RefusedError as refusal:
             if refusal.code == DEVICE_BUSY:
-                self._stage = before
+                self._stage = previous
                 raise
             # a camera may refuse to let go of what is not down: refused twice, it is not
-            if before is Stage.DOWN:
+            if previous is Stage.DOWN:
                 raise
         self._stage = Stage.UP
         return reply

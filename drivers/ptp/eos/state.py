@@ -132,11 +132,11 @@ class EosState:
             if self._clock.now() >= deadline_s:
                 if self._says(prop, value):
                     return  # it took it, and reports nothing that it had before
-                said = self._values.get(prop)
+                reported = self._values.get(prop)
                 raise DeviceError(
                     f"asked the camera for {prop.name.replace('_', ' ')} (0x{prop:X}) = "
                     f"{value_text(prop, value)}, it says "
-                    f"{'nothing' if said is None else value_text(prop, said)}: "
+                    f"{'nothing' if reported is None else value_text(prop, reported)}: "
                     "turn its dial to M, leave its menus, and try again"
                 )
             self._clock.sleep(POLL_PERIOD_S)
@@ -160,5 +160,5 @@ class EosState:
 
     def _says(self, prop: Property, value: bytes) -> bool:
         """Return whether the camera reports a value; models differ in the zeros after it."""
-        said = self._values.get(prop)
-        return said is not None and said.rstrip(b"\0") == value.rstrip(b"\0")
+        reported = self._values.get(prop)
+        return reported is not None and reported.rstrip(b"\0") == value.rstrip(b"\0")

@@ -40,7 +40,7 @@ class PacketStream:
         self._socket = connected
         self._name = name
         self._received = bytearray()
-        self._gone: str | None = None
+        self._loss: str | None = None
 
     def fileno(self) -> int:
         """Return the socket's file descriptor, for `select`."""
@@ -63,7 +63,7 @@ class PacketStream:
         try:
             self._socket.sendall(packets)
         except OSError as failure:
-            self._gone = str(failure)  # half a packet may be out: nothing can follow it
+            self._loss = str(failure)  # half a packet may be out: nothing can follow it
             self.check(doing)
 
     def take_in(self) -> None:
@@ -71,10 +71,10 @@ class PacketStream:
         try:
             received = self._socket.recv(BLOCK_BYTES)
         except OSError as failure:
-            self._gone = str(failure)
+            self._loss = str(failure)
             return
         if not received:
-            self._gone = "it has hung up"
+            self._loss = "it has hung up"
         self._received += received
 
     def check(self, doing: str) -> None:
@@ -85,9 +85,9 @@ class PacketStream:
         UnpluggedError
             The camera is gone.
         """
-        if self._gone is not None:
+        if self._loss is not None:
             raise UnpluggedError(
-                f"{self._name}: {doing}: it is gone ({self._gone}): {LOOK_AT_NETWORK}"
+                f"{self._name}: {doing}: it is gone ({self._loss}): {LOOK_AT_NETWORK}"
             )
 
     def next_packet(self, at_most_bytes: int) -> Packet | None:
@@ -229,8 +229,8 @@ class IpLink:
         self._streams[1].write(packet, doing)
         is_over = False
         while not is_over:
-            left_s = deadline_s - self._clock.now()
-            answer = self._next(doing, max(0.0, left_s), _MOST_PACKET_BYTES)
+            remaining_s = deadline_s - self._clock.now()
+            answer = self._next(doing, max(0.0, remaining_s), _MOST_PACKET_BYTES)
             if answer.kind == PacketKind.OPERATION_RESPONSE:
                 is_over = packets.response(answer).transaction_id == transaction_id
 
@@ -275,8 +275,8 @@ class IpLink:
         packet = self._wait_for_packet(stream, doing, INTRODUCTION_TIMEOUT_S, _SHORT_PACKET_BYTES)
         if packet.kind == PacketKind.INIT_FAIL:
             (reason,) = packet.fields("I")
-            said = _REFUSALS.get(reason, "switch it off and on")
-            raise DeviceError(f"{self._name}: {doing}: refused with reason {reason}: {said}")
+            remedy = _REFUSALS.get(reason, "switch it off and on")
+            raise DeviceError(f"{self._name}: {doing}: refused with reason {reason}: {remedy}")
         if packet.kind != expected:
             raise self._out_of_order(doing, expected.name, packet)
         return packet
@@ -290,15 +290,15 @@ class IpLink:
         return self._wait_for_packet(self._command(doing), doing, timeout_s, at_most_bytes)
 
     def _wait_for_packet(
-        self, wanted: PacketStream, doing: str, timeout_s: float, at_most_bytes: int
+        self, awaited: PacketStream, doing: str, timeout_s: float, at_most_bytes: int
     ) -> Packet:
         deadline_s = self._clock.now() + timeout_s
-        while (packet := wanted.next_packet(at_most_bytes)) is None:
+        while (packet := awaited.next_packet(at_most_bytes)) is None:
             for stream in self._streams[1:]:
-                if stream is not wanted:
+                if stream is not awaited:
                     self._look_at_events(stream, doing)
             if not self._take_in(doing, deadline_s):
-                only = f", only {shown(wanted.beginning)}" if wanted.beginning else ""
+                only = f", only {shown(awaited.beginning)}" if awaited.beginning else ""
                 raise NoAnswerError(
                     f"{self._name}: {doing}: no answer within {timeout_s:g} s{only}: "
                     f"{LOOK_AT_NETWORK}"
@@ -309,11 +309,11 @@ class IpLink:
         """Receive bytes on either connection; return False if none come until then."""
         for stream in self._streams:
             stream.check(doing)
-        left_s = deadline_s - self._clock.now()
-        readable, _, _ = select.select(self._streams, [], [], max(0.0, left_s))
+        remaining_s = deadline_s - self._clock.now()
+        readable, _, _ = select.select(self._streams, [], [], max(0.0, remaining_s))
         for stream in readable:
             stream.take_in()
-        return left_s > 0 and bool(readable)
+        return remaining_s > 0 and bool(readable)
 
     def _look_at_events(self, stream: PacketStream, doing: str) -> None:
         while (packet := stream.next_packet(_SHORT_PACKET_BYTES)) is not None:

@@ -150,8 +150,8 @@ def _needs(properties: StandardProperties) -> Iterator[Finding]:
         if described is None:
             untold.append(need.fine)
         elif described.value != need.value:
-            said = f"{need.prop} = 0x{described.value:X}"
-            yield Finding(need.severity, f"{need.spoils} ({said})", need.remedy)
+            reported = f"{need.prop} = 0x{described.value:X}"
+            yield Finding(need.severity, f"{need.spoils} ({reported})", need.remedy)
         else:
             yield Finding("fine", need.fine)
     if untold:

@@ -70,14 +70,14 @@ class StandardExposure:
                 "or correct the rig file"
             )
         return CameraOffers(
-            exposures_s=tuple(sorted(each / UNITS_PER_S for each in units)),
+            exposures_s=tuple(sorted(choice / UNITS_PER_S for choice in units)),
             isos=tuple(sorted(isos)),
             f_numbers=tuple(sorted(self._f_number_choices(self._aperture()))),
             overhead_s=self._settings.frame_time,
             frame_bytes=round(self._settings.frame_size),
         )
 
-    def apply(self, wanted: ExposureSettings) -> None:
+    def apply(self, requested: ExposureSettings) -> None:
         """Set what is not in force already, read back.
 
         Raises
@@ -85,24 +85,24 @@ class StandardExposure:
         DeviceError
             The camera does not offer a setting or did not take it.
         """
-        if not wanted.exposure_s > 0:
+        if not requested.exposure_s > 0:
             raise DeviceError(
-                f"expected a shutter time longer than 0 s, asked for {wanted.exposure_s} s: "
+                f"expected a shutter time longer than 0 s, asked for {requested.exposure_s} s: "
                 "correct the protocol"
             )
         shutter, iso, aperture = self._shutter(), self._iso(), self._aperture()
-        units = _nearest(wanted.exposure_s * UNITS_PER_S, self._shutter_choices(shutter))
-        if units is None or wanted.iso not in self._iso_choices(iso):
-            what = "shutter time" if units is None else "ISO"
+        units = _nearest(requested.exposure_s * UNITS_PER_S, self._shutter_choices(shutter))
+        if units is None or requested.iso not in self._iso_choices(iso):
+            missing = "shutter time" if units is None else "ISO"
             raise DeviceError(
-                f"asked the camera for {wanted}, it does not offer this {what}: choose from what "
-                "'labrig rig check' shows, or set it to manual exposure"
+                f"asked the camera for {requested}, it does not offer this {missing}: choose from "
+                "what 'labrig rig check' shows, or set it to manual exposure"
             )
-        self._set(StandardProperty.exposure_time, shutter, units, wanted)
+        self._set(StandardProperty.exposure_time, shutter, units, requested)
         if iso is not None:
-            self._set(StandardProperty.exposure_index, iso, wanted.iso, wanted)
-        if wanted.f_number is not None:
-            self._set_aperture(aperture, wanted.f_number, wanted)
+            self._set(StandardProperty.exposure_index, iso, requested.iso, requested)
+        if requested.f_number is not None:
+            self._set_aperture(aperture, requested.f_number, requested)
 
     def in_force(self) -> ExposureSettings:
         """Return the settings that the camera reports.
@@ -170,13 +170,13 @@ class StandardExposure:
         return [number for number in numbers if number is not None]
 
     def _set_aperture(
-        self, aperture: PropertyDescription | None, f_number: float, wanted: ExposureSettings
+        self, aperture: PropertyDescription | None, f_number: float, requested: ExposureSettings
     ) -> None:
         offered = self._f_number_choices(aperture)
-        near = [number for number in offered if abs(number / f_number - 1) < SAME_F_NUMBER]
-        if aperture is None or not near:
+        matching = [number for number in offered if abs(number / f_number - 1) < SAME_F_NUMBER]
+        if aperture is None or not matching:
             raise DeviceError(
-                f"asked the camera for {wanted}, "
+                f"asked the camera for {requested}, "
                 + (
                     f"its lens offers {', '.join(f'f/{number:g}' for number in offered)}: choose "
                     "one of these"
@@ -185,20 +185,20 @@ class StandardExposure:
                     "f_number out"
                 )
             )
-        units = round(near[0] * F_NUMBER_UNITS)
-        self._set(StandardProperty.f_number, aperture, units, wanted)
+        units = round(matching[0] * F_NUMBER_UNITS)
+        self._set(StandardProperty.f_number, aperture, units, requested)
 
     def _set(
         self,
         prop: StandardProperty,
         described: PropertyDescription,
         value: int,
-        wanted: ExposureSettings,
+        requested: ExposureSettings,
     ) -> None:
-        said = self._properties.set(prop, described, value)
-        if said != value:
+        reported = self._properties.set(prop, described, value)
+        if reported != value:
             raise DeviceError(
-                f"asked the camera for {wanted}, its {prop} = {value}, it says {said}: "
+                f"asked the camera for {requested}, its {prop} = {value}, it says {reported}: "
                 "set it to manual exposure, leave its menus, and try again"
             )
 
@@ -210,6 +210,6 @@ def _f_number(units: int) -> float | None:
 
 def _nearest(units: float, among: Iterable[int]) -> int | None:
     """Return the shutter time that `units` stands for, as offered or as on a dial."""
-    off_stops = {each: abs(math.log2(each / units)) for each in among}
+    off_stops = {choice: abs(math.log2(choice / units)) for choice in among}
     nearest = min(off_stops, key=off_stops.__getitem__, default=None)
     return None if nearest is None or off_stops[nearest] > SAME_SHUTTER_STOPS else nearest

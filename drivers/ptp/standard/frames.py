@@ -54,8 +54,8 @@ class StandardFrames:
         self._clock = clock
         self._timeout_s = timeout_s
         part = Standard.GetPartialObject
-        known_part = part if part in info.operations else None
-        self._objects = ObjectTransfer(session, clock, Standard.GetObject, known_part)
+        partial_operation = part if part in info.operations else None
+        self._objects = ObjectTransfer(session, clock, Standard.GetObject, partial_operation)
         self._can_delete = Standard.DeleteObject in info.operations
         self._tells_end = StandardEvent.CaptureComplete in info.events
         self._due_after_s: float | None = None
@@ -132,8 +132,8 @@ class StandardFrames:
         """Return the frame that is due; None if there is none, only others, or no room for one."""
         latest_s = (self._due_after_s or self._clock.now()) + self._timeout_s
         deadline_s = latest_s
-        while not self._is_full and (left_s := deadline_s - self._clock.now()) > 0:
-            heard = self._listen(min(LISTEN_S, left_s))
+        while not self._is_full and (remaining_s := deadline_s - self._clock.now()) > 0:
+            heard = self._listen(min(LISTEN_S, remaining_s))
             for stored in self._added:
                 if stored.info.is_raw and not self._is_copy(stored.info):
                     return stored
@@ -145,8 +145,8 @@ class StandardFrames:
 
     def _listen_for_end(self) -> None:
         deadline_s = self._clock.now() + NEXT_FILE_S
-        while not self._is_ended and (left_s := deadline_s - self._clock.now()) > 0:
-            self._listen(min(LISTEN_S, left_s))
+        while not self._is_ended and (remaining_s := deadline_s - self._clock.now()) > 0:
+            self._listen(min(LISTEN_S, remaining_s))
         self._tells_end = self._is_ended
 
     def _listen(self, timeout_s: float) -> int | None:
@@ -172,7 +172,7 @@ class StandardFrames:
                 raise
             return  # it was deleted in the camera
         info = parse_object_info(reply.data)
-        is_new = handle not in {each.handle for each in self._added}
+        is_new = handle not in {stored.handle for stored in self._added}
         if is_new and info.object_format != FOLDER and self._is_ours(info):
             self._added.append(_Stored(handle, info))
 
@@ -203,7 +203,7 @@ class StandardFrames:
                 "format its card or put in a larger one"
             )
         if self._added:
-            delivered = ", ".join(str(each.info) for each in self._added)
+            delivered = ", ".join(str(stored.info) for stored in self._added)
             return DeviceError(
                 f"expected a RAW file from the camera, it took {delivered}: set its image quality "
                 "to RAW alone"

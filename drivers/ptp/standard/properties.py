@@ -39,7 +39,7 @@ class StandardProperties:
     ) -> None:
         self._session = session
         self._clock = clock
-        self._known = known
+        self._codes = known
         self._settle_s = settle_s
 
     def describe(self, prop: StandardProperty) -> PropertyDescription | None:
@@ -50,7 +50,7 @@ class StandardProperties:
         DeviceError
             The camera does not answer, or violates the protocol.
         """
-        if prop not in self._known:
+        if prop not in self._codes:
             return None
         try:
             data = self._session.transact(Standard.GetDevicePropDesc, prop).data
@@ -72,9 +72,9 @@ class StandardProperties:
             return value
         self._session.transact(Standard.SetDevicePropValue, prop, data=described.encode(value))
         deadline_s = self._clock.now() + self._settle_s
-        while (said := self._ask(prop, described)) != value and self._clock.now() < deadline_s:
+        while (reported := self._ask(prop, described)) != value and self._clock.now() < deadline_s:
             self._clock.sleep(POLL_PERIOD_S)
-        return said
+        return reported
 
     def _ask(self, prop: StandardProperty, described: PropertyDescription) -> int:
         return described.decode(self._session.transact(Standard.GetDevicePropValue, prop).data)

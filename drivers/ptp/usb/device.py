@@ -161,7 +161,7 @@ class UsbDevice:
         self._device = device
         self._address = address
         self._is_gone = False
-        with self._named("opening its PTP interface"):
+        with self._naming_errors("opening its PTP interface"):
             self._endpoints = claim_still_image(device, address)
 
     @property
@@ -176,23 +176,23 @@ class UsbDevice:
 
     def write(self, data: bytes, doing: str) -> int:
         """Send one transfer; return the number of bytes that the device took."""
-        with self._named(doing):
+        with self._naming_errors(doing):
             return int(self._device.write(self._endpoints.bulk_out, data, _ms(WRITE_TIMEOUT_S)))
 
     def read(self, most_bytes: int, timeout_s: float, doing: str) -> bytes:
         """Return one transfer, of whole packets but the last."""
-        with self._named(f"{doing} within {timeout_s:g} s"):
+        with self._naming_errors(f"{doing} within {timeout_s:g} s"):
             return bytes(self._device.read(self._endpoints.bulk_in, most_bytes, _ms(timeout_s)))
 
     def read_event_packet(self, timeout_s: float, doing: str) -> bytes:
         """Return one packet of an event: a longer read would wait for more after a full one."""
         size = self._endpoints.event_packet_bytes
-        with self._named(doing):
+        with self._naming_errors(doing):
             return bytes(self._device.read(self._endpoints.interrupt_in, size, _ms(timeout_s)))
 
     def request(self, request: int, data: bytes, doing: str) -> None:
         """Send a class request with data."""
-        with self._named(doing):
+        with self._naming_errors(doing):
             self._device.ctrl_transfer(
                 HOST_TO_INTERFACE,
                 request,
@@ -204,7 +204,7 @@ class UsbDevice:
 
     def ask(self, request: int, doing: str) -> bytes:
         """Send a class request and return its answer."""
-        with self._named(doing):
+        with self._naming_errors(doing):
             return bytes(
                 self._device.ctrl_transfer(
                     INTERFACE_TO_HOST,
@@ -218,13 +218,13 @@ class UsbDevice:
 
     def clear_bulk_halts(self) -> None:
         """Let both bulk endpoints go on after a stall."""
-        with self._named("clearing a halted endpoint"):
+        with self._naming_errors("clearing a halted endpoint"):
             for endpoint in (self._endpoints.bulk_in, self._endpoints.bulk_out):
                 self._device.clear_halt(endpoint)
 
     def clear_event_halt(self) -> None:
         """Let the interrupt endpoint go on after a stall."""
-        with self._named("clearing a halted endpoint"):
+        with self._naming_errors("clearing a halted endpoint"):
             self._device.clear_halt(self._endpoints.interrupt_in)
 
     def close(self) -> None:
@@ -233,7 +233,7 @@ class UsbDevice:
             usb.util.dispose_resources(self._device)
 
     @contextmanager
-    def _named(self, doing: str) -> Iterator[None]:
+    def _naming_errors(self, doing: str) -> Iterator[None]:
         """Name pyusb's failed call in its error; a camera that is gone stays so."""
         context = f"camera {self._address}: {doing}"
         if self._is_gone:

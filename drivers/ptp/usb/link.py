@@ -133,9 +133,9 @@ class UsbLink:
             )
         deadline_s = self._clock.now() + timeout_s
         event, is_silent = None, True
-        while event is None and (left_s := deadline_s - self._clock.now()) > 0:
+        while event is None and (remaining_s := deadline_s - self._clock.now()) > 0:
             try:
-                packet = self._device.read_event_packet(left_s, doing)
+                packet = self._device.read_event_packet(remaining_s, doing)
             except NoAnswerError:
                 break
             except StallError:
@@ -180,16 +180,16 @@ class UsbLink:
     def _write(self, data: bytes, doing: str) -> None:
         """Send one container; an empty packet ends it if nothing shorter does."""
         try:
-            sent = self._device.write(data, doing)
-            if sent == len(data) and len(data) % self._device.packet_bytes == 0:
+            sent_bytes = self._device.write(data, doing)
+            if sent_bytes == len(data) and len(data) % self._device.packet_bytes == 0:
                 self._device.write(b"", doing)
         except StallError:
             self._clear_halts()
             raise
-        if sent != len(data):
+        if sent_bytes != len(data):
             raise DeviceError(
-                f"{self._name}: {doing}: it took {sent} of {len(data)} bytes of {shown(data)}: "
-                "unplug it and plug it in again"
+                f"{self._name}: {doing}: it took {sent_bytes} of {len(data)} bytes of {shown(data)}"
+                ": unplug it and plug it in again"
             )
 
     def _read(self, doing: str, timeout_s: float, at_most_bytes: int) -> bytes:

@@ -71,10 +71,10 @@ class Connection:
         try:
             while self._outgoing:
                 head = self._outgoing[0]
-                sent = self._socket.send(head)
-                self._head_is_cut = sent < len(head)
+                sent_bytes = self._socket.send(head)
+                self._head_is_cut = sent_bytes < len(head)
                 if self._head_is_cut:
-                    self._outgoing[0] = head[sent:]
+                    self._outgoing[0] = head[sent_bytes:]
                 else:
                     self._outgoing.popleft()
         except BlockingIOError:

@@ -102,8 +102,8 @@ def parameters(payload: bytes) -> tuple[int, ...]:
     MalformedPacketError
         There are more parameters, or incomplete ones.
     """
-    count, rest = divmod(len(payload), 4)
-    if rest or count > _MAX_PARAMETERS:
+    count, remainder = divmod(len(payload), 4)
+    if remainder or count > _MAX_PARAMETERS:
         raise MalformedPacketError
     return struct.unpack(f"<{count}I", payload)
 

@@ -217,9 +217,9 @@ class PtpIpServer:
             self._strangers.remove(connection)
         elif self._host and connection in (self._host.command, self._host.event):
             used, self._host = (self._host.command, self._host.event), None
-            for other in used:
-                if other is not None:
-                    other.close()
+            for used_connection in used:
+                if used_connection is not None:
+                    used_connection.close()
             self._responder.disconnect()
 
 

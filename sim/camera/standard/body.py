@@ -138,10 +138,10 @@ class StandardBody:
     def _file(self, exposure: Exposure, exposure_s: float) -> None:
         """Keep the photograph, and report it when it is there."""
         properties = self.properties
-        taken = (self._sensor, exposure.start_s, exposure_s, properties.iso, properties.f_number)
+        exposed = (self._sensor, exposure.start_s, exposure_s, properties.iso, properties.f_number)
         files: dict[ObjectFormat, Photograph] = {
-            ObjectFormat.DNG: Photograph(*taken),
-            ObjectFormat.JPEG: _Developed(*taken),
+            ObjectFormat.DNG: Photograph(*exposed),
+            ObjectFormat.JPEG: _Developed(*exposed),
         }
         ready_s = exposure.end_s + READOUT_S
         if self._habits.end_reported == "before":

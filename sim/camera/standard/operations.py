@@ -73,13 +73,13 @@ class StandardOperations:
         return self._body.take_event()
 
     def _prop_desc(self, code: int) -> Response:
-        return _told(self._body.properties.description(code))
+        return _data_response(self._body.properties.description(code))
 
     def _prop_value(self, code: int) -> Response:
-        return _told(self._body.properties.value(code))
+        return _data_response(self._body.properties.value(code))
 
 
-def _told(data: bytes | None) -> Response:
+def _data_response(data: bytes | None) -> Response:
     if data is None:
         return Response(ResponseCode.DEVICE_PROP_NOT_SUPPORTED)
     return Response(ResponseCode.OK, data=data)

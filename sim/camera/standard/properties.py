@@ -84,7 +84,7 @@ class StandardProperties:
         focus = _AUTOFOCUS if settings.autofocus else _MANUAL_FOCUS
         iso = AUTO_ISO if settings.iso == "auto" else settings.iso
         first_time = min(shutter_times, key=lambda units: abs(units - UNITS_PER_S / 60))
-        self._all: dict[int, _Property] = {
+        self._properties: dict[int, _Property] = {
             code.BATTERY_LEVEL: _Property("B", 100),
             code.COMPRESSION_SETTING: _Property("B", _RAW),
             code.F_NUMBER: _Property("H", 560, F_NUMBERS),
@@ -101,50 +101,50 @@ class StandardProperties:
     @property
     def known(self) -> tuple[int, ...]:
         """Codes of the existing properties."""
-        return tuple(self._all)
+        return tuple(self._properties)
 
     @property
     def exposure_s(self) -> float:
         """Actual shutter time in seconds."""
-        return self._shutter_times[self._all[StandardProperty.EXPOSURE_TIME].value]
+        return self._shutter_times[self._properties[StandardProperty.EXPOSURE_TIME].value]
 
     @property
     def iso(self) -> int:
         """Sensitivity; if it is automatic, the camera's choice."""
-        iso = self._all[StandardProperty.EXPOSURE_INDEX].value
+        iso = self._properties[StandardProperty.EXPOSURE_INDEX].value
         return codes.AUTO_AT_M if iso == AUTO_ISO else iso
 
     @property
     def f_number(self) -> float:
         """Actual relative aperture."""
-        return codes.true_f_number(self._all[StandardProperty.F_NUMBER].value / 100)
+        return codes.true_f_number(self._properties[StandardProperty.F_NUMBER].value / 100)
 
     @property
     def delay_s(self) -> float:
         """Delay of the self-timer in seconds."""
-        return self._all[StandardProperty.CAPTURE_DELAY].value / 1000
+        return self._properties[StandardProperty.CAPTURE_DELAY].value / 1000
 
     def description(self, code: int) -> bytes | None:
         """Return the DevicePropDesc dataset of a property."""
-        found = self._all.get(code)
-        return None if found is None else found.describe(code)
+        prop = self._properties.get(code)
+        return None if prop is None else prop.describe(code)
 
     def value(self, code: int) -> bytes | None:
         """Return the bytes of a property's value."""
-        found = self._all.get(code)
-        return None if found is None else found.pack(found.value)
+        prop = self._properties.get(code)
+        return None if prop is None else prop.pack(prop.value)
 
     def set(self, code: int, data: bytes) -> ResponseCode:
         """Change a property on behalf of the host."""
-        found = self._all.get(code)
-        if found is None:
+        prop = self._properties.get(code)
+        if prop is None:
             return ResponseCode.DEVICE_PROP_NOT_SUPPORTED
-        if not found.choices:
+        if not prop.choices:
             return ResponseCode.ACCESS_DENIED
-        if len(data) != struct.calcsize(found.letter):
+        if len(data) != struct.calcsize(prop.letter):
             return ResponseCode.INVALID_DEVICE_PROP_FORMAT
         value = int.from_bytes(data, "little")
-        if value not in found.choices:
+        if value not in prop.choices:
             return ResponseCode.INVALID_DEVICE_PROP_VALUE
-        found.value = value
+        prop.value = value
         return ResponseCode.OK

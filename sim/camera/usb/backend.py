@@ -191,10 +191,10 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         """Answer string descriptors and the class requests; anything else stalls, for this once."""
         self._use(dev_handle)
         if bmRequestType == _TO_INTERFACE:
-            sent = data.tobytes()
+            content = data.tobytes()
             self._cable.carry(0)
-            self._function.request_out(bRequest, sent)
-            return len(sent)
+            self._function.request_out(bRequest, content)
+            return len(content)
         if bmRequestType == _FROM_INTERFACE:
             answer = self._function.request_in(bRequest)
         elif (bmRequestType, bRequest, wValue >> 8) == _GET_STRING:

@@ -37,8 +37,8 @@ class Container:
 
     def parameters(self) -> tuple[int, ...]:
         """The payload read as at most five parameters."""
-        count, rest = divmod(len(self.payload), 4)
-        if rest or count > _MAX_PARAMETERS:
+        count, remainder = divmod(len(self.payload), 4)
+        if remainder or count > _MAX_PARAMETERS:
             raise MalformedContainerError
         return struct.unpack(f"<{count}I", self.payload)
 
