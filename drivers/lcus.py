@@ -17,9 +17,9 @@ from .serial_line import LATEST_ANSWER_S, SerialLine
 
 BAUDRATE = 9600
 QUERY = b"\xff"
-#: The board does not pause for so long inside an answer.
+#: Pause that ends an answer of the board.
 QUIET_S = 0.05
-#: Until the last bit of a command has left at 9600 baud: ten bits a byte.
+#: Time of a command at 9600 baud: ten bits a byte.
 COMMAND_S = 4 * 10 / BAUDRATE
 MOST_RELAYS = 8
 _LINE = re.compile(rb"CH(\d+): *(ON|OFF) *\r\n")

@@ -11,14 +11,14 @@ from labrig.acquire import SerialPort
 from labrig.clock import Clock
 from labrig.errors import DeviceLostError, UnclearAnswerError
 
-#: How often the line is looked at; USB serial adapters deliver once a millisecond at best.
+#: Interval of polling; USB serial adapters deliver once a millisecond at best.
 POLL_S = 0.002
 #: Answers come at once; through a slow hub or into a busy PC some are a tenth of a second late.
 #: Whoever wants to be sure that nothing is on its way any more waits for longer than that.
 LATEST_ANSWER_S = 0.25
-#: A line that is not quiet by then never will be.
+#: Time within which a line becomes quiet, if ever.
 DRAIN_S = 1.0
-#: How often it is looked whether it is.
+#: Interval of polling while draining.
 DRAIN_POLL_S = 0.01
 
 
@@ -86,7 +86,7 @@ class SerialLine:
         received = b""
         while self._clock.now() - quiet_since_s < quiet_s and self._clock.now() < deadline_s:
             if self._waiting():
-                received += self._read_one()
+                received += self._read_byte()
                 quiet_since_s = self._clock.now()
             else:
                 self._clock.sleep(DRAIN_POLL_S)
@@ -104,7 +104,7 @@ class SerialLine:
         deadline_s = self._clock.now() + timeout_s
         received = b""
         while not is_all(received):
-            byte = self._read_one()
+            byte = self._read_byte()
             received += byte
             if self._clock.now() >= deadline_s and not is_all(received):
                 raise UnclearAnswerError(
@@ -115,7 +115,7 @@ class SerialLine:
                 self._clock.sleep(POLL_S)
         return received
 
-    def _read_one(self) -> bytes:
+    def _read_byte(self) -> bytes:
         try:
             return self._port.read(1) if self._port.in_waiting else b""
         except (serial.SerialException, OSError) as error:

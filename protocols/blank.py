@@ -37,9 +37,9 @@ BLANK = ManualStep(
     "what the sequence shows without a glow is measured",
     "blank",
 )
-#: What the frames of the sequence are for.
+#: Role of the frames of the sequence.
 BLANK_FRAMES = "blank"
-#: The first frame of a sequence without a door.
+#: Begin of the first frame of a sequence without a door.
 EARLIEST_S = 0.1
 
 

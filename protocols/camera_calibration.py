@@ -41,7 +41,7 @@ class CardFrames(StrEnum):
     FLAT = "flat"
 
 
-#: The unit whose bracket tells the deviation from linearity.
+#: Name of the unit whose bracket shows the deviation from linearity.
 LINEARITY = "linearity"
 
 #: Fractions of the range that the lit card fills: the reference exposure of brackets, flats,
@@ -53,7 +53,7 @@ LEAST, MOST = 0.012, 0.7
 PHOTON_FRACTIONS = (0.03, 0.75)
 #: … of the linearity, into saturation.
 LINEARITY_FRACTIONS = (0.015, 2.0)
-#: After so many exposures of a bracket comes its reference again.
+#: Number of exposures of a bracket between two of its reference.
 REFERENCE_EVERY = 3
 DARKS_EACH = 4
 FLATS = 4

@@ -23,7 +23,7 @@ from .steps.patch_names import FilterPatches
 from .steps.sample_pose import check_visible, lights_out
 from .steps.scenes import Arranged, Arrangement, LampKind, PutBackUnit
 
-#: The units' names end with the lamp.
+#: Begin of the units' names, which end with the lamp.
 _AFTER = "spectrum-"
 
 
@@ -45,7 +45,7 @@ Time = Annotated[DurationS, Field(gt=0)]
 WHITE_EXPOSURES_S = (1 / 1024, 1 / 256, 1 / 64, 1 / 16, 1 / 4)
 WHITES_PER_EXPOSURE = 2
 
-#: Why a person arranges what.
+#: Reasons for the arrangements.
 THROUGH_IT = "the glow is photographed through it"
 OTHER_LAMP = "the glow is to have the same colour whatever lamp charged it"
 WHITE = "it tells what the camera's curves are off by"

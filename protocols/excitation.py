@@ -62,7 +62,7 @@ class UnitKind(StrEnum):
         return unit.rpartition("-")[0] == self
 
 
-#: Each pause between two frames is longer than the one before by this factor.
+#: Factor by which each pause between two frames is longer than the one before.
 PAUSES_GROW = 1.25
 #: Places along each patch, for metering and for choosing charge times.
 PLACES = 12
@@ -326,7 +326,7 @@ class DarkUnit(ExcitationUnit):
 
 
 @dataclass(frozen=True)
-class _Meter(ExcitationUnit):
+class _MeterUnit(ExcitationUnit):
     """A charge whose glow determines the exposures."""
 
     def _meter(self, session: Session, unit: str, hand: ManualStep, charge_s: float) -> None:
@@ -349,7 +349,7 @@ class _Meter(ExcitationUnit):
 
 
 @dataclass(frozen=True)
-class StripMeter(_Meter):
+class StripMeter(_MeterUnit):
     """Metering charge through the variable filter."""
 
     name: str = "strip-meter"
@@ -360,7 +360,7 @@ class StripMeter(_Meter):
 
 
 @dataclass(frozen=True)
-class DirectMeter(_Meter):
+class DirectMeter(_MeterUnit):
     """Metering charge without the filter."""
 
     name: str = "direct-meter"
@@ -371,14 +371,14 @@ class DirectMeter(_Meter):
         self._meter(session, self.name, LVF_AWAY, self.protocol.direct[0])
 
 
-#: Frames of a charge are made for it to glow at most this much brighter than the one looked at.
+#: Largest expected ratio of the glow to that of the reference charge, for exposures.
 HEADROOM = 2.0
-#: A growing exposure saves counts late in a decay.
+#: Largest ratio of a shutter time to the first one, which keeps counts late in a decay.
 EXPOSURES_GROW = 16.0
 
 
 @dataclass(frozen=True)
-class _Charged(ExcitationUnit):
+class _ChargeUnit(ExcitationUnit):
     """One charge and the decay after it."""
 
     def _charge(self, session: Session, role: str, charge_s: float, lasting_s: float) -> None:
@@ -453,7 +453,7 @@ def _lamp_on_s(session: Session, unit: str) -> float:
 
 
 @dataclass(frozen=True)
-class DoublingUnit(_Charged):
+class DoublingUnit(_ChargeUnit):
     """Charge through the filter, twice as long as the last, unless the glow has stopped growing."""
 
     number: int
@@ -480,7 +480,7 @@ class DoublingUnit(_Charged):
 
 
 @dataclass(frozen=True)
-class RefiningUnit(_Charged):
+class RefiningUnit(_ChargeUnit):
     """Charge through the filter, of the most informative duration."""
 
     number: int
@@ -507,7 +507,7 @@ class RefiningUnit(_Charged):
 
 
 @dataclass(frozen=True)
-class DirectUnit(_Charged):
+class DirectUnit(_ChargeUnit):
     """Charge by the lamp itself; after the last one, a longer decay."""
 
     number: int

@@ -44,7 +44,7 @@ class LampFrames(StrEnum):
     WARMING = "warming"
 
 
-#: What is photographed after a switch.
+#: Roles of frames after a switch.
 SWITCHED = LampFrames.FADE, LampFrames.RISE
 
 LVF = ManualStep(
@@ -52,9 +52,9 @@ LVF = ManualStep(
     "lvf before camera",
 )  # fmt: skip
 LVF_AWAY = ManualStep("take the variable filter away", "it is not needed any more", "lvf away")
-#: No lamp fades more slowly than to 1/e in this: photographs of the fade clip at no delay.
+#: Slowest fade of a lamp to 1/e, with which photographs clip at no delay.
 SLOWEST_S = 0.09
-#: A filament is steady, or cold, after this.
+#: Time after which a filament is steady, or cold.
 STEADY_S = 4.0
 #: How long a lamp's housing cools before it is watched, when from switching on it is photographed,
 #: how often each time, and how far apart: the last per cents of light come with the housing.

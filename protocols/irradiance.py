@@ -29,7 +29,7 @@ class CardFrames(StrEnum):
 
 Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
-#: Of Table 1 of the paper.
+#: Edges of the bands of Table 1 of the paper.
 BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
 _DIRECT = Arrangement("grey card")
 _THROUGH = Arrangement("grey card", "on sample")

@@ -80,14 +80,14 @@ class Isotropy(GlowSettings):
     def units(self) -> Sequence[Unit]:
         """Return darks, metering, and every angle between two straight views."""
         units: list[Unit] = [DarkUnit(self), MeterUnit(self, self.charge)]
-        stands = 0
+        previous = 0
         for name, angle in [
             ("before", 0),
             *((str(degrees), degrees) for degrees in self.angles),
             ("after", 0),
         ]:
-            units.append(AngleUnit(self, f"angle-{name}", angle, stands))
-            stands = angle
+            units.append(AngleUnit(self, f"angle-{name}", angle, previous))
+            previous = angle
         return units
 
 

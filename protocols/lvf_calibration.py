@@ -47,7 +47,7 @@ class LvfFrames(StrEnum):
     STRIPES = "lvf-stripes"
 
 
-#: What the unit without a colour filter is called by.
+#: Name of the unit without a colour filter.
 NO_FILTER = "none"
 #: Shutter times of the stripes' photographs, as fractions of the longest.
 STRIPES_LADDER = (1 / 512, 1 / 64, 1 / 8, 1)
@@ -160,7 +160,7 @@ _CARD = Arrangement("grey card")
 _ON_SAMPLE = Arrangement("grey card", "on sample")
 _BEFORE_CAMERA = Arrangement("grey card", "before camera")
 
-#: Why a scene is arranged, by the role of its frames.
+#: Reason for a scene's arrangement, by the role of its frames.
 _WHY: dict[str, str] = {
     LvfFrames.CARD: "how bright the card is at every place by itself",
     LvfFrames.STRIP_ON_SAMPLE: "where the filter's strip falls on the sample",
@@ -169,7 +169,7 @@ _WHY: dict[str, str] = {
     LvfFrames.LINES_ON_SAMPLE: "mercury lines tell the wavelength of every place on the sample",
     LvfFrames.STRIPES: "the stripes glow where the camera will see the sample",
 }
-#: Kind and name of a unit, role of its frames, what lies where, and the kind's own keys.
+#: Kind and name of a unit, role of its frames, arrangement, and the kind's own keys.
 _Scene = tuple[type[SceneUnit], str, str, Arrangement, dict[str, Any]]
 
 

@@ -31,8 +31,8 @@ class Phosphor(ProtocolModel):
         fractions of the frame, one above the other, each as long as the filter. Their results lie
         in folders of these names. Default: one material.
     parts
-        Protocols of the chain in order, each written as in a file of its own. `part: NAME` tells
-        two of one protocol apart.
+        Protocols of the chain in order, each written as in a file of its own. `part: NAME` is a
+        name for one of two parts with the same protocol.
     """
 
     rate_frames = (*ProtocolModel.rate_frames, *ExcitationFrames)

@@ -40,12 +40,12 @@ class Light(StrEnum):
 
 Charge = Annotated[DurationS, Field(gt=0)]
 
-#: What depends on what a person does here.
+#: Reason for the manual steps.
 WHY = "saturation in level shows only between two irradiances"
 
 
 class WeakerLight(BaseModel):
-    """How the light is weakened by hand: by a neutral filter or by a distance.
+    """Weakening of the light by hand: by a neutral filter or by a distance.
 
     Attributes
     ----------

@@ -89,7 +89,7 @@ class ServoBoardSettings(Part):
 
 
 class StripSettings(Part):
-    """Where the camera finds the LVF, or what it has let through to the sample.
+    """Place in the frame of the LVF's strip, or of the light that it passes to the sample.
 
     Attributes
     ----------

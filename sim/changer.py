@@ -11,9 +11,9 @@ from .faults import given
 from .filters import Filters
 from .simulation import Simulation
 
-#: As far as a sample can be turned away from the camera.
+#: Largest angle of a sample against the camera's axis.
 MOST_TILT_DEG = 85
-#: As near as a lamp can be moved.
+#: Least distance of a lamp from the sample.
 LEAST_LAMP_M = 0.2
 
 

@@ -29,13 +29,13 @@ class RoomClock(VirtualClock):
     def spend(self, duration_s: float) -> None:
         """Spend time as a virtual clock does, prolonged by sleep."""
         super().spend(duration_s)
-        self._sleep_if_tired()
+        self._sleep_if_due()
 
     def _pause_until(self, deadline_s: float) -> None:
         super()._pause_until(min(deadline_s, self._naps[0].at) if self._naps else deadline_s)
-        self._sleep_if_tired()
+        self._sleep_if_due()
 
-    def _sleep_if_tired(self) -> None:
+    def _sleep_if_due(self) -> None:
         while self._naps and self._naps[0].at <= self._now_s:
             lasting_s = self._naps.pop(0).lasting
             self._now_s += lasting_s

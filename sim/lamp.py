@@ -38,7 +38,7 @@ RADIATION_EXPONENT = 5
 #: Cold tungsten conducts better and draws an inrush current: P = U²/R, R growing as this power.
 RESISTANCE_EXPONENT = 1.2
 
-#: This long after a switch the filament has settled to the last digits.
+#: Time after a switch until the filament has settled to the last digits.
 SETTLED_S = 3.0
 
 #: Cells of the wavelength grid: 380–780 nm; borders of Table 1's bands are borders of cells.
@@ -79,7 +79,7 @@ def filament_spectrum(temperature_k: float | FloatArray) -> FloatArray:
     return planck
 
 
-#: Of the burning lamp.
+#: Spectrum of the burning lamp.
 BURNING_SPECTRUM: FloatArray = filament_spectrum(BURNING_K)
 
 

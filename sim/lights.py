@@ -18,7 +18,7 @@ from .lamp import BURNING_K, PANEL_FADING_S, WAVELENGTH_NM, Lamp, filament_spect
 from .lamps import FilteredLamps
 
 FloatArray = NDArray[np.float64]
-#: Part of a light at a time.
+#: Function of time: fraction of a light.
 UnitFraction = Callable[[float], float]
 
 #: The room light's irradiance at the sample over the warm lamp's.

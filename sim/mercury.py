@@ -23,7 +23,7 @@ LINES = (
     (579.0670, 0.09),
     (690.7500, 0.006),
 )
-#: Of the strongest line, over what the warm halogen lamp gives in 1 nm at 560 nm.
+#: Light of the strongest line over the warm halogen lamp's in 1 nm at 560 nm.
 STRONGEST = 40.0
 #: Continuum in 1 nm over the strongest line.
 CONTINUUM = 1e-4

@@ -31,7 +31,7 @@ RELAYS = 8
 LCUS_RELAYS = 4
 #: Analogue input of the Numato board that has the thermometer.
 TEMPERATURE_INPUT = 0
-#: Its stream of random numbers, of nothing else in the room.
+#: Stream of random numbers of the thermometer alone.
 TEMPERATURE_STREAM = 9
 
 

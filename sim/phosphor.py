@@ -31,7 +31,7 @@ ATOL = 1e-13
 STAGES = 8
 #: The next step is not shorter than the last by more than this factor, nor longer.
 SHORTER, LONGER = 0.1, 10.0
-#: An error that is none.
+#: Least error, to avoid division by zero.
 TINY = 1e-30
 
 #: Level of a fully charged state of which neither excitation rates nor a charge are known.
@@ -142,12 +142,12 @@ class Phosphor:
                 raise ArithmeticError(f"the rate equations cannot be integrated at {start_s} s")
             spans = np.array([[start_s, end_s], [start_s, middle_s], [middle_s, end_s]])
             full_step, first_half, second_half = self._steps(spans, shining, visible)
-            coarse, fine = full_step(state), second_half(first_half(state))
-            error = np.max(np.abs(coarse - fine) / (ATOL + RTOL * np.abs(fine)))
+            coarse, refined = full_step(state), second_half(first_half(state))
+            error = np.max(np.abs(coarse - refined) / (ATOL + RTOL * np.abs(refined)))
             factor = 0.9 * max(error, TINY) ** (-1 / (2 * STAGES + 1))
             step_s = (end_s - start_s) * min(max(factor, SHORTER), LONGER)
             if error <= 1:
-                start_s, state = end_s, fine
+                start_s, state = end_s, refined
         return state
 
     def _steps(

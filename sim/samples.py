@@ -73,25 +73,23 @@ class Samples:
         self._below_lvf: dict[bool, Phosphor] = {}
         # Where they have been followed to, by time. The past cannot change, so they stay true; a
         # photograph that is looked at late starts from the last one before it.
-        self._known_s = [0.0]
-        self._known_levels = [
-            np.full_like(self._patches.k_r_per_s, simulation.initial.concentration)
-        ]
+        self._times_s = [0.0]
+        self._levels = [np.full_like(self._patches.k_r_per_s, simulation.initial.concentration)]
 
     def freshen(self, now_s: float, lights: Lights, arrangements: Arrangements) -> None:
         """Replace the samples by others of the same materials, long in the dark."""
         self.level_at(now_s, lights, arrangements)
-        self._known_s.append(now_s)
-        self._known_levels.append(np.zeros_like(self._patches.k_r_per_s))
+        self._times_s.append(now_s)
+        self._levels.append(np.zeros_like(self._patches.k_r_per_s))
 
     def level_at(self, time_s: float, lights: Lights, arrangements: Arrangements) -> FloatArray:
         """Return the concentrations of all states at a time, for `evolve` and `of_cells`."""
-        last = bisect_right(self._known_s, time_s) - 1
-        level = self._known_levels[last]
-        for begin_s, stop_s, arrangement in arrangements.spans(self._known_s[last], time_s):
+        last = bisect_right(self._times_s, time_s) - 1
+        level = self._levels[last]
+        for begin_s, stop_s, arrangement in arrangements.spans(self._times_s[last], time_s):
             level, _ = self.evolve(level, begin_s, stop_s, arrangement, lights)
-        self._known_s.insert(last + 1, time_s)
-        self._known_levels.insert(last + 1, level)
+        self._times_s.insert(last + 1, time_s)
+        self._levels.insert(last + 1, level)
         return level
 
     def evolve(

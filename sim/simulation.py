@@ -28,7 +28,7 @@ from .boards.lcus import Answers
 from .camera import BodySettings
 from .faults import Fault, given
 
-#: Where one sample lies when no region is given.
+#: Place of a single sample without a region.
 MIDDLE: Region = (0.1, 0.1, 0.8, 0.8)
 
 #: A level below 1: only infinite light would reach 1 itself.

@@ -15,13 +15,13 @@ from .sensor import AMBIENT_C
 TRAP_K = 0.65 / 8.617333e-5
 ZERO_C_K = 273.15
 
-#: What a TMP36 gives: 0.75 V at 25 °C and 10 mV for a degree more.
+#: Voltage of a TMP36: 0.75 V at 25 °C and 10 mV for a degree more.
 VOLTS_AT_25, VOLTS_PER_K = 0.75, 0.01
-#: One is off by so much, 1 σ in K, and always alike.
+#: Constant error of a sensor, 1 σ in K.
 SENSOR_SIGMA_K = 0.3
-#: Of each conversion, 1 σ: the sensor's own, the supply's and the converter's.
+#: Noise of each conversion, 1 σ: the sensor's own, the supply's and the converter's.
 NOISE_V = 0.004
-#: What an input shows from which the sensor's wire has come off.
+#: Voltage of an input from which the sensor's wire has come off.
 OPEN_V = 5.0
 
 

@@ -17,11 +17,11 @@ from .process import require_gphoto2
 from .release import Release, release_of
 from .settings import Gphoto2CameraSettings
 
-#: Canon and Nikon alone have it; with others the live view ends with the next frame.
+#: Setting that ends the live view, on Canon and Nikon only; elsewhere it ends with the next frame.
 VIEWFINDER = "viewfinder"
-#: Busy at the full press is common; a frame later than so much belongs to no decay.
+#: Time for which a busy full press is repeated; a frame any later belongs to no decay.
 LATE_PRESS_S = 3.0
-#: So often a release of which nobody knows whether it happened; what comes of it is passed over.
+#: Number of uncertain releases that are repeated; their frames, if any, are passed over.
 _UNSURE_TRIES = 3
 
 

@@ -7,10 +7,10 @@ from labrig.errors import DeviceError
 
 from .library import AT_ONCE_S, Library
 
-#: Somebody who asks to stop meanwhile is heard after this.
+#: Interval at which a request to stop is noticed.
 LISTEN_S = 0.2
 _JPEG = b"\xff\xd8\xff"
-#: What libgphoto2 calls every format of a Canon that it does not know, even a RAW file in TIFF.
+#: Suffix that libgphoto2 gives to unknown formats of a Canon, even a RAW file in TIFF.
 _UNKNOWN = ".jpg"
 _TIFF = (b"II*\0", b"MM\0*")
 

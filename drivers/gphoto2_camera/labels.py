@@ -10,13 +10,13 @@ import math
 import re
 from collections.abc import Collection, Iterable, Mapping
 
-#: In thirds of a stop a label is at most so far off the true time.
+#: Largest deviation of a label in thirds of a stop from the actual time.
 LABEL_STOPS = 0.12
-#: A time is asked for by its label or by its true value.
+#: Tolerance of a requested time, which is nominal or actual.
 SAME_SHUTTER_STOPS = 0.05
 #: Neighbouring aperture labels differ by 6 % or more.
 SAME_F_NUMBER = 0.02
-#: Longer times are no dial's but a timer's, in true seconds.
+#: Longest time on a dial; longer ones are a timer's, in actual seconds.
 LONGEST_ON_DIAL_S = 30.0
 #: Steps of a stop.
 _THIRDS, _HALVES = 3, 2

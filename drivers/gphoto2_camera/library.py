@@ -14,11 +14,11 @@ CONNECT_S = 30.0
 USUAL_S = 25.0
 #: A slow lens keeps a 5D Mark II from answering for 8 s (libgphoto2).
 RELEASE_S = 12.0
-#: Whoever wants the safe state does not wait longer for what was under way.
+#: Longest wait for a pending request before the safe state.
 SETTLE_S = 3.0
-#: Between two tries of what the camera is not ready for.
+#: Interval between two attempts while the camera is not ready.
 POLL_PERIOD_S = 0.01
-#: So short that nothing but what is there already is found.
+#: Time in which only waiting events are reported.
 AT_ONCE_S = 0.02
 
 

@@ -7,10 +7,10 @@ from labrig.errors import DeviceError
 from .labels import is_raw_alone
 from .library import Library
 
-#: Names differ by make.
+#: Names of settings, which differ by make.
 FORMAT = ("imageformat", "imagequality")
 TARGET = ("capturetarget",)
-#: For how many frames there is room, on the card or the PC.
+#: Number of frames for which there is room, on the card or the PC.
 ROOM = "availableshots"
 DRIVE = ("drivemode", "capturemode")
 #: libgphoto2's own switch, whether it has a Nikon focus before each frame.

@@ -21,7 +21,7 @@ from labrig.errors import DeviceLostError, UsageError
 from .failures import failure
 
 HELPER = Path(__file__).with_name("helper.py")
-#: A process that has been told to end does so within.
+#: Time within which a process ends on command.
 END_S = 5.0
 
 

@@ -8,7 +8,7 @@ from labrig.errors import UsageError
 from .failures import BusyError, PerhapsReleasedError
 from .library import POLL_PERIOD_S, RELEASE_S, Library, Span
 
-#: Canon EOS alone have it.
+#: Setting of the release button, on Canon EOS only.
 BUTTON = "eosremoterelease"
 #: Half and full press that leave the lens alone; older versions of libgphoto2 have the others.
 _PRESSES = (("Press Half MF", "Press Full MF"), ("Press Half", "Press Full"))

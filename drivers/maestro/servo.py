@@ -19,7 +19,7 @@ from ..serial_line import SerialLine
 
 CONTROL_CENTER = "the Maestro Control Center"
 
-#: What each bit means and what to do, from bit 0 on.
+#: Meaning and remedy of each bit, from bit 0 on.
 ERRORS = (
     ("a byte came damaged", "check its wiring and baud rate, or use its USB port"),
     ("bytes came faster than it took them", "end whatever else writes to this port"),
@@ -54,10 +54,10 @@ def told(bits: int) -> str:
 #: The USB port ignores it; a Maestro's own default where it is wired to a UART adapter.
 BAUDRATE = 9600
 ANSWER_TIMEOUT_S = 0.5
-#: In this time a new pulse is sent at the latest: five servo frames.
+#: Time within which a new pulse is sent: five servo frames.
 READ_BACK_S = 0.1
 LOOK_AGAIN_S = 0.005
-#: Beyond the time that the whole way takes.
+#: Time added to that of the whole way.
 SLACK_S = 1.0
 
 SET_TARGET, SET_SPEED, SET_ACCELERATION = 0x84, 0x87, 0x89
@@ -65,7 +65,7 @@ GET_POSITION, GET_MOVING, GET_ERRORS = 0x90, 0x93, 0xA1
 POLOLU_PROTOCOL = 0xAA
 QUARTER_US = 0.25e-6
 
-#: What a Maestro can send: 64 µs to 4080 µs.
+#: Length of a Maestro's pulse: 64 µs to 4080 µs.
 PulseS = Annotated[DurationS, Field(ge=64e-6, le=4080e-6)]
 
 

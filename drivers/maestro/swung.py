@@ -20,7 +20,7 @@ class Swung:
         Connections that open the port.
     """
 
-    #: What it is called.
+    #: Name of the device in messages.
     what: ClassVar[str]
 
     @staticmethod

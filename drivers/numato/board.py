@@ -14,7 +14,7 @@ from ..serial_line import SerialLine
 #: USB CDC ignores it; Numato's own samples use this one.
 BAUDRATE = 19200
 ANSWER_TIMEOUT_S = 1.0
-#: How relays and inputs are counted in commands.
+#: Characters of relays and inputs in commands.
 CHANNELS = "0123456789ABCDEFGHIJKLMNOPQRSTUV"
 
 

@@ -53,7 +53,7 @@ class NumatoLedBank:
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._relays = settings.relays
         self._board = Board(address, connections)
-        #: Those not read back as off since they were last lit: of one just connected, all.
+        #: LEDs not read back as off since they were last lit; after connecting, all.
         self._may_be_lit = set(self._relays)
 
     @classmethod

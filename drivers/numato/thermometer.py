@@ -17,9 +17,9 @@ from labrig.errors import DeviceError, DeviceLostError
 from .board import CHANNELS, Board
 
 CONVERSIONS = 32
-#: A board that is slow gives fewer.
+#: Time after which a slow board gives fewer conversions.
 CONVERTING_S = 1.0
-#: Of a dark room with people and lamps in it; a sensor of another kind, or wired wrongly, is out.
+#: Plausible temperatures of a dark room; a sensor of another kind, or wired wrongly, is out.
 PLAUSIBLE_C = (0.0, 60.0)
 
 Volts = Annotated[float, Field(gt=0, allow_inf_nan=False)]

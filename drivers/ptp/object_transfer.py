@@ -8,7 +8,7 @@ from labrig.errors import DeviceError
 from .session import Session, Timeouts
 
 PIECE_BYTES = 1024 * 1024
-#: Some times the largest RAW file there is: what announces more is damaged.
+#: Longest file, several times the largest RAW file; a longer announcement is damaged.
 MOST_FILE_BYTES = 512 * 1024 * 1024
 #: A camera that still develops or writes is busy for seconds.
 PATIENT = Timeouts(answer_s=10.0, busy_s=10.0)

@@ -47,9 +47,9 @@ class Timeouts:
     busy_s: float
 
 
-#: For what a camera does at once.
+#: Time-outs of an operation that takes no time.
 USUAL = Timeouts(answer_s=5.0, busy_s=3.0)
-#: For taking leave: nothing waits for it.
+#: Time-outs of closing: nothing waits for it.
 CURT = Timeouts(answer_s=2.0, busy_s=0.0)
 
 

@@ -53,14 +53,14 @@ class PtpCameraSettings(BaseModel):
 
     @field_validator("isos")
     @classmethod
-    def _known_isos(cls, isos: tuple[int, ...]) -> tuple[int, ...]:
+    def _canon_isos(cls, isos: tuple[int, ...]) -> tuple[int, ...]:
         if unknown := sorted(set(isos) - set(ISOS.values())):
             raise ValueError(f"expected ISO values of a Canon dial, such as 100, got {unknown}")
         return tuple(sorted(set(isos)))
 
     @field_validator("f_numbers")
     @classmethod
-    def _known_f_numbers(cls, f_numbers: tuple[float, ...]) -> tuple[float, ...]:
+    def _canon_f_numbers(cls, f_numbers: tuple[float, ...]) -> tuple[float, ...]:
         if unknown := sorted(set(f_numbers) - set(F_NUMBERS.values())):
             raise ValueError(f"expected f-numbers of a Canon lens, such as 5.6, got {unknown}")
         return tuple(sorted(set(f_numbers)))

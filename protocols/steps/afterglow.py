@@ -18,25 +18,25 @@ from .metering import MeteringFrame
 
 FloatArray = npt.NDArray[np.float64]
 
-#: A glow is seen when it is so many standard uncertainties and so many counts above darkness.
+#: Limits of detection of a glow above darkness, in standard uncertainties and in counts.
 SEEN_SIGMA = 5.0
 SEEN_DN = 1.0
-#: In so many seconds every phosphor that was just charged fades by more than two per cent.
+#: Time in which every phosphor that was just charged fades by more than two per cent.
 LEAST_S = 10.0
 FADED = 0.02
-#: And by so much between two looks `LOOK_AGAIN_S` apart, that are taken in doubt.
+#: Fading between two checks `LOOK_AGAIN_S` apart, which are made in doubt.
 FADED_IN_DOUBT = 0.05
 LOOK_AGAIN_S = 60.0
-#: Noise of the two levels compared, above which nothing can be said.
+#: Largest noise of two levels that can be compared.
 MOST_NOISE = 0.01
-#: So many shutter times at the begin of the metering's ladder are too short for any glow to clip.
+#: Number of shutter times at the begin of the ladder that are too short for a glow to clip.
 SHORT = 3
 #: A glow that stays level in the second half of a decay at more than this fraction of its first
 #: frame may be another light.
 LINGERING = 0.2
-#: Flicker and noise do not make a second frame brighter than the first by so much.
+#: Increase from the first to the second frame that flicker and noise do not cause.
 RISEN = 0.1
-#: A glow below this fraction of what it was before was not charged like that.
+#: Fraction of the earlier glow below which the sample was not charged like before.
 WEAK = 0.5
 
 

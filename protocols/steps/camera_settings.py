@@ -26,7 +26,7 @@ def frame_times_s(first_s: float, every_s: float, until_s: float) -> list[float]
 
 #: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.
 DARKS_PER_EXPOSURE = 4
-#: Left free between a frame and the next deadline: setting the camera, half-pressing it.
+#: Time between a frame and the next deadline for setting the camera and half-pressing it.
 MARGIN_S = 0.5
 
 

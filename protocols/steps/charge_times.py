@@ -13,9 +13,9 @@ from labrig.fit import least_squares
 
 FloatArray = NDArray[np.float64]
 
-#: Places of a patch whose glow is chosen by: the brightest, where noise does not decide.
+#: Number of a patch's places that decide: the brightest, where noise does not matter.
 BRIGHTEST = 6
-#: Charge times that are weighed against each other.
+#: Number of charge times that are compared.
 CANDIDATES = 33
 
 

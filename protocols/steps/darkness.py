@@ -14,14 +14,14 @@ from .metering import MeteringFrame
 
 FloatArray = npt.NDArray[np.float64]
 
-#: No camera's black level is off by more, as a fraction of the range between black and white.
+#: Largest error of a camera's black level, as a fraction of the range from black to white.
 BLACK_ERROR = 0.005
 #: No sensor makes more in the dark, per second at ISO 100, as a fraction of the range: 10 electrons
 #: of some 60 000. A 5D Mark II comes to that at 50 °C.
 DARK_CURRENT_PER_S = 2e-4
-#: From this fraction of the range on it is no leak or last glow that a dark frame takes care of.
+#: Fraction of the range from which light is too bright to be subtracted by dark frames.
 BRIGHT = 0.25
-#: A glow is known by fading by so much along the dark frames; shutters flicker by a third of it.
+#: Fading of a glow along the dark frames; shutters flicker by a third of it.
 FADED = 0.03
 
 

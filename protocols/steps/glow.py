@@ -23,7 +23,7 @@ from .sanity_checks import SanityChecks
 
 #: Shutter times of a metering's first frames, as fractions of the longest.
 LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
-#: Of the further ones, along the decay.
+#: Shutter times of the further frames, along the decay, as fractions of the longest.
 LATER = (1 / 16, 1)
 
 
@@ -128,12 +128,12 @@ def metered_schedule(session: Session, protocol: GlowSettings, metering: str) ->
     return session.choose("exposure", decide, protocol.brightest_schedule(offers))
 
 
-#: How often the sample is looked at, and for how long at most.
+#: Interval of checks of the sample, and longest rest.
 CHECK_EVERY_S = 180.0
 AT_MOST_S = 3600.0
-#: A light that fades by less between two looks does not fade.
+#: Least fading between two checks of a light that fades.
 FADES = 0.05
-#: Less light than this fraction of the range is none.
+#: Fraction of the range below which there is no light.
 LEAST = 5e-4
 
 

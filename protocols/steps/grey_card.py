@@ -31,9 +31,9 @@ GREY_CARD = ManualStep(
 
 #: Shutter times of the metering: one of them is right whatever the lamp.
 METERED_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1.0)
-#: A lamp that was on before needs no warming up, one without a warm-up time at least this.
+#: Least warm-up time of a lamp that was off.
 SETTLES_S = 5.0
-#: What a plan assumes: a card so dim that exposures are long.
+#: Brightness of the card that a plan assumes: so dim that exposures are long.
 DIM_PER_S = 0.5
 
 

@@ -20,10 +20,10 @@ FloatArray = npt.NDArray[np.float64]
 #: Fraction of the range between black and white that the brightest frame may fill. The rest is room
 #: for a longer charge, the lamp's drift and the shutter's flicker.
 TARGET = 0.4
-#: A glow is seen when its mean is this many standard uncertainties and at least this many counts.
+#: Limits of detection of a glow's mean, in standard uncertainties and in counts.
 SEEN_SIGMA = 5.0
 SEEN_DN = 2.0
-#: Below this fraction of the range the longest exposure still leaves a picture that is all noise.
+#: Fraction of the range below which the longest exposure is dominated by noise.
 DIM = 0.002
 
 

@@ -9,10 +9,10 @@ from pydantic import AfterValidator, BeforeValidator
 
 from labrig.region import Region
 
-#: What some system takes for a path, a device or a pattern, or does not take at all.
+#: Characters of paths, devices or patterns, or refused ones, on some system.
 _FORBIDDEN = './\\:*?"<>|'
 _LONGEST = 60
-#: In a result beside the patches, and what Windows takes for devices.
+#: Names of other folders of a result, and Windows' names of devices.
 _TAKEN = re.compile(r"figures|con|prn|aux|nul|(?:com|lpt)\d")
 
 

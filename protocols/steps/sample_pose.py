@@ -21,9 +21,9 @@ from labrig.acquire import (
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
 
-#: Until a halogen lamp is dark (Nalbach et al., section 4.6); a shield is faster.
+#: Time until a halogen lamp is dark (Nalbach et al., section 4.6); a shield is faster.
 LAMP_DARK_S = 0.32
-#: A servo takes a new pulse over with its next frame, and a door rings a little.
+#: Time for the servo's next frame and the ringing of the door.
 SETTLES_S = 0.1
 
 

@@ -26,9 +26,9 @@ from .afterglow import (
 from .darkness import DARK, Darkness, darkness, levels
 from .metering import FrameCache, MeteringFrame
 
-#: A lamp has gone dark by then; a halogen lamp takes a third of it.
+#: Time by which a lamp has gone dark; a halogen lamp takes a third of it.
 LAMP_GONE_S = 1.0
-#: Frames that begin so late are told of; a PC's own tails are shorter.
+#: Delay of a frame from which there is a warning; a PC's own delays are shorter.
 LATE_S = 0.1
 
 

@@ -175,11 +175,11 @@ class PutBackUnit:
         Arrangement().set_up(session, arrangement, "the next measurement finds the bench as usual")
 
 
-#: Shutter times to look with, as fractions of the longest.
+#: Shutter times of metering, as fractions of the longest.
 LADDER = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
-#: A look that fills so much of the range is the last: its noise does not matter any more.
+#: Fraction of the range that ends metering: noise does not matter there.
 ENOUGH = 0.05
-#: The second exposure of a bracket, for the dim parts, in which bright ones clip.
+#: Ratio of a bracket's second exposure to the first, for dim parts; bright ones clip in it.
 LONGER = 8.0
 
 

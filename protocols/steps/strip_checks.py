@@ -9,9 +9,9 @@ from labrig.optics import Strip
 from labrig.reduce import Exposure, find_strip, read_hdr_frame, strip_profile
 from labrig.results import StripProfile
 
-#: Scenes are alike if this fraction of the strip, in per cent, agrees to that; two gels do not.
+#: Percentage of the strip that agrees within this limit in like scenes; two gels do not.
 NEARLY_ALL, ALIKE = 90, 0.02
-#: Dimmer than this fraction of the brightest, a place along the strip says nothing of that.
+#: Fraction of the brightest place below which a place along the strip is not compared.
 BRIGHT = 0.05
 
 

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Literal
 
-#: What a board says to the query FF: nothing, lines of text, or a byte a relay.
+#: Answer of a board to the query FF: nothing, lines of text, or a byte for each relay.
 Answers = Literal["nothing", "text", "bytes"]
 
 START, QUERY = 0xA0, 0xFF

@@ -12,7 +12,7 @@ from labrig.clock import VirtualClock
 CHANNELS = 24
 DEVICE_NUMBER = 12
 QUARTER_US = 0.25e-6
-#: What every channel can be set to; 0 for no pulses.
+#: Pulses to which every channel can be set; 0 for no pulses.
 RANGE_S = (500e-6, 2500e-6)
 #: Units of the limits: 0.25 µs per 10 ms, and that per 80 ms.
 SPEED_S = 0.01

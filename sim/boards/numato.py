@@ -3,7 +3,7 @@
 from collections.abc import Callable, Mapping
 
 CHANNELS = "0123456789ABCDEFGHIJKLMNOPQRSTUV"
-#: The converter's largest number, and what it stands for: the supply from the USB port.
+#: The converter's largest number, and its voltage: the supply from the USB port.
 FULL, SUPPLY_V = 1023, 5.0
 #: Analogue inputs; one with nothing on it floats up.
 INPUTS = 4

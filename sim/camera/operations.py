@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 from .vocabulary import Operation
 
-#: Obeyed by the responder itself, for every camera.
+#: Operations of the responder itself, for every camera.
 SESSION_OPERATIONS = (
     Operation.GET_DEVICE_INFO,
     Operation.OPEN_SESSION,

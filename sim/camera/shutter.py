@@ -13,13 +13,13 @@ from enum import IntFlag
 
 from labrig.clock import Clock
 
-#: Autofocus on something that it can see.
+#: Time of autofocus on a visible object.
 FOCUS_S = 0.1
-#: Light metering, which even a lens on manual focus waits for.
+#: Time of light metering, for which even a lens on manual focus waits.
 METERING_S = 0.02
-#: Mirror down, sensor read out, file made.
+#: Time until the mirror is down, the sensor read out and the file written.
 READOUT_S = 0.2
-#: Second curtain after the end of a bulb exposure was asked for.
+#: Time until the second curtain closes after the command to end a bulb exposure.
 BULB_CLOSE_S = 0.01
 
 

@@ -12,7 +12,7 @@ from ..session import Reply, Session, Timeouts
 from .protocol import Eos
 from .release import FOCUS_S, LATE_PRESS_S, Held, Release, TwoStageRelease
 
-#: While the shutter is open nothing matters more than to be heard: busy for so long is asked again.
+#: Time for which a busy camera is asked again to close its shutter.
 CLOSING_S = 30.0
 _GENERAL_ERROR = 0x2002
 #: BulbStart may answer OK and hide a response code in its first parameter (libgphoto2).

@@ -18,7 +18,7 @@ _STEP = {0: Fraction(0), 3: Fraction(1, 3), 4: Fraction(1, 2), 5: Fraction(2, 3)
 _TV_ZERO = 0x38
 #: 32 s ("30") and 1/8192 s ("1/8000").
 LONGEST_TV, SHORTEST_TV = 0x10, 0xA0
-#: The shutter stays open until it is told to close.
+#: Code of bulb: the shutter stays open until the command to close.
 BULB_TV = 0x0C
 #: Longer times than the dial's begin here, and double.
 SHORTEST_BULB_S = 64.0

@@ -11,7 +11,7 @@ values as ExifTool's CanonCustom Functions2, which finds the same block in CR2 f
 import struct
 from enum import IntEnum
 
-#: More than any camera has sent (364 bytes, a 5DS): what announces more is something else.
+#: Longest block, more than any camera has sent (364 bytes, a 5DS).
 MOST_BYTES = 4096
 
 

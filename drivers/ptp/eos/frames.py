@@ -14,7 +14,7 @@ from .transfer import EosTransfer
 
 _SUFFIX = re.compile(r"\.[a-z0-9]{1,5}")
 _JPEG_FORMAT = 0x3801
-#: So long after its end the frame of an exposure that a dead program began may still be offered.
+#: Time after which a frame of a dead program's exposure is no longer offered.
 LEFT_OVER_S = 2.0
 
 

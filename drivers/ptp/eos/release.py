@@ -12,7 +12,7 @@ from .protocol import Eos
 HALF, FULL = 1, 2
 #: A slow lens keeps a 5D Mark II from answering for 8 s (libgphoto2).
 FOCUS_S = 12.0
-#: Busy at the full press is common; a frame later than so much belongs to no decay.
+#: Time for which a busy full press is repeated; a frame any later belongs to no decay.
 LATE_PRESS_S = 3.0
 
 _RESULTS = {
@@ -29,7 +29,7 @@ class Stage(Enum):
     """Position of a stage that can be held, as far as is known."""
 
     UP = auto()
-    #: A command was sent, and not answered with OK.
+    #: State after a command that was not answered with OK.
     UNKNOWN = auto()
     DOWN = auto()
 

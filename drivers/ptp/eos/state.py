@@ -13,9 +13,9 @@ from .events import ChoicesChanged, Event, ObjectOffered, ValueChanged, parse_ev
 from .protocol import Eos, Property, property_dataset, value_text
 
 POLL_PERIOD_S = 0.03
-#: A camera lists itself in a few answers; more than so many in a row is a babbling one.
+#: Largest number of answers in a row; a camera lists its state in a few.
 MOST_ANSWERS = 64
-#: Many times what fits into a camera's memory for the PC.
+#: Largest number of frames, many times what fits into a camera's memory for the PC.
 MOST_OFFERED = 1000
 _KNOWN = frozenset(Property)
 

@@ -108,7 +108,7 @@ class PacketStream:
 #: IANA's port for PTP/IP.
 PORT = 15740
 NAME = "labrig"
-#: By which a camera knows this program again, once it was allowed in.
+#: GUID by which a camera recognises this program, once it was allowed in.
 GUID = b"labrig initiator"
 #: Some cameras ask their owner first.
 INTRODUCTION_TIMEOUT_S = 20.0
@@ -117,7 +117,7 @@ CANCEL_TIMEOUT_S = 5.0
 _AROUND_DATA_BYTES = 12
 #: Longer than any packet that carries no data: an introduction with its name.
 _SHORT_PACKET_BYTES = 1024
-#: While cancelling, data of any length may still be on its way.
+#: Longest packet while cancelling, when data of any length may still be on its way.
 _MOST_PACKET_BYTES = 256 * 1024 * 1024
 #: An EOS reports without end what nobody listens to, because it says it again when asked.
 _MOST_EVENTS_KEPT = 256
@@ -209,9 +209,9 @@ class IpLink:
         doing = "waiting for an event"
         deadline_s = self._clock.now() + timeout_s
         self._command(doing)
-        self._look_at_events(self._streams[1], doing)
+        self._poll_events(self._streams[1], doing)
         while not self._events and self._take_in(doing, deadline_s):
-            self._look_at_events(self._streams[1], doing)
+            self._poll_events(self._streams[1], doing)
         return packets.event(self._events.popleft()) if self._events else None
 
     def cancel(self, transaction_id: int) -> None:
@@ -296,7 +296,7 @@ class IpLink:
         while (packet := awaited.next_packet(at_most_bytes)) is None:
             for stream in self._streams[1:]:
                 if stream is not awaited:
-                    self._look_at_events(stream, doing)
+                    self._poll_events(stream, doing)
             if not self._take_in(doing, deadline_s):
                 only = f", only {shown(awaited.beginning)}" if awaited.beginning else ""
                 raise NoAnswerError(
@@ -315,7 +315,7 @@ class IpLink:
             stream.take_in()
         return remaining_s > 0 and bool(readable)
 
-    def _look_at_events(self, stream: PacketStream, doing: str) -> None:
+    def _poll_events(self, stream: PacketStream, doing: str) -> None:
         while (packet := stream.next_packet(_SHORT_PACKET_BYTES)) is not None:
             if packet.kind == PacketKind.PING:
                 stream.write(packets.encode(PacketKind.PONG), doing)

@@ -12,9 +12,9 @@ from ..failures import MalformedError
 
 HEADER_BYTES = 8
 VERSION = 0x00010000
-#: For `OperationRequest`: whether the PC sends data.
+#: Data phase of an `OperationRequest`: whether the PC sends data.
 NO_DATA_FROM_PC, DATA_FROM_PC = 1, 2
-#: A camera that does not know yet how long its data will be.
+#: Length of data that the camera does not know yet.
 UNKNOWN_LENGTH = 0xFFFFFFFFFFFFFFFF
 _GUID_BYTES = 16
 

@@ -17,9 +17,9 @@ from .exposure import StandardExposure
 from .frames import StandardFrames
 from .properties import StandardProperties
 
-#: A frame later than so much belongs to no decay.
+#: Longest delay of a frame of a decay.
 LATE_RELEASE_S = 3.0
-#: A lens that focuses keeps a camera from answering.
+#: Time for which a focusing lens keeps a camera from answering.
 FOCUS_S = 12.0
 #: An answer later than this and than the exposure's end comes when the shutter has closed.
 PROMPT_S = 0.25
@@ -205,7 +205,7 @@ class StandardCamera:
         except RefusedError:
             self._frames.expect_none()
             raise
-        return _begun_s(reply, exposure_s) + self._settings.shutter_lag
+        return _exposure_begin_s(reply, exposure_s) + self._settings.shutter_lag
 
     def _require_manual(self) -> None:
         program = self._properties.describe(StandardProperty.exposure_program)
@@ -216,7 +216,7 @@ class StandardCamera:
             )
 
 
-def _begun_s(reply: Reply, exposure_s: float) -> float:
+def _exposure_begin_s(reply: Reply, exposure_s: float) -> float:
     """Return the middle of the time in which an exposure can have begun.
 
     By the standard a camera answers when the exposure has begun; some answer when it is over.

@@ -15,18 +15,18 @@ from ..settings import PtpCameraSettings
 from .properties import StandardProperties
 from .property_description import PropertyDescription
 
-#: Of ExposureTime.
+#: Units of ExposureTime per second.
 UNITS_PER_S = 10_000
-#: Rounding is up to 2 % of so many units; shorter times are of no use for photometry.
+#: Fewest units, of which rounding is up to 2 %; shorter times are useless for photometry.
 FEWEST_UNITS = 25
-#: Of FNumber: hundredths.
+#: Units of FNumber: hundredths.
 F_NUMBER_UNITS = 100
-#: Of ExposureIndex; 0 is "undefined".
+#: Values of ExposureIndex; 0 is "undefined".
 AUTO_ISO, NO_ISO = 0xFFFF, 0
-#: Asked and offered are the same within so much: neighbours are 1/6 stop and 6 % apart.
+#: Tolerances of requested settings: neighbours are 1/6 stop and 6 % apart.
 SAME_SHUTTER_STOPS = 0.1
 SAME_F_NUMBER = 0.02
-#: Where a camera gives bounds only: thirds of a stop from 1/512 s to 1024 s.
+#: Shutter times where a camera gives bounds only: thirds of a stop from 1/512 s to 1024 s.
 _THIRDS_S = tuple(2.0 ** (third / 3) for third in range(-27, 31))
 
 

@@ -12,13 +12,13 @@ from ..object_transfer import PATIENT, ObjectTransfer
 from ..session import Session
 from .object_info import FOLDER, ObjectInfo, parse_object_info
 
-#: Between two looks for Ctrl-C.
+#: Interval between two checks for Ctrl-C.
 LISTEN_S = 0.1
-#: A camera that has said nothing for so long has nothing left to say.
+#: Time of silence after which a camera has nothing left to report.
 SILENCE_S = 0.1
-#: From one file of a capture to its next, and to CaptureComplete.
+#: Time from one file of a capture to its next, and to CaptureComplete.
 NEXT_FILE_S = 3.0
-#: More than one capture reports.
+#: Number of events, more than one capture reports.
 MOST_EVENTS = 64
 
 
@@ -157,14 +157,14 @@ class StandardFrames:
             return None
         match event.code:
             case StandardEvent.ObjectAdded if event.params:
-                self._look_at(event.params[0])
+                self._inspect(event.params[0])
             case StandardEvent.CaptureComplete:
                 self._is_ended = True
             case StandardEvent.StoreFull:
                 self._is_full = True
         return event.code
 
-    def _look_at(self, handle: int) -> None:
+    def _inspect(self, handle: int) -> None:
         try:
             reply = self._session.transact(Standard.GetObjectInfo, handle, timeouts=PATIENT)
         except RefusedError as refusal:

@@ -28,18 +28,18 @@ class StandardProperties:
         Session with the camera.
     clock
         Clock of the waiting for the camera.
-    known
+    codes
         Codes of the properties that the camera reports.
     settle_s
         Seconds within which the camera must have taken a setting.
     """
 
     def __init__(
-        self, session: Session, clock: Clock, known: Collection[int], settle_s: float
+        self, session: Session, clock: Clock, codes: Collection[int], settle_s: float
     ) -> None:
         self._session = session
         self._clock = clock
-        self._codes = known
+        self._codes = codes
         self._settle_s = settle_s
 
     def describe(self, prop: StandardProperty) -> PropertyDescription | None:

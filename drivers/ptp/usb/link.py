@@ -62,7 +62,7 @@ STATUS_BYTES = 4
 
 #: One read asks for at most this much; a whole number of packets at any speed.
 BLOCK_BYTES = 256 * 1024
-#: A camera that has been silent for so long has nothing left to say.
+#: Time of silence after which a camera has nothing left to send.
 SILENCE_S = 0.05
 READY_TIMEOUT_S = 3.0
 READY_PERIOD_S = 0.05

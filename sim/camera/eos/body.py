@@ -18,7 +18,7 @@ from .events import EventQueue, object_added, record, transfer_request
 from .properties import SELF_TIMER_S, Destination, Drive, PropertyBank
 from .viewfinder import Viewfinder
 
-#: From a new value of a property to the event that says so.
+#: Time from a new value of a property to its event.
 PROPERTY_DELAY_S = 0.03
 #: More free photographs than the camera can show.
 _MOST_SHOTS = 9999

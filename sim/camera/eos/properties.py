@@ -35,7 +35,7 @@ class Drive(IntEnum):
     SELF_TIMER_2_S = 0x11
 
 
-#: How long a drive mode waits after the button.
+#: Delay of a drive mode after the button.
 SELF_TIMER_S = {Drive.SINGLE: 0.0, Drive.SELF_TIMER_10_S: 10.0, Drive.SELF_TIMER_2_S: 2.0}
 
 
@@ -43,7 +43,7 @@ def _u32(*values: int) -> tuple[bytes, ...]:
     return tuple(struct.pack("<I", value) for value in values)
 
 
-#: What the host may set, and to what. Mirror lock-up can only be off.
+#: Properties that the host may set, and their choices. Mirror lock-up can only be off.
 _CHOICES: dict[EosProperty, tuple[bytes, ...]] = {
     EosProperty.AV: _u32(*codes.AV_CODES),
     EosProperty.TV: _u32(*codes.TV_CODES),

@@ -12,9 +12,9 @@ from labrig.clock import Clock
 
 from ..sensor import Sensor
 
-#: From the command until the first picture: mirror up, shutter open, sensor running.
+#: Time from the command to the first picture: mirror up, shutter open, sensor running.
 START_S = 0.4
-#: A live picture is read out so often.
+#: Interval of live pictures.
 PICTURE_S = 1 / 30
 #: EVF output to the PC; the camera's own display is 1.
 TO_PC = 2

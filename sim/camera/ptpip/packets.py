@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 _HEADER = struct.Struct("<II")
-#: No host sends this camera more than a name or a property; a greater length is one gone wrong.
+#: Longest packet from a host, a name or a property; a longer one is damaged.
 _MAX_FROM_HOST = 65536
 _MAX_PARAMETERS = 5
 #: A photograph goes out in pieces of this many bytes, so that a host can cancel between them.

@@ -19,10 +19,10 @@ from .connection import Connection
 from .packets import FailReason, MalformedPacketError, Packet, PacketType
 from .transactions import Transactions
 
-#: Nobody outside this PC may reach a simulated camera.
+#: Address of the server, which no other PC can reach.
 LOOPBACK = "127.0.0.1"
-#: Connections that have not said what they are for; the oldest makes way for a new one.
-_MOST_STRANGERS = 8
+#: Largest number of unidentified connections; the oldest is closed for a new one.
+_MOST_UNIDENTIFIED = 8
 _GUID = b"labrig simulated"
 _GUID_BYTES = 16
 #: Longer than the 39 letters of the standard, because libgphoto2 sends the PC's name as it is.
@@ -133,7 +133,7 @@ class PtpIpServer:
         except OSError:
             return  # it has hung up already
         self._strangers.append(Connection(accepted))
-        if len(self._strangers) > _MOST_STRANGERS:
+        if len(self._strangers) > _MOST_UNIDENTIFIED:
             self._hang_up(self._strangers[0])
 
     def _report_events(self, now_s: float) -> None:

@@ -15,7 +15,7 @@ from .packets import (
 
 _DATA_TO_CAMERA = 2
 _NO_DATA_OR_TO_HOST = 1
-#: What a host may announce that does not know the size of what it will send.
+#: Announced size of data whose size the host does not know.
 _UNKNOWN_SIZE = 0xFFFFFFFFFFFFFFFF
 _MAX_DATA = 65536
 
@@ -85,8 +85,8 @@ class Transactions:
         self._answering = None
 
     def _begin(self, packet: Packet) -> list[bytes]:
-        (direction, opcode, transaction_id), rest = packet.split("IHI")
-        params = parameters(rest)
+        (direction, opcode, transaction_id), remainder = packet.split("IHI")
+        params = parameters(remainder)
         if self._request is not None:
             raise MalformedPacketError
         if direction == _DATA_TO_CAMERA:

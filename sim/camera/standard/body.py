@@ -17,7 +17,7 @@ from ..shutter import FOCUS_S, METERING_S, READOUT_S, Exposure, Shutter, Stage
 from ..vocabulary import ObjectFormat, ResponseCode, StandardEvent
 from .properties import SHUTTER_TIMES, StandardProperties
 
-#: Between two files of a photograph, and before the report that it is over.
+#: Time between two files of a photograph, and before the report of its end.
 NEXT_FILE_S = 0.05
 _ANY = 0
 

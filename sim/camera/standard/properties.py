@@ -11,7 +11,7 @@ from .. import codes
 from ..body_settings import BodySettings
 from ..vocabulary import ResponseCode, StandardProperty
 
-#: Shutter times are told in 0.1 ms.
+#: Units of a reported shutter time per second: 0.1 ms.
 UNITS_PER_S = 10_000
 AUTO_ISO = 0xFFFF
 #: Manual, program, aperture and shutter priority; the standard has no bulb.

@@ -8,9 +8,9 @@ from ..faults import CameraFaults
 from ..power import AutoPowerOff
 from . import errors
 
-#: Host controller and scheduler, for every transfer however small (one high-speed microframe).
+#: Time of host controller and scheduler for every transfer (one high-speed microframe).
 TRANSACTION_S = 125e-6
-#: What a high-speed bulk pipe really carries.
+#: Actual rate of a high-speed bulk pipe.
 BYTES_PER_S = 35e6
 
 

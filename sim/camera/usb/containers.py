@@ -7,7 +7,7 @@ from typing import NoReturn
 
 _HEADER = struct.Struct("<IHHI")
 _MAX_PARAMETERS = 5
-#: Nobody sends this camera more than a property; a greater length is a header gone wrong.
+#: Longest container from the host, a property; a longer one is a damaged header.
 _MAX_FROM_HOST = 65536
 #: Bytes before the parameters or the payload.
 HEADER_SIZE = _HEADER.size
