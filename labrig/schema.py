@@ -57,7 +57,12 @@ def _rig() -> Any:
         if fitting:
             summary = inspect.cleandoc(role.does.__doc__ or "").splitlines()[0]
             roles[key] = (_one_of("driver", fitting), Field(None, description=summary))
-    devices = create_model("Devices", __config__={"extra": "forbid"}, **roles)
+    devices = create_model(
+        "Devices",
+        __config__={"extra": "forbid"},
+        __doc__="Devices of the bench by their roles.",
+        **roles,
+    )
     from labrig.sim import Simulation
 
     return create_model(

@@ -73,13 +73,13 @@ class Gphoto2Camera:
 
     def identity(self) -> str:
         """Return maker, model, serial number, firmware and driver of the camera."""
-        told = self._library.at_connect
-        maker, model = self._maker(), told("cameramodel") or "camera"
+        setting_at_connect = self._library.at_connect
+        maker, model = self._maker(), setting_at_connect("cameramodel") or "camera"
         is_named_twice = maker != "" and maker.split()[0] in model
         parts = [
             model if is_named_twice else f"{maker} {model}".strip(),
-            f"serial {told('serialnumber') or 'unknown'}",
-            f"firmware {told('deviceversion') or 'unknown'}",
+            f"serial {setting_at_connect('serialnumber') or 'unknown'}",
+            f"firmware {setting_at_connect('deviceversion') or 'unknown'}",
             f"released by libgphoto2 {self._version}, {self._release.words}",
         ]
         return ", ".join(parts)
