@@ -1,8 +1,8 @@
 """LCUS relay boards (LC Technology, CH340): four bytes a command, and never an acknowledgement.
 
-Boards with several relays answer the query FF, in text or in bytes, the first time often with what
-was true before; LCUS-1 says nothing at all. Sources: sellers' data sheets of LCUS-1 to LCUS-8
-and the public drivers of brzycki, AscomSwitchDriver and MultiRoomAudio.
+Boards with several relays answer the query FF, in text or in bytes, the first time often with the
+previous states; LCUS-1 never answers. Sources: sellers' data sheets of LCUS-1 to LCUS-8 and the
+public drivers of brzycki, AscomSwitchDriver and MultiRoomAudio.
 """
 
 import re
@@ -17,9 +17,9 @@ from .serial_line import LATEST_ANSWER_S, SerialLine
 
 BAUDRATE = 9600
 QUERY = b"\xff"
-#: The board does not pause for so long inside an answer.
+#: Pause that ends an answer of the board.
 QUIET_S = 0.05
-#: Until the last bit of a command has left at 9600 baud: ten bits a byte.
+#: Time of a command at 9600 baud: ten bits a byte.
 COMMAND_S = 4 * 10 / BAUDRATE
 MOST_RELAYS = 8
 _LINE = re.compile(rb"CH(\d+): *(ON|OFF) *\r\n")
@@ -28,8 +28,8 @@ _LINE = re.compile(rb"CH(\d+): *(ON|OFF) *\r\n")
 class LcusRelay:
     """One relay of an LCUS board, switching a lamp.
 
-    `on` and `off` return when the command has left the PC; nothing tells whether it was obeyed. A
-    board that answers the query is asked by `is_on` and `make_safe`, not by `on` and `off`: two
+    `on` and `off` return when the command has left the PC, without any sign that it was obeyed. A
+    board that answers the query is queried by `is_on` and `make_safe`, not by `on` and `off`: two
     queries take a fifth of a second, in which a halogen lamp fades, and the time at which the lamp
     was switched would be as uncertain.
 
@@ -40,16 +40,16 @@ class LcusRelay:
     settings
         The rig file's keys for this device.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file.
+        """Keys of a relay of an LCUS board in a rig file.
 
         Attributes
         ----------
         relay
-            As printed on the board: the first one is 1.
+            Number of the relay that switches the lamp, as printed on the board: the first one is 1.
         """
 
         model_config = ConfigDict(frozen=True, extra="forbid")
@@ -61,26 +61,26 @@ class LcusRelay:
         self._name = f"the LCUS board at {address}"
         self._clock = connections.clock
         self._line = SerialLine(connections.serial(address, BAUDRATE), self._clock, self._name)
-        self._asked_on = False
+        self._commanded_on = False
         self._send(on=False)
         self._answers = self._query() is not None
 
     def reads_back(self) -> bool:
-        """Whether the board answers its query."""
+        """Return whether the board answers its query."""
         return self._answers
 
     def identity(self) -> str:
-        """What the board shows of itself: how many relays it tells of, or that it tells nothing."""
+        """Return the number of relays that the board reports, or that it never acknowledges."""
         states = self._query() if self._answers else None
-        told = (
+        description = (
             "never acknowledges: only the camera can verify it"
             if states is None
             else f"{len(states)} relays, read back by query"
         )
-        return f"LCUS relay board ({told}), relay {self._relay}"
+        return f"LCUS relay board ({description}), relay {self._relay}"
 
     def findings(self) -> Sequence[Finding]:
-        """Whether anything but the camera can tell that the lamp was switched."""
+        """Return whether anything but the camera can verify that the lamp was switched."""
         if self._answers:
             return [Finding("fine", "the board answers its query: its register is read back")]
         return [
@@ -101,20 +101,20 @@ class LcusRelay:
         self._send(on=False)
 
     def is_on(self) -> bool:
-        """The board's register, where it answers its query; else merely what was sent last.
+        """Return the board's register, where it answers its query; else the last command.
 
-        Of a board that never acknowledges nobody knows more: it may have missed the command, its
-        contact may be welded. The register knows nothing of the contact, either.
+        A board that never acknowledges may have missed the command, or its contact may be welded.
+        The register does not show the contact, either.
         """
-        return self._read() if self._answers else self._asked_on
+        return self._read() if self._answers else self._commanded_on
 
     def make_safe(self) -> None:
-        """Off, sent twice: the second ends a command that was cut off; then read back, if it is.
+        """Switch off twice, as the second command ends one that was cut off; read back if possible.
 
         Raises
         ------
         UnclearAnswerError
-            It reads on, or has answered before and does not now.
+            The relay reads on, or the board has answered before and does not now.
         """
         self._send(on=False)
         self._send(on=False)
@@ -125,11 +125,11 @@ class LcusRelay:
             )
 
     def disconnect(self) -> None:
-        """The port belongs to the connections, which close it."""
+        """Do nothing: the port belongs to the connections, which close it."""
 
     def _send(self, *, on: bool) -> None:
         self._line.write(command(self._relay, on=on))
-        self._asked_on = on
+        self._commanded_on = on
         self._clock.sleep(COMMAND_S)
 
     def _read(self) -> bool:
@@ -142,35 +142,35 @@ class LcusRelay:
         return states[self._relay - 1]
 
     def _query(self) -> tuple[bool, ...] | None:
-        """States of all relays; None if nothing comes. Asked twice: the first answer may be old."""
+        """Return the states of all relays; None without an answer. The first answer may be old."""
         self._line.drain()
         for _ in range(2):
             self._line.write(QUERY)
-            came = self._line.read_burst(QUIET_S)
-        if not came:
+            answer = self._line.read_burst(QUIET_S)
+        if not answer:
             return None
-        states = relay_states(came)
+        states = relay_states(answer)
         if len(states) < self._relay:
             raise UnclearAnswerError(
                 f"{self._name} was asked for relay {self._relay}: expected 'CH{self._relay}: ON' "
-                f"or 'OFF', or a byte for each relay, got {came!r}; is it an LCUS board, and has "
+                f"or 'OFF', or a byte for each relay, got {answer!r}; is it an LCUS board, and has "
                 "it that many relays?"
             )
         return states
 
 
 def command(relay: int, *, on: bool) -> bytes:
-    """A0, relay, 1 or 0, and the sum of these three in a byte."""
+    """Return the command's bytes: A0, relay, 1 or 0, and the sum of these three in a byte."""
     return bytes((0xA0, relay, on, (0xA0 + relay + on) & 0xFF))
 
 
 def relay_states(answer: bytes) -> tuple[bool, ...]:
-    """States of relays 1, 2, … in an answer to the query; empty if it is none.
+    """Return the states of relays 1, 2, … in an answer to the query; empty if it is none.
 
     Parameters
     ----------
     answer
-        Lines such as `CH1: ON`, numbered without a gap, or one byte 00 or 01 a relay.
+        Lines such as `CH1: ON`, numbered without a gap, or one byte 00 or 01 for each relay.
     """
     if set(answer) <= {0, 1}:
         return tuple(byte == 1 for byte in answer)

@@ -11,26 +11,28 @@ from labrig.acquire import SerialPort
 from labrig.clock import Clock
 from labrig.errors import DeviceLostError, UnclearAnswerError
 
-#: How often the line is looked at; USB serial adapters deliver once a millisecond at best.
+#: Interval of polling; USB serial adapters deliver once a millisecond at best.
 POLL_S = 0.002
 #: Answers come at once; through a slow hub or into a busy PC some are a tenth of a second late.
 #: Whoever wants to be sure that nothing is on its way any more waits for longer than that.
 LATEST_ANSWER_S = 0.25
-#: A line that is not quiet by then never will be.
+#: Time within which a line becomes quiet, if ever.
 DRAIN_S = 1.0
-#: How often it is looked whether it is.
+#: Interval of polling while draining.
 DRAIN_POLL_S = 0.01
 
 
 class SerialLine:
-    """Bytes out, bytes in, time-outs and one-line errors.
+    """Writing and reading with time-outs and one-line errors.
 
     Parameters
     ----------
     port
         Open port whose reads do not block.
+    clock
+        Clock of the time-outs.
     name
-        What to call the device in messages: `Numato board at COM3`.
+        Name of the device in messages, for example `Numato board at COM3`.
     """
 
     def __init__(self, port: SerialPort, clock: Clock, name: str) -> None:
@@ -55,76 +57,76 @@ class SerialLine:
                 f"{self._name} does not take what is sent to it; check its power, cable and address"
             ) from None
         except (serial.SerialException, OSError) as error:
-            raise self._gone(error) from None
+            raise self._lost_error(error) from None
 
     def read_until(self, end: bytes, timeout_s: float) -> bytes:
-        """Bytes up to and including `end`.
+        """Return the bytes up to and including `end`.
 
         Raises
         ------
         UnclearAnswerError
-            `end` did not come in time; shows what came.
+            `end` did not come in time; the message shows the bytes that came.
         """
-        return self._read(lambda came: came.endswith(end), f"{end!r} at the end", timeout_s)
+        return self._read(lambda received: received.endswith(end), f"{end!r} at the end", timeout_s)
 
     def read_exactly(self, count: int, timeout_s: float) -> bytes:
-        """The next `count` bytes.
+        """Return the next `count` bytes.
 
         Raises
         ------
         UnclearAnswerError
-            They did not come in time; shows what came.
+            They did not come in time; the message shows the bytes that came.
         """
-        return self._read(lambda came: len(came) == count, f"{count} bytes", timeout_s)
+        return self._read(lambda received: len(received) == count, f"{count} bytes", timeout_s)
 
     def drain(self, quiet_s: float = LATEST_ANSWER_S, timeout_s: float = DRAIN_S) -> bytes:
-        """What comes until the line is quiet for `quiet_s`."""
+        """Return all bytes that come until the line is quiet for `quiet_s`."""
         deadline_s = self._clock.now() + timeout_s
         quiet_since_s = self._clock.now()
-        came = b""
+        received = b""
         while self._clock.now() - quiet_since_s < quiet_s and self._clock.now() < deadline_s:
             if self._waiting():
-                came += self._read_one()
+                received += self._read_byte()
                 quiet_since_s = self._clock.now()
             else:
                 self._clock.sleep(DRAIN_POLL_S)
-        return came
+        return received
 
     def read_burst(self, quiet_s: float) -> bytes:
-        """What comes in one go: begun within `LATEST_ANSWER_S`, ended by a pause of `quiet_s`."""
+        """Return one burst: begun within `LATEST_ANSWER_S`, ended by a pause of `quiet_s`."""
         deadline_s = self._clock.now() + LATEST_ANSWER_S
         while not self._waiting() and self._clock.now() < deadline_s:
             self._clock.sleep(POLL_S)
         return self.drain(quiet_s) if self._waiting() else b""
 
     def _read(self, is_all: Callable[[bytes], bool], expected: str, timeout_s: float) -> bytes:
-        """Bytes one by one, so that none is taken that comes after."""
+        """Read bytes one by one, so that later ones stay in the port."""
         deadline_s = self._clock.now() + timeout_s
-        came = b""
-        while not is_all(came):
-            byte = self._read_one()
-            came += byte
-            if self._clock.now() >= deadline_s and not is_all(came):
+        received = b""
+        while not is_all(received):
+            byte = self._read_byte()
+            received += byte
+            if self._clock.now() >= deadline_s and not is_all(received):
                 raise UnclearAnswerError(
                     f"{self._name} did not answer within {timeout_s:g} s: expected {expected}, "
-                    f"got {came!r}; check its power, cable and address"
+                    f"got {received!r}; check its power, cable and address"
                 )
             if not byte:
                 self._clock.sleep(POLL_S)
-        return came
+        return received
 
-    def _read_one(self) -> bytes:
+    def _read_byte(self) -> bytes:
         try:
             return self._port.read(1) if self._port.in_waiting else b""
         except (serial.SerialException, OSError) as error:
-            raise self._gone(error) from None
+            raise self._lost_error(error) from None
 
     def _waiting(self) -> bool:
         try:
             return self._port.in_waiting > 0
         except (serial.SerialException, OSError) as error:
-            raise self._gone(error) from None
+            raise self._lost_error(error) from None
 
-    def _gone(self, error: Exception) -> DeviceLostError:
-        said = " ".join(str(error).split())
-        return DeviceLostError(f"{self._name} is gone ({said}); plug it in again")
+    def _lost_error(self, error: Exception) -> DeviceLostError:
+        reason = " ".join(str(error).split())
+        return DeviceLostError(f"{self._name} is gone ({reason}); plug it in again")

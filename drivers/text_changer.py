@@ -1,7 +1,7 @@
-r"""A changer that obeys lines of text: a sample changer or filter wheel of one's own.
+r"""A changer that obeys lines of text: a home-made sample changer or filter wheel.
 
 Any microcontroller will do: it reads `fresh sample\n` or `filter 37\n`, moves, and answers `done\n`
-or `cannot`, the reason and `\n`. The simulated room's changer speaks the same.
+or `cannot`, the reason and `\n`. The simulated room's changer uses the same lines.
 """
 
 from pydantic import BaseModel, ConfigDict, Field
@@ -21,22 +21,22 @@ class TextChanger:
     Parameters
     ----------
     address
-        Their serial port.
+        Serial port of the changer.
     settings
         The rig file's keys for this device.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file.
+        """Keys of a changer that obeys lines of text in a rig file.
 
         Attributes
         ----------
         baud
-            Of the line; USB boards ignore it.
+            Baud rate of the serial line; USB boards ignore it.
         takes_at_most
-            Until they have answered `done`.
+            Time within which the changer must have answered `done`, for example `2 min`.
         """
 
         model_config = ConfigDict(frozen=True, extra="forbid")
@@ -51,33 +51,33 @@ class TextChanger:
         self._line = SerialLine(port, connections.clock, self._name)
 
     def identity(self) -> str:
-        """They do not tell more than where they are."""
+        """Return the changer's address: it reports no identity."""
         return self._name.removeprefix("the ")
 
     def do(self, task: str) -> None:
-        """Do it; returns when they say that it is done.
+        """Have the changer do a task; return when it has answered `done`.
 
         Raises
         ------
         DeviceError
-            They cannot.
+            The changer cannot do the task.
         UnclearAnswerError
-            They answer something else, or nothing.
+            The changer gives another answer, or none.
         """
         self._line.write(task.encode() + b"\n")
-        came = self._line.read_until(b"\n", self._settings.takes_at_most)
-        said = " ".join(came.decode(errors="replace").split())
-        if said != "done":
-            kind = DeviceError if said.startswith("cannot") else UnclearAnswerError
+        line = self._line.read_until(b"\n", self._settings.takes_at_most)
+        answer = " ".join(line.decode(errors="replace").split())
+        if answer != "done":
+            kind = DeviceError if answer.startswith("cannot") else UnclearAnswerError
             raise kind(
-                f"{self._name} were told '{task}': expected 'done', got '{said}'; do it by hand, "
+                f"{self._name} were told '{task}': expected 'done', got '{answer}'; do it by hand, "
                 "without 'changer:' in the rig file, or teach them"
             )
 
     def make_safe(self) -> None:
-        """End a half-written line and forget old answers; a changer that moves comes to its end."""
+        """End a half-written line and discard old answers; a moving changer finishes its task."""
         self._line.write(b"\n")
         self._line.drain()
 
     def disconnect(self) -> None:
-        """The port belongs to the connections, which close it."""
+        """Do nothing: the port belongs to the connections, which close it."""

@@ -1,4 +1,4 @@
-"""A webcam, or a stick on the camera's HDMI output, to aim by: 8 bits, never measured with.
+"""A webcam, or a stick on the camera's HDMI output, for aiming: 8 bits, never used to measure.
 
 Addresses: `uvc://0` is the system's first video device; anything else that OpenCV opens, such as
 `http://…/stream.mjpg` or numbered files `frame%03d.png`, is given as it is.
@@ -15,25 +15,25 @@ JPEG_QUALITY = 90
 
 
 class UvcPreview:
-    """Live view only; the device is not opened before somebody looks.
+    """Live view only; the device is opened with the first picture.
 
     Parameters
     ----------
     address
-        As above.
+        Address of the video device, as in this module's description.
     settings
-        None.
+        The rig file's keys for this device, of which there are none.
     connections
-        Not needed: OpenCV opens video devices itself.
+        Connections, not needed: OpenCV opens video devices itself.
 
     Raises
     ------
     DeviceError
-        `uvc://` with anything but a number behind it.
+        `uvc://` is followed by anything but a number.
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file: none."""
+        """Keys of a video device for aiming in a rig file: none of its own."""
 
         model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -49,21 +49,23 @@ class UvcPreview:
         self._capture: cv2.VideoCapture | None = None
 
     def identity(self) -> str:
-        """The address: video devices do not tell OpenCV who they are."""
+        """Return the address: video devices do not report an identity to OpenCV."""
         return f"video device at {self._address}, for aiming only"
 
     def preview(self) -> bytes:
-        """The next picture, as JPEG.
+        """Return the next picture, as JPEG.
 
         Raises
         ------
         DeviceError
-            No such device, or no picture comes.
+            There is no such device, or no picture comes.
         """
         if self._capture is None:
             self._capture = self._opened()
-        there, picture = self._capture.read()
-        encoded = there and cv2.imencode(".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])
+        is_read, picture = self._capture.read()
+        encoded = is_read and cv2.imencode(
+            ".jpg", picture, [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY]
+        )
         if not encoded:
             self.make_safe()
             raise DeviceError(
@@ -73,7 +75,7 @@ class UvcPreview:
         return bytes(encoded[1])
 
     def make_safe(self) -> None:
-        """Release the device; it is opened again when somebody looks."""
+        """Release the device; the next picture opens it again."""
         if self._capture is not None:
             self._capture.release()
             self._capture = None

@@ -4,12 +4,14 @@ import inspect
 import operator
 import re
 from collections.abc import Callable, Iterator
+from contextlib import suppress
+from copy import copy
 from functools import reduce
 from typing import Annotated, Any, Literal
 
 from pydantic import BaseModel, Field, TypeAdapter, create_model
 from pydantic.json_schema import GenerateJsonSchema, JsonSchemaValue
-from pydantic_core import core_schema
+from pydantic_core import SchemaError, SchemaSerializer, core_schema
 
 from labrig import plugins
 from labrig.acquire import ROLES, DeviceEntry, RigFile
@@ -55,7 +57,12 @@ def _rig() -> Any:
         if fitting:
             summary = inspect.cleandoc(role.does.__doc__ or "").splitlines()[0]
             roles[key] = (_one_of("driver", fitting), Field(None, description=summary))
-    devices = create_model("Devices", __config__={"extra": "forbid"}, **roles)
+    devices = create_model(
+        "Devices",
+        __config__={"extra": "forbid"},
+        __doc__="Devices of the bench by their roles.",
+        **roles,
+    )
     from labrig.sim import Simulation
 
     return create_model(
@@ -68,12 +75,14 @@ def _rig() -> Any:
 
 
 def _entry(driver: str, settings: type[BaseModel]) -> type[BaseModel]:
-    """Return the model of a device entry of one driver."""
-    shared_fields: dict[str, Any] = {
-        name: (field.annotation, field) for name, field in DeviceEntry.model_fields.items()
-    }
-    fields: dict[str, Any] = shared_fields | {"driver": (Literal[driver], ...)}
-    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **fields)
+    """A device entry of one driver."""
+    texts = _descriptions(DeviceEntry)
+    shared: dict[str, Any] = {}
+    for name, field in DeviceEntry.model_fields.items():
+        described = copy(field)
+        described.description = texts[name]
+        shared[name] = (Literal[driver] if name == "driver" else field.annotation, described)
+    return create_model(driver, __base__=settings, __doc__=settings.__doc__, **shared)
 
 
 def _one_of(key: str, models: list[type[BaseModel]]) -> Any:
@@ -83,30 +92,42 @@ def _one_of(key: str, models: list[type[BaseModel]]) -> Any:
 
 
 class _Described(GenerateJsonSchema):
-    """Schema generator with the models' docstrings as descriptions and defaults as written."""
+    """Describes keys as the models' docstrings do; defaults have the form that YAML has."""
 
     def model_schema(self, schema: core_schema.ModelSchema) -> JsonSchemaValue:
-        json_schema = super().model_schema(schema)
-        docstring = inspect.cleandoc(schema["cls"].__doc__ or "")
-        json_schema["description"] = docstring.partition("\n\n")[0]
-        texts = dict(_attributes(docstring))
-        for name, field in schema["cls"].model_fields.items():
-            entry: dict[str, Any] = json_schema.get("properties", {}).get(field.alias or name, {})
-            if name in texts:
-                entry["description"] = texts[name]
-        return json_schema
+        made = super().model_schema(schema)
+        model = schema["cls"]
+        made["description"] = inspect.cleandoc(model.__doc__ or "").partition("\n\n")[0]
+        texts = _descriptions(model)
+        for branch in (made, *made.get("anyOf", [])):
+            for name, field in model.model_fields.items():
+                place: dict[str, Any] = branch.get("properties", {}).get(field.alias or name, {})
+                if name in texts:
+                    place["description"] = texts[name]
+        return made
 
     def default_schema(self, schema: core_schema.WithDefaultSchema) -> JsonSchemaValue:
-        json_schema = super().default_schema(schema)
-        default = json_schema.get("default")
-        if default is None or (json_schema.get("type") == "string") != isinstance(default, str):
-            json_schema.pop("default", None)
-        return json_schema
+        made = super().default_schema(schema)
+        if made.get("default") is None:
+            made.pop("default", None)
+            return made
+        with suppress(SchemaError):  # a model's own serializer has done it
+            written = SchemaSerializer(schema["schema"])
+            made["default"] = written.to_python(schema["default"], mode="json", by_alias=True)
+        return made
 
 
-def _attributes(docstring: str) -> Iterator[tuple[str, str]]:
-    """Yield name and text of each entry in the Attributes section of a numpy docstring."""
-    _, _, section = docstring.partition("Attributes\n----------\n")
+def _descriptions(model: type[BaseModel]) -> dict[str, str]:
+    """Description of every documented field of a model, of its base classes', too, by name."""
+    texts: dict[str, str] = {}
+    for part in reversed(model.__mro__):
+        texts.update(_attributes(inspect.cleandoc(part.__doc__ or "")))
+    return texts
+
+
+def _attributes(documented: str) -> Iterator[tuple[str, str]]:
+    """Name and text of each entry in a numpy docstring's section of attributes."""
+    _, _, section = documented.partition("Attributes\n----------\n")
     for names, text in re.findall(r"^(\w[\w, ]*)\n((?:    .*\n?|\n(?=    ))+)", section, re.M):
         for name in names.split(","):
             yield name.strip(), " ".join(text.split())

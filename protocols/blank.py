@@ -1,7 +1,8 @@
-"""A blank: the decay's sequence on what does not glow, for the light that is no glow.
+"""A blank: the sequence of a decay on an inert card, for background and stray light.
 
 A lamp that is off still glows a little (Nalbach et al., section 4.4), light leaks in, a stray
-reflection finds its way. An inert card in the sample's place shows all of that and nothing else.
+reflection reaches the camera. An inert card in the sample's place shows all of that and nothing
+else.
 """
 
 from collections.abc import Sequence
@@ -36,15 +37,22 @@ BLANK = ManualStep(
     "what the sequence shows without a glow is measured",
     "blank",
 )
-#: What the frames of the sequence are for.
+#: Role of the frames of the sequence.
 BLANK_FRAMES = "blank"
-#: The first frame of a sequence without a door.
+#: Begin of the first frame of a sequence without a door.
 EARLIEST_S = 0.1
 
 
 class Clean(BaseModel):
-    """From when on a blank counts as clean: less than so many σ, or than that fraction of the range
-    from black to white.
+    """Limits below which the signal of a blank counts as zero.
+
+    Attributes
+    ----------
+    sigmas
+        Signal in standard uncertainties below which the blank counts as clean, for example `4`.
+    fraction
+        Signal as a fraction of the camera's range from black to white below which the blank counts
+        as clean, whatever its uncertainty, for example `0.001 %`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -54,7 +62,35 @@ class Clean(BaseModel):
 
 
 class Blank(ProtocolModel):
-    """See `blank.yaml` for what each key means."""
+    """Settings of a blank; `blank.yaml` is the commented example.
+
+    Attributes
+    ----------
+    charge
+        Time for which the lamp shines before each sequence, for example `5 min`. The lamp's housing
+        should become as warm as in a decay.
+    every
+        Time between the begins of two photographs, for example `5 s`.
+    duration
+        Time after lamp off until which photographs begin, for example `60 s`; at least four times
+        `every`.
+    first
+        Time from lamp off to the first photograph, for example `500 ms`. `auto` is as soon as the
+        trap door is open, or 100 ms without a door.
+    later_by
+        Further delay of each sequence's first photograph, one sequence for each, so that the time
+        just after lamp off is sampled in small steps, for example `[0 s, 100 ms]`.
+    exposure
+        Shutter time of the first photograph of each sequence, for example `500 ms`. All others are
+        as long as fits between two begins.
+    camera
+        Sensitivity and aperture of the camera: those of the decays to which the blank belongs.
+    region
+        Place of the blank in the frame, where the sample will be: `[x, y, width, height]` in
+        pixels, or all four as fractions of the frame.
+    clean
+        Limits below which the signal of the blank counts as zero.
+    """
 
     protocol: Literal["blank"] = "blank"
     charge: DurationS = Field(300.0, gt=0)
@@ -77,34 +113,34 @@ class Blank(ProtocolModel):
         return self
 
     def units(self) -> Sequence[Unit]:
-        """Darks, the sequences, the bench as it was."""
+        """Return dark frames, the sequences, and the bench put back."""
         sequences = [SequenceUnit(self, number) for number in range(1, len(self.later_by) + 1)]
         return [BlankDarkUnit(self), *sequences, PutBackUnit(Arrangement("grey card"))]
 
     def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
+        """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def exposures_s(self, offers: CameraOffers) -> tuple[float, float]:
-        """Of the first frame of a sequence, and of all others."""
+        """Return the shutter times of a sequence's first frame and of all others, in seconds."""
         longest_s = offers.exposure_at_most(self.every - offers.overhead_s - MARGIN_S)
         return min(offers.exposure_at_most(self.exposure), longest_s), longest_s
 
     def times_s(self, earliest_s: float, later_s: float) -> list[float]:
-        """Begin of each frame of a sequence after lamp off."""
+        """Return the begin of each frame of a sequence in seconds after lamp off."""
         first_s = (earliest_s if self.first == "auto" else self.first) + later_s
         return frame_times_s(first_s, self.every, self.duration)
 
 
 @dataclass(frozen=True)
 class BlankDarkUnit:
-    """Dark frames in the pose of the sequences, the blank already there."""
+    """Dark frames in the pose of the sequences, with the blank in its place."""
 
     protocol: Blank
     name: str = "dark"
 
     def run(self, session: Session) -> None:
-        """At the shortest shutter time and at those to come; a lamp that burns is refused."""
+        """Photograph at the shortest shutter time and at the later ones; refuse a burning lamp."""
         session.ask(BLANK)
         session.wait_until_warm("camera")
         face_camera(session)
@@ -119,18 +155,18 @@ class BlankDarkUnit:
 
 @dataclass(frozen=True)
 class SequenceUnit:
-    """Lamp on for a while, off, then frames as in a decay."""
+    """A charge of the blank, lamp off, then frames as in a decay."""
 
     protocol: Blank
     number: int
 
     @property
     def name(self) -> str:
-        """`blank-1`, `blank-2`, …"""
+        """Name of the unit: `blank-1`, `blank-2`, …"""
         return f"blank-{self.number}"
 
     def run(self, session: Session) -> None:
-        """Later by a little in each sequence."""
+        """Charge and photograph, a little later in each sequence."""
         protocol = self.protocol
         session.wait_until_warm("camera")
         first_s, others_s = protocol.exposures_s(session.rig[CAMERA].offers())

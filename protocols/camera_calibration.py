@@ -1,8 +1,8 @@
-"""What a body and a lens make of light: dark, gain, linearity, shutter, ISO, aperture, flat field.
+"""Calibration of a camera with its lens: dark, gain, linearity, shutter, ISO, aperture, flat field.
 
-A grey card under the steady lamp is all that is needed. Photon transfer and linearity as EMVA
-Standard 1288 has them; brackets are interleaved with one reference exposure, so that neither the
-lamp's drift nor the shutter's flicker is taken for a factor.
+A grey card under the steady lamp is all that is needed. Photon transfer and linearity follow EMVA
+Standard 1288; brackets are interleaved with one reference exposure, so that neither the lamp's
+drift nor the shutter's flicker is taken for a factor.
 """
 
 from collections.abc import Callable, Iterator, Sequence
@@ -33,7 +33,7 @@ from .steps.scenes import Arrangement, PutBackUnit
 
 
 class CardFrames(StrEnum):
-    """The card in pairs at rising light, again and again, in brackets, and for the flat field."""
+    """Roles of frames of the card: pairs at rising light, repeats, brackets, flat field."""
 
     PHOTON = "photon"
     REPEAT = "repeat"
@@ -41,7 +41,7 @@ class CardFrames(StrEnum):
     FLAT = "flat"
 
 
-#: The unit whose bracket tells the deviation from linearity.
+#: Name of the unit whose bracket shows the deviation from linearity.
 LINEARITY = "linearity"
 
 #: Fractions of the range that the lit card fills: the reference exposure of brackets, flats,
@@ -53,7 +53,7 @@ LEAST, MOST = 0.012, 0.7
 PHOTON_FRACTIONS = (0.03, 0.75)
 #: … of the linearity, into saturation.
 LINEARITY_FRACTIONS = (0.015, 2.0)
-#: After so many exposures of a bracket comes its reference again.
+#: Number of exposures of a bracket between two of its reference.
 REFERENCE_EVERY = 3
 DARKS_EACH = 4
 FLATS = 4
@@ -64,7 +64,7 @@ Bracket = Callable[[CardLight, CameraOffers, ExposureSettings], Sequence[Exposur
 
 @dataclass(frozen=True)
 class CardDarkUnit:
-    """Dark frames at one ISO, the card already in its place."""
+    """Dark frames at one ISO, with the card in its place."""
 
     reference: ExposureSettings
     card: Region
@@ -74,11 +74,11 @@ class CardDarkUnit:
 
     @property
     def name(self) -> str:
-        """`dark-iso-100`."""
+        """Name of the unit, for example `dark-iso-100`."""
         return f"dark-iso-{self.iso}"
 
     def run(self, session: Session) -> None:
-        """Photograph darkness, shortest and longest exposure, and see that it is dark."""
+        """Photograph at the shortest and the longest exposure, and check that it is dark."""
         if self.asks:
             session.ask(GREY_CARD)
         session.wait_until_warm("camera")
@@ -103,24 +103,24 @@ class PhotonUnit:
 
     @property
     def name(self) -> str:
-        """`photon-iso-100`."""
+        """Name of the unit, for example `photon-iso-100`."""
         return f"photon-iso-{self.iso}"
 
     def run(self, session: Session) -> None:
-        """Two frames at each level."""
+        """Take two frames at each level."""
         light_card(session)
         light, offers = card_light(session, self.reference, self.card), session.rig[CAMERA].offers()
         settings = replace(self.reference, iso=self.iso)
         fractions = np.linspace(*PHOTON_FRACTIONS, self.levels)
-        wanted = [light.exposed(float(fraction), settings, offers) for fraction in fractions]
-        for shot in dict.fromkeys(wanted):
+        shots = [light.exposed(float(fraction), settings, offers) for fraction in fractions]
+        for shot in dict.fromkeys(shots):
             session.perform(Shoot(CardFrames.PHOTON, shot))
             session.perform(Shoot(CardFrames.PHOTON, shot))
 
 
 @dataclass(frozen=True)
 class RepeatUnit:
-    """The same frame again and again: the flicker."""
+    """Repeated frames of one exposure, for the flicker."""
 
     reference: ExposureSettings
     card: Region
@@ -128,7 +128,7 @@ class RepeatUnit:
     name: str = "repeats"
 
     def run(self, session: Session) -> None:
-        """At the reference exposure."""
+        """Photograph at the reference exposure."""
         light_card(session)
         light = card_light(session, self.reference, self.card)
         shot = light.exposed(HALF, self.reference, session.rig[CAMERA].offers())
@@ -138,7 +138,7 @@ class RepeatUnit:
 
 @dataclass(frozen=True)
 class FlatUnit:
-    """The lit card at one aperture."""
+    """Frames of the lit card at one aperture, for the flat field."""
 
     reference: ExposureSettings
     card: Region
@@ -146,11 +146,11 @@ class FlatUnit:
 
     @property
     def name(self) -> str:
-        """`flat-f4`."""
+        """Name of the unit, for example `flat-f4`."""
         return "flat" if self.f_number is None else f"flat-f{self.f_number:g}"
 
     def run(self, session: Session) -> None:
-        """A few frames, whose noise averages out."""
+        """Take a few frames, whose noise averages out."""
         light_card(session)
         light = card_light(session, self.reference, self.card)
         settings = replace(self.reference, f_number=self.f_number)
@@ -161,7 +161,7 @@ class FlatUnit:
 
 @dataclass(frozen=True)
 class BracketUnit:
-    """Frames that differ in one setting, there and back again, the reference in between."""
+    """Frames that differ in one setting, forwards and backwards, with the reference in between."""
 
     reference: ExposureSettings
     card: Region
@@ -170,7 +170,7 @@ class BracketUnit:
     cycles: int
 
     def run(self, session: Session) -> None:
-        """Forwards in one cycle, backwards in the next: a lamp's drift then is no factor."""
+        """Photograph forwards in one cycle, backwards in the next, so that the drift cancels."""
         light_card(session)
         light = card_light(session, self.reference, self.card)
         first, *others = self.bracket(light, session.rig[CAMERA].offers(), self.reference)
@@ -183,7 +183,7 @@ class BracketUnit:
 def linearity_bracket(
     light: CardLight, offers: CameraOffers, reference: ExposureSettings
 ) -> Sequence[ExposureSettings]:
-    """Shutter times from next to nothing to what is too long."""
+    """Return shutter times from near darkness to saturation."""
     low, high = (light.exposure_s(fraction, reference) for fraction in LINEARITY_FRACTIONS)
     return [
         light.exposed(HALF, reference, offers),
@@ -192,7 +192,7 @@ def linearity_bracket(
 
 
 def shutter_bracket(every_nth: int, f_numbers: Sequence[float | None]) -> Bracket:
-    """Shutter times at the reference aperture, then longer ones at the smallest aperture."""
+    """Return shutter times at the reference aperture, then longer ones at the smallest aperture."""
     smallest = max((f_number or 0.0 for f_number in f_numbers), default=0.0)
 
     def bracket(
@@ -210,35 +210,35 @@ def shutter_bracket(every_nth: int, f_numbers: Sequence[float | None]) -> Bracke
 
 
 def iso_bracket(isos: Sequence[int]) -> Bracket:
-    """One shutter time at every ISO."""
+    """Return one shutter time at every ISO."""
 
     def bracket(
         light: CardLight, offers: CameraOffers, reference: ExposureSettings
     ) -> Sequence[ExposureSettings]:
         shot = light.exposed(MOST, replace(reference, iso=max(isos)), offers)
-        same = replace(reference, exposure_s=shot.exposure_s)
-        return [same, *(replace(same, iso=iso) for iso in isos if iso != reference.iso)]
+        settings = replace(reference, exposure_s=shot.exposure_s)
+        return [settings, *(replace(settings, iso=iso) for iso in isos if iso != reference.iso)]
 
     return bracket
 
 
 def aperture_bracket(f_numbers: Sequence[float | None]) -> Bracket:
-    """One shutter time at every aperture."""
+    """Return one shutter time at every aperture."""
 
     def bracket(
         light: CardLight, offers: CameraOffers, reference: ExposureSettings
     ) -> Sequence[ExposureSettings]:
         widest = min(f_numbers, key=lambda f_number: f_number or 0.0)
         shot = light.exposed(MOST, replace(reference, f_number=widest), offers)
-        same = replace(reference, exposure_s=shot.exposure_s)
-        others = [one for one in f_numbers if one != reference.f_number]
-        return [same, *(replace(same, f_number=f_number) for f_number in others)]
+        settings = replace(reference, exposure_s=shot.exposure_s)
+        others = [f_number for f_number in f_numbers if f_number != reference.f_number]
+        return [settings, *(replace(settings, f_number=f_number) for f_number in others)]
 
     return bracket
 
 
 def _between(offers: CameraOffers, low_s: float, high_s: float) -> list[float]:
-    """Offered shutter times of that range, two at the least."""
+    """Return the offered shutter times of that range, at least two."""
     times_s = [time_s for time_s in offers.exposures_s if low_s <= time_s <= high_s * 1.0001]
     return times_s if len(times_s) > 1 else list(offers.exposures_s[:2])
 
@@ -254,7 +254,37 @@ def _interleaved(
 
 
 class CameraCalibration(ProtocolModel):
-    """See `camera_calibration.yaml` for what each key means."""
+    """Settings of a camera calibration; `camera_calibration.yaml` is the commented example.
+
+    Attributes
+    ----------
+    camera
+        Reference sensitivity and aperture, at which all correction factors are 1; the lower the
+        ISO, the less noise. Both stand in `isos` and `f_numbers`, too.
+    isos
+        Sensitivities to calibrate, for example `[100, 200, 400]`. Others are later taken by their
+        labels.
+    f_numbers
+        Apertures to calibrate, for example `[2.8, 4, 5.6]`. Frames at other apertures are refused
+        later. Empty for a lens that reports no aperture, with `f_number: null` in `camera`.
+    card
+        Place of the lit grey card in the frame: `[x, y, width, height]` in pixels, or all four as
+        fractions of the frame. The larger it is, the better the flat field is known towards the
+        corners.
+    levels
+        Number of signal levels of the photon transfer curve at every ISO, two frames each.
+    repeats
+        Number of frames of the same exposure, for the flicker of shutter, aperture and lamp.
+    cycles
+        Number of passes through each bracket. The uncertainty of a factor is about flicker /
+        √cycles.
+    every_nth_shutter_time
+        Step through the camera's shutter times: 1 calibrates every one for which the lamp is bright
+        enough, 3 every third. Those between are interpolated.
+    longest_dark
+        Longer of the two shutter times of the dark frames, for example `8 s`; the other one is the
+        camera's shortest.
+    """
 
     protocol: Literal["camera_calibration"] = "camera_calibration"
     camera: CameraSettings = CameraSettings(iso=100, f_number=4.0)
@@ -279,11 +309,11 @@ class CameraCalibration(ProtocolModel):
         return self
 
     def settings(self) -> ExposureSettings:
-        """The reference; its shutter time is to be metered."""
+        """Return the reference settings, whose shutter time is to be metered."""
         return ExposureSettings(1.0, self.camera.iso, self.camera.f_number)
 
     def units(self) -> Sequence[Unit]:
-        """Darks, metering, photon transfer, repeats, brackets, flats; then the card goes away."""
+        """Return darks, metering, photon transfer, repeats, brackets, flats, the bench put back."""
         reference = self.settings()
         apertures: list[float | None] = [*self.f_numbers] or [None]
         brackets = {

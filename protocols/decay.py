@@ -41,7 +41,19 @@ from .steps.sanity_checks import SanityChecks
 
 
 class Plateau(BaseModel):
-    """When `charge: plateau` ends: the glow grew by less than `growth` since the last look."""
+    """Criterion by which `charge: plateau` ends.
+
+    Attributes
+    ----------
+    growth
+        Growth of the glow since the last check, as a fraction, below which the sample counts as
+        charged, for example `1 %`.
+    check_every
+        Time of charging between two checks, for example `5 min`.
+    at_most
+        Time of charging after which the decay begins in any case, with a warning, for example
+        `2 h`.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -51,7 +63,45 @@ class Plateau(BaseModel):
 
 
 class DecaySettings(ProtocolModel):
-    """The keys; see `decay.yaml` for what each means."""
+    """Settings of a decay; `decay.yaml` is the commented example.
+
+    Attributes
+    ----------
+    charge
+        Time for which the lamp shines on the sample, for example `90 min`; `plateau` charges until
+        the glow stops growing.
+    plateau
+        Criterion by which `charge: plateau` ends.
+    every
+        Time between the begins of two photographs, for example `5 s`.
+    duration
+        Time after lamp off until which photographs begin, for example `180 s`.
+    first
+        Time from lamp off to the first photograph, for example `500 ms`. A halogen lamp needs about
+        320 ms to go dark, and a trap door must be open.
+    repeats
+        Number of charges, each with a decay after it.
+    camera
+        Sensitivity and aperture of the camera.
+    exposure
+        Shutter time of all photographs, for example `1 s`. `auto` meters a short charge first, so
+        that nothing clips; `grow` does so and exposes longer along the decay, to keep counts.
+    grow_at_most
+        Largest ratio of a shutter time to the first one with `exposure: grow`.
+    dark
+        Source of the level without light: `frames`, dark frames before charging, or `background`, a
+        region of every frame.
+    background
+        Region of every frame that never glows, for `dark: background`: `[x, y, width, height]` in
+        pixels, or all four as fractions of the frame.
+    patches
+        Regions of interest by name: `[x, y, width, height]` in pixels, or all four as fractions of
+        the frame. Each gets a fit of its own.
+    daylight
+        Whether the sample is also photographed under the lamp, for the report.
+    states
+        Number of excited states to fit: 1, 2 or 3; `auto` chooses it from the data.
+    """
 
     protocol: Literal["decay"] = "decay"
     charge: Annotated[float | Literal["plateau"], WordOrDuration("plateau")] = 5400.0
@@ -89,25 +139,25 @@ class DecaySettings(ProtocolModel):
         return self
 
     def frame_times_s(self) -> list[float]:
-        """Planned begin of each frame, seconds after lamp off."""
+        """Return the planned begin of each frame in seconds after lamp off."""
         return frame_times_s(self.first, self.every, self.duration)
 
     def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
+        """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def longest_exposure_s(self, offers: CameraOffers) -> float:
-        """Longest offered shutter time that fits between two frames."""
+        """Return the longest offered shutter time that fits between two frames, in seconds."""
         return offers.exposure_at_most(self.every - offers.overhead_s - MARGIN_S)
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
-        """Shutter time of each dark frame."""
+        """Return the shutter time of each dark frame in seconds."""
         if isinstance(self.exposure, float):
             return [offers.exposure_near(self.exposure)] * DARKS_PER_EXPOSURE
         return dark_exposures_s(self.longest_exposure_s(offers), offers)
 
     def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
-        """Begin after lamp off and shutter time of each metering frame; for `grow`, to the end."""
+        """Return begin and shutter time of each metering frame; for `grow`, along the decay."""
         longest_s = self.longest_exposure_s(offers)
         pause_s = offers.overhead_s + MARGIN_S
         ladder, at_s = [], self.first
@@ -130,7 +180,7 @@ class DecaySettings(ProtocolModel):
         metering: Sequence[MeteringFrame],
         warn: Callable[[str], None],
     ) -> Schedule:
-        """Frames of a decay; their shutter times rest on the metering's, unless they are given."""
+        """Return the frames of a decay; their shutter times follow from metering, unless given."""
         times_s = self.frame_times_s()
         if isinstance(self.exposure, float):
             return Schedule.constant(times_s, offers.exposure_near(self.exposure))
@@ -144,35 +194,39 @@ class DecaySettings(ProtocolModel):
         expected: Callable[[float, float], Sequence[FrameMeasurement]],
         warn: Callable[[str], None],
     ) -> Schedule:
-        """What `schedule` will come to, before anything is measured.
+        """Return the expected result of `schedule`, before anything is measured.
 
         Parameters
         ----------
+        offers
+            Exposure settings that the camera offers.
         expected
-            What a frame of the glow will show in each patch, from its begin after lamp off and its
-            shutter time in seconds.
+            Function that predicts a frame of the glow in each patch, from its begin after lamp off
+            and its shutter time in seconds.
+        warn
+            Function that receives warnings.
         """
         metering = [MeteringFrame(*at, expected(*at)) for at in self.meter_ladder(offers)]
         return self.schedule(offers, metering, warn)
 
     def short_settings(self, session: Session) -> list[ExposureSettings]:
-        """For a closer look at what clips."""
+        """Return the settings of the shortest metering frames, for a check of clipped frames."""
         ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
         return [self.settings(exposure_s) for _, exposure_s in ladder]
 
     def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
-        """Holds a unit's frames against what should have happened, and what `metering` saw."""
+        """Return the sanity checks of a unit's frames, compared with those of `metering`."""
         background = self.background if self.dark == "background" else None
         regions = list(self.patches.values())
         return SanityChecks(session, unit, regions, background, metering=metering)
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
-        """Lamp on for that long, for its own warm-up at the least."""
+        """Charge for that long, and at least for the lamp's warm-up time."""
         charge(session, max(duration_s, session.rig.warm_up_s("lamp")))
 
 
 class DecayFrames(StrEnum):
-    """The glow between two charges, to see whether it still grows."""
+    """Role of frames of the glow between two charges, which show whether it still grows."""
 
     PLATEAU = "plateau"
 
@@ -184,14 +238,14 @@ LAMP_SETTLES_S = 5.0
 
 @dataclass(frozen=True)
 class DecayUnit:
-    """One charge and the decay after it, exposed as the unit `metering` found."""
+    """One charge and the decay after it, with exposures from the unit `metering`."""
 
     protocol: DecaySettings
     name: str
     metering: str = "meter"
 
     def run(self, session: Session) -> None:
-        """Charge, lamp off, one frame every `every` seconds."""
+        """Charge, switch the lamp off, take one frame every `every` seconds."""
         session.wait_until_warm("camera")
         schedule = self._schedule(session)
         check_visible(session, self.protocol.first)
@@ -214,7 +268,9 @@ class DecayUnit:
         regions = list(protocol.patches.values())
 
         def decide() -> Schedule:
-            frames = [one for one in session.frames(FrameRole.METER) if one.unit == self.metering]
+            frames = [
+                frame for frame in session.frames(FrameRole.METER) if frame.unit == self.metering
+            ]
             metering = [measure_frame(frame, regions) for frame in frames]
             return protocol.schedule(offers, metering, session.warn)
 
@@ -247,29 +303,32 @@ class DecayUnit:
         )
 
     def _level(self, session: Session) -> bool:
-        """Whether every patch grew by less than the rule allows since the last look."""
+        """Return whether every patch grew by less than the criterion since the last check."""
         metering = [
             frame for frame in session.frames(DecayFrames.PLATEAU) if frame.unit == self.name
         ]
         if len(metering) < 2:
             return False
-        before, now = (
+        previous_dn, present_dn = (
             [glow(frame.path, region) for region in self.protocol.patches.values()]
             for frame in metering[-2:]
         )
         limit = 1 + self.protocol.plateau.growth
-        return all(new <= old * limit for old, new in zip(before, now, strict=True))
+        return all(
+            present <= previous * limit
+            for previous, present in zip(previous_dn, present_dn, strict=True)
+        )
 
 
 @dataclass(frozen=True)
 class DaylightUnit:
-    """What the samples look like under the lamp."""
+    """Photographs of the samples under the lamp."""
 
     protocol: DecaySettings
     name: str = "daylight"
 
     def run(self, session: Session) -> None:
-        """Lamp on, a ladder of short exposures, lamp off."""
+        """Switch the lamp on, take a ladder of short exposures, switch the lamp off."""
         if has_door(session):
             session.warn("no daylight photograph: behind a door the lamp lights the sample unseen")
             return
@@ -277,8 +336,8 @@ class DaylightUnit:
         session.perform(LAMP_ON)
         session.wait(LAMP_SETTLES_S, "lamp settles")
         under_lamp = [
-            self.protocol.settings(offers.exposure_at_most(wanted_s))
-            for wanted_s in DAYLIGHT_EXPOSURES_S
+            self.protocol.settings(offers.exposure_at_most(nominal_s))
+            for nominal_s in DAYLIGHT_EXPOSURES_S
         ]
         for settings in under_lamp:
             session.perform(Shoot(FrameRole.DAYLIGHT, settings))
@@ -286,10 +345,10 @@ class DaylightUnit:
 
 
 class Decay(DecaySettings):
-    """The decay protocol; see `decay.yaml` for what each key means."""
+    """Decay protocol; `decay.yaml` is the commented example."""
 
     def units(self) -> Sequence[Unit]:
-        """Darks, metering, the decays, daylight; what is not needed is left out."""
+        """Return darks, metering, decays and daylight, as far as needed."""
         units: list[Unit] = []
         if self.dark == "frames":
             units.append(DarkUnit(self))

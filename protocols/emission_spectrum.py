@@ -1,6 +1,6 @@
 """The emission spectrum: the glow through the LVF at some times after lamp off.
 
-After Nalbach et al., sec. 4.3: it is to be the same at all times, and whatever lamp charged it.
+After Nalbach et al., sec. 4.3, the spectrum is the same at all times, and for every lamp.
 """
 
 from collections.abc import Sequence
@@ -23,17 +23,17 @@ from .steps.patch_names import FilterPatches
 from .steps.sample_pose import check_visible, lights_out
 from .steps.scenes import Arranged, Arrangement, LampKind, PutBackUnit
 
-#: The units' names end with the lamp.
+#: Begin of the units' names, which end with the lamp.
 _AFTER = "spectrum-"
 
 
 def lamp_of(unit: str) -> str:
-    """The lamp that charged in such a unit."""
+    """Return the lamp that charged the sample in such a unit."""
     return unit.removeprefix(_AFTER)
 
 
 class SpectrumFrames(StrEnum):
-    """The glow through the filter, and the lit card."""
+    """Roles of frames of the glow through the filter, and of the lit card."""
 
     GLOW = "spectrum"
     WHITE = "white"
@@ -45,14 +45,36 @@ Time = Annotated[DurationS, Field(gt=0)]
 WHITE_EXPOSURES_S = (1 / 1024, 1 / 256, 1 / 64, 1 / 16, 1 / 4)
 WHITES_PER_EXPOSURE = 2
 
-#: Why a person arranges what.
+#: Reasons for the arrangements.
 THROUGH_IT = "the glow is photographed through it"
 OTHER_LAMP = "the glow is to have the same colour whatever lamp charged it"
 WHITE = "it tells what the camera's curves are off by"
 
 
 class EmissionSpectrum(GlowSettings):
-    """The protocol; see `emission_spectrum.yaml` for what each key means."""
+    """Settings of an emission spectrum; `emission_spectrum.yaml` is the commented example.
+
+    Attributes
+    ----------
+    camera
+        Sensitivity and aperture of the camera.
+    times
+        Begin of each photograph after lamp off, rising, for example `[2 s, 10 s]`. The spectrum is
+        to be the same at all of them (Nalbach et al., fig. 6), which is tested.
+    lamps
+        Lamps to charge with, one after the other: `halogen`, `mercury` or both. Whether the
+        spectrum depends on them is tested.
+    white
+        Whether a grey card under the halogen lamp is photographed through the same filter, which
+        corrects most of the error of camera curves from another laboratory.
+    region
+        Region of the frame in which the linear variable filter is to be seen, for metering only:
+        `[x, y, width, height]` in pixels, or all four as fractions of the frame.
+    patches
+        Rows of several materials seen through the filter, by name: `[x, y, width, height]`, one
+        above the other, each as long as the filter. They take the place of `region`, and each has a
+        spectrum of its own. Default: one material.
+    """
 
     rests_on = (LVF_KIND,)
 
@@ -78,29 +100,32 @@ class EmissionSpectrum(GlowSettings):
 
     @property
     def role(self) -> str:
-        """Of the frames of the glow."""
+        """Role of the frames of the glow."""
         return SpectrumFrames.GLOW
 
     def times_s(self) -> Sequence[float]:
-        """Begin of each frame, seconds after lamp off."""
+        """Return the begin of each frame in seconds after lamp off."""
         return self.times
 
     def regions(self) -> Sequence[Region]:
-        """All that the LVF may fill, or every patch; the brightest decides."""
+        """Return the region of the LVF, or every patch; the brightest decides."""
         return list(self.patches.values()) or [self.region]
 
     def units(self) -> Sequence[Unit]:
-        """Darks, then metering and spectrum for each lamp, the white, and all put back."""
-        stands, now = Arrangement(), Arrangement(lvf="before camera")
-        units: list[Unit] = [Arranged(DarkUnit(self), now, stands, THROUGH_IT)]
+        """Return darks, metering and spectrum for each lamp, white card, the bench put back."""
+        previous, arrangement = Arrangement(), Arrangement(lvf="before camera")
+        units: list[Unit] = [Arranged(DarkUnit(self), arrangement, previous, THROUGH_IT)]
         for lamp in self.lamps:
-            stands, now = now, replace(now, lamp=lamp)
+            previous, arrangement = arrangement, replace(arrangement, lamp=lamp)
             metering = MeterUnit(self, self.charge, f"meter-{lamp}")
-            units += [Arranged(metering, now, stands, OTHER_LAMP), SpectrumUnit(self, lamp)]
+            units += [
+                Arranged(metering, arrangement, previous, OTHER_LAMP),
+                SpectrumUnit(self, lamp),
+            ]
         if self.white:
-            stands, now = now, Arrangement("grey card", "before camera")
-            units.append(Arranged(WhiteUnit(self), now, stands, WHITE))
-        return [*units, PutBackUnit(now)]
+            previous, arrangement = arrangement, Arrangement("grey card", "before camera")
+            units.append(Arranged(WhiteUnit(self), arrangement, previous, WHITE))
+        return [*units, PutBackUnit(arrangement)]
 
 
 @dataclass(frozen=True)
@@ -112,11 +137,11 @@ class SpectrumUnit:
 
     @property
     def name(self) -> str:
-        """`spectrum-halogen`, `spectrum-mercury`."""
+        """Name of the unit: `spectrum-halogen`, `spectrum-mercury`."""
         return f"{_AFTER}{self.lamp}"
 
     def run(self, session: Session) -> None:
-        """Charge, lamp off, a frame at every time."""
+        """Charge, switch the lamp off, take a frame at every time."""
         session.wait_until_warm("camera")
         metering = f"meter-{self.lamp}"
         schedule = metered_schedule(session, self.protocol, metering)
@@ -145,13 +170,13 @@ class WhiteUnit:
     name: str = "white"
 
     def run(self, session: Session) -> None:
-        """Lamp on, a ladder of exposures, lamp off."""
+        """Switch the lamp on, take a ladder of exposures, switch the lamp off."""
         session.wait_until_warm("camera")
         light_card(session)
         offers = session.rig[CAMERA].offers()
-        for wanted_s in WHITE_EXPOSURES_S:
+        for nominal_s in WHITE_EXPOSURES_S:
             shoot = Shoot(
-                SpectrumFrames.WHITE, self.protocol.settings(offers.exposure_at_most(wanted_s))
+                SpectrumFrames.WHITE, self.protocol.settings(offers.exposure_at_most(nominal_s))
             )
             for _ in range(WHITES_PER_EXPOSURE):
                 session.perform(shoot)

@@ -40,36 +40,49 @@ from .steps.sanity_checks import SanityChecks
 
 
 class ExcitationFrames(StrEnum):
-    """The glow after a charge through the filter, and after one by the lamp itself."""
+    """Roles of frames of the glow after a charge through the filter, and by the lamp itself."""
 
     STRIP = "strip"
     DIRECT = "direct"
 
 
 class UnitKind(StrEnum):
-    """Charges through the filter, each twice as long; those that tell most; those without it."""
+    """Kinds of charges: doubling ones through the filter, most informative ones, direct ones."""
 
     STRIP = "strip"
     REFINE = "refine"
     DIRECT = "direct"
 
     def numbered(self, number: int) -> str:
-        """The name of a unit of this kind."""
+        """Return the name of a unit of this kind."""
         return f"{self}-{number}"
 
     def has(self, unit: str) -> bool:
-        """Whether a unit is of this kind."""
+        """Return whether a unit is of this kind."""
         return unit.rpartition("-")[0] == self
 
 
-#: Each pause between two frames is longer than the one before by this factor.
+#: Factor by which each pause between two frames is longer than the one before.
 PAUSES_GROW = 1.25
 #: Places along each patch, for metering and for choosing charge times.
 PLACES = 12
 
 
 class Rest(BaseModel):
-    """Darkness between two charges: at least and at most so long, until the glow is that low."""
+    """Rest in the dark between two charges, until the sample hardly glows.
+
+    Attributes
+    ----------
+    below
+        Glow, as a fraction of that just after the last charge, below which the next charge begins,
+        for example `2 %`.
+    at_least
+        Shortest rest, for example `1 min`.
+    check_every
+        Time between two photographs that check the glow, for example `3 min`.
+    at_most
+        Longest rest, for example `15 min`. The glow that is left is measured and accounted for.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -86,7 +99,56 @@ class Rest(BaseModel):
 
 
 class ExcitationSettings(ProtocolModel):
-    """The keys; see `excitation.yaml` for what each means."""
+    """Settings of excitation rates; `excitation.yaml` is the commented example.
+
+    Attributes
+    ----------
+    first_charge
+        Duration of the first charge through the variable filter, for example `8 s`. Each next one
+        is twice as long.
+    growth
+        Growth of the glow from one charge to the next, as a fraction, below which charges are not
+        doubled any more, for example `3 %`.
+    at_most
+        Largest number of charges that double.
+    refine
+        Number of charges after those, of durations that add most information on the rates.
+    direct
+        Durations of the charges by the lamp itself, without the filter, rising, for example
+        `[3 s, 1 min]`. They determine the level of the charge; the shortest ones, that of states
+        that decay within seconds.
+    first
+        Time from lamp off to the first photograph, for example `1 s`. A trap door must be open by
+        then.
+    every
+        Time between the begins of the first two photographs after a charge, for example `4 s`. Each
+        further one is a quarter longer.
+    duration
+        Time after lamp off until which photographs begin, for example `90 s`.
+    last_decay
+        Time after lamp off until which photographs begin after the last charge, which has the
+        longest decay, for example `180 s`.
+    rest
+        Rest in the dark between two charges.
+    samples
+        Number of samples at hand. With more than one, a fresh sample is put in for every charge,
+        instead of a rest.
+    camera
+        Sensitivity and aperture of the camera.
+    sites
+        Place of the filter on the sample in the frame: `[x, y, width, height]` in pixels, or all
+        four as fractions of the frame. Only exposures and charge times depend on it; the fit uses
+        the place that `lvf_calibration` measured.
+    patches
+        Rows of several materials below the filter, by name: `[x, y, width, height]`, one above the
+        other, each as long as the filter. They take the place of `sites`, and each has a material
+        file of its own. Default: one material.
+    states
+        Number of excited states to fit: 1, 2 or 3; `auto` chooses it from the data.
+    saturated
+        Whether the longest charge is taken for a full one, r(0) = 1, as in the paper. If not, r(0)
+        is fitted to the data.
+    """
 
     rate_frames = tuple(ExcitationFrames)
     rests_on = (IRRADIANCE_KIND,)
@@ -121,11 +183,11 @@ class ExcitationSettings(ProtocolModel):
         return self
 
     def doubled_s(self, number: int) -> float:
-        """The charge of that number, from 1, while they double."""
+        """Return the duration of the doubling charge of that number, from 1, in seconds."""
         return self.first_charge * 2.0 ** (number - 1)
 
     def frame_times_s(self, lasting_s: float) -> list[float]:
-        """Planned begin of each frame after lamp off."""
+        """Return the planned begin of each frame in seconds after lamp off."""
         times_s, pause_s = [self.first], self.every
         while times_s[-1] + pause_s <= lasting_s:
             times_s.append(times_s[-1] + pause_s)
@@ -133,9 +195,9 @@ class ExcitationSettings(ProtocolModel):
         return times_s
 
     def longest_exposures_s(self, offers: CameraOffers, lasting_s: float) -> list[float]:
-        """Longest offered shutter time of each frame; the last one has the time of the one before.
+        """Return the longest offered shutter time of each frame; the last two are alike.
 
-        A camera must be ready again before the next.
+        A camera must be ready again before the next frame.
         """
         times_s = self.frame_times_s(lasting_s)
         pauses_s = [later - earlier for earlier, later in pairwise(times_s)]
@@ -143,15 +205,15 @@ class ExcitationSettings(ProtocolModel):
         return [offers.exposure_at_most(pause_s - spare_s) for pause_s in (*pauses_s, pauses_s[-1])]
 
     def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
+        """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
-        """Shutter time of each dark frame."""
+        """Return the shutter time of each dark frame in seconds."""
         return dark_exposures_s(max(self.longest_exposures_s(offers, self.last_decay)), offers)
 
     def ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
-        """Begin after lamp off and shutter time of each metering frame."""
+        """Return begin after lamp off and shutter time of each metering frame."""
         longest_s = max(self.longest_exposures_s(offers, self.duration))
         at_s, ladder = self.first, []
         for fraction in (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1):
@@ -161,11 +223,11 @@ class ExcitationSettings(ProtocolModel):
         return ladder
 
     def regions(self) -> list[Region]:
-        """Where a glow is to be seen: every patch, or the strip on the sample."""
+        """Return the regions of the glow: every patch, or the strip on the sample."""
         return list(self.patches.values()) or [self.sites]
 
     def strip(self) -> list[Region]:
-        """Places along each of the regions, those of one after those of another."""
+        """Return places along each of the regions, region by region."""
         return [
             (x + width * k / PLACES, y, width / PLACES, height)
             for x, y, width, height in self.regions()
@@ -192,24 +254,24 @@ FRESH = ManualStep(
 
 @dataclass(frozen=True)
 class ExcitationUnit:
-    """What all units share."""
+    """Common part of all units."""
 
     protocol: ExcitationSettings
     frame_cache: FrameCache
 
     def darks(self, session: Session) -> list[MeteringFrame]:
-        """One dark frame of each shutter time."""
+        """Return one measured dark frame of each shutter time."""
         frames = {frame.exposure_s: frame for frame in session.frames(FrameRole.DARK)}
         return [self.frame_cache.measure_frame(frame) for frame in frames.values()]
 
     def rates(self, frame: FrameRecord, darks: Sequence[MeteringFrame]) -> FloatArray:
-        """(patches, places) along the strip, brightest channel above darkness, DN/s."""
-        seen = self.frame_cache.measure_frame(frame)
-        above = levels(seen) - dark_level(darks, frame.exposure_s)
-        return np.asarray(above.max(axis=1) / frame.exposure_s).reshape(-1, PLACES)
+        """Return the brightest channel's rate along the strip in DN/s, shape (patches, places)."""
+        measured = self.frame_cache.measure_frame(frame)
+        above_dark_dn = levels(measured) - dark_level(darks, frame.exposure_s)
+        return np.asarray(above_dark_dn.max(axis=1) / frame.exposure_s).reshape(-1, PLACES)
 
     def rest(self, session: Session) -> None:
-        """Darkness until hardly anything glows, or another sample."""
+        """Wait in the dark until the sample hardly glows, or have another sample put in."""
         rule = self.protocol.rest
         if self.protocol.samples > 1:
             session.ask(FRESH)
@@ -225,14 +287,14 @@ class ExcitationUnit:
             session.perform(look_now)
             face_lamp(session)
             dark = session.choose("dark again", lambda: self._is_dark(session), worst=False)
-            left_s = rule.at_most - rested_s
-            if dark or left_s <= 0:
+            remaining_s = rule.at_most - rested_s
+            if dark or remaining_s <= 0:
                 return
-            session.wait(min(rule.check_every, left_s), "resting in the dark")
+            session.wait(min(rule.check_every, remaining_s), "resting in the dark")
             rested_s += rule.check_every
 
     def _is_dark(self, session: Session) -> bool:
-        """Whether the glow of every patch is low against that just after the last charge."""
+        """Return whether the glow of every patch is low against that after the last charge."""
         frames = [
             *session.frames(ExcitationFrames.STRIP),
             *session.frames(ExcitationFrames.DIRECT),
@@ -240,20 +302,20 @@ class ExcitationUnit:
         ]
         darks = self.darks(session)
         last_unit = max(frames, key=lambda frame: frame.start_time).unit
-        after = [frame for frame in frames if frame.unit == last_unit]
-        brightest = np.max([self.rates(frame, darks).max(axis=1) for frame in after], axis=0)
-        now = self.rates(session.frames(FrameRole.REST)[-1], darks).max(axis=1)
-        return bool((now < self.protocol.rest.below * brightest).all())
+        last_frames = [frame for frame in frames if frame.unit == last_unit]
+        brightest = np.max([self.rates(frame, darks).max(axis=1) for frame in last_frames], axis=0)
+        present = self.rates(session.frames(FrameRole.REST)[-1], darks).max(axis=1)
+        return bool((present < self.protocol.rest.below * brightest).all())
 
 
 @dataclass(frozen=True)
 class DarkUnit(ExcitationUnit):
-    """Dark frames at the exposures to come, before anything glows."""
+    """Dark frames at the later exposures, before anything glows."""
 
     name: str = "dark"
 
     def run(self, session: Session) -> None:
-        """Warm the camera up, then photograph darkness."""
+        """Warm the camera up, then photograph in the dark."""
         session.wait_until_warm("camera")
         offers, regions = session.rig[CAMERA].offers(), self.protocol.regions()
         exposures_s = self.protocol.dark_exposures_s(offers)
@@ -264,8 +326,8 @@ class DarkUnit(ExcitationUnit):
 
 
 @dataclass(frozen=True)
-class _Meter(ExcitationUnit):
-    """A charge whose glow says how long to expose."""
+class _MeterUnit(ExcitationUnit):
+    """A charge whose glow determines the exposures."""
 
     def _meter(self, session: Session, unit: str, hand: ManualStep, charge_s: float) -> None:
         session.wait_until_warm("camera")
@@ -287,36 +349,36 @@ class _Meter(ExcitationUnit):
 
 
 @dataclass(frozen=True)
-class StripMeter(_Meter):
-    """Through the variable filter."""
+class StripMeter(_MeterUnit):
+    """Metering charge through the variable filter."""
 
     name: str = "strip-meter"
 
     def run(self, session: Session) -> None:
-        """Lay the filter on, charge, a ladder of exposures."""
+        """Lay the filter on, charge, take a ladder of exposures."""
         self._meter(session, self.name, LVF_ON, self.protocol.first_charge)
 
 
 @dataclass(frozen=True)
-class DirectMeter(_Meter):
-    """Without the filter."""
+class DirectMeter(_MeterUnit):
+    """Metering charge without the filter."""
 
     name: str = "direct-meter"
 
     def run(self, session: Session) -> None:
-        """Take the filter away, charge, a ladder of exposures."""
+        """Take the filter away, charge, take a ladder of exposures."""
         self.rest(session)
         self._meter(session, self.name, LVF_AWAY, self.protocol.direct[0])
 
 
-#: Frames of a charge are made for it to glow at most this much brighter than the one looked at.
+#: Largest expected ratio of the glow to that of the reference charge, for exposures.
 HEADROOM = 2.0
-#: A growing exposure saves counts late in a decay.
+#: Largest ratio of a shutter time to the first one, which keeps counts late in a decay.
 EXPOSURES_GROW = 16.0
 
 
 @dataclass(frozen=True)
-class _Charged(ExcitationUnit):
+class _ChargeUnit(ExcitationUnit):
     """One charge and the decay after it."""
 
     def _charge(self, session: Session, role: str, charge_s: float, lasting_s: float) -> None:
@@ -339,73 +401,75 @@ class _Charged(ExcitationUnit):
         )
 
     def _schedule(self, session: Session, role: str, charge_s: float, lasting_s: float) -> Schedule:
-        """Exposures by what was seen after the longest charge like this one, else by the meter."""
+        """Return exposures that follow from the longest similar charge, else from the metering."""
         protocol, offers = self.protocol, session.rig[CAMERA].offers()
         times_s = protocol.frame_times_s(lasting_s)
         longest_s = max(protocol.longest_exposures_s(offers, lasting_s))
 
         def decide() -> Schedule:
-            looked_s, frames = self._looked_at(session, role)
-            found = DecayMeter(
+            reference_s, frames = self._reference_charge(session, role)
+            schedule = DecayMeter(
                 [self.frame_cache.measure_frame(frame) for frame in frames]
             ).schedule(times_s, offers, longest_s, EXPOSURES_GROW, session.warn)
-            shorter = max(charge_s / looked_s / HEADROOM, 1.0)
-            exposures_s = [offers.exposure_at_most(one_s / shorter) for one_s in found.exposures_s]
-            return Schedule(found.times_s, tuple(exposures_s))
+            shorter = max(charge_s / reference_s / HEADROOM, 1.0)
+            exposures_s = [
+                offers.exposure_at_most(exposure_s / shorter) for exposure_s in schedule.exposures_s
+            ]
+            return Schedule(schedule.times_s, tuple(exposures_s))
 
         return session.choose("exposure", decide, Schedule.constant(times_s, longest_s))
 
-    def _looked_at(self, session: Session, role: str) -> tuple[float, list[FrameRecord]]:
-        """Charge time and frames of the longest charge of the kind."""
-        done = self._done(session, role)
-        if done:
-            return max(done, key=lambda one: one[0])
+    def _reference_charge(self, session: Session, role: str) -> tuple[float, list[FrameRecord]]:
+        """Return charge time and frames of the longest charge of the kind."""
+        charges = self._charges_so_far(session, role)
+        if charges:
+            return max(charges, key=lambda charge: charge[0])
         meter = f"{role}-meter"
-        return _lit_s(session, meter), [
-            f for f in session.frames(FrameRole.METER) if f.unit == meter
+        return _lamp_on_s(session, meter), [
+            frame for frame in session.frames(FrameRole.METER) if frame.unit == meter
         ]
 
-    def _done(self, session: Session, role: str) -> list[tuple[float, list[FrameRecord]]]:
-        """Charge time and frames of every charge of the kind so far."""
+    def _charges_so_far(self, session: Session, role: str) -> list[tuple[float, list[FrameRecord]]]:
+        """Return charge time and frames of every charge of the kind so far."""
         units: dict[str, list[FrameRecord]] = {}
         for frame in session.frames(role):
             units.setdefault(frame.unit, []).append(frame)
-        return [(_lit_s(session, unit), frames) for unit, frames in units.items()]
+        return [(_lamp_on_s(session, unit), frames) for unit, frames in units.items()]
 
-    def _grown(
-        self, session: Session, done: Sequence[tuple[float, list[FrameRecord]]]
+    def _glow_by_charge(
+        self, session: Session, charges: Sequence[tuple[float, list[FrameRecord]]]
     ) -> tuple[list[float], FloatArray]:
-        """Charge times, and the glow of every place in the first frame after each."""
+        """Return the charge times, and the glow of every place in the first frame after each."""
         darks = self.darks(session)
-        return [one[0] for one in done], np.array(
-            [self.rates(frames[0], darks) for _, frames in done]
+        return [charge_s for charge_s, _ in charges], np.array(
+            [self.rates(frames[0], darks) for _, frames in charges]
         )
 
 
-def _lit_s(session: Session, unit: str) -> float:
-    """For how long the lamp shone in a unit."""
+def _lamp_on_s(session: Session, unit: str) -> float:
+    """Return the time for which the lamp shone in a unit, in seconds."""
     times_s = [action.start_time for action in session.actions("lamp") if action.unit == unit]
     return times_s[1] - times_s[0]
 
 
 @dataclass(frozen=True)
-class DoublingUnit(_Charged):
-    """Through the filter, twice as long as the one before, unless the glow has stopped growing."""
+class DoublingUnit(_ChargeUnit):
+    """Charge through the filter, twice as long as the last, unless the glow has stopped growing."""
 
     number: int
 
     @property
     def name(self) -> str:
-        """`strip-1`, `strip-2`, …"""
+        """Name of the unit: `strip-1`, `strip-2`, …"""
         return UnitKind.STRIP.numbered(self.number)
 
     def run(self, session: Session) -> None:
-        """Charge and photograph, or find that it is enough."""
+        """Charge and photograph, unless the glow has stopped growing."""
 
         def grows() -> bool:
-            done = self._done(session, ExcitationFrames.STRIP)
-            return len(done) == self.number - 1 and still_grows(
-                self._grown(session, done)[1], self.protocol.growth
+            charges = self._charges_so_far(session, ExcitationFrames.STRIP)
+            return len(charges) == self.number - 1 and still_grows(
+                self._glow_by_charge(session, charges)[1], self.protocol.growth
             )
 
         if self.number > 2 and not session.choose("the glow still grows", grows, worst=True):
@@ -416,14 +480,14 @@ class DoublingUnit(_Charged):
 
 
 @dataclass(frozen=True)
-class RefiningUnit(_Charged):
-    """Through the filter, for as long as tells most."""
+class RefiningUnit(_ChargeUnit):
+    """Charge through the filter, of the most informative duration."""
 
     number: int
 
     @property
     def name(self) -> str:
-        """`refine-1`, `refine-2`, …"""
+        """Name of the unit: `refine-1`, `refine-2`, …"""
         return UnitKind.REFINE.numbered(self.number)
 
     def run(self, session: Session) -> None:
@@ -432,7 +496,9 @@ class RefiningUnit(_Charged):
 
         def decide() -> float:
             return most_informative_s(
-                *self._grown(session, self._done(session, ExcitationFrames.STRIP))
+                *self._glow_by_charge(
+                    session, self._charges_so_far(session, ExcitationFrames.STRIP)
+                )
             )
 
         worst_s = self.protocol.doubled_s(self.protocol.at_most)
@@ -441,14 +507,14 @@ class RefiningUnit(_Charged):
 
 
 @dataclass(frozen=True)
-class DirectUnit(_Charged):
-    """Under the lamp itself; after the last one, a longer decay."""
+class DirectUnit(_ChargeUnit):
+    """Charge by the lamp itself; after the last one, a longer decay."""
 
     number: int
 
     @property
     def name(self) -> str:
-        """`direct-1`, `direct-2`, …"""
+        """Name of the unit: `direct-1`, `direct-2`, …"""
         return UnitKind.DIRECT.numbered(self.number)
 
     def run(self, session: Session) -> None:
@@ -461,10 +527,10 @@ class DirectUnit(_Charged):
 
 
 class Excitation(ExcitationSettings):
-    """The excitation protocol; see `excitation.yaml` for what each key means."""
+    """Excitation protocol; `excitation.yaml` is the commented example."""
 
     def units(self) -> Sequence[Unit]:
-        """Darks; a metered charge and all others through the filter; the same without it."""
+        """Return darks, then metering and charges through the filter, then the same without it."""
         frame_cache = FrameCache(self.strip())
         return [
             DarkUnit(self, frame_cache),

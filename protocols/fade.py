@@ -1,8 +1,8 @@
-"""How the lamp goes dark after switching off, and how it comes on, from photographs of a card.
+"""Turn-off and turn-on transients of the lamp, from photographs of a card.
 
-A shutter opens a while after the switch, another while in every photograph. What it still sees of
-the fade is over in a second, so that every photograph holds all that is left of it. The steady lamp
-is photographed before each. (Nalbach et al., section 4.6, give 320 ms until the lamp is dark.)
+The shutter opens with another delay after the switch in every photograph. The rest of the fade is
+over in a second, so that every photograph contains all of it. The steady lamp is photographed
+before each. (Nalbach et al., section 4.6, give 320 ms until the lamp is dark.)
 """
 
 import math
@@ -36,7 +36,7 @@ from .steps.scenes import Arrangement, PutBackUnit
 
 
 class LampFrames(StrEnum):
-    """The card under the steady lamp, after it was switched off or on, and while it warms."""
+    """Roles of frames of the card: steady lamp, after switching off, after on, during warm-up."""
 
     STEADY = "steady"
     FADE = "fade"
@@ -44,7 +44,7 @@ class LampFrames(StrEnum):
     WARMING = "warming"
 
 
-#: What is photographed after a switch.
+#: Roles of frames after a switch.
 SWITCHED = LampFrames.FADE, LampFrames.RISE
 
 LVF = ManualStep(
@@ -52,9 +52,9 @@ LVF = ManualStep(
     "lvf before camera",
 )  # fmt: skip
 LVF_AWAY = ManualStep("take the variable filter away", "it is not needed any more", "lvf away")
-#: No lamp fades more slowly than to 1/e in this: photographs of the fade clip at no delay.
+#: Slowest fade of a lamp to 1/e, with which photographs clip at no delay.
 SLOWEST_S = 0.09
-#: A filament is steady, or cold, after this.
+#: Time after which a filament is steady, or cold.
 STEADY_S = 4.0
 #: How long a lamp's housing cools before it is watched, when from switching on it is photographed,
 #: how often each time, and how far apart: the last per cents of light come with the housing.
@@ -64,7 +64,40 @@ WARMING_SHOTS, WARMING_EVERY_S = 4, 2.0
 
 
 class Fade(ProtocolModel):
-    """See `fade.yaml` for what each key means."""
+    """Settings of a fade; `fade.yaml` is the commented example.
+
+    Attributes
+    ----------
+    camera
+        Sensitivity and aperture of the camera. A halogen lamp on mains fills the range within a few
+        milliseconds at the default.
+    every
+        Step of the delay from the switch to the release of the shutter, for example `30 ms`.
+    until
+        Longest delay, by which the lamp is dark, for example `450 ms`; at least four times `every`.
+    passes
+        Number of passes through all delays, each a part of a step later than the one before.
+    longest
+        Longest exposure of the fade, which should contain all that is left of it, for example
+        `1 s`.
+    rise
+        Whether the rise after switching on is measured, too.
+    repeat_late
+        Number of times that a delay is photographed again if something began late. The late
+        photograph is kept, with its actual times.
+    warming
+        Whether the warm-up of the lamp's housing is recorded, which takes 20 minutes. Short charges
+        are known to a part of the last per cents of light by it.
+    through_lvf
+        Whether the lamp is seen band by band through a calibrated variable filter before the
+        camera. If not, the camera's three channels are used and the lamp is taken for a black-body
+        emitter.
+    card
+        Place of the lit grey card in the frame: `[x, y, width, height]` in pixels, or all four as
+        fractions of the frame.
+    bands
+        Edges of the wavelength bands in nm, rising.
+    """
 
     protocol: Literal["fade"] = "fade"
     camera: CameraSettings = CameraSettings(iso=400, f_number=4.0)
@@ -91,25 +124,25 @@ class Fade(ProtocolModel):
         return self
 
     def settings(self) -> ExposureSettings:
-        """The reference; its shutter time is to be metered."""
+        """Return the reference settings, whose shutter time is to be metered."""
         return ExposureSettings(1.0, self.camera.iso, self.camera.f_number)
 
     def delays_s(self, number: int) -> list[float]:
-        """From the switch to the release in one pass; each pass begins a little later."""
+        """Return the delays from the switch to the release in one pass; each pass begins later."""
         first_s = number / self.passes * self.every
         return frame_times_s(first_s, self.every, self.until)
 
     def fade_exposure_s(self, delay_s: float, light: CardLight, offers: CameraOffers) -> float:
-        """Longest shutter time in which even a slowly fading lamp fills no more than its share."""
+        """Return the longest shutter time in which even a slowly fading lamp does not clip."""
         steady_s = light.exposure_s(HALF, self.settings())
-        left_s = SLOWEST_S * math.exp(-delay_s / SLOWEST_S)
-        if left_s <= steady_s:
+        remaining_s = SLOWEST_S * math.exp(-delay_s / SLOWEST_S)
+        if remaining_s <= steady_s:
             return offers.exposure_at_most(self.longest)
-        filled_s = -SLOWEST_S * math.log1p(-steady_s / left_s)
+        filled_s = -SLOWEST_S * math.log1p(-steady_s / remaining_s)
         return offers.exposure_at_most(min(filled_s, self.longest))
 
     def units(self) -> Sequence[Unit]:
-        """Darks, metering, passes over all delays, the bench as it was."""
+        """Return darks, metering, passes over all delays, and the bench put back."""
         reference = self.settings()
         filter_in = [ByHandUnit("lvf-in", LVF)] if self.through_lvf else []
         filter_away = [ByHandUnit("lvf-away", LVF_AWAY)] if self.through_lvf else []
@@ -126,13 +159,13 @@ class Fade(ProtocolModel):
 
 @dataclass(frozen=True)
 class ByHandUnit:
-    """One thing that is done by hand."""
+    """One manual step."""
 
     name: str
     step: ManualStep
 
     def run(self, session: Session) -> None:
-        """Have it done."""
+        """Ask for the manual step."""
         session.ask(self.step)
 
 
@@ -145,11 +178,11 @@ class PassUnit:
 
     @property
     def name(self) -> str:
-        """`pass-1`, `pass-2`, …"""
+        """Name of the unit: `pass-1`, `pass-2`, …"""
         return f"pass-{self.number + 1}"
 
     def run(self, session: Session) -> None:
-        """Steady, off and fading, on and rising, and again."""
+        """Photograph the steady lamp, the fade and the rise at every delay."""
         protocol, offers = self.protocol, session.rig[CAMERA].offers()
         session.wait_until_warm("camera")
         light_card(session)
@@ -164,7 +197,7 @@ class PassUnit:
     def _missed(
         self, session: Session, delay_s: float, steady: ExposureSettings, exposure_s: float
     ) -> bool:
-        """Photograph one delay; whether something began late."""
+        """Photograph one delay; return whether something began late."""
         session.perform(Shoot(LampFrames.STEADY, steady))
         fading = Shoot(LampFrames.FADE, replace(steady, exposure_s=exposure_s))
         missed = session.run_sequence([at(0.0, LAMP_OFF), at(delay_s, fading)])
@@ -187,7 +220,7 @@ class WarmingUnit:
     name: str = "warming"
 
     def run(self, session: Session) -> None:
-        """Off until the housing is cold; then on, and more and more seldom looked at."""
+        """Wait until the housing is cold; switch on and photograph with growing pauses."""
         protocol = self.protocol
         session.wait_until_warm("camera")
         light_card(session)

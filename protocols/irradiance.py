@@ -1,4 +1,4 @@
-"""What the lamp does to the sample: by itself, and through the LVF that lies on it.
+"""Irradiance of the lamp at the sample, by itself and through the LVF that lies on it.
 
 The map lamp × LVF at the sample's plane enters excitation rates one to one (Nalbach et al.,
 Practical Capture and Reproduction of Phosphorescent Appearance, sec. 4.6): it is measured.
@@ -21,7 +21,7 @@ from .steps.scenes import Arrangement, Bracketing, PutBackUnit, SceneUnit, Still
 
 
 class CardFrames(StrEnum):
-    """The card under the lamp by itself, and through the filter."""
+    """Roles of frames of the card under the lamp by itself, and through the filter."""
 
     DIRECT = "irradiance-direct"
     THROUGH = "irradiance-through"
@@ -29,14 +29,33 @@ class CardFrames(StrEnum):
 
 Nanometres = Annotated[float, Field(gt=0, allow_inf_nan=False)]
 
-#: Of Table 1 of the paper.
+#: Edges of the bands of Table 1 of the paper.
 BANDS_NM = (400.0, 437.5, 475.0, 512.5, 550.0, 587.5, 625.0, 662.5, 700.0)
 _DIRECT = Arrangement("grey card")
 _THROUGH = Arrangement("grey card", "on sample")
 
 
 class Irradiance(ProtocolModel):
-    """The irradiance protocol; see `irradiance.yaml` for what each key means."""
+    """Settings of an irradiance measurement; `irradiance.yaml` is the commented example.
+
+    Attributes
+    ----------
+    bands_nm
+        Edges of the wavelength bands in nm, rising. The default is that of Table 1 of the paper.
+    vector_length
+        Euclidean length to which the lamp's irradiance, one number for each band, is scaled;
+        excitation rates belong to it. Table 1 of the paper has 1.
+    camera
+        Sensitivity and aperture of the camera.
+    longest
+        Longest exposure, for example `8 s`.
+    repeats
+        Number of photographs at each of two exposures of a scene; the longer exposure is for the
+        dim ends of the strip.
+    rounds
+        Number of times that the card is photographed by itself and through the filter in turn,
+        because the lamp drifts.
+    """
 
     rests_on = (LVF_KIND,)
 
@@ -58,21 +77,26 @@ class Irradiance(ProtocolModel):
 
     @property
     def bracketing(self) -> Bracketing:
-        """How the card is photographed."""
+        """Bracketing with which the card is photographed."""
         return Bracketing(self.camera, self.longest, self.repeats)
 
     def units(self) -> Sequence[Unit]:
-        """Darks, then the card by itself and through the LVF in turn: the lamp drifts."""
+        """Return darks, then the card by itself and through the LVF in turn, as the lamp drifts."""
         units: list[SceneUnit] = []
         for number in range(1, self.rounds + 1):
-            before = units[-1].wanted if units else Arrangement()
-            why = "how bright the lamp is by itself"
+            previous = units[-1].wanted if units else Arrangement()
+            reason = "how bright the lamp is by itself"
             units.append(
                 SceneUnit(
-                    self.bracketing, f"direct-{number}", CardFrames.DIRECT, _DIRECT, before, why
+                    self.bracketing,
+                    f"direct-{number}",
+                    CardFrames.DIRECT,
+                    _DIRECT,
+                    previous,
+                    reason,
                 )
             )
-            why = "how much of it the variable filter leaves"
+            reason = "how much of it the variable filter leaves"
             units.append(
                 StripUnit(
                     self.bracketing,
@@ -80,7 +104,7 @@ class Irradiance(ProtocolModel):
                     CardFrames.THROUGH,
                     _THROUGH,
                     _DIRECT,
-                    why,
+                    reason,
                 )
             )
         return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]

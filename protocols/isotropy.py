@@ -1,4 +1,4 @@
-"""Isotropy: the glow seen at several angles, the charge always the same.
+"""Isotropy: the glow at several angles, always after the same charge.
 
 After Nalbach et al., sec. 4: 0° to 80° in 20° steps, the intensity fluctuated by less than 5 %.
 """
@@ -24,7 +24,28 @@ Angle = Annotated[int, Field(ge=-85, le=85)]
 
 
 class Isotropy(GlowSettings):
-    """The protocol; see `isotropy.yaml` for what each key means."""
+    """Settings of an isotropy test; `isotropy.yaml` is the commented example.
+
+    Attributes
+    ----------
+    angles
+        Angles in whole degrees by which the sample is turned against the camera, by hand and in the
+        dark, for example `[20, 40]`. The straight view is photographed before and after all others.
+    first
+        Time from lamp off to the first photograph, for example `60 s`. The sample is turned before
+        it.
+    every
+        Time between the begins of two photographs, for example `10 s`.
+    frames
+        Number of photographs at each angle.
+    patch
+        Position of the patches: `inside` of the sample at every angle, so that its radiance is
+        measured, or `around` all of it with darkness about, so that its intensity is measured and
+        divided by the cosine of the angle.
+    patches
+        Regions of interest by name: `[x, y, width, height]` in pixels, or all four as fractions of
+        the frame.
+    """
 
     protocol: Literal["isotropy"] = "isotropy"
     angles: tuple[Angle, ...] = Field((20, 40, 60, 80), min_length=1)
@@ -45,37 +66,41 @@ class Isotropy(GlowSettings):
 
     @property
     def role(self) -> str:
-        """Of the frames of the glow."""
+        """Role of the frames of the glow."""
         return "isotropy"
 
     def times_s(self) -> Sequence[float]:
-        """Begin of each frame, seconds after lamp off."""
+        """Return the begin of each frame in seconds after lamp off."""
         return [self.first + number * self.every for number in range(self.frames)]
 
     def regions(self) -> Sequence[Region]:
-        """The patches."""
+        """Return the regions of the patches."""
         return list(self.patches.values())
 
     def units(self) -> Sequence[Unit]:
-        """Darks, metering, every angle between two straight views."""
+        """Return darks, metering, and every angle between two straight views."""
         units: list[Unit] = [DarkUnit(self), MeterUnit(self, self.charge)]
-        stands = 0
-        for name, angle in [("before", 0), *((str(a), a) for a in self.angles), ("after", 0)]:
-            units.append(AngleUnit(self, f"angle-{name}", angle, stands))
-            stands = angle
+        previous = 0
+        for name, angle in [
+            ("before", 0),
+            *((str(degrees), degrees) for degrees in self.angles),
+            ("after", 0),
+        ]:
+            units.append(AngleUnit(self, f"angle-{name}", angle, previous))
+            previous = angle
         return units
 
 
 @dataclass(frozen=True)
 class AngleUnit:
-    """One charge, seen straight; then the glow at an angle.
+    """One charge at normal incidence; then the glow at an angle.
 
     Attributes
     ----------
     angle
-        Against the camera's axis, degrees.
+        Angle of the sample against the camera's axis, in degrees.
     stands
-        The angle that the unit before left it at.
+        Angle at which the unit before left the sample, in degrees.
     """
 
     protocol: Isotropy
@@ -84,7 +109,7 @@ class AngleUnit:
     stands: int
 
     def run(self, session: Session) -> None:
-        """Straight, charge, lamp off, turn, photograph."""
+        """Turn straight, charge, switch the lamp off, turn, photograph."""
         session.wait_until_warm("camera")
         schedule = metered_schedule(session, self.protocol, "meter")
         if self.stands:
@@ -94,8 +119,10 @@ class AngleUnit:
         session.run_sequence(lights_out(session))
         if self.angle:
             by = duration_text(self.protocol.first)
-            why = f"the glow is photographed {by} after lamp off, so in the dark and without delay"
-            session.ask(_turn(self.angle, why, TURNING_S))
+            reason = (
+                f"the glow is photographed {by} after lamp off, so in the dark and without delay"
+            )
+            session.ask(_turn(self.angle, reason, TURNING_S))
         first_s = lamp_off_s + self.protocol.first - session.clock.now()
         if first_s < 0:
             session.warn(
@@ -112,7 +139,7 @@ class AngleUnit:
         checks.require_decay(self.protocol.short_settings(session))
 
 
-def _turn(angle: int, why: str, takes_s: float) -> ManualStep:
+def _turn(angle: int, reason: str, duration_s: float) -> ManualStep:
     return ManualStep(
-        f"turn the sample by {angle}° against the camera", why, f"tilt {angle}", takes_s
+        f"turn the sample by {angle}° against the camera", reason, f"tilt {angle}", duration_s
     )

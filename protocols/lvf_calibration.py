@@ -37,7 +37,7 @@ from .steps.scenes import (
 
 
 class LvfFrames(StrEnum):
-    """The card; the strip looked through and on the sample; mercury lines there; their stripes."""
+    """Roles of frames of card, strip before camera and on sample, mercury lines and stripes."""
 
     CARD = "lvf-card"
     FILTER = "lvf-filter"
@@ -47,23 +47,23 @@ class LvfFrames(StrEnum):
     STRIPES = "lvf-stripes"
 
 
-#: What the unit without a colour filter is called by.
+#: Name of the unit without a colour filter.
 NO_FILTER = "none"
 #: Shutter times of the stripes' photographs, as fractions of the longest.
 STRIPES_LADDER = (1 / 512, 1 / 64, 1 / 8, 1)
 
 
 def filter_unit(name: str | None) -> str:
-    """Name of the unit of a colour filter."""
+    """Return the name of the unit of a colour filter."""
     return f"filter-{name or NO_FILTER}"
 
 
 @dataclass(frozen=True)
 class StripUnit(SceneUnit):
-    """The strip under a halogen lamp, looked through or on the sample."""
+    """The strip under a halogen lamp, before the camera or on the sample."""
 
     def check(self, session: Session) -> None:
-        """It has to be seen, whole and straight."""
+        """Check that the strip is visible, whole and straight."""
         session.choose("strip", lambda: self._strip(session), worst="found")
 
     def _strip(self, session: Session) -> str:
@@ -80,16 +80,16 @@ class LinesUnit(SceneUnit):
     Attributes
     ----------
     strip
-        Purpose and unit of the strip under a halogen lamp.
+        Role and unit of the frames of the strip under a halogen lamp.
     rising
-        Whether wavelengths should rise from left to right.
+        Whether wavelengths should rise from left to right; None: either way.
     """
 
     strip: tuple[str, str] = ("", "")
     rising: bool | None = None
 
     def check(self, session: Session) -> None:
-        """Its lines have to be seen, the right way round."""
+        """Check that the mercury lines are visible, the right way round."""
         session.choose("mercury", lambda: self._lines(session), worst="lines found")
 
     def _lines(self, session: Session) -> str:
@@ -103,8 +103,10 @@ class FilterUnit(SceneUnit):
     """A colour filter, seen through the strip."""
 
     def check(self, session: Session) -> None:
-        """Tell at once of a filter that seems not to be in its place."""
-        if session.choose("like the picture before", lambda: self._same(session), worst=False):
+        """Warn of a filter that seems not to be in its place."""
+        if session.choose(
+            "like the picture before", lambda: self._is_like_previous(session), worst=False
+        ):
             session.warn(
                 f"the picture with the colour filter {self.wanted.filter} is like the one before "
                 f"it ({self._unit_before}): take the last step back if the filter is not in its "
@@ -115,24 +117,24 @@ class FilterUnit(SceneUnit):
     def _unit_before(self) -> str:
         return filter_unit(self.before.filter)
 
-    def _same(self, session: Session) -> bool:
+    def _is_like_previous(self, session: Session) -> bool:
         from .steps.strip_checks import look_alike
 
-        before = frames_of(session, self.role, self._unit_before)
+        previous = frames_of(session, self.role, self._unit_before)
         strip = frames_of(session, self.role, filter_unit(None))
-        return look_alike(self.own(session), before, strip)
+        return look_alike(self.own(session), previous, strip)
 
 
 @dataclass(frozen=True)
 class StripesUnit(SceneUnit):
-    """The sample charged by mercury lines through the strip: where they glow, the map is pinned.
+    """The sample charged by mercury lines through the strip, whose glow fixes the map.
 
     Without a trap door the sample is seen where it lies.
 
     Attributes
     ----------
     charge_s
-        For how long.
+        Duration of the charge in seconds.
     """
 
     charge_s: float = 600.0
@@ -158,7 +160,7 @@ _CARD = Arrangement("grey card")
 _ON_SAMPLE = Arrangement("grey card", "on sample")
 _BEFORE_CAMERA = Arrangement("grey card", "before camera")
 
-#: Why a scene is arranged, by the role of its frames.
+#: Reason for a scene's arrangement, by the role of its frames.
 _WHY: dict[str, str] = {
     LvfFrames.CARD: "how bright the card is at every place by itself",
     LvfFrames.STRIP_ON_SAMPLE: "where the filter's strip falls on the sample",
@@ -167,12 +169,40 @@ _WHY: dict[str, str] = {
     LvfFrames.LINES_ON_SAMPLE: "mercury lines tell the wavelength of every place on the sample",
     LvfFrames.STRIPES: "the stripes glow where the camera will see the sample",
 }
-#: Kind and name of a unit, role of its frames, what lies where, and the kind's own keys.
+#: Kind and name of a unit, role of its frames, arrangement, and the kind's own keys.
 _Scene = tuple[type[SceneUnit], str, str, Arrangement, dict[str, Any]]
 
 
 class LvfCalibration(ProtocolModel):
-    """The calibration of an LVF; see `lvf_calibration.yaml` for what each key means."""
+    """Settings of the calibration of an LVF; `lvf_calibration.yaml` is the commented example.
+
+    Attributes
+    ----------
+    rising
+        Whether the wavelength rises from left to right when the camera looks through the filter. A
+        filter the other way round is then refused. Default: either way is accepted.
+    rising_on_sample
+        Whether the wavelength rises from left to right when the filter lies on the sample. A filter
+        the other way round is then refused. Default: either way is accepted.
+    filters
+        Colour filters by the names of their files, for example `[longpass-440, shortpass-620]`: six
+        or more, with edges all over the spectrum. `all` takes those in the rig file's folder of
+        filters, or without one those that labrig ships.
+    camera
+        Sensitivity and aperture of the camera.
+    longest
+        Longest exposure, for example `8 s`.
+    repeats
+        Number of photographs at each of two exposures of a scene; the longer exposure is for the
+        dim ends of the strip.
+    mercury_warm_up
+        Time until the mercury lamp is steady, for example `5 min`. That of the usual lamp stands in
+        the rig file.
+    stripes
+        Time for which the mercury lamp charges the sample through the filter, so that its lines
+        glow as stripes where the camera sees the sample, for example `10 min`. `none` leaves this
+        out.
+    """
 
     protocol: Literal["lvf_calibration"] = "lvf_calibration"
     rising: bool | None = None
@@ -195,26 +225,28 @@ class LvfCalibration(ProtocolModel):
 
     @property
     def bracketing(self) -> Bracketing:
-        """How everything but the stripes is photographed."""
+        """Bracketing of all scenes but the stripes."""
         return Bracketing(self.camera, self.longest, self.repeats)
 
     def filter_names(self) -> tuple[str, ...]:
-        """The colour filters, one after the other; `suited_to` no rig, all are the shipped ones."""
+        """Return the names of the colour filters; before `suited_to`, `all` are those shipped."""
         return tuple(Optics().filter_files()) if self.filters == "all" else self.filters
 
     def suited_to(self, rig: RigFile) -> Self:
-        """With the names of all filters that the rig file has curves of."""
+        """Return the protocol with the names of all filters of which the rig file has curves."""
         if self.filters != "all":
             return self
         return self.model_copy(update={"filters": tuple(rig.optics.filter_files())})
 
     def units(self) -> Sequence[Unit]:
-        """All that can go wrong first: the strip and its lines; then filter by filter."""
+        """Return first what can go wrong, the strip and its lines, then filter by filter."""
         units: list[SceneUnit] = []
-        for kind, name, role, wanted, more in self._scenes():
-            before = units[-1].wanted if units else Arrangement()
-            why, mercury_s = _WHY[role], self.mercury_warm_up
-            units.append(kind(self.bracketing, name, role, wanted, before, why, mercury_s, **more))
+        for kind, name, role, arrangement, keys in self._scenes():
+            previous = units[-1].wanted if units else Arrangement()
+            reason, mercury_s = _WHY[role], self.mercury_warm_up
+            units.append(
+                kind(self.bracketing, name, role, arrangement, previous, reason, mercury_s, **keys)
+            )
         return [StillDarkUnit(self.bracketing), *units, PutBackUnit(units[-1].wanted)]
 
     def _scenes(self) -> Iterator[_Scene]:
@@ -222,15 +254,15 @@ class LvfCalibration(ProtocolModel):
         yield SceneUnit, "card", LvfFrames.CARD, _CARD, {}
         yield StripUnit, "strip-on-sample", strip, _ON_SAMPLE, {}
         yield StripUnit, none, LvfFrames.FILTER, _BEFORE_CAMERA, {}
-        lit = replace(_BEFORE_CAMERA, lamp="mercury")
-        more = {"strip": (LvfFrames.FILTER, none), "rising": self.rising}
-        yield LinesUnit, "lines", LvfFrames.LINES, lit, more
-        lit = replace(_ON_SAMPLE, lamp="mercury")
-        more = {"strip": (strip, "strip-on-sample"), "rising": self.rising_on_sample}
-        yield LinesUnit, "lines-on-sample", LvfFrames.LINES_ON_SAMPLE, lit, more
+        arrangement = replace(_BEFORE_CAMERA, lamp="mercury")
+        keys = {"strip": (LvfFrames.FILTER, none), "rising": self.rising}
+        yield LinesUnit, "lines", LvfFrames.LINES, arrangement, keys
+        arrangement = replace(_ON_SAMPLE, lamp="mercury")
+        keys = {"strip": (strip, "strip-on-sample"), "rising": self.rising_on_sample}
+        yield LinesUnit, "lines-on-sample", LvfFrames.LINES_ON_SAMPLE, arrangement, keys
         if isinstance(self.stripes, float):
-            lit = replace(lit, stage="sample")
-            yield StripesUnit, "stripes", LvfFrames.STRIPES, lit, {"charge_s": self.stripes}
+            arrangement = replace(arrangement, stage="sample")
+            yield StripesUnit, "stripes", LvfFrames.STRIPES, arrangement, {"charge_s": self.stripes}
         for name in self.filter_names():
             yield (
                 FilterUnit,

@@ -1,4 +1,4 @@
-"""All that a phosphor's material file holds, in one afternoon: one protocol after the other.
+"""Measurement of a phosphor's whole material file, by one protocol after the other.
 
 After Nalbach et al., sections 4.2 to 4.7.
 """
@@ -22,7 +22,18 @@ OF_PATCHES = ("emission_spectrum", "decay", "excitation", "saturation")
 
 
 class Phosphor(ProtocolModel):
-    """The chain; see `phosphor.yaml` for what each key means."""
+    """Settings of a chain of protocols; `phosphor.yaml` is the commented example.
+
+    Attributes
+    ----------
+    patches
+        Regions of several materials by name: `[x, y, width, height]` in pixels, or all four as
+        fractions of the frame, one above the other, each as long as the filter. Their results lie
+        in folders of these names. Default: one material.
+    parts
+        Protocols of the chain in order, each written as in a file of its own. `part: NAME` is a
+        name for one of two parts with the same protocol.
+    """
 
     rate_frames = (*ProtocolModel.rate_frames, *ExcitationFrames)
 
@@ -39,26 +50,26 @@ class Phosphor(ProtocolModel):
                 "two alike a 'part:' name of its own"
             )
         folders = {name.casefold() for name in names}
-        if taken := [name for name in self.patches if name.casefold() in folders]:
+        if clashes := [name for name in self.patches if name.casefold() in folders]:
             raise ValueError(
-                f"expected patches that are not called like a part, got '{taken[0]}': both would "
+                f"expected patches that are not called like a part, got '{clashes[0]}': both would "
                 "be that folder of the result"
             )
         return self
 
     def chain(self) -> tuple["Part", ...]:
-        """The protocols in order, each with the sample and the patches of the chain."""
+        """Return the protocols in order, each with the sample and the patches of the chain."""
         return tuple(Part.read(content, self) for content in self.parts)
 
     def patches_of(self, unit: str) -> Mapping[str, Region]:
-        """Those of the part that the unit is of."""
+        """Return the patches of the part to which the unit belongs."""
         for part in self.chain():
-            if (own := unit_within(part.name, unit)) is not None:
-                return part.protocol.patches_of(own)
+            if (part_unit := unit_within(part.name, unit)) is not None:
+                return part.protocol.patches_of(part_unit)
         return self.patches
 
     def suited_to(self, rig: RigFile) -> Self:
-        """With what its parts leave to the rig file filled in."""
+        """Return the chain with the keys filled in that its parts leave to the rig file."""
         parts = [
             content | _changed(part.protocol, part.protocol.suited_to(rig))
             for content, part in zip(self.parts, self.chain(), strict=True)
@@ -66,16 +77,16 @@ class Phosphor(ProtocolModel):
         return self.model_copy(update={"parts": tuple(parts)})
 
     def unmeasured(self, rig: RigFile) -> Sequence[str]:
-        """What neither the rig file names nor an earlier part measures."""
+        """Return the protocols that neither the rig file names nor an earlier part measures."""
         measured: set[str] = set()
         missing: list[str] = []
         for part in self.chain():
-            missing += [one for one in part.protocol.unmeasured(rig) if one not in measured]
+            missing += [name for name in part.protocol.unmeasured(rig) if name not in measured]
             measured.add(part.protocol.protocol)
         return missing
 
     def units(self) -> Sequence[Unit]:
-        """Those of all parts, in order."""
+        """Return the units of all parts, in order."""
         return [
             PartUnit(part.name, unit) for part in self.chain() for unit in part.protocol.units()
         ]
@@ -90,12 +101,12 @@ class Part:
 
     @classmethod
     def read(cls, content: dict[str, Any], chain: Phosphor) -> Self:
-        """A protocol written as in a file of its own.
+        """Return a protocol that is written as in a file of its own.
 
         Raises
         ------
         ValueError
-            It names no protocol that may be a part, or other patches than the chain.
+            The content names no protocol that may be a part, or other patches than the chain.
         """
         keys = dict(content)
         kind = keys.get("protocol")
@@ -104,21 +115,21 @@ class Part:
         name = str(keys.pop("part", kind))
         keys.setdefault("sample", chain.sample.model_dump(exclude_none=True))
         if chain.patches and kind in OF_PATCHES:
-            own = keys.get("patches")
-            if own is None:
+            patches = keys.get("patches")
+            if patches is None:
                 keys["patches"] = chain.patches
-            elif isinstance(own, dict) and set(map(str, own)) != set(chain.patches):
+            elif isinstance(patches, dict) and set(map(str, patches)) != set(chain.patches):
                 raise ValueError(
                     f"part {name}: expected the patches of the chain, {', '.join(chain.patches)}, "
-                    f"got {', '.join(map(str, own)) or 'none'}; leave 'patches:' out of the part, "
-                    "or give them the same names"
+                    f"got {', '.join(map(str, patches)) or 'none'}; leave 'patches:' out of the "
+                    "part, or give them the same names"
                 )
         model = plugins.load(plugins.PROTOCOLS, kind, f"part {name}")
         return cls(name, validate(keys, model, f"part {name}"))
 
 
-def _changed(before: ProtocolModel, after: ProtocolModel) -> dict[str, Any]:
-    """Keys, as written in YAML, that are other after than before."""
-    kept = before.model_dump(mode="json", by_alias=True)
-    now = after.model_dump(mode="json", by_alias=True)
-    return {key: value for key, value in now.items() if value != kept[key]}
+def _changed(original: ProtocolModel, completed: ProtocolModel) -> dict[str, Any]:
+    """Return the keys, as written in YAML, that differ between two protocols."""
+    original_keys = original.model_dump(mode="json", by_alias=True)
+    completed_keys = completed.model_dump(mode="json", by_alias=True)
+    return {key: value for key, value in completed_keys.items() if value != original_keys[key]}

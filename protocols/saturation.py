@@ -1,7 +1,7 @@
 """Saturation: decays after short and long charges, under the lamp and under a weaker light.
 
-Nalbach et al. take r(0) = 1 after a long charge (sec. 4.4). Saturation in time is not saturation
-in level: two irradiances tell the two apart. And the rates are to be the same whatever the charge.
+Nalbach et al. take r(0) = 1 after a long charge (sec. 4.4). Saturation in time is not saturation in
+level: two irradiances distinguish them. And the rates should not depend on the charge.
 """
 
 from collections.abc import Sequence
@@ -23,29 +23,43 @@ from .steps.scenes import Arranged, Arrangement, Prepared
 
 
 class Light(StrEnum):
-    """What charged the sample: the lamp as it is, or weakened."""
+    """Light that charged the sample: the lamp at full or weaker irradiance."""
 
     FULL = "full"
     WEAKER = "weaker"
 
     def numbered(self, number: int) -> str:
-        """The unit of a charge under this light."""
+        """Return the name of the unit of a charge under this light."""
         return f"{self}-{number}"
 
     @classmethod
     def of(cls, unit: str) -> Self:
-        """The light of such a unit."""
+        """Return the light of such a unit."""
         return cls(unit.rpartition("-")[0])
 
 
 Charge = Annotated[DurationS, Field(gt=0)]
 
-#: What depends on what a person does here.
+#: Reason for the manual steps.
 WHY = "saturation in level shows only between two irradiances"
 
 
 class WeakerLight(BaseModel):
-    """How a person weakens the light, by a neutral filter or a distance; how much of it is left."""
+    """Weakening of the light by hand: by a neutral filter or by a distance.
+
+    Attributes
+    ----------
+    filter
+        Name of the neutral filter to put before the lamp, for example `neutral-50`. Either this or
+        `distance` is given.
+    distance
+        Distance from the sample to which the lamp is moved, for example `1.41 m`. Either this or
+        `filter` is given.
+    fraction
+        Fraction of the irradiance that is left, for example `50 %`.
+    fraction_sigma
+        Standard uncertainty of `fraction`, relative to it, for example `2 %`.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -61,21 +75,48 @@ class WeakerLight(BaseModel):
         return self
 
     def begun(self, unit: Unit) -> Unit:
-        """`unit`, the light weakened before it."""
+        """Return `unit` with the light weakened before it."""
         if self.filter is not None:
             return Arranged(unit, Arrangement(filter=self.filter), Arrangement(), WHY)
-        what = f"move the lamp to a distance of {self.distance} from the sample"
-        return Prepared(unit, ManualStep(what, WHY, f"lamp at {self.distance}"))
+        instruction = f"move the lamp to a distance of {self.distance} from the sample"
+        return Prepared(unit, ManualStep(instruction, WHY, f"lamp at {self.distance}"))
 
     def ended(self, unit: Unit) -> Unit:
-        """`unit`, the light as it was before it."""
+        """Return `unit` with the light restored before it."""
         if self.filter is not None:
             return Arranged(unit, Arrangement(), Arrangement(filter=self.filter), WHY)
         return Prepared(unit, ManualStep("move the lamp back", WHY, "lamp back"))
 
 
 class Saturation(ProtocolModel):
-    """The protocol; see `saturation.yaml` for what each key means."""
+    """Settings of a saturation test; `saturation.yaml` is the commented example.
+
+    Attributes
+    ----------
+    charges
+        Durations of the charges, rising, for example `[5 min, 45 min, 90 min]`. The last two show
+        saturation in time; the first one, much shorter, shows rates that depend on the level.
+    weaker
+        Second, weaker irradiance, which saturation in level takes. Default: none, and r(0) remains
+        unknown.
+    every
+        Time between the begins of two photographs, for example `5 s`.
+    duration
+        Time after lamp off until which photographs begin, for example `180 s`.
+    first
+        Time from lamp off to the first photograph, for example `800 ms`. A trap door must be open
+        by then.
+    camera
+        Sensitivity and aperture of the camera.
+    exposure
+        Shutter time of all photographs, for example `1 s`. `auto` meters a short charge first, so
+        that nothing clips.
+    patches
+        Regions of interest by name: `[x, y, width, height]` in pixels, or all four as fractions of
+        the frame.
+    states
+        Number of excited states to fit: 1, 2 or 3; `auto` chooses it from the data.
+    """
 
     protocol: Literal["saturation"] = "saturation"
     charges: tuple[Charge, ...] = Field((300.0, 2700.0, 5400.0), min_length=2)
@@ -100,7 +141,7 @@ class Saturation(ProtocolModel):
         return self
 
     def units(self) -> Sequence[Unit]:
-        """Darks, then metering and decays, weaker light first: each begins with less glow left."""
+        """Return darks, then metering and decays, weaker light first: each leaves less glow."""
         dark, full = DarkUnit(self._decay(self.charges[0])), self._decays(Light.FULL)
         if self.weaker is None:
             return [dark, *full]
@@ -125,7 +166,7 @@ class Saturation(ProtocolModel):
         return decays
 
     def _decay(self, charge_s: float) -> Decay:
-        """One of the decays as a protocol of its own."""
+        """Return one of the decays as a protocol of its own."""
         exposure = self.exposure if isinstance(self.exposure, str) else f"{self.exposure!r} s"
         return Decay.model_validate(
             {

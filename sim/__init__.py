@@ -1,4 +1,4 @@
-"""The simulated dark room: physics of its own, and boards that speak the real protocols."""
+"""The simulated dark room: independent physics, and boards that use the real protocols."""
 
 if __name__ != "labrig.sim":
     raise ImportError("this package is labrig.sim; import it by that name")

@@ -1,4 +1,4 @@
-"""What the room looks like through the viewfinder: quick, small and developed for the eye."""
+"""Live view of the room: quick, small and developed for display."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -27,23 +27,24 @@ GRAIN_SEED = 20
 
 
 def live_stride(height: int, width: int) -> int:
-    """Every how many Bayer cells a live picture takes one."""
+    """Return the step in Bayer cells between two pixels of a live picture."""
     return max(1, round(max(height, width) / 2 / LIVE_PIXELS + 0.499))
 
 
 def developed(electrons: FloatArray, rng: np.random.Generator) -> NDArray[np.uint8]:
-    """A live picture as a camera shows it.
+    """Return a live picture as a camera shows it.
 
     Parameters
     ----------
     electrons : ndarray, shape (height, width, 3)
-        Expected photo-electrons: R, G, B.
+        Expected photo-electrons of R, G, B.
     rng
-        Of this picture alone.
+        Random generator of this picture alone.
 
     Returns
     -------
-    ndarray of uint8, same shape
+    ndarray of uint8, shape (height, width, 3)
+        Picture for a display.
     """
     grain = np.random.default_rng(GRAIN_SEED).standard_normal(electrons.shape[:2])
     brightest = float(np.percentile(electrons, METERED_PERCENTILE))
@@ -54,7 +55,7 @@ def developed(electrons: FloatArray, rng: np.random.Generator) -> NDArray[np.uin
     light += scatter * rng.standard_normal(light.shape, dtype=np.float32)
     # The camera's own white balance, roughly: green counts most.
     balanced = light * np.array([1.9, 1.0, 1.6]) / WHITE_ELECTRONS
-    shown: NDArray[np.uint8] = np.clip(
+    picture: NDArray[np.uint8] = np.clip(
         255.0 * np.clip(balanced, 0.0, 1.0) ** (1 / 2.2) + 0.5, 0, 255
     ).astype(np.uint8)
-    return shown
+    return picture

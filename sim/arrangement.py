@@ -1,4 +1,4 @@
-"""What the changer has arranged on the bench, and since when."""
+"""Arrangements of the bench by the changer, and their times."""
 
 from bisect import bisect_right
 from collections.abc import Iterator
@@ -21,20 +21,20 @@ class Arrangement:
     Attributes
     ----------
     card
-        What lies there. `blank` is in the samples' place; grey card and ColorChecker lie on the
-        closed door's outside, or without a door on the samples.
+        Object that is laid out. `blank` is in the samples' place; grey card and ColorChecker lie on
+        the closed door's outside, or without a door on the samples.
     lvf
-        Where the linear variable filter is.
+        Place of the linear variable filter.
     turned
-        Whether it was put there the wrong way round.
+        Whether the filter was put there the wrong way round.
     filter
-        The colour filter before the lamp.
+        Name of the colour filter before the lamp.
     lamp
-        Which one the relay feeds.
+        Lamp that the relay feeds.
     lamp_m
-        Its distance from the sample.
+        Distance of the lamp from the sample in metres.
     tilt_deg
-        Of the sample against the camera's axis.
+        Angle of the sample against the camera's axis in degrees.
     """
 
     card: Card = "sample"
@@ -53,9 +53,9 @@ class Arrangements:
     Attributes
     ----------
     since_s
-        When each began on the room's clock, rising, the first at 0.
+        Begin of each state on the room's clock in seconds, rising, the first at 0.
     states
-        As many.
+        State of the bench since each of these times.
     """
 
     since_s: tuple[float, ...] = (0.0,)
@@ -63,24 +63,24 @@ class Arrangements:
 
     @property
     def last(self) -> Arrangement:
-        """As it is now."""
+        """Present state of the bench."""
         return self.states[-1]
 
     def changed(self, now_s: float, **what: Any) -> "Arrangements":
-        """With one more change, of those fields of an `Arrangement`."""
-        after = replace(self.last, **what)
-        if after == self.last:
+        """Return the arrangements with one more change, of those fields of an `Arrangement`."""
+        changed = replace(self.last, **what)
+        if changed == self.last:
             return self
         if now_s <= self.since_s[-1]:
-            return Arrangements(self.since_s, (*self.states[:-1], after))
-        return Arrangements((*self.since_s, now_s), (*self.states, after))
+            return Arrangements(self.since_s, (*self.states[:-1], changed))
+        return Arrangements((*self.since_s, now_s), (*self.states, changed))
 
     def at(self, time_s: float) -> Arrangement:
-        """The state at a time; from the moment of a change on it is the new one."""
+        """Return the state at a time; from the moment of a change on it is the new one."""
         return self.states[bisect_right(self.since_s, time_s) - 1]
 
     def spans(self, start_s: float, end_s: float) -> Iterator[tuple[float, float, Arrangement]]:
-        """Beginning, end and state of every part of an interval in which nothing changes."""
+        """Yield begin, end and state of every part of an interval in which nothing changes."""
         changes = [time_s for time_s in self.since_s if start_s < time_s < end_s]
-        for left, right in pairwise([start_s, *changes, end_s]):
-            yield left, right, self.at(left)
+        for begin_s, stop_s in pairwise([start_s, *changes, end_s]):
+            yield begin_s, stop_s, self.at(begin_s)

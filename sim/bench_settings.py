@@ -1,4 +1,4 @@
-"""What stands between lamp, sample and camera, as a rig file's `simulation:` describes it."""
+"""Settings of the parts between lamp, sample and camera in a rig file's `simulation:`."""
 
 from typing import Annotated, Self
 
@@ -12,7 +12,7 @@ Nanometres = Annotated[float, Field(ge=300, le=900)]
 
 
 class Part(BaseModel):
-    """Of a simulated room; never changes."""
+    """Part of a simulated room; never changes."""
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -23,17 +23,19 @@ class DoorSettings(Part):
     Attributes
     ----------
     channel
-        Of the Maestro `servo` that moves it.
-    closed, open
-        Length of the servo's pulse at either end.
+        Channel of the Maestro at `sim://room/servo` that moves the door, counted from 0.
+    closed
+        Length of the servo's pulse with the door closed, for example `1000 us`.
+    open
+        Length of the servo's pulse with the door open, for example `2000 us`.
     travel
-        Of the whole way, after the servo's frame of up to 20 ms.
+        Time that the whole way takes, after the servo's frame of up to 20 ms, for example `200 ms`.
     overshoot
-        How far it swings beyond its end, as a part of its way.
+        Swing of the door beyond its end, as a fraction of its way, for example `4 %`.
     ringing
-        Time in which the ringing after that falls to 1/e.
+        Time constant with which the ringing at the end falls to 1/e, for example `10 ms`.
     ringing_hz
-        Of the ringing.
+        Frequency of the ringing in Hz.
     """
 
     channel: Annotated[int, Field(ge=0, le=23)] = 0
@@ -57,11 +59,14 @@ class LedSettings(Part):
     Attributes
     ----------
     relay
-        Of the board; its relay 0 is the lamp's.
-    centre, fwhm
-        Of its band, in nanometres.
+        Relay of the Numato board that switches the LED; relay 0 is the lamp's.
+    centre
+        Centre wavelength of the LED's band, in nm.
+    fwhm
+        Full width at half maximum of the LED's band, in nm.
     level
-        Its light, of the warm lamp's over all wavelengths.
+        Irradiance of the LED as a fraction of the warm lamp's, over all wavelengths, for example
+        `10 %`.
     """
 
     relay: Annotated[int, Field(ge=1, le=7)]
@@ -76,21 +81,23 @@ class ServoBoardSettings(Part):
     Attributes
     ----------
     time_out
-        The serial time-out after which it sends all channels home; null: none.
+        Serial time-out after which the Maestro sends all channels home, for example `3 min`; null:
+        none.
     """
 
     time_out: Annotated[DurationS, Field(gt=0)] | None = None
 
 
 class StripSettings(Part):
-    """Where the camera finds the LVF, or what it has let through to the sample.
+    """Place in the frame of the LVF's strip, or of the light that it passes to the sample.
 
     Attributes
     ----------
     region
-        The strip as if it were not tilted; all around is its opaque holder.
+        Place of the strip in the frame as if it were not tilted, `[x, y, width, height]`; all
+        around is its opaque holder.
     tilt
-        Of the strip about its middle, in degrees, clockwise in the picture.
+        Rotation of the strip about its middle in degrees, clockwise in the picture.
     rising
         Whether the wavelength rises from left to right.
     """
@@ -106,17 +113,19 @@ class LvfSettings(Part):
     Attributes
     ----------
     before_camera
-        Place where the camera looks through it.
+        Place of the strip in the frame when the camera looks through the filter.
     on_sample
-        Place between lamp and sample, as the camera sees that part of the sample.
+        Place of the strip in the frame when the filter is between lamp and sample.
     centre
-        Wavelengths of the strip's blue and red end, in nm.
+        Wavelengths of the strip's blue and red end in nm, for example `[388, 712]`.
     bend_nm
-        How far its middle is off the straight line between them.
+        Deviation of the wavelength at the strip's middle from the straight line between its ends,
+        in nm.
     fwhm_nm
-        Width of the pass band, in the middle of the strip; it grows with the wavelength.
+        Full width at half maximum of the pass band in the middle of the strip, in nm; it grows with
+        the wavelength.
     leakage
-        What it lets through at all wavelengths.
+        Transmittance outside of the pass band, at all wavelengths, for example `0.1 %`.
     """
 
     before_camera: StripSettings = StripSettings(region=(0.06, 0.28, 0.88, 0.4), tilt=1.5)
@@ -142,9 +151,9 @@ class LensSettings(Part):
     Attributes
     ----------
     name
-        As it introduces itself.
+        Name of the lens that the camera reports, for example `EF75mm`.
     focal_mm
-        Focal length on a full-format body, 36 mm wide.
+        Focal length in mm, on a full-format body, 36 mm wide.
     """
 
     name: Annotated[str, Field(pattern="^[ -~]+$")]
@@ -152,23 +161,23 @@ class LensSettings(Part):
 
 
 class TemperatureSettings(Part):
-    """Of the room; re-radiation follows it with an activation energy of 0.65 eV.
+    """Temperature of the room; re-radiation follows it with an activation energy of 0.65 eV.
 
     Attributes
     ----------
     start
-        Degrees Celsius at the epoch; a material's rates belong to 21.
+        Temperature at the epoch in degrees Celsius; a material's rates belong to 21.
     drift_per_hour
-        Degrees by which it rises, or falls, in an hour.
+        Rise of the temperature in degrees Celsius per hour; negative: it falls.
     """
 
     start: Annotated[float, Field(ge=0, le=45)] = 21.0
     drift_per_hour: Annotated[float, Field(ge=-10, le=10)] = 0.0
 
     def celsius(self, time_s: float) -> float:
-        """At a time after the epoch."""
+        """Return the temperature at a time after the epoch, in degrees Celsius."""
         return self.start + self.drift_per_hour * time_s / 3600.0
 
     def later(self, seconds: float) -> Self:
-        """The same of a room that opens so much later."""
+        """Return the settings of a room that opens later by that time."""
         return self.model_copy(update={"start": self.celsius(seconds)})

@@ -1,4 +1,4 @@
-"""What the changer lays before lamp and camera: a grey card, a ColorChecker."""
+"""Cards before lamp and camera: a grey card, a ColorChecker."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,10 +22,10 @@ GREY = (0.972, 0.995, 1.003, 1.0, 0.998, 1.0, 1.008)
 
 
 def reflectances(card: Card, grey: float) -> FloatArray:
-    """Of all surfaces of a card, shape (surfaces, 160) on `WAVELENGTH_NM`.
+    """Return reflectances of all surfaces of a card, shape (surfaces, 160) on `WAVELENGTH_NM`.
 
-    Surface 0 is where the card is not, and 0. A grey card, or a blank of the same, is surface 1;
-    of a ColorChecker, row by row, 1 to 24, its frame is 25.
+    Surface 0 is outside of the card, and 0. A grey card, or a blank of the same, is surface 1; of a
+    ColorChecker, row by row, 1 to 24, its frame is 25.
     """
     nothing = np.zeros((1, len(WAVELENGTH_NM)))
     if card == "sample":
@@ -37,13 +37,13 @@ def reflectances(card: Card, grey: float) -> FloatArray:
 
 
 def surfaces(card: Card, chart: Region, width: int, height: int) -> IntArray:
-    """Which surface of a card that lies on top is in every pixel, shape (height, width).
+    """Return the surface of a card on top in every pixel, shape (height, width).
 
     A grey card fills the picture, a ColorChecker its region. A blank lies below.
     """
-    found = np.zeros((height, width), dtype=np.intp)
+    surface = np.zeros((height, width), dtype=np.intp)
     if card == "grey card":
-        found[:] = 1
+        surface[:] = 1
     elif card == "colorchecker":
         x, y, wide, high = region_pixels(chart, width, height)
         row, in_row = np.divmod((np.arange(high) + 0.5) / high * ROWS, 1)
@@ -52,12 +52,12 @@ def surfaces(card: Card, chart: Region, width: int, height: int) -> IntArray:
         inside = (np.abs(in_row - 0.5) < 0.5 - FRAME)[:, None] & (
             np.abs(in_column - 0.5) < 0.5 - FRAME
         )
-        found[y : y + high, x : x + wide] = np.where(inside, number, 1 + ROWS * COLUMNS)
-    return found
+        surface[y : y + high, x : x + wide] = np.where(inside, number, 1 + ROWS * COLUMNS)
+    return surface
 
 
 def _colorchecker() -> FloatArray:
-    """BabelColor's averages over 30 ColorCheckers, shape (24, 160); the ends go on."""
+    """Return BabelColor's means over 30 ColorCheckers, shape (24, 160), constant at the ends."""
     import colour  # takes seconds to load
 
     patches = colour.SDS_COLOURCHECKERS["BabelColor Average"].values()

@@ -1,4 +1,4 @@
-"""What the changer can do in the simulated room: cards, filters, lamps, the LVF."""
+"""Tasks of the changer in the simulated room: cards, filters, lamps, the LVF."""
 
 import re
 from collections.abc import Callable, Mapping
@@ -11,27 +11,27 @@ from .faults import given
 from .filters import Filters
 from .simulation import Simulation
 
-#: As far as a sample can be turned away from the camera.
+#: Largest angle of a sample against the camera's axis.
 MOST_TILT_DEG = 85
-#: As near as a lamp can be moved.
+#: Least distance of a lamp from the sample.
 LEAST_LAMP_M = 0.2
 
 
 class Changer:
-    """They arrange the bench, and sometimes make mistakes.
+    """Changer that arranges the bench, and sometimes makes mistakes.
 
     Parameters
     ----------
     simulation
-        What there is in the room, and what goes wrong.
+        Settings of the room, with its faults.
     filters
-        That they find.
+        Filters that the changer has.
     clock
-        The room's.
+        The room's clock.
     freshen
-        Puts another sample in.
+        Function that puts another sample in.
     plug
-        Puts another lamp behind the relay.
+        Function that connects another lamp to the relay.
     """
 
     def __init__(
@@ -54,7 +54,7 @@ class Changer:
 
     @property
     def tasks(self) -> Mapping[str, Callable[..., None]]:
-        """What to do by the line that tells it; a word in capitals stands for what is given."""
+        """Tasks by their command line; a word in capitals stands for a parameter."""
         return {
             "fresh sample": self._fresh_sample,
             "sample": lambda: self._lay("sample"),
@@ -86,7 +86,7 @@ class Changer:
     def _put_lvf(self, place: LvfPlace) -> None:
         if place != "away" and not self._has_lvf:
             raise UsageError("there is no LVF in this room, see 'simulation.lvf'")
-        turned = any(when.is_on(self._clock.now()) for when in self._turned)
+        turned = any(span.is_on(self._clock.now()) for span in self._turned)
         self._change(lvf=place, turned=turned and place != "away")
 
     def _put_filter(self, name: str | None) -> None:

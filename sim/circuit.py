@@ -1,4 +1,4 @@
-"""From the register of the relay board to the filament: a contact, a bulb, and what ails them."""
+"""The circuit from the relay board's register to the filament: contact and bulb, with faults."""
 
 from collections.abc import Sequence
 
@@ -14,19 +14,20 @@ from .simulation import LampSettings
 class LampCircuit:
     """The lamp behind its relay.
 
-    Nothing runs in the background: what has become of contact and bulb is worked out when
-    somebody asks.
+    Nothing runs in the background: the states of contact and bulb are computed when they are asked
+    for.
 
     Parameters
     ----------
     settings
-        Of the lamp.
+        Settings of the lamp.
     asked_on
-        What the register says when the room is opened.
+        State of the register when the room is opened.
     faults
-        `lamp_dead`, `mercury_dead`, `relay_dead` and `relay_welded` are the circuit's.
+        Faults of the room, of which `lamp_dead`, `mercury_dead`, `relay_dead` and `relay_welded`
+        are the circuit's.
     clock
-        The room's.
+        The room's clock.
     """
 
     def __init__(
@@ -39,13 +40,13 @@ class LampCircuit:
         self._welded = given(fault.relay_welded for fault in faults)
         changes = {
             time_s
-            for when in (*self._bulb_dead, *self._mercury_dead, *self._dead, *self._welded)
-            for time_s in (when.at, when.until)
+            for span in (*self._bulb_dead, *self._mercury_dead, *self._dead, *self._welded)
+            for time_s in (span.at, span.until)
         }
         self._changes_s = sorted(time_s for time_s in changes if time_s > 0)
-        self._asked_on = asked_on
+        self._register_on = asked_on
         # Welded before the room was opened: it was closed then, and has not let go.
-        self._closed = any(when.at < 0 and when.is_on(0.0) for when in self._welded)
+        self._closed = any(span.at < 0 and span.is_on(0.0) for span in self._welded)
         self._closed = self._contact(0.0)
         self._plugged: LampKind = "halogen"
         self._lamp = Lamp.found(settings, self._closed and not _any(self._bulb_dead, 0.0))
@@ -53,7 +54,7 @@ class LampCircuit:
 
     @property
     def closed(self) -> bool:
-        """Whether the contact is closed now: whether the lamp has current, if its bulb is whole."""
+        """Whether the contact is closed now, so that the lamp has current if its bulb is whole."""
         self._follow()
         return self._closed
 
@@ -70,15 +71,15 @@ class LampCircuit:
         return self._mercury
 
     def plug(self, lamp: LampKind) -> None:
-        """Put one lamp instead of the other behind the relay, now."""
+        """Connect another lamp to the relay, now."""
         self._follow()
         self._plugged = lamp
         self._settle(self._clock.now())
 
     def ask(self, on: bool) -> None:
-        """The board's register changes now."""
+        """Change the board's register now."""
         self._follow()
-        self._asked_on = on
+        self._register_on = on
         self._settle(self._clock.now())
 
     def _follow(self) -> None:
@@ -95,8 +96,8 @@ class LampCircuit:
 
     def _contact(self, time_s: float) -> bool:
         stuck = self._closed and _any(self._welded, time_s)
-        return stuck or (self._asked_on and not _any(self._dead, time_s))
+        return stuck or (self._register_on and not _any(self._dead, time_s))
 
 
 def _any(whens: Sequence[FaultTime], time_s: float) -> bool:
-    return any(when.is_on(time_s) for when in whens)
+    return any(span.is_on(time_s) for span in whens)

@@ -15,7 +15,7 @@ class RoomClock(VirtualClock):
     epoch_s
         Seconds since 1970 at the clock's zero.
     naps
-        When the PC sleeps; those that began before the room was opened are over.
+        Times at which the PC sleeps; those that began before the room was opened are over.
     """
 
     def __init__(self, epoch_s: float, naps: Iterable[Nap] = ()) -> None:
@@ -27,15 +27,15 @@ class RoomClock(VirtualClock):
         return self._slept_s
 
     def spend(self, duration_s: float) -> None:
-        """As of a virtual clock; one that is slept through takes longer by that."""
+        """Spend time as a virtual clock does, prolonged by sleep."""
         super().spend(duration_s)
-        self._sleep_if_tired()
+        self._sleep_if_due()
 
     def _pause_until(self, deadline_s: float) -> None:
         super()._pause_until(min(deadline_s, self._naps[0].at) if self._naps else deadline_s)
-        self._sleep_if_tired()
+        self._sleep_if_due()
 
-    def _sleep_if_tired(self) -> None:
+    def _sleep_if_due(self) -> None:
         while self._naps and self._naps[0].at <= self._now_s:
             lasting_s = self._naps.pop(0).lasting
             self._now_s += lasting_s

@@ -1,4 +1,4 @@
-"""The disk of the PC in the simulated room: the real one, behind what ails it."""
+"""The disk of the PC in the simulated room: the real one, with faults."""
 
 import errno
 import os
@@ -11,16 +11,16 @@ from .faults import AfterBytes, Slowness
 
 
 class SimulatedDisk:
-    """Writes durably to the real disk, as slowly and as much as the faults allow.
+    """Durable writing to the real disk, limited by the faults.
 
     Parameters
     ----------
     clock
-        The room's.
+        The room's clock.
     full
-        When no byte more fits; with `after_bytes`, a write is cut off at that byte.
+        Times at which the disk is full; with `after_bytes`, a write is cut off at that byte.
     slow
-        When each write takes its time.
+        Times at which each write takes long.
     """
 
     def __init__(
@@ -37,7 +37,7 @@ class SimulatedDisk:
         Raises
         ------
         OSError
-            ENOSPC; what still fitted is in the file.
+            The disk is full (ENOSPC); the bytes that still fitted are in the file.
         """
         now_s = self._clock.now()
         self._clock.spend(sum(slow.takes for slow in self._slow if slow.is_on(now_s)))
@@ -48,14 +48,14 @@ class SimulatedDisk:
         if fits < len(data):
             raise OSError(errno.ENOSPC, os.strerror(errno.ENOSPC))
 
-    def _fits(self, wanted: int) -> int:
-        """How many of so many bytes the disk has room for."""
-        now_s, fits = self._clock.now(), wanted
-        for number, full in enumerate(self._full):
-            if full.after_bytes is None:
-                fits = 0 if full.is_on(now_s) else fits
-            elif self._written_bytes + wanted > full.after_bytes:
-                fits = min(fits, full.after_bytes - self._written_bytes)
+    def _fits(self, size: int) -> int:
+        """Return how many of that number of bytes the disk has room for."""
+        now_s, fits = self._clock.now(), size
+        for number, fault in enumerate(self._full):
+            if fault.after_bytes is None:
+                fits = 0 if fault.is_on(now_s) else fits
+            elif self._written_bytes + size > fault.after_bytes:
+                fits = min(fits, fault.after_bytes - self._written_bytes)
                 # From here on it is full until somebody makes room.
-                self._full[number] = full.model_copy(update={"at": now_s, "after_bytes": None})
+                self._full[number] = fault.model_copy(update={"at": now_s, "after_bytes": None})
         return fits

@@ -1,7 +1,7 @@
 """The simulated camera's RAW file: an uncompressed Bayer DNG, with EXIF as a Canon writes it.
 
-Written here and not by tifffile, which cannot write an EXIF directory; cameras keep the exposure
-there. Make is `labrig`, so that LibRaw applies no quirks of a model it knows.
+tifffile is not used, since it cannot write an EXIF directory; cameras keep the exposure there. Make
+is `labrig`, so that LibRaw applies no quirks of a known model.
 """
 
 import struct
@@ -41,9 +41,9 @@ Entry = tuple[int, int, Values]
 
 @dataclass(frozen=True)
 class Shot:
-    """What the camera notes about an exposure; `start_s` counts from 1970.
+    """Metadata of an exposure; `start_s` counts from 1970.
 
-    `lens` is its name and focal length in mm; None: it tells nothing.
+    `lens` is its name and focal length in mm; None: it reports nothing.
     """
 
     start_s: float
@@ -54,7 +54,7 @@ class Shot:
 
 
 def exposure_label(exposure_s: float) -> Fraction:
-    """The exposure time that a Canon writes: the dial's label, 1/60 for 1/64 s.
+    """Return the exposure time that a Canon writes: the nominal time, 1/60 for 1/64 s.
 
     Bulb exposures beyond the dial are written in whole seconds.
     """
@@ -66,19 +66,19 @@ def exposure_label(exposure_s: float) -> Fraction:
 
 
 def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
-    """The file's bytes, of a 16-bit `mosaic` (height, width) and the notes in `shot`."""
+    """Return the file's bytes, of a 16-bit `mosaic` (height, width) and the metadata in `shot`."""
     height, width = mosaic.shape
     pixels = mosaic.astype("<u2").tobytes()
     # Whole microseconds first: the clock's seconds must not tip over by rounding twice.
     seconds, microseconds = divmod(round(shot.start_s * 1e6), 1_000_000)
-    taken = datetime.fromtimestamp(seconds, UTC).strftime("%Y:%m:%d %H:%M:%S")
+    date_time = datetime.fromtimestamp(seconds, UTC).strftime("%Y:%m:%d %H:%M:%S")
     subsecond = f"{microseconds // 10_000:02d}"
     exif: list[Entry] = [
         (33434, _RATIONAL, [exposure_label(shot.exposure_s)]),
         (33437, _RATIONAL, [Fraction(shot.f_number).limit_denominator(10)]),
         (34855, _SHORT, [shot.iso]),
         (36864, _UNDEFINED, b"0230"),
-        (36867, _ASCII, taken),
+        (36867, _ASCII, date_time),
         (37521, _ASCII, subsecond),
     ]
     if shot.lens is not None:
@@ -99,7 +99,7 @@ def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
         (277, _SHORT, [1]),
         (278, _LONG, [height]),
         (279, _LONG, [len(pixels)]),
-        (306, _ASCII, taken),
+        (306, _ASCII, date_time),
         (33421, _SHORT, [2, 2]),
         (33422, _BYTE, BAYER_RGGB),
         (34665, _LONG, [0]),  # where EXIF begins; set below
@@ -122,7 +122,7 @@ def encode_dng(mosaic: Mosaic, shot: Shot) -> bytes:
 
 
 def _directory(entries: list[Entry], at: int) -> bytes:
-    """A TIFF directory that stands at offset `at`, the values that do not fit in it behind it."""
+    """Return a TIFF directory at offset `at`, followed by the values that do not fit in it."""
     table, behind = struct.pack("<H", len(entries)), b""
     behind_at = at + 2 + 12 * len(entries) + 4
     for tag, kind, values in entries:

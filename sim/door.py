@@ -1,8 +1,8 @@
-"""A door on a servo: travel, overshoot and ringing. The shield before the lamp is one, too.
+"""A door on a servo: travel, overshoot and ringing. The shield before the lamp is such a door, too.
 
-The door swings by a quarter turn, evenly, and rings at the end as a damped spring does. Closed,
-its sample faces the lamp, open, the camera: of the angle, cos² is left to the one and sin² to the
-other, so that a door that shoots past its end loses light as one that has not reached it.
+The door swings by a quarter turn, evenly, and rings at the end as a damped spring does. Closed, its
+sample faces the lamp, open, the camera: at an angle, the fraction cos² remains for the lamp and
+sin² for the camera, so that a door beyond its end loses light as one that has not reached it.
 """
 
 import math
@@ -26,7 +26,7 @@ AT_REST = 1e-4
 
 @dataclass(frozen=True)
 class _Swing:
-    """From `start_s` on the way from angle `begin` to `end`, 0 closed to 1 open; then ringing."""
+    """Swing from angle `begin` to `end` from `start_s` on, 0 closed to 1 open; then ringing."""
 
     start_s: float
     begin: float
@@ -45,12 +45,12 @@ class Door:
 
     @classmethod
     def found(cls, settings: DoorSettings, *, is_open: bool) -> Self:
-        """A door that has been open, or closed, for long at time zero."""
+        """Return a door that has been open, or closed, for long at time zero."""
         angle = float(is_open)
         return cls(settings, (_Swing(0.0, angle, angle, 0.0, 0.0, 0.0),))
 
     def sent(self, end: float, start_s: float, travel_s: float) -> "Door":
-        """The door after it began, at `start_s`, to swing to the angle `end`."""
+        """Return the door after it began, at `start_s`, to swing to the angle `end`."""
         begin = self.angle(start_s)
         if begin == end and self.is_still(start_s, start_s):
             return self
@@ -60,65 +60,65 @@ class Door:
         return self._with(_Swing(start_s, begin, end, stop_s, stop_s + ringing_s, overshoot))
 
     def held(self, start_s: float) -> "Door":
-        """The door as if it were held where it is at `start_s`."""
+        """Return the door as if it were held in its position at `start_s`."""
         angle = self.angle(start_s)
         return self._with(_Swing(start_s, angle, angle, start_s, start_s, 0.0))
 
     def angle(self, time_s: float) -> float:
-        """Of a quarter turn: 0 closed, 1 open; ringing goes a little beyond."""
+        """Return the angle in quarter turns: 0 closed, 1 open; ringing goes a little beyond."""
         swing = next(s for s in reversed(self.swings) if s.start_s <= time_s)
         if time_s >= swing.rest_s:
             return swing.end
         if time_s < swing.stop_s:
-            gone = (time_s - swing.start_s) / (swing.stop_s - swing.start_s)
-            return swing.begin + gone * (swing.end - swing.begin)
+            progress = (time_s - swing.start_s) / (swing.stop_s - swing.start_s)
+            return swing.begin + progress * (swing.end - swing.begin)
         rung_s = time_s - swing.stop_s
         fading = swing.overshoot * math.exp(-rung_s / self.settings.ringing)
         return swing.end + fading * math.sin(2 * math.pi * self.settings.ringing_hz * rung_s)
 
     def openness(self, time_s: float) -> float:
-        """Part of the sample that the camera sees, 0 to 1."""
+        """Return the fraction of the sample that the camera sees, 0 to 1."""
         return math.sin(math.pi / 2 * self.angle(time_s)) ** 2
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
-        """Times strictly between at which the door does not go on smoothly."""
+        """Return the times strictly between at which the door's motion is not smooth."""
         times = {t for s in self.swings for t in (s.start_s, s.stop_s, s.rest_s)}
         return sorted(t for t in times if start_s < t < end_s)
 
     def is_still(self, start_s: float, end_s: float) -> bool:
-        """Whether it stands from `start_s` to `end_s`."""
+        """Return whether the door stands still from `start_s` to `end_s`."""
         swing = next(s for s in reversed(self.swings) if s.start_s <= start_s)
         return start_s >= swing.rest_s and not self.corners(start_s, end_s)
 
     @property
     def settled_s(self) -> float:
-        """When it came, or will come, to rest after the last command."""
+        """Time at which the door comes to rest after the last command."""
         return self.swings[-1].rest_s
 
     def _with(self, swing: _Swing) -> "Door":
-        before = tuple(s for s in self.swings if s.start_s < swing.start_s)
-        return replace(self, swings=(*before, swing))
+        earlier = tuple(s for s in self.swings if s.start_s < swing.start_s)
+        return replace(self, swings=(*earlier, swing))
 
 
 class DoorDrive:
-    """The servo between a Maestro's pulses and the door, and what ails the two.
+    """The servo between a Maestro's pulses and the door, with faults of both.
 
-    Nothing runs in the background: where the door is is worked out when somebody asks.
+    Nothing runs in the background: the door's position is computed when it is asked for.
 
     Parameters
     ----------
     settings
-        Of the door.
+        Settings of the door.
     is_open
-        As it is found.
+        Whether the door is open at the begin.
     pulses
-        Those that the servo has been sent up to now.
+        Function that returns the pulses that the servo has been sent up to now.
     jitter_s
-        Gives for the time of a command how long its servo frame is still to come.
+        Function of a command's time that returns the time until the servo's next frame.
     clock
-        The room's.
+        The room's clock.
     stuck, slow
-        When the door does not move, or takes its time for the whole way.
+        Times at which the door does not move, or takes long for the whole way.
     """
 
     def __init__(
@@ -138,7 +138,7 @@ class DoorDrive:
         self._clock = clock
         self._stuck = stuck
         self._slow = slow
-        changes = {time_s for when in stuck for time_s in (when.at, when.until)}
+        changes = {time_s for span in stuck for time_s in (span.at, span.until)}
         self._changes_s = sorted(time_s for time_s in changes if time_s > 0)
         self._followed = len(pulses())
         self._goal = float(is_open)
@@ -146,7 +146,7 @@ class DoorDrive:
 
     @property
     def door(self) -> Door:
-        """The door with its history up to now, and what its last pulse will make of it."""
+        """The door with its history up to now, and its motion by the last pulse."""
         new = self._pulses()[self._followed :]
         self._followed += len(new)
         for pulse in new:
@@ -174,9 +174,9 @@ class DoorDrive:
         if self._is_stuck(start_s):
             return
         takes = [slow.takes for slow in self._slow if slow.is_on(start_s)]
-        way = abs(self._goal - self._door.angle(start_s))
-        travel_s = max(max(takes, default=self._settings.travel) * way, at_least_s)
+        turn = abs(self._goal - self._door.angle(start_s))
+        travel_s = max(max(takes, default=self._settings.travel) * turn, at_least_s)
         self._door = self._door.sent(self._goal, start_s, travel_s)
 
     def _is_stuck(self, time_s: float) -> bool:
-        return any(when.is_on(time_s) for when in self._stuck)
+        return any(span.is_on(time_s) for span in self._stuck)

@@ -1,4 +1,4 @@
-"""The doors of a simulated room, as its settings say: the trap door, the shield before the lamp."""
+"""The doors of a simulated room: the trap door, the shield before the lamp."""
 
 from collections.abc import Callable, Sequence
 
@@ -20,39 +20,39 @@ Pulses = Callable[[int], Sequence[Pulse]]
 
 
 def no_pulses(_: int) -> Sequence[Pulse]:
-    """Of a servo board that is not there."""
+    """Return no pulses, as of a missing servo board."""
     return ()
 
 
 class Doors:
-    """What a servo board swings; a door that the settings do not have is None.
+    """Doors that a servo board swings; one that the settings do not have is None.
 
     Parameters
     ----------
     simulation
-        What the room is like; its door's faults are the trap door's.
+        Settings of the room; its door's faults are the trap door's.
     clock
-        The room's.
+        The room's clock.
     pulses
-        What the servos are sent.
+        Function of a channel that returns the pulses sent to its servo up to now.
     """
 
     def __init__(self, simulation: Simulation, clock: VirtualClock, pulses: Pulses) -> None:
         self._seed = simulation.seed
         self._clock = clock
         self._pulses = pulses
-        found_open = simulation.initial.door == "open"
-        self._trap_door = self._drive(simulation.door, simulation.faults, is_open=found_open)
+        is_open = simulation.initial.door == "open"
+        self._trap_door = self._drive(simulation.door, simulation.faults, is_open=is_open)
         self._shield = self._drive(simulation.shield, (), is_open=True)
 
     @property
     def trap_door(self) -> Door | None:
-        """With its history up to now."""
+        """The trap door with its history up to now."""
         return None if self._trap_door is None else self._trap_door.door
 
     @property
     def shield(self) -> Door | None:
-        """With its history up to now."""
+        """The shield with its history up to now."""
         return None if self._shield is None else self._shield.door
 
     def _drive(
@@ -71,7 +71,7 @@ class Doors:
         )
 
     def _frame_to_come_s(self, channel: int, asked_s: float) -> float:
-        """Until a servo takes over the pulse that its board was told at `asked_s`."""
+        """Return the time until a servo takes over a pulse that was commanded at `asked_s`."""
         moment = round(self._clock.wall(asked_s) * 1e6)
         rng = np.random.default_rng([self._seed, SERVO_STREAM, channel, moment])
         return float(rng.uniform(0.0, FRAME_S))

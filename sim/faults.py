@@ -1,4 +1,4 @@
-"""What goes wrong in a simulated room, and when: `simulation.faults` of a rig file."""
+"""Faults of a simulated room and their times: `simulation.faults` of a rig file."""
 
 import math
 from collections.abc import Iterable
@@ -14,15 +14,15 @@ class _Part(BaseModel):
 
 
 class FaultTime(_Part):
-    """When a fault is there.
+    """Time span of a fault.
 
     Attributes
     ----------
     at
-        From then on, in seconds after the epoch that the rig file gives. The room of a resumed
-        run opens later than that, so that what was over stays over.
+        Begin of the fault after the epoch that the rig file gives, for example `25 min`. The room
+        of a resumed run opens later than that epoch, so that a past fault stays past.
     lasting
-        For so long; in YAML `for`. None: for ever.
+        Duration of the fault, `for` in YAML, for example `20 s`; null: it lasts for ever.
     """
 
     at: DurationS = 0.0
@@ -30,20 +30,27 @@ class FaultTime(_Part):
 
     @property
     def until(self) -> float:
-        """When it is over."""
+        """End of the fault in seconds; infinity if it lasts for ever."""
         return math.inf if self.lasting is None else self.at + self.lasting
 
     def is_on(self, now_s: float) -> bool:
-        """Whether the fault is there at `now_s`."""
+        """Return whether the fault is there at `now_s`."""
         return self.at <= now_s < self.until
 
     def seen_from(self, opening_s: float) -> Self:
-        """The same on the clock of a room that opens `opening_s` after the rig file's epoch."""
+        """Return the fault on the clock of a room that opens `opening_s` after its epoch."""
         return self.model_copy(update={"at": self.at - opening_s})
 
 
 class AfterBytes(FaultTime):
-    """A fault that may also come when `after_bytes` have passed since the room was opened."""
+    """A fault that may also come when `after_bytes` have passed since the room was opened.
+
+    Attributes
+    ----------
+    after_bytes
+        Number of bytes, since the room was opened, after which the fault begins; given instead of
+        `at`.
+    """
 
     after_bytes: Annotated[int, Field(ge=0)] | None = None
 
@@ -55,31 +62,62 @@ class AfterBytes(FaultTime):
 
 
 class Slowness(FaultTime):
-    """`takes`: seconds for each write, or for the whole way of a door."""
+    """A fault that slows something down.
+
+    Attributes
+    ----------
+    takes
+        Time that each write, or the whole way of a door, takes, for example `2 s`.
+    """
 
     takes: DurationS = 2.0
 
 
 class Nap(FaultTime):
-    """`for`: how long the PC sleeps, an hour if that is not said."""
+    """A fault that puts the PC to sleep.
+
+    Attributes
+    ----------
+    lasting
+        Duration of the PC's sleep, `for` in YAML, for example `1 h`.
+    """
 
     lasting: DurationS = Field(3600.0, alias="for")
 
 
 class Step(FaultTime):
-    """`by`: how far a clock is stepped."""
+    """A fault that steps a clock.
+
+    Attributes
+    ----------
+    by
+        Time by which the clock is stepped, for example `1 h`.
+    """
 
     by: DurationS = 3600.0
 
 
 class Leak(FaultTime):
-    """`level`: light from the surroundings, of the warm lamp's at the sample."""
+    """A fault that lets light in.
+
+    Attributes
+    ----------
+    level
+        Irradiance at the sample of light from the surroundings, as a fraction of the warm lamp's,
+        for example `0.001 %`.
+    """
 
     level: Annotated[Fraction, Field(ge=0, le=0.1)] = 1e-5
 
 
 class Skipped(FaultTime):
-    """`name`: of the filter; none: whichever."""
+    """A fault at a change of filter.
+
+    Attributes
+    ----------
+    name
+        Name of the filter to which the changer does not change; null: whichever.
+    """
 
     name: str | None = None
 
@@ -88,10 +126,15 @@ WhenT = TypeVar("WhenT", bound=FaultTime)
 
 
 def _or_its_name(schema: dict[str, Any]) -> None:
-    """For editors: a fault that is always there may be written as its name alone."""
-    when = {**schema, "minProperties": 1, "maxProperties": 1}
+    """Allow the name alone in the schema: the fault is then always there."""
+    with_span = {**schema, "minProperties": 1, "maxProperties": 1}
     schema.clear()
-    schema["anyOf"] = [{"enum": list(when["properties"])}, when]
+    name = {
+        "description": "Name of a fault that is there from the epoch on and for ever.",
+        "enum": list(with_span["properties"]),
+    }
+    with_span["description"] = "Name of a fault and its time span."
+    schema["anyOf"] = [name, with_span]
 
 
 class Fault(_Part):
@@ -100,27 +143,29 @@ class Fault(_Part):
     Attributes
     ----------
     lamp_dead
-        The lamp's relay switches, but nothing lights up: its bulb has blown, or makes bad contact.
+        The lamp's relay switches, but the lamp stays dark: its bulb has blown, or makes bad
+        contact.
     relay_dead
-        The board acknowledges and its register reads on, but the contact does not close.
+        The relay board acknowledges and its register reads on, but the contact does not close.
     relay_welded
-        The contact that is closed, or closes, stays closed, whatever the register reads.
+        The relay's contact that is closed, or closes, stays closed, whatever the register reads.
     relays_unplugged
-        The relay board's cable is pulled, and put back. It has its own power: the contacts stay.
+        The relay board's cable is pulled, and plugged in again. The board has its own power, so
+        that the contacts stay as they are.
     relays_silent
-        The board hears nothing and says nothing.
+        The relay board receives nothing and sends nothing.
     relays_echo_lost
-        The board obeys, but its echo is lost on the way.
+        The relay board obeys, but its echo is lost on the way.
     door_stuck
-        The trap door stays where it is, whatever its servo is told; then it swings on.
+        The trap door stays where it is, whatever its servo receives; after the fault it swings on.
     door_slow
         The trap door, or its servo, is slow to move.
     camera_unplugged
-        The camera's cable is pulled, and put back.
+        The camera's cable is pulled, and plugged in again.
     camera_busy
         The camera answers DeviceBusy to every full press.
     camera_full
-        The camera believes that there is no room for a photograph, on the PC or on its card.
+        The camera reports that there is no room for a photograph, on the PC or on its card.
     mercury_dead
         The mercury lamp has current, but no arc.
     ambient_light
@@ -130,16 +175,20 @@ class Fault(_Part):
     filter_skipped
         The changer reports a change of filter, but leaves the one before in.
     light_left_on
-        Somebody has left the room's light on.
+        The room's light has been left on.
     thermometer_off
         The thermometer's wire has come off its input.
     disk_full
-        No byte more fits on the disk with the run; with `after_bytes`, in the middle of a write.
+        The disk with the run has no room for another byte; with `after_bytes`, in the middle of a
+        write.
     disk_slow
         The disk takes its time for everything that is written durably.
-    clock_ahead, clock_back
-        The PC's own clock is stepped, by hand, by a time server or for the summer. A program that
-        is running keeps its own time; the next one starts with the new one.
+    clock_ahead
+        The PC's own clock is stepped ahead, by hand, by a time server or for the summer. A program
+        that is running keeps its own time; the next one starts with the new one.
+    clock_back
+        The PC's own clock is stepped back. A program that is running keeps its own time; the next
+        one starts with the new one.
     pc_asleep
         The PC falls asleep and wakes up again: to save energy, or because its lid was closed.
     """
@@ -177,23 +226,23 @@ class Fault(_Part):
         if isinstance(item, dict):
             if len(item) != 1:
                 raise ValueError(f"expected one fault in each item of the list, got {len(item)}")
-            return {name: {} if when is None else when for name, when in item.items()}
+            return {name: {} if span is None else span for name, span in item.items()}
         return item
 
     @model_serializer
     def _to_name(self) -> dict[str, Any]:
         return {
-            name: when.model_dump(mode="json", by_alias=True, exclude_unset=True)
-            for name, when in self
-            if when is not None
+            name: span.model_dump(mode="json", by_alias=True, exclude_unset=True)
+            for name, span in self
+            if span is not None
         }
 
     def seen_from(self, opening_s: float) -> Self:
-        """The same on the clock of a room that opens `opening_s` after the rig file's epoch."""
-        later = {name: when.seen_from(opening_s) for name, when in self if when is not None}
+        """Return the fault on the clock of a room that opens `opening_s` after its epoch."""
+        later = {name: span.seen_from(opening_s) for name, span in self if span is not None}
         return self.model_copy(update=later)
 
 
-def given(whens: Iterable[WhenT | None]) -> tuple[WhenT, ...]:
-    """Those that are there at all."""
-    return tuple(when for when in whens if when is not None)
+def given(spans: Iterable[WhenT | None]) -> tuple[WhenT, ...]:
+    """Return the time spans of the faults that are given."""
+    return tuple(span for span in spans if span is not None)

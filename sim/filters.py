@@ -1,4 +1,4 @@
-"""Colour filters before the lamp: curves from a folder, really a little different."""
+"""Colour filters before the lamp: curves from a folder, in truth a little different."""
 
 import csv
 import zlib
@@ -29,11 +29,11 @@ class Filters:
     Parameters
     ----------
     folder
-        Of their curves; None: the shipped one.
+        Folder of the filters' curves; None: the shipped one.
     bent
-        Root mean square of what they really differ from them, of their transmittance.
+        Root mean square difference of the true transmittances from the files'.
     seed
-        Of that difference.
+        Seed of that difference.
 
     Raises
     ------
@@ -50,7 +50,7 @@ class Filters:
             raise UsageError(f"{place}: expected a {SUFFIX} file for each colour filter, got none")
         self._bent = bent
         self._seed = seed
-        self._known: dict[str | None, FloatArray] = {None: np.ones_like(WAVELENGTH_NM)}
+        self._transmissions: dict[str | None, FloatArray] = {None: np.ones_like(WAVELENGTH_NM)}
 
     def check(self, name: str) -> None:
         """Raise UsageError if there is no filter of that name."""
@@ -58,25 +58,25 @@ class Filters:
             raise UsageError(f"no filter '{name}'; {did_you_mean(name, list(self._files))}")
 
     def history(self, arrangements: Arrangements) -> tuple[tuple[float, FloatArray], ...]:
-        """From when on, and what of the lamp's light arrived then; the first from 0 on.
+        """Return times, and the transmission of the lamp's light from each on; the first is 0.
 
-        A lamp that is further away than usual gives less by the square of its distance.
+        A lamp that is further away than usual gives less light by the square of its distance.
         """
         history: list[tuple[float, str | None, float]] = []
         for since_s, arrangement in zip(arrangements.since_s, arrangements.states, strict=True):
-            now = arrangement.filter, arrangement.lamp_m
-            if not history or history[-1][1:] != now:
-                history.append((since_s, *now))
+            state = arrangement.filter, arrangement.lamp_m
+            if not history or history[-1][1:] != state:
+                history.append((since_s, *state))
         return tuple(
             (since_s, self.transmission(name) * (USUAL_LAMP_M / lamp_m) ** 2)
             for since_s, name, lamp_m in history
         )
 
     def transmission(self, name: str | None) -> FloatArray:
-        """What the filter lets through, shape (160,) on `WAVELENGTH_NM`; no filter: all."""
-        if name is not None and name not in self._known:
-            self._known[name] = self._really(name)
-        return self._known[name]
+        """Return the filter's transmittance, shape (160,) on `WAVELENGTH_NM`; no filter: 1."""
+        if name is not None and name not in self._transmissions:
+            self._transmissions[name] = self._really(name)
+        return self._transmissions[name]
 
     def _really(self, name: str) -> FloatArray:
         self.check(name)
@@ -91,12 +91,12 @@ class Filters:
 
 
 def read_curve(path: Path) -> FloatArray:
-    """Wavelength and value in the first two columns, on `WAVELENGTH_NM`; the ends go on.
+    """Return a curve from a file's first two columns, on `WAVELENGTH_NM`, constant at the ends.
 
     Raises
     ------
     UsageError
-        Not such a file.
+        The file is no table of wavelength and value.
     """
     try:
         lines = path.read_text(encoding="utf-8-sig").splitlines()

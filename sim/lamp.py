@@ -1,7 +1,7 @@
 """A halogen lamp: a glowing filament with a heat capacity, in a housing that warms slowly.
 
-The fade after switching off is not put in but comes out: the filament cools by radiation and
-conduction, and what it still emits follows Planck's law, so the blue goes first.
+The fade after switching off results from the model: the filament cools by radiation and conduction,
+and its emission follows Planck's law, so that the blue fades first.
 """
 
 import math
@@ -38,7 +38,7 @@ RADIATION_EXPONENT = 5
 #: Cold tungsten conducts better and draws an inrush current: P = U²/R, R growing as this power.
 RESISTANCE_EXPONENT = 1.2
 
-#: This long after a switch the filament has settled to the last digits.
+#: Time after a switch until the filament has settled to the last digits.
 SETTLED_S = 3.0
 
 #: Cells of the wavelength grid: 380–780 nm; borders of Table 1's bands are borders of cells.
@@ -64,14 +64,14 @@ _AT_560_NM = (0.47 - 2e-4 * 160.0) / (560.0**5 * math.expm1(C2_NM_K / (560.0 * B
 
 
 def filament_spectrum(temperature_k: float | FloatArray) -> FloatArray:
-    """Spectrum of a tungsten filament relative to one at 3000 K and 560 nm.
+    """Return the spectrum of a tungsten filament relative to one at 3000 K and 560 nm.
 
     Planck's law times tungsten's emissivity.
 
     Returns
     -------
     ndarray, shape (..., 160)
-        Of every temperature, on `WAVELENGTH_NM`.
+        Spectrum at every temperature, on `WAVELENGTH_NM`.
     """
     each_k = np.asarray(temperature_k)[..., None]
     exponent = np.minimum(C2_NM_K / (WAVELENGTH_NM * each_k), 700.0)
@@ -79,12 +79,12 @@ def filament_spectrum(temperature_k: float | FloatArray) -> FloatArray:
     return planck
 
 
-#: Of the burning lamp.
+#: Spectrum of the burning lamp.
 BURNING_SPECTRUM: FloatArray = filament_spectrum(BURNING_K)
 
 
 def _warming_k_per_s(temperature_k: float, powered: bool) -> float:
-    """Energy balance of the filament, everything relative to the burning state."""
+    """Return the filament's energy balance, relative to the burning state."""
     t = temperature_k / BURNING_K
     room = ROOM_K / BURNING_K
     radiated = (t**RADIATION_EXPONENT - room**RADIATION_EXPONENT) / (1 - room**RADIATION_EXPONENT)
@@ -96,7 +96,7 @@ def _warming_k_per_s(temperature_k: float, powered: bool) -> float:
 
 @lru_cache(maxsize=32)
 def _settling(begin_k: float, powered: bool) -> BSpline:
-    """Temperature of a filament over time after a switch, until it has settled."""
+    """Return the temperature of a filament over time after a switch, until it has settled."""
     temperature_k = solve_ivp(
         lambda _, t: [_warming_k_per_s(t[0], powered)],
         (0.0, SETTLED_S),
@@ -114,10 +114,10 @@ def _settling(begin_k: float, powered: bool) -> BSpline:
 
 @dataclass(frozen=True)
 class _Phase:
-    """From one switch to the next, at `start_s`.
+    """Time from one switch to the next, from `start_s` on.
 
-    `begin_k` is the filament's temperature then, `warmth` the housing's, 0 cold to 1 warm;
-    `glowing` what is left behind of the light that the lamp gave, 0 to 1.
+    `begin_k` is the filament's temperature at its begin, `warmth` the housing's, 0 cold to 1 warm;
+    `glowing` the fraction of the afterglow, 0 to 1.
     """
 
     start_s: float
@@ -128,16 +128,16 @@ class _Phase:
 
     @property
     def settled_k(self) -> float:
-        """Temperature of the filament in the end."""
+        """Temperature of the settled filament in K."""
         return BURNING_K if self.powered else ROOM_K
 
     @property
     def settled_s(self) -> float:
-        """When it has that."""
+        """Time at which the filament has settled."""
         return self.start_s if self.begin_k == self.settled_k else self.start_s + SETTLED_S
 
     def temperature_k(self, time_s: FloatArray) -> FloatArray:
-        """Of the filament."""
+        """Return the temperature of the filament in K."""
         if self.begin_k == self.settled_k:
             return np.full_like(time_s, self.settled_k)
         after_s = time_s - self.start_s
@@ -158,7 +158,7 @@ class Lamp:
 
     @classmethod
     def found(cls, settings: LampSettings, on: bool) -> Self:
-        """A lamp that has been on (and is warm), or off (and is cold), for long at time zero."""
+        """Return a lamp that has long been on (and is warm), or off (and is cold), at time zero."""
         begin_k = BURNING_K if on else ROOM_K
         return cls(settings, (_Phase(0.0, on, float(on), float(on), begin_k),))
 
@@ -168,7 +168,7 @@ class Lamp:
         return self.phases[-1].powered
 
     def switched(self, on: bool, at_s: float) -> "Lamp":
-        """The lamp after one more switch; switching to what it is already does nothing."""
+        """Return the lamp after one more switch; switching to the present state does nothing."""
         if on == self.on:
             return self
         warmth, glowing = float(self._warmth(at_s)), float(self._glowing(at_s))
@@ -176,32 +176,32 @@ class Lamp:
         return replace(self, phases=(*self.phases, phase))
 
     def until(self, time_s: float) -> "Lamp":
-        """The lamp as if nobody had touched it after `time_s`."""
+        """Return the lamp without switches after `time_s`."""
         return replace(self, phases=tuple(p for p in self.phases if p.start_s <= time_s))
 
     def last_switch_off(self, time_s: float) -> float | None:
-        """When the lamp was last switched off, up to and including `time_s`."""
+        """Return the time at which the lamp was last switched off, up to and including `time_s`."""
         off = [p.start_s for p in self.phases[1:] if not p.powered and p.start_s <= time_s]
         return max(off, default=None)
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
-        """Times strictly between at which the light does not go on smoothly."""
+        """Return the times strictly between at which the light is not smooth."""
         times = {t for p in self.phases for t in (p.start_s, p.start_s + SETTLED_S)}
         return sorted(t for t in times if start_s < t < end_s)
 
     def temperature_k(self, time_s: float | FloatArray) -> FloatArray:
-        """Of the filament, at every time."""
+        """Return the temperature of the filament at every time, in K."""
         return self._by_phase(time_s, lambda phase, at_s: phase.temperature_k(at_s))
 
     def dark(self, start_s: float, end_s: float) -> bool:
-        """Whether no light at all is to be expected from `start_s` to `end_s`."""
+        """Return whether there is no light at all from `start_s` to `end_s`."""
         if self.settings.afterglow and self._glowing(start_s):
             return False
         cold = self._settled(start_s) and not self._phase(start_s).powered
         return cold and not self.corners(start_s, end_s)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Relative spectral irradiance at the sample, shape (..., 160), on `WAVELENGTH_NM`."""
+        """Return the relative spectral irradiance at the sample on the grid, shape (..., 160)."""
         temperature_k = self.temperature_k(time_s)
         if np.all(temperature_k == BURNING_K):
             spectrum = BURNING_SPECTRUM
@@ -215,12 +215,12 @@ class Lamp:
         return light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """∫ irradiance dt over an interval, shape (160,)."""
+        """Return ∫ irradiance dt over an interval, shape (160,)."""
         total = np.zeros_like(WAVELENGTH_NM)
-        for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
-            if not self.dark(left, right):
-                panel_s = PANEL_SETTLED_S if self._settled(left) else PANEL_FADING_S
-                at_s, part_s = nodes(left, right, panel_s)
+        for begin_s, stop_s in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
+            if not self.dark(begin_s, stop_s):
+                panel_s = PANEL_SETTLED_S if self._settled(begin_s) else PANEL_FADING_S
+                at_s, part_s = nodes(begin_s, stop_s, panel_s)
                 total += part_s @ self.irradiance(at_s)
         return total
 
@@ -233,25 +233,25 @@ class Lamp:
     def _by_phase(
         self, time_s: float | FloatArray, value: Callable[[_Phase, FloatArray], FloatArray]
     ) -> FloatArray:
-        """What `value` is at every time, in the phase of that time."""
+        """Return `value` at every time, in the phase of that time."""
         times_s = np.asarray(time_s)
         if np.all(times_s >= self.phases[-1].start_s):
             return value(self.phases[-1], times_s)
         starts_s = [phase.start_s for phase in self.phases]
-        of_time = np.searchsorted(starts_s, times_s, side="right") - 1
-        first, last = of_time.min(), of_time.max()
-        found = value(self.phases[first], times_s)
+        phase_index = np.searchsorted(starts_s, times_s, side="right") - 1
+        first, last = phase_index.min(), phase_index.max()
+        values = value(self.phases[first], times_s)
         for index in range(first + 1, last + 1):
-            found = np.where(of_time < index, found, value(self.phases[index], times_s))
-        return found
+            values = np.where(phase_index < index, values, value(self.phases[index], times_s))
+        return values
 
     def _warmth(self, time_s: float | FloatArray) -> FloatArray:
-        """Newton's law for the housing, 0 cold to 1 warm."""
+        """Return the housing's warmth by Newton's law, 0 cold to 1 warm."""
         constant_s = self.settings.warm_up
         return self._by_phase(time_s, lambda p, at_s: _approach(p, p.warmth, at_s, constant_s))
 
     def _glowing(self, time_s: float | FloatArray) -> FloatArray:
-        """What glows on behind the filament, 0 to 1."""
+        """Return the fraction of the afterglow behind the filament, 0 to 1."""
         constant_s = self.settings.afterglow_fades
         return self._by_phase(time_s, lambda p, at_s: _approach(p, p.glowing, at_s, constant_s))
 
@@ -262,14 +262,14 @@ class Lamp:
 
 
 def _approach(phase: _Phase, begin: float, time_s: FloatArray, constant_s: float) -> FloatArray:
-    """From `begin` towards 1 while there is power, towards 0 while there is none."""
+    """Return the exponential approach from `begin` to 1 with power, to 0 without."""
     goal = float(phase.powered)
     elapsed_s = np.maximum(time_s - phase.start_s, 0.0)
     return goal + (begin - goal) * np.exp(-elapsed_s / constant_s)
 
 
 def nodes(start_s: float, end_s: float, panel_s: float) -> tuple[FloatArray, FloatArray]:
-    """Times and weights of Gauss and Legendre's quadrature in panels no longer than `panel_s`."""
+    """Return times and weights of Gauss–Legendre quadrature in panels no longer than `panel_s`."""
     node, weight = PANEL
     edges = np.linspace(start_s, end_s, math.ceil((end_s - start_s) / panel_s) + 1)
     half, middle = np.diff(edges)[:, None] / 2, (edges[:-1, None] + edges[1:, None]) / 2

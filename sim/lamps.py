@@ -15,16 +15,16 @@ FloatArray = NDArray[np.float64]
 
 @dataclass(frozen=True)
 class FilteredLamps:
-    """Their light with its history; it can be used as a `Lamp` is.
+    """Light of the lamps with its history, in place of a `Lamp`.
 
     Attributes
     ----------
     halogen, mercury
-        Only one of them is fed at a time, but a filament fades after it was switched off.
+        Lamps, of which one is fed at a time; a filament still fades after it was switched off.
     filters
-        From when on, and what the filter then lets through, shape (160,); the first from 0 on.
+        Begin in seconds and transmittance, shape (160,), of each filter; the first from 0 on.
     leds
-        Their light does not pass it.
+        LEDs, whose light does not pass the filter.
     """
 
     halogen: Lamp
@@ -33,7 +33,7 @@ class FilteredLamps:
     leds: Leds = field(default_factory=Leds)
 
     def until(self, time_s: float) -> "FilteredLamps":
-        """As if nobody had touched the lamps after `time_s`."""
+        """Return the lamps without switches after `time_s`."""
         return replace(
             self,
             halogen=self.halogen.until(time_s),
@@ -42,25 +42,25 @@ class FilteredLamps:
         )
 
     def last_switch_off(self, time_s: float) -> float | None:
-        """When one was last switched off, up to and including `time_s`."""
+        """Return the time at which a lamp was last switched off, up to and including `time_s`."""
         lights = (self.halogen, self.mercury, self.leds)
         off = [light.last_switch_off(time_s) for light in lights]
         return max((off_s for off_s in off if off_s is not None), default=None)
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
-        """Times strictly between at which the light does not go on smoothly."""
+        """Return the times strictly between at which the light is not smooth."""
         changes = {since_s for since_s, _ in self.filters if start_s < since_s < end_s}
         changes.update(self.halogen.corners(start_s, end_s), self.mercury.corners(start_s, end_s))
         changes.update(self.leds.corners(start_s, end_s))
         return sorted(changes)
 
     def dark(self, start_s: float, end_s: float) -> bool:
-        """Whether no light at all is to be expected from `start_s` to `end_s`."""
+        """Return whether there is no light at all from `start_s` to `end_s`."""
         lights = (self.halogen, self.mercury, self.leds)
         return all(light.dark(start_s, end_s) for light in lights)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Relative spectral irradiance at the sample, shape (..., 160)."""
+        """Return the relative spectral irradiance at the sample, shape (..., 160)."""
         light = self.halogen.irradiance(time_s)
         if self.mercury.was_on:
             light = light + self.mercury.irradiance(time_s)
@@ -68,14 +68,14 @@ class FilteredLamps:
         return light + self.leds.irradiance(time_s) if self.leds.were_lit else light
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """∫ irradiance dt over an interval, shape (160,)."""
+        """Return ∫ irradiance dt over an interval, shape (160,)."""
         changes = [since_s for since_s, _ in self.filters if start_s < since_s < end_s]
         total = np.zeros_like(self.filters[0][1])
-        for left, right in pairwise([start_s, *changes, end_s]):
-            light = self.halogen.exposure(left, right)
+        for begin_s, stop_s in pairwise([start_s, *changes, end_s]):
+            light = self.halogen.exposure(begin_s, stop_s)
             if self.mercury.was_on:
-                light = light + self.mercury.exposure(left, right)
-            total += light * self._passed(left)
+                light = light + self.mercury.exposure(begin_s, stop_s)
+            total += light * self._passed(begin_s)
         return total + self.leds.exposure(start_s, end_s) if self.leds.were_lit else total
 
     def _passed(self, time_s: float | FloatArray) -> FloatArray:

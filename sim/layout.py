@@ -1,4 +1,4 @@
-"""What lies where in the picture: samples, the strip of the LVF on them and before them, cards."""
+"""Layout of the picture: samples, the strip of the LVF on them and before them, cards."""
 
 from dataclasses import dataclass
 
@@ -18,18 +18,18 @@ IntArray = NDArray[np.intp]
 
 @dataclass(frozen=True)
 class Places:
-    """All that can look different in a picture, arrays of shape (places,).
+    """All parts of a picture that can look different, arrays of shape (places,).
 
     Attributes
     ----------
     cell
-        Which cell lies there, see `Layout`.
+        Index of the cell at each place, see `Layout`.
     surface
-        Which surface of a card lies on it, see `cards`; 0 for none.
+        Index of the card's surface on it, see `cards`; 0 for none.
     piece
-        Through which piece of the LVF's strip it is seen, see `lvf`.
+        Index of the piece of the LVF's strip before it, see `lvf`.
     painted : ndarray, shape (height, width)
-        For every pixel 4 times its place, plus which of a Bayer cell's four pixels it is.
+        For every pixel 4 times its place, plus its index among the four pixels of a Bayer cell.
     """
 
     cell: IntArray
@@ -39,20 +39,20 @@ class Places:
 
 
 class Layout:
-    """Cells: the cloth, and each part of a sample that lies below its own piece of the strip.
+    """Cells of the picture: the cloth, and each part of a sample below its own piece of the strip.
 
     Attributes
     ----------
     patch, piece : ndarray, shape (cells,)
-        Of every cell: its sample, from 1 on, and the piece of the strip on it; cell 0 is the
-        cloth. Without an LVF a sample is one cell.
+        Sample of every cell, from 1 on, and the piece of the strip on it; cell 0 is the cloth.
+        Without an LVF a sample is one cell.
     pixels : ndarray, shape (cells,)
-        How many belong to a cell.
+        Number of pixels of a cell.
 
     Raises
     ------
     UsageError
-        A patch or a strip outside the frame.
+        A patch or a strip is outside the frame.
     """
 
     def __init__(self, simulation: Simulation) -> None:
@@ -73,22 +73,22 @@ class Layout:
             numbers += np.where(patch > 0, self._strips["on sample"], 0)
         # The cloth and every patch have a cell, even one that others hide.
         every = np.arange(len(simulation.patches) + 1) * (PIECES + 1)
-        found, counts = np.unique(np.concatenate([every, numbers.ravel()]), return_counts=True)
-        self._cells = np.searchsorted(found, numbers)
-        self.patch, self.piece = np.divmod(found, PIECES + 1)
-        self.pixels = counts - np.isin(found, every)
-        self._known: dict[tuple[Card, LvfPlace], Places] = {}
+        cells, counts = np.unique(np.concatenate([every, numbers.ravel()]), return_counts=True)
+        self._cells = np.searchsorted(cells, numbers)
+        self.patch, self.piece = np.divmod(cells, PIECES + 1)
+        self.pixels = counts - np.isin(cells, every)
+        self._places_by_arrangement: dict[tuple[Card, LvfPlace], Places] = {}
 
     def places(self, arrangement: Arrangement) -> Places:
-        """All that looks different in an arrangement."""
+        """Return all places that look different in an arrangement."""
         through = self.looked_through(arrangement)
         key = arrangement.card, through
-        if key not in self._known:
-            self._known[key] = self._places(*key)
-        return self._known[key]
+        if key not in self._places_by_arrangement:
+            self._places_by_arrangement[key] = self._places(*key)
+        return self._places_by_arrangement[key]
 
     def looked_through(self, arrangement: Arrangement) -> LvfPlace:
-        """Where the LVF is if the camera looks through it, else `away`.
+        """Return the LVF's place if the camera looks through it, else `away`.
 
         Without a door the sample does not leave an LVF that lies on it.
         """
@@ -101,9 +101,9 @@ class Layout:
         surface = surfaces(card, self._simulation.chart, width, height)
         piece = self._strips.get(through, np.zeros_like(surface))
         numbers = (self._cells * (surface.max() + 1) + surface) * (PIECES + 1) + piece
-        found, place = np.unique(numbers, return_inverse=True)
-        rest, pieces_found = np.divmod(found, PIECES + 1)
-        cells_found, surfaces_found = np.divmod(rest, surface.max() + 1)
+        distinct, place = np.unique(numbers, return_inverse=True)
+        remainder, pieces_found = np.divmod(distinct, PIECES + 1)
+        cells_found, surfaces_found = np.divmod(remainder, surface.max() + 1)
         bayer = np.tile(np.arange(len(BAYER_RGGB)).reshape(2, 2), (height // 2, width // 2))
         painted = place.reshape(height, width) * len(BAYER_RGGB) + bayer
         return Places(cells_found, surfaces_found, pieces_found, painted)

@@ -1,4 +1,4 @@
-"""A bank of LEDs: narrow bands, there at once when their relays close and gone when they open."""
+"""A bank of LEDs: narrow bands, switched at once by their relays."""
 
 import math
 from bisect import bisect_right
@@ -18,7 +18,7 @@ FWHM_OVER_SIGMA = 2 * math.sqrt(2 * math.log(2))
 
 
 def led_spectrum(led: LedSettings) -> FloatArray:
-    """Of a lit LED, relative as a `Lamp`'s irradiance, shape (160,) on `WAVELENGTH_NM`."""
+    """Return a lit LED's irradiance, relative as a `Lamp`'s, shape (160,) on `WAVELENGTH_NM`."""
     shape = np.exp(-(((WAVELENGTH_NM - led.centre) / led.fwhm * FWHM_OVER_SIGMA) ** 2) / 2)
     spectrum: FloatArray = led.level * BURNING_SPECTRUM.sum() / shape.sum() * shape
     return spectrum
@@ -28,14 +28,14 @@ def led_spectrum(led: LedSettings) -> FloatArray:
 class Leds:
     """The bank with its history; values never change. Times are seconds of the room's clock.
 
-    Nothing keeps two from being lit together: that is for who switches the relays.
+    Several LEDs may be lit together: preventing that is up to the driver.
 
     Attributes
     ----------
     bank
-        Its LEDs.
+        Settings of the LEDs.
     states
-        From when on, and the relays that were closed then; the first from 0 on.
+        Begin in seconds and closed relays of each state; the first from 0 on.
     """
 
     bank: tuple[LedSettings, ...] = ()
@@ -48,53 +48,55 @@ class Leds:
 
     @property
     def were_lit(self) -> bool:
-        """Whether there has ever been light."""
+        """Whether any LED has ever been lit."""
         return len(self.states) > 1
 
     def switched(self, relay: int, on: bool, at_s: float) -> "Leds":
-        """The bank after a relay has moved; one that has no LED does nothing."""
-        lit = self.lit | {relay} if on else self.lit - {relay}
-        if lit == self.lit or relay not in {led.relay for led in self.bank}:
+        """Return the bank after a relay has moved; one that has no LED does nothing."""
+        relays = self.lit | {relay} if on else self.lit - {relay}
+        if relays == self.lit or relay not in {led.relay for led in self.bank}:
             return self
-        return replace(self, states=(*self.states, (at_s, lit)))
+        return replace(self, states=(*self.states, (at_s, relays)))
 
     def until(self, time_s: float) -> "Leds":
-        """The bank as if nobody had touched it after `time_s`."""
+        """Return the bank without switches after `time_s`."""
         return replace(self, states=tuple(state for state in self.states if state[0] <= time_s))
 
     def last_switch_off(self, time_s: float) -> float | None:
-        """When one was last switched off, up to and including `time_s`."""
-        off = [at_s for (_, before), (at_s, after) in pairwise(self.states) if before - after]
+        """Return the time at which an LED was last switched off, up to and including `time_s`."""
+        off = [at_s for (_, previous), (at_s, relays) in pairwise(self.states) if previous - relays]
         return max((at_s for at_s in off if at_s <= time_s), default=None)
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
-        """Times strictly between at which the light does not go on smoothly."""
+        """Return the times strictly between at which the light is not smooth."""
         return [at_s for at_s, _ in self.states if start_s < at_s < end_s]
 
     def dark(self, start_s: float, end_s: float) -> bool:
-        """Whether there is no light from `start_s` to `end_s`."""
+        """Return whether there is no light from `start_s` to `end_s`."""
         times_s = [start_s, *self.corners(start_s, end_s)]
         return not any(self.states[self._place(at_s)][1] for at_s in times_s)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Relative spectral irradiance at the sample, shape (..., 160)."""
+        """Return the relative spectral irradiance at the sample, shape (..., 160)."""
         since_s = [at_s for at_s, _ in self.states]
-        found: FloatArray = self._light[np.searchsorted(since_s, time_s, side="right") - 1]
-        return found
+        irradiance: FloatArray = self._light[np.searchsorted(since_s, time_s, side="right") - 1]
+        return irradiance
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """∫ irradiance dt over an interval, shape (160,)."""
+        """Return ∫ irradiance dt over an interval, shape (160,)."""
         edges_s = [start_s, *self.corners(start_s, end_s), end_s]
-        places = [self._place(left) for left in edges_s[:-1]]
-        found: FloatArray = np.diff(edges_s) @ self._light[places]
-        return found
+        places = [self._place(begin_s) for begin_s in edges_s[:-1]]
+        exposure: FloatArray = np.diff(edges_s) @ self._light[places]
+        return exposure
 
     def _place(self, time_s: float) -> int:
         return bisect_right(self.states, time_s, key=lambda state: state[0]) - 1
 
     @cached_property
     def _light(self) -> FloatArray:
-        """Of every state, shape (states, 160)."""
+        """Return the irradiance of every state, shape (states, 160)."""
         spectra = {led.relay: led_spectrum(led) for led in self.bank}
         dark = np.zeros_like(WAVELENGTH_NM)
-        return np.array([sum((spectra[one] for one in lit), dark) for _, lit in self.states])
+        return np.array(
+            [sum((spectra[relay] for relay in relays), dark) for _, relays in self.states]
+        )

@@ -1,8 +1,8 @@
-"""All that shines on the samples, and what the camera sees of it.
+"""All light on the samples, and the camera's part of it by reflection.
 
-The lamp, the room's own light where somebody left it on, and what leaks in; between them and the
-samples there may be a shield before the lamp and a trap door, which turns the samples from lamp to
-camera.
+There are the lamp, the room's own light if it was left on, and light that leaks in; between them
+and the samples there may be a shield before the lamp and a trap door, which turns the samples from
+lamp to camera.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,7 +18,7 @@ from .lamp import BURNING_K, PANEL_FADING_S, WAVELENGTH_NM, Lamp, filament_spect
 from .lamps import FilteredLamps
 
 FloatArray = NDArray[np.float64]
-#: Part of a light at a time.
+#: Function of time: fraction of a light.
 UnitFraction = Callable[[float], float]
 
 #: The room light's irradiance at the sample over the warm lamp's.
@@ -29,18 +29,19 @@ LEAK_PEAKS = ((452.0, 10.0, 1.0), (560.0, 52.0, 0.9))
 
 @dataclass(frozen=True)
 class VisibleLight:
-    """∫ irradiance × visible part dt of what the camera sees by reflection, each shape (160,).
+    """∫ irradiance × visible fraction dt, which the camera sees by reflection, each shape (160,).
 
     Attributes
     ----------
     sample
-        From the lamp's side, as far as the door is open; without a door all there is.
+        Light on the samples from the lamp's side, as far as the door is open; without a door all
+        light.
     sample_stray
-        From the camera's side, as far as the door is open.
+        Light on the samples from the camera's side, as far as the door is open.
     door
-        Its outside, as far as it is closed.
+        Light on the door's outside, as far as it is closed.
     cloth
-        All around.
+        Light on the cloth around.
     """
 
     sample: FloatArray
@@ -51,30 +52,30 @@ class VisibleLight:
 
 @dataclass(frozen=True)
 class Stray:
-    """Light from everywhere, on at some times.
+    """Light from all directions, on at some times.
 
     Attributes
     ----------
     whens
-        When it is there.
+        Times at which the light is on.
     spectrum : ndarray, shape (160,)
-        On `WAVELENGTH_NM`, relative as a `Lamp`'s irradiance.
+        Irradiance on `WAVELENGTH_NM`, relative as a `Lamp`'s.
     """
 
     whens: Sequence[FaultTime]
     spectrum: FloatArray
 
     def is_on(self, time_s: float) -> bool:
-        """Whether it is there at a time."""
-        return any(when.is_on(time_s) for when in self.whens)
+        """Return whether the light is on at a time."""
+        return any(span.is_on(time_s) for span in self.whens)
 
 
 @dataclass(frozen=True)
 class Lights:
-    """A lamp, and when the room light is on; irradiances as `Lamp`'s.
+    """A lamp, and the times of the room light; irradiances are relative as a `Lamp`'s.
 
     The lamp reaches the sample as far as the trap door is closed and the shield open; the room
-    light, and what leaks in, come from everywhere.
+    light, and light that leaks in, come from all directions.
     """
 
     lamp: Lamp | FilteredLamps
@@ -84,23 +85,23 @@ class Lights:
     leaks: Sequence[Stray] = ()
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
-        """Times strictly between at which light or door does not go on smoothly."""
-        whens = [when for stray in self._strays for when in stray.whens]
-        switches = {time_s for when in whens for time_s in (when.at, when.until)}
+        """Return the times strictly between at which light or door is not smooth."""
+        spans = [span for stray in self._strays for span in stray.whens]
+        switches = {time_s for span in spans for time_s in (span.at, span.until)}
         inside = {time_s for time_s in switches if start_s < time_s < end_s}
         moving = [time_s for door in self._doors for time_s in door.corners(start_s, end_s)]
         return sorted(inside.union(self.lamp.corners(start_s, end_s), moving))
 
     def dark(self, start_s: float, end_s: float) -> bool:
-        """Whether there is no light at all from `start_s` to `end_s`."""
+        """Return whether there is no light at all from `start_s` to `end_s`."""
         if not self.lamp.dark(start_s, end_s):
             return False
         corners = [start_s, *self.corners(start_s, end_s), end_s]
-        middles = [(left + right) / 2 for left, right in pairwise(corners)]
+        middles = [(begin_s + stop_s) / 2 for begin_s, stop_s in pairwise(corners)]
         return not any(stray.is_on(at_s) for stray in self._strays for at_s in middles)
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Relative spectral irradiance at the sample, shape (..., 160), on `WAVELENGTH_NM`."""
+        """Return the relative spectral irradiance at the sample on the grid, shape (..., 160)."""
         light = self.lamp.irradiance(time_s)
         if self._doors:
             arriving = _at(time_s, lambda at_s: self._unshielded(at_s) * self._facing_lamp(at_s))
@@ -110,16 +111,16 @@ class Lights:
         return light
 
     def openness(self, time_s: float) -> float:
-        """Part of the samples that the camera sees."""
+        """Return the fraction of the samples that the camera sees."""
         return 1.0 if self.door is None else self.door.openness(time_s)
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """∫ irradiance dt over an interval without doors, shape (160,)."""
+        """Return ∫ irradiance dt over an interval without doors, shape (160,)."""
         lamp = self.lamp.exposure(start_s, end_s)
         return lamp + self._stray(start_s, end_s, lambda _: 1.0)
 
     def seen(self, start_s: float, end_s: float) -> VisibleLight:
-        """What the camera sees by reflection in an interval."""
+        """Return the light that the camera sees by reflection in an interval."""
         if not self._doors:
             light, none = self.exposure(start_s, end_s), np.zeros_like(WAVELENGTH_NM)
             return VisibleLight(light, none, none, light)
@@ -159,35 +160,35 @@ class Lights:
         return 1.0 if self.shield is None else self.shield.openness(time_s)
 
     def _lamp(self, start_s: float, end_s: float, fractions: Sequence[UnitFraction]) -> FloatArray:
-        """∫ shares of the lamp dt, shape (shares, 160)."""
+        """Return ∫ shares of the lamp dt, shape (shares, 160)."""
         total = np.zeros((len(fractions), len(WAVELENGTH_NM)))
-        for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
-            if self.lamp.dark(left, right):
+        for begin_s, stop_s in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
+            if self.lamp.dark(begin_s, stop_s):
                 continue
-            if self._is_still(left, right):
-                parts = [fraction((left + right) / 2) for fraction in fractions]
-                total += np.outer(parts, self.lamp.exposure(left, right))
+            if self._is_still(begin_s, stop_s):
+                parts = [fraction((begin_s + stop_s) / 2) for fraction in fractions]
+                total += np.outer(parts, self.lamp.exposure(begin_s, stop_s))
                 continue
-            times_s, part_s = nodes(left, right, PANEL_FADING_S)
+            times_s, part_s = nodes(begin_s, stop_s, PANEL_FADING_S)
             parts_s = part_s * np.array([_at(times_s, fraction) for fraction in fractions])
             total += parts_s @ self.lamp.irradiance(times_s)
         return total
 
     def _stray(self, start_s: float, end_s: float, fraction: UnitFraction) -> FloatArray:
-        """∫ share of what comes from everywhere dt, shape (160,)."""
+        """Return ∫ share of the light from all directions dt, shape (160,)."""
         total = np.zeros_like(WAVELENGTH_NM)
         strays = self._strays
         if not strays:
             return total
-        for left, right in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
-            middle_s = (left + right) / 2
+        for begin_s, stop_s in pairwise([start_s, *self.corners(start_s, end_s), end_s]):
+            middle_s = (begin_s + stop_s) / 2
             light = sum(stray.spectrum for stray in strays if stray.is_on(middle_s))
-            if self._is_still(left, right):
-                seen_s = fraction(middle_s) * (right - left)
+            if self._is_still(begin_s, stop_s):
+                share_s = fraction(middle_s) * (stop_s - begin_s)
             else:
-                times_s, part_s = nodes(left, right, PANEL_FADING_S)
-                seen_s = float(part_s @ _at(times_s, fraction))
-            total += light * seen_s
+                times_s, part_s = nodes(begin_s, stop_s, PANEL_FADING_S)
+                share_s = float(part_s @ _at(times_s, fraction))
+            total += light * share_s
         return total
 
     def _is_still(self, start_s: float, end_s: float) -> bool:
@@ -195,19 +196,19 @@ class Lights:
 
 
 def _at(time_s: float | FloatArray, fraction: UnitFraction) -> FloatArray:
-    """A share at every time."""
+    """Return a share at every time."""
     times_s = np.asarray(time_s)
     return np.array([fraction(at_s) for at_s in times_s.ravel().tolist()]).reshape(times_s.shape)
 
 
 def room_light_spectrum() -> FloatArray:
-    """Of the room light, shape (160,): incandescent, too."""
+    """Return the spectrum of the room light, incandescent, too, shape (160,)."""
     spectrum: FloatArray = ROOM_LIGHT * filament_spectrum(BURNING_K)
     return spectrum
 
 
 def leak(level: float, whens: Sequence[FaultTime]) -> Stray:
-    """Light from a screen or a crack, of `level` times the warm lamp's over all wavelengths."""
+    """Return light from a screen or a crack, of `level` times the warm lamp's irradiance."""
     peaks = [
         height * np.exp(-(((WAVELENGTH_NM - at_nm) / wide_nm) ** 2) / 2)
         for at_nm, wide_nm, height in LEAK_PEAKS

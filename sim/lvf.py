@@ -1,7 +1,7 @@
-"""The linear variable filter: where its strip is in the picture, and what it lets through there.
+"""The linear variable filter: place of its strip in the picture, and transmittance along it.
 
-Its pass band is no Gaussian: flatter on top, steeper at its sides, with a shoulder towards long
-wavelengths; its wavelength is not quite linear along the strip. Like a real one.
+As of a real filter, its pass band is no Gaussian: flatter on top, steeper at its sides, with a
+shoulder towards long wavelengths; its wavelength is not quite linear along the strip.
 """
 
 import math
@@ -39,21 +39,21 @@ class Lvf:
     Parameters
     ----------
     settings
-        Of the filter.
+        Settings of the filter.
     """
 
     def __init__(self, settings: LvfSettings) -> None:
         self._settings = settings
 
     def centre_nm(self, u: FloatArray) -> FloatArray:
-        """Middle of the pass band from the blue end, u = 0, to the red end, u = 1."""
+        """Return the middle of the pass band from the blue end, u = 0, to the red end, u = 1."""
         blue, red = self._settings.centre
         bend = np.sin(np.pi * u) + WIGGLE * np.sin(2 * np.pi * u)
         centre: FloatArray = blue + (red - blue) * u + self._settings.bend_nm * bend
         return centre
 
     def transmission(self, u: FloatArray, wavelength_nm: FloatArray = WAVELENGTH_NM) -> FloatArray:
-        """T(λ) at some places (p,) and wavelengths (n,), shape (p, n)."""
+        """Return T(λ) at some places (p,) and wavelengths (n,), shape (p, n)."""
         fwhm_nm = self._settings.fwhm_nm * np.interp(u, [0.0, 1.0], WIDTHS)[:, None]
         x = 2 * (wavelength_nm - self.centre_nm(u)[:, None]) / fwhm_nm
         # The two together are 1 high and, at half of that, `fwhm_nm` wide to within 1 %.
@@ -66,11 +66,12 @@ class Lvf:
         return passed
 
     def seen(self, strip: StripSettings, turned: bool) -> FloatArray:
-        """T(λ) of all pieces of a strip from left to right, the holder's before them.
+        """Return T(λ) of all pieces of a strip from left to right, the holder's before them.
 
         Returns
         -------
         ndarray, shape (1 + PIECES, 160)
+            Transmittance on `WAVELENGTH_NM`.
         """
         rising, falling = self._rising, self._rising[::-1]
         pieces = rising if strip.rising != turned else falling
@@ -82,7 +83,7 @@ class Lvf:
 
 
 def pieces(strip: StripSettings, width: int, height: int) -> IntArray:
-    """Through which piece of a strip each pixel is seen, as in `Lvf.seen`, shape (height, width).
+    """Return the piece of a strip before each pixel, as in `Lvf.seen`, shape (height, width).
 
     Raises
     ------
@@ -97,12 +98,12 @@ def pieces(strip: StripSettings, width: int, height: int) -> IntArray:
     u = (from_x * math.cos(along) + from_y * math.sin(along)) / wide + 0.5
     v = (from_y * math.cos(along) - from_x * math.sin(along)) / high + 0.5
     inside = (u >= 0) & (u < 1) & (v >= 0) & (v < 1)
-    found: IntArray = np.where(inside, 1 + np.floor(u * PIECES).astype(np.intp), 0)
-    return found
+    piece: IntArray = np.where(inside, 1 + np.floor(u * PIECES).astype(np.intp), 0)
+    return piece
 
 
 def in_pixels(region: Region, width: int, height: int) -> tuple[float, float, float, float]:
-    """A region in pixels, not rounded."""
+    """Return a region in pixels, not rounded."""
     x, y, wide, high = region
     if max(region) > 1:
         return region

@@ -23,7 +23,7 @@ LINES = (
     (579.0670, 0.09),
     (690.7500, 0.006),
 )
-#: Of the strongest line, over what the warm halogen lamp gives in 1 nm at 560 nm.
+#: Light of the strongest line over the warm halogen lamp's in 1 nm at 560 nm.
 STRONGEST = 40.0
 #: Continuum in 1 nm over the strongest line.
 CONTINUUM = 1e-4
@@ -34,17 +34,17 @@ WARM_UP_S = 45.0
 
 
 def line_spectrum() -> FloatArray:
-    """Of the warm lamp, relative as a `Lamp`'s irradiance, shape (160,) on `WAVELENGTH_NM`.
+    """Return the warm lamp's irradiance, relative as a `Lamp`'s, shape (160,) on `WAVELENGTH_NM`.
 
     Each line is shared by the two cells about it so that its centroid is exact.
     """
     spectrum = np.full_like(WAVELENGTH_NM, CONTINUUM * STRONGEST)
     for line_nm, strength in LINES:
-        left = int((line_nm - WAVELENGTH_NM[0]) // CELL_NM)
-        right_fraction = (line_nm - WAVELENGTH_NM[left]) / CELL_NM
+        cell = int((line_nm - WAVELENGTH_NM[0]) // CELL_NM)
+        right_fraction = (line_nm - WAVELENGTH_NM[cell]) / CELL_NM
         light = STRONGEST * strength / CELL_NM
-        spectrum[left] += (1 - right_fraction) * light
-        spectrum[left + 1] += right_fraction * light
+        spectrum[cell] += (1 - right_fraction) * light
+        spectrum[cell + 1] += right_fraction * light
     return spectrum
 
 
@@ -55,7 +55,7 @@ class Mercury:
     Attributes
     ----------
     switches
-        When it was switched, and whether on.
+        Time and new state of each switch.
     """
 
     switches: tuple[tuple[float, bool], ...] = ((0.0, False),)
@@ -67,45 +67,45 @@ class Mercury:
 
     @property
     def was_on(self) -> bool:
-        """Whether there has ever been one."""
+        """Whether there has ever been an arc."""
         return len(self.switches) > 1
 
     def switched(self, on: bool, at_s: float) -> "Mercury":
-        """The lamp after one more switch; switching to what it is already does nothing."""
+        """Return the lamp after one more switch; switching to the present state does nothing."""
         if on == self.on:
             return self
         return replace(self, switches=(*self.switches, (at_s, on)))
 
     def until(self, time_s: float) -> "Mercury":
-        """The lamp as if nobody had touched it after `time_s`."""
+        """Return the lamp without switches after `time_s`."""
         return replace(self, switches=tuple(s for s in self.switches if s[0] <= time_s))
 
     def last_switch_off(self, time_s: float) -> float | None:
-        """When it was last switched off, up to and including `time_s`."""
+        """Return the time at which the lamp was last switched off, up to and including `time_s`."""
         off = [at_s for at_s, on in self.switches[1:] if not on and at_s <= time_s]
         return max(off, default=None)
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
-        """Times strictly between at which the light does not go on smoothly."""
+        """Return the times strictly between at which the light is not smooth."""
         return [at_s for at_s, _ in self.switches if start_s < at_s < end_s]
 
     def irradiance(self, time_s: float | FloatArray) -> FloatArray:
-        """Relative spectral irradiance at the sample, shape (..., 160)."""
+        """Return the relative spectral irradiance at the sample, shape (..., 160)."""
         return np.multiply.outer(np.vectorize(self._gain, otypes=[float])(time_s), line_spectrum())
 
     def exposure(self, start_s: float, end_s: float) -> FloatArray:
-        """∫ irradiance dt over an interval, shape (160,)."""
+        """Return ∫ irradiance dt over an interval, shape (160,)."""
         corners = [start_s, *self.corners(start_s, end_s), end_s]
         total_s = 0.0
-        for left, right in pairwise(corners):
-            at_s, on = self._switch(left)
+        for begin_s, stop_s in pairwise(corners):
+            at_s, on = self._switch(begin_s)
             if on:
-                cold = [math.exp(-(t - at_s) / WARM_UP_S) for t in (left, right)]
-                total_s += right - left - (1 - COLD) * WARM_UP_S * (cold[0] - cold[1])
+                cold = [math.exp(-(time_s - at_s) / WARM_UP_S) for time_s in (begin_s, stop_s)]
+                total_s += stop_s - begin_s - (1 - COLD) * WARM_UP_S * (cold[0] - cold[1])
         return total_s * line_spectrum()
 
     def dark(self, start_s: float, end_s: float) -> bool:
-        """Whether there is no light from `start_s` to `end_s`."""
+        """Return whether there is no light from `start_s` to `end_s`."""
         return not (self._switch(start_s)[1] or self.corners(start_s, end_s))
 
     def _switch(self, time_s: float) -> tuple[float, bool]:

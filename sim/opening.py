@@ -1,4 +1,4 @@
-"""A simulated room with its doors open: boards on serial lines, a camera on USB."""
+"""Opening of a simulated room: boards on serial lines, a camera on USB."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -31,12 +31,12 @@ RELAYS = 8
 LCUS_RELAYS = 4
 #: Analogue input of the Numato board that has the thermometer.
 TEMPERATURE_INPUT = 0
-#: Its stream of random numbers, of nothing else in the room.
+#: Stream of random numbers of the thermometer alone.
 TEMPERATURE_STREAM = 9
 
 
 class OpenRoom:
-    """The room, its clock and what stands in it."""
+    """The open room, its clock, its boards and its camera."""
 
     def __init__(self, simulation: Simulation, clock: VirtualClock) -> None:
         self.clock = clock
@@ -92,7 +92,7 @@ class OpenRoom:
         )
 
     def usb(self, device: str) -> usb.backend.IBackend | None:
-        """The USB bus on which `device` is alone; `None` if there is no such device."""
+        """Return the USB bus on which `device` is alone; None if there is no such device."""
         return self.camera.backend if device == "camera" else None
 
     def _relay_moved(self, board: str, relay: int, on: bool) -> None:
@@ -108,18 +108,37 @@ def open_room(
 ) -> Iterator[OpenRoom]:
     """Build the room that a rig file's `simulation:` describes and make it reachable.
 
+    While the context is open, pyserial finds the room's boards at addresses such as
+    `sim://room/relays`, and the room's clock runs.
+
     Parameters
     ----------
+    content
+        Content of the rig file's `simulation:`, as YAML loads it.
     source
         Path of the rig file, for messages.
     not_before_s
-        Seconds since 1970; the room's epoch is moved there if it is earlier. Faults keep to their
-        time on the wall.
+        Earliest epoch of the room in seconds since 1970. A room whose epoch is earlier is opened at
+        this time, and its faults keep their times on the wall clock.
+
+    Yields
+    ------
+    OpenRoom
+        The room with its clock, its boards and its camera.
 
     Raises
     ------
     UsageError
-        The description does not fit.
+        The description does not fit the model `Simulation`.
+
+    Examples
+    --------
+    >>> from labrig.sim import open_room
+    >>> description = {"sample": "blue-paint", "faults": [{"lamp_dead": {"at": "5 min"}}]}
+    >>> with open_room(description, "my-rig.yaml") as room:
+    ...     room.clock.sleep(60.0)
+    ...     print(sorted(room.boards), room.clock.now())
+    ['changer', 'lcus', 'relays', 'servo'] 60.0
     """
     simulation = validate(content, Simulation, f"{source}, simulation").opened_at(not_before_s)
     naps = given(fault.pc_asleep for fault in simulation.faults)
@@ -132,7 +151,7 @@ def open_room(
 
 
 def _servo_board(simulation: Simulation, clock: VirtualClock) -> MaestroBoard:
-    """The Maestro, its channels at home: trap door closed, shield open."""
+    """Return the Maestro, its channels at home: trap door closed, shield open."""
     homes = {}
     if simulation.shield is not None:
         homes[simulation.shield.channel] = simulation.shield.open
@@ -145,20 +164,20 @@ def _servo_board(simulation: Simulation, clock: VirtualClock) -> MaestroBoard:
 
 
 def _camera_faults(faults: Sequence[Fault]) -> CameraFaults:
-    """What befalls the camera; its cable can be pulled once."""
-    found = CameraFaults(
+    """Return the faults of the camera; its cable can be pulled once."""
+    camera_faults = CameraFaults(
         busy_spans_s=_spans_s(given(fault.camera_busy for fault in faults)),
         full_spans_s=_spans_s(given(fault.camera_full for fault in faults)),
     )
     for out in given(fault.camera_unplugged for fault in faults):
-        found = replace(
-            found,
+        camera_faults = replace(
+            camera_faults,
             unplug_at_s=out.at if out.after_bytes is None else None,
             unplug_after_bytes=out.after_bytes,
             replug_after_s=out.lasting,
         )
-    return found
+    return camera_faults
 
 
-def _spans_s(whens: Sequence[FaultTime]) -> tuple[tuple[float, float], ...]:
-    return tuple((when.at, when.until) for when in whens)
+def _spans_s(spans: Sequence[FaultTime]) -> tuple[tuple[float, float], ...]:
+    return tuple((span.at, span.until) for span in spans)

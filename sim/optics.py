@@ -1,7 +1,7 @@
 """From light to photo-electrons: the simulated camera's own curves, aperture and lens.
 
-The curves are the shipped ones of a Canon EOS 5D Mark II, bent smoothly by as much as three
-laboratories disagree about that camera: labrig, which has the shipped ones, must cope.
+The curves are the shipped ones of a Canon EOS 5D Mark II, changed smoothly by as much as three
+laboratories disagree about that camera: labrig, which has the shipped ones, must tolerate it.
 """
 
 import json
@@ -57,19 +57,19 @@ class CameraCurves:
     sensitivity: FloatArray
 
     def glow_electrons_per_s(self, emission: FloatArray, f_number: float) -> FloatArray:
-        """Of emission spectra (…, wavelengths) in Table 1's scale; shape (…, 3)."""
+        """Return electrons per second of spectra (…, wavelengths) in Table 1's scale, (…, 3)."""
         rate: FloatArray = (
             ELECTRONS_PER_S_NM / f_number**2 * CELL_NM * (emission @ self.sensitivity.T)
         )
         return rate
 
     def reflected_electrons(self, lamp_exposure: FloatArray, f_number: float) -> FloatArray:
-        """Of a white surface under ∫ irradiance dt (wavelengths,); shape (3,)."""
+        """Return electrons of a white surface under ∫ irradiance dt (wavelengths,), shape (3,)."""
         return self.glow_electrons_per_s(REFLECTED * lamp_exposure, f_number)
 
 
 def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
-    """A camera's curves as measured, on the simulator's grid; 0 where they were not.
+    """Return a camera's measured curves on the simulator's grid; 0 beyond the measurement.
 
     Parameters
     ----------
@@ -79,7 +79,7 @@ def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
     Raises
     ------
     UsageError
-        No such file, or not such a file.
+        There is no such file, or it has another format.
     """
     path = resources.find("config/optics", "camera", name_or_path)
     try:
@@ -95,7 +95,7 @@ def measured_curves(name_or_path: str = CURVES) -> CameraCurves:
 
 
 def bent_curves(rng: np.random.Generator) -> CameraCurves:
-    """The curves as this simulated camera has them."""
+    """Return the curves of this simulated camera."""
     return CameraCurves(np.array([_bent(row, rng) for row in measured_curves().sensitivity]))
 
 
@@ -105,7 +105,7 @@ def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
     factor, added = CubicSpline(KNOTS_NM, rng.standard_normal((2, len(KNOTS_NM))), axis=1)(
         WAVELENGTH_NM
     )
-    seen = (WAVELENGTH_NM > 400.0) & (WAVELENGTH_NM < 700.0)
+    visible = (WAVELENGTH_NM > 400.0) & (WAVELENGTH_NM < 700.0)
 
     def normalised(strength: float) -> FloatArray:
         bent = curve / peak * np.exp(strength * factor) + strength * ADDED * added
@@ -113,16 +113,16 @@ def _bent(curve: FloatArray, rng: np.random.Generator) -> FloatArray:
         return positive / float(positive.max())
 
     def excess(strength: float) -> float:
-        difference = (normalised(strength) - curve / peak)[seen]
+        difference = (normalised(strength) - curve / peak)[visible]
         return float(np.sqrt(np.mean(difference**2))) - goal
 
-    enough = next(strength for strength in STRENGTHS if excess(strength) > 0)
-    result: FloatArray = peak * normalised(brentq(excess, 0.0, enough, xtol=1e-6))
+    largest = next(strength for strength in STRENGTHS if excess(strength) > 0)
+    result: FloatArray = peak * normalised(brentq(excess, 0.0, largest, xtol=1e-6))
     return result
 
 
 def emission(material: Material) -> FloatArray:
-    """Λ of every state as a smooth spectrum, shape (states, wavelengths).
+    """Return Λ of every state as a smooth spectrum, shape (states, wavelengths).
 
     A spectrum in the file gives the shape; without one it is the slope of a monotone curve through
     the bands' running sum, so that its mean over each band is the file's number.
@@ -130,7 +130,7 @@ def emission(material: Material) -> FloatArray:
     Raises
     ------
     UsageError
-        The file does not say what the material radiates.
+        The file has no re-radiation.
     """
     if material.bands_nm is None or any(state.reradiation is None for state in material.states):
         raise UsageError(
@@ -141,10 +141,10 @@ def emission(material: Material) -> FloatArray:
     if material.spectrum is not None:
         measured = material.spectrum
         shape = PchipInterpolator(measured.wavelength_nm, measured.value, extrapolate=False)
-        fine = np.nan_to_num(shape(WAVELENGTH_NM))
+        spectrum = np.nan_to_num(shape(WAVELENGTH_NM))
         cells = band_cells(material.bands_nm)
-        in_bands = (cells @ fine / np.maximum(cells.sum(axis=1), 1e-12)).sum()
-        return np.outer(bands.sum(axis=1) / in_bands, fine)
+        in_bands = (cells @ spectrum / np.maximum(cells.sum(axis=1), 1e-12)).sum()
+        return np.outer(bands.sum(axis=1) / in_bands, spectrum)
     edges = np.asarray(material.bands_nm)
     below = np.pad(np.cumsum(bands * np.diff(edges), axis=1), ((0, 0), (2, 1)), mode="edge")
     below[:, :2] = 0.0
@@ -155,7 +155,7 @@ def emission(material: Material) -> FloatArray:
 
 
 def vignetting(height: int, width: int, focal_mm: float = FOCAL_MM) -> FloatArray:
-    """Light of a pixel over that in the middle, cos⁴ of the field angle, shape (height, width)."""
+    """Return a pixel's light relative to the middle, cos⁴ of the field angle, (height, width)."""
     y = (np.arange(height) - (height - 1) / 2)[:, None]
     x = (np.arange(width) - (width - 1) / 2)[None, :]
     corner = CORNER_MM / focal_mm

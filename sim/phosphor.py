@@ -1,8 +1,8 @@
 """The samples: rate equations of all states of all patches, integrated along the light.
 
 Eq. 1 of Nalbach et al. is integrated as it stands, by collocation at the nodes of Gauss and
-Legendre (an implicit Runge–Kutta method of order 16). Nothing here knows a solution of it: that is
-what labrig's fits are tested against.
+Legendre (an implicit Runge–Kutta method of order 16). No analytical solution is used, since
+labrig's fits are tested against this simulation.
 """
 
 import math
@@ -31,7 +31,7 @@ ATOL = 1e-13
 STAGES = 8
 #: The next step is not shorter than the last by more than this factor, nor longer.
 SHORTER, LONGER = 0.1, 10.0
-#: An error that is none.
+#: Least error, to avoid division by zero.
 TINY = 1e-30
 
 #: Level of a fully charged state of which neither excitation rates nor a charge are known.
@@ -39,14 +39,14 @@ UNKNOWN_CHARGE = 0.5
 
 
 def _collocation() -> tuple[FloatArray, FloatArray, FloatArray, FloatArray]:
-    """Nodes and weights between 0 and 1; integrals up to the nodes; and what extrapolates to 1.
+    """Return nodes and weights between 0 and 1, integrals up to the nodes, extrapolation to 1.
 
     With values f at the nodes, ∫f up to node i is `integrals[i] @ f`, and that up to 1
     `weights @ f` or, from the integrals themselves, `extrapolation @ (integrals @ f)`.
     """
     nodes, weights = legendre.leggauss(STAGES)
-    of_values = np.linalg.inv(legendre.legvander(nodes, STAGES - 1))
-    below = legendre.legval(nodes, legendre.legint(of_values, lbnd=-1)).T
+    coefficients = np.linalg.inv(legendre.legvander(nodes, STAGES - 1))
+    below = legendre.legval(nodes, legendre.legint(coefficients, lbnd=-1)).T
     integrals = np.asarray(below, dtype=np.float64)
     extrapolation = weights @ np.linalg.inv(integrals)
     return (nodes + 1) / 2, weights / 2, integrals / 2, extrapolation
@@ -56,31 +56,32 @@ NODES, WEIGHTS, INTEGRALS, EXTRAPOLATION = _collocation()
 
 
 class Light(Protocol):
-    """What excites: a `Lamp`, or in tests anything with a known solution."""
+    """Light that excites: a `Lamp`, or in tests any light with a known solution."""
 
     def corners(self, start_s: float, end_s: float) -> list[float]:
-        """Times strictly between at which the light does not go on smoothly."""
+        """Return the times strictly between at which the light is not smooth."""
 
     def dark(self, start_s: float, end_s: float) -> bool:
-        """Whether there is no light at all from `start_s` to `end_s`."""
+        """Return whether there is no light at all from `start_s` to `end_s`."""
 
     def irradiance(self, time_s: FloatArray) -> FloatArray:
-        """Relative spectral irradiance at every time on `WAVELENGTH_NM`, shape (times, 160)."""
+        """Return the relative spectral irradiance at every time, shape (times, 160)."""
 
 
 @dataclass(frozen=True)
 class Phosphor:
-    """All states of all patches, flat.
+    """All states of all patches in one array.
 
     Attributes
     ----------
     k_r_per_s : ndarray, shape (states,)
+        Re-radiation rates in 1/s.
     excitation : ndarray, shape (states, wavelengths)
-        κ = excitation @ irradiance.
+        Excitation matrix, κ = excitation @ irradiance.
     patch : ndarray, shape (states,)
-        Index of the patch, or part of one, that a state belongs to.
+        Index of the patch, or part of one, to which a state belongs.
     quickening
-        By how much re-radiation is faster at a time than `k_r_per_s` says.
+        Function of time: factor by which re-radiation is faster than `k_r_per_s`.
     """
 
     k_r_per_s: FloatArray
@@ -96,18 +97,18 @@ class Phosphor:
         light: Light,
         visible: Callable[[float], float] = lambda _: 1.0,
     ) -> tuple[FloatArray, FloatArray]:
-        """Let time pass.
+        """Integrate the rate equations over an interval.
 
         Parameters
         ----------
         level : ndarray, shape (states,)
             Concentrations r at `start_s`.
         start_s, end_s
-            Of the interval.
+            Begin and end of the interval in seconds.
         light
-            What shines on the samples.
+            Light on the samples.
         visible
-            Part v of the samples that is seen at a time; smooth where the light is.
+            Function of time: fraction v of the samples that is seen; smooth where the light is.
 
         Returns
         -------
@@ -118,48 +119,48 @@ class Phosphor:
         """
         state = np.array([level, np.zeros_like(level)])
         corners = [start_s, *light.corners(start_s, end_s), end_s]
-        for left, right in pairwise(corners):
-            if right > left:
-                state = self._smooth(state, left, right, light, visible)
+        for begin_s, stop_s in pairwise(corners):
+            if stop_s > begin_s:
+                state = self._smooth(state, begin_s, stop_s, light, visible)
         return state[0], state[1]
 
     def _smooth(
         self,
         state: FloatArray,
-        left: float,
-        right: float,
+        begin_s: float,
+        stop_s: float,
         light: Light,
         visible: Callable[[float], float],
     ) -> FloatArray:
-        """Levels and exposures at `right`, shape (2, states); halves of a step confirm it."""
-        shining = None if light.dark(left, right) else light
-        start_s, step_s = left, right - left
-        while math.nextafter(start_s, right) < right:
-            end_s = min(start_s + step_s, right)
+        """Return levels and exposures at `right`, shape (2, states), confirmed by half steps."""
+        shining = None if light.dark(begin_s, stop_s) else light
+        start_s, step_s = begin_s, stop_s - begin_s
+        while math.nextafter(start_s, stop_s) < stop_s:
+            end_s = min(start_s + step_s, stop_s)
             middle_s = (start_s + end_s) / 2
             if not start_s < middle_s < end_s:
                 raise ArithmeticError(f"the rate equations cannot be integrated at {start_s} s")
             spans = np.array([[start_s, end_s], [start_s, middle_s], [middle_s, end_s]])
-            whole, first, second = self._steps(spans, shining, visible)
-            rough, fine = whole(state), second(first(state))
-            error = np.max(np.abs(rough - fine) / (ATOL + RTOL * np.abs(fine)))
+            full_step, first_half, second_half = self._steps(spans, shining, visible)
+            coarse, refined = full_step(state), second_half(first_half(state))
+            error = np.max(np.abs(coarse - refined) / (ATOL + RTOL * np.abs(refined)))
             factor = 0.9 * max(error, TINY) ** (-1 / (2 * STAGES + 1))
             step_s = (end_s - start_s) * min(max(factor, SHORTER), LONGER)
             if error <= 1:
-                start_s, state = end_s, fine
+                start_s, state = end_s, refined
         return state
 
     def _steps(
         self, spans: FloatArray, light: Light | None, visible: Callable[[float], float]
     ) -> list["_Step"]:
-        """The step from beginning to end of each of the `spans`, shape (spans, 2); None: dark."""
+        """Return the step of each of the `spans`, shape (spans, 2); without light it is dark."""
         lasting_s = np.diff(spans)
         times_s = spans[:, :1] + lasting_s * NODES
         each_s = times_s.ravel().tolist()
         faster = np.array([self.quickening(at_s) for at_s in each_s]).reshape(times_s.shape)
-        seen = np.array([visible(at_s) for at_s in each_s]).reshape(times_s.shape) * faster
+        visible_rate = np.array([visible(at_s) for at_s in each_s]).reshape(times_s.shape) * faster
         # In the dark states of one rate are alike, of which there may be hundreds.
-        k_r_per_s, alike = self._rates if light is None else (self.k_r_per_s, np.s_[:])
+        k_r_per_s, rate_index = self._rates if light is None else (self.k_r_per_s, np.s_[:])
         loss = faster[:, None, :] * k_r_per_s[:, None]
         charging = np.zeros_like(loss)
         if light is not None:
@@ -172,51 +173,51 @@ class Phosphor:
         levels = np.linalg.solve(matrix, np.stack([np.ones_like(charged), charged], axis=-1))
         end = EXTRAPOLATION @ levels
         end[..., 0] += 1 - EXTRAPOLATION.sum()
-        exposure_s = ((lasting_s * WEIGHTS * seen)[:, None, None, :] @ levels)[:, :, 0]
-        both = np.stack([end, exposure_s], axis=-1).transpose(0, 2, 3, 1)[..., alike]
-        return [_Step(*step) for step in both]
+        exposure_s = ((lasting_s * WEIGHTS * visible_rate)[:, None, None, :] @ levels)[:, :, 0]
+        columns = np.stack([end, exposure_s], axis=-1).transpose(0, 2, 3, 1)[..., rate_index]
+        return [_Step(*step) for step in columns]
 
     @cached_property
     def _rates(self) -> tuple[FloatArray, NDArray[np.intp]]:
-        """All different `k_r_per_s`, and which of them each state has."""
+        """All different `k_r_per_s`, and the index of each state's among them."""
         return np.unique(self.k_r_per_s, return_inverse=True)
 
 
 @dataclass(frozen=True)
 class _Step:
-    """What a step makes of levels and exposures, each shape (2, states).
+    """Linear map of levels and exposures over a step, each shape (2, states).
 
     Attributes
     ----------
     factor
-        Level and exposure at its end per level at its beginning.
+        Level and exposure at the step's end per level at its begin.
     added
-        The same without any level at its beginning.
+        Level and exposure at the step's end for a level of 0 at its begin.
     """
 
     factor: FloatArray
     added: FloatArray
 
     def __call__(self, state: FloatArray) -> FloatArray:
-        """Levels and exposures after the step."""
-        after: FloatArray = self.factor * state[0] + self.added
-        after[1] += state[1]
-        return after
+        """Return levels and exposures after the step."""
+        end: FloatArray = self.factor * state[0] + self.added
+        end[1] += state[1]
+        return end
 
 
 def phosphor(
     materials: Sequence[Material], charges: Sequence[float | None], irradiance: float
 ) -> Phosphor:
-    """The states of one patch after the other.
+    """Return the states of one patch after the other.
 
     Parameters
     ----------
     materials
-        Of every patch.
+        Material of every patch.
     charges
         Level of every patch after a long charge, where given.
     irradiance
-        Of the warm lamp in multiples of the norm of a material's excitation rates.
+        Irradiance of the warm lamp in multiples of the norm of a material's excitation rates.
     """
     rows = [
         (state.k_r_per_s, _excitation(material, state, charge, irradiance), index)
@@ -230,24 +231,26 @@ def phosphor(
 def _excitation(
     material: Material, state: State, charge: float | None, irradiance: float
 ) -> FloatArray:
-    """Row of the excitation matrix: κ per unit of the lamp's relative irradiance, per cell."""
-    full = filament_spectrum(BURNING_K)
+    """Return a row of the excitation matrix: κ per unit of the lamp's irradiance, per cell."""
+    spectrum = filament_spectrum(BURNING_K)
     if charge is not None or state.k_e_per_s is None:
         level = UNKNOWN_CHARGE if charge is None else charge
         # κ/(κ + k_r) = level under the burning lamp, all wavelengths taking their part.
-        row: FloatArray = np.full_like(full, state.k_r_per_s * level / (1 - level) / full.sum())
+        row: FloatArray = np.full_like(
+            spectrum, state.k_r_per_s * level / (1 - level) / spectrum.sum()
+        )
         return row
     if material.bands_nm is None or material.irradiance_norm is None:
         raise UsageError(f"{material.name}: excitation rates need 'bands_nm', 'irradiance_norm'")
     cells = band_cells(material.bands_nm)
-    length = float(np.linalg.norm(cells @ full))
+    length = float(np.linalg.norm(cells @ spectrum))
     scale = irradiance * material.irradiance_norm.value / length
     row = scale * (np.asarray(state.k_e_per_s) @ cells)
     return row
 
 
 def band_cells(bands_nm: Sequence[float]) -> FloatArray:
-    """Which part of every cell of the grid lies in every band, shape (bands, wavelengths)."""
+    """Return the fraction of every cell of the grid in every band, shape (bands, wavelengths)."""
     edges = np.asarray(bands_nm)
     low = np.maximum(edges[:-1, None], CELL_EDGES_NM[None, :-1])
     high = np.minimum(edges[1:, None], CELL_EDGES_NM[None, 1:])

@@ -1,7 +1,7 @@
 """pyserial's URL handler for `sim://room/device`; pyserial finds it by this module's name.
 
-The registry of open rooms is the one module-level state in labrig: pyserial hands a handler
-nothing but the URL.
+The registry of open rooms is the one module-level state in labrig: pyserial passes nothing but the
+URL to a handler.
 """
 
 import errno
@@ -26,7 +26,7 @@ class SerialRoom(Protocol):
 
     @property
     def clock(self) -> VirtualClock:
-        """Time in the room."""
+        """Clock of the room."""
 
     @property
     def boards(self) -> dict[str, SerialCable]:
@@ -43,13 +43,13 @@ def open_door(name: str, room: SerialRoom) -> None:
 
 
 def close_door(name: str) -> None:
-    """Forget a room."""
+    """Remove a room from the registry."""
     del _ROOMS[name]
     serial.protocol_handler_packages.remove(__package__)
 
 
 class Serial(serial.SerialBase):
-    """A serial port whose other end is an emulated board; pulled out, it fails as Linux' does."""
+    """A serial port to an emulated board; once unplugged, it fails as a Linux port does."""
 
     def open(self) -> None:
         """Connect to the board that the URL names."""
@@ -75,23 +75,23 @@ class Serial(serial.SerialBase):
         self.is_open = False
 
     def _reconfigure_port(self) -> None:
-        """Line settings mean nothing to a USB CDC board."""
+        """Do nothing: line settings have no meaning for a USB CDC board."""
 
     @property
     def in_waiting(self) -> int:
-        """Bytes that have arrived by now."""
+        """Number of bytes that have arrived by now."""
         if self._is_gone:
             raise _input_output_error()
         return bisect_right(self._due_s, self._clock.now())
 
     def read(self, size: int = 1, /) -> bytes:
-        """Up to `size` bytes that have arrived."""
+        """Return up to `size` bytes that have arrived."""
         if self._is_gone:
             raise serial.SerialException(f"read failed: {_input_output_error()}")
         count = min(size, bisect_right(self._due_s, self._clock.now()))
-        taken = self._take(count)
+        received = self._take(count)
         self._clock.spend(BYTE_S * count)
-        return taken
+        return received
 
     def write(self, data: bytes, /) -> int:  # type: ignore[override]
         """Send `data`; the answer arrives byte by byte, a little later."""
@@ -108,13 +108,13 @@ class Serial(serial.SerialBase):
         return len(data)
 
     def reset_input_buffer(self) -> None:
-        """Forget what has arrived."""
+        """Discard the bytes that have arrived."""
         self._take(self.in_waiting)
 
     def _take(self, count: int) -> bytes:
-        taken, self._incoming = self._incoming[:count], self._incoming[count:]
+        received, self._incoming = self._incoming[:count], self._incoming[count:]
         del self._due_s[:count]
-        return taken
+        return received
 
     @property
     def _is_gone(self) -> bool:

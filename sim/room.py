@@ -49,16 +49,16 @@ class Room:
     Parameters
     ----------
     simulation
-        What the room is like.
+        Settings of the room.
     clock
-        The room's time; its zero is the epoch, at which the camera was switched on.
+        The room's clock; its zero is the epoch, at which the camera was switched on.
     pulses
-        What the doors' servos are sent.
+        Function of a channel that returns the pulses sent to its servo up to now.
 
     Raises
     ------
     UsageError
-        A material that does not exist or cannot glow, or a patch outside the frame.
+        A material does not exist or cannot glow, or a patch is outside the frame.
     """
 
     def __init__(
@@ -72,8 +72,11 @@ class Room:
         faults = simulation.faults
         self._circuit = LampCircuit(simulation.lamp, simulation.initial.lamp == "on", faults, clock)
         self._leds = Leds(simulation.leds)
-        self._left_on = given(fault.light_left_on for fault in faults)
-        leaks = [leak(one.level, [one]) for one in given(fault.ambient_light for fault in faults)]
+        self._room_light_spans = given(fault.light_left_on for fault in faults)
+        leaks = [
+            leak(fault_leak.level, [fault_leak])
+            for fault_leak in given(fault.ambient_light for fault in faults)
+        ]
         always = [leak(simulation.ambient, [FaultTime()])] if simulation.ambient else []
         self._leaks = (*always, *leaks)
         self._doors = Doors(simulation, clock, pulses)
@@ -98,7 +101,7 @@ class Room:
 
     @property
     def lamp_on(self) -> bool:
-        """Whether the lamp has current, whatever register and bulb say."""
+        """Whether the lamp has current, whatever the states of register and bulb."""
         return self._circuit.closed
 
     @property
@@ -113,12 +116,12 @@ class Room:
 
     @property
     def tasks(self) -> Mapping[str, Callable[..., None]]:
-        """What the changer can do in the room, by the line that tells it."""
+        """Tasks of the changer in the room, by their command line."""
         return self._changer.tasks
 
     @property
     def arrangements(self) -> Arrangements:
-        """What the changer has arranged, up to now."""
+        """Arrangements of the bench up to now."""
         return self._changer.arrangements
 
     def switch_lamp(self, on: bool) -> None:
@@ -126,18 +129,18 @@ class Room:
         self._circuit.ask(on)
 
     def switch_led(self, relay: int, on: bool) -> None:
-        """The contact of a relay moves now; an LED may hang on it."""
+        """Move the contact of a relay now, to which an LED may be connected."""
         self._leds = self._leds.switched(relay, on, self._clock.now())
 
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
-        """The DNG of an exposure that is over.
+        """Return the DNG of an exposure that is over.
 
         Parameters
         ----------
         start_s, exposure_s
-            On the room's clock.
+            Begin and duration of the exposure on the room's clock, in seconds.
         iso, f_number
-            The camera's settings.
+            Sensitivity and aperture of the camera.
 
         Raises
         ------
@@ -152,9 +155,9 @@ class Room:
             )
         lights = self._lights()
         light: NDArray[np.float32] | None = None
-        for left, right, arrangement in self._changer.arrangements.spans(start_s, end_s):
-            seen = lights.seen(left, right)
-            rgb = self._electrons(left, right, arrangement, lights, seen, f_number)
+        for begin_s, stop_s, arrangement in self._changer.arrangements.spans(start_s, end_s):
+            reflected = lights.seen(begin_s, stop_s)
+            rgb = self._electrons(begin_s, stop_s, arrangement, lights, reflected, f_number)
             painted = self._layout.places(arrangement).painted
             part = rgb[:, BAYER_RGGB].reshape(-1)[painted]
             light = part if light is None else light + part
@@ -167,27 +170,29 @@ class Room:
             self._rng(FRAME_STREAM, round(self._clock.wall(start_s) * 1e6)),
         )
         lens = self._simulation.lens
-        told = None if lens is None else (lens.name, lens.focal_mm)
-        return encode_dng(mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number, told))
+        lens_notes = None if lens is None else (lens.name, lens.focal_mm)
+        return encode_dng(
+            mosaic, Shot(self._clock.wall(start_s), exposure_s, iso, f_number, lens_notes)
+        )
 
     def preview(self, at_s: float) -> NDArray[np.uint8]:
-        """The viewfinder's picture: R, G, B for a display, with the room light on if there is one.
+        """Return the viewfinder's picture for a display, R, G, B, with the room light if any.
 
-        That light is for the eye only: it does not charge the samples.
+        That light is for display only: it does not charge the samples.
         """
         arrangement = self._changer.arrangements.at(at_s)
         start_s = max(at_s - LIVE_EXPOSURE_S, 0.0)
         lights = self._lights()
-        seen = lights.seen(start_s, at_s)
+        reflected = lights.seen(start_s, at_s)
         if self._simulation.room_light:
             light, opened = (at_s - start_s) * room_light_spectrum(), lights.openness(at_s)
-            seen = VisibleLight(
-                seen.sample,
-                seen.sample_stray + opened * light,
-                seen.door + (1 - opened) * light,
-                seen.cloth + light,
+            reflected = VisibleLight(
+                reflected.sample,
+                reflected.sample_stray + opened * light,
+                reflected.door + (1 - opened) * light,
+                reflected.cloth + light,
             )
-        rgb = self._electrons(start_s, at_s, arrangement, lights, seen, LIVE_F_NUMBER)
+        rgb = self._electrons(start_s, at_s, arrangement, lights, reflected, LIVE_F_NUMBER)
         painted = self._layout.places(arrangement).painted
         step = 2 * live_stride(*painted.shape)
         place = painted[::step, ::step] // len(BAYER_RGGB)
@@ -197,7 +202,7 @@ class Room:
         )
 
     def truth(self, iso: int = 400, f_number: float = 4.0) -> Truth:
-        """What a perfect fit of the decay after the last lamp-off would find."""
+        """Return the result of a perfect fit of the decay after the last lamp-off."""
         lamps = self._lamps()
         off_s = lamps.last_switch_off(self._clock.now())
         level = effective = None
@@ -205,13 +210,13 @@ class Room:
         faster = cells.quickening(self._clock.now() if off_s is None else off_s)
         if off_s is not None:
             arrangements = self._changer.arrangements
-            found = self._samples.level_at(off_s, self._lights(), arrangements)
-            after, _ = self._samples.evolve(
-                found, off_s, off_s + SETTLED_S, arrangements.at(off_s), lamps.until(off_s)
+            level_at_off = self._samples.level_at(off_s, self._lights(), arrangements)
+            level_later, _ = self._samples.evolve(
+                level_at_off, off_s, off_s + SETTLED_S, arrangements.at(off_s), lamps.until(off_s)
             )
-            level = self._samples.of_cells(found)
+            level = self._samples.of_cells(level_at_off)
             growth = np.exp(faster * cells.k_r_per_s * SETTLED_S)
-            effective = self._samples.of_cells(after) * growth
+            effective = self._samples.of_cells(level_later) * growth
         electrons_per_s = self._curves.glow_electrons_per_s(self._samples.radiance_at_one, f_number)
         return Truth(
             lamp_off_s=off_s,
@@ -233,7 +238,7 @@ class Room:
         )
 
     def write_truth(self, path: Path) -> None:
-        """`truth()` as a JSON file, next to a run, for tests."""
+        """Write `truth()` as a JSON file, next to a run, for tests."""
         self.truth().write(path)
 
     def _lamps(self) -> FilteredLamps:
@@ -246,7 +251,9 @@ class Room:
 
     def _lights(self) -> Lights:
         doors = self._doors
-        return Lights(self._lamps(), self._left_on, doors.trap_door, doors.shield, self._leaks)
+        return Lights(
+            self._lamps(), self._room_light_spans, doors.trap_door, doors.shield, self._leaks
+        )
 
     def _falloff(self, height: int, width: int) -> FloatArray:
         lens = self._simulation.lens
@@ -264,11 +271,11 @@ class Room:
         end_s: float,
         arrangement: Arrangement,
         lights: Lights,
-        seen: VisibleLight,
+        reflected: VisibleLight,
         f_number: float,
     ) -> NDArray[np.float32]:
-        """Expected electrons in the middle of the lens, shape (places, 3)."""
+        """Return the expected electrons in the middle of the lens, shape (places, 3)."""
         level = self._samples.level_at(start_s, lights, self._changer.arrangements)
         glow_s = self._samples.glow(level, start_s, end_s, arrangement, lights)
-        radiance_s = self._view.radiance_s(arrangement, glow_s, seen)
+        radiance_s = self._view.radiance_s(arrangement, glow_s, reflected)
         return self._curves.glow_electrons_per_s(radiance_s, f_number).astype(np.float32)

@@ -1,4 +1,4 @@
-"""The samples on the table: what has charged them, where they have been followed to."""
+"""The samples on the table: their charge, and the time up to which it is integrated."""
 
 from bisect import bisect_right
 from collections.abc import Callable
@@ -22,24 +22,24 @@ FloatArray = NDArray[np.float64]
 
 
 class Samples:
-    """All states of the samples, flat: of whole patches, or of their cells.
+    """All states of the samples in one array: of whole patches, or of their cells.
 
     Only an LVF that lies on a sample makes its cells differ. Until then, and again with a fresh
-    sample, patches are followed as wholes.
+    sample, patches are integrated as wholes.
 
     Parameters
     ----------
     simulation
-        What the room is like.
+        Settings of the room.
     layout
-        Its cells.
+        Layout of the picture into cells.
 
     Attributes
     ----------
     materials
-        Of its patches.
+        Material of every patch.
     cells : Phosphor
-        Its `patch` is the cell that a state belongs to.
+        States of the cells; `patch` is the cell to which a state belongs.
     radiance_at_one : ndarray, shape (states, wavelengths)
         Λ k_r of every state of the cells: its radiance at r = 1 (eq. 3).
     """
@@ -51,43 +51,45 @@ class Samples:
             phosphor(self.materials, charges, simulation.lamp.irradiance),
             quickening=quickening(simulation.temperature),
         )
-        of_patch = [np.flatnonzero(self._patches.patch == n) for n in range(len(self.materials))]
-        states = [of_patch[patch - 1] for patch in layout.patch[1:]]
-        self._whole = np.concatenate(states)
+        patch_states = [
+            np.flatnonzero(self._patches.patch == n) for n in range(len(self.materials))
+        ]
+        states = [patch_states[patch - 1] for patch in layout.patch[1:]]
+        self._state_of_cells = np.concatenate(states)
         cell = np.repeat(np.arange(1, len(layout.patch)), [len(index) for index in states])
         self.cells = replace(
             self._patches,
-            k_r_per_s=self._patches.k_r_per_s[self._whole],
-            excitation=self._patches.excitation[self._whole],
+            k_r_per_s=self._patches.k_r_per_s[self._state_of_cells],
+            excitation=self._patches.excitation[self._state_of_cells],
             patch=cell,
         )
         emitted = np.concatenate([emission(material) for material in self.materials])
-        self.radiance_at_one: FloatArray = (emitted * self._patches.k_r_per_s[:, None])[self._whole]
+        self.radiance_at_one: FloatArray = (emitted * self._patches.k_r_per_s[:, None])[
+            self._state_of_cells
+        ]
         self._piece = layout.piece[cell]
         self._lvf = simulation.lvf
         self._has_door = simulation.door is not None
         self._below_lvf: dict[bool, Phosphor] = {}
         # Where they have been followed to, by time. The past cannot change, so they stay true; a
         # photograph that is looked at late starts from the last one before it.
-        self._known_s = [0.0]
-        self._known_levels = [
-            np.full_like(self._patches.k_r_per_s, simulation.initial.concentration)
-        ]
+        self._times_s = [0.0]
+        self._levels = [np.full_like(self._patches.k_r_per_s, simulation.initial.concentration)]
 
     def freshen(self, now_s: float, lights: Lights, arrangements: Arrangements) -> None:
-        """Other pieces of the same materials are put in, which have been in the dark for long."""
+        """Replace the samples by others of the same materials, long in the dark."""
         self.level_at(now_s, lights, arrangements)
-        self._known_s.append(now_s)
-        self._known_levels.append(np.zeros_like(self._patches.k_r_per_s))
+        self._times_s.append(now_s)
+        self._levels.append(np.zeros_like(self._patches.k_r_per_s))
 
     def level_at(self, time_s: float, lights: Lights, arrangements: Arrangements) -> FloatArray:
-        """Concentrations of all states at a time, for `evolve` and `of_cells`."""
-        last = bisect_right(self._known_s, time_s) - 1
-        level = self._known_levels[last]
-        for left, right, arrangement in arrangements.spans(self._known_s[last], time_s):
-            level, _ = self.evolve(level, left, right, arrangement, lights)
-        self._known_s.insert(last + 1, time_s)
-        self._known_levels.insert(last + 1, level)
+        """Return the concentrations of all states at a time, for `evolve` and `of_cells`."""
+        last = bisect_right(self._times_s, time_s) - 1
+        level = self._levels[last]
+        for begin_s, stop_s, arrangement in arrangements.spans(self._times_s[last], time_s):
+            level, _ = self.evolve(level, begin_s, stop_s, arrangement, lights)
+        self._times_s.insert(last + 1, time_s)
+        self._levels.insert(last + 1, level)
         return level
 
     def evolve(
@@ -99,20 +101,20 @@ class Samples:
         light: Light,
         visible: Callable[[float], float] = lambda _: 1.0,
     ) -> tuple[FloatArray, FloatArray]:
-        """Let time pass on a bench that does not change; see `Phosphor.evolve`."""
+        """Integrate over time on a bench that does not change; see `Phosphor.evolve`."""
         on_top = arrangement.card in ("grey card", "colorchecker") and not self._has_door
         if arrangement.lvf == "on sample":
             level, states = self.of_cells(level), self._below(turned=arrangement.turned)
         else:
-            whole = len(level) == len(self._patches.k_r_per_s)
-            states = self._patches if whole else self.cells
+            are_patches = len(level) == len(self._patches.k_r_per_s)
+            states = self._patches if are_patches else self.cells
         if arrangement.card == "blank" or on_top:
             states = replace(states, excitation=np.zeros_like(states.excitation))
         return states.evolve(level, start_s, end_s, light, visible)
 
     def of_cells(self, level: FloatArray) -> FloatArray:
-        """The same for every state of every cell, shape (states,)."""
-        return level if len(level) == len(self._whole) else level[self._whole]
+        """Return the concentrations for every state of every cell, shape (states,)."""
+        return level if len(level) == len(self._state_of_cells) else level[self._state_of_cells]
 
     def glow(
         self,
@@ -122,24 +124,26 @@ class Samples:
         arrangement: Arrangement,
         lights: Lights,
     ) -> FloatArray:
-        """∫ visible radiance dt of every cell, shape (cells, wavelengths); cell 0 is the cloth.
+        """Return ∫ visible radiance dt of all cells, shape (cells, wavelengths); cell 0 is cloth.
 
         Parameters
         ----------
         level
             Concentrations at `start_s`.
+        start_s, end_s
+            Begin and end of the interval in seconds.
         arrangement
-            Of the bench until `end_s`.
+            Arrangement of the bench until `end_s`.
         """
-        _, seen_s = self.evolve(level, start_s, end_s, arrangement, lights, lights.openness)
-        radiance_s = self.of_cells(seen_s)[:, None] * self.radiance_at_one
+        _, exposure_s = self.evolve(level, start_s, end_s, arrangement, lights, lights.openness)
+        radiance_s = self.of_cells(exposure_s)[:, None] * self.radiance_at_one
         # States are in the order of their cells, and every cell but the cloth has some.
-        begin = np.searchsorted(self.cells.patch, np.arange(1, self.cells.patch[-1] + 1))
-        of_cloth = np.zeros((1, radiance_s.shape[1]))
-        return np.concatenate([of_cloth, np.add.reduceat(radiance_s, begin)])
+        first_states = np.searchsorted(self.cells.patch, np.arange(1, self.cells.patch[-1] + 1))
+        cloth = np.zeros((1, radiance_s.shape[1]))
+        return np.concatenate([cloth, np.add.reduceat(radiance_s, first_states)])
 
     def _below(self, *, turned: bool) -> Phosphor:
-        """The cells' states with what excites them below the LVF."""
+        """Return the cells' states with their excitation below the LVF."""
         if turned not in self._below_lvf:
             assert self._lvf is not None
             passed = Lvf(self._lvf).seen(self._lvf.on_sample, turned)[self._piece]

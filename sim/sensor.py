@@ -1,7 +1,7 @@
-"""The sensor: photo-electrons in, a mosaic of 14-bit numbers with all their blemishes out.
+"""The sensor: from photo-electrons to a mosaic of 14-bit numbers with all its defects.
 
-Figures are chosen: typical of a full-format DSLR of the EOS 5D Mark II's generation, whose read
-noise falls steeply up to ISO 1600. They are not a measurement of one.
+Values are chosen: typical of a full-format DSLR of the EOS 5D Mark II's generation, whose read
+noise falls steeply up to ISO 1600. They are not a measurement of a specimen.
 """
 
 import math
@@ -52,12 +52,12 @@ MANY_ELECTRONS = 4.0
 
 
 def gain_electrons_per_dn(iso: float) -> float:
-    """Conversion at an ISO setting; amplification is exactly proportional to ISO."""
+    """Return the conversion at an ISO setting; amplification is exactly proportional to ISO."""
     return GAIN_ISO_100 * 100.0 / iso
 
 
 def read_noise_electrons(iso: float) -> float:
-    """1 σ of reading a pixel, referred to electrons."""
+    """Return 1 σ of reading a pixel, in electrons."""
     logarithm = np.interp(math.log(iso), np.log(READ_NOISE_ISO), np.log(READ_NOISE_ELECTRONS))
     return math.exp(logarithm)
 
@@ -69,7 +69,7 @@ class SensorTemperature:
         self._exposures_s: dict[float, float] = {}
 
     def expose(self, start_s: float, exposure_s: float) -> float:
-        """Degrees Celsius at the middle of an exposure."""
+        """Return the temperature in degrees Celsius at the middle of an exposure."""
         self._exposures_s[start_s] = exposure_s
         middle_s = start_s + exposure_s / 2
         itself_c = SELF_HEATING_C * -math.expm1(-middle_s / SELF_HEATING_S)
@@ -82,22 +82,23 @@ class SensorTemperature:
 
 
 class Sensor:
-    """One specimen of a sensor, its blemishes drawn once.
+    """One specimen of a sensor, with fixed random defects.
 
     Parameters
     ----------
     rng
-        For the fixed maps.
+        Random generator of the fixed maps.
     falloff : ndarray, shape (height, width)
-        Vignetting.
+        Vignetting of the lens.
     flicker
-        1 σ scatter of all light between frames: shutter, aperture, lamp.
+        Standard deviation of all light between frames: shutter, aperture, lamp.
     crosstalk
-        Fraction of a pixel's charge that shows in each of its four neighbours instead: capacitance
-        between pixels, which blurs the noise with the picture (A. C. Moore, Z. Ninkov, W. J.
-        Forrest, Optical Engineering 45, 2006).
+        Fraction of a pixel's charge that appears in each of its four neighbours instead:
+        capacitance between pixels, which blurs the noise with the picture (A. C. Moore, Z. Ninkov,
+        W. J. Forrest, Optical Engineering 45, 2006).
     row_noise
-        1 σ of what reading a row adds to all of its pixels, in multiples of a pixel's read noise.
+        Standard deviation of the offset that all pixels of a row share, in multiples of a pixel's
+        read noise.
     """
 
     def __init__(
@@ -130,22 +131,23 @@ class Sensor:
         temperature_c: float,
         rng: np.random.Generator,
     ) -> Mosaic:
-        """One exposure, read out.
+        """Return one exposure, read out.
 
         Parameters
         ----------
         light_electrons : ndarray, shape (height, width)
             Expected photo-electrons in the middle of the lens, per pixel.
         exposure_s, iso
-            The camera's settings.
+            Shutter time in seconds and sensitivity.
         temperature_c
-            Of the sensor.
+            Temperature of the sensor in degrees Celsius.
         rng
-            Of this frame alone.
+            Random generator of this frame alone.
 
         Returns
         -------
         ndarray of uint16, shape (height, width)
+            Mosaic of the frame in DN.
         """
         gain = gain_electrons_per_dn(iso)
         common = max(1 + self._flicker * rng.standard_normal(), 0.0)
@@ -174,7 +176,7 @@ class Sensor:
 
 
 def _shared_with_neighbours(electrons: Float32Array, fraction: float) -> Float32Array:
-    """Each pixel less `fraction` for each of its four neighbours; the border repeats."""
+    """Return each pixel less `fraction` for each of its four neighbours; the border repeats."""
     bordered = np.pad(electrons, 1, mode="edge")
     around = bordered[:-2, 1:-1] + bordered[2:, 1:-1] + bordered[1:-1, :-2] + bordered[1:-1, 2:]
     shared: Float32Array = electrons * np.float32(1 - 4 * fraction) + np.float32(fraction) * around
@@ -182,7 +184,7 @@ def _shared_with_neighbours(electrons: Float32Array, fraction: float) -> Float32
 
 
 def _shot_noise(expected: Float32Array, rng: np.random.Generator) -> Float32Array:
-    """Electrons that arrive where `expected` are to be expected: Poisson's distribution.
+    """Return random numbers of electrons with expectation `expected`: Poisson's distribution.
 
     For many electrons by Cornish and Fisher's expansion, λ + √(λ − 1/18) z + (z² − 1)/6, which has
     the mean, the variance and the third moment of the Poisson distribution.

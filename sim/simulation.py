@@ -1,4 +1,4 @@
-"""The `simulation:` section of a rig file: what stands in the simulated dark room."""
+"""The `simulation:` section of a rig file: settings of the simulated dark room."""
 
 from datetime import UTC, datetime
 from typing import Annotated, Any, Literal, Self
@@ -28,7 +28,7 @@ from .boards.lcus import Answers
 from .camera import BodySettings
 from .faults import Fault, given
 
-#: Where one sample lies when no region is given.
+#: Place of a single sample without a region.
 MIDDLE: Region = (0.1, 0.1, 0.8, 0.8)
 
 #: A level below 1: only infinite light would reach 1 itself.
@@ -51,12 +51,14 @@ class Patch(Part):
     Attributes
     ----------
     material
-        Material file, or shipped name.
+        Name of a shipped material, such as `blue-paint`, or path of a material file.
     region
-        Where the camera sees it, see `labrig.region`.
+        Place of the sample in the frame: `[x, y, width, height]` in pixels, or all four as
+        fractions of the frame.
     initial_charge
-        Level r that a long charge under this room's lamp reaches, given instead of computed from
-        the excitation rates. Null: computed; 0.5 for states without excitation rates.
+        Concentration r that a long charge under this room's lamp reaches, 0 to 1, instead of the
+        one that follows from the excitation rates. Null: it follows from them, and is 0.5 for
+        states without excitation rates.
     """
 
     material: str
@@ -69,15 +71,20 @@ class SensorSettings(Part):
 
     Attributes
     ----------
+    width
+        Width of the sensor in pixels, even.
+    height
+        Height of the sensor in pixels, even.
     flicker
-        1 σ scatter of all light between frames.
+        Standard deviation of the exposure from frame to frame, as a fraction, for example `0.7 %`.
     crosstalk
-        Fraction of a pixel's charge that shows in each of its four neighbours instead.
+        Fraction of a pixel's charge that appears in each of its four neighbours instead.
     row_noise
-        1 σ of what reading a row adds to all of its pixels, in multiples of a pixel's read noise.
+        Standard deviation of the offset that all pixels of a row share, in multiples of a pixel's
+        read noise.
     curves
-        The camera's spectral sensitivity, a file in rawtoaces' format; null: the shipped one of a
-        Canon EOS 5D Mark II, bent by as much as laboratories disagree about it.
+        Spectral sensitivities of the simulated camera, a file in rawtoaces' format; null: those
+        shipped of a Canon EOS 5D Mark II, changed by as much as laboratories disagree about them.
     """
 
     width: Pixels = 1404
@@ -94,21 +101,25 @@ class LampSettings(Part):
     Attributes
     ----------
     irradiance
-        Of the warm lamp, in multiples of the irradiance to which a material's k_e belong (with
-        Table 1's norm: the length of the 8-band vector E). 4 puts r∞ of Table 1's between 0.2
-        and 0.6.
+        Irradiance of the warm lamp, in multiples of that to which a material's k_e belong (with
+        Table 1's norm: the length of the 8-band vector E). 4 puts r∞ of Table 1's materials between
+        0.2 and 0.6.
     warm_up
-        Time constant with which housing and mirror warm, and the light with them.
+        Time constant with which housing and mirror become warm, and the light with them, for
+        example `150 s`.
     warm_up_deficit
-        Light missing when switched on cold.
+        Fraction of the light that is missing when the lamp is switched on cold, for example `3 %`.
     drift_per_hour
-        Light lost by ageing and dust, per hour of the room's clock.
+        Fraction of the light that is lost by ageing and dust in an hour of the room's clock, for
+        example `0.2 %`.
     board
-        The board that switches it: relay 0 of `relays` (Numato), or relay 1 of `lcus`.
+        Board that switches the lamp: `relays`, relay 0 of the Numato board, or `lcus`, relay 1 of
+        the LCUS board.
     afterglow
-        Light that stays behind when it is switched off, of the burning lamp's.
+        Light of the lamp just after it is switched off, as a fraction of the burning lamp's, beside
+        the cooling filament's.
     afterglow_fades
-        Time in which that falls to 1/e.
+        Time constant with which the afterglow falls to 1/e, for example `60 s`.
     """
 
     irradiance: Annotated[float, Field(gt=0, allow_inf_nan=False)] = 4.0
@@ -121,12 +132,18 @@ class LampSettings(Part):
 
 
 class InitialState(Part):
-    """How the room is found at the epoch: what a crash left behind, a sample that still glows.
+    """State of the room at the epoch: after a crash, or with a sample that still glows.
 
     Attributes
     ----------
+    lamp
+        State of the lamp at the epoch: `off`, or `on` as a crash may have left it.
+    door
+        State of the trap door at the epoch: `closed` or `open`.
+    concentration
+        Concentration r of every excited state at the epoch, 0 to 1; above 0 the sample still glows.
     manual_steps
-        What the changer has done before, such as `lvf on sample`.
+        Tasks that the changer has done before, for example `[lvf on sample]`.
     """
 
     lamp: Literal["off", "on"] = "off"
@@ -145,47 +162,62 @@ class Simulation(Part):
     Attributes
     ----------
     sample
-        The patches; in YAML also the name of a single material, in the middle of the frame.
+        Samples on the table: a list of patches, or the name of a single material, which then lies
+        in the middle of the frame.
     initial_charge
-        As `Patch.initial_charge`, for patches that do not say.
+        Concentration r that a long charge under this room's lamp reaches, 0 to 1, for patches that
+        give none of their own.
+    sensor
+        Sensor of the camera.
     camera
-        Which body the camera has, and how somebody has set it.
+        Body of the camera, and its settings that are made by hand.
     lens
-        Its lens; null: one of 75 mm that tells nothing.
+        Lens of the camera; null: one of 75 mm that reports nothing.
     epoch
-        Wall-clock time at which the room's clock stands at zero.
+        Wall-clock time at which the room's clock stands at zero, with its time zone, for example
+        `2026-01-01T00:00:00Z`.
     seed
-        Of everything random: camera curves, hot pixels, noise.
+        Seed of all random numbers: camera curves, hot pixels, noise.
+    initial
+        State of the room at the epoch.
     faults
-        What goes wrong, and when, see `sim.faults`.
+        Faults of the room: names, or names with times, for example
+        `[lamp_dead, {camera_unplugged: {at: 25 min, for: 20 s}}]`.
+    lamp
+        Properties of the halogen lamp.
     leds
-        The bank of LEDs.
+        Narrow-band LEDs beside the lamp.
     door
-        The trap door: closed, the sample faces the lamp, open, the camera. Null: none, and the
-        sample always faces both.
+        Trap door: closed, the sample faces the lamp; open, the camera. Null: none, and the sample
+        always faces both.
     shield
-        A door before the lamp, open at first; null: none.
+        Door before the lamp, open at first; null: none.
     servo
-        The board that moves both.
+        Servo board that moves trap door and shield.
     lcus
-        What the LCUS board at `sim://room/lcus` says to its query.
+        Answer of the LCUS board at `sim://room/lcus` to its query: `nothing`, lines of `text`, or
+        `bytes`, one for each relay.
     lvf
-        The linear variable filter; null: there is none.
+        Linear variable filter; null: there is none.
     filters
-        Folder of the colour filters' transmittances, a file each, named by its stem; null: the
-        shipped one.
+        Folder with the colour filters' spectral transmittances, one file `NAME.csv` for each
+        filter; null: the shipped folder.
     filters_bent
-        By which they really differ from that, root mean square.
+        Root mean square by which the true transmittances differ from those of the files, for
+        example `1 %`.
     grey_card
         Reflectance of the grey card, nearly the same at all wavelengths.
     chart
-        Where the camera sees a ColorChecker that the changer lays down.
+        Place in the frame of a ColorChecker that the changer lays down: `[x, y, width, height]` in
+        pixels, or all four as fractions of the frame.
     ambient
-        Light that leaks into the room, of the warm lamp's at the sample.
+        Irradiance at the sample of light that leaks into the room, as a fraction of the warm
+        lamp's, for example `0.001 %`.
     temperature
-        Of the room; null: such that rates are what the materials' files say.
+        Temperature of the room; null: constant, and rates are those of the materials' files.
     anisotropy
-        Part of its glow that a sample loses when it is turned away by 90 degrees.
+        Fraction of its glow that a sample loses when it is turned away by 90 degrees, for example
+        `5 %`.
     room_light
         Whether the room's own light is on while somebody aims through the viewfinder; photographs
         are always taken without it.
@@ -242,7 +274,7 @@ class Simulation(Part):
         return self
 
     def opened_at(self, wall_s: float) -> Self:
-        """The same room opened at `wall_s`, seconds since 1970, if its epoch is earlier."""
+        """Return the room opened at `wall_s`, seconds since 1970, if its epoch is earlier."""
         later_s = wall_s - self.epoch.timestamp()
         if later_s <= 0:
             return self
@@ -256,7 +288,7 @@ class Simulation(Part):
 
     @property
     def wall_at_opening_s(self) -> float:
-        """What the PC's clock says when the room is opened, seconds since 1970."""
+        """Time of the PC's clock when the room is opened, in seconds since 1970."""
         ahead = given(fault.clock_ahead for fault in self.faults)
         back = given(fault.clock_back for fault in self.faults)
         return (

@@ -1,4 +1,4 @@
-"""The room's temperature, what re-radiation makes of it, and a sensor that shows it."""
+"""The room's temperature, its effect on re-radiation, and its sensor."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -15,23 +15,23 @@ from .sensor import AMBIENT_C
 TRAP_K = 0.65 / 8.617333e-5
 ZERO_C_K = 273.15
 
-#: What a TMP36 gives: 0.75 V at 25 °C and 10 mV for a degree more.
+#: Voltage of a TMP36: 0.75 V at 25 °C and 10 mV for a degree more.
 VOLTS_AT_25, VOLTS_PER_K = 0.75, 0.01
-#: One is off by so much, 1 σ in K, and always alike.
+#: Constant error of a sensor, 1 σ in K.
 SENSOR_SIGMA_K = 0.3
-#: Of each conversion, 1 σ: the sensor's own, the supply's and the converter's.
+#: Noise of each conversion, 1 σ: the sensor's own, the supply's and the converter's.
 NOISE_V = 0.004
-#: What an input shows from which the sensor's wire has come off.
+#: Voltage of an input from which the sensor's wire has come off.
 OPEN_V = 5.0
 
 
 def celsius(settings: TemperatureSettings | None, time_s: float) -> float:
-    """Of the room; 21 where nothing is said, where materials were measured."""
+    """Return the temperature of the room, by default 21 °C, to which a material's rates belong."""
     return AMBIENT_C if settings is None else settings.celsius(time_s)
 
 
 def quickening(settings: TemperatureSettings | None) -> Callable[[float], float]:
-    """By how much re-radiation is faster at a time than at 21 °C, where materials were measured."""
+    """Return the factor by which re-radiation is faster than at 21 °C, at a time."""
     if settings is None:
         return lambda _: 1.0
 
@@ -48,13 +48,13 @@ class TemperatureSensor:
     Parameters
     ----------
     settings
-        Of the room.
+        Settings of the room's temperature.
     clock
-        The room's.
+        The room's clock.
     rng
-        Of the sensor's error and noise.
+        Random generator of the sensor's error and noise.
     off
-        When its wire has come off.
+        Times at which its wire has come off.
     """
 
     def __init__(
@@ -71,9 +71,9 @@ class TemperatureSensor:
         self._error_k = rng.normal(0.0, SENSOR_SIGMA_K)
 
     def volts(self) -> float:
-        """What it gives now."""
+        """Return the present voltage of the sensor."""
         now_s = self._clock.now()
-        if any(when.is_on(now_s) for when in self._off):
+        if any(span.is_on(now_s) for span in self._off):
             return OPEN_V
-        shown = celsius(self._settings, now_s) + self._error_k
-        return VOLTS_AT_25 + VOLTS_PER_K * (shown - 25.0) + self._rng.normal(0.0, NOISE_V)
+        celsius_shown = celsius(self._settings, now_s) + self._error_k
+        return VOLTS_AT_25 + VOLTS_PER_K * (celsius_shown - 25.0) + self._rng.normal(0.0, NOISE_V)

@@ -1,4 +1,4 @@
-"""What the simulated room knows and labrig must find out: for tests, never for a fit."""
+"""True parameters of the simulated room, which labrig has to find: for tests, never for a fit."""
 
 import math
 from pathlib import Path
@@ -29,17 +29,17 @@ class TrueState(_Part):
     Attributes
     ----------
     k_r_per_s
-        At the room's temperature at lamp-off.
+        Re-radiation rate in 1/s, at the room's temperature at lamp-off.
     k_e_per_s, reradiation
-        Of every band, as in the material's file.
+        Excitation rate and Λ of every band, as in the material's file.
     emission
         Λ on the room's `wavelength_nm`.
     concentration
-        r at the moment of the last lamp-off; null if the lamp was never switched off. Where an
-        LVF has lain on the patch, the mean over its pixels; so is the amplitude.
+        r at the moment of the last lamp-off; null if the lamp was never switched off. Where an LVF
+        has lain on the patch, the mean over its pixels; so is the amplitude.
     amplitude_dn_per_s
-        R, G, B: what the state adds to the signal per second of exposure, extrapolated from the
-        dark back to lamp-off (the fade charges a little more), in the middle of the lens.
+        Signal of the state in R, G, B per second of exposure, extrapolated from the dark back to
+        lamp-off (the fade charges a little more), in the middle of the lens.
     """
 
     k_r_per_s: float
@@ -60,14 +60,14 @@ class TruePatch(_Part):
 
 
 class TrueStrip(_Part):
-    """Where the LVF's strip is in the picture, in pixels.
+    """The strip of the LVF in the picture, in pixels.
 
     Attributes
     ----------
     left, right
         x and y of the ends of its centre line.
     height
-        Across that.
+        Height of the strip across that line.
     rising
         Whether the wavelength rises from left to right.
     """
@@ -86,10 +86,9 @@ class TrueLvf(_Part):
     u
         31 places along the strip: middles of even slices from its blue end, 0, to its red, 1.
     centre_nm, fwhm_nm
-        Middle and width between the wavelengths that are let through half as well as the best,
-        the leakage subtracted.
+        Middle and full width at half maximum of the pass band in nm, the leakage subtracted.
     transmission
-        There, on the room's `wavelength_nm`.
+        Transmittance at these places, on the room's `wavelength_nm`.
     """
 
     u: tuple[float, ...]
@@ -108,13 +107,13 @@ class Truth(_Part):
     lamp_off_s
         Time of the last lamp-off on the room's clock.
     iso, f_number
-        To which the amplitudes belong.
+        Sensitivity and aperture to which the amplitudes belong.
     sensitivity
         Rows R, G, B of the camera's own curves on `wavelength_nm`.
     lamp_irradiance
         Relative spectral irradiance of the warm, new lamp on `wavelength_nm`.
     lvf
-        Null where there is none.
+        The linear variable filter; null where there is none.
     """
 
     lamp_off_s: float | None
@@ -127,7 +126,7 @@ class Truth(_Part):
     lvf: TrueLvf | None
 
     def write(self, path: Path) -> None:
-        """As JSON."""
+        """Write the parameters as JSON."""
         path.write_text(self.model_dump_json(indent=1) + "\n", encoding="utf-8")
 
 
@@ -140,18 +139,18 @@ def true_patches(
     dn_per_s: FloatArray,
     faster: float,
 ) -> tuple[TruePatch, ...]:
-    """All patches of the room.
+    """Return all patches of the room.
 
     Parameters
     ----------
     level, effective : ndarray, shape (states,)
-        Concentrations at lamp-off, and as they seem to have been there from the dark.
+        Concentrations at lamp-off, and those extrapolated from the dark.
     dn_per_s : ndarray, shape (states, 3)
-        What the states add at r = 1.
+        Signal of the states at r = 1 in DN/s.
     faster
-        By what the room's temperature makes of their rates.
+        Factor of the room's temperature on their rates.
     """
-    found = []
+    patches = []
     k_r = samples.cells.k_r_per_s
     for number, (placed, material) in enumerate(
         zip(simulation.patches, samples.materials, strict=True), start=1
@@ -162,23 +161,23 @@ def true_patches(
         # One row a state, one column a cell.
         index = np.flatnonzero(np.isin(samples.cells.patch, cells)).reshape(len(cells), -1).T
         states = []
-        for of_state in np.argsort(-k_r[index[:, 0]], kind="stable"):
-            here, state = index[of_state], material.states[of_state]
+        for rank in np.argsort(-k_r[index[:, 0]], kind="stable"):
+            indices, state = index[rank], material.states[rank]
             amplitude = None
             if effective is not None:
-                red, green, blue = dn_per_s[here[0]] * float(weight @ effective[here])
+                red, green, blue = dn_per_s[indices[0]] * float(weight @ effective[indices])
                 amplitude = (red, green, blue)
             states.append(
                 TrueState(
-                    k_r_per_s=faster * k_r[here[0]],
+                    k_r_per_s=faster * k_r[indices[0]],
                     k_e_per_s=state.k_e_per_s,
                     reradiation=state.reradiation,
-                    emission=tuple(samples.radiance_at_one[here[0]] / k_r[here[0]]),
-                    concentration=None if level is None else float(weight @ level[here]),
+                    emission=tuple(samples.radiance_at_one[indices[0]] / k_r[indices[0]]),
+                    concentration=None if level is None else float(weight @ level[indices]),
                     amplitude_dn_per_s=amplitude,
                 )
             )
-        found.append(
+        patches.append(
             TruePatch(
                 material=material.name,
                 region=placed.region,
@@ -186,11 +185,11 @@ def true_patches(
                 states=tuple(states),
             )
         )
-    return tuple(found)
+    return tuple(patches)
 
 
 def true_lvf(simulation: Simulation) -> TrueLvf | None:
-    """The room's LVF."""
+    """Return the room's LVF."""
     settings = simulation.lvf
     if settings is None:
         return None

@@ -1,4 +1,4 @@
-"""What the camera sees of the bench: glow, and light thrown back by samples, cards, door, cloth."""
+"""The camera's view of the bench: glow, and light reflected by samples, cards, door, cloth."""
 
 import numpy as np
 from numpy.typing import NDArray
@@ -15,14 +15,14 @@ FloatArray = NDArray[np.float64]
 
 
 class View:
-    """The way of the light from the bench into the lens.
+    """The path of the light from the bench into the lens.
 
     Parameters
     ----------
     simulation
-        What the room is like.
+        Settings of the room.
     layout
-        Where everything is.
+        Layout of the picture.
     """
 
     def __init__(self, simulation: Simulation, layout: Layout) -> None:
@@ -32,22 +32,22 @@ class View:
         self._lvf = None if simulation.lvf is None else Lvf(simulation.lvf)
 
     def radiance_s(
-        self, arrangement: Arrangement, glow_s: FloatArray, seen: VisibleLight
+        self, arrangement: Arrangement, glow_s: FloatArray, reflected: VisibleLight
     ) -> FloatArray:
-        """∫ radiance dt of all places of an arrangement, shape (places, wavelengths).
+        """Return ∫ radiance dt of all places of an arrangement, shape (places, wavelengths).
 
         Parameters
         ----------
         arrangement
-            Of the bench, which does not change meanwhile.
+            Arrangement of the bench, which does not change meanwhile.
         glow_s : ndarray, shape (cells, wavelengths)
-            ∫ visible glow dt.
+            ∫ visible glow dt of each cell.
         seen
-            What the camera sees by reflection.
+            Light that the camera sees by reflection.
         """
         places = self._layout.places(arrangement)
-        radiance = self._samples(arrangement, glow_s, seen)[places.cell]
-        self._cover(radiance, arrangement, places, seen)
+        radiance = self._samples(arrangement, glow_s, reflected)[places.cell]
+        self._cover(radiance, arrangement, places, reflected)
         through = self._layout.looked_through(arrangement)
         if through == "away":
             return radiance
@@ -56,26 +56,30 @@ class View:
         return radiance
 
     def _samples(
-        self, arrangement: Arrangement, glow_s: FloatArray, seen: VisibleLight
+        self, arrangement: Arrangement, glow_s: FloatArray, reflected: VisibleLight
     ) -> FloatArray:
-        """Of all cells with nothing before them, shape (cells, wavelengths); cell 0 is cloth."""
-        light = seen.sample + seen.sample_stray
+        """Return the radiance of uncovered cells, shape (cells, wavelengths); cell 0 is cloth."""
+        light = reflected.sample + reflected.sample_stray
         if arrangement.lvf == "on sample":
             passed = self._passed("on sample", arrangement.turned)[self._layout.piece]
-            light = passed * seen.sample + seen.sample_stray
+            light = passed * reflected.sample + reflected.sample_stray
         if arrangement.card == "blank":
             glow_s = np.zeros_like(glow_s)
             reflectance = reflectances("blank", self._simulation.grey_card)[1]
         else:
-            reflectance = np.full_like(seen.sample, SAMPLE_REFLECTANCE)
+            reflectance = np.full_like(reflected.sample, SAMPLE_REFLECTANCE)
             glow_s = glow_s * self._turned_away(arrangement.tilt_deg)
-        thrown_back = reflectance * light + CLOTH_REFLECTANCE * seen.door
+        thrown_back = reflectance * light + CLOTH_REFLECTANCE * reflected.door
         radiance: FloatArray = glow_s + self._reflected * thrown_back
-        radiance[0] = self._reflected * CLOTH_REFLECTANCE * seen.cloth
+        radiance[0] = self._reflected * CLOTH_REFLECTANCE * reflected.cloth
         return radiance
 
     def _cover(
-        self, radiance: FloatArray, arrangement: Arrangement, places: Places, seen: VisibleLight
+        self,
+        radiance: FloatArray,
+        arrangement: Arrangement,
+        places: Places,
+        reflected: VisibleLight,
     ) -> None:
         """Lay a card on the door's outside, or without a door on everything."""
         covered = places.surface > 0
@@ -87,17 +91,17 @@ class View:
             piece = self._layout.piece[places.cell[covered]]
             card = self._passed("on sample", arrangement.turned)[piece] * card
         if self._simulation.door is None:
-            radiance[covered] = self._reflected * card * seen.cloth
+            radiance[covered] = self._reflected * card * reflected.cloth
         else:
             # What the closed door hides is what the card hides, and the door's own outside.
-            radiance[covered] += self._reflected * (card - CLOTH_REFLECTANCE) * seen.door
+            radiance[covered] += self._reflected * (card - CLOTH_REFLECTANCE) * reflected.door
 
     def _turned_away(self, tilt_deg: int) -> float:
-        """Radiance of a sample over that of one that faces the camera."""
+        """Return the radiance of a sample relative to one that faces the camera."""
         return float(1 - self._simulation.anisotropy * (1 - np.cos(np.radians(tilt_deg))))
 
     def _passed(self, place: LvfPlace, turned: bool) -> FloatArray:
-        """What the pieces of the strip that lies there let through, shape (pieces, 160)."""
+        """Return the transmittance of the pieces of the strip there, shape (pieces, 160)."""
         settings = self._simulation.lvf
         assert settings is not None
         assert self._lvf is not None

@@ -87,10 +87,39 @@ def test_what_labrig_takes_an_editor_takes(
     validators["rig"].validate(rig)
 
 
-def test_keys_are_explained(validators: dict[str, Draft202012Validator]) -> None:
-    camera = validators["rig"].schema["$defs"]["ptp_camera"]["properties"]
-    assert "rig check" in camera["shutter_lag"]["description"]
-    assert validators["rig"].schema["properties"]["devices"]
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_key_is_described(kind: str, validators: dict[str, Draft202012Validator]) -> None:
+    for name, key in properties(validators[kind].schema):
+        description = key.get("description", "")
+        assert description[:1].isupper(), name
+        assert description.endswith("."), name
+
+
+@pytest.mark.parametrize("kind", KINDS)
+def test_every_default_may_be_written(
+    kind: str, validators: dict[str, Draft202012Validator]
+) -> None:
+    for _, key in properties(validators[kind].schema):
+        if "default" in key:
+            validators[kind].evolve(schema=key).validate(key["default"])
+
+
+def test_keys_are_described_by_the_models_and_their_base_classes(
+    validators: dict[str, Draft202012Validator],
+) -> None:
+    protocols = validators["protocol"].schema["$defs"]
+    every = protocols["Decay"]["properties"]["every"]
+    assert every["description"] == (
+        "Time between the begins of two photographs, for example `5 s`."
+    )
+    assert every["default"] == "5.0 s"
+    assert "saturated" in protocols["Isotropy"]["properties"]["charge"]["description"]
+    rig = validators["rig"].schema["$defs"]
+    assert "rig check" in rig["ptp_camera"]["properties"]["shutter_lag"]["description"]
+    assert "until the device is steady" in rig["lcus_relay"]["properties"]["warm_up"]["description"]
+    name, with_times = rig["Fault"]["anyOf"]
+    assert "for ever" in name["description"]
+    assert "bulb" in with_times["properties"]["lamp_dead"]["description"]
 
 
 def test_the_command_prints_it(labrig: Callable[..., Ended]) -> None:
@@ -100,6 +129,19 @@ def test_the_command_prints_it(labrig: Callable[..., Ended]) -> None:
     refused = labrig("schema", "rigg")
     assert (refused.code, len(refused.err.splitlines())) == (2, 1)
     assert "did you mean 'rig'" in refused.err
+
+
+def properties(schema: Any, place: str = "") -> Iterator[tuple[str, dict[str, Any]]]:
+    """Every property of a schema and of its definitions, with a name for messages."""
+    if isinstance(schema, dict):
+        for name, key in schema.get("properties", {}).items():
+            yield f"{place}.{name}", key
+        for part, inner in schema.items():
+            if part not in ("default", "enum", "const", "discriminator"):
+                yield from properties(inner, part if part not in ("properties", "items") else place)
+    elif isinstance(schema, list):
+        for inner in schema:
+            yield from properties(inner, place)
 
 
 def keys(content: Any, place: tuple[Any, ...] = ()) -> Iterator[tuple[Any, ...]]:

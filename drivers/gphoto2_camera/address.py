@@ -1,4 +1,4 @@
-"""From a rig file's address to libgphoto2's name of a port."""
+"""Conversion of a rig file's address to libgphoto2's name of a port."""
 
 from urllib.parse import urlsplit
 
@@ -13,17 +13,17 @@ PTPIP_PORT = 15740
 
 
 def port_path(address: str, connections: Connections) -> str:
-    """libgphoto2's name of the port at `usb://vid:pid[/serial]` or `ptpip://host[:port]`.
+    """Return libgphoto2's name of the port at `usb://vid:pid[/serial]` or `ptpip://host[:port]`.
 
     The address is held for this labrig; a camera on the network is dialled once and hung up, since
-    libgphoto2 takes numbers only and is slow to say that nobody is there.
+    libgphoto2 takes numbers only and is slow to report that no camera answers.
 
     Raises
     ------
     UsageError
-        Another kind of address, or a simulated rig.
+        The address is of another kind, or the rig is simulated.
     DeviceError
-        No camera there.
+        No camera is at the address.
     """
     scheme = urlsplit(address).scheme
     if scheme == "sim" or isinstance(connections.clock, VirtualClock):
@@ -39,7 +39,7 @@ def port_path(address: str, connections: Connections) -> str:
 
 
 def _peer(address: str, connections: Connections) -> tuple[str, int]:
-    """Number and port of a camera on the network."""
+    """Return the IP number and the port of a camera on the network."""
     try:
         with connections.tcp(address, PTPIP_PORT) as dialled:
             host, port = dialled.getpeername()[:2]

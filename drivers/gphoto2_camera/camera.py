@@ -17,11 +17,11 @@ from .process import require_gphoto2
 from .release import Release, release_of
 from .settings import Gphoto2CameraSettings
 
-#: Canon and Nikon alone have it; with others the live view ends with the next frame.
+#: Setting that ends the live view, on Canon and Nikon only; elsewhere it ends with the next frame.
 VIEWFINDER = "viewfinder"
-#: Busy at the full press is common; a frame later than so much belongs to no decay.
+#: Time for which a busy full press is repeated; a frame any later belongs to no decay.
 LATE_PRESS_S = 3.0
-#: So often a release of which nobody knows whether it happened; what comes of it is passed over.
+#: Number of uncertain releases that are repeated; their frames, if any, are passed over.
 _UNSURE_TRIES = 3
 
 
@@ -31,18 +31,18 @@ class Gphoto2Camera:
     Parameters
     ----------
     address
-        `usb://vid:pid[/serial]` or `ptpip://host[:port]`.
+        Address of the camera, `usb://vid:pid[/serial]` or `ptpip://host[:port]`.
     settings
         The rig file's keys for this camera.
     connections
-        Finds the USB device, dials the network; has the clock.
+        Connections that find the USB device or dial the network, and have the clock.
 
     Raises
     ------
     UsageError
-        The extra is not installed, or the rig is a simulated one.
+        The extra is not installed, or the rig is simulated.
     DeviceError
-        No camera there, in use by another program, or not one that can be set to RAW.
+        No camera is at the address, another program uses it, or it cannot be set to RAW.
     """
 
     Settings = Gphoto2CameraSettings
@@ -68,34 +68,35 @@ class Gphoto2Camera:
 
     @classmethod
     def declared_offers(cls, settings: Gphoto2CameraSettings) -> CameraOffers:
-        """What planning without the camera assumes."""
+        """Return the offers that planning without the camera assumes."""
         return settings.declared_offers()
 
     def identity(self) -> str:
-        """Maker, model, serial number and firmware as the camera gives them, and what drives it."""
-        told = self._library.at_connect
-        maker, model = self._maker(), told("cameramodel") or "camera"
+        """Return maker, model, serial number, firmware and driver of the camera."""
+        setting_at_connect = self._library.at_connect
+        maker, model = self._maker(), setting_at_connect("cameramodel") or "camera"
         is_named_twice = maker != "" and maker.split()[0] in model
         parts = [
             model if is_named_twice else f"{maker} {model}".strip(),
-            f"serial {told('serialnumber') or 'unknown'}",
-            f"firmware {told('deviceversion') or 'unknown'}",
+            f"serial {setting_at_connect('serialnumber') or 'unknown'}",
+            f"firmware {setting_at_connect('deviceversion') or 'unknown'}",
             f"released by libgphoto2 {self._version}, {self._release.words}",
         ]
         return ", ".join(parts)
 
     def offers(self) -> CameraOffers:
-        """What it can be set to, as it is now.
+        """Return the exposure settings that the camera offers now.
 
         Raises
         ------
         DeviceError
-            Nothing that the rig file allows, for example because its dial is not at M.
+            The camera offers no settings that the rig file allows, for example because its dial is
+            not at M.
         """
         return self._exposure.offers()
 
     def findings(self) -> Sequence[Finding]:
-        """How it is set, as far as libgphoto2 tells.
+        """Return findings on the camera's settings, as far as libgphoto2 reports them.
 
         Raises
         ------
@@ -105,7 +106,7 @@ class Gphoto2Camera:
         return findings(self._library, self._release, self._maker())
 
     def keep_awake(self) -> None:
-        """Look for events, by which libgphoto2 keeps a camera on.
+        """Poll for events, by which libgphoto2 keeps a camera on.
 
         Raises
         ------
@@ -115,17 +116,18 @@ class Gphoto2Camera:
         self._frames.discard_reported()
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
-        """Set and read back; returns the settings in force, with the true shutter time.
+        """Set and read back; return the settings in force, with the actual shutter time.
 
         Parameters
         ----------
         settings
-            The shutter time as offered, or as on the dial (1/60 s for the true 1/64 s).
+            Exposure settings; the shutter time as offered, or as on the dial (1/60 s for the actual
+            1/64 s).
 
         Raises
         ------
         DeviceError
-            The camera does not offer them or did not take them.
+            The camera does not offer the settings or did not take them.
         """
         self._disarm()
         self._frames.discard_abandoned()
@@ -157,7 +159,7 @@ class Gphoto2Camera:
         Raises
         ------
         DeviceError
-            The camera did not release, or delivered no or another frame.
+            The camera did not release, or delivered no frame or another one.
         """
         self.arm()
         settings, self._armed = self._armed, None
@@ -172,7 +174,7 @@ class Gphoto2Camera:
         return Frame(data, suffix, start_s, end_s, settings)
 
     def preview(self) -> bytes:
-        """One picture of the live view, a JPEG; the first one starts it, `make_safe` stops it.
+        """Return a live view picture, a JPEG; the first call starts it, `make_safe` stops it.
 
         Raises
         ------
@@ -184,7 +186,7 @@ class Gphoto2Camera:
         return self._library.preview()
 
     def make_safe(self) -> None:
-        """Bring libgphoto2 back into step, let go of the button, live view off, nothing pending.
+        """Resynchronise libgphoto2, release the button, stop live view, leave nothing pending.
 
         An exposure that has begun runs to its end in the camera; its frame is passed over later.
 
@@ -193,7 +195,7 @@ class Gphoto2Camera:
         DeviceLostError
             The camera is gone.
         DeviceError
-            One of these could not be confirmed; the others were tried.
+            One of these steps could not be confirmed; the others were tried.
         """
         problems: list[DeviceError] = []
         with self._clock.shielded():
@@ -212,9 +214,9 @@ class Gphoto2Camera:
                     problems.append(problem)
         if problems:
             is_lost = any(isinstance(problem, DeviceLostError) for problem in problems)
-            said = "; ".join(dict.fromkeys(map(str, problems)))
+            messages = "; ".join(dict.fromkeys(map(str, problems)))
             kind = DeviceLostError if is_lost else DeviceError
-            raise kind(f"camera not known to be safe: {said}")
+            raise kind(f"camera not known to be safe: {messages}")
 
     def disconnect(self) -> None:
         """Give the camera back to its own buttons and release it; never raises."""
@@ -222,7 +224,7 @@ class Gphoto2Camera:
             self._leaving.close()
 
     def _take_control(self) -> None:
-        """Connect and set what a PC must have set, whatever was before."""
+        """Connect and apply the settings that control by a PC needs, whatever the state before."""
         self._library.connect()
         self._armed = None
         self._is_viewing = False
@@ -246,7 +248,7 @@ class Gphoto2Camera:
         self._is_viewing = False
 
     def _press(self, exposure_s: float) -> float:
-        """Clock time at which the exposure began."""
+        """Release the shutter and return the clock time at which the exposure began."""
         deadline_s = self._clock.now() + LATE_PRESS_S
         tries_left = _UNSURE_TRIES
         while True:
@@ -268,7 +270,7 @@ class Gphoto2Camera:
                 return (obeyed.begin_s + obeyed.end_s) / 2 + self._settings.shutter_lag
 
     def _busy_s(self) -> float:
-        """How long the camera may be busy: to the end of an exposure, and a little more."""
+        """Return how long the camera may be busy: to the end of an exposure, and a little more."""
         return self._frames.exposing_for_s() + LATE_PRESS_S
 
     def _maker(self) -> str:

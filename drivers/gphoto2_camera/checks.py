@@ -1,4 +1,4 @@
-"""What of a camera's settings would spoil photometry, as far as libgphoto2 tells.
+"""Checks of a camera's settings that would spoil photometry, as far as libgphoto2 reports them.
 
 Names of settings: libgphoto2 2.5.34, camlibs/ptp2/config.c.
 """
@@ -22,7 +22,7 @@ _BY_HAND = "look for yourself in the camera's menu"
 
 
 def findings(library: Library, release: Release, maker: str) -> list[Finding]:
-    """All that can be told.
+    """Return all findings on the camera's settings.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""Shutter time, aperture and sensitivity: what the camera offers, what is set, setting it."""
+"""Shutter time, aperture and sensitivity: the camera's offers, settings in force, setting them."""
 
 from collections.abc import Callable
 from typing import TypeVar
@@ -37,16 +37,16 @@ class Exposure:
         self._aperture = library.first_of(APERTURE)
 
     def offers(self) -> CameraOffers:
-        """The camera's own lists, less what the rig file excludes.
+        """Return the camera's own lists, less what the rig file excludes.
 
         Raises
         ------
         DeviceError
-            Nothing is left of them.
+            The rig file excludes all settings that the camera offers.
         """
         self._require_manual()
         exposures_s = self._times_s(self._library.get(self._shutter)).values()
-        isos = _known(self._library.get(self._iso), iso)
+        isos = _values_by_label(self._library.get(self._iso), iso)
         allowed = set(isos.values()) & set(self._settings.isos)
         if not exposures_s or not allowed:
             missing = "isos" if exposures_s else "shutter times up to longest_exposure"
@@ -56,25 +56,25 @@ class Exposure:
             )
         return self._settings.offers(exposures_s, allowed, self._apertures().values())
 
-    def apply(self, wanted: ExposureSettings) -> None:
+    def apply(self, requested: ExposureSettings) -> None:
         """Set what is not in force already, read back.
 
         Raises
         ------
         DeviceError
-            The camera does not offer it or did not take it.
+            The camera does not offer a setting or did not take it.
         """
         self._require_manual()
-        for name, label in self._labels_of(wanted).items():
+        for name, label in self._labels_of(requested).items():
             self._library.set_surely(name, label, self._settings.answer_timeout)
 
     def in_force(self) -> ExposureSettings:
-        """What the camera says is set, with the true shutter time.
+        """Return the settings that the camera reports, with the actual shutter time.
 
         Raises
         ------
         DeviceError
-            It is at bulb, at automatic ISO, at something unknown, or its dial not at M.
+            The camera is at bulb, at automatic ISO, at something unknown, or its dial not at M.
         """
         self._require_manual()
         shutter, sensitivity = self._library.get(self._shutter), self._library.get(self._iso)
@@ -87,30 +87,32 @@ class Exposure:
         aperture = None if self._aperture is None else self._library.get(self._aperture).value
         return ExposureSettings(exposure_s, value, None if aperture is None else f_number(aperture))
 
-    def _labels_of(self, wanted: ExposureSettings) -> dict[str, str]:
-        """Setting → label."""
+    def _labels_of(self, requested: ExposureSettings) -> dict[str, str]:
+        """Return the label of each exposure setting by the setting's name."""
         times_s = self._times_s(self._library.get(self._shutter))
-        isos = _known(self._library.get(self._iso), iso)
-        shutter = label_of_time(wanted.exposure_s, times_s) if wanted.exposure_s > 0 else None
-        sensitivity = next((label for label, value in isos.items() if value == wanted.iso), None)
+        isos = _values_by_label(self._library.get(self._iso), iso)
+        shutter = label_of_time(requested.exposure_s, times_s) if requested.exposure_s > 0 else None
+        sensitivity = next((label for label, value in isos.items() if value == requested.iso), None)
         if shutter is None or sensitivity is None:
-            what = "shutter time" if shutter is None else "ISO"
+            missing = "shutter time" if shutter is None else "ISO"
             raise DeviceError(
-                f"asked the camera for {wanted}, it does not offer this {what}: choose from what "
-                "'labrig rig check' shows, or turn its dial to M"
+                f"asked the camera for {requested}, it does not offer this {missing}: choose from "
+                "what 'labrig rig check' shows, or turn its dial to M"
             )
         labels = {self._shutter: shutter, self._iso: sensitivity}
-        if wanted.f_number is not None:
-            labels |= self._aperture_label(wanted, wanted.f_number)
+        if requested.f_number is not None:
+            labels |= self._aperture_label(requested, requested.f_number)
         return labels
 
-    def _aperture_label(self, wanted: ExposureSettings, wanted_f_number: float) -> dict[str, str]:
+    def _aperture_label(
+        self, requested: ExposureSettings, requested_f_number: float
+    ) -> dict[str, str]:
         offered = self._apertures()
         for label, value in offered.items():
-            if self._aperture is not None and abs(value / wanted_f_number - 1) < SAME_F_NUMBER:
+            if self._aperture is not None and abs(value / requested_f_number - 1) < SAME_F_NUMBER:
                 return {self._aperture: label}
         raise DeviceError(
-            f"asked the camera for {wanted}, "
+            f"asked the camera for {requested}, "
             + (
                 f"its lens offers {', '.join(f'f/{value:g}' for value in offered.values())}: "
                 "choose one of these"
@@ -125,33 +127,37 @@ class Exposure:
         return {label: time_s for label, time_s in times_s.items() if allows(time_s)}
 
     def _apertures(self) -> dict[str, float]:
-        return {} if self._aperture is None else _known(self._library.get(self._aperture), f_number)
+        return (
+            {}
+            if self._aperture is None
+            else _values_by_label(self._library.get(self._aperture), f_number)
+        )
 
     def _require_manual(self) -> None:
         mode = self._library.first_of(MODE)
-        if mode is not None and (said := self._library.get(mode).value) not in MANUAL:
+        if mode is not None and (label := self._library.get(mode).value) not in MANUAL:
             raise DeviceError(
-                f"expected the camera's dial at M, it says {said}: turn the dial to M"
+                f"expected the camera's dial at M, it says {label}: turn the dial to M"
             )
 
 
-def _known(setting: Setting, meaning: Callable[[str], T | None]) -> dict[str, T]:
-    """Label → value of those choices that have one."""
-    return {c: value for c in setting.choices if (value := meaning(c)) is not None}
+def _values_by_label(setting: Setting, meaning: Callable[[str], T | None]) -> dict[str, T]:
+    """Return the labels with a known value, and their values."""
+    return {label: value for label in setting.choices if (value := meaning(label)) is not None}
 
 
-def _needed(library: Library, names: tuple[str, ...], what: str) -> str:
+def _needed(library: Library, names: tuple[str, ...], purpose: str) -> str:
     name = library.first_of(names)
     if name is None:
         raise DeviceError(
-            f"libgphoto2 cannot set the {what} of this camera, as it has no "
+            f"libgphoto2 cannot set the {purpose} of this camera, as it has no "
             f"{' or '.join(names)}: turn its dial to M, or use another camera"
         )
     return name
 
 
-def _unusable(what: str, said: str) -> DeviceError:
+def _unusable(quantity: str, label: str) -> DeviceError:
     return DeviceError(
-        f"expected a {what} that can be reduced, the camera says {said}: turn its dial to M, "
+        f"expected a {quantity} that can be reduced, the camera says {label}: turn its dial to M, "
         "neither bulb nor automatic ISO"
     )

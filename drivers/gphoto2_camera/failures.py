@@ -1,4 +1,4 @@
-"""How libgphoto2 fails, and what to do about it; all of it is `DeviceError` to the outside."""
+"""Failures of libgphoto2 and their remedies; all of them are `DeviceError` to the outside."""
 
 from labrig.errors import DeviceError, DeviceLostError
 
@@ -26,17 +26,17 @@ class BusyError(DeviceError):
 
 
 class PerhapsReleasedError(DeviceError):
-    """The camera was busy before its release, or after it: nobody knows."""
+    """The camera was busy before its release or after it: whether it released is unknown."""
 
 
 class UnspecifiedError(DeviceError):
-    """Anything: also what is said first when the line breaks."""
+    """Unspecified error of libgphoto2, which is also its first one when the line breaks."""
 
 
 def failure(context: str, code: int, text: str) -> DeviceError:
-    """The error for what libgphoto2 answered; `context` says who it was and what for."""
-    said = f"{context}: libgphoto2 says '{text}' ({code})"
+    """Return the error for libgphoto2's answer; `context` names the device and the purpose."""
+    problem = f"{context}: libgphoto2 says '{text}' ({code})"
     if code in _GONE:
-        return DeviceLostError(f"{said}: {_LOOK}")
+        return DeviceLostError(f"{problem}: {_LOOK}")
     kind = {CAMERA_BUSY: BusyError, GENERAL: UnspecifiedError}.get(code, DeviceError)
-    return kind(f"{said}: {_ADVICE.get(code, _ELSE)}")
+    return kind(f"{problem}: {_ADVICE.get(code, _ELSE)}")

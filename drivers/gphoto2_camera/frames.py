@@ -1,4 +1,4 @@
-"""Frames as libgphoto2 reports them: the one that is due, and those that nobody wants any more."""
+"""Frames as libgphoto2 reports them: the one that is due, and abandoned ones."""
 
 from pathlib import PurePosixPath
 
@@ -7,23 +7,23 @@ from labrig.errors import DeviceError
 
 from .library import AT_ONCE_S, Library
 
-#: Somebody who asks to stop meanwhile is heard after this.
+#: Interval at which a request to stop is noticed.
 LISTEN_S = 0.2
 _JPEG = b"\xff\xd8\xff"
-#: What libgphoto2 calls every format of a Canon that it does not know, even a RAW file in TIFF.
+#: Suffix that libgphoto2 gives to unknown formats of a Canon, even a RAW file in TIFF.
 _UNKNOWN = ".jpg"
 _TIFF = (b"II*\0", b"MM\0*")
 
 
 class Frames:
-    """Knows whether a frame is due, so that none is ever taken for another.
+    """Bookkeeping of the frame that is due, so that none is ever taken for another.
 
     Parameters
     ----------
     library
-        Reports and transfers them.
+        Library that reports and transfers the frames.
     clock
-        On which is waited for them.
+        Clock of the waiting for frames.
     timeout_s
         Seconds from the end of an exposure until its frame must be there.
     """
@@ -35,40 +35,40 @@ class Frames:
         self._due_after_s: float | None = None
 
     def expect(self, exposure_end_s: float) -> None:
-        """An exposure has begun, or may have, that ends at this clock time at the latest."""
+        """Note that an exposure has begun, or may have, and ends at this clock time at latest."""
         self._due_after_s = exposure_end_s
 
     def expect_none(self) -> None:
-        """No exposure is under way."""
+        """Note that no exposure is under way."""
         self._due_after_s = None
 
     def exposing_for_s(self) -> float:
-        """Seconds for which the camera may still expose."""
+        """Return the seconds for which the camera may still expose."""
         now_s = self._clock.now()
         return max(0.0, (self._due_after_s or now_s) - now_s)
 
     def fetch(self) -> tuple[bytes, str]:
-        """The frame that is due: its bytes and its suffix, such as `.nef`.
+        """Return the bytes of the frame that is due and its suffix, such as `.nef`.
 
         Raises
         ------
         DeviceError
-            None came, or one that is no RAW file.
+            No frame came, or one that is no RAW file.
         """
-        found = self._wait()
-        if found is None:
+        file = self._wait()
+        if file is None:
             raise DeviceError(
                 f"expected a frame within {self._timeout_s:g} s of the exposure's end, libgphoto2 "
                 "reported none: set the lens to manual focus (MF), mirror lock-up and self-timer "
                 "off, and let the camera keep its frames for the PC"
             )
         self._due_after_s = None
-        folder, name = found
+        folder, name = file
         data = self._library.read(folder, name, self._timeout_s)
         return data, raw_suffix(name, data)
 
     def discard_abandoned(self) -> None:
-        """Wait for a frame that is due though nobody wants it, and pass over all there are.
+        """Wait for an abandoned frame that is due, and pass over all frames.
 
         Raises
         ------
@@ -82,7 +82,7 @@ class Frames:
         self.discard_reported()
 
     def discard_reported(self) -> None:
-        """Pass over the frames that are reported by now.
+        """Pass over the frames that have been reported.
 
         Raises
         ------
@@ -95,18 +95,18 @@ class Frames:
     def _wait(self) -> tuple[str, str] | None:
         deadline_s = (self._due_after_s or self._clock.now()) + self._timeout_s
         while True:
-            found = self._library.next_file(LISTEN_S, self._timeout_s)
-            if found is not None or self._clock.now() >= deadline_s:
-                return found
+            file = self._library.next_file(LISTEN_S, self._timeout_s)
+            if file is not None or self._clock.now() >= deadline_s:
+                return file
 
 
 def raw_suffix(name: str, data: bytes) -> str:
-    """Suffix of a RAW file, by its name and by how it begins.
+    """Return the suffix of a RAW file, by its name and its first bytes.
 
     Raises
     ------
     DeviceError
-        It is empty, a JPEG or no photograph at all.
+        The file is empty, a JPEG or no photograph at all.
     """
     suffix = PurePosixPath(name).suffix.lower()
     if not data or data.startswith(_JPEG) or not suffix[1:].isalnum():

@@ -1,4 +1,4 @@
-"""What runs in the process of its own: calls of libgphoto2, one after another, as asked.
+"""Helper process: calls of libgphoto2, one after another, as requested over a pipe.
 
     python helper.py DESCRIPTOR
 
@@ -32,7 +32,7 @@ class Session:
         self._camera = gphoto2.Camera()
 
     def connect(self, path: str) -> dict[str, str]:
-        """The camera at one of libgphoto2's port paths; its settings' names and values."""
+        """Connect to the camera at one of libgphoto2's port paths; return its settings by name."""
         ports = gphoto2.PortInfoList()
         ports.load()
         abilities = gphoto2.CameraAbilitiesList()
@@ -40,8 +40,11 @@ class Session:
         if path.startswith("ptpip:"):
             model = NETWORK_MODEL
         else:
-            found = abilities.detect(ports)
-            models = {found.get_value(i): found.get_name(i) for i in range(found.count())}
+            cameras = abilities.detect(ports)
+            models = {
+                cameras.get_value(index): cameras.get_name(index)
+                for index in range(cameras.count())
+            }
             if path not in models:
                 raise gphoto2.GPhoto2Error(gphoto2.GP_ERROR_MODEL_NOT_FOUND)
             model = models[path]
@@ -51,17 +54,17 @@ class Session:
         return _values(self._camera.get_config(), {})
 
     def version(self) -> str:
-        """That of libgphoto2."""
+        """Return the version of libgphoto2."""
         return str(gphoto2.gp_library_version(gphoto2.GP_VERSION_SHORT)[0])
 
     def get(self, name: str) -> tuple[str, tuple[str, ...]]:
-        """A setting and its choices, if it has some."""
+        """Return a setting and its choices, if it has some."""
         widget = self._camera.get_single_config(name)
         choices = widget.get_choices() if widget.get_type() in _CHOICES else ()
         return str(widget.get_value()), tuple(choices)
 
     def set(self, name: str, value: str) -> tuple[float, float]:
-        """Set; when it was sent and answered."""
+        """Set a setting; return the times at which it was sent and answered."""
         widget = self._camera.get_single_config(name)
         is_switch = widget.get_type() == gphoto2.GP_WIDGET_TOGGLE
         widget.set_value(int(value) if is_switch else value)
@@ -70,29 +73,29 @@ class Session:
         return sent_s, self._clock.now()
 
     def trigger(self) -> tuple[float, float]:
-        """Photograph; when libgphoto2 began and when it believed that it was done."""
-        asked_s = self._clock.now()
+        """Photograph; return the times at which libgphoto2 began and reported the end."""
+        called_s = self._clock.now()
         self._camera.trigger_capture()
-        return asked_s, self._clock.now()
+        return called_s, self._clock.now()
 
     def next_file(self, within_s: float) -> tuple[str, str] | None:
-        """Folder and name of the next file that the camera reports; None if it reports none."""
+        """Return folder and name of the next file that the camera reports; None without one."""
         deadline_s = self._clock.now() + within_s
         while True:
-            left_s = deadline_s - self._clock.now()
-            kind, event = self._camera.wait_for_event(max(1, round(left_s * 1e3)))
+            remaining_s = deadline_s - self._clock.now()
+            kind, event = self._camera.wait_for_event(max(1, round(remaining_s * 1e3)))
             if kind == FILE_ADDED:
                 return event.folder, event.name
-            if left_s <= 0:
+            if remaining_s <= 0:
                 return None
 
     def read(self, folder: str, name: str) -> bytes:
-        """The bytes of a file."""
+        """Return the bytes of a file."""
         file = self._camera.file_get(folder, name, gphoto2.GP_FILE_TYPE_NORMAL)
         return bytes(file.get_data_and_size())
 
     def preview(self) -> bytes:
-        """One picture of the live view."""
+        """Return one picture of the live view."""
         file = self._camera.capture_preview()  # its bytes are freed with it
         return bytes(file.get_data_and_size())
 
@@ -101,18 +104,18 @@ class Session:
         self._camera.exit()
 
 
-def _values(widget: Any, found: dict[str, str]) -> dict[str, str]:
-    """All settings below `widget`; of several with one name the first."""
+def _values(widget: Any, values: dict[str, str]) -> dict[str, str]:
+    """Return all settings below `widget`; of several with one name the first."""
     if widget.get_type() in _GROUPS:
         for child in widget.get_children():
-            _values(child, found)
+            _values(child, values)
     elif widget.get_type() != gphoto2.GP_WIDGET_BUTTON:
-        found.setdefault(widget.get_name(), str(widget.get_value()))
-    return found
+        values.setdefault(widget.get_name(), str(widget.get_value()))
+    return values
 
 
 def serve(pipe: Connection) -> None:
-    """Answer until nobody asks any more."""
+    """Answer requests until the other end of the pipe is closed."""
     session = Session()
     while True:
         try:

@@ -1,22 +1,22 @@
-"""What the labels mean that libgphoto2 gives to settings: `1/60`, `10/13`, `0.0100s`, `f/5.6`.
+"""Meaning of the labels that libgphoto2 gives to settings: `1/60`, `10/13`, `0.0100s`, `f/5.6`.
 
-A shutter's true times are powers of two, in thirds or halves of a stop (APEX, ISO 2720 annex A);
-its labels are rounded: 1/60 is 1/64 s, 30 is 32 s. Fujifilm's cameras report the true ones beside
-the labels, Canon's codes are eighths of a stop; of other makes it is assumed. Apertures and
-sensitivities keep their labels, by which people, lenses and EXIF know them.
+A shutter's actual times are powers of two, in thirds or halves of a stop (APEX, ISO 2720 annex A);
+its labels, the nominal times, are rounded: 1/60 is 1/64 s, 30 is 32 s. Fujifilm's cameras report
+the actual times beside the labels, Canon's codes are eighths of a stop; of other makes it is
+assumed. Apertures and sensitivities keep their labels, which people, lenses and EXIF use.
 """
 
 import math
 import re
 from collections.abc import Collection, Iterable, Mapping
 
-#: In thirds of a stop a label is at most so far off the true time.
+#: Largest deviation of a label in thirds of a stop from the actual time.
 LABEL_STOPS = 0.12
-#: A time is asked for by its label or by its true value.
+#: Tolerance of a requested time, which is nominal or actual.
 SAME_SHUTTER_STOPS = 0.05
 #: Neighbouring aperture labels differ by 6 % or more.
 SAME_F_NUMBER = 0.02
-#: Longer times are no dial's but a timer's, in true seconds.
+#: Longest time on a dial; longer ones are a timer's, in actual seconds.
 LONGEST_ON_DIAL_S = 30.0
 #: Steps of a stop.
 _THIRDS, _HALVES = 3, 2
@@ -28,7 +28,7 @@ _NOT_RAW_ALONE = re.compile(r"\+|,|jpe?g|heif", re.IGNORECASE)
 
 
 def labelled_time_s(label: str) -> float | None:
-    """The time that a label names, in seconds; None for bulb, automatic and the like."""
+    """Return the nominal time of a label, in seconds; None for bulb, automatic and the like."""
     match = _TIME.fullmatch(label.strip())
     if match is None:
         return None
@@ -38,18 +38,18 @@ def labelled_time_s(label: str) -> float | None:
 
 
 def true_times_s(labels: Iterable[str]) -> dict[str, float]:
-    """True shutter time of each label that names one, in seconds.
+    """Return the actual shutter time of each label that names a time, in seconds.
 
-    Whether a camera counts in thirds or in halves of a stop shows in how many there are.
+    The number of labels shows whether a camera counts in thirds or in halves of a stop.
     """
-    named = {label: time_s for label in labels if (time_s := labelled_time_s(label)) is not None}
-    dial = {label: time_s for label, time_s in named.items() if time_s <= LONGEST_ON_DIAL_S}
+    nominal = {label: time_s for label in labels if (time_s := labelled_time_s(label)) is not None}
+    dial = {label: time_s for label, time_s in nominal.items() if time_s <= LONGEST_ON_DIAL_S}
     steps = _steps_of_a_stop(dial.values())
-    return named | {label: _true_time_s(time_s, steps) for label, time_s in dial.items()}
+    return nominal | {label: _true_time_s(time_s, steps) for label, time_s in dial.items()}
 
 
 def label_of_time(exposure_s: float, times_s: Mapping[str, float]) -> str | None:
-    """The label in `times_s` that means `exposure_s` seconds, true or as on the dial."""
+    """Return the label in `times_s` for `exposure_s` seconds, actual or nominal."""
 
     def off_stops(label: str) -> float:
         meant_s = (times_s[label], labelled_time_s(label) or times_s[label])
@@ -60,18 +60,18 @@ def label_of_time(exposure_s: float, times_s: Mapping[str, float]) -> str | None
 
 
 def f_number(label: str) -> float | None:
-    """The f-number of a label such as `5.6` or `f/5.6`."""
+    """Return the f-number of a label such as `5.6` or `f/5.6`."""
     match = _F_NUMBER.fullmatch(label.strip())
     return float(match[1]) or None if match else None
 
 
 def iso(label: str) -> int | None:
-    """The sensitivity of a label; None for automatic ones."""
+    """Return the sensitivity of a label; None for automatic ones."""
     return int(label) or None if label.isascii() and label.isdigit() else None
 
 
 def is_raw_alone(label: str) -> bool:
-    """Whether an image format is RAW in full and nothing else: not `RAW + JPEG`, not `mRAW`."""
+    """Return whether an image format is full RAW and nothing else: not `RAW + JPEG`, not `mRAW`."""
     return bool(_RAW.search(label)) and not _NOT_RAW_ALONE.search(label)
 
 

@@ -14,39 +14,39 @@ CONNECT_S = 30.0
 USUAL_S = 25.0
 #: A slow lens keeps a 5D Mark II from answering for 8 s (libgphoto2).
 RELEASE_S = 12.0
-#: Whoever wants the safe state does not wait longer for what was under way.
+#: Longest wait for a pending request before the safe state.
 SETTLE_S = 3.0
-#: Between two tries of what the camera is not ready for.
+#: Interval between two attempts while the camera is not ready.
 POLL_PERIOD_S = 0.01
-#: So short that nothing but what is there already is found.
+#: Time in which only waiting events are reported.
 AT_ONCE_S = 0.02
 
 
 class Span(NamedTuple):
-    """Between these two times of the clock something happened, in seconds."""
+    """Two clock times, in seconds, between which an event happened."""
 
     begin_s: float
     end_s: float
 
 
 class Setting(NamedTuple):
-    """The label of a setting's value and those that it may have; none if it is not a choice."""
+    """Label of a setting's value, and the labels of its choices; none if it is not a choice."""
 
     value: str
     choices: tuple[str, ...]
 
 
 class Library:
-    """libgphoto2 connected with one camera.
+    """Connection of libgphoto2 with one camera.
 
     Parameters
     ----------
     clock
-        On which it is waited for.
+        Clock of the waiting for the camera.
     path
         libgphoto2's name of the port: `usb:001,004`, `ptpip:192.168.1.20`.
     name
-        What messages call the camera.
+        Name of the camera in messages.
     """
 
     def __init__(self, clock: Clock, path: str, name: str) -> None:
@@ -62,37 +62,37 @@ class Library:
         Raises
         ------
         DeviceError
-            No camera there that libgphoto2 knows, or another program holds it.
+            No camera that libgphoto2 supports is there, or another program holds it.
         """
         self._process.start()
         self._values = self._process.ask("connecting", CONNECT_S, "connect", self._path)
 
     def close(self) -> None:
-        """Let go of the camera; never raises."""
+        """Close the connection with the camera; never raises."""
         self._process.end()
 
     def settle(self) -> bool:
-        """Whether it is ready for the next request, whatever was interrupted."""
+        """Return whether libgphoto2 is ready for the next request, whatever was interrupted."""
         return self._process.settle(SETTLE_S)
 
     def version(self) -> str:
-        """That of libgphoto2."""
+        """Return the version of libgphoto2."""
         return str(self._ask("asking for its version", USUAL_S, "version"))
 
     def at_connect(self, name: str) -> str | None:
-        """Value of a setting when it was connected; None if it has no such setting."""
+        """Return the value of a setting at the connection; None if there is no such setting."""
         return self._values.get(name)
 
     def has(self, name: str) -> bool:
-        """Whether the camera has a setting of that name."""
+        """Return whether the camera has a setting of that name."""
         return name in self._values
 
     def first_of(self, names: tuple[str, ...]) -> str | None:
-        """The first of `names` that this camera has: they differ from make to make."""
+        """Return the first of `names` that this camera has: names differ from make to make."""
         return next((name for name in names if name in self._values), None)
 
     def get(self, name: str) -> Setting:
-        """A setting as it is now.
+        """Return a setting as it is now.
 
         Raises
         ------
@@ -102,45 +102,45 @@ class Library:
         return Setting(*self._ask(f"reading its {name}", USUAL_S, "get", name))
 
     def set(self, name: str, value: str, within_s: float = USUAL_S) -> Span:
-        """Set, without reading back; when that was sent and answered.
+        """Set a setting without reading back; return the times at which it was sent and answered.
 
         Raises
         ------
         BusyError
-            Not now.
+            The camera is busy.
         DeviceError
-            The camera does not take it.
+            The camera does not take the setting.
         """
         doing = f"setting its {name} to {value}"
         return Span(*self._ask(doing, within_s, "set", name, value))
 
     def set_surely(self, name: str, value: str, within_s: float) -> None:
-        """Set what is not set already, and read back until the camera says so.
+        """Set a setting that has another value, and read back until the camera reports the new one.
 
         Raises
         ------
         DeviceError
-            It did not take it within `within_s` seconds.
+            The camera did not take it within `within_s` seconds.
         """
         if self.get(name).value == value:
             return
         self.set(name, value)
         deadline_s = self._clock.now() + within_s
-        while (said := self.get(name).value) != value:
+        while (reported := self.get(name).value) != value:
             if self._clock.now() >= deadline_s:
                 raise DeviceError(
-                    f"camera {self._name}: asked for {name} {value}, it stays at {said}: turn its "
-                    "dial to M, leave its menus and try again"
+                    f"camera {self._name}: asked for {name} {value}, it stays at {reported}: turn "
+                    "its dial to M, leave its menus and try again"
                 )
             self._clock.sleep(POLL_PERIOD_S)
 
     def trigger(self, exposure_s: float) -> Span:
-        """Photograph; when libgphoto2 began and when it was done.
+        """Photograph; return the times at which libgphoto2 began and ended.
 
         Raises
         ------
         BusyError
-            Not now.
+            The camera is busy.
         DeviceError
             The camera does not release.
         """
@@ -148,40 +148,40 @@ class Library:
         return Span(*self._ask("releasing", within_s, "trigger"))
 
     def next_file(self, within_s: float, transfer_s: float = USUAL_S) -> tuple[str, str] | None:
-        """Folder and name of the next file; None if none is reported within `within_s` seconds.
+        """Return folder and name of the next file; None without one within `within_s` seconds.
 
         Parameters
         ----------
         transfer_s
-            Some are transferred before they are reported: seconds that this may take.
+            Seconds that the transfer may take of a file that is transferred before it is reported.
 
         Raises
         ------
         DeviceError
             The camera does not answer.
         """
-        found: tuple[str, str] | None = self._ask(
+        file: tuple[str, str] | None = self._ask(
             "waiting for its frame", within_s + transfer_s, "next_file", within_s
         )
-        return found
+        return file
 
     def read(self, folder: str, name: str, within_s: float) -> bytes:
-        """The bytes of a file.
+        """Return the bytes of a file.
 
         Raises
         ------
         DeviceError
-            They did not all come.
+            The file is incomplete.
         """
         return bytes(self._ask(f"transferring {name}", within_s, "read", folder, name))
 
     def preview(self) -> bytes:
-        """One picture of the live view, a JPEG.
+        """Return one picture of the live view, a JPEG.
 
         Raises
         ------
         DeviceError
-            The camera sends none.
+            The camera sends no picture.
         """
         return bytes(self._ask("live view", USUAL_S, "preview"))
 

@@ -1,4 +1,4 @@
-"""What a camera is set to before a PC photographs with it: single RAW frames, to the PC alone."""
+"""Settings of a camera before a PC photographs with it: single RAW frames, to the PC alone."""
 
 from collections.abc import Callable
 
@@ -7,10 +7,10 @@ from labrig.errors import DeviceError
 from .labels import is_raw_alone
 from .library import Library
 
-#: Names differ by make.
+#: Names of settings, which differ by make.
 FORMAT = ("imageformat", "imagequality")
 TARGET = ("capturetarget",)
-#: For how many frames there is room, on the card or the PC.
+#: Number of frames for which there is room, on the card or the PC.
 ROOM = "availableshots"
 DRIVE = ("drivemode", "capturemode")
 #: libgphoto2's own switch, whether it has a Nikon focus before each frame.
@@ -18,17 +18,17 @@ AUTOFOCUS = ("autofocus",)
 
 
 def prepare(library: Library, answer_s: float) -> None:
-    """Set all this, as far as the camera has it, read back.
+    """Apply all these settings, as far as the camera has them, and read them back.
 
     Parameters
     ----------
     answer_s
-        Seconds until it must have taken a setting.
+        Seconds until the camera must have taken a setting.
 
     Raises
     ------
     DeviceError
-        The camera offers no RAW, or did not take one of these.
+        The camera offers no RAW, or did not take one of the settings.
     """
     _send_frames_to_pc(library, answer_s)
     _set_where(library, DRIVE, lambda label: label.startswith("Single"), answer_s)
@@ -49,12 +49,12 @@ def _send_frames_to_pc(library: Library, answer_s: float) -> None:
         return
     target = library.get(name)
     to_pc = [label for label in target.choices if "ram" in label.lower() and "+" not in label]
-    others = [label for label in target.choices if label not in to_pc]
+    other_names = [label for label in target.choices if label not in to_pc]
     is_full = library.has(ROOM) and library.get(ROOM).value == "0"
-    if others and is_full:
+    if other_names and is_full:
         # a Canon is told of the PC's room only when the target changes, and forgets it
         # when a program dies
-        library.set_surely(name, others[0], answer_s)
+        library.set_surely(name, other_names[0], answer_s)
     if to_pc:
         library.set_surely(name, to_pc[0], answer_s)
 
@@ -62,7 +62,7 @@ def _send_frames_to_pc(library: Library, answer_s: float) -> None:
 def _set_where(
     library: Library, names: tuple[str, ...], is_meant: Callable[[str], bool], answer_s: float
 ) -> bool:
-    """Set the first of `names` that there is to its first choice that is meant; whether it is."""
+    """Set the first of `names` that exists to its first suitable choice; return whether done."""
     name = library.first_of(names)
     if name is None:
         return False

@@ -1,8 +1,8 @@
 """libgphoto2 in a process of its own.
 
 Its calls block, for minutes if a camera hangs, some of them in Python's lock; and it has crashed.
-In a process of its own neither keeps Ctrl-C from being heard or the lamp from being switched off:
-it is ended, and another one started.
+In a process of its own neither keeps Ctrl-C from being handled or the lamp from being switched off:
+the process is ended, and another one started.
 """
 
 import importlib.util
@@ -21,19 +21,19 @@ from labrig.errors import DeviceLostError, UsageError
 from .failures import failure
 
 HELPER = Path(__file__).with_name("helper.py")
-#: A process that has been told to end does so within.
+#: Time within which a process ends on command.
 END_S = 5.0
 
 
 class HelperProcess:
-    """Asks the helper, one thing after another, and waits on the clock for what it answers.
+    """Process that runs libgphoto2; it gets one request after the other, awaited on the clock.
 
     Parameters
     ----------
     clock
-        On which it is waited, so that somebody can ask to stop meanwhile.
+        Clock of the waiting for answers, during which a request to stop is noticed.
     name
-        What messages call the camera.
+        Name of the camera in messages.
     """
 
     def __init__(self, clock: Clock, name: str) -> None:
@@ -44,7 +44,7 @@ class HelperProcess:
         self._owes_answer = False
 
     def start(self) -> None:
-        """Start it, or start it anew."""
+        """Start the process, or start it anew."""
         self.end()
         self._pipe, theirs = Pipe()
         with theirs:
@@ -61,16 +61,16 @@ class HelperProcess:
         self._owes_answer = False
 
     def ask(self, doing: str, within_s: float, request: str, *arguments: Any) -> Any:
-        """What the helper's `request` returns.
+        """Return the result of the helper's `request`.
 
         Raises
         ------
         DeviceLostError
             The camera is gone, or libgphoto2 hung or crashed and was ended.
         DeviceError
-            libgphoto2 could not do it; `doing` says in the message what.
+            libgphoto2 failed at the request; `doing` is its purpose in the message.
         Interrupted
-            Somebody asked to stop; the answer is still to come.
+            A stop was requested; the answer is still to come.
         """
         context = f"camera {self._name}: {doing}"
         if not self.settle(within_s) or self._pipe is None:
@@ -97,7 +97,7 @@ class HelperProcess:
         return result
 
     def settle(self, within_s: float) -> bool:
-        """Whether it is ready for the next request; one that hangs is ended."""
+        """Return whether the process is ready for the next request; one that hangs is ended."""
         if self._pipe is None:
             return False
         if self._owes_answer:
@@ -113,7 +113,7 @@ class HelperProcess:
         return True
 
     def end(self) -> None:
-        """End it, gently if it is ready for that; never raises."""
+        """End the process, gently if it is ready for that; never raises."""
         process, pipe = self._process, self._pipe
         self._process = self._pipe = None
         if pipe is not None:
@@ -127,7 +127,7 @@ class HelperProcess:
         process.wait()
 
     def _answered(self, within_s: float) -> bool:
-        """Whether there is an answer; looks up for somebody who asks to stop."""
+        """Return whether there is an answer; a request to stop is noticed meanwhile."""
         assert self._pipe is not None
         deadline_s = self._clock.now() + within_s
         while not self._pipe.poll(min(CHECK_INTERVAL_S, max(0.0, deadline_s - self._clock.now()))):
@@ -137,14 +137,14 @@ class HelperProcess:
         return True
 
     def _exit_code(self) -> int | None:
-        """Of a process that has closed its end of the pipe."""
+        """Return the exit code of a process that has closed its end of the pipe."""
         process, self._owes_answer = self._process, False
         self.end()
         return None if process is None else process.returncode
 
 
 def require_gphoto2() -> None:
-    """Raise `UsageError` where libgphoto2 cannot be had."""
+    """Raise `UsageError` where libgphoto2 is not available."""
     if sys.platform == "win32":
         raise UsageError(
             "the driver gphoto2_camera needs Linux or macOS, for which alone libgphoto2 is made; "
@@ -155,5 +155,5 @@ def require_gphoto2() -> None:
 
 
 def _environment() -> dict[str, str]:
-    """With libgphoto2's labels in English."""
+    """Return the environment with libgphoto2's labels in English."""
     return os.environ | {"LC_ALL": "C", "LANGUAGE": ""}

@@ -8,7 +8,7 @@ from labrig.errors import UsageError
 from .failures import BusyError, PerhapsReleasedError
 from .library import POLL_PERIOD_S, RELEASE_S, Library, Span
 
-#: Canon EOS alone have it.
+#: Setting of the release button, on Canon EOS only.
 BUTTON = "eosremoterelease"
 #: Half and full press that leave the lens alone; older versions of libgphoto2 have the others.
 _PRESSES = (("Press Half MF", "Press Full MF"), ("Press Half", "Press Full"))
@@ -20,31 +20,31 @@ class Release(Protocol):
 
     @property
     def words(self) -> str:
-        """What a person is told of it."""
+        """Description of the way of release, for people."""
 
     def get_ready(self) -> None:
         """Do what can be done before the release."""
 
     def press(self, exposure_s: float) -> Span:
-        """Begin an exposure of `exposure_s` seconds; between which times the camera obeyed.
+        """Begin an exposure of `exposure_s` seconds; return when, at the earliest and latest.
 
         Raises
         ------
         BusyError
             No exposure has begun.
         PerhapsReleasedError
-            Nobody knows whether one has.
+            Whether an exposure has begun is unknown.
         """
 
     def let_go_full(self, busy_s: float) -> None:
-        """Let go of the second stage; a camera that still exposes may be busy for `busy_s`."""
+        """Release the second stage; a camera that still exposes may be busy for `busy_s`."""
 
     def let_go(self, busy_s: float) -> None:
-        """Nothing is pressed any more, half or full."""
+        """Release both stages, half and full."""
 
 
 class ButtonRelease:
-    """Half and full press apart: the second is one short transaction."""
+    """Release by half and full press apart: the second is one short transaction."""
 
     words = "its remote button"
 
@@ -52,46 +52,46 @@ class ButtonRelease:
         self._library = library
         self._clock = clock
         self._half, self._full = half, full
-        self._held: list[str] = []
+        self._pending_releases: list[str] = []
 
     def get_ready(self) -> None:
-        if _LET_GO_HALF not in self._held:
-            self._held.append(_LET_GO_HALF)
+        if _LET_GO_HALF not in self._pending_releases:
+            self._pending_releases.append(_LET_GO_HALF)
         self._library.set(BUTTON, self._half, RELEASE_S)
 
     def press(self, exposure_s: float) -> Span:
-        self._held.append(_LET_GO_FULL)
+        self._pending_releases.append(_LET_GO_FULL)
         try:
             # some cameras answer when the shutter has closed
             return self._library.set(BUTTON, self._full, RELEASE_S + exposure_s)
         except BusyError:
-            self._held.pop()
+            self._pending_releases.pop()
             raise
 
     def let_go_full(self, busy_s: float) -> None:
-        if _LET_GO_FULL in self._held:
+        if _LET_GO_FULL in self._pending_releases:
             self._let_go_last(busy_s)
 
     def let_go(self, busy_s: float) -> None:
-        while self._held:
+        while self._pending_releases:
             self._let_go_last(busy_s)
 
     def _let_go_last(self, busy_s: float) -> None:
         deadline_s = self._clock.now() + busy_s
         while True:
             try:
-                self._library.set(BUTTON, self._held[-1])
+                self._library.set(BUTTON, self._pending_releases[-1])
             except BusyError:
                 if self._clock.now() >= deadline_s:
                     raise
                 self._clock.sleep(POLL_PERIOD_S)
             else:
-                self._held.pop()
+                self._pending_releases.pop()
                 return
 
 
 class TriggerRelease:
-    """libgphoto2 presses by itself; when in the course of its call depends on the make.
+    """Release by libgphoto2 itself; the time of the release within its call depends on the make.
 
     Sources: `camera_trigger_capture` of libgphoto2 2.5.34; for Canon also measured, against the
     simulated camera, by `tests/acceptance/gphoto2_latency.py`.
@@ -125,8 +125,8 @@ class TriggerRelease:
         pass
 
 
-def release_of(library: Library, clock: Clock, maker: str, wanted: str | None) -> Release:
-    """The way that is wanted, by default the better one that the camera has.
+def release_of(library: Library, clock: Clock, maker: str, requested: str | None) -> Release:
+    """Return the way of release that the settings name, by default the better one of the camera.
 
     Raises
     ------
@@ -135,11 +135,11 @@ def release_of(library: Library, clock: Clock, maker: str, wanted: str | None) -
     """
     offered = library.get(BUTTON).choices if library.has(BUTTON) else ()
     presses = next((pair for pair in _PRESSES if set(pair) <= set(offered)), None)
-    if presses is None and wanted == "button":
+    if presses is None and requested == "button":
         raise UsageError(
             "the rig file asks for 'release: button', which libgphoto2 has for Canon EOS alone: "
             "leave it out, or write 'release: trigger'"
         )
-    if presses is None or wanted == "trigger":
+    if presses is None or requested == "trigger":
         return TriggerRelease(library, maker)
     return ButtonRelease(library, clock, *presses)

@@ -1,4 +1,4 @@
-"""What a rig file can say about a camera behind libgphoto2."""
+"""Settings of a camera behind libgphoto2 in a rig file."""
 
 from collections.abc import Iterable
 from typing import Annotated, Literal
@@ -15,30 +15,35 @@ Positive = Annotated[DurationS, Field(gt=0)]
 
 
 class Gphoto2CameraSettings(BaseModel):
-    """Keys of the rig file beside `driver` and `address`.
+    """Keys of a camera behind libgphoto2 in a rig file.
 
     Attributes
     ----------
     shutter_lag
-        From the camera's obeying the release to the begin of the exposure; measure it.
+        Time from the release that the camera obeyed to the begin of the exposure, for example
+        `60 ms`; to be measured.
     release
-        `button`: half and full press apart, so that nothing but the shutter follows the second.
-        `trigger`: libgphoto2 does both, which takes 0.15 to 0.5 s. By default the better one that
-        the camera has.
+        Way to release the shutter. `button` sends half and full press apart, so that nothing but
+        the shutter follows the second; `trigger` leaves both to libgphoto2, which takes 0.15 to 0.5
+        s. Default: `button` where the camera has it.
     isos
-        The sensor's native sensitivities; the camera's others (gain after digitising) stay unused.
+        Native ISO sensitivities of the sensor. The camera's others, which are gain after
+        digitising, stay unused.
     f_numbers
-        Apertures of the lens, for planning; read from the camera when there is one.
+        Apertures of the lens as f-numbers, for planning without the camera; with it, they are read
+        from it.
     longest_exposure
-        Longer ones are not used; a true 32 s is the dial's 30 s.
+        Longest shutter time to use, for example `32 s`. The dial's 30 s is an actual 32 s.
     frame_time
-        From the end of an exposure until its frame is on the PC and the next can begin.
+        Time from the end of an exposure until its frame is on the PC and the next can begin, for
+        example `2 s`.
     frame_size
-        Of one RAW file, for planning disk space.
+        Size of one RAW file, for planning disk space, for example `27 MB`.
     transfer_timeout
-        From the end of an exposure until its frame must be on the PC.
+        Time from the end of an exposure within which its frame must be on the PC, for example
+        `30 s`.
     answer_timeout
-        Until the camera must have taken a setting.
+        Time within which the camera must have taken a setting, for example `5 s`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -56,18 +61,18 @@ class Gphoto2CameraSettings(BaseModel):
     answer_timeout: Positive = 5.0
 
     def allows_exposure(self, exposure_s: float) -> bool:
-        """Whether `exposure_s` seconds are within `longest_exposure`."""
+        """Return whether `exposure_s` seconds are within `longest_exposure`."""
         return exposure_s <= self.longest_exposure * 1.0001
 
     def declared_offers(self) -> CameraOffers:
-        """What planning without the camera assumes: shutter times in thirds of a stop."""
+        """Return the offers assumed without the camera: shutter times in thirds of a stop."""
         times_s = (2.0 ** (n / 3) for n in range(_SHORTEST_THIRDS, _LONGEST_THIRDS + 1))
         return self.offers(filter(self.allows_exposure, times_s), self.isos, self.f_numbers)
 
     def offers(
         self, exposures_s: Iterable[float], isos: Iterable[int], f_numbers: Iterable[float]
     ) -> CameraOffers:
-        """Offers with this file's costs of a frame."""
+        """Return offers with this file's time and size of a frame."""
         return CameraOffers(
             exposures_s=tuple(sorted(set(exposures_s))),
             isos=tuple(sorted(set(isos))),

@@ -13,20 +13,22 @@ from .swung import Swung
 class MaestroDoor(Swung):
     """A trap door moved by a servo on a Pololu Maestro.
 
-    What is read back is the pulse that the Maestro sends, not the angle of the door: a door that
-    is stuck, or a servo without power, is seen by the camera alone. A servo takes a new pulse with
-    its next frame, so the door starts 0 to 20 ms after the command, differently each time.
+    The read-back is the pulse that the Maestro sends, not the angle of the door: a door that is
+    stuck, or a servo without power, is seen by the camera alone. A servo takes a new pulse with its
+    next frame, so the door starts 0 to 20 ms after the command, differently each time.
     """
 
     what = "trap door"
 
     class Settings(ServoSettings):
-        """Keys of the rig file.
+        """Keys of a trap door on a Pololu Maestro in a rig file.
 
         Attributes
         ----------
-        closed, open
-            Length of the servo's pulse at either end, such as `1000 us`.
+        closed
+            Length of the servo's pulse with the door closed, for example `1000 us`.
+        open
+            Length of the servo's pulse with the door open, for example `2000 us`.
         """
 
         closed: PulseS
@@ -51,5 +53,5 @@ class MaestroDoor(Swung):
         self._servo.go(self._settings.closed)
 
     def make_safe(self) -> None:
-        """Bring the line back into step, then close; returns when the door has had the time."""
+        """Resynchronise the line, then close; return when the door has had the time."""
         self._servo.bring(self._settings.closed)

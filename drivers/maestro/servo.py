@@ -19,7 +19,7 @@ from ..serial_line import SerialLine
 
 CONTROL_CENTER = "the Maestro Control Center"
 
-#: What each bit means and what to do, from bit 0 on.
+#: Meaning and remedy of each bit, from bit 0 on.
 ERRORS = (
     ("a byte came damaged", "check its wiring and baud rate, or use its USB port"),
     ("bytes came faster than it took them", "end whatever else writes to this port"),
@@ -41,21 +41,23 @@ ERRORS = (
 
 
 def told(bits: int) -> str:
-    """All errors in the 16 bits that the command A1 reads, with what to do; empty for none."""
-    known = [error for bit, error in enumerate(ERRORS) if bits >> bit & 1]
-    unknown = [bit for bit in range(len(ERRORS), 16) if bits >> bit & 1]
-    remedies = dict.fromkeys(remedy for _, remedy in known)
-    what = [what for what, _ in known] + [f"error bit {bit}, unknown to labrig" for bit in unknown]
-    return ", and ".join(what) + (f" ({'; '.join(remedies)})" if remedies else "")
+    """Return all errors in the 16 bits that the command A1 reads, with remedies; empty for none."""
+    errors = [error for bit, error in enumerate(ERRORS) if bits >> bit & 1]
+    unknown_bits = [bit for bit in range(len(ERRORS), 16) if bits >> bit & 1]
+    remedies = dict.fromkeys(remedy for _, remedy in errors)
+    names = [name for name, _ in errors] + [
+        f"error bit {bit}, unknown to labrig" for bit in unknown_bits
+    ]
+    return ", and ".join(names) + (f" ({'; '.join(remedies)})" if remedies else "")
 
 
 #: The USB port ignores it; a Maestro's own default where it is wired to a UART adapter.
 BAUDRATE = 9600
 ANSWER_TIMEOUT_S = 0.5
-#: In this time a new pulse is sent at the latest: five servo frames.
+#: Time within which a new pulse is sent: five servo frames.
 READ_BACK_S = 0.1
 LOOK_AGAIN_S = 0.005
-#: Beyond the time that the whole way takes.
+#: Time added to that of the whole way.
 SLACK_S = 1.0
 
 SET_TARGET, SET_SPEED, SET_ACCELERATION = 0x84, 0x87, 0x89
@@ -63,26 +65,28 @@ GET_POSITION, GET_MOVING, GET_ERRORS = 0x90, 0x93, 0xA1
 POLOLU_PROTOCOL = 0xAA
 QUARTER_US = 0.25e-6
 
-#: What a Maestro can send: 64 µs to 4080 µs.
+#: Length of a Maestro's pulse: 64 µs to 4080 µs.
 PulseS = Annotated[DurationS, Field(ge=64e-6, le=4080e-6)]
 
 
 class ServoSettings(BaseModel):
-    """Keys of the rig file that every servo has.
+    """Keys of a servo on a Pololu Maestro in a rig file.
 
     Attributes
     ----------
     channel
-        Of the Maestro, counted from 0.
+        Channel of the Maestro to which the servo is connected, counted from 0.
     travel
-        From the command until it has stopped ringing, the servo's frame of 20 ms included.
+        Time from the command until the door has stopped ringing, the servo's frame of up to 20 ms
+        included, for example `300 ms`.
     speed
-        Limit in 0.25 µs per 10 ms, as in the Maestro Control Center; 0: none.
+        Speed limit of the servo in 0.25 µs per 10 ms, as in the Maestro Control Center; 0: no
+        limit.
     acceleration
-        Limit in 0.25 µs per 10 ms per 80 ms; 0: none.
+        Acceleration limit of the servo in 0.25 µs per 10 ms per 80 ms; 0: no limit.
     device_number
-        Of one Maestro of several on a line, which is then spoken to by Pololu's protocol; null:
-        the only one, by the compact protocol.
+        Device number of the Maestro if several share the line, which are then addressed by Pololu's
+        protocol; null: the only one, addressed by the compact protocol.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -96,19 +100,19 @@ class ServoSettings(BaseModel):
 
 @dataclass(frozen=True)
 class Wire:
-    """How commands are written: by the compact protocol, or with a device number by Pololu's."""
+    """Encoding of commands: by the compact protocol, or with a device number by Pololu's."""
 
     device_number: int | None = None
 
     def command(self, code: int, *data: int) -> bytes:
-        """Bytes of a command; data bytes have 7 bits."""
+        """Return the bytes of a command; data bytes have 7 bits."""
         if self.device_number is None:
             return bytes((code, *data))
         return bytes((POLOLU_PROTOCOL, self.device_number, code & 0x7F, *data))
 
 
 def seven_bits(value: int) -> tuple[int, int]:
-    """A number below 2¹⁴ as the Maestro takes it: low seven bits first."""
+    """Return a number below 2¹⁴ in the Maestro's form: low seven bits first."""
     return value & 0x7F, value >> 7
 
 
@@ -118,11 +122,11 @@ class Servo:
     Parameters
     ----------
     address
-        Serial port.
+        Serial port of the Maestro.
     settings
         The servo's part of the rig file.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     def __init__(self, address: str, settings: ServoSettings, connections: Connections) -> None:
@@ -136,9 +140,9 @@ class Servo:
 
     @property
     def pulse_s(self) -> float:
-        """Length of the pulse that is being sent, 0 for none: what is commanded, not an angle."""
-        came = self._ask(GET_POSITION, 2, self._settings.channel)
-        return int.from_bytes(came, "little") * QUARTER_US
+        """Length of the pulse that is being sent, 0 for none: the command, not an angle."""
+        answer = self._ask(GET_POSITION, 2, self._settings.channel)
+        return int.from_bytes(answer, "little") * QUARTER_US
 
     def go(self, pulse_s: float) -> None:
         """Begin to turn; errors and the pulse are read back.
@@ -157,12 +161,12 @@ class Servo:
             self._clock.sleep(LOOK_AGAIN_S)
 
     def bring(self, pulse_s: float) -> None:
-        """Whatever was interrupted, turn, and return when the servo has had the time to stop.
+        """Turn, whatever was interrupted, and return when the servo has had the time to stop.
 
         Raises
         ------
         UnclearAnswerError
-            As `go`.
+            The Maestro reports an error, or sends another pulse and does not ramp to this one.
         """
         self._resynchronise()
         self._tell(SET_SPEED, *seven_bits(self._settings.speed))
@@ -184,7 +188,7 @@ class Servo:
         Raises
         ------
         UnclearAnswerError
-            Names each error that has happened since they were read last.
+            Errors have happened since the bits were read last; the message names each.
         """
         if bits := self._errors():
             raise UnclearAnswerError(
@@ -220,12 +224,12 @@ class Servo:
         return self._line.read_exactly(count, ANSWER_TIMEOUT_S)
 
     def _resynchronise(self) -> None:
-        """Forget old errors and a half-read answer; a half-written command is an error itself."""
+        """Discard old errors and a half-read answer; a half-written command is an error itself."""
         self._line.drain()
         for _ in range(2):
             self._errors()
 
 
 def quarters(pulse_s: float) -> int:
-    """A pulse in quarter microseconds, the Maestro's unit."""
+    """Return a pulse in quarter microseconds, the Maestro's unit."""
     return round(pulse_s / QUARTER_US)

@@ -13,19 +13,22 @@ from .swung import Swung
 class MaestroShield(Swung):
     """A shield that a servo on a Pololu Maestro swings before the lamp.
 
-    Read back and timed as a `MaestroDoor`. Safe is uncovered: a hot lamp behind a shield cannot
-    lose its heat.
+    Its read-back and timing are those of `MaestroDoor`. Its safe position is uncovered: a hot lamp
+    behind a shield cannot lose its heat.
     """
 
     what = "lamp shield"
 
     class Settings(ServoSettings):
-        """Keys of the rig file.
+        """Keys of a lamp shield on a Pololu Maestro in a rig file.
 
         Attributes
         ----------
-        covering, uncovering
-            Length of the servo's pulse at either end, such as `1000 us`.
+        covering
+            Length of the servo's pulse with the shield before the lamp, for example `1000 us`.
+        uncovering
+            Length of the servo's pulse with the shield away from the lamp, its safe end, for
+            example `2000 us`.
         """
 
         covering: PulseS
@@ -50,5 +53,5 @@ class MaestroShield(Swung):
         self._servo.go(self._settings.uncovering)
 
     def make_safe(self) -> None:
-        """Bring the line back into step, then uncover; returns when it has had the time."""
+        """Resynchronise the line, then uncover; return when the shield has had the time."""
         self._servo.bring(self._settings.uncovering)

@@ -1,4 +1,4 @@
-"""What a servo swings to and fro: all that a trap door and a lamp shield have in common."""
+"""Common part of a trap door and a lamp shield, which a servo swings to and fro."""
 
 from typing import ClassVar
 
@@ -8,7 +8,7 @@ from .servo import Servo, ServoSettings
 
 
 class Swung:
-    """Something on one channel of a Pololu Maestro.
+    """Part of the bench on one channel of a Pololu Maestro.
 
     Parameters
     ----------
@@ -17,15 +17,15 @@ class Swung:
     settings
         The rig file's keys for this device.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
-    #: What it is called.
+    #: Name of the device in messages.
     what: ClassVar[str]
 
     @staticmethod
     def declared_travel_s(settings: ServoSettings) -> float:
-        """For plans: seconds from the command until it has stopped."""
+        """Return the seconds from the command until the door has stopped, for plans."""
         return settings.travel
 
     def __init__(self, address: str, settings: ServoSettings, connections: Connections) -> None:
@@ -33,19 +33,19 @@ class Swung:
         self._servo = Servo(address, settings, connections)
 
     def identity(self) -> str:
-        """The Maestro's channel and its pulse; a Maestro does not tell its model or serial."""
+        """Return the Maestro's channel and pulse; a Maestro reports no model or serial number."""
         return (
             f"Pololu Maestro servo controller, {self.what} on channel {self._channel}, "
             f"pulse {self._servo.pulse_s * 1e6:.2f} µs"
         )
 
     def travel_s(self) -> float:
-        """Seconds from the command until it has stopped, as the rig file says."""
+        """Return the seconds from the command until the door has stopped, from the rig file."""
         return self._travel_s
 
     def heartbeat(self) -> None:
-        """Keep the Maestro's serial time-out from running out, and see that it has not."""
+        """Restart the Maestro's serial time-out, and check that it has not run out."""
         self._servo.raise_errors()
 
     def disconnect(self) -> None:
-        """The port belongs to the connections, which close it."""
+        """Do nothing: the port belongs to the connections, which close it."""

@@ -14,19 +14,19 @@ from ..serial_line import SerialLine
 #: USB CDC ignores it; Numato's own samples use this one.
 BAUDRATE = 19200
 ANSWER_TIMEOUT_S = 1.0
-#: How relays and inputs are counted in commands.
+#: Characters of relays and inputs in commands.
 CHANNELS = "0123456789ABCDEFGHIJKLMNOPQRSTUV"
 
 
 class Board:
-    """A Numato board; what hangs on it may share the port.
+    """A Numato board; its devices may share the port.
 
     Parameters
     ----------
     address
         Serial port of the board.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     def __init__(self, address: str, connections: Connections) -> None:
@@ -36,24 +36,24 @@ class Board:
         self.resynchronise()
 
     def identity(self) -> str:
-        """Firmware version and id, as the board says."""
+        """Return firmware version and id of the board."""
         version, board_id = self.ask("ver"), self.ask("id get")
         return f"firmware {version}, id {board_id}"
 
     def ask(self, command: str) -> str:
-        """What the board says to `command` between echo and prompt; mostly nothing.
+        """Return the board's answer to `command` between echo and prompt; mostly empty.
 
         Raises
         ------
         UnclearAnswerError
-            No answer in time, or no echo.
+            The board does not answer in time, or does not echo.
         """
         self._line.write(command.encode("ascii") + b"\r")
-        came = self._line.read_until(b">", ANSWER_TIMEOUT_S)
-        lines = re.split(r"[\r\n]+", came.decode("ascii", errors="replace").removesuffix(">"))
+        answer = self._line.read_until(b">", ANSWER_TIMEOUT_S)
+        lines = re.split(r"[\r\n]+", answer.decode("ascii", errors="replace").removesuffix(">"))
         if lines[0] != command:
             raise UnclearAnswerError(
-                f"{self.name} did not echo '{command}': got {came!r}; is it a Numato board, and "
+                f"{self.name} did not echo '{command}': got {answer!r}; is it a Numato board, and "
                 "its cable well?"
             )
         return " ".join(line for line in lines[1:] if line)
@@ -67,21 +67,21 @@ class Board:
             The board refuses, or the relay does not read as it was switched.
         """
         state, channel = "on" if on else "off", CHANNELS[relay]
-        said = self.ask(f"relay {state} {channel}")
-        if said:
+        answer = self.ask(f"relay {state} {channel}")
+        if answer:
             raise UnclearAnswerError(
                 f"{self.name} refused 'relay {state} {channel}': expected a bare prompt, got "
-                f"'{said}'; is relay {relay} on this board?"
+                f"'{answer}'; is relay {relay} on this board?"
             )
         if self.is_on(relay) != on:
-            read = "off" if on else "on"
+            opposite = "off" if on else "on"
             raise UnclearAnswerError(
-                f"relay {relay} of {self.name} was switched {state} but reads {read}; switch off "
-                "by hand and check the board"
+                f"relay {relay} of {self.name} was switched {state} but reads {opposite}; switch "
+                "off by hand and check the board"
             )
 
     def is_on(self, relay: int) -> bool:
-        """What the board reads a relay as."""
+        """Return the state of a relay in the board's register."""
         state = self.ask(f"relay read {CHANNELS[relay]}")
         if state not in ("on", "off"):
             raise UnclearAnswerError(
@@ -90,6 +90,6 @@ class Board:
         return state == "on"
 
     def resynchronise(self) -> None:
-        """A bare return ends a half-typed command; whatever comes is of no interest."""
+        """End a half-typed command by a bare return, and discard the answer."""
         self._line.write(b"\r")
         self._line.drain()

@@ -17,8 +17,8 @@ Relay = Annotated[int, Field(ge=0, lt=len(CHANNELS))]
 class NumatoLedBank:
     """Several relays of one Numato board, each switching an LED.
 
-    Two are never lit together: all that may be lit are switched off and read back before another
-    one is switched on.
+    Two LEDs are never lit together: all that may be lit are switched off and read back before
+    another one is switched on.
 
     Parameters
     ----------
@@ -27,16 +27,17 @@ class NumatoLedBank:
     settings
         The rig file's keys for this device.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file.
+        """Keys of LEDs on relays of a Numato board in a rig file.
 
         Attributes
         ----------
         relays
-            Name of each LED, and the relay that it hangs on.
+            Relay of each LED by the LED's name, counted from 0, for example
+            `{"450 nm": 1, "525 nm": 2}`.
         """
 
         model_config = ConfigDict(frozen=True, extra="forbid")
@@ -52,35 +53,35 @@ class NumatoLedBank:
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._relays = settings.relays
         self._board = Board(address, connections)
-        #: Those not read back as off since they were last lit: of one just connected, all.
+        #: LEDs not read back as off since they were last lit; after connecting, all.
         self._may_be_lit = set(self._relays)
 
     @classmethod
     def declared_channels(cls, settings: Settings) -> tuple[str, ...]:
-        """Names of the LEDs, for plans."""
+        """Return the names of the LEDs, for plans."""
         return tuple(settings.relays)
 
     def channels(self) -> tuple[str, ...]:
-        """Names of the LEDs, in the rig file's order."""
+        """Return the names of the LEDs, in the rig file's order."""
         return tuple(self._relays)
 
     def reads_back(self) -> bool:
-        """Every Numato board tells the states of its relays."""
+        """Return True: every Numato board reports the states of its relays."""
         return True
 
     def identity(self) -> str:
-        """Maker, firmware version and id, as the board says; LEDs do not tell what they are."""
+        """Return maker, firmware version and id of the board, and the names of the LEDs."""
         leds = ", ".join(f"{name} on relay {relay}" for name, relay in self._relays.items())
         return f"Numato relay board, {self._board.identity()}, LEDs {leds}"
 
     def light(self, channel: str) -> None:
-        """Switch off what may be lit, then switch on one; all read back."""
+        """Switch off all LEDs that may be lit, then switch on one; all are read back."""
         self.dark()
         self._may_be_lit.add(channel)
         self._board.switch(self._relays[channel], on=True)
 
     def dark(self) -> None:
-        """Switch off all that may be lit, each whatever became of the others; read back."""
+        """Switch off all LEDs that may be lit, each even if another one fails; read all back."""
         failure: DeviceError | None = None
         for channel in [name for name in self._relays if name in self._may_be_lit]:
             try:
@@ -94,26 +95,26 @@ class NumatoLedBank:
             raise failure
 
     def lit(self) -> str | None:
-        """The one that the board reads as on.
+        """Return the name of the LED that the board reads as on.
 
         Raises
         ------
         DeviceError
-            There are several.
+            Several LEDs are on.
         """
-        lit = [name for name, relay in self._relays.items() if self._board.is_on(relay)]
-        if len(lit) > 1:
+        names = [name for name, relay in self._relays.items() if self._board.is_on(relay)]
+        if len(names) > 1:
             raise DeviceError(
-                f"{self._board.name}: {' and '.join(lit)} are lit at once; something else has "
+                f"{self._board.name}: {' and '.join(names)} are lit at once; something else has "
                 "switched them: leave the board to labrig while it measures"
             )
-        return lit[0] if lit else None
+        return names[0] if names else None
 
     def make_safe(self) -> None:
-        """Bring the line back into step, then all off, whatever they were before."""
+        """Resynchronise the line, then switch all LEDs off, whatever their states before."""
         self._board.resynchronise()
         self._may_be_lit = set(self._relays)
         self.dark()
 
     def disconnect(self) -> None:
-        """The port belongs to the connections, which close it."""
+        """Do nothing: the port belongs to the connections, which close it."""

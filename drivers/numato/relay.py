@@ -17,11 +17,17 @@ class NumatoRelay:
     settings
         The rig file's keys for this device.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file."""
+        """Keys of a relay of a Numato board in a rig file.
+
+        Attributes
+        ----------
+        relay
+            Number of the relay that switches the lamp, counted from 0.
+        """
 
         model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -32,29 +38,29 @@ class NumatoRelay:
         self._board = Board(address, connections)
 
     def reads_back(self) -> bool:
-        """Every Numato board tells the states of its relays."""
+        """Return True: every Numato board reports the states of its relays."""
         return True
 
     def identity(self) -> str:
-        """Maker, firmware version and id, as the board says."""
+        """Return maker, firmware version and id of the board, and the relay."""
         return f"Numato relay board, {self._board.identity()}, relay {self._relay}"
 
     def on(self) -> None:
-        """Switch on, read back."""
+        """Switch the relay on and read it back."""
         self._board.switch(self._relay, on=True)
 
     def off(self) -> None:
-        """Switch off, read back."""
+        """Switch the relay off and read it back."""
         self._board.switch(self._relay, on=False)
 
     def is_on(self) -> bool:
-        """State as the board reads it."""
+        """Return the relay's state in the board's register."""
         return self._board.is_on(self._relay)
 
     def make_safe(self) -> None:
-        """Bring the line back into step, then off."""
+        """Resynchronise the line, then switch off."""
         self._board.resynchronise()
         self.off()
 
     def disconnect(self) -> None:
-        """The port belongs to the connections, which close it."""
+        """Do nothing: the port belongs to the connections, which close it."""

@@ -17,9 +17,9 @@ from labrig.errors import DeviceError, DeviceLostError
 from .board import CHANNELS, Board
 
 CONVERSIONS = 32
-#: A board that is slow gives fewer.
+#: Time after which a slow board gives fewer conversions.
 CONVERTING_S = 1.0
-#: Of a dark room with people and lamps in it; a sensor of another kind, or wired wrongly, is out.
+#: Plausible temperatures of a dark room; a sensor of another kind, or wired wrongly, is out.
 PLAUSIBLE_C = (0.0, 60.0)
 
 Volts = Annotated[float, Field(gt=0, allow_inf_nan=False)]
@@ -35,24 +35,25 @@ class NumatoThermometer:
     settings
         The rig file's keys for this device.
     connections
-        Opens the port.
+        Connections that open the port.
     """
 
     class Settings(BaseModel):
-        """Keys of the rig file; the defaults are a TMP36 on a board with 5 V.
+        """Keys of a thermometer on a Numato board in a rig file; by default a TMP36 at 5 V.
 
         Attributes
         ----------
         input
-            As in `adc read`, counted from 0.
+            Analogue input of the board to which the sensor is connected, as in `adc read`, counted
+            from 0.
         volts_per_degree
-            Of the sensor, per degree Celsius.
+            Sensitivity of the sensor in volts per degree Celsius: 0.01 for a TMP36 or an LM35.
         volts_at_zero
-            Of the sensor, at 0 °C: 0 for an LM35.
+            Voltage of the sensor at 0 °C, in volts: 0.5 for a TMP36, 0 for an LM35.
         reference_volts
-            What the board's largest number stands for: its supply.
+            Voltage at which the converter reads its largest number, in volts: the board's supply.
         bits
-            Of the board's converter.
+            Resolution of the board's converter in bits.
         """
 
         model_config = ConfigDict(frozen=True, extra="forbid")
@@ -65,23 +66,23 @@ class NumatoThermometer:
 
     def __init__(self, address: str, settings: Settings, connections: Connections) -> None:
         self._settings = settings
-        self._full = 2**settings.bits - 1
+        self._largest = 2**settings.bits - 1
         self._clock = connections.clock
         self._board = Board(address, connections)
         self._name = f"input {settings.input} of {self._board.name}"
 
     def identity(self) -> str:
-        """Maker, firmware version and id, as the board says; a sensor does not tell its kind."""
+        """Return maker, firmware version and id of the board, and the number of the input."""
         return f"Numato board, {self._board.identity()}, analogue input {self._settings.input}"
 
     def celsius(self) -> float:
-        """Mean of some conversions, in degrees Celsius.
+        """Return the mean of some conversions, in degrees Celsius.
 
         Raises
         ------
         DeviceError
-            No number, nothing connected, or a temperature that cannot be. The line is in step
-            again: a lamp's relay may be on it.
+            The answer is no number, no sensor is connected, or the temperature is implausible. The
+            line is resynchronised: a lamp's relay may be on it.
         """
         try:
             return self._celsius(self._steps())
@@ -91,12 +92,12 @@ class NumatoThermometer:
             raise
 
     def make_safe(self) -> None:
-        """Bring the line back into step; no thermometer is unsafe, not even one that is gone."""
+        """Resynchronise the line; no thermometer is unsafe, not even one that is gone."""
         with suppress(DeviceLostError):
             self._board.resynchronise()
 
     def disconnect(self) -> None:
-        """The port belongs to the connections, which close it."""
+        """Do nothing: the port belongs to the connections, which close it."""
 
     def _steps(self) -> float:
         deadline_s = self._clock.now() + CONVERTING_S
@@ -106,14 +107,14 @@ class NumatoThermometer:
         return sum(steps) / len(steps)
 
     def _convert(self) -> int:
-        said = self._board.ask(f"adc read {CHANNELS[self._settings.input]}")
-        if not (said.isascii() and said.isdecimal() and int(said) <= self._full):
+        answer = self._board.ask(f"adc read {CHANNELS[self._settings.input]}")
+        if not (answer.isascii() and answer.isdecimal() and int(answer) <= self._largest):
             raise DeviceError(
-                f"{self._name}: expected a number from 0 to {self._full}, got '{said}'; has this "
-                "board that analogue input, and as many 'bits'?"
+                f"{self._name}: expected a number from 0 to {self._largest}, got '{answer}'; has "
+                "this board that analogue input, and as many 'bits'?"
             )
-        step = int(said)
-        if step in (0, self._full):
+        step = int(answer)
+        if step in (0, self._largest):
             raise DeviceError(
                 f"{self._name} reads {step}, the {'end' if step else 'beginning'} of its range; is "
                 "the sensor connected, the right way round, and fed?"
@@ -122,7 +123,7 @@ class NumatoThermometer:
 
     def _celsius(self, steps: float) -> float:
         settings = self._settings
-        volts = steps / self._full * settings.reference_volts
+        volts = steps / self._largest * settings.reference_volts
         celsius: float = (volts - settings.volts_at_zero) / settings.volts_per_degree
         low, high = PLAUSIBLE_C
         if not low <= celsius <= high:

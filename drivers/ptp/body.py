@@ -1,4 +1,4 @@
-"""What kinds of PTP cameras have in common once a session with them is open."""
+"""Common interface of all kinds of PTP cameras once a session with them is open."""
 
 from collections.abc import Callable, Sequence
 from typing import Protocol
@@ -7,37 +7,37 @@ from labrig.acquire import CameraOffers, ExposureSettings, Finding, Frame
 
 
 class Body(Protocol):
-    """One kind of camera; its methods are those of the roles, where not described here."""
+    """One kind of camera; methods that are not described here are those of the roles."""
 
     def take_control(self) -> None:
-        """Set what a PC must have set before it photographs, read back."""
+        """Apply the settings that control by a PC needs, and read them back."""
 
     def take_over(self) -> None:
-        """As `take_control`, where a program that died, or a reset, left things as they were."""
+        """Take control where a dead program, or a reset, left the camera in an unknown state."""
 
     def give_back(self) -> None:
         """Give the camera back to its own buttons."""
 
     def offers(self) -> CameraOffers:
-        """What it can be set to, as it is now."""
+        """Return the exposure settings that the camera offers now."""
 
     def findings(self) -> Sequence[Finding]:
-        """How it is set by hand, as far as it tells."""
+        """Return findings on the camera's manual settings, as far as it reports them."""
 
     def keep_awake(self) -> None:
-        """Put off its automatic switching-off."""
+        """Postpone the camera's automatic switching-off."""
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
-        """Set and read back."""
+        """Apply exposure settings and read them back."""
 
     def arm(self) -> None:
-        """Do all that can be done beforehand."""
+        """Do all that can be done before the release."""
 
     def shoot(self) -> Frame:
         """Release now, wait for the exposure, transfer the frame."""
 
     def preview(self) -> bytes:
-        """One live picture, a JPEG."""
+        """Return one live picture, a JPEG."""
 
     def steps_to_safety(self) -> Sequence[Callable[[], None]]:
-        """What must be done for it to be safe, all of it tried in this order."""
+        """Return the steps that make the camera safe, all of which are tried in this order."""

@@ -16,21 +16,22 @@ from .standard.camera import NEEDED, StandardCamera
 
 
 class PtpCamera:
-    """A camera in a PTP session, and the kind of body that it says it is.
+    """A camera in a PTP session, and the kind of body that it reports.
 
     Parameters
     ----------
     address
-        `usb://vid:pid[/serial]`, `ptpip://host[:port]` or `sim://room/device`.
+        Address of the camera, `usb://vid:pid[/serial]`, `ptpip://host[:port]` or
+        `sim://room/device`.
     settings
         The rig file's keys for this camera.
     connections
-        Opens the USB device or the network connection; has the clock.
+        Connections that open the USB device or the network connection, and have the clock.
 
     Raises
     ------
     DeviceError
-        No camera there, in use by another program, or not one that can be remotely controlled.
+        No camera is at the address, another program uses it, or it has no remote control.
     """
 
     Settings = PtpCameraSettings
@@ -41,12 +42,12 @@ class PtpCamera:
             link = open_link(address, connections)
             leaving.callback(link.close)
             self._session = Session(link, self._clock)
-            left_behind = open_session(self._session)
+            is_stale = open_session(self._session)
             leaving.callback(self._close_session)
             self._info = identify(self._session)
             self._body = self._body_for(address, settings)
             leaving.callback(self._give_back)
-            if left_behind:
+            if is_stale:
                 self._body.take_over()
             else:
                 self._body.take_control()
@@ -55,25 +56,26 @@ class PtpCamera:
 
     @classmethod
     def declared_offers(cls, settings: PtpCameraSettings) -> CameraOffers:
-        """What planning without the camera assumes."""
+        """Return the offers that planning without the camera assumes."""
         return settings.declared_offers()
 
     def identity(self) -> str:
-        """Model, serial number and firmware, as the camera gave them."""
+        """Return model, serial number and firmware that the camera reported."""
         return str(self._info)
 
     def offers(self) -> CameraOffers:
-        """What it can be set to, as it is now.
+        """Return the exposure settings that the camera offers now.
 
         Raises
         ------
         DeviceError
-            Nothing that the rig file allows, for example because its dial is not at M.
+            The camera offers no settings that the rig file allows, for example because its dial is
+            not at M.
         """
         return self._body.offers()
 
     def findings(self) -> Sequence[Finding]:
-        """How its dial, lens switch and menus are set, as far as it tells.
+        """Return findings on dial, lens switch and menus, as far as the camera reports them.
 
         Raises
         ------
@@ -83,7 +85,7 @@ class PtpCamera:
         return self._body.findings()
 
     def keep_awake(self) -> None:
-        """Put off its automatic switching-off.
+        """Postpone the camera's automatic switching-off.
 
         Raises
         ------
@@ -93,12 +95,12 @@ class PtpCamera:
         self._body.keep_awake()
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
-        """Set and read back; returns the settings in force, with the true shutter time.
+        """Set and read back; return the settings in force, with the actual shutter time.
 
         Raises
         ------
         DeviceError
-            The camera does not offer them or did not take them.
+            The camera does not offer the settings or did not take them.
         """
         return self._body.configure(settings)
 
@@ -118,12 +120,12 @@ class PtpCamera:
         Raises
         ------
         DeviceError
-            The camera did not release, or delivered no or another frame.
+            The camera did not release, or delivered no frame or another one.
         """
         return self._body.shoot()
 
     def preview(self) -> bytes:
-        """One picture of the viewfinder, a JPEG; the first one starts it, `make_safe` stops it.
+        """Return a viewfinder picture, a JPEG; the first call starts it, `make_safe` stops it.
 
         Raises
         ------
@@ -133,14 +135,14 @@ class PtpCamera:
         return self._body.preview()
 
     def make_safe(self) -> None:
-        """Bring the line back into step, let go of the button, viewfinder off, nothing pending.
+        """Resynchronise the line, release the button, stop the viewfinder, leave nothing pending.
 
         Raises
         ------
         DeviceLostError
             The camera is gone.
         DeviceError
-            One of these could not be confirmed; all of them were tried.
+            One of these steps could not be confirmed; all of them were tried.
         """
         problems: list[DeviceError] = []
         with self._clock.shielded():
@@ -152,9 +154,9 @@ class PtpCamera:
         if problems:
             self._in_control = False
             is_lost = any(isinstance(problem, DeviceLostError) for problem in problems)
-            said = "; ".join(dict.fromkeys(map(str, problems)))
+            messages = "; ".join(dict.fromkeys(map(str, problems)))
             kind = DeviceLostError if is_lost else DeviceError
-            raise kind(f"camera not known to be safe: {said}")
+            raise kind(f"camera not known to be safe: {messages}")
 
     def disconnect(self) -> None:
         """Give the camera back to its own buttons and release it; never raises."""
@@ -162,16 +164,16 @@ class PtpCamera:
             self._leaving.close()
 
     def _body_for(self, address: str, settings: PtpCameraSettings) -> Body:
-        known = self._info.operations
-        if not (lacking := lacking_operations(known)):
+        operations = self._info.operations
+        if not (lacking := lacking_operations(operations)):
             return EosCamera(self._session, self._clock, self._info, settings)
-        if known >= NEEDED:
+        if operations >= NEEDED:
             return StandardCamera(self._session, self._clock, self._info, settings)
         raise DeviceError(
             f"camera {address}: expected a Canon EOS with remote release or a camera with "
             f"InitiateCapture, got {self._info} without {', '.join(lacking)}, and without "
-            f"{', '.join(f'0x{op:X}' for op in sorted(NEEDED - known))}: set its USB mode to PC "
-            "remote, or use a camera that has them"
+            f"{', '.join(f'0x{op:X}' for op in sorted(NEEDED - operations))}: set its USB mode to "
+            "PC remote, or use a camera that has them"
         )
 
     def _give_back(self) -> None:
@@ -183,7 +185,7 @@ class PtpCamera:
             self._session.close()
 
     def _back_in_step(self) -> None:
-        """Give up what was broken off; where that does not help, or did not, begin anew."""
+        """Cancel a transaction that was broken off; where cancelling fails, start over."""
         if self._in_control:
             try:
                 self._session.resynchronise()

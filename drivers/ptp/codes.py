@@ -1,4 +1,4 @@
-"""Codes of the PTP standard (PIMA 15740:2000, clauses 10 to 13), as far as spoken or explained."""
+"""Codes of the PTP standard (PIMA 15740:2000, clauses 10 to 13), as far as used or explained."""
 
 from enum import IntEnum
 
@@ -60,7 +60,7 @@ _ADVICE = {
 
 
 class Standard(IntEnum):
-    """Standard operations."""
+    """Codes of standard operations."""
 
     GetDeviceInfo = 0x1001
     OpenSession = 0x1002
@@ -76,7 +76,7 @@ class Standard(IntEnum):
 
 
 class StandardProperty(IntEnum):
-    """Standard properties, with the words that messages use."""
+    """Codes of standard properties, with the words that messages use."""
 
     f_number = 0x5007
     focus_mode = 0x500A
@@ -93,7 +93,7 @@ class StandardProperty(IntEnum):
 
 
 class StandardEvent(IntEnum):
-    """Standard events."""
+    """Codes of standard events."""
 
     ObjectAdded = 0x4002
     StoreFull = 0x400A
@@ -101,15 +101,15 @@ class StandardEvent(IntEnum):
 
 
 def response_text(code: int) -> str:
-    """A response code as a person can look it up: `0x2019 DeviceBusy`."""
+    """Return a response code as a person can look it up: `0x2019 DeviceBusy`."""
     return f"0x{code:04X} {_RESPONSES.get(code, 'not a code of the standard')}"
 
 
 def advice(code: int) -> str:
-    """What to do when the camera answers `code`."""
+    """Return the remedy when the camera answers `code`."""
     return _ADVICE.get(code, "switch the camera off and on, its dial at M, and start again")
 
 
 def operation_text(operation: IntEnum) -> str:
-    """An operation as a person can look it up: `GetDeviceInfo 0x1001`."""
+    """Return an operation as a person can look it up: `GetDeviceInfo 0x1001`."""
     return f"{operation.name} 0x{operation:04X}"

@@ -1,4 +1,4 @@
-"""PTP containers on USB (PIMA 15740 over USB still image class 1.0, section 7): bytes and back.
+"""PTP containers on USB (PIMA 15740 over USB still image class 1.0, section 7): encoding, decoding.
 
 Layout, little-endian: u32 length of everything, u16 kind, u16 code, u32 transaction id, then u32
 parameters or, in a data container, the payload.
@@ -19,7 +19,7 @@ _HEADER = struct.Struct("<IHHI")
 
 
 class Kind(IntEnum):
-    """What a container is for."""
+    """Kind of a container."""
 
     COMMAND = 1
     DATA = 2
@@ -34,13 +34,13 @@ class Container:
     Attributes
     ----------
     kind
-        Command, data, response or event.
+        Kind of the container: command, data, response or event.
     code
         Operation, response or event code; a data container repeats its operation's.
     transaction_id
-        Which transaction it belongs to.
+        Id of the transaction to which the container belongs.
     payload
-        The parameters or the data, as bytes.
+        Bytes of the parameters or the data.
     """
 
     kind: Kind
@@ -50,19 +50,19 @@ class Container:
 
     @property
     def params(self) -> tuple[int, ...]:
-        """The payload read as u32 parameters; empty for a data container."""
+        """Parameters of the payload as u32 numbers; empty for a data container."""
         if self.kind is Kind.DATA:
             return ()
         return struct.unpack(f"<{len(self.payload) // 4}I", self.payload)
 
 
 def command(code: int, transaction_id: int, params: tuple[int, ...]) -> Container:
-    """Command `code` with its u32 parameters."""
+    """Return a container of command `code` with its u32 parameters."""
     return Container(Kind.COMMAND, code, transaction_id, struct.pack(f"<{len(params)}I", *params))
 
 
 def encode(container: Container) -> bytes:
-    """The container as it goes over the bulk endpoint."""
+    """Return the bytes of the container on the bulk endpoint."""
     header = _HEADER.pack(
         HEADER_BYTES + len(container.payload),
         container.kind,
@@ -73,34 +73,34 @@ def encode(container: Container) -> bytes:
 
 
 def announced_length(beginning: bytes) -> int:
-    """Bytes of the whole container of which `beginning` is the first packet.
+    """Return the length in bytes of the whole container of which `beginning` is the first packet.
 
     Raises
     ------
     MalformedError
-        Too short for a header, or a header that cannot be.
+        The packet is too short for a header, or its header is impossible.
     """
     if len(beginning) < HEADER_BYTES:
         raise MalformedError(
             f"expected a PTP container of at least {HEADER_BYTES} bytes from the camera", beginning
         )
     length, kind, _, _ = _HEADER.unpack_from(beginning)
-    most = HEADER_BYTES + 4 * MOST_PARAMETERS
+    longest = HEADER_BYTES + 4 * MOST_PARAMETERS
     plausible = length >= HEADER_BYTES and kind in iter(Kind)
     if plausible and kind != Kind.DATA:
-        plausible = length <= most and length % 4 == 0
+        plausible = length <= longest and length % 4 == 0
     if not plausible:
         raise MalformedError("expected a PTP container from the camera", beginning)
     return int(length)
 
 
 def decode(data: bytes) -> Container:
-    """The container that `data` is, all of it.
+    """Return the container that makes up all of `data`.
 
     Raises
     ------
     MalformedError
-        Not exactly one well-formed container.
+        `data` is not exactly one well-formed container.
     """
     length = announced_length(data)
     if length != len(data):

@@ -1,4 +1,4 @@
-"""The DeviceInfo dataset (PIMA 15740, 5.5.1): who the camera is and what it can do."""
+"""The DeviceInfo dataset (PIMA 15740, 5.5.1): identity and abilities of the camera."""
 
 import struct
 from dataclasses import dataclass
@@ -7,14 +7,14 @@ from .failures import MalformedError
 
 
 class DatasetReader:
-    """Takes one field after the other.
+    """Reader of one field of a dataset after the other.
 
     Parameters
     ----------
     data
-        The whole dataset.
+        Bytes of the whole dataset.
     name
-        What messages call it.
+        Name of the dataset in messages.
     """
 
     def __init__(self, data: bytes, name: str) -> None:
@@ -23,12 +23,12 @@ class DatasetReader:
         self._position = 0
 
     def take(self, size: int) -> bytes:
-        """The next `size` bytes.
+        """Return the next `size` bytes.
 
         Raises
         ------
         MalformedError
-            There are fewer, as in everything that follows.
+            Fewer bytes are left; all other methods raise it, too.
         """
         piece = self._data[self._position : self._position + size]
         if len(piece) < size:
@@ -41,31 +41,31 @@ class DatasetReader:
         return piece
 
     def numbers(self, layout: str) -> tuple[int, ...]:
-        """Numbers in `struct`'s letters."""
+        """Return numbers of the format in `struct`'s letters."""
         return struct.unpack("<" + layout, self.take(struct.calcsize("<" + layout)))
 
     def codes(self) -> tuple[int, ...]:
-        """An array of u16."""
+        """Return an array of u16 numbers."""
         (count,) = self.numbers("I")
         return struct.unpack(f"<{count}H", self.take(2 * count))
 
     def text(self) -> str:
-        """A string, without what cannot be printed."""
+        """Return a string, without characters that cannot be printed."""
         units = self.take(2 * self.take(1)[0])
-        words = units.decode("utf-16-le", errors="replace").partition("\0")[0]
-        return "".join(letter for letter in words if letter.isprintable()).strip()
+        decoded = units.decode("utf-16-le", errors="replace").partition("\0")[0]
+        return "".join(letter for letter in decoded if letter.isprintable()).strip()
 
 
 @dataclass(frozen=True)
 class DeviceInfo:
-    """Who the camera is, from its own words.
+    """Identity and abilities of the camera, as it reports them.
 
     Attributes
     ----------
     operations, events, properties
-        Codes of the operations it knows, of the events it reports, of the properties it has.
+        Codes of the operations, events and properties that the camera has.
     capture_formats
-        Codes of the formats in which it can photograph.
+        Codes of the formats in which the camera can photograph.
     """
 
     manufacturer: str
@@ -86,7 +86,7 @@ class DeviceInfo:
 
 
 def parse_device_info(data: bytes) -> DeviceInfo:
-    """DeviceInfo from the data phase of GetDeviceInfo.
+    """Return the DeviceInfo in the data phase of GetDeviceInfo.
 
     Raises
     ------

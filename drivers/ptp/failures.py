@@ -1,4 +1,4 @@
-"""The ways in which talking to a camera fails; all of them are `DeviceError` to the outside."""
+"""Failures of the communication with a camera; all of them are `DeviceError` to the outside."""
 
 from labrig.errors import DeviceError, DeviceLostError
 
@@ -6,7 +6,7 @@ MOST_SHOWN_BYTES = 32
 
 
 def shown(data: bytes) -> str:
-    """How a message shows bytes: all of them in hexadecimal if few, else how they begin."""
+    """Return bytes for a message: all of them in hexadecimal if few, else the first ones."""
     if not data:
         return "nothing"
     if len(data) <= MOST_SHOWN_BYTES:
@@ -23,26 +23,26 @@ class UnpluggedError(DeviceLostError):
 
 
 class StallError(DeviceError):
-    """The camera halted an endpoint, its way of giving a transaction up."""
+    """The camera halted an endpoint, its way of cancelling a transaction."""
 
 
 class MalformedError(DeviceError):
-    """Bytes that are not what the protocol says; the message always shows them.
+    """Bytes that violate the protocol; the message always shows them.
 
     Parameters
     ----------
     expected
-        The message's beginning: what should have come.
-    came
-        What came instead.
+        Begin of the message: the expected bytes.
+    received
+        Bytes that came instead.
     remedy
-        What to do.
+        Remedy for the user.
     """
 
     def __init__(
-        self, expected: str, came: bytes, remedy: str = "switch the camera off and on"
+        self, expected: str, received: bytes, remedy: str = "switch the camera off and on"
     ) -> None:
-        super().__init__(f"{expected}, got {shown(came)}: {remedy}")
+        super().__init__(f"{expected}, got {shown(received)}: {remedy}")
 
 
 class RefusedError(DeviceError):
@@ -51,7 +51,7 @@ class RefusedError(DeviceError):
     Attributes
     ----------
     code
-        Its response code.
+        Response code of the camera.
     """
 
     def __init__(self, message: str, code: int) -> None:

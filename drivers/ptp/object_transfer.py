@@ -1,4 +1,4 @@
-"""Fetching a file from a camera, in pieces if it can, so that Ctrl-C is heard between them."""
+"""Transfer of a file from a camera, in parts if possible, so that Ctrl-C is handled in between."""
 
 from enum import IntEnum
 
@@ -8,21 +8,21 @@ from labrig.errors import DeviceError
 from .session import Session, Timeouts
 
 PIECE_BYTES = 1024 * 1024
-#: Some times the largest RAW file there is: what announces more is damaged.
+#: Longest file, several times the largest RAW file; a longer announcement is damaged.
 MOST_FILE_BYTES = 512 * 1024 * 1024
 #: A camera that still develops or writes is busy for seconds.
 PATIENT = Timeouts(answer_s=10.0, busy_s=10.0)
 
 
 class ObjectTransfer:
-    """Fetches files.
+    """Transfer of files from a camera.
 
     Parameters
     ----------
     session
-        Over which they come.
+        Session with the camera.
     clock
-        On which is looked for Ctrl-C.
+        Clock that notices Ctrl-C.
     whole
         Operation that sends all of a file.
     part
@@ -38,7 +38,7 @@ class ObjectTransfer:
         self._part = part
 
     def fetch(self, handle: int, name: str, size_bytes: int) -> bytes:
-        """The file's bytes.
+        """Return the file's bytes.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class ObjectTransfer:
 
     def _piece(self, handle: int, offset: int, size: int) -> bytes:
         if self._part is None:
-            asked: tuple[IntEnum, *tuple[int, ...]] = (self._whole, handle)
+            request: tuple[IntEnum, *tuple[int, ...]] = (self._whole, handle)
         else:
-            asked = (self._part, handle, offset, size)
-        return self._session.transact(*asked, timeouts=PATIENT, most_bytes=size).data
+            request = (self._part, handle, offset, size)
+        return self._session.transact(*request, timeouts=PATIENT, most_bytes=size).data

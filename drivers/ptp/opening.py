@@ -1,4 +1,4 @@
-"""From a rig file's address to the camera that is meant."""
+"""Opening of the camera at a rig file's address."""
 
 from typing import Any
 from urllib.parse import urlsplit
@@ -16,12 +16,12 @@ from .usb.link import UsbLink
 
 
 def open_link(address: str, connections: Connections) -> Link:
-    """The link to the camera at `ptpip://host[:port]`, or at an address of a USB device.
+    """Return the link to the camera at `ptpip://host[:port]`, or at an address of a USB device.
 
     Raises
     ------
     DeviceError
-        No camera there, or another program holds it.
+        No camera is at the address, or another program holds it.
     """
     clock = connections.clock
     if urlsplit(address).scheme == "ptpip":
@@ -31,12 +31,12 @@ def open_link(address: str, connections: Connections) -> Link:
 
 
 def open_session(session: Session) -> bool:
-    """Open a session, through a reset if need be; True if a dead program left one behind.
+    """Open a session, through a reset if need be; return whether a dead program left one behind.
 
     Raises
     ------
     DeviceError
-        The camera does not open one.
+        The camera does not open a session.
     """
     try:
         return session.open()
@@ -46,18 +46,18 @@ def open_session(session: Session) -> bool:
 
 
 def identify(session: Session) -> DeviceInfo:
-    """Ask a camera who it is.
+    """Return the camera's DeviceInfo.
 
     Raises
     ------
     DeviceError
-        It does not answer, or not in the protocol's terms.
+        The camera does not answer, or violates the protocol.
     """
     return parse_device_info(session.transact(Standard.GetDeviceInfo).data)
 
 
 def _serial_number(device: Any, address: str, clock: Clock) -> str:
-    """What a camera says in PTP that tells its serial number nowhere else, such as a Canon."""
+    """Return the serial number from PTP of a camera that has it nowhere else, such as a Canon."""
     link = UsbLink(device, address, clock)
     try:
         session = Session(link, clock)

@@ -33,7 +33,7 @@ MOST_ANSWER_BYTES = 4 * 1024 * 1024
 
 @dataclass(frozen=True)
 class Timeouts:
-    """How long a transaction may take.
+    """Longest durations of a transaction.
 
     Attributes
     ----------
@@ -47,15 +47,15 @@ class Timeouts:
     busy_s: float
 
 
-#: For what a camera does at once.
+#: Time-outs of an operation that takes no time.
 USUAL = Timeouts(answer_s=5.0, busy_s=3.0)
-#: For taking leave: nothing waits for it.
+#: Time-outs of closing: nothing waits for it.
 CURT = Timeouts(answer_s=2.0, busy_s=0.0)
 
 
 @dataclass(frozen=True)
 class Reply:
-    """What the camera answered, and when.
+    """Answer of the camera, and its time.
 
     Attributes
     ----------
@@ -76,9 +76,9 @@ class Reply:
 class Session:
     """Transactions over a link.
 
-    A transaction broken off by an error or an interruption stays noted as under way; the next
-    one, or `resynchronise`, first has the camera give it up. A camera that says that it knows no
-    such session, or counts its transactions otherwise, is not asked again before `start_over`.
+    A transaction broken off by an error or an interruption stays noted as under way; the next one,
+    or `resynchronise`, first makes the camera cancel it. A camera that reports no such session, or
+    another count of transactions, gets no request before `start_over`.
     """
 
     def __init__(self, link: Link, clock: Clock) -> None:
@@ -89,12 +89,12 @@ class Session:
         self._lost_by: int | None = None
 
     def open(self) -> bool:
-        """Open the session; True if one was open already, left behind by a program that died.
+        """Open the session; return whether one was open already, left by a program that died.
 
         Raises
         ------
         DeviceError
-            The camera does not open one.
+            The camera does not open a session.
         """
         try:
             self._open()
@@ -112,7 +112,7 @@ class Session:
         Raises
         ------
         DeviceError
-            The camera did not take it.
+            The camera did not close it.
         """
         self.transact(Standard.CloseSession, timeouts=CURT)
 
@@ -124,18 +124,18 @@ class Session:
         timeouts: Timeouts = USUAL,
         most_bytes: int = MOST_ANSWER_BYTES,
     ) -> Reply:
-        """One operation, asked again while the camera is busy.
+        """Do one operation, repeated while the camera is busy.
 
         Parameters
         ----------
         operation
             Member of an enumeration of operation codes.
         params
-            Its u32 parameters.
+            Parameters of the operation, u32 each.
         data
-            What is sent in the data phase, if it has one outwards.
+            Data to send in the data phase, if it has one outwards.
         timeouts
-            How long it may take.
+            Longest duration of the transaction.
         most_bytes
             Longest data phase that is accepted.
 
@@ -144,7 +144,7 @@ class Session:
         RefusedError
             The camera answered something other than OK.
         DeviceError
-            It did not answer, or not in the protocol's terms.
+            The camera did not answer, or violated the protocol.
         """
         deadline_s = self._clock.now() + timeouts.busy_s
         back_off_s = FIRST_BACK_OFF_S
@@ -167,22 +167,22 @@ class Session:
             back_off_s = min(2 * back_off_s, LONGEST_BACK_OFF_S)
 
     def event(self, timeout_s: float) -> Container | None:
-        """What the camera reports by itself next, None if nothing within `timeout_s`.
+        """Return the camera's next event, None if there is none within `timeout_s`.
 
         Raises
         ------
         DeviceError
-            The camera is gone, or reports nothing that can be understood.
+            The camera is gone, or its report is no event.
         """
         return self._link.event(timeout_s)
 
     def resynchronise(self) -> None:
-        """Have the camera give up a transaction that was broken off; nothing if there is none.
+        """Make the camera cancel a transaction that was broken off, if there is one.
 
         Raises
         ------
         DeviceError
-            The camera does not come back into step.
+            The camera does not resynchronise.
         """
         if self._lost_by is not None:
             raise DeviceError(
@@ -199,7 +199,7 @@ class Session:
         Raises
         ------
         DeviceError
-            That did not help either.
+            The reset did not help either.
         """
         self._link.reset()
         self._under_way = None

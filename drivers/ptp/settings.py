@@ -1,4 +1,4 @@
-"""What a rig file can say about a camera on PTP, and what planning without the camera assumes."""
+"""Settings of a camera on PTP in a rig file, and the offers that planning without it assumes."""
 
 from typing import Annotated
 
@@ -12,28 +12,32 @@ from .eos.iso import NativeIsos, isos_of_model
 
 
 class PtpCameraSettings(BaseModel):
-    """Keys of the rig file beside `driver` and `address`.
+    """Keys of a camera on PTP in a rig file.
 
     Attributes
     ----------
     shutter_lag
-        From the release to the begin of the exposure, as `labrig rig check` measured it.
+        Time from the release to the begin of the exposure, as `labrig rig check` measures it, for
+        example `60 ms`.
     isos
-        The sensor's native sensitivities; the camera's others (gain after digitising) stay unused.
-        What is written here goes before what `eos.iso` knows of an EOS.
+        Native ISO sensitivities of the sensor. The camera's others, which are gain after
+        digitising, stay unused. Default: those known of the EOS model, else 100 to 1600.
     f_numbers
-        Apertures of the lens; read from the camera when there is one.
+        Apertures of the lens as f-numbers, for planning without the camera; with it, they are read
+        from it.
     longest_exposure
-        Longer ones are not used; a true 32 s is the dial's 30 s. From 64 s on an EOS exposes at
-        bulb: 64 s, 128 s, … up to this.
+        Longest shutter time to use, for example `32 s`. The dial's 30 s is an actual 32 s. From 64
+        s on an EOS exposes at bulb: 64 s, 128 s, … up to this time.
     frame_time
-        From the end of an exposure until its frame is on the PC and the next can begin.
+        Time from the end of an exposure until its frame is on the PC and the next can begin, for
+        example `2 s`.
     frame_size
-        Of one RAW file, for planning disk space.
+        Size of one RAW file, for planning disk space, for example `27 MB`.
     transfer_timeout
-        From the end of an exposure until the camera must have offered its frame.
+        Time from the end of an exposure within which the camera must have offered its frame, for
+        example `30 s`.
     answer_timeout
-        Until the camera must have taken a setting.
+        Time within which the camera must have taken a setting, for example `5 s`.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -49,20 +53,20 @@ class PtpCameraSettings(BaseModel):
 
     @field_validator("isos")
     @classmethod
-    def _known_isos(cls, isos: tuple[int, ...]) -> tuple[int, ...]:
+    def _canon_isos(cls, isos: tuple[int, ...]) -> tuple[int, ...]:
         if unknown := sorted(set(isos) - set(ISOS.values())):
             raise ValueError(f"expected ISO values of a Canon dial, such as 100, got {unknown}")
         return tuple(sorted(set(isos)))
 
     @field_validator("f_numbers")
     @classmethod
-    def _known_f_numbers(cls, f_numbers: tuple[float, ...]) -> tuple[float, ...]:
+    def _canon_f_numbers(cls, f_numbers: tuple[float, ...]) -> tuple[float, ...]:
         if unknown := sorted(set(f_numbers) - set(F_NUMBERS.values())):
             raise ValueError(f"expected f-numbers of a Canon lens, such as 5.6, got {unknown}")
         return tuple(sorted(set(f_numbers)))
 
     def allows_exposure(self, exposure_s: float) -> bool:
-        """Whether `exposure_s` seconds are within `longest_exposure`."""
+        """Return whether `exposure_s` seconds are within `longest_exposure`."""
         return exposure_s <= self.longest_exposure * 1.0001
 
     @property
@@ -71,13 +75,13 @@ class PtpCameraSettings(BaseModel):
         return bulb_times_s(self.longest_exposure * 1.0001)
 
     def native_isos(self, model: str) -> NativeIsos:
-        """What the rig file says is native, else what is known of the model."""
+        """Return the rig file's native ISOs if it gives some, else those of the model."""
         if "isos" in self.model_fields_set:
             return NativeIsos(self.isos, "rig file")
         return isos_of_model(model)
 
     def declared_offers(self) -> CameraOffers:
-        """What a camera on these settings can be expected to offer, in thirds of a stop."""
+        """Return the expected offers of a camera with these settings, in thirds of a stop."""
         times_s = (shutter_time_s(code) for code in third_stop_codes())
         return CameraOffers(
             exposures_s=(

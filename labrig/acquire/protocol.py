@@ -26,7 +26,22 @@ class Unit(Protocol):
 
 
 class Sample(BaseModel):
-    """Description of the sample on the bench."""
+    """Description of the sample on the bench, for the record.
+
+    Attributes
+    ----------
+    name
+        Name of the sample, which the material file takes over, for example `blue-paint`.
+    thickness
+        Thickness of the sample as free text, for example `0.4 mm`. It is recorded, not used.
+    batch
+        Batch or lot of the sample as free text, for example `B-17`. It is recorded, not used.
+    last_light
+        When the sample last saw light, and which, as free text, for example
+        `daylight, yesterday evening`.
+    notes
+        Anything else worth keeping about the sample, as free text.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -38,7 +53,15 @@ class Sample(BaseModel):
 
 
 class ProtocolModel(BaseModel):
-    """Base of the protocols' models; a YAML file names its model in `protocol:`."""
+    """Base of the protocols' models; a YAML file names its model in `protocol:`.
+
+    Attributes
+    ----------
+    protocol
+        Name of the protocol, which decides what the other keys are, for example `decay`.
+    sample
+        Description of the sample, for the record.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

@@ -17,7 +17,22 @@ ModelT = TypeVar("ModelT", bound=BaseModel)
 
 
 class DeviceEntry(BaseModel):
-    """One device; further keys belong to its driver and are validated by the driver's model."""
+    """One device; further keys belong to its driver and are validated by the driver's model.
+
+    Attributes
+    ----------
+    driver
+        Name of the device's driver, which decides what the other keys are, for example
+        `numato_relay`.
+    address
+        Address of the device: a serial port (`COM3`, `/dev/ttyACM0`, `/dev/cu.usbmodem…`), a USB
+        device (`usb://04a9:3199`, with `/SERIAL` behind it if there are two alike), a network
+        camera (`ptpip://host`), a video device (`uvc://0`), or a device of the simulated room
+        (`sim://room/relays`).
+    warm_up
+        Time after connecting, or for a lamp after switching on, until the device is steady, for
+        example `15 min`. A lamp's warm-up time is part of the charge. Default: none.
+    """
 
     model_config = ConfigDict(frozen=True, extra="allow")
 
@@ -35,7 +50,9 @@ def _with_calibrations(model: type[ModelT]) -> type[ModelT]:
     keys: dict[str, Any] = {
         kind.optics_key: (
             str | None,
-            Field(None, description=f"What {kind.protocol} found: a file, or the folder of a run."),
+            Field(
+                None, description=f"Result of {kind.protocol}: its file, or the folder of its run."
+            ),
         )
         for kind in kinds()
     }
@@ -48,10 +65,32 @@ class Optics(BaseModel):
 
     Attributes
     ----------
-    camera, lamp, grey_card
-        Measured curves, by names of shipped files or paths.
+    camera
+        Spectral sensitivities of the camera: name of a shipped file, such as
+        `canon_eos_5d_mark_ii`, or path of a file.
+    lamp
+        Spectrum of the lamp: name of a shipped file, such as `halogen_3000k`, or path of a file.
+    grey_card
+        Spectral reflectance of the grey card: name of a shipped file, such as `grey_card_18`, or
+        path of a file.
     filters
-        Folder of the colour filters' transmittances, with one file each.
+        Folder with the colour filters' spectral transmittances, one file `NAME.csv` for each
+        filter. Default: the shipped folder.
+    camera_file
+        Camera calibration: its file `camera.yaml`, or the folder of the run of protocol
+        `camera_calibration` that measured it.
+    lvf
+        Calibration of the linear variable filter: its file `lvf.yaml`, or the folder of the run of
+        protocol `lvf_calibration` that measured it.
+    irradiance
+        Irradiance of the lamp at the sample: its file `irradiance.yaml`, or the folder of the run
+        of protocol `irradiance` that measured it.
+    fade
+        Turn-off and turn-on transient of the lamp: its file `fade.yaml`, or the folder of the run
+        of protocol `fade` that measured it.
+    blank
+        Background and stray light of the bench after lamp off: its file `blank.yaml`, or the folder
+        of the run of protocol `blank` that measured it.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -88,7 +127,23 @@ class Optics(BaseModel):
 
 
 class RigFile(BaseModel):
-    """Content of a rig file."""
+    """Content of a rig file.
+
+    Attributes
+    ----------
+    name
+        Name of the bench, for reports and messages, for example `dark room`.
+    devices
+        Devices of the bench, each under the key of its role, such as `lamp` or `camera`.
+    optics
+        Spectral curves of the bench's parts, and its calibrations.
+    on_finish
+        What happens when a run has ended: `bell` rings the terminal's bell, a list of words is a
+        command to start, for example `[notify-send, labrig]`. Default: nothing.
+    simulation
+        Content of the simulated dark room, for a rig file whose devices have addresses
+        `sim://room/…`. Default: none, the devices are real.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 

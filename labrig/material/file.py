@@ -30,8 +30,13 @@ class _Part(BaseModel):
 class IrradianceNorm(_Part):
     """Normalisation of the irradiance E to which the excitation rates belong.
 
-    `vector_length`: the lamp's E, one number a band, was scaled to this Euclidean length; Table 1
-    of the paper uses 1.
+    Attributes
+    ----------
+    kind
+        Norm of the irradiance: `vector_length`, the Euclidean length of the vector E of the lamp's
+        irradiance, one number for each band.
+    value
+        Length to which E was scaled; Table 1 of Nalbach et al. uses 1.
     """
 
     kind: Literal["vector_length"]
@@ -44,15 +49,27 @@ class State(_Part):
     Attributes
     ----------
     k_r_per_s
-        Re-radiation rate in 1/s.
+        Re-radiation rate k_r of the state, in 1/s.
     amplitude
-        Amplitude a = Λ* k_r r(0) of the decay, in the camera's or the fit's own unit.
+        Amplitude a = Λ k_r r(0) of the state in the decay, in the camera's or the fit's own unit.
     r0
-        Concentration at lamp off to which `amplitude` belongs, 0 to 1.
+        Concentration r(0) of the state at lamp off to which `amplitude` belongs, 0 to 1.
     k_e_per_s
-        Excitation rate of each band in 1/s per unit of the normalised irradiance.
+        Excitation rate k_e of the state in every band, in 1/s per unit of the normalised
+        irradiance; as many numbers as there are bands.
     reradiation
-        Relative radiance Λ of each band.
+        Re-radiation Λ of the state in every band, as relative radiance; as many numbers as there
+        are bands.
+    k_r_per_s_sigma
+        Standard deviation of `k_r_per_s`, in 1/s.
+    amplitude_sigma
+        Standard deviation of `amplitude`, in its unit.
+    r0_sigma
+        Standard deviation of `r0`.
+    k_e_per_s_sigma
+        Standard deviation of each number of `k_e_per_s`, in the same unit.
+    reradiation_sigma
+        Standard deviation of each number of `reradiation`, in the same unit.
     """
 
     k_r_per_s: Rate
@@ -83,7 +100,17 @@ class State(_Part):
 
 
 class Spectrum(_Part):
-    """Emission on a finer grid than the bands, with largest value 1 (Λ* of section 4.3)."""
+    """Emission on a finer grid than the bands, largest value 1 (Λ* of section 4.3).
+
+    Attributes
+    ----------
+    wavelength_nm
+        Wavelengths of the emission spectrum in nm, rising.
+    value
+        Relative spectral radiance at each wavelength, the largest 1.
+    sigma
+        Standard deviation of each number of `value`. Default: not measured.
+    """
 
     wavelength_nm: tuple[Rate, ...]
     value: Series
@@ -106,9 +133,18 @@ class Provenance(_Part):
 
     Attributes
     ----------
+    source
+        Origin of the numbers: a publication, or the measurement.
+    run
+        Name of the run folder in which the numbers were measured.
+    frames
+        Names of the frames from which the numbers were derived.
+    version
+        Version of labrig that derived the numbers.
+    note
+        Remark on the numbers, as free text.
     temperature_c
-        Mean temperature of the sample while its glow was measured, in degrees Celsius; the rates
-        depend on it.
+        Mean temperature while the glow was measured, in degrees Celsius: rates belong to it.
     """
 
     source: str
@@ -124,10 +160,22 @@ class Material(_Part):
 
     Attributes
     ----------
+    name
+        Name of the material, for example `blue-paint`.
+    kind
+        Kind of the material: `phosphor`, the only one so far.
     bands_nm
-        Rising edges of the bands in nm; one more than there are bands.
+        Edges of the wavelength bands in nm, rising; one more than there are bands. They are needed
+        for excitation rates and re-radiation.
     irradiance_norm
-        Normalisation of the irradiance; required if a state has excitation rates.
+        Norm of the irradiance to which the excitation rates belong. It is needed as soon as a state
+        has excitation rates, which mean nothing without it.
+    states
+        Excited states of the material, at least one.
+    spectrum
+        Emission spectrum on a finer grid than the bands. Default: not measured.
+    provenance
+        Origin of the numbers. Default: not recorded.
     """
 
     name: Annotated[str, Field(min_length=1)]

@@ -1,1 +1,1 @@
-"""What several protocols are made of: posing, resting, exposing, watching, arranging."""
+"""Common parts of protocols: pose, rest, exposure, checks, arrangement."""

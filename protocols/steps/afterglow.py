@@ -1,7 +1,7 @@
-"""Whether what is photographed after lamp off is a glow: seen, fading, as bright as expected.
+"""Checks that frames after lamp off show a glow: visible, fading, as bright as expected.
 
-The relay only says what its register holds. That the lamp lit, and that it went out, is seen in
-the frames.
+The relay reports its register only. Whether the lamp lit, and whether it went out, is seen in the
+frames.
 """
 
 from collections.abc import Callable, Sequence
@@ -18,30 +18,30 @@ from .metering import MeteringFrame
 
 FloatArray = npt.NDArray[np.float64]
 
-#: A glow is seen when it is so many standard uncertainties and so many counts above darkness.
+#: Limits of detection of a glow above darkness, in standard uncertainties and in counts.
 SEEN_SIGMA = 5.0
 SEEN_DN = 1.0
-#: In so many seconds every phosphor that was just charged fades by more than two per cent.
+#: Time in which every phosphor that was just charged fades by more than two per cent.
 LEAST_S = 10.0
 FADED = 0.02
-#: And by so much between two looks `LOOK_AGAIN_S` apart, that are taken in doubt.
+#: Fading between two checks `LOOK_AGAIN_S` apart, which are made in doubt.
 FADED_IN_DOUBT = 0.05
 LOOK_AGAIN_S = 60.0
-#: Noise of the two levels compared, above which nothing can be said.
+#: Largest noise of two levels that can be compared.
 MOST_NOISE = 0.01
-#: So many shutter times at the begin of the metering's ladder are too short for any glow to clip.
+#: Number of shutter times at the begin of the ladder that are too short for a glow to clip.
 SHORT = 3
 #: A glow that stays level in the second half of a decay at more than this fraction of its first
 #: frame may be another light.
 LINGERING = 0.2
-#: Flicker and noise do not make a second frame brighter than the first by so much.
+#: Increase from the first to the second frame that flicker and noise do not cause.
 RISEN = 0.1
-#: A glow below this fraction of what it was before was not charged like that.
+#: Fraction of the earlier glow below which the sample was not charged like before.
 WEAK = 0.5
 
 
 class Afterglow(Enum):
-    """What the frames after lamp off show."""
+    """Classification of the frames after lamp off."""
 
     FADING = "fading"
     LINGERING = "fading to a level that stays"
@@ -55,20 +55,20 @@ class Afterglow(Enum):
         return self.value
 
     def require(self, warn: Callable[[str], None]) -> None:
-        """Refuse what is no decay of a charged sample, and tell of what looks wrong.
+        """Refuse a series that is no decay of a charged sample, and warn of doubtful ones.
 
         Raises
         ------
         DeviceError
-            Says what to look at.
+            The series is refused; the message names what to check.
         """
-        if self in _REFUSED:
-            raise DeviceError(_REFUSED[self])
-        if self in _TOLD:
-            warn(_TOLD[self])
+        if self in _ERRORS:
+            raise DeviceError(_ERRORS[self])
+        if self in _WARNINGS:
+            warn(_WARNINGS[self])
 
 
-_REFUSED = {
+_ERRORS = {
     Afterglow.ABSENT: "nothing glows after the charge: the lamp did not light (check its bulb, its "
     "plug and the contact of its relay), a trap door did not open, or the patches hold nothing "
     "that glows at these settings (raise camera.iso or open the aperture)",
@@ -81,7 +81,7 @@ _REFUSED = {
 }
 
 
-_TOLD = {
+_WARNINGS = {
     Afterglow.WEAK: "the glow is less than half of what it was before: the lamp may have gone out "
     "while charging or stayed on too long before (check its bulb and its relay), or lamp, sample "
     "or camera was moved; amplitudes are not to be trusted",
@@ -97,7 +97,13 @@ class Glow:
     Attributes
     ----------
     at_s
-        Middle of the exposure, after the planned begin of the first frame.
+        Middle of the exposure in seconds after the planned begin of the first frame.
+    exposure_s
+        Shutter time in seconds.
+    rate, sigma
+        Signal and its standard uncertainty in DN/s, shape (patches × channels,).
+    clips
+        Whether some channel of some patch clips.
     """
 
     at_s: float
@@ -108,30 +114,32 @@ class Glow:
 
     @property
     def brightest(self) -> float:
-        """Rate of the brightest channel of the brightest patch."""
+        """Rate of the brightest channel of the brightest patch, in DN/s."""
         return float(self.rate.max())
 
     @property
     def seen(self) -> bool:
-        """Whether there is any light."""
-        least = np.maximum(SEEN_SIGMA * self.sigma, SEEN_DN / self.exposure_s)
-        return self.clips or bool(np.any(self.rate > least))
+        """Whether any light is detected."""
+        limit = np.maximum(SEEN_SIGMA * self.sigma, SEEN_DN / self.exposure_s)
+        return self.clips or bool(np.any(self.rate > limit))
 
 
-def glow(seen: MeteringFrame, dark: FloatArray, zero_s: float) -> Glow:
-    """What `seen` shows above the level `dark`, of shape (patches, channels), in DN."""
-    sigma = np.array([[c.sigma for c in patch.channels.values()] for patch in seen.patches])
+def glow(frame: MeteringFrame, dark: FloatArray, zero_s: float) -> Glow:
+    """Return a frame's signal above the level `dark`, of shape (patches, channels), in DN."""
+    sigma = np.array(
+        [[channel.sigma for channel in patch.channels.values()] for patch in frame.patches]
+    )
     return Glow(
-        at_s=seen.start_s + seen.exposure_s / 2 - zero_s,
-        exposure_s=seen.exposure_s,
-        rate=((levels(seen) - dark) / seen.exposure_s).ravel(),
-        sigma=(sigma / seen.exposure_s).ravel(),
-        clips=clips(seen),
+        at_s=frame.start_s + frame.exposure_s / 2 - zero_s,
+        exposure_s=frame.exposure_s,
+        rate=((levels(frame) - dark) / frame.exposure_s).ravel(),
+        sigma=(sigma / frame.exposure_s).ravel(),
+        clips=clips(frame),
     )
 
 
 def dark_level(darks: Sequence[MeteringFrame], exposure_s: float) -> FloatArray:
-    """Level of dark frames of that shutter time, straight between those that were taken."""
+    """Return the level of dark frames at that shutter time, interpolated between those taken."""
     times_s = sorted({frame.exposure_s for frame in darks})
     mean = np.array(
         [
@@ -146,7 +154,7 @@ def dark_level(darks: Sequence[MeteringFrame], exposure_s: float) -> FloatArray:
 
 
 def metered(glows: Sequence[Glow]) -> Afterglow:
-    """What a ladder of exposures shows, by rising shutter time."""
+    """Classify a ladder of exposures, by rising shutter time."""
     if not any(glow.seen for glow in glows):
         return Afterglow.ABSENT
     if any(glow.clips for glow in glows[:SHORT]):
@@ -155,16 +163,16 @@ def metered(glows: Sequence[Glow]) -> Afterglow:
 
 
 def decayed(
-    first: Sequence[Glow], middle: Glow, last: Sequence[Glow], before: Sequence[Glow]
+    first: Sequence[Glow], middle: Glow, last: Sequence[Glow], reference: Sequence[Glow]
 ) -> Afterglow:
-    """What some frames of a decay show.
+    """Classify some frames of a decay.
 
     Parameters
     ----------
     first, middle, last
-        Where in the decay they were taken.
+        Frames of the begin, the middle and the end of the decay.
     before
-        Of the metering, or of an earlier decay: what the first frame is held against.
+        Frames of the metering or of an earlier decay, with which the first frame is compared.
     """
     start, end = first[0], last[-1]
     if not any(glow.seen for glow in first):
@@ -175,7 +183,7 @@ def decayed(
         return Afterglow.FADING
     if first[-1].brightest > (1 + RISEN) * start.brightest and first[-1].seen:
         return Afterglow.RISING
-    if start.brightest < WEAK * _expected(start, before):
+    if start.brightest < WEAK * _expected(start, reference):
         return Afterglow.WEAK
     if _is_steady(first, last, FADED):
         return Afterglow.STEADY
@@ -183,39 +191,41 @@ def decayed(
     return Afterglow.LINGERING if lingers else Afterglow.FADING
 
 
-def looked_at(looks: Sequence[Glow], again: Sequence[Glow]) -> Afterglow:
-    """What looks in doubt show, and the same shutter times after a while."""
-    pairs = [pair for pair in zip(looks, again, strict=True) if not pair[0].clips]
+def looked_at(frames: Sequence[Glow], repeats: Sequence[Glow]) -> Afterglow:
+    """Classify doubtful frames by repeating their shutter times after a while."""
+    pairs = [pair for pair in zip(frames, repeats, strict=True) if not pair[0].clips]
     if not pairs:
         return Afterglow.STEADY
-    before, after = pairs[-1]
-    steady = after.clips or _is_steady([before], [after], FADED_IN_DOUBT)
+    frame, repeat = pairs[-1]
+    steady = repeat.clips or _is_steady([frame], [repeat], FADED_IN_DOUBT)
     return Afterglow.STEADY if steady else Afterglow.FADING
 
 
-def went_out(lit: Glow, after: Glow) -> bool:
-    """Whether a frame after lamp off is darker than the same under the lamp."""
-    brightest = int(np.argmax(lit.rate))
-    if lit.clips or not lit.seen:
-        return not after.clips
-    return bool(after.rate[brightest] < (1 - FADED) * lit.rate[brightest])
+def went_out(under_lamp: Glow, after_lamp_off: Glow) -> bool:
+    """Return whether a frame after lamp off is darker than the same under the lamp."""
+    brightest = int(np.argmax(under_lamp.rate))
+    if under_lamp.clips or not under_lamp.seen:
+        return not after_lamp_off.clips
+    return bool(after_lamp_off.rate[brightest] < (1 - FADED) * under_lamp.rate[brightest])
 
 
 def _is_steady(first: Sequence[Glow], last: Sequence[Glow], faded: float) -> bool:
-    """Whether it is certain that the brightest channel has not faded by so much."""
+    """Return whether the brightest channel has certainly not faded by that fraction."""
     brightest = int(np.argmax(first[0].rate))
-    before = float(np.mean([glow.rate[brightest] for glow in first]))
-    after = float(np.mean([glow.rate[brightest] for glow in last]))
+    first_rate = float(np.mean([glow.rate[brightest] for glow in first]))
+    last_rate = float(np.mean([glow.rate[brightest] for glow in last]))
     noise = max(float(glow.sigma[brightest]) for glow in (*first, *last))
     long_enough = last[-1].at_s - first[0].at_s > LEAST_S
-    return long_enough and noise < MOST_NOISE * before and after > (1 - faded) * before
+    return long_enough and noise < MOST_NOISE * first_rate and last_rate > (1 - faded) * first_rate
 
 
-def _expected(first: Glow, before: Sequence[Glow]) -> float:
-    """Rate of the brightest channel at that time, log-linear between what was seen before; or 0."""
+def _expected(first: Glow, reference: Sequence[Glow]) -> float:
+    """Return the brightest channel's rate at that time, log-linear between earlier frames; or 0."""
     brightest = int(np.argmax(first.rate))
-    seen = [glow for glow in before if glow.seen and not glow.clips and glow.rate[brightest] > 0]
-    if not seen:
+    detected = [
+        glow for glow in reference if glow.seen and not glow.clips and glow.rate[brightest] > 0
+    ]
+    if not detected:
         return 0.0
-    log_rate = np.log([glow.rate[brightest] for glow in seen])
-    return float(np.exp(np.interp(first.at_s, [glow.at_s for glow in seen], log_rate)))
+    log_rate = np.log([glow.rate[brightest] for glow in detected])
+    return float(np.exp(np.interp(first.at_s, [glow.at_s for glow in detected], log_rate)))

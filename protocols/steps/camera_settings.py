@@ -1,4 +1,4 @@
-"""How the camera is set, and what a photograph needs of it."""
+"""Settings of the camera, and times that follow from them."""
 
 from pydantic import BaseModel, ConfigDict, Field
 
@@ -8,12 +8,12 @@ from labrig.quantity import duration_text
 
 
 def frame_times_s(first_s: float, every_s: float, until_s: float) -> list[float]:
-    """Begin of each frame, evenly from `first_s` to `until_s`, which is one of them if it fits.
+    """Return the begin of each frame, evenly from `first_s` to `until_s`, included if it fits.
 
     Raises
     ------
     ProtocolError
-        More frames than a run may have steps.
+        There are more frames than a run may have steps.
     """
     count = (until_s - first_s) / every_s + 1e-9
     if count >= MOST_STEPS:
@@ -26,12 +26,20 @@ def frame_times_s(first_s: float, every_s: float, until_s: float) -> list[float]
 
 #: Frames at each exposure of the dark unit: enough for a mean, its scatter and a map of hot pixels.
 DARKS_PER_EXPOSURE = 4
-#: Left free between a frame and the next deadline: setting the camera, half-pressing it.
+#: Time between a frame and the next deadline for setting the camera and half-pressing it.
 MARGIN_S = 0.5
 
 
 class CameraSettings(BaseModel):
-    """How the camera is set; the shutter time has a key of its own."""
+    """Sensitivity and aperture of the camera; the shutter time has a key of its own.
+
+    Attributes
+    ----------
+    iso
+        ISO sensitivity, one of those that the camera offers, for example `400`.
+    f_number
+        Aperture as f-number, for example `4`; null for a lens that reports none.
+    """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
 
@@ -40,6 +48,6 @@ class CameraSettings(BaseModel):
 
 
 def dark_exposures_s(longest_s: float, offers: CameraOffers) -> list[float]:
-    """Shutter time of each dark frame, where frames of up to `longest_s` are to come."""
+    """Return the shutter time of each dark frame, where later frames take up to `longest_s`."""
     exposures_s = [offers.exposure_at_most(longest_s * part) for part in (1 / 64, 1 / 4, 1)]
     return [exposure_s for exposure_s in exposures_s for _ in range(DARKS_PER_EXPOSURE)]

@@ -1,4 +1,4 @@
-"""Whether it is dark before anything is charged: what the dark frames say about light."""
+"""Checks for darkness before charging, from the light in the dark frames."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -14,30 +14,30 @@ from .metering import MeteringFrame
 
 FloatArray = npt.NDArray[np.float64]
 
-#: No camera's black level is off by more, as a fraction of the range between black and white.
+#: Largest error of a camera's black level, as a fraction of the range from black to white.
 BLACK_ERROR = 0.005
 #: No sensor makes more in the dark, per second at ISO 100, as a fraction of the range: 10 electrons
 #: of some 60 000. A 5D Mark II comes to that at 50 °C.
 DARK_CURRENT_PER_S = 2e-4
-#: From this fraction of the range on it is no leak or last glow that a dark frame takes care of.
+#: Fraction of the range from which light is too bright to be subtracted by dark frames.
 BRIGHT = 0.25
-#: A glow is known by fading by so much along the dark frames; shutters flicker by a third of it.
+#: Fading of a glow along the dark frames; shutters flicker by a third of it.
 FADED = 0.03
 
 
 @dataclass(frozen=True)
 class Darkness:
-    """What is left of light.
+    """Light that is left before charging.
 
     Attributes
     ----------
     light
-        Fraction of the range that it fills in `exposure_s` seconds, beyond what a sensor makes in
-        the dark: 0 is dark, 1 clips.
+        Fraction of the range that the light fills in `exposure_s` seconds, beyond the dark current:
+        0 is dark, 1 clips.
     exposure_s
         Longest shutter time of the dark frames.
     fades
-        Whether it gets less from frame to frame, as a glow does and a lamp does not.
+        Whether the light decreases from frame to frame, as a glow does and a lamp does not.
     """
 
     light: float
@@ -52,21 +52,21 @@ class Darkness:
 
     @property
     def is_bright(self) -> bool:
-        """Whether dark frames cannot take care of it."""
+        """Whether the light is too bright to be subtracted by dark frames."""
         return self.light >= BRIGHT
 
     @property
     def is_doubtful(self) -> bool:
-        """Whether it may be a lamp, or a glow that fades too slowly for these frames."""
+        """Whether the light may be a lamp, or a glow that fades too slowly for these frames."""
         return self.is_bright and not self.fades
 
     def require(self, warn: Callable[[str], None]) -> None:
-        """Refuse to go on where nothing could be measured, and tell of what is merely untidy.
+        """Refuse light in which nothing can be measured, and warn of light that can be subtracted.
 
         Raises
         ------
         DeviceError
-            A light is on: the lamp may be, and then nobody is safe.
+            A light is on: the lamp may be, which is unsafe.
         DataError
             The sample still glows too brightly.
         """
@@ -97,10 +97,10 @@ DARK = Darkness(0.0, 0.0, fades=False)
 
 
 def darkness(frames: Sequence[MeteringFrame], iso: int) -> Darkness:
-    """What dark frames show beyond what a sensor makes without light.
+    """Return the light in dark frames beyond the dark current.
 
-    The level of the shortest exposure is taken as black, so that no wrong black level in a file
-    and no hot pixel frames like light; with one exposure, what the file calls black.
+    The level of the shortest exposure is taken as black, so that neither a wrong black level in a
+    file nor a hot pixel looks like light; with one exposure, the file's black level.
     """
     shortest_s = min(frame.exposure_s for frame in frames)
     longest_s = max(frame.exposure_s for frame in frames)
@@ -111,10 +111,10 @@ def darkness(frames: Sequence[MeteringFrame], iso: int) -> Darkness:
     if not open_s:
         return Darkness(1.0, longest_s, fades=False)
     shortest = [frame for frame in frames if frame.exposure_s == shortest_s]
-    black = _black(shortest, others=shortest_s < open_s)
+    black = _black(shortest, has_longer=shortest_s < open_s)
     series = [levels(frame) - black for frame in frames if frame.exposure_s == open_s]
     brightest = np.argmax(series[0])
-    level = np.array([each.flat[brightest] for each in series]) / range_dn(frames[0])
+    level = np.array([level_dn.flat[brightest] for level_dn in series]) / range_dn(frames[0])
     half = max(len(level) // 2, 1)
     fades = bool(level[-half:].mean() < (1 - FADED) * level[:half].mean())
     light = float(level.mean()) if open_s == longest_s else 1.0
@@ -123,23 +123,25 @@ def darkness(frames: Sequence[MeteringFrame], iso: int) -> Darkness:
     return Darkness(light, longest_s, fades)
 
 
-def _black(shortest: Sequence[MeteringFrame], others: bool) -> FloatArray:
-    """Level without light, in DN above what the file calls black."""
+def _black(shortest: Sequence[MeteringFrame], has_longer: bool) -> FloatArray:
+    """Return the level without light, in DN above the file's black level."""
     mean: FloatArray = np.mean([levels(frame) for frame in shortest], axis=0)
-    told = max(shortest[0].patches[0].black) > 0
-    return mean if others or not told else np.zeros_like(mean)
+    has_black_level = max(shortest[0].patches[0].black) > 0
+    return mean if has_longer or not has_black_level else np.zeros_like(mean)
 
 
 def levels(frame: MeteringFrame) -> FloatArray:
-    """Means in DN above black, shape (patches, channels)."""
-    return np.array([[c.mean for c in patch.channels.values()] for patch in frame.patches])
+    """Return means in DN above black, shape (patches, channels)."""
+    return np.array(
+        [[channel.mean for channel in patch.channels.values()] for patch in frame.patches]
+    )
 
 
 def clips(frame: MeteringFrame) -> bool:
-    """Whether some channel of some patch is too bright for its shutter time.
+    """Return whether some channel of some patch clips.
 
-    Pixels that stand out alone are hot: of a small patch one is more than may clip, and it is full
-    in a long exposure however dark it is.
+    Isolated bright pixels are hot: in a small patch a single one exceeds the limit for clipping,
+    and it is saturated in a long exposure in any darkness.
     """
     return any(
         is_clipped(max(channel.saturated - channel.hot, 0), channel.n)
@@ -149,5 +151,5 @@ def clips(frame: MeteringFrame) -> bool:
 
 
 def range_dn(frame: MeteringFrame) -> float:
-    """From black to white."""
+    """Return the range from black to white, in DN."""
     return frame.patches[0].range_dn

@@ -1,4 +1,4 @@
-"""Protocols that charge a sample and photograph its glow: keys, resting before, darks, metering."""
+"""Protocols that charge a sample and photograph its glow: keys, rest before, darks, metering."""
 
 from abc import abstractmethod
 from collections.abc import Callable, Sequence
@@ -23,12 +23,23 @@ from .sanity_checks import SanityChecks
 
 #: Shutter times of a metering's first frames, as fractions of the longest.
 LADDER: tuple[float, ...] = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
-#: Of the further ones, along the decay.
+#: Shutter times of the further frames, along the decay, as fractions of the longest.
 LATER = (1 / 16, 1)
 
 
 class GlowSettings(ProtocolModel):
-    """The keys of such a protocol, and the exposures that follow."""
+    """Settings of a protocol that photographs a glow, and the exposures that follow from them.
+
+    Attributes
+    ----------
+    charge
+        Time for which the lamp shines on the sample before each series of photographs, for example
+        `10 min`. A strong glow is enough; it need not be saturated.
+    longest
+        Longest exposure, for example `30 s`.
+    camera
+        Sensitivity and aperture of the camera.
+    """
 
     charge: DurationS = Field(600.0, gt=0)
     longest: DurationS = Field(30.0, gt=0)
@@ -37,22 +48,22 @@ class GlowSettings(ProtocolModel):
     @property
     @abstractmethod
     def role(self) -> str:
-        """Of the frames of the glow."""
+        """Role of the frames of the glow."""
 
     @abstractmethod
     def times_s(self) -> Sequence[float]:
-        """Begin of each frame, seconds after lamp off, rising."""
+        """Return the begin of each frame in seconds after lamp off, rising."""
 
     @abstractmethod
     def regions(self) -> Sequence[Region]:
-        """Where the glow is to be seen; the brightest decides."""
+        """Return the regions of the glow; the brightest decides."""
 
     def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
+        """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def longest_exposures_s(self, offers: CameraOffers) -> list[float]:
-        """Longest shutter time of each frame: it is over before the next one begins."""
+        """Return the longest shutter time of each frame, which ends before the next begins."""
         free_s = [
             min(later - earlier - offers.overhead_s - MARGIN_S, self.longest)
             for earlier, later in pairwise(self.times_s())
@@ -60,11 +71,11 @@ class GlowSettings(ProtocolModel):
         return [offers.exposure_at_most(limit_s) for limit_s in (*free_s, self.longest)]
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
-        """Shutter time of each dark frame."""
+        """Return the shutter time of each dark frame in seconds."""
         return dark_exposures_s(max(self.longest_exposures_s(offers)), offers)
 
     def meter_ladder(self, offers: CameraOffers) -> list[tuple[float, float]]:
-        """Begin after lamp off and shutter time of each metering frame, to the last of the glow."""
+        """Return begin and shutter time of each metering frame, to the last frame of the glow."""
         longest_s = max(self.longest_exposures_s(offers))
         pause_s = offers.overhead_s + MARGIN_S
         ladder: list[tuple[float, float]] = []
@@ -80,7 +91,7 @@ class GlowSettings(ProtocolModel):
     def schedule(
         self, offers: CameraOffers, measured: Sequence[MeteringFrame], warn: Callable[[str], None]
     ) -> Schedule:
-        """Frames of the glow, as bright as the metering frames let them be."""
+        """Return frames of the glow, as bright as the metering frames allow."""
         limits_s = self.longest_exposures_s(offers)
         times_s = self.times_s()
         wished = DecayMeter(measured).schedule(times_s, offers, max(limits_s), float("inf"), warn)
@@ -88,25 +99,25 @@ class GlowSettings(ProtocolModel):
         return Schedule(tuple(times_s), tuple(exposures_s))
 
     def brightest_schedule(self, offers: CameraOffers) -> Schedule:
-        """The most that `schedule` can come to."""
+        """Return the schedule with the longest exposures that `schedule` can return."""
         return Schedule(tuple(self.times_s()), tuple(self.longest_exposures_s(offers)))
 
     def short_settings(self, session: Session) -> list[ExposureSettings]:
-        """For a closer look at what clips."""
+        """Return the settings of the shortest metering frames, for a check of clipped frames."""
         ladder = self.meter_ladder(session.rig[CAMERA].offers())[:3]
         return [self.settings(exposure_s) for _, exposure_s in ladder]
 
     def checks(self, session: Session, unit: str, metering: str = "meter") -> SanityChecks:
-        """Holds a unit's frames against what should have happened, and what `metering` saw."""
+        """Return the sanity checks of a unit's frames, compared with those of `metering`."""
         return SanityChecks(session, unit, self.regions(), None, self.role, metering)
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
-        """Lamp on for that long, for its own warm-up at the least."""
+        """Charge for that long, and at least for the lamp's warm-up time."""
         charge(session, max(duration_s, session.rig.warm_up_s("lamp")))
 
 
 def metered_schedule(session: Session, protocol: GlowSettings, metering: str) -> Schedule:
-    """Shutter times of the glow, from what the unit `metering` saw of it."""
+    """Return the schedule of the glow, from the frames of the unit `metering`."""
     offers = session.rig[CAMERA].offers()
 
     def decide() -> Schedule:
@@ -117,28 +128,32 @@ def metered_schedule(session: Session, protocol: GlowSettings, metering: str) ->
     return session.choose("exposure", decide, protocol.brightest_schedule(offers))
 
 
-#: How often the sample is looked at, and for how long at most.
+#: Interval of checks of the sample, and longest rest.
 CHECK_EVERY_S = 180.0
 AT_MOST_S = 3600.0
-#: A light that fades by less between two looks does not fade.
+#: Least fading between two checks of a light that fades.
 FADES = 0.05
-#: Less light than this fraction of the range is none.
+#: Fraction of the range below which there is no light.
 LEAST = 5e-4
 
 
 def dark_frames(
     session: Session, unit: str, regions: Sequence[Region], exposures: Sequence[ExposureSettings]
 ) -> None:
-    """Dark frames as the sample is seen later; behind a door it rests before until it is dark.
+    """Take dark frames in the later pose; behind a door the sample rests before until it is dark.
 
-    Without a door the dark frames alone can tell. A plan assumes a sample that is dark.
+    Without a door only the dark frames show whether it is dark. A plan assumes a dark sample.
 
     Parameters
     ----------
+    session
+        Session of the run.
     unit
-        That takes them.
+        Name of the unit that takes the frames.
     regions
-        Where the sample lies.
+        Regions of the sample.
+    exposures
+        Camera settings of the dark frames.
     """
     if has_door(session):
         longest = max(exposures, key=lambda settings: settings.exposure_s)
@@ -150,39 +165,39 @@ def dark_frames(
 def _rest_until_dark(
     session: Session, unit: str, regions: Sequence[Region], longest: ExposureSettings
 ) -> None:
-    """Ends with the door open. What the camera sees behind the closed one is what dark means."""
+    """Rest until the sample is as dark as the closed door; the door is open afterwards."""
     face_lamp(session)
     session.perform(Shoot(FrameRole.REST, longest))
     face_camera(session)
-    before, rested_s = np.inf, 0.0
+    previous, rested_s = np.inf, 0.0
     while True:
         session.perform(Shoot(FrameRole.REST, longest))
         light = session.choose("light before", lambda: _light(session, unit, regions), worst=0.0)
-        fades = light < (1 - FADES) * before
+        fades = light < (1 - FADES) * previous
         if not light or not fades or rested_s >= AT_MOST_S:
             break
-        before = light
+        previous = light
         session.wait(CHECK_EVERY_S, "the sample still glows, resting in the dark")
         rested_s += CHECK_EVERY_S
     if light:
-        what = (
+        advice = (
             "a light is on in the room, or leaks in; it is subtracted as long as it stays the same"
             if not fades
             else "the sample glows from earlier; longer in the dark before a run is better"
         )
         session.warn(
             f"after {duration_text(rested_s)} in the dark the sample's place is not dark: "
-            f"{100 * light:.2g} % of the camera's range in {longest.exposure_s:.2g} s; {what}"
+            f"{100 * light:.2g} % of the camera's range in {longest.exposure_s:.2g} s; {advice}"
         )
 
 
 def _light(session: Session, unit: str, regions: Sequence[Region]) -> float:
-    """Fraction of the range by which the last frame exceeds the closed door; 0 for noise."""
-    closed, *_, seen = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
+    """Return the fraction of the range by which the last frame exceeds the closed door, or 0."""
+    closed, *_, last = (frame for frame in session.frames(FrameRole.REST) if frame.unit == unit)
     dark = measure_frame(closed, regions)
-    found = glow(measure_frame(seen, regions), levels(dark), seen.start_time)
-    fraction = found.brightest * seen.exposure_s / range_dn(dark)
-    return fraction if found.clips or (found.seen and fraction > LEAST) else 0.0
+    signal = glow(measure_frame(last, regions), levels(dark), last.start_time)
+    fraction = signal.brightest * last.exposure_s / range_dn(dark)
+    return fraction if signal.clips or (signal.seen and fraction > LEAST) else 0.0
 
 
 #: Charge before metering; a longer one glows brighter, which the metering's headroom allows for.
@@ -190,36 +205,36 @@ METER_CHARGE_S = 600.0
 
 
 class MeteredProtocol(Protocol):
-    """What a protocol says that photographs darkness, then meters a glow."""
+    """Interface of a protocol that takes dark frames, then meters a glow."""
 
     def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
+        """Return the camera settings with that shutter time."""
 
     def dark_exposures_s(self, offers: CameraOffers) -> Sequence[float]:
-        """Shutter time of each dark frame."""
+        """Return the shutter time of each dark frame in seconds."""
 
     def meter_ladder(self, offers: CameraOffers) -> Sequence[tuple[float, float]]:
-        """Begin after lamp off and shutter time of each metering frame."""
+        """Return begin after lamp off and shutter time of each metering frame."""
 
     def short_settings(self, session: Session) -> list[ExposureSettings]:
-        """For a closer look at what clips."""
+        """Return the settings of the shortest metering frames, for a check of clipped frames."""
 
     def charge_sample(self, session: Session, duration_s: float) -> None:
-        """Lamp on for that long, for its own warm-up at the least."""
+        """Charge for that long, and at least for the lamp's warm-up time."""
 
     def checks(self, session: Session, unit: str) -> SanityChecks:
-        """Holds a unit's frames against what should have happened."""
+        """Return the sanity checks of a unit's frames."""
 
 
 @dataclass(frozen=True)
 class DarkUnit:
-    """Dark frames at the exposures to come, before anything glows."""
+    """Dark frames at the later exposures, before anything glows."""
 
     protocol: MeteredProtocol
     name: str = "dark"
 
     def run(self, session: Session) -> None:
-        """Warm the camera up, then photograph darkness."""
+        """Warm the camera up, then photograph in the dark."""
         session.wait_until_warm("camera")
         exposures_s = self.protocol.dark_exposures_s(session.rig[CAMERA].offers())
         exposures = [self.protocol.settings(exposure_s) for exposure_s in exposures_s]
@@ -230,14 +245,14 @@ class DarkUnit:
 
 @dataclass(frozen=True)
 class MeterUnit:
-    """A shorter charge whose glow says how long to expose."""
+    """A shorter charge whose glow determines the exposures."""
 
     protocol: MeteredProtocol
     charge_s: float
     name: str = "meter"
 
     def run(self, session: Session) -> None:
-        """Charge, lamp off, a ladder of exposures; for `grow`, then on along the decay."""
+        """Charge, switch the lamp off, take a ladder of exposures; for `grow`, along the decay."""
         session.wait_until_warm("camera")
         self.protocol.charge_sample(session, min(self.charge_s, METER_CHARGE_S))
         ladder = self.protocol.meter_ladder(session.rig[CAMERA].offers())

@@ -1,4 +1,4 @@
-"""A grey card under the steady lamp: who puts it there, how bright it is, how long to expose."""
+"""A grey card under the steady lamp: placing, lighting and metering it."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -31,22 +31,22 @@ GREY_CARD = ManualStep(
 
 #: Shutter times of the metering: one of them is right whatever the lamp.
 METERED_S = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1.0)
-#: A lamp that was on before needs no warming up, one without a warm-up time at least this.
+#: Least warm-up time of a lamp that was off.
 SETTLES_S = 5.0
-#: What a plan assumes: a card so dim that exposures are long.
+#: Brightness of the card that a plan assumes: so dim that exposures are long.
 DIM_PER_S = 0.5
 
 
 @dataclass(frozen=True)
 class CardLight:
-    """How fast the lit card fills the range from black to white, in its brightest pixels.
+    """Rate at which the lit card fills the range from black to white, in its brightest pixels.
 
     Attributes
     ----------
     per_s
-        Fraction of the range in a second.
+        Fraction of the range per second.
     settings
-        At which that is so; their shutter time means nothing.
+        Sensitivity and aperture to which `per_s` belongs; the shutter time has no meaning.
     """
 
     per_s: float
@@ -56,7 +56,7 @@ class CardLight:
         return f"fills the range in {duration_text(1 / self.per_s)}"
 
     def exposure_s(self, fraction: float, settings: ExposureSettings) -> float:
-        """Shutter time in which it fills that fraction of the range at an ISO and f-number."""
+        """Return the shutter time that fills that fraction of the range at an ISO and f-number."""
         gain = settings.iso / self.settings.iso
         if settings.f_number is not None and self.settings.f_number is not None:
             gain *= (self.settings.f_number / settings.f_number) ** 2
@@ -65,14 +65,14 @@ class CardLight:
     def exposed(
         self, fraction: float, settings: ExposureSettings, offers: CameraOffers
     ) -> ExposureSettings:
-        """`settings` with the longest offered shutter time that fills no more than that share."""
+        """Return `settings` with the longest offered shutter time within that fraction."""
         exposure_s = offers.exposure_at_most(self.exposure_s(fraction, settings))
         return ExposureSettings(exposure_s, settings.iso, settings.f_number)
 
 
 @dataclass(frozen=True)
 class CardMeterUnit:
-    """The lit card at a ladder of shutter times, for `card_light`."""
+    """Frames of the lit card at a ladder of shutter times, for `card_light`."""
 
     settings: ExposureSettings
     card: Region
@@ -83,15 +83,15 @@ class CardMeterUnit:
         session.wait_until_warm("camera")
         light_card(session)
         offers = session.rig[CAMERA].offers()
-        for wanted_s in METERED_S:
-            exposure_s = offers.exposure_at_most(wanted_s)
+        for nominal_s in METERED_S:
+            exposure_s = offers.exposure_at_most(nominal_s)
             shot = ExposureSettings(exposure_s, self.settings.iso, self.settings.f_number)
             session.perform(Shoot(FrameRole.METER, shot))
         card_light(session, self.settings, self.card)
 
 
 def light_card(session: Session) -> None:
-    """Lamp on and warm, the sample turned to it; nothing is done where it burns already."""
+    """Switch the lamp on and warm it up, facing the sample, unless it burns already."""
     face_lamp(session)
     if not session.rig[LAMP].is_on():
         session.perform(LAMP_ON)
@@ -99,37 +99,37 @@ def light_card(session: Session) -> None:
 
 
 def card_light(session: Session, settings: ExposureSettings, card: Region) -> CardLight:
-    """How bright the lit card was when it was metered.
+    """Return the brightness of the lit card when it was metered.
 
     Raises
     ------
     DeviceError
-        It is dark, or clips at every shutter time.
+        The card is dark, or clips at every shutter time.
     """
 
     def decide() -> CardLight:
-        looks = [measure_frame(frame, [card]) for frame in session.frames(FrameRole.METER)]
-        return CardLight(_per_s(looks), settings)
+        frames = [measure_frame(frame, [card]) for frame in session.frames(FrameRole.METER)]
+        return CardLight(_per_s(frames), settings)
 
     return session.choose("light of the card", decide, CardLight(DIM_PER_S, settings))
 
 
-def _per_s(looks: Sequence[MeteringFrame]) -> float:
-    """From the fullest look that does not clip."""
-    fitting = []
-    for seen in looks:
-        card = seen.patches[0]
+def _per_s(frames: Sequence[MeteringFrame]) -> float:
+    """Return the rate from the brightest frame that does not clip."""
+    unclipped = []
+    for frame in frames:
+        card = frame.patches[0]
         if not card.clipped:
-            fitting.append((max(card.channels.values(), key=lambda channel: channel.mean), seen))
-    if not fitting:
+            unclipped.append((max(card.channels.values(), key=lambda channel: channel.mean), frame))
+    if not unclipped:
         raise DeviceError(
             "the lit card is too bright for the shortest shutter time: lower camera.iso or close "
             "the aperture"
         )
-    brightest, seen = max(fitting, key=lambda pair: pair[0].mean)
-    if brightest.mean < SEEN_SIGMA * brightest.sigma or brightest.mean < 0.001 * range_dn(seen):
+    brightest, frame = max(unclipped, key=lambda pair: pair[0].mean)
+    if brightest.mean < SEEN_SIGMA * brightest.sigma or brightest.mean < 0.001 * range_dn(frame):
         raise DeviceError(
             "the card is not lit: look whether the lamp burns, the card lies in its place and "
             "'card:' is its region in the frame"
         )
-    return brightest.peak / range_dn(seen) / seen.exposure_s
+    return brightest.peak / range_dn(frame) / frame.exposure_s

@@ -1,4 +1,4 @@
-"""How long to expose: from the frames of a metering unit to the shutter times of a decay."""
+"""Metering: from the frames of a metering unit to the shutter times of a decay."""
 
 import math
 from collections.abc import Callable, Iterator, Sequence
@@ -20,32 +20,32 @@ FloatArray = npt.NDArray[np.float64]
 #: Fraction of the range between black and white that the brightest frame may fill. The rest is room
 #: for a longer charge, the lamp's drift and the shutter's flicker.
 TARGET = 0.4
-#: A glow is seen when its mean is this many standard uncertainties and at least this many counts.
+#: Limits of detection of a glow's mean, in standard uncertainties and in counts.
 SEEN_SIGMA = 5.0
 SEEN_DN = 2.0
-#: Below this fraction of the range the longest exposure still leaves a picture that is all noise.
+#: Fraction of the range below which the longest exposure is dominated by noise.
 DIM = 0.002
 
 
 def glow(path: Path, region: Region) -> float:
-    """Mean black-subtracted value of the brightest channel in `region`, in DN."""
+    """Return the mean black-subtracted value of the brightest channel in `region`, in DN."""
     return max(channel.mean for channel in measure(read_raw(path), region).channels.values())
 
 
 @dataclass(frozen=True)
 class Schedule:
-    """When each frame of a decay begins, in seconds after lamp off, and its shutter time."""
+    """Begin of each frame of a decay in seconds after lamp off, and its shutter time in seconds."""
 
     times_s: tuple[float, ...]
     exposures_s: tuple[float, ...]
 
     @classmethod
     def constant(cls, times_s: Sequence[float], exposure_s: float) -> Self:
-        """The same shutter time throughout."""
+        """Return a schedule with the same shutter time throughout."""
         return cls(tuple(times_s), (exposure_s,) * len(times_s))
 
     def frames(self) -> Iterator[tuple[float, float]]:
-        """Begin and shutter time of each frame."""
+        """Return begin and shutter time of each frame."""
         return zip(self.times_s, self.exposures_s, strict=True)
 
     def __str__(self) -> str:
@@ -55,7 +55,7 @@ class Schedule:
 
 @dataclass(frozen=True)
 class MeteringFrame:
-    """A frame of a metering unit, measured in every patch; `start_s` has any zero they share."""
+    """A frame of a metering unit, measured in every patch; the zero of `start_s` is arbitrary."""
 
     start_s: float
     exposure_s: float
@@ -63,7 +63,7 @@ class MeteringFrame:
 
 
 def measure_frame(frame: FrameRecord, regions: Sequence[Region]) -> MeteringFrame:
-    """Measure a frame that was taken."""
+    """Measure a frame in every region."""
     raw = read_raw(frame.path)
     return MeteringFrame(
         frame.start_time, frame.exposure_s, [measure(raw, region) for region in regions]
@@ -72,7 +72,7 @@ def measure_frame(frame: FrameRecord, regions: Sequence[Region]) -> MeteringFram
 
 @dataclass(frozen=True)
 class _Reading:
-    """One frame in which the glow is seen and nothing clips."""
+    """One frame in which the glow is detected and nothing clips."""
 
     time_s: float
     rate_dn_per_s: float
@@ -81,7 +81,7 @@ class _Reading:
 
 
 class DecayMeter:
-    """What a metering unit's frames say about the glow after lamp off.
+    """The glow after lamp off, from the frames of a metering unit.
 
     Parameters
     ----------
@@ -94,10 +94,10 @@ class DecayMeter:
         self._range_dn = math.inf
         self._readings: list[_Reading] = []
         self._shortest_clipped = False
-        for seen in metering:
-            self._range_dn = min(self._range_dn, seen.patches[0].range_dn)
-            channels = [channel for patch in seen.patches for channel in patch.channels.values()]
-            self._take(seen.start_s - metering[0].start_s, seen.exposure_s, channels)
+        for frame in metering:
+            self._range_dn = min(self._range_dn, frame.patches[0].range_dn)
+            channels = [channel for patch in frame.patches for channel in patch.channels.values()]
+            self._take(frame.start_s - metering[0].start_s, frame.exposure_s, channels)
 
     def _take(self, time_s: float, exposure_s: float, channels: list[ChannelStats]) -> None:
         if any(channel.clipped for channel in channels):
@@ -116,16 +116,20 @@ class DecayMeter:
         growth: float,
         warn: Callable[[str], None],
     ) -> Schedule:
-        """Shutter time for each frame, at most `growth` times the first one.
+        """Return a shutter time for each frame, at most `growth` times the first one.
 
         Parameters
         ----------
         times_s
-            Begin of each frame, seconds after lamp off.
+            Begin of each frame in seconds after lamp off.
+        offers
+            Exposure settings that the camera offers.
         longest_s
-            No exposure is longer.
+            Longest shutter time in seconds.
+        growth
+            Largest ratio of a shutter time to the first one.
         warn
-            Is told when the glow is too bright or too dim for these settings.
+            Function that receives a warning when the glow is too bright or too dim.
         """
         if not self._readings:
             if self._shortest_clipped:
@@ -134,50 +138,50 @@ class DecayMeter:
             warn("no glow was seen while metering; raise camera.iso or open the aperture")
             return Schedule.constant(times_s, longest_s)
         rates = self._peak_rates(np.asarray(times_s) - times_s[0])
-        wanted_s = TARGET * self._range_dn / rates
-        first_s = offers.exposure_at_most(min(float(wanted_s[0]), longest_s))
+        target_s = TARGET * self._range_dn / rates
+        first_s = offers.exposure_at_most(min(float(target_s[0]), longest_s))
         if rates[0] * first_s < DIM * self._range_dn:
             warn("the glow is very dim at these settings; raise camera.iso or open the aperture")
         limit_s = min(first_s * growth, longest_s)
         exposures_s = (
-            max(first_s, offers.exposure_at_most(min(float(wish_s), limit_s)))
-            for wish_s in wanted_s
+            max(first_s, offers.exposure_at_most(min(float(exposure_s), limit_s)))
+            for exposure_s in target_s
         )
         return Schedule(tuple(times_s), tuple(exposures_s))
 
     def _peak_rates(self, times_s: FloatArray) -> FloatArray:
-        """Rate of the brightest pixels in DN/s at times after the first frame.
+        """Return the rate of the brightest pixels in DN/s at times after the first frame.
 
-        Log-linear between readings; before the first reading the glow was brighter, so the slope
-        of the first two is drawn back. How far the brightest pixels stand above the mean is taken
-        from the reading with most counts: in dim ones it is noise.
+        Log-linear between readings; before the first reading the glow was brighter, so the slope of
+        the first two is extrapolated. The ratio of the brightest pixels to the mean is taken from
+        the reading with most counts: in dim ones it is noise.
         """
-        seen_s = np.array([reading.time_s for reading in self._readings])
+        reading_s = np.array([reading.time_s for reading in self._readings])
         log_rate = np.log([reading.rate_dn_per_s for reading in self._readings])
-        rates = np.interp(times_s, seen_s, log_rate)
-        if len(seen_s) > 1:
-            slope = min((log_rate[1] - log_rate[0]) / (seen_s[1] - seen_s[0]), 0.0)
-            early = times_s < seen_s[0]
-            rates[early] = log_rate[0] + slope * (times_s[early] - seen_s[0])
+        rates = np.interp(times_s, reading_s, log_rate)
+        if len(reading_s) > 1:
+            slope = min((log_rate[1] - log_rate[0]) / (reading_s[1] - reading_s[0]), 0.0)
+            is_early = times_s < reading_s[0]
+            rates[is_early] = log_rate[0] + slope * (times_s[is_early] - reading_s[0])
         fullest = max(self._readings, key=lambda reading: reading.mean_dn)
         return np.exp(rates) * fullest.peak_dn / fullest.mean_dn
 
 
 @dataclass(frozen=True)
 class FrameCache:
-    """Looks at frames, always in the same regions.
+    """Measurements of frames, always in the same regions.
 
     Attributes
     ----------
     regions
-        Where to measure.
+        Regions to measure.
     """
 
     regions: Sequence[Region]
     _measured: dict[Path, MeteringFrame] = field(default_factory=dict, repr=False, compare=False)
 
     def measure_frame(self, frame: FrameRecord) -> MeteringFrame:
-        """What a frame shows."""
+        """Return the measurement of a frame."""
         if frame.path not in self._measured:
             self._measured[frame.path] = measure_frame(frame, self.regions)
         return self._measured[frame.path]

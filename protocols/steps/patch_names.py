@@ -1,4 +1,4 @@
-"""What patches may be called, each name is a folder of the result; how they lie below a filter."""
+"""Names of patches, each of which is a folder of the result; their layout below a filter."""
 
 import re
 import unicodedata
@@ -9,15 +9,15 @@ from pydantic import AfterValidator, BeforeValidator
 
 from labrig.region import Region
 
-#: What some system takes for a path, a device or a pattern, or does not take at all.
+#: Characters of paths, devices or patterns, or refused ones, on some system.
 _FORBIDDEN = './\\:*?"<>|'
 _LONGEST = 60
-#: In a result beside the patches, and what Windows takes for devices.
+#: Names of other folders of a result, and Windows' names of devices.
 _TAKEN = re.compile(r"figures|con|prn|aux|nul|(?:com|lpt)\d")
 
 
-def _in_words(patches: Any) -> dict[str, Any]:
-    """`1: […]` is the patch "1", though YAML reads a number there."""
+def _with_text_names(patches: Any) -> dict[str, Any]:
+    """Return patches by names that are texts: YAML reads `1: […]` as a number."""
     if not isinstance(patches, dict) or not patches:
         raise ValueError("expected 'name: [x, y, width, height]' for each patch")
     return {"" if name is None else str(name): region for name, region in patches.items()}
@@ -34,8 +34,8 @@ def _can_be_folder(name: str) -> bool:
 
 
 def _folders(patches: dict[str, Region]) -> dict[str, Region]:
-    """Refuse what is no name of a folder on every disk, or of the same one twice."""
-    seen: dict[str, str] = {}
+    """Refuse a name that is no folder on every disk, or two names of the same folder."""
+    names: dict[str, str] = {}
     for name in patches:
         folder = unicodedata.normalize("NFC", name).casefold()
         if not _can_be_folder(folder):
@@ -43,26 +43,26 @@ def _folders(patches: dict[str, Region]) -> dict[str, Region]:
                 f"expected names of patches that can be folders (1 to {_LONGEST} characters, none "
                 f"of {' '.join(_FORBIDDEN)}, no space around, not 'figures'), got '{name}'"
             )
-        if folder in seen:
+        if folder in names:
             raise ValueError(
                 "expected names of patches that differ in more than capital letters, got "
-                f"'{seen[folder]}' and '{name}'"
+                f"'{names[folder]}' and '{name}'"
             )
-        seen[folder] = name
+        names[folder] = name
     return patches
 
 
-def _in_words_or_none(patches: Any) -> dict[str, Any]:
-    return {} if patches in (None, {}) else _in_words(patches)
+def _with_text_names_or_none(patches: Any) -> dict[str, Any]:
+    return {} if patches in (None, {}) else _with_text_names(patches)
 
 
-def _one_above_the_other(patches: dict[str, Region]) -> dict[str, Region]:
-    """Refuse patches that share rows; pixels and fractions cannot be held against each other."""
+def _in_separate_rows(patches: dict[str, Region]) -> dict[str, Region]:
+    """Refuse patches that share rows; pixels and fractions are not compared."""
     for (name, (_, y, _, high)), (other, (_, other_y, _, other_high)) in combinations(
         patches.items(), 2
     ):
-        alike = (max(patches[name]) <= 1) == (max(patches[other]) <= 1)
-        if alike and y < other_y + other_high and other_y < y + high:
+        same_unit = (max(patches[name]) <= 1) == (max(patches[other]) <= 1)
+        if same_unit and y < other_y + other_high and other_y < y + high:
             raise ValueError(
                 "expected patches one above the other, each in rows of its own and as long as the "
                 f"filter, got '{name}' in rows {y:g} to {y + high:g} and '{other}' in rows "
@@ -72,12 +72,12 @@ def _one_above_the_other(patches: dict[str, Region]) -> dict[str, Region]:
 
 
 #: Regions of interest by name.
-Patches = Annotated[dict[str, Region], BeforeValidator(_in_words), AfterValidator(_folders)]
+Patches = Annotated[dict[str, Region], BeforeValidator(_with_text_names), AfterValidator(_folders)]
 
 #: Rows of different materials below one strip of the variable filter; none: all of it is one.
 FilterPatches = Annotated[
     dict[str, Region],
-    BeforeValidator(_in_words_or_none),
+    BeforeValidator(_with_text_names_or_none),
     AfterValidator(_folders),
-    AfterValidator(_one_above_the_other),
+    AfterValidator(_in_separate_rows),
 ]

@@ -1,4 +1,4 @@
-"""Which way the sample faces: trap door and lamp shield, on benches that have them.
+"""Pose of the sample: trap door and lamp shield, on benches that have them.
 
 Without a door the sample faces lamp and camera at once, and nothing has to be moved.
 """
@@ -21,26 +21,26 @@ from labrig.acquire import (
 from labrig.errors import ProtocolError
 from labrig.quantity import duration_text
 
-#: Until a halogen lamp is dark (Nalbach et al., section 4.6); a shield is faster.
+#: Time until a halogen lamp is dark (Nalbach et al., section 4.6); a shield is faster.
 LAMP_DARK_S = 0.32
-#: A servo takes a new pulse over with its next frame, and a door rings a little.
+#: Time for the servo's next frame and the ringing of the door.
 SETTLES_S = 0.1
 
 
 def has_door(session: Session) -> bool:
-    """Whether the sample turns from lamp to camera."""
+    """Return whether the sample turns from lamp to camera."""
     return DOOR in session.rig
 
 
 def face_camera(session: Session) -> None:
-    """The camera sees the sample, the lamp does not reach it; waits until the door has stopped."""
+    """Turn the sample to the camera, away from the lamp; wait until the door has stopped."""
     if has_door(session):
         session.perform(DOOR_OPEN)
         session.wait(session.rig[DOOR].travel_s() + SETTLES_S, "door opens")
 
 
 def face_lamp(session: Session) -> None:
-    """The sample faces the lamp, uncovered; waits until the doors have stopped."""
+    """Turn the sample to the lamp, uncovered; wait until the doors have stopped."""
     travels_s = []
     if SHIELD in session.rig:
         session.perform(SHIELD_UNCOVER)
@@ -60,7 +60,7 @@ def charge(session: Session, duration_s: float) -> None:
 
 
 def lights_out(session: Session) -> Sequence[TimedAction]:
-    """The begin of a timed sequence: lamp off, shield before it, then the door opens."""
+    """Return the begin of a timed sequence: lamp off, shield before it, then the door opens."""
     steps = [at(0.0, LAMP_OFF)]
     dark_s = LAMP_DARK_S
     if SHIELD in session.rig:
@@ -72,7 +72,7 @@ def lights_out(session: Session) -> Sequence[TimedAction]:
 
 
 def seen_s(session: Session) -> float:
-    """From `lights_out` until the camera sees the whole sample."""
+    """Return the time from `lights_out` until the camera sees the whole sample, in seconds."""
     if not has_door(session):
         return 0.0
     return lights_out(session)[-1].at_s + session.rig[DOOR].travel_s() + SETTLES_S
@@ -84,7 +84,7 @@ def check_visible(session: Session, first_s: float) -> None:
     Raises
     ------
     ProtocolError
-        Says how long it takes.
+        The first photograph is too early; the message has the earliest time.
     """
     if first_s < seen_s(session):
         raise ProtocolError(

@@ -1,4 +1,4 @@
-"""Holds the frames of a unit against what lamp, relay, room and disk should have done."""
+"""Sanity checks of a unit's frames against lamp, relay, room and disk."""
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -26,28 +26,30 @@ from .afterglow import (
 from .darkness import DARK, Darkness, darkness, levels
 from .metering import FrameCache, MeteringFrame
 
-#: A lamp has gone dark by then; a halogen lamp takes a third of it.
+#: Time by which a lamp has gone dark; a halogen lamp takes a third of it.
 LAMP_GONE_S = 1.0
-#: Frames that begin so late are told of; a PC's own tails are shorter.
+#: Delay of a frame from which there is a warning; a PC's own delays are shorter.
 LATE_S = 0.1
 
 
 @dataclass(frozen=True)
 class SanityChecks:
-    """Judges by what was recorded and nothing else, so that a resumed run judges alike.
+    """Checks of recorded frames only, so that a resumed run is judged alike.
 
     Attributes
     ----------
-    session, unit
-        The unit's session, and its name.
+    session
+        Session of the unit.
+    unit
+        Name of the unit.
     patches
-        Where the samples lie.
+        Regions of the samples.
     background
-        A region that never glows, where it takes the place of dark frames.
+        Region that never glows, which takes the place of dark frames.
     role
-        Of the frames after lamp off.
+        Role of the frames after lamp off.
     metering
-        The unit that metered the same glow.
+        Name of the unit that metered the same glow.
     """
 
     session: Session
@@ -63,71 +65,91 @@ class SanityChecks:
         Parameters
         ----------
         shorter
-            For a closer look in doubt.
-
-        Raises
-        ------
-        DeviceError, DataError
-            As `Darkness.require`.
-        """
-
-        def decide() -> Darkness:
-            frames = self._own(FrameRole.DARK)
-            longest_s = max(frame.exposure_s for frame in frames)
-            longest = [frame for frame in frames if frame.exposure_s == longest_s]
-            looks = [self._look(frame) for frame in (*_one_each(frames), *longest[1:])]
-            return darkness(looks, frames[0].iso)
-
-        found = self.session.choose("light before charging", decide, worst=DARK)
-        if found.is_doubtful:
-            found = replace(found, fades=self._closer_look(shorter) is Afterglow.FADING)
-        found.require(self.session.warn)
-
-    def require_glow(self, shorter: Sequence[ExposureSettings]) -> None:
-        """Refuse a metering after which nothing glows, or something does not fade.
+            Settings of shorter exposures, for a repetition in doubt.
 
         Raises
         ------
         DeviceError
-            As `Afterglow.require`.
+            A light is on.
+        DataError
+            The sample still glows too brightly.
         """
-        self._require(lambda: metered(self._glows(self._own(FrameRole.METER))), shorter)
+
+        def decide() -> Darkness:
+            frames = self._unit_frames(FrameRole.DARK)
+            longest_s = max(frame.exposure_s for frame in frames)
+            longest = [frame for frame in frames if frame.exposure_s == longest_s]
+            measured = [
+                self._measure(frame) for frame in (*_first_of_each_exposure(frames), *longest[1:])
+            ]
+            return darkness(measured, frames[0].iso)
+
+        light = self.session.choose("light before charging", decide, worst=DARK)
+        if light.is_doubtful:
+            light = replace(light, fades=self._closer_look(shorter) is Afterglow.FADING)
+        light.require(self.session.warn)
+
+    def require_glow(self, shorter: Sequence[ExposureSettings]) -> None:
+        """Refuse a metering after which nothing glows, or the light does not fade.
+
+        Parameters
+        ----------
+        shorter
+            Settings of shorter exposures, for a repetition in doubt.
+
+        Raises
+        ------
+        DeviceError
+            The frames show no glow; the message names what to check.
+        """
+        self._require(lambda: metered(self._glows(self._unit_frames(FrameRole.METER))), shorter)
 
     def require_decay(self, shorter: Sequence[ExposureSettings]) -> None:
-        """Refuse a decay that is none; as `require_glow`."""
+        """Refuse a series of frames that is no decay.
+
+        Parameters
+        ----------
+        shorter
+            Settings of shorter exposures, for a repetition in doubt.
+
+        Raises
+        ------
+        DeviceError
+            The frames show no decay; the message names what to check.
+        """
 
         def decide() -> Afterglow:
-            frames = self._own(self.role)
+            frames = self._unit_frames(self.role)
             middle = len(frames) // 2
-            some = min(2, middle)
-            chosen = [*frames[:some], frames[middle], *frames[-some:]]
+            count = min(2, middle)
+            chosen = [*frames[:count], frames[middle], *frames[-count:]]
             glows = self._glows(chosen)
-            return decayed(glows[:some], glows[some], glows[some + 1 :], self._before())
+            return decayed(glows[:count], glows[count], glows[count + 1 :], self._reference_glows())
 
         self._require(decide, shorter)
 
     def switch_off(self, under_lamp: Sequence[ExposureSettings]) -> None:
-        """Switch the lamp off after photographs under it, and see that it has gone out.
+        """Switch the lamp off after photographs under it, and check that it has gone out.
 
         Parameters
         ----------
         under_lamp
-            Of the photographs, by rising exposure.
+            Settings of the photographs, by rising exposure.
 
         Raises
         ------
         DeviceError
-            It is as bright as before.
+            The frames are as bright as before.
         """
 
         def longest_open() -> ExposureSettings:
-            lit = zip(under_lamp, self._glows(self._own(FrameRole.DAYLIGHT)), strict=True)
-            fitting = [settings for settings, seen in lit if not seen.clips]
-            return fitting[-1] if fitting else under_lamp[0]
+            glows = zip(under_lamp, self._glows(self._unit_frames(FrameRole.DAYLIGHT)), strict=True)
+            unclipped = [settings for settings, signal in glows if not signal.clips]
+            return unclipped[-1] if unclipped else under_lamp[0]
 
         def gone_out() -> bool:
-            lit = self._own(FrameRole.DAYLIGHT)[under_lamp.index(compared)]
-            return went_out(*self._glows([lit, *self._own(FrameRole.LOOK)]))
+            under_lamp_frame = self._unit_frames(FrameRole.DAYLIGHT)[under_lamp.index(compared)]
+            return went_out(*self._glows([under_lamp_frame, *self._unit_frames(FrameRole.LOOK)]))
 
         compared = self.session.choose("frame to compare with", longest_open, under_lamp[-1])
         look_again = Shoot(FrameRole.LOOK, compared)
@@ -139,14 +161,14 @@ class SanityChecks:
             )
 
     def report_delays(self, times_s: Sequence[float]) -> None:
-        """Say if frames of the decay began late, and whether the disk was why.
+        """Warn if frames of the decay began late, and whether the disk was the reason.
 
         Parameters
         ----------
         times_s
-            When each was to begin after lamp off.
+            Planned begin of each frame in seconds after lamp off.
         """
-        frames = self._own(self.role)
+        frames = self._unit_frames(self.role)
         if not frames:
             return  # the plan takes none
         # A busy camera releases late, though it was asked in time: the begins themselves count.
@@ -155,31 +177,31 @@ class SanityChecks:
         late_s = lags_s - lamp_off_s
         if late_s.max() <= LATE_S:
             return
-        said = (
+        message = (
             f"{np.count_nonzero(late_s > LATE_S)} of {len(frames)} frames began late, up to "
             f"{duration_text(float(late_s.max()))}"
         )
         disk_s = max(frame.disk_s for frame in frames)
         if disk_s > LATE_S:
-            said += (
+            message += (
                 f": the disk cannot keep up, it took up to {duration_text(disk_s)} for a frame "
                 "(use another disk, or leave more time between frames)"
             )
-        self.session.warn(f"{said}; all are kept, with the times at which they were taken")
+        self.session.warn(f"{message}; all are kept, with the times at which they were taken")
 
     def _require(
         self, decide: Callable[[], Afterglow], shorter: Sequence[ExposureSettings]
     ) -> None:
-        found = self.session.choose("after lamp off", decide, worst=Afterglow.FADING)
-        if found is Afterglow.CLIPPED:
-            found = self._closer_look(shorter)
-        found.require(self.session.warn)
+        afterglow = self.session.choose("after lamp off", decide, worst=Afterglow.FADING)
+        if afterglow is Afterglow.CLIPPED:
+            afterglow = self._closer_look(shorter)
+        afterglow.require(self.session.warn)
 
     def _closer_look(self, shorter: Sequence[ExposureSettings]) -> Afterglow:
-        """Whether it fades: the same frames, and again after a while."""
+        """Return whether the light fades: the same frames are taken again after a while."""
 
         def decide() -> Afterglow:
-            glows = self._glows(self._own(FrameRole.LOOK))
+            glows = self._glows(self._unit_frames(FrameRole.LOOK))
             return looked_at(glows[: len(shorter)], glows[len(shorter) :])
 
         self._shoot(shorter)
@@ -188,40 +210,45 @@ class SanityChecks:
         return self.session.choose("a closer look", decide, worst=Afterglow.FADING)
 
     def _shoot(self, settings: Sequence[ExposureSettings]) -> None:
-        for one in settings:
-            self.session.perform(Shoot(FrameRole.LOOK, one))
+        for exposure in settings:
+            self.session.perform(Shoot(FrameRole.LOOK, exposure))
 
-    def _own(self, role: str) -> list[FrameRecord]:
+    def _unit_frames(self, role: str) -> list[FrameRecord]:
         return [frame for frame in self.session.frames(role) if frame.unit == self.unit]
 
-    def _before(self) -> list[Glow]:
-        """Of the metering, else the begin of the first decay that is complete."""
+    def _reference_glows(self) -> list[Glow]:
+        """Return the glow of the metering, else that at the begin of the first complete decay."""
         decays = self.session.frames(self.role)
         metering = [
-            one for one in self.session.frames(FrameRole.METER) if one.unit == self.metering
+            frame for frame in self.session.frames(FrameRole.METER) if frame.unit == self.metering
         ]
         if not metering and decays[0].unit == self.unit:
             return []
         return self._glows(metering or decays[:2])
 
     def _glows(self, frames: Sequence[FrameRecord]) -> list[Glow]:
-        """Times count from the planned begin of the first of them."""
+        """Return the glow of frames, at times from the planned begin of the first of them."""
         zero_s = frames[0].start_time - frames[0].late_s
-        darks = [self._look(frame) for frame in _one_each(self.session.frames(FrameRole.DARK))]
+        darks = [
+            self._measure(frame)
+            for frame in _first_of_each_exposure(self.session.frames(FrameRole.DARK))
+        ]
         if darks and darkness(darks, frames[0].iso).light:
             darks = []  # they hold an earlier glow
         return [self._glow(frame, darks, zero_s) for frame in frames]
 
     def _glow(self, frame: FrameRecord, darks: Sequence[MeteringFrame], zero_s: float) -> Glow:
-        seen = self._look(frame)
+        measured = self._measure(frame)
         if self.background is not None:
-            without = MeteringFrame(seen.start_s, seen.exposure_s, seen.patches[:-1])
-            return glow(without, levels(seen)[-1], zero_s)
-        dark = dark_level(darks, frame.exposure_s) if darks else np.zeros(levels(seen).shape)
-        return glow(seen, dark, zero_s)
+            patches_only = MeteringFrame(
+                measured.start_s, measured.exposure_s, measured.patches[:-1]
+            )
+            return glow(patches_only, levels(measured)[-1], zero_s)
+        dark = dark_level(darks, frame.exposure_s) if darks else np.zeros(levels(measured).shape)
+        return glow(measured, dark, zero_s)
 
-    def _look(self, frame: FrameRecord) -> MeteringFrame:
-        """At a frame, the background last if there is one."""
+    def _measure(self, frame: FrameRecord) -> MeteringFrame:
+        """Return the measurement of a frame, with the background last if there is one."""
         return self._frame_cache.measure_frame(frame)
 
     @cached_property
@@ -230,6 +257,6 @@ class SanityChecks:
         return FrameCache([*self.patches, *background])
 
 
-def _one_each(frames: Sequence[FrameRecord]) -> list[FrameRecord]:
-    """The first frame of each shutter time."""
+def _first_of_each_exposure(frames: Sequence[FrameRecord]) -> list[FrameRecord]:
+    """Return the first frame of each shutter time."""
     return list({frame.exposure_s: frame for frame in reversed(frames)}.values())

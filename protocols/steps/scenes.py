@@ -1,4 +1,4 @@
-"""Still scenes: what lies where, put there by a person, photographed in a bracket of exposures."""
+"""Still scenes: arranged by a person, photographed in a bracket of exposures."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -46,18 +46,18 @@ _LVF = {
 
 @dataclass(frozen=True)
 class Arrangement:
-    """What lies where; as it stands here a bench is before and after every protocol.
+    """Arrangement of the bench; the default is that before and after every protocol.
 
     Attributes
     ----------
     stage
-        What lamp and camera see.
+        Object that lamp and camera face.
     lvf
-        Where the linear variable filter is.
+        Place of the linear variable filter.
     filter
         Name of the colour filter before the lamp.
     lamp
-        Which one the relay switches.
+        Lamp that the relay switches.
     """
 
     stage: Stage = "sample"
@@ -66,22 +66,26 @@ class Arrangement:
     lamp: LampKind = "halogen"
 
     def set_up(self, session: Session, before: "Arrangement | None", why: str) -> None:
-        """Have done by hand what differs from `before`; another lamp is not exchanged while lit.
+        """Ask for the manual steps from `before`; the lamp is switched off for another one.
 
         Parameters
         ----------
+        session
+            Session of the run.
         before
-            What lies there; None if nobody can be sure, and all is asked for.
+            Arrangement of the bench; None if it is uncertain, and all steps are asked for.
+        why
+            Reason for the arrangement, for the person.
         """
         if before is None or self.lamp != before.lamp:
             session.perform(LAMP_OFF)
         for name in ("lamp", "stage", "lvf", "filter"):
             if before is None or getattr(self, name) != getattr(before, name):
-                what, task = self._step(name)
-                session.ask(ManualStep(what, why, task))
+                instruction, task = self._step(name)
+                session.ask(ManualStep(instruction, why, task))
 
     def _step(self, name: str) -> tuple[str, str]:
-        """As one says it to a person, and to a changer."""
+        """Return the text of a step for a person, and for a changer."""
         match name:
             case "lamp":
                 return f"connect the {self.lamp} lamp to the relay", f"lamp {self.lamp}"
@@ -92,12 +96,12 @@ class Arrangement:
             case _ if self.filter is None:
                 return "take the colour filter out", "no filter"
             case _:
-                what = f"put the colour filter {self.filter} before the lamp"
-                return what, f"filter {self.filter}"
+                instruction = f"put the colour filter {self.filter} before the lamp"
+                return instruction, f"filter {self.filter}"
 
 
 def light(session: Session, warm_up_s: float) -> None:
-    """Lamp on, and steady; one that has been on since the unit before is."""
+    """Switch the lamp on and wait until it is steady, unless it burns since the unit before."""
     if not session.rig[LAMP].is_on():
         face_lamp(session)
         session.perform(LAMP_ON)
@@ -105,8 +109,9 @@ def light(session: Session, warm_up_s: float) -> None:
 
 
 def left_by(before: Arrangement, session: Session) -> Arrangement | None:
-    """How the unit before left the bench; None in a run that was resumed, when it may have been
-    put to another use meanwhile.
+    """Return the arrangement after the unit before; None in a resumed run.
+
+    The bench may have been put to another use before a run is resumed.
     """
 
     def decide() -> bool:
@@ -120,7 +125,7 @@ def left_by(before: Arrangement, session: Session) -> Arrangement | None:
 
 @dataclass(frozen=True)
 class Arranged:
-    """A unit that needs the bench otherwise than the unit before it left it."""
+    """A unit that needs another arrangement of the bench than the unit before it."""
 
     unit: Unit
     now: Arrangement
@@ -129,67 +134,67 @@ class Arranged:
 
     @property
     def name(self) -> str:
-        """Of the unit."""
+        """Name of the unit."""
         return self.unit.name
 
     def run(self, session: Session) -> None:
-        """Have it arranged, then do the unit."""
+        """Ask for the arrangement, then run the unit."""
         self.now.set_up(session, self.before, self.why)
         self.unit.run(session)
 
 
 @dataclass(frozen=True)
 class Prepared:
-    """A unit before which something else is done by hand."""
+    """A unit with another manual step before it."""
 
     unit: Unit
     step: ManualStep
 
     @property
     def name(self) -> str:
-        """Of the unit."""
+        """Name of the unit."""
         return self.unit.name
 
     def run(self, session: Session) -> None:
-        """Have it done, then do the unit."""
+        """Ask for the manual step, then run the unit."""
         session.ask(self.step)
         self.unit.run(session)
 
 
 @dataclass(frozen=True)
 class PutBackUnit:
-    """The bench as it was found; a unit of its own, so that nothing is measured again for it."""
+    """The bench put back; a unit of its own, so that nothing is measured again for it."""
 
     before: Arrangement
     name: str = "put-back"
 
     def run(self, session: Session) -> None:
-        """Lamp off, filters and card away."""
+        """Switch the lamp off, have filters and card taken away."""
         session.perform(LAMP_OFF)
-        before = left_by(self.before, session)
-        Arrangement().set_up(session, before, "the next measurement finds the bench as usual")
+        arrangement = left_by(self.before, session)
+        Arrangement().set_up(session, arrangement, "the next measurement finds the bench as usual")
 
 
-#: Shutter times to look with, as fractions of the longest.
+#: Shutter times of metering, as fractions of the longest.
 LADDER = (1 / 4096, 1 / 512, 1 / 64, 1 / 8, 1)
-#: A look that fills so much of the range is the last: its noise does not matter any more.
+#: Fraction of the range that ends metering: noise does not matter there.
 ENOUGH = 0.05
-#: The second exposure of a bracket, for the dim parts, in which bright ones clip.
+#: Ratio of a bracket's second exposure to the first, for dim parts; bright ones clip in it.
 LONGER = 8.0
 
 
 @dataclass(frozen=True)
 class Bracketing:
-    """How to photograph a scene.
+    """Bracket of exposures of a scene.
 
     Attributes
     ----------
     camera
-        ISO and aperture.
+        Sensitivity and aperture of the camera.
     longest_s
-        No exposure is longer.
+        Longest exposure in seconds.
     repeats
-        Photographs at each exposure.
+        Number of photographs at each exposure.
     """
 
     camera: CameraSettings
@@ -197,11 +202,11 @@ class Bracketing:
     repeats: int
 
     def settings(self, exposure_s: float) -> ExposureSettings:
-        """Camera settings with that shutter time."""
+        """Return the camera settings with that shutter time."""
         return ExposureSettings(exposure_s, self.camera.iso, self.camera.f_number)
 
     def dark_exposures_s(self, offers: CameraOffers) -> list[float]:
-        """Shutter time of each dark frame."""
+        """Return the shutter time of each dark frame in seconds."""
         exposures_s = {
             offers.exposure_at_most(self.longest_s * part) for part in (1 / 64, 1 / 8, 1)
         }
@@ -212,20 +217,24 @@ class Bracketing:
 
         Parameters
         ----------
+        session
+            Session of the run.
         unit, role
-            Of the frames.
+            Unit and role of the frames.
         lamp
-            What to call the light that should be there.
+            Name of the expected lamp, for messages.
 
         Raises
         ------
         DeviceError
-            It is dark.
+            The scene is dark.
         """
         offers = session.rig[CAMERA].offers()
         for exposure_s in self._ladder(offers):
             session.perform(Shoot(FrameRole.LOOK, self.settings(exposure_s)))
-            if session.choose("bright enough", lambda: self._enough(session, unit), worst=False):
+            if session.choose(
+                "bright enough", lambda: self._is_bright_enough(session, unit), worst=False
+            ):
                 break
         # That takes longest: both exposures of a bracket, and the longer one as long as it may be.
         worst_s = offers.exposure_at_most(self.longest_s / LONGER)
@@ -240,33 +249,33 @@ class Bracketing:
     def _ladder(self, offers: CameraOffers) -> Sequence[float]:
         return sorted({offers.exposure_at_most(self.longest_s * fraction) for fraction in LADDER})
 
-    def _enough(self, session: Session, unit: str) -> bool:
-        return _seen(_looks(session, unit)[-1]).fraction > ENOUGH
+    def _is_bright_enough(self, session: Session, unit: str) -> bool:
+        return _measure_brightness(_metering_frames(session, unit)[-1]).fraction > ENOUGH
 
     def _exposure_s(self, session: Session, unit: str, lamp: str) -> float:
-        """Shutter time at which the brightest fills as much of the range as it should."""
-        offers, looks = session.rig[CAMERA].offers(), _looks(session, unit)
-        seen = [_seen(frame) for frame in looks]
-        visible = [one for one in seen if one.visible]
-        if not visible:
+        """Return the shutter time at which the brightest pixels fill the target fraction."""
+        offers, frames = session.rig[CAMERA].offers(), _metering_frames(session, unit)
+        brightness = [_measure_brightness(frame) for frame in frames]
+        detected = [reading for reading in brightness if reading.visible]
+        if not detected:
             raise DeviceError(
-                f"{unit}: dark even in {duration_text(looks[-1].exposure_s)}: the {lamp} lamp did "
+                f"{unit}: dark even in {duration_text(frames[-1].exposure_s)}: the {lamp} lamp did "
                 "not light (check its bulb, its plug and the contact of its relay), or what should "
                 "be seen is not in its place"
             )
-        open_ones = [one for one in visible if not one.clips]
-        if not open_ones:
+        unclipped = [reading for reading in detected if not reading.clips]
+        if not unclipped:
             session.warn(
                 f"{unit}: even the shortest exposure clips; lower camera.iso or close the aperture"
             )
             return offers.exposures_s[0]
-        best = open_ones[-1]
-        wanted_s = best.exposure_s * TARGET / best.fraction
-        return offers.exposure_at_most(min(wanted_s, self.longest_s))
+        best = unclipped[-1]
+        target_s = best.exposure_s * TARGET / best.fraction
+        return offers.exposure_at_most(min(target_s, self.longest_s))
 
 
 @dataclass(frozen=True)
-class _Seen:
+class _Brightness:
     """The brightest 0.5 % of a frame's pixels, as a fraction of the range."""
 
     exposure_s: float
@@ -275,12 +284,12 @@ class _Seen:
     clips: bool
 
 
-def _seen(frame: FrameRecord) -> _Seen:
+def _measure_brightness(frame: FrameRecord) -> _Brightness:
     measured = measure(read_raw(frame.path))
     channels = list(measured.channels.values())
     brightest = max(channels, key=lambda channel: channel.peak)
     noise_dn = SEEN_SIGMA * brightest.sigma * np.sqrt(brightest.n)
-    return _Seen(
+    return _Brightness(
         exposure_s=frame.exposure_s,
         fraction=brightest.peak / measured.range_dn,
         visible=brightest.mean > max(SEEN_SIGMA * brightest.sigma, SEEN_DN)
@@ -289,19 +298,19 @@ def _seen(frame: FrameRecord) -> _Seen:
     )
 
 
-def _looks(session: Session, unit: str) -> list[FrameRecord]:
+def _metering_frames(session: Session, unit: str) -> list[FrameRecord]:
     return [frame for frame in session.frames(FrameRole.LOOK) if frame.unit == unit]
 
 
 @dataclass(frozen=True)
 class StillDarkUnit:
-    """Dark frames at the exposures to come."""
+    """Dark frames at the later exposures."""
 
     bracketing: Bracketing
     name: str = "dark"
 
     def run(self, session: Session) -> None:
-        """Warm the camera up, then photograph darkness."""
+        """Warm the camera up, then photograph in the dark."""
         session.wait_until_warm("camera")
         scene = self.bracketing
         exposures_s = scene.dark_exposures_s(session.rig[CAMERA].offers())
@@ -319,15 +328,15 @@ class SceneUnit:
     Attributes
     ----------
     bracketing
-        How it is photographed.
+        Bracketing of the scene's photographs.
     name, role
-        Of the unit, and of its frames.
+        Name of the unit, and role of its frames.
     wanted, before
-        What lies where now, and in the unit before.
+        Arrangements of this unit and of the unit before.
     why
-        To arrange it.
+        Reason for the arrangement, for the person.
     mercury_warm_up_s
-        Of the lamp that the rig file does not know.
+        Warm-up time in seconds of the mercury lamp, which the rig file does not have.
     """
 
     bracketing: Bracketing
@@ -339,7 +348,7 @@ class SceneUnit:
     mercury_warm_up_s: float = 0.0
 
     def run(self, session: Session) -> None:
-        """Arrange, light, photograph, and see whether it shows what it should."""
+        """Arrange, light, photograph, and check the photographs."""
         session.wait_until_warm("camera")
         self.arrange(session)
         light(session, self.warm_up_s(session))
@@ -347,23 +356,23 @@ class SceneUnit:
         self.check(session)
 
     def arrange(self, session: Session) -> None:
-        """Have everything put in its place."""
+        """Ask for the arrangement."""
         self.wanted.set_up(session, left_by(self.before, session), self.why)
 
     def warm_up_s(self, session: Session) -> float:
-        """Until the lamp in use is steady."""
+        """Return the warm-up time of the lamp in use, in seconds."""
         if self.wanted.lamp == "mercury":
             return self.mercury_warm_up_s
         return session.rig.warm_up_s("lamp")
 
     def check(self, session: Session) -> None:
-        """Refuse pictures of something else; here none are."""
+        """Refuse pictures of another scene; by default none are."""
 
     def own(self, session: Session) -> list[FrameRecord]:
-        """Its frames."""
+        """Return the unit's frames."""
         return frames_of(session, self.role, self.name)
 
 
 def frames_of(session: Session, role: str, unit: str) -> list[FrameRecord]:
-    """Frames of one unit."""
+    """Return the frames of one unit."""
     return [frame for frame in session.frames(role) if frame.unit == unit]

@@ -1,4 +1,4 @@
-"""What frames of a filter's strip are held against while the bench is still as it was."""
+"""Checks of frames of a filter's strip while the bench is still arranged for them."""
 
 from collections.abc import Sequence
 
@@ -9,46 +9,50 @@ from labrig.optics import Strip
 from labrig.reduce import Exposure, find_strip, read_hdr_frame, strip_profile
 from labrig.results import StripProfile
 
-#: Scenes are alike if this fraction of the strip, in per cent, agrees to that; two gels do not.
+#: Percentage of the strip that agrees within this limit in like scenes; two gels do not.
 NEARLY_ALL, ALIKE = 90, 0.02
-#: Dimmer than this fraction of the brightest, a place along the strip says nothing of that.
+#: Fraction of the brightest place below which a place along the strip is not compared.
 BRIGHT = 0.05
 
 
 def strip_found(frames: Sequence[Exposure]) -> str:
-    """Where the strip is, in words.
+    """Return the place of the strip, in words.
 
     Raises
     ------
     DataError
-        As `find_strip`.
+        No strip is found, see `find_strip`.
     """
     return str(find_strip(read_hdr_frame(frames)))
 
 
 def lines_found(
-    frames: Sequence[Exposure], of_strip: Sequence[Exposure], rising: bool | None
+    frames: Sequence[Exposure], strip_frames: Sequence[Exposure], rising: bool | None
 ) -> str:
-    """Which lines are seen, in words.
+    """Return the mercury lines that are found, in words.
 
     Raises
     ------
     FitError
-        As `locate_lines`: none are, or the filter is the wrong way round.
+        No lines are found, or the filter is the wrong way round, see `locate_lines`.
     """
-    profile = _profile(frames, _strip(of_strip))
+    profile = _profile(frames, _strip(strip_frames))
     return str(locate_lines(profile.position, profile.value_dn_per_s, rising=rising))
 
 
 def look_alike(
-    frames: Sequence[Exposure], others: Sequence[Exposure], of_strip: Sequence[Exposure]
+    frames: Sequence[Exposure],
+    previous_frames: Sequence[Exposure],
+    strip_frames: Sequence[Exposure],
 ) -> bool:
-    """Whether the strip looks the same in two sets of frames, brightness included."""
-    strip = _strip(of_strip)
-    one, other = (_profile(some, strip).value_dn_per_s for some in (frames, others))
-    bright = other > BRIGHT * other.max(axis=0)
-    apart = np.abs(one[bright] / other[bright] - 1)
-    return bool(np.percentile(apart, NEARLY_ALL) < ALIKE)
+    """Return whether the strip looks the same in two sets of frames, brightness included."""
+    strip = _strip(strip_frames)
+    present, previous = (
+        _profile(exposures, strip).value_dn_per_s for exposures in (frames, previous_frames)
+    )
+    bright = previous > BRIGHT * previous.max(axis=0)
+    deviation = np.abs(present[bright] / previous[bright] - 1)
+    return bool(np.percentile(deviation, NEARLY_ALL) < ALIKE)
 
 
 def _strip(frames: Sequence[Exposure]) -> Strip:

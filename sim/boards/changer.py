@@ -6,13 +6,13 @@ from labrig.errors import UsageError
 
 
 class ChangerBoard:
-    """Answers `done`, or `cannot …`, to every line.
+    """Board that answers `done`, or `cannot …`, to every line.
 
     Parameters
     ----------
     tasks
-        What the changer can do, by its command line. Of `filter NAME` it is given what
-        stands for the word in capitals; a UsageError says what they cannot.
+        Tasks of the changer by their command line. A task such as `filter NAME` receives the text
+        in place of the word in capitals; it raises UsageError where it is impossible.
     """
 
     def __init__(self, tasks: Mapping[str, Callable[..., None]]) -> None:
@@ -20,7 +20,7 @@ class ChangerBoard:
         self._line = b""
 
     def receive(self, data: bytes) -> bytes:
-        """What they answer, in order, for these bytes."""
+        """Return the changer's answers to these bytes, in order."""
         answer = b""
         for byte in data:
             if byte != ord("\n"):
@@ -39,12 +39,12 @@ class ChangerBoard:
         return "done\n"
 
     def do(self, task: str) -> None:
-        """Do what one line says.
+        """Do the task of one line.
 
         Raises
         ------
         UsageError
-            They do not know how.
+            The changer does not know the task.
         """
         for pattern, act in self._tasks.items():
             words, _, variable = pattern.rpartition(" ")

@@ -3,7 +3,7 @@
 from collections.abc import Callable
 from typing import Literal
 
-#: What a board says to the query FF: nothing, lines of text, or a byte a relay.
+#: Answer of a board to the query FF: nothing, lines of text, or a byte for each relay.
 Answers = Literal["nothing", "text", "bytes"]
 
 START, QUERY = 0xA0, 0xFF
@@ -11,16 +11,16 @@ COMMAND_BYTES = 4
 
 
 class LcusBoard:
-    """Understands `A0 relay op sum`, relays counted from 1, and the query FF.
+    """Board that obeys `A0 relay op sum`, relays counted from 1, and the query FF.
 
     Parameters
     ----------
     relays
         Number of relays.
     on_change
-        Called with (relay, on) whenever a contact moves; the first relay is 1.
+        Function that is called with (relay, on) whenever a contact moves; the first relay is 1.
     answers
-        To the query. The first answer after a change is what was true before it.
+        Form of the answer to the query. The first answer after a change has the states before it.
     """
 
     def __init__(
@@ -30,10 +30,10 @@ class LcusBoard:
         self._on_change = on_change
         self._answers = answers
         self._command = b""
-        self._told = tuple(self.states)
+        self._reported = tuple(self.states)
 
     def receive(self, data: bytes) -> bytes:
-        """What the board sends back, in order, for these bytes."""
+        """Return the board's answers to these bytes, in order."""
         answer = b""
         for byte in data:
             if self._command or byte == START:
@@ -47,22 +47,22 @@ class LcusBoard:
 
     def _obey(self, command: bytes) -> None:
         relay, operation, checksum = command[1:]
-        known = 1 <= relay <= len(self.states) and operation in (0, 1)
-        if known and sum(command[:3]) & 0xFF == checksum:
+        is_valid = 1 <= relay <= len(self.states) and operation in (0, 1)
+        if is_valid and sum(command[:3]) & 0xFF == checksum:
             on = operation == 1
             if self.states[relay - 1] != on:
                 self.states[relay - 1] = on
                 self._on_change(relay, on)
 
     def _answer(self) -> bytes:
-        told, self._told = self._told, tuple(self.states)
+        states, self._reported = self._reported, tuple(self.states)
         match self._answers:
             case "nothing":
                 return b""
             case "bytes":
-                return bytes(told)
+                return bytes(states)
             case "text":
                 return "".join(
                     f"CH{relay}: {'ON ' if on else 'OFF'}\r\n"
-                    for relay, on in enumerate(told, start=1)
+                    for relay, on in enumerate(states, start=1)
                 ).encode("ascii")

@@ -1,6 +1,6 @@
 """A Pololu Maestro servo controller: binary commands in, pulses out, errors that send it home.
 
-Understands the commands of the compact and of Pololu's protocol that set and read one channel.
+The board obeys the commands of the compact and of Pololu's protocol that set and read one channel.
 """
 
 import math
@@ -12,7 +12,7 @@ from labrig.clock import VirtualClock
 CHANNELS = 24
 DEVICE_NUMBER = 12
 QUARTER_US = 0.25e-6
-#: What every channel can be set to; 0 for no pulses.
+#: Pulses to which every channel can be set; 0 for no pulses.
 RANGE_S = (500e-6, 2500e-6)
 #: Units of the limits: 0.25 µs per 10 ms, and that per 80 ms.
 SPEED_S = 0.01
@@ -24,7 +24,7 @@ PROTOCOL_ERROR, TIME_OUT_ERROR = 1 << 4, 1 << 5
 
 
 class Pulse(NamedTuple):
-    """From `at_s` on the channel goes to pulses of `width_s`, 0 for none, evenly in `ramp_s`."""
+    """Change of a channel to pulses of `width_s`, 0 for none, evenly in `ramp_s` from `at_s` on."""
 
     at_s: float
     width_s: float
@@ -32,17 +32,17 @@ class Pulse(NamedTuple):
 
 
 class MaestroBoard:
-    """Twenty-four channels.
+    """Board with twenty-four channels.
 
     Parameters
     ----------
     clock
-        The room's.
+        The room's clock.
     homes
-        Channel → pulse in seconds at which it starts and to which any error sends it; all others
-        send none.
+        Pulse in seconds by channel, at which the channel starts and to which any error sends it;
+        all others send none.
     time_out_s
-        An error, too, if no command comes for so long; None: never.
+        Time without a command after which there is an error, too, in seconds; None: never.
     """
 
     def __init__(
@@ -60,17 +60,17 @@ class MaestroBoard:
         }
 
     def start_at(self, channel: int, width_s: float) -> None:
-        """What a channel sends when the room is opened, instead of its home."""
+        """Set the pulse of a channel when the room is opened, instead of its home."""
         self._pulses[channel] = [Pulse(0.0, width_s, 0.0)]
 
     def pulses(self, channel: int) -> Sequence[Pulse]:
-        """All changes of a channel's pulse up to now."""
-        self._look_at_the_time()
+        """Return all changes of a channel's pulse up to now."""
+        self._check_time_out()
         return self._pulses[channel]
 
     def receive(self, data: bytes) -> bytes:
-        """What the board sends back, in order, for these bytes."""
-        self._look_at_the_time()
+        """Return the board's answers to these bytes, in order."""
+        self._check_time_out()
         answer = b""
         for byte in data:
             begins = byte >= 0x80
@@ -84,15 +84,17 @@ class MaestroBoard:
 
     def _completed(self) -> bytes:
         """Obey the command if it is complete."""
-        named = self._command[0] == 0xAA
-        if named and len(self._command) < 3:
+        is_addressed = self._command[0] == 0xAA
+        if is_addressed and len(self._command) < 3:
             return b""
-        code, *data = [self._command[2] | 0x80, *self._command[3:]] if named else self._command
+        code, *data = (
+            [self._command[2] | 0x80, *self._command[3:]] if is_addressed else self._command
+        )
         if code == 0xAA or len(data) < DATA_BYTES.get(code, 0):
             return b""
-        meant = not named or self._command[1] == DEVICE_NUMBER
+        is_own = not is_addressed or self._command[1] == DEVICE_NUMBER
         self._command = []
-        if not meant:
+        if not is_own:
             return b""
         if code not in DATA_BYTES or (data and data[0] >= CHANNELS):
             self._err(PROTOCOL_ERROR, self._clock.now())
@@ -126,7 +128,7 @@ class MaestroBoard:
         self._pulses[channel].append(Pulse(now_s, width_s, ramp_s))
 
     def _ramp_s(self, channel: int, change_s: float) -> float:
-        """Duration of a change: even, or speeding up and slowing down, or both."""
+        """Return the duration of a change: even, or speeding up and slowing down, or both."""
         quarters = change_s / QUARTER_US
         speed = self._limits.get((0x87, channel), 0) / SPEED_S or math.inf
         acceleration = self._limits.get((0x89, channel), 0) / ACCELERATION_S2 or math.inf
@@ -137,17 +139,17 @@ class MaestroBoard:
         return quarters / speed + speed / acceleration
 
     def _width_s(self, channel: int) -> float:
-        *before, last = self._pulses[channel]
-        if not (before and self._is_ramping(channel)):
+        *earlier, last = self._pulses[channel]
+        if not (earlier and self._is_ramping(channel)):
             return last.width_s
-        gone = (self._clock.now() - last.at_s) / last.ramp_s
-        return before[-1].width_s + gone * (last.width_s - before[-1].width_s)
+        progress = (self._clock.now() - last.at_s) / last.ramp_s
+        return earlier[-1].width_s + progress * (last.width_s - earlier[-1].width_s)
 
     def _is_ramping(self, channel: int) -> bool:
         last = self._pulses[channel][-1]
         return self._clock.now() < last.at_s + last.ramp_s
 
-    def _look_at_the_time(self) -> None:
+    def _check_time_out(self) -> None:
         silent_until_s = self._heard_s + self._time_out_s
         if self._clock.now() > silent_until_s:
             self._err(TIME_OUT_ERROR, silent_until_s)

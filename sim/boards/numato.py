@@ -3,23 +3,23 @@
 from collections.abc import Callable, Mapping
 
 CHANNELS = "0123456789ABCDEFGHIJKLMNOPQRSTUV"
-#: The converter's largest number, and what it stands for: the supply from the USB port.
+#: The converter's largest number, and its voltage: the supply from the USB port.
 FULL, SUPPLY_V = 1023, 5.0
 #: Analogue inputs; one with nothing on it floats up.
 INPUTS = 4
 
 
 class NumatoBoard:
-    """Understands `relay on|off|read N`, `relay readall|writeall`, `adc read N`, `ver`, `id get`.
+    """Board with `relay on|off|read N`, `relay readall|writeall`, `adc read N`, `ver`, `id get`.
 
     Parameters
     ----------
     relays
         Number of relays.
     on_change
-        Called with (relay, on) whenever a contact moves.
+        Function that is called with (relay, on) whenever a contact moves.
     volts
-        Analogue input → what is there now; all others are open.
+        Function that returns the present voltage, by analogue input; all others are open.
     """
 
     def __init__(
@@ -34,12 +34,12 @@ class NumatoBoard:
         self._typed = ""
 
     def receive(self, data: bytes) -> bytes:
-        """What the board sends back, in order, for these bytes."""
+        """Return the board's answers to these bytes, in order."""
         answer = ""
         for character in data.decode("ascii", errors="replace"):
             if character == "\r":
-                said = self._obey(self._typed)
-                answer += "\n\r" + (f"{said}\n\r" if said else "") + ">"
+                result = self._obey(self._typed)
+                answer += "\n\r" + (f"{result}\n\r" if result else "") + ">"
                 self._typed = ""
             else:
                 self._typed += character

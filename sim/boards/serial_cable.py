@@ -1,4 +1,4 @@
-"""The USB cable between the PC and a serial board, and what can be wrong with it."""
+"""The USB cable between the PC and a serial board, with its faults."""
 
 from collections.abc import Sequence
 from typing import Protocol
@@ -12,7 +12,7 @@ class Board(Protocol):
     """The far end of a serial line."""
 
     def receive(self, data: bytes) -> bytes:
-        """What it sends back for these bytes."""
+        """Return the board's answer to these bytes."""
 
 
 class SerialCable:
@@ -21,15 +21,15 @@ class SerialCable:
     Parameters
     ----------
     board
-        Has its own power supply: it does not notice that the cable is out.
+        Board with its own power supply, which does not notice that the cable is out.
     clock
-        The room's.
+        The room's clock.
     unplugged
-        When the cable is out.
+        Times at which the cable is out.
     silent
-        When the board neither hears nor answers.
+        Times at which the board neither receives nor answers.
     echo_lost
-        When the board's echo does not arrive; the rest of its answer does.
+        Times at which the board's echo does not arrive; the rest of its answer does.
     """
 
     def __init__(
@@ -50,25 +50,27 @@ class SerialCable:
     @property
     def is_plugged(self) -> bool:
         """Whether the cable is in now."""
-        return not self._now(self._unplugged)
+        return not self._is_any_on(self._unplugged)
 
     @property
     def plugging(self) -> int:
-        """How often the cable was pulled: a port that was open before that is dead for good."""
+        """Number of pulls of the cable: a port that was open before is dead for good."""
         now_s = self._clock.now()
         return sum(out.at <= now_s for out in self._unplugged)
 
     def has_held(self, plugging: int) -> bool:
-        """Whether the cable is in, and has been since it had been pulled so often."""
+        """Return whether the cable is in, and has been since that number of pulls."""
         return not self._unplugged or (self.is_plugged and self.plugging == plugging)
 
     def carry(self, data: bytes) -> bytes:
-        """Bytes to the board; what comes back for them."""
-        if self._now(self._silent):
+        """Carry bytes to the board; return its answer."""
+        if self._is_any_on(self._silent):
             return b""
         answer = self._board.receive(data)
-        return answer.removeprefix(data.rstrip(b"\r")) if self._now(self._echo_lost) else answer
+        return (
+            answer.removeprefix(data.rstrip(b"\r")) if self._is_any_on(self._echo_lost) else answer
+        )
 
-    def _now(self, whens: Sequence[FaultTime]) -> bool:
+    def _is_any_on(self, spans: Sequence[FaultTime]) -> bool:
         now_s = self._clock.now()
-        return any(when.is_on(now_s) for when in whens)
+        return any(span.is_on(now_s) for span in spans)

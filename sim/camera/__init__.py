@@ -1,8 +1,8 @@
 """A simulated camera on a simulated USB cable, or on the loopback network.
 
-It is a Canon EOS 5D Mark II, or one that knows nothing but the PTP standard.
+It is a Canon EOS 5D Mark II, or one that implements nothing but the PTP standard.
 
-`SimulatedCamera(...).backend` is given to pyusb, which then talks to it packet by packet;
+`SimulatedCamera(...).backend` is given to pyusb, which then exchanges packets with it;
 `PtpIpServer` serves `SimulatedCamera(...).responder` to any program on this PC.
 """
 

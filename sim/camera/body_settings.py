@@ -1,4 +1,4 @@
-"""What somebody has set on the simulated camera's body by hand: `simulation.camera` of a rig."""
+"""Manual settings of the simulated camera's body: `simulation.camera` of a rig file."""
 
 from typing import Annotated, Literal, Self
 
@@ -18,22 +18,31 @@ def _on_the_dial(iso: object) -> object:
 
 
 class BodySettings(BaseModel):
-    """Dial, lens switch and menus; as a careful person sets them for photometry.
+    """Dial, lens switch and menus of the simulated camera; by default set for photometry.
 
     Attributes
     ----------
     body
-        Which camera it is: a Canon EOS, or one that knows nothing but the PTP standard.
+        Kind of the camera: `eos`, a Canon EOS, or `standard`, one that has the PTP standard only.
     exposure_mode
-        Where the dial stands.
+        Position of the mode dial; protocols need `M`.
     autofocus
-        The switch on the lens.
+        Whether the lens's switch is at autofocus.
     iso
-        As the dial says it.
+        ISO sensitivity that is set on the camera when labrig connects, 100 to 6400 in thirds of a
+        stop, or `auto`.
     auto_power_off
-        Without a word from the host for so long, the camera switches itself off; 0: never.
-    long_exposure_noise_reduction, highlight_tone_priority, mirror_lock_up
-        Custom functions of an EOS; only reported, their effect is not simulated.
+        Time without a command from the host after which the camera switches itself off, for example
+        `1 min`; `0 s`: never.
+    long_exposure_noise_reduction
+        Whether the EOS's custom function of this name is on. It is reported; its effect is not
+        simulated.
+    highlight_tone_priority
+        Whether the EOS's custom function of this name is on. It is reported; its effect is not
+        simulated.
+    mirror_lock_up
+        Whether the EOS's custom function of this name is on. It is reported; its effect is not
+        simulated.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")

@@ -1,4 +1,4 @@
-"""A camera on a simulated cable: the parts put together."""
+"""A camera on a simulated cable, composed of its parts."""
 
 from labrig.clock import VirtualClock
 
@@ -32,27 +32,27 @@ _STANDARD_IDS = (0x1209, 0x0001)
 class SimulatedCamera:
     """A camera whose sensor stands in a simulated room: a Canon EOS 5D Mark II, or a standard one.
 
-    Its state lives as long as this object: a second connection finds the session that the first
-    one left open.
+    Its state lives as long as this object: a second connection finds the session that the first one
+    left open.
 
     Parameters
     ----------
     clock
-        The room's clock; every transfer lets some of its time pass.
+        The room's clock; every transfer takes some of its time.
     sensor
-        Makes the RAW files, which are DNG.
+        Sensor that makes the RAW files, which are DNG.
     serial
         Serial number in PTP's DeviceInfo.
     seed
-        Of the shutter's jitter.
+        Seed of the shutter's jitter.
     shutter_lag_s, shutter_jitter_s
         Mean and standard deviation of the time from a full press to the open shutter.
     faults
-        What goes wrong.
+        Faults of the camera and its cable.
     body
-        Which camera it is, and what somebody has set by hand.
+        Kind of the camera, and its manual settings.
     habits
-        Of the maker of a standard camera.
+        Peculiarities of the maker of a standard camera.
     """
 
     def __init__(
@@ -85,7 +85,7 @@ class SimulatedCamera:
 
     @property
     def backend(self) -> CameraBackend:
-        """For `usb.core.find(backend=...)`."""
+        """Backend for `usb.core.find(backend=...)`."""
         return self._backend
 
     @property
@@ -95,12 +95,12 @@ class SimulatedCamera:
 
     @property
     def files(self) -> tuple[StoredObject, ...]:
-        """What the camera keeps now, on cards and in memory."""
+        """Files in the camera now, on cards and in memory."""
         return self._objects.all()
 
     def lose_host(self) -> None:
-        """The program that uses the camera is killed: the system closes its connections.
+        """Kill the program that uses the camera: the system closes its connections.
 
-        The camera is not told, so its session stays open.
+        The camera does not notice, so its session stays open.
         """
         self._backend.close_all()

@@ -1,7 +1,7 @@
-"""What the camera's exposure codes mean: eight steps a stop, and the true APEX value behind each.
+"""The camera's exposure codes: eight steps a stop, and the actual APEX value behind each.
 
-A dial says 1/60 s or f/5.6; the shutter does 2⁻⁶ s and the diaphragm 2^2.5. The difference is real
-(up to 7 %) and stays in the simulated photographs.
+A dial shows 1/60 s or f/5.6; the shutter's actual time is 2⁻⁶ s and the diaphragm's f-number 2^2.5.
+The difference (up to 7 %) is real and stays in the simulated photographs.
 """
 
 import math
@@ -40,35 +40,35 @@ ISO_CODES = _codes(_ISO_100, 0x78)
 
 
 def iso_code(iso: int | Literal["auto"]) -> int:
-    """Code of a number on the dial."""
+    """Return the code of a sensitivity on the dial."""
     return ISO_AUTO if iso == "auto" else ISO_CODES[ISO_LABELS.index(iso)]
 
 
 def _stops(code: int, zero: int) -> Fraction:
-    """Stops between two codes, exact in thirds."""
+    """Return the stops between two codes, exact in thirds."""
     eighths = code - zero
     return eighths // 8 + Fraction(_THIRD_OF_EIGHTH[eighths % 8], 3)
 
 
 def exposure_s(tv_code: int) -> float:
-    """Seconds for which the shutter is really open: 2^-Tv; without end at bulb."""
+    """Return the actual shutter time in seconds: 2^-Tv; infinite at bulb."""
     if tv_code == TV_BULB:
         return math.inf
     return float(2.0 ** -_stops(tv_code, _TV_ONE_SECOND))
 
 
 def f_number(av_code: int) -> float:
-    """True relative aperture: 2^(Av/2)."""
+    """Return the actual relative aperture: 2^(Av/2)."""
     return float(2.0 ** (_stops(av_code, _AV_F_1) / 2))
 
 
 def iso(iso_code: int) -> int:
-    """Sensitivity as the dial says it."""
+    """Return the sensitivity on the dial."""
     if iso_code == ISO_AUTO:
         return AUTO_AT_M
     return ISO_LABELS[int(_stops(iso_code, _ISO_100) * 3)]
 
 
 def true_f_number(label: float) -> float:
-    """Relative aperture behind a label in thirds of a stop: 2^2.5 behind f/5.6."""
+    """Return the actual relative aperture of a label in thirds of a stop: 2^2.5 for f/5.6."""
     return float(2.0 ** (round(6 * math.log2(label)) / 6))

@@ -17,7 +17,7 @@ _ASSOCIATION_FORMAT, _GENERIC_FOLDER = 0x3001, 1
 
 
 def ptp_string(text: str) -> bytes:
-    """Length in characters with the final zero, then UTF-16; an empty string is one zero byte."""
+    """Return the length with the final zero, then UTF-16; an empty string is one zero byte."""
     if not text:
         return b"\0"
     encoded = (text + "\0").encode("utf-16-le")
@@ -25,19 +25,19 @@ def ptp_string(text: str) -> bytes:
 
 
 def ptp_array(values: Iterable[int], item: str) -> bytes:
-    """Count, then the items in the struct format `item`."""
+    """Return the count, then the items in the struct format `item`."""
     items = list(values)
     return struct.pack(f"<I{len(items)}{item}", len(items), *items)
 
 
 def ptp_time(wall_s: float) -> str:
-    """YYYYMMDDThhmmss of seconds since 1970."""
+    """Return YYYYMMDDThhmmss of seconds since 1970."""
     return datetime.fromtimestamp(wall_s, UTC).strftime("%Y%m%dT%H%M%S")
 
 
 @dataclass(frozen=True)
 class DeviceInfo:
-    """Who the camera is and what it understands."""
+    """Identity and abilities of the camera."""
 
     manufacturer: str
     model: str
@@ -51,7 +51,7 @@ class DeviceInfo:
     vendor_extension: int
 
     def encode(self) -> bytes:
-        """The DeviceInfo dataset."""
+        """Return the DeviceInfo dataset."""
         standard_version, vendor_version, functional_mode = 100, 200, 0
         return b"".join(
             (
@@ -73,7 +73,7 @@ class DeviceInfo:
 
 @dataclass(frozen=True)
 class ObjectInfo:
-    """What is known of one object: a photograph or a folder."""
+    """Properties of one object: a photograph or a folder."""
 
     storage_id: int
     object_format: int
@@ -83,7 +83,7 @@ class ObjectInfo:
     captured: str
 
     def encode(self) -> bytes:
-        """The ObjectInfo dataset; no thumbnail, image size left to the file itself."""
+        """Return the ObjectInfo dataset, without thumbnail and image size."""
         association = _GENERIC_FOLDER if self.object_format == _ASSOCIATION_FORMAT else 0
         return (
             struct.pack("<IHHI", self.storage_id, self.object_format, 0, self.size)
@@ -98,7 +98,7 @@ class ObjectInfo:
 
 
 def storage_info(capacity_bytes: int, free_bytes: int) -> bytes:
-    """The StorageInfo dataset of a memory card."""
+    """Return the StorageInfo dataset of a memory card."""
     return (
         struct.pack("<HHH", _REMOVABLE_RAM, _DCF, 0)
         + struct.pack("<QQI", capacity_bytes, free_bytes, _UNKNOWN_COUNT)
@@ -108,11 +108,11 @@ def storage_info(capacity_bytes: int, free_bytes: int) -> bytes:
 
 
 def string_prop_desc(code: int, value: str, access: int) -> bytes:
-    """DevicePropDesc of a text, without a form."""
+    """Return the DevicePropDesc of a text, without a form."""
     text = ptp_string(value)
     return struct.pack("<HHB", code, _STRING, access) + text + text + b"\0"
 
 
 def uint32_prop_desc(code: int, value: int) -> bytes:
-    """DevicePropDesc of a read-only number, without a form."""
+    """Return the DevicePropDesc of a read-only number, without a form."""
     return struct.pack("<HHBIIB", code, _UINT32, READ_ONLY, value, value, 0)

@@ -1,32 +1,32 @@
-"""What can be wrong with a simulated camera or its cable."""
+"""Faults of a simulated camera or its cable."""
 
 from dataclasses import dataclass
 
 
 @dataclass(frozen=True)
 class CameraFaults:
-    """Misfortunes of one simulated camera, each of which happens as often as said, then no more.
+    """Faults of one simulated camera, each of which happens that number of times and then no more.
 
     Attributes
     ----------
     busy_releases
-        So many full presses are answered DeviceBusy, whatever the state of the camera.
+        Number of full presses that are answered DeviceBusy, whatever the state of the camera.
     busy_spans_s, full_spans_s
-        (begin, end) on the clock between which every full press is answered DeviceBusy, or
+        Spans (begin, end) on the clock in which every full press is answered DeviceBusy, or
         StoreFull.
     stall_at
-        Operation code whose data phase, or whose answer if it has none, stalls the pipes the
-        first time. Data from the host is then not acted on.
+        Operation code whose data phase, or whose answer if it has none, stalls the pipes the first
+        time. The camera does not act on data from the host then.
     timeout_once_at
         Operation code whose answer is never sent the first time, although the camera obeys.
     lost_event
-        The first RequestObjectTransfer event is never queued.
+        Whether the first RequestObjectTransfer event is never queued.
     unplug_at_s
-        The cable is pulled at this time of the clock.
+        Time of the clock at which the cable is pulled.
     unplug_after_bytes
-        The cable is pulled when so many bytes have passed over the bulk pipes.
+        Number of bytes over the bulk pipes after which the cable is pulled.
     replug_after_s
-        The cable is put back so much later; never if not given.
+        Time in seconds after which the cable is plugged in again; None: never.
     """
 
     busy_releases: int = 0
@@ -40,11 +40,11 @@ class CameraFaults:
     replug_after_s: float | None = None
 
     def is_busy(self, now_s: float) -> bool:
-        """Whether the camera has no time for a release now."""
+        """Return whether the camera is busy for a release now."""
         return _within(self.busy_spans_s, now_s)
 
     def is_full(self, now_s: float) -> bool:
-        """Whether the camera believes now that it has no room."""
+        """Return whether the camera reports no room now."""
         return _within(self.full_spans_s, now_s)
 
 

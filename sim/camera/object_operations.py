@@ -1,4 +1,4 @@
-"""Operations on what the camera keeps: cards, folders, files."""
+"""Operations on the camera's storage: cards, folders, files."""
 
 from collections.abc import Callable
 
@@ -18,7 +18,7 @@ class ObjectOperations:
 
     @property
     def table(self) -> dict[int, Handler]:
-        """All of them."""
+        """Return all operations on objects."""
         return {
             Operation.GET_STORAGE_IDS: Handler(self.storage_ids),
             Operation.GET_STORAGE_INFO: Handler(self.storage_info, 1, 1),
@@ -30,24 +30,24 @@ class ObjectOperations:
         }
 
     def storage_ids(self) -> Response:
-        """The cards."""
+        """Return the ids of the cards."""
         return Response(ResponseCode.OK, data=datasets.ptp_array(self._store.cards, "I"))
 
     def storage_info(self, storage_id: int) -> Response:
-        """One card."""
+        """Return StorageInfo of one card."""
         if storage_id not in self._store.cards:
             return Response(ResponseCode.INVALID_STORAGE_ID)
         return Response(ResponseCode.OK, data=self._store.storage_info())
 
     def whole(self, handle: int) -> Response:
-        """All of a file."""
+        """Return all of a file."""
         stored = self._store.find(handle)
         if stored is None:
             return Response(ResponseCode.INVALID_OBJECT_HANDLE)
         return Response(ResponseCode.OK, data=stored.photograph.raw)
 
     def part(self, handle: int, offset: int, size: int) -> Response:
-        """A part of a file."""
+        """Return a part of a file."""
         stored = self._store.find(handle)
         if stored is None:
             return Response(ResponseCode.INVALID_OBJECT_HANDLE)
@@ -57,7 +57,7 @@ class ObjectOperations:
         return Response(ResponseCode.OK, data=raw[offset : offset + size])
 
     def if_found(self, handle: int, act: Callable[[StoredObject], None]) -> ResponseCode:
-        """Do something with a file."""
+        """Apply a function to a file, if it exists."""
         stored = self._store.find(handle)
         if stored is None:
             return ResponseCode.INVALID_OBJECT_HANDLE

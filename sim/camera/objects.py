@@ -1,4 +1,4 @@
-"""What the camera keeps: photographs on cards, and those that wait in memory for the host."""
+"""Storage of the camera: photographs on cards, and those that wait in memory for the host."""
 
 from dataclasses import dataclass
 
@@ -24,7 +24,7 @@ _IN_ROOT = 0xFFFFFFFF
 
 @dataclass(frozen=True)
 class StoredObject:
-    """One file in the camera; it can be seen from `available_s` on."""
+    """One file in the camera, visible from `available_s` on."""
 
     handle: int
     storage_id: int
@@ -40,9 +40,9 @@ class ObjectStore:
     Parameters
     ----------
     clock
-        Time.
+        The room's clock.
     folder, prefix
-        Where the camera puts its photographs in DCIM, and how their names begin.
+        Folder in DCIM of the camera's photographs, and begin of their names.
     cards
         Storage ids; a second card has no folders.
     """
@@ -59,12 +59,12 @@ class ObjectStore:
 
     @property
     def free_shots(self) -> int:
-        """Photographs that still fit on the card."""
+        """Number of photographs that still fit on the card."""
         on_card = sum(item.storage_id == CARD_ID for item in self._objects.values())
         return _CARD_SHOTS - on_card
 
     def begin_photograph(self) -> None:
-        """All files from now on carry the next number."""
+        """Give all later files the next number."""
         self._count += 1
 
     def add(
@@ -83,46 +83,46 @@ class ObjectStore:
         return stored
 
     def all(self) -> tuple[StoredObject, ...]:
-        """Every file that can be seen now."""
+        """Return every visible file."""
         return tuple(stored for stored in self._objects.values() if self.find(stored.handle))
 
     def find(self, handle: int) -> StoredObject | None:
-        """The photograph of that handle, if it is over and still there."""
+        """Return the photograph of that handle, if it is over and still there."""
         stored = self._objects.get(handle)
         if stored is None or stored.available_s > self._clock.now():
             return None
         return stored
 
     def forget_transferred(self, stored: StoredObject) -> None:
-        """The host has it: memory is free again, a card keeps its file."""
+        """Free the memory of a transferred file; a card keeps its file."""
         if stored.storage_id not in self.cards:
             del self._objects[stored.handle]
 
     def forget_memory(self) -> None:
-        """The host is gone: what waited for it is lost."""
+        """Delete the files in memory, whose host is gone."""
         for stored in list(self._objects.values()):
             if self.find(stored.handle) is stored:
                 self.forget_transferred(stored)
 
     def delete(self, stored: StoredObject) -> None:
-        """Erase one photograph."""
+        """Delete one photograph."""
         del self._objects[stored.handle]
 
     def delete_all(self) -> None:
-        """Erase the card."""
+        """Delete all photographs on the card."""
         for handle in self._on_card():
             del self._objects[handle]
 
     def is_folder(self, handle: int) -> bool:
-        """Whether that handle is one of the card's two folders."""
+        """Return whether that handle is one of the card's two folders."""
         return handle in (_DCIM, _FOLDER)
 
     def has_storage(self, storage_id: int) -> bool:
-        """Whether that is a card, or all cards."""
+        """Return whether that id is a card's, or stands for all cards."""
         return storage_id in (*self.cards, _ALL)
 
     def handles(self, object_format: int, parent: int) -> list[int] | None:
-        """Handles on cards as GetObjectHandles asks for them; None if `parent` is no folder."""
+        """Return handles on cards for GetObjectHandles; None if `parent` is no folder."""
         tree = {_IN_ROOT: [_DCIM], _DCIM: [_FOLDER], _FOLDER: self._on_card()}
         tree[0] = [_DCIM, _FOLDER, *self._on_card()]
         if parent not in tree:
@@ -130,7 +130,7 @@ class ObjectStore:
         return [h for h in tree[parent] if object_format in (0, self._format(h))]
 
     def info(self, handle: int) -> ObjectInfo | None:
-        """ObjectInfo of a photograph or a folder."""
+        """Return ObjectInfo of a photograph or a folder."""
         if handle in (_DCIM, _FOLDER):
             parent, name = (0, "DCIM") if handle == _DCIM else (_DCIM, self._folder)
             return ObjectInfo(CARD_ID, ObjectFormat.ASSOCIATION, 0, parent, name, "")
@@ -147,11 +147,11 @@ class ObjectStore:
         )
 
     def parent(self, stored: StoredObject) -> int:
-        """The folder that a photograph is in; 0 in memory."""
+        """Return the folder of a photograph; 0 in memory."""
         return _FOLDER if stored.storage_id == CARD_ID else 0
 
     def storage_info(self) -> bytes:
-        """The StorageInfo dataset of the card."""
+        """Return the StorageInfo dataset of the card."""
         return storage_info(_CARD_BYTES, self.free_shots * SHOT_BYTES)
 
     def _on_card(self) -> list[int]:

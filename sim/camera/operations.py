@@ -1,4 +1,4 @@
-"""What a responder needs of a camera: a table of operations, and events that it sends by itself."""
+"""Interface of a camera for a responder: a table of operations, and events."""
 
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass
@@ -6,7 +6,7 @@ from typing import NamedTuple, Protocol
 
 from .vocabulary import Operation
 
-#: Obeyed by the responder itself, for every camera.
+#: Operations of the responder itself, for every camera.
 SESSION_OPERATIONS = (
     Operation.GET_DEVICE_INFO,
     Operation.OPEN_SESSION,
@@ -23,7 +23,7 @@ class Response(NamedTuple):
 
 
 class Event(NamedTuple):
-    """What a camera says without being asked."""
+    """Event that a camera sends by itself."""
 
     code: int
     params: tuple[int, ...] = ()
@@ -36,9 +36,9 @@ class Handler:
     Attributes
     ----------
     run
-        Called with the parameters, and last with the data if the host sends some.
+        Function that is called with the parameters, and last with the data if the host sends some.
     required, most
-        How many parameters there must be, how many there may be.
+        Least and largest number of parameters.
     takes_data
         Whether the host sends a data phase.
     """
@@ -50,7 +50,7 @@ class Handler:
 
 
 def only_code(run: Callable[..., int]) -> Callable[..., Response]:
-    """A handler's `run` for what answers nothing but a code."""
+    """Return a handler's `run` for an answer that is only a code."""
 
     def answer(*arguments: object) -> Response:
         return Response(run(*arguments))
@@ -63,27 +63,27 @@ class Operations(Protocol):
 
     @property
     def model(self) -> str:
-        """Its name."""
+        """Name of the camera's model."""
 
     @property
     def table(self) -> Mapping[int, Handler]:
-        """What it obeys in a session, beside the session's own operations."""
+        """Operations inside a session, beside the session's own."""
 
     @property
     def is_exposing(self) -> bool:
         """Whether the shutter is open."""
 
     def device_info(self) -> Response:
-        """GetDeviceInfo."""
+        """Return DeviceInfo."""
 
     def is_too_busy_for(self, opcode: int) -> bool:
-        """Whether this operation has to wait for the end of an exposure."""
+        """Return whether this operation has to wait for the end of an exposure."""
 
     def forget_host(self) -> None:
-        """The session is over."""
+        """End the session."""
 
     def event_due_s(self) -> float:
-        """When it will next say something by itself."""
+        """Return the time of the next event."""
 
     def take_event(self) -> Event:
-        """What that is; said once."""
+        """Return the event that is due; each is reported once."""

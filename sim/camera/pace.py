@@ -4,16 +4,16 @@ from labrig.clock import Clock, VirtualClock
 
 
 class Pace:
-    """Lets the time of a simulated room pass as that of the PC does.
+    """Coupling of a simulated room's time to that of the PC.
 
-    The room's clock stands still inside a transaction and is moved up before the next.
+    The room's clock stands still inside a transaction and is advanced before the next.
 
     Parameters
     ----------
     clock
-        The PC's.
+        The PC's clock.
     room_clock
-        The room's, which nothing else moves.
+        The room's clock, which nothing else advances.
     """
 
     def __init__(self, clock: Clock, room_clock: VirtualClock) -> None:
@@ -22,7 +22,7 @@ class Pace:
         self._zero_s = clock.now() - room_clock.now()
 
     def catch_up(self) -> float:
-        """Move the room's clock up to the PC's; the room's time."""
+        """Advance the room's clock to the PC's; return the room's time."""
         behind_s = self._clock.now() - self._zero_s - self._room_clock.now()
         self._room_clock.spend(max(0.0, behind_s))
         return self._room_clock.now()

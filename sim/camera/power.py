@@ -1,4 +1,4 @@
-"""The camera's habit of switching itself off."""
+"""Automatic switching-off of the camera."""
 
 from collections.abc import Callable
 
@@ -6,16 +6,16 @@ from labrig.clock import Clock
 
 
 class AutoPowerOff:
-    """Off for good after `after_s` seconds in which nobody has spoken to the camera; 0 for never.
+    """Switch that is off for good after `after_s` seconds without a request; 0 for never.
 
     Parameters
     ----------
     clock
-        Time.
+        The room's clock.
     after_s
-        As set in the menu.
+        Time in seconds that is set in the menu.
     exposing_until_s
-        Until when the shutter is open: a camera that exposes stays on.
+        Function that returns the end of the exposure: a camera that exposes stays on.
     """
 
     def __init__(self, clock: Clock, after_s: float, exposing_until_s: Callable[[], float]) -> None:
@@ -26,11 +26,11 @@ class AutoPowerOff:
 
     @property
     def is_off(self) -> bool:
-        """Whether it has happened; only a person can switch the camera on again."""
+        """Whether the camera is off; only a person can switch it on again."""
         idle_since_s = max(self._spoken_to_s, self._exposing_until_s())
         return 0 < self._after_s < self._clock.now() - idle_since_s
 
     def put_off(self) -> None:
-        """Somebody speaks to the camera."""
+        """Note a request to the camera, which postpones its switching-off."""
         if not self.is_off:
             self._spoken_to_s = self._clock.now()

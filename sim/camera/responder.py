@@ -1,4 +1,4 @@
-"""The camera as a PTP responder, whatever carries the containers."""
+"""The camera as a PTP responder, independent of the transport of containers."""
 
 from .operations import Event, Handler, Operations, Response
 from .vocabulary import Operation, ResponseCode
@@ -12,7 +12,7 @@ class Responder:
     Parameters
     ----------
     operations
-        The camera; who carries the containers lets its time pass.
+        Operations of the camera, whose time the transport advances.
     """
 
     def __init__(self, operations: Operations) -> None:
@@ -26,11 +26,11 @@ class Responder:
 
     @property
     def model(self) -> str:
-        """Name of the camera."""
+        """Name of the camera's model."""
         return self._operations.model
 
     def takes_data(self, opcode: int) -> bool:
-        """Whether the host sends a data phase after this command."""
+        """Return whether the host sends a data phase after this command."""
         handler = self._table.get(opcode)
         return handler is not None and handler.takes_data
 
@@ -39,8 +39,8 @@ class Responder:
     ) -> Response:
         """Do one operation.
 
-        Every transaction inside a session counts, also one that is refused; a wrong transaction
-        id does not.
+        Every transaction inside a session counts, also one that is refused; a wrong transaction id
+        does not.
         """
         if opcode == Operation.OPEN_SESSION:
             return self._open_session(transaction_id, params)
@@ -57,21 +57,21 @@ class Responder:
         return self._in_session(opcode, params, data)
 
     def abandon(self, transaction_id: int) -> None:
-        """A transaction that began and will not be finished: it counts."""
+        """Count a transaction that began and will not be finished."""
         if self._session_id and transaction_id == self._next_transaction:
             self._count_transaction()
 
     def disconnect(self) -> None:
-        """The host is gone or has reset the camera: no session, nobody to report to."""
+        """End the session of a host that is gone or has reset the camera."""
         self._session_id = 0
         self._operations.forget_host()
 
     def event_due_s(self) -> float:
-        """When the camera will next say something by itself."""
+        """Return the time of the next event."""
         return self._operations.event_due_s()
 
     def take_event(self) -> Event:
-        """What that is; said once."""
+        """Return the event that is due; each is reported once."""
         return self._operations.take_event()
 
     def _open_session(self, transaction_id: int, params: tuple[int, ...]) -> Response:

@@ -1,4 +1,4 @@
-"""What a camera body needs from the simulated room: light turned into a RAW file."""
+"""Interface of the simulated room for a camera body: light turned into a RAW file."""
 
 from functools import cached_property
 from typing import Protocol
@@ -8,12 +8,12 @@ class Sensor(Protocol):
     """The sensor behind the shutter, standing in a simulated room."""
 
     def photograph(self, start_s: float, exposure_s: float, iso: int, f_number: float) -> bytes:
-        """RAW file of an exposure that began at start_s and is over."""
+        """Return the RAW file of an exposure that began at start_s and is over."""
         ...
 
 
 class Photograph:
-    """One exposure, computed the first time that somebody looks at it."""
+    """One exposure, computed when it is read for the first time."""
 
     def __init__(
         self, sensor: Sensor, start_s: float, exposure_s: float, iso: int, f_number: float
@@ -26,5 +26,5 @@ class Photograph:
 
     @cached_property
     def raw(self) -> bytes:
-        """The RAW file."""
+        """Bytes of the RAW file."""
         return self._sensor.photograph(self.start_s, self._exposure_s, self._iso, self._f_number)

@@ -1,9 +1,9 @@
-"""The release: what the two stages of the button and the shutter behind it are doing.
+"""The release: states of the button's two stages and of the shutter behind it.
 
     idle ──full press──> waiting (lag, self-timer) ──> open ──> reading out ──> idle
       └─half press─> focusing ──> focused ──full press──> waiting (lag only)
 
-Nothing runs in the background: a state is a question to the clock.
+Nothing runs in the background: a state is computed from the clock.
 """
 
 import math
@@ -13,13 +13,13 @@ from enum import IntFlag
 
 from labrig.clock import Clock
 
-#: Autofocus on something that it can see.
+#: Time of autofocus on a visible object.
 FOCUS_S = 0.1
-#: Light metering, which even a lens on manual focus waits for.
+#: Time of light metering, for which even a lens on manual focus waits.
 METERING_S = 0.02
-#: Mirror down, sensor read out, file made.
+#: Time until the mirror is down, the sensor read out and the file written.
 READOUT_S = 0.2
-#: Second curtain after the end of a bulb exposure was asked for.
+#: Time until the second curtain closes after the command to end a bulb exposure.
 BULB_CLOSE_S = 0.01
 
 
@@ -32,14 +32,14 @@ class Stage(IntFlag):
 
 @dataclass(frozen=True)
 class Exposure:
-    """One opening of the shutter; a bulb exposure ends at infinity until somebody ends it."""
+    """One opening of the shutter; a bulb exposure ends at infinity until it is ended."""
 
     start_s: float
     end_s: float
 
     @property
     def is_endless(self) -> bool:
-        """Whether this is a bulb exposure that nobody has ended."""
+        """Whether this is a bulb exposure that has not been ended."""
         return self.end_s == math.inf
 
 
@@ -49,11 +49,11 @@ class Shutter:
     Parameters
     ----------
     clock
-        Time.
+        The room's clock.
     lag_s, jitter_s
         Mean and standard deviation of the time from a full press to the open shutter.
     seed
-        Of the jitter.
+        Seed of the jitter.
     """
 
     def __init__(self, clock: Clock, lag_s: float, jitter_s: float, seed: int) -> None:
@@ -62,7 +62,7 @@ class Shutter:
         self._jitter_s = jitter_s
         self._random = random.Random(seed)
         self._settled_s: float | None = None
-        self._held = False
+        self._is_held = False
         self._exposure = Exposure(-math.inf, -math.inf)
 
     @property
@@ -72,24 +72,24 @@ class Shutter:
 
     @property
     def is_endless(self) -> bool:
-        """Whether an exposure waits for somebody to end it."""
+        """Whether a bulb exposure waits for its end."""
         return self._exposure.is_endless
 
     @property
     def open_until_s(self) -> float:
-        """When the last exposure ends, or ended; infinity at bulb, −infinity before the first."""
+        """End of the last exposure; infinity at bulb, −infinity before the first."""
         return self._exposure.end_s
 
     @property
     def is_ready(self) -> bool:
-        """Whether a full press would be obeyed: nothing going on, not focusing, button up."""
+        """Whether a full press would be obeyed: idle, not focusing, button up."""
         now_s = self._clock.now()
         exposing = now_s < self._exposure.end_s + READOUT_S
         focusing = self._settled_s is not None and now_s < self._settled_s
-        return not (exposing or focusing or self._held)
+        return not (exposing or focusing or self._is_held)
 
     def press_half(self, settling_s: float) -> None:
-        """Focus and meter, which takes so long; again only after the button was let go."""
+        """Focus and meter, which takes time; again only after the button was released."""
         if self._settled_s is None:
             self._settled_s = self._clock.now() + settling_s
 
@@ -99,19 +99,19 @@ class Shutter:
         if self._settled_s is None:
             lag_s += settling_s
         start_s = self._clock.now() + lag_s
-        self._held = True
+        self._is_held = True
         self._exposure = Exposure(start_s, start_s + exposure_s)
         return self._exposure
 
     def let_go(self, stages: Stage) -> None:
         """Release stages of the button."""
         if Stage.FULL in stages:
-            self._held = False
+            self._is_held = False
         if Stage.HALF in stages:
             self._settled_s = None
 
     def end_bulb(self) -> Exposure | None:
-        """Close the shutter of a bulb exposure; the whole exposure, or None if there is none."""
+        """Close the shutter of a bulb exposure; return the exposure, or None if there is none."""
         if not self.is_endless:
             return None
         start_s = self._exposure.start_s

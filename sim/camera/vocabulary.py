@@ -1,4 +1,4 @@
-"""The numbers of PTP (ISO 15740) and of Canon's EOS extension that these cameras know."""
+"""Codes of PTP (ISO 15740) and of Canon's EOS extension that these cameras use."""
 
 from enum import IntEnum
 

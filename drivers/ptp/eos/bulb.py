@@ -1,7 +1,7 @@
 """Bulb: an exposure that the PC begins and ends, for times longer than the dial's 30 s.
 
-BulbStart and BulbEnd, where a camera has them; newer ones (an EOS M50, say) have the full stage of
-the release button held instead, with the shutter time at bulb. Sources: libgphoto2's
+BulbStart and BulbEnd, where a camera has them; newer ones (an EOS M50, for example) have the full
+stage of the release button held instead, with the shutter time at bulb. Sources: libgphoto2's
 `ptp_canon_eos_bulbstart`, its documentation for newer EOS, and its issues 193 and 413.
 """
 
@@ -12,7 +12,7 @@ from ..session import Reply, Session, Timeouts
 from .protocol import Eos
 from .release import FOCUS_S, LATE_PRESS_S, Held, Release, TwoStageRelease
 
-#: While the shutter is open nothing matters more than to be heard: busy for so long is asked again.
+#: Time for which a busy camera is asked again to close its shutter.
 CLOSING_S = 30.0
 _GENERAL_ERROR = 0x2002
 #: BulbStart may answer OK and hide a response code in its first parameter (libgphoto2).
@@ -20,44 +20,44 @@ _HIDDEN_MASK, _HIDDEN = 0x7000, 0x2000
 
 
 class EosBulb:
-    """Opens the shutter and closes it.
+    """Shutter that the PC opens and closes.
 
     Parameters
     ----------
-    held
-        What is down while the shutter is open.
+    release
+        Command pair whose press keeps the shutter open.
     needs_half_press
         Whether the button's first stage goes first; BulbStart goes alone.
     """
 
-    def __init__(self, held: Held, *, needs_half_press: bool) -> None:
-        self._held = held
+    def __init__(self, release: Held, *, needs_half_press: bool) -> None:
+        self._release = release
         self.needs_half_press = needs_half_press
 
     def open(self) -> Reply:
-        """Begin the exposure; the reply tells when.
+        """Begin the exposure; the reply has the time.
 
         Raises
         ------
         RefusedError
-            None has begun.
+            No exposure has begun.
         DeviceError
-            Nobody knows whether one has.
+            Whether an exposure has begun is unknown.
         """
         try:
-            reply = self._held.press(Timeouts(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
+            reply = self._release.press(Timeouts(answer_s=FOCUS_S, busy_s=LATE_PRESS_S))
         except RefusedError as refusal:
             if refusal.code == _GENERAL_ERROR:
                 raise _refused(refusal.code) from None
             raise
         hidden = reply.params[0] & 0xFFFF if reply.params else 0
         if hidden & _HIDDEN_MASK == _HIDDEN and hidden != OK:
-            self._held.doubt()
+            self._release.doubt()
             raise _refused(hidden)
         return reply
 
     def close(self) -> Reply | None:
-        """End the exposure; None if certainly none was under way.
+        """End the exposure; return None if certainly none was under way.
 
         Raises
         ------
@@ -65,7 +65,7 @@ class EosBulb:
             The shutter may still be open.
         """
         try:
-            return self._held.let_go(CLOSING_S)
+            return self._release.let_go(CLOSING_S)
         except RefusedError as refusal:
             if refusal.code != _GENERAL_ERROR:
                 raise
@@ -77,21 +77,21 @@ class EosBulb:
             ) from None
 
     def close_blindly(self) -> None:
-        """End what another program, or this one before a reset, may have begun.
+        """End an exposure that another program, or this one before a reset, may have begun.
 
         Raises
         ------
         DeviceError
             The shutter may still be open.
         """
-        self._held.let_go_blindly()
+        self._release.let_go_blindly()
 
 
 def bulb_of(info: DeviceInfo, session: Session, release: Release) -> EosBulb | None:
-    """How a camera does bulb exposures; None if it cannot."""
+    """Return the camera's way of bulb exposures; None if it has none."""
     if {Eos.BulbStart, Eos.BulbEnd} <= info.operations:
-        held = Held(session, (Eos.BulbStart,), (Eos.BulbEnd,))
-        return EosBulb(held, needs_half_press=False)
+        commands = Held(session, (Eos.BulbStart,), (Eos.BulbEnd,))
+        return EosBulb(commands, needs_half_press=False)
     if isinstance(release, TwoStageRelease):
         return EosBulb(release.full, needs_half_press=True)
     return None

@@ -35,16 +35,16 @@ class EosCamera:
 
     The button is held half pressed from `arm` on, so that `shoot` costs one short transaction
     before the shutter moves. A frame whose `shoot` was broken off is discarded before the next.
-    Exposures longer than the dial's are at bulb, and as long as they are measured to be.
+    Exposures longer than the dial's are at bulb, and their actual times are the measured ones.
 
     Parameters
     ----------
     session
-        Over which it is spoken to.
+        Session with the camera.
     clock
-        On which it is waited for.
+        Clock of all waiting.
     info
-        What it says about itself.
+        Identity and abilities that the camera reports.
     settings
         The rig file's keys for this camera.
     """
@@ -70,12 +70,12 @@ class EosCamera:
         self._viewfinder = EosViewfinder(session, self._state, clock, info)
 
     def take_control(self) -> None:
-        """Remote mode, single shots, RAW frames to the PC.
+        """Set remote mode, single shots, RAW frames to the PC.
 
         Raises
         ------
         DeviceError
-            The camera did not take one of these.
+            The camera did not take one of these settings.
         """
         self._session.transact(Eos.SetRemoteMode, 1)
         self._session.transact(Eos.SetEventMode, 1)
@@ -88,19 +88,19 @@ class EosCamera:
         self._state.refresh()
 
     def take_over(self) -> None:
-        """As `take_control`; lets go of a button, or a shutter, that somebody may have held.
+        """Take control, and release a button or a shutter that another program may have held.
 
         Raises
         ------
         DeviceError
-            The camera did not take one of these.
+            The camera did not take one of the settings.
         """
         self.take_control()
         self._shutter.let_go_blindly()
         self._frames.expect_left_over()
 
     def give_back(self) -> None:
-        """Out of remote mode.
+        """End remote mode.
 
         Raises
         ------
@@ -112,18 +112,19 @@ class EosCamera:
                 self._session.transact(step, 0, timeouts=CURT)
 
     def offers(self) -> CameraOffers:
-        """What it can be set to, as it is now.
+        """Return the exposure settings that the camera offers now.
 
         Raises
         ------
         DeviceError
-            Nothing that the rig file allows, for example because its dial is not at M.
+            The camera offers no settings that the rig file allows, for example because its dial is
+            not at M.
         """
         self._state.refresh()
         return self._exposure.offers()
 
     def findings(self) -> Sequence[Finding]:
-        """How its dial, lens switch and menus are set.
+        """Return findings on dial, lens switch and menus.
 
         Raises
         ------
@@ -134,7 +135,7 @@ class EosCamera:
         return findings(self._state, self._settings, self._info, has_bulb=self._shutter.has_bulb)
 
     def keep_awake(self) -> None:
-        """Put off its automatic switching-off.
+        """Postpone the camera's automatic switching-off.
 
         Raises
         ------
@@ -146,18 +147,18 @@ class EosCamera:
             self._send_if_known(Eos.KeepDeviceOn)
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
-        """Set and read back; returns the settings in force, with the true shutter time.
+        """Set and read back; return the settings in force, with the actual shutter time.
 
         Parameters
         ----------
         settings
-            The shutter time as offered, or as on the dial (1/60 s for the true 1/64 s). At bulb
-            the true one is only known when it is over: see the frame's.
+            Exposure settings; the shutter time as offered, or as on the dial (1/60 s for the actual
+            1/64 s). At bulb the actual time is known after the exposure only: see the frame's.
 
         Raises
         ------
         DeviceError
-            The camera does not offer them or did not take them.
+            The camera does not offer the settings or did not take them.
         """
         self._armed = False
         self._shutter.let_go()
@@ -190,7 +191,7 @@ class EosCamera:
         Raises
         ------
         DeviceError
-            The camera did not release, or delivered no or another frame.
+            The camera did not release, or delivered no frame or another one.
         """
         self.arm()
         self._armed = False
@@ -205,7 +206,7 @@ class EosCamera:
         return Frame(data, suffix, start_s, end_s, settings)
 
     def preview(self) -> bytes:
-        """One picture of the viewfinder, a JPEG; the first one starts it.
+        """Return one picture of the viewfinder, a JPEG; the first call starts it.
 
         Raises
         ------
@@ -216,7 +217,7 @@ class EosCamera:
         return self._viewfinder.picture()
 
     def steps_to_safety(self) -> Sequence[Callable[[], None]]:
-        """Shutter closed at bulb, button let go, viewfinder off, nothing pending.
+        """Return the steps: shutter closed at bulb, button up, viewfinder off, nothing pending.
 
         Another exposure that has begun runs to its end in the camera; frames are discarded later.
         """

@@ -1,8 +1,7 @@
-"""What of an EOS's own settings would spoil photometry, and where its menu has them.
+"""Checks of an EOS's own settings that would spoil photometry, and their places in its menu.
 
-Menus are named as a 5D Mark II shows them. Sources of codes: libgphoto2's ptp.h and config.c
-(exposure and focus modes, automatic switching-off in seconds); of custom functions:
-`custom_functions`.
+Menus are named as on a 5D Mark II. Sources of codes: libgphoto2's ptp.h and config.c (exposure and
+focus modes, automatic switching-off in seconds); of custom functions: `custom_functions`.
 """
 
 from collections.abc import Iterable, Iterator
@@ -29,14 +28,14 @@ _BY_HAND = "look for yourself in the camera's menu"
 def findings(
     state: EosState, settings: PtpCameraSettings, info: DeviceInfo, *, has_bulb: bool
 ) -> list[Finding]:
-    """All that can be told; the state's events must be fresh.
+    """Return all findings on the camera's settings; the state's events must be fresh.
 
     Parameters
     ----------
     settings
         The rig file's keys for this camera.
     info
-        Its model, and what it can do.
+        Model and abilities of the camera.
     has_bulb
         Whether the PC can end an exposure.
     """
@@ -92,13 +91,13 @@ def _iso_in_force(code: int | None, native: NativeIsos) -> Finding:
     if code == AUTO_ISO:
         return Finding("refuse", "automatic ISO is on: gain may change between frames", where)
     if ISOS.get(code) not in native.values:
-        said = f"ISO {ISOS[code]}" if code in ISOS else f"the ISO code 0x{code:X}"
-        return Finding("refuse", f"{said} is not native: computed after digitising", where)
+        name = f"ISO {ISOS[code]}" if code in ISOS else f"the ISO code 0x{code:X}"
+        return Finding("refuse", f"{name} is not native: computed after digitising", where)
     return Finding("fine", f"ISO {ISOS[code]} is native")
 
 
 def _native_isos(native: NativeIsos, model: str) -> Iterator[Finding]:
-    """Who says so, where that leaves a doubt."""
+    """Return a finding on the source of the native ISOs, where it leaves a doubt."""
     listed = _listed(native.values)
     if native.source == "assumed":
         yield Finding(
@@ -107,13 +106,13 @@ def _native_isos(native: NativeIsos, model: str) -> Iterator[Finding]:
             "is assumed",
             "write what you know into the camera's 'isos' in the rig file",
         )
-    of_model = isos_of_model(model)
-    others = sorted(set(native.values) - set(of_model.values))
-    if native.source == "rig file" and others:
-        known = "is not known to be native" if of_model.source == "assumed" else "is not native"
+    model_isos = isos_of_model(model)
+    foreign = sorted(set(native.values) - set(model_isos.values))
+    if native.source == "rig file" and foreign:
+        doubt = "is not known to be native" if model_isos.source == "assumed" else "is not native"
         yield Finding(
             "warn",
-            f"the rig file allows ISO {_listed(others)}, which {known} in a {model}: computed "
+            f"the rig file allows ISO {_listed(foreign)}, which {doubt} in a {model}: computed "
             "after digitising",
             "leave it out of the camera's 'isos' unless you have measured it",
         )
@@ -124,7 +123,7 @@ def _listed(isos: Iterable[int]) -> str:
 
 
 def _auto_power_off(after_s: int | None) -> Finding:
-    """It is kept awake, too, but a night's run is not staked on one of the two."""
+    """Return a finding on automatic switching-off, a second precaution beside keeping awake."""
     where = "Set-up 1 (yellow) → Auto power off → Off"
     if after_s is None:
         return Finding(
@@ -136,7 +135,7 @@ def _auto_power_off(after_s: int | None) -> Finding:
 
 
 def _custom_functions(state: EosState) -> Iterator[Finding]:
-    for function, words, spoils, where in (
+    for function, name, spoils, where in (
         (
             CustomFunction.long_exposure_noise_reduction,
             "long-exposure noise reduction",
@@ -158,11 +157,11 @@ def _custom_functions(state: EosState) -> Iterator[Finding]:
     ):
         value = state.custom_functions.value(function)
         if value is None:
-            yield Finding("warn", f"could not read {words}", f"{_BY_HAND}: {where}")
+            yield Finding("warn", f"could not read {name}", f"{_BY_HAND}: {where}")
         elif value:
-            yield Finding("refuse", f"{words} is on: {spoils}", where)
+            yield Finding("refuse", f"{name} is on: {spoils}", where)
         else:
-            yield Finding("fine", f"{words} is off")
+            yield Finding("fine", f"{name} is off")
     if state.custom_functions.value(CustomFunction.iso_expansion):
         yield Finding(
             "warn",

@@ -1,8 +1,8 @@
 """Canon's codes for shutter time, aperture and sensitivity: eighths of a stop (APEX × 8).
 
 A step of three eighths stands for a third of a stop, four for a half, five for two thirds. The
-shutter's true time is the power of two, not the label on the dial: 1/60 is 1/64 s, 30 s is 32 s.
-Apertures and sensitivities keep their labels, by which people, lenses and EXIF know them.
+shutter's actual time is the power of two, not the nominal one on the dial: 1/60 is 1/64 s, 30 s is
+32 s. Apertures and sensitivities keep their labels, which people, lenses and EXIF use.
 
 Sources: APEX (ISO 2720 annex A); code ↔ label pairs as published with libgphoto2.
 """
@@ -18,7 +18,7 @@ _STEP = {0: Fraction(0), 3: Fraction(1, 3), 4: Fraction(1, 2), 5: Fraction(2, 3)
 _TV_ZERO = 0x38
 #: 32 s ("30") and 1/8192 s ("1/8000").
 LONGEST_TV, SHORTEST_TV = 0x10, 0xA0
-#: The shutter stays open until it is told to close.
+#: Code of bulb: the shutter stays open until the command to close.
 BULB_TV = 0x0C
 #: Longer times than the dial's begin here, and double.
 SHORTEST_BULB_S = 64.0
@@ -60,21 +60,21 @@ ISOS = MappingProxyType(
 
 @cache
 def shutter_time_s(code: int) -> float | None:
-    """True shutter time of a Tv code, in seconds; None for bulb and unknown codes."""
-    whole, eighths = divmod(code - _TV_ZERO, 8)
+    """Return the actual shutter time of a Tv code, in seconds; None for bulb and unknown codes."""
+    stops, eighths = divmod(code - _TV_ZERO, 8)
     if not LONGEST_TV <= code <= SHORTEST_TV or eighths not in _STEP:
         return None
-    return float(2.0 ** -float(whole + _STEP[eighths]))
+    return float(2.0 ** -float(stops + _STEP[eighths]))
 
 
 def third_stop_codes() -> tuple[int, ...]:
-    """Tv codes in thirds of a stop, from the longest time to the shortest."""
+    """Return the Tv codes in thirds of a stop, from the longest time to the shortest."""
     codes = range(LONGEST_TV, SHORTEST_TV + 1)
     return tuple(c for c in codes if (c - _TV_ZERO) % 8 in (0, 3, 5))
 
 
 def bulb_times_s(longest_s: float) -> tuple[float, ...]:
-    """Times offered at bulb, doubling from 64 s up to `longest_s` seconds."""
+    """Return the times offered at bulb, doubling from 64 s up to `longest_s` seconds."""
     times_s = []
     time_s = SHORTEST_BULB_S
     while time_s <= longest_s:
@@ -84,7 +84,7 @@ def bulb_times_s(longest_s: float) -> tuple[float, ...]:
 
 
 def shutter_code(exposure_s: float, among: Iterable[int]) -> int | None:
-    """The Tv code among `among` that means `exposure_s` seconds, true or as on the dial."""
+    """Return the Tv code in `among` for `exposure_s` seconds, actual or nominal."""
     off_stops = {
         code: abs(math.log2(time_s / exposure_s))
         for code in among
@@ -95,7 +95,7 @@ def shutter_code(exposure_s: float, among: Iterable[int]) -> int | None:
 
 
 def aperture_code(f_number: float, among: Iterable[int]) -> int | None:
-    """The Av code among `among` whose label is `f_number`."""
+    """Return the Av code in `among` whose label is `f_number`."""
     for code in among:
         if code in F_NUMBERS and abs(F_NUMBERS[code] / f_number - 1) < SAME_F_NUMBER:
             return code
@@ -103,5 +103,5 @@ def aperture_code(f_number: float, among: Iterable[int]) -> int | None:
 
 
 def iso_code(iso: int, among: Iterable[int]) -> int | None:
-    """The sensitivity code among `among` that means `iso`."""
+    """Return the sensitivity code in `among` for `iso`."""
     return next((code for code in among if ISOS.get(code) == iso), None)

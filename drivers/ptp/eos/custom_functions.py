@@ -11,14 +11,15 @@ values as ExifTool's CanonCustom Functions2, which finds the same block in CR2 f
 import struct
 from enum import IntEnum
 
-#: More than any camera has sent (364 bytes, a 5DS): what announces more is something else.
+#: Longest block, more than any camera has sent (364 bytes, a 5DS).
 MOST_BYTES = 4096
 
 
 class CustomFunction(IntEnum):
-    """Functions that matter here. High ISO noise reduction and Auto Lighting Optimizer do not.
+    """Ids of the custom functions that matter here.
 
-    Those two change the camera's JPEGs only, never a RAW file.
+    High ISO noise reduction and Auto Lighting Optimizer change the camera's JPEGs only, never a RAW
+    file.
     """
 
     iso_expansion = 0x103
@@ -28,14 +29,14 @@ class CustomFunction(IntEnum):
 
 
 class CustomFunctions:
-    """What the camera has said so far, group by group."""
+    """Custom functions that the camera has reported so far, group by group."""
 
     def __init__(self) -> None:
         self._values: dict[int, tuple[int, ...]] = {}
         self._is_unknown = False
 
     def take(self, block: bytes) -> None:
-        """Take in one block; one of another layout leaves nothing to rely on."""
+        """Take in one block; a block of another layout invalidates all values."""
         parsed = parse_custom_functions(block)
         if parsed is None:
             self._is_unknown = True
@@ -43,13 +44,13 @@ class CustomFunctions:
             self._values |= parsed
 
     def value(self, function: CustomFunction) -> int | None:
-        """Its only value; None if the camera did not tell it in a known layout."""
+        """Return a function's only value; None if it was not reported in a known layout."""
         values = self._values.get(function, ())
         return values[0] if len(values) == 1 and not self._is_unknown else None
 
 
 def parse_custom_functions(block: bytes) -> dict[int, tuple[int, ...]] | None:
-    """Function id → values; None where any number does not fit the known layout."""
+    """Return the values by function id; None where any number does not fit the known layout."""
     if not 8 <= len(block) <= MOST_BYTES or len(block) % 4:
         return None
     numbers = struct.unpack(f"<{len(block) // 4}I", block)
@@ -57,26 +58,26 @@ def parse_custom_functions(block: bytes) -> dict[int, tuple[int, ...]] | None:
     # events of some models are padded behind the block
     if size % 4 or not 8 <= size <= len(block) or any(numbers[size // 4 :]):
         return None
-    rest = numbers[2 : size // 4]
-    found: dict[int, tuple[int, ...]] = {}
+    remaining = numbers[2 : size // 4]
+    values: dict[int, tuple[int, ...]] = {}
     for _ in range(groups):
-        if len(rest) < 3 or rest[1] % 4 or not 2 <= rest[1] // 4 < len(rest):
+        if len(remaining) < 3 or remaining[1] % 4 or not 2 <= remaining[1] // 4 < len(remaining):
             return None
-        end = 1 + rest[1] // 4
-        functions = _functions(rest[3:end], rest[2])
+        end = 1 + remaining[1] // 4
+        functions = _functions(remaining[3:end], remaining[2])
         if functions is None:
             return None
-        found |= functions
-        rest = rest[end:]
-    return None if rest else found
+        values |= functions
+        remaining = remaining[end:]
+    return None if remaining else values
 
 
 def _functions(numbers: tuple[int, ...], count: int) -> dict[int, tuple[int, ...]] | None:
-    found = {}
+    values = {}
     for _ in range(count):
         if len(numbers) < 2 or len(numbers) < 2 + numbers[1]:
             return None
         end = 2 + numbers[1]
-        found[numbers[0]] = numbers[2:end]
+        values[numbers[0]] = numbers[2:end]
         numbers = numbers[end:]
-    return None if numbers else found
+    return None if numbers else values

@@ -22,7 +22,7 @@ _FOLDER_FORMAT = 0x3001
 
 @dataclass(frozen=True)
 class ValueChanged:
-    """A property has this value now."""
+    """Event that a property has this value now."""
 
     prop: int
     value: bytes
@@ -30,7 +30,7 @@ class ValueChanged:
 
 @dataclass(frozen=True)
 class ChoicesChanged:
-    """A property can be set to these codes now."""
+    """Event that a property can be set to these codes now."""
 
     prop: int
     codes: tuple[int, ...]
@@ -38,18 +38,18 @@ class ChoicesChanged:
 
 @dataclass(frozen=True)
 class ObjectOffered:
-    """A file in the camera that is to be fetched.
+    """Event that a file in the camera is to be fetched.
 
     Attributes
     ----------
     handle
-        By which the camera knows it.
+        Handle of the file in the camera.
     object_format
         PTP object format code.
     size_bytes
-        As announced.
+        Announced size of the file, in bytes.
     name
-        File name, from the camera.
+        File name that the camera gave.
     """
 
     handle: int
@@ -60,7 +60,7 @@ class ObjectOffered:
 
 @dataclass(frozen=True)
 class Other:
-    """A record that says nothing to this driver."""
+    """Record that this driver does not use."""
 
     code: int
     payload: bytes
@@ -87,12 +87,12 @@ _OBJECTS = {
 
 
 def parse_events(data: bytes) -> tuple[Event, ...]:
-    """The events in the data phase of GetEvent, in order.
+    """Return the events in the data phase of GetEvent, in order.
 
     Raises
     ------
     MalformedError
-        A record that is cut short or runs over its end.
+        A record is cut short or runs over its end.
     """
     return tuple(_event(code, payload) for code, payload in _records(data))
 

@@ -1,4 +1,4 @@
-"""Shutter time, aperture and sensitivity of an EOS: what it offers, what is set, setting it."""
+"""Shutter time, aperture and sensitivity of an EOS: offers, settings in force, setting them."""
 
 import math
 from collections.abc import Collection
@@ -23,16 +23,16 @@ from .state import EosState
 
 
 class EosExposure:
-    """The exposure settings behind an `EosState`; that one's events must be fresh.
+    """The exposure settings behind an `EosState`, whose events must be fresh.
 
     Parameters
     ----------
     state
-        What the camera says.
+        State that the camera has reported.
     settings
-        The rig file's keys for it.
+        The rig file's keys for the camera.
     isos
-        Sensitivities that are native.
+        Native sensitivities.
     has_bulb
         Whether the PC can end an exposure.
     """
@@ -57,12 +57,13 @@ class EosExposure:
         return self._shutter() == BULB_TV
 
     def offers(self) -> CameraOffers:
-        """The camera's own lists, less what the rig file excludes, and bulb if that asks for it.
+        """Return the camera's own lists, less what the rig file excludes, plus bulb if it needs it.
 
         Raises
         ------
         DeviceError
-            The camera lets none be set, for its dial is not at M, or none that the rig file allows.
+            The camera offers no settings, for its dial is not at M, or none that the rig file
+            allows.
         """
         self._require_manual()
         dial_s = sorted(t for c in self._shutter_codes() if (t := shutter_time_s(c)))
@@ -83,34 +84,36 @@ class EosExposure:
             frame_bytes=round(self._settings.frame_size),
         )
 
-    def apply(self, wanted: ExposureSettings) -> None:
+    def apply(self, requested: ExposureSettings) -> None:
         """Set what is not in force already, read back.
 
         Raises
         ------
         DeviceError
-            The camera does not offer it or did not take it.
+            The camera does not offer a setting or did not take it.
         """
         self._require_manual()
-        bulb_s = self._bulb_time_s(wanted.exposure_s)
-        codes = self._codes_of(wanted, None if bulb_s is None else BULB_TV)
+        bulb_s = self._bulb_time_s(requested.exposure_s)
+        codes = self._codes_of(requested, None if bulb_s is None else BULB_TV)
         self._bulb_s = bulb_s
         for prop, code in codes.items():
             self._state.set(prop, number(code))
         for prop, code in codes.items():
-            if (said := self._state.value(prop)) != code:
+            if (reported := self._state.value(prop)) != code:
                 raise DeviceError(
-                    f"asked the camera for {wanted}, it has changed its {_words(prop)} to "
-                    f"{value_text(prop, number(said or 0))} since: turn its dial to M and try again"
+                    f"asked the camera for {requested}, it has changed its {_name_of(prop)} to "
+                    f"{value_text(prop, number(reported or 0))} since: turn its dial to M and try "
+                    "again"
                 )
 
     def in_force(self) -> ExposureSettings:
-        """What the camera says is set, with the true shutter time; at bulb the one asked for.
+        """Return the reported settings, with the actual shutter time; at bulb the nominal one.
 
         Raises
         ------
         DeviceError
-            It is at bulb unasked, at automatic ISO, at something unknown, or its dial not at M.
+            The camera is at bulb unasked, at automatic ISO, at something unknown, or its dial not
+            at M.
         """
         self._require_manual()
         tv = self._shutter()
@@ -125,25 +128,25 @@ class EosExposure:
         f_number = None if av is None else F_NUMBERS.get(av)
         return ExposureSettings(exposure_s, ISOS[iso], f_number)
 
-    def _codes_of(self, wanted: ExposureSettings, bulb: int | None) -> dict[Property, int]:
-        shutter = bulb or shutter_code(wanted.exposure_s, self._shutter_codes())
-        iso = iso_code(wanted.iso, self._iso_codes())
+    def _codes_of(self, requested: ExposureSettings, bulb: int | None) -> dict[Property, int]:
+        shutter = bulb or shutter_code(requested.exposure_s, self._shutter_codes())
+        iso = iso_code(requested.iso, self._iso_codes())
         if shutter is None or iso is None:
-            what = "shutter time" if shutter is None else "ISO"
-            dial = "B" if shutter is None and wanted.exposure_s >= SHORTEST_BULB_S else "M"
+            missing = "shutter time" if shutter is None else "ISO"
+            dial = "B" if shutter is None and requested.exposure_s >= SHORTEST_BULB_S else "M"
             raise DeviceError(
-                f"asked the camera for {wanted}, it does not offer this {what}: choose from what "
-                f"'labrig rig check' shows, or turn its dial to {dial}"
+                f"asked the camera for {requested}, it does not offer this {missing}: choose from "
+                f"what 'labrig rig check' shows, or turn its dial to {dial}"
             )
         # a dial at B leaves no shutter time to be set
         codes = {} if self._dial_is_at_b else {Property.shutter_time: shutter}
         codes[Property.iso] = iso
-        if wanted.f_number is not None:
-            aperture = aperture_code(wanted.f_number, self._aperture_codes())
+        if requested.f_number is not None:
+            aperture = aperture_code(requested.f_number, self._aperture_codes())
             if aperture is None:
                 offered = [f"f/{F_NUMBERS[c]:g}" for c in self._aperture_codes()]
                 raise DeviceError(
-                    f"asked the camera for {wanted}, "
+                    f"asked the camera for {requested}, "
                     + (
                         f"its lens offers {', '.join(offered)}: choose one of these"
                         if offered
@@ -162,7 +165,7 @@ class EosExposure:
         return BULB_TV if self._dial_is_at_b else self._state.value(Property.shutter_time)
 
     def _shutter_codes(self) -> tuple[int, ...]:
-        """Of times that the camera itself counts."""
+        """Return the codes of times that the camera itself counts."""
         allowed = self._settings.allows_exposure
         return tuple(
             code
@@ -178,7 +181,7 @@ class EosExposure:
         return self._settings.bulb_times_s if possible else ()
 
     def _bulb_time_s(self, exposure_s: float) -> float | None:
-        """The time offered at bulb that is meant by `exposure_s`."""
+        """Return the time offered at bulb that `exposure_s` stands for."""
         if not exposure_s > 0:
             raise DeviceError(
                 f"expected a shutter time longer than 0 s, asked for {exposure_s} s: "
@@ -206,13 +209,13 @@ class EosExposure:
             )
 
 
-def _words(prop: Property) -> str:
+def _name_of(prop: Property) -> str:
     return prop.name.replace("_", " ")
 
 
 def _unusable(prop: Property, value: int | None) -> DeviceError:
-    said = "nothing" if value is None else value_text(prop, number(value))
+    reported = "nothing" if value is None else value_text(prop, number(value))
     return DeviceError(
-        f"expected a {_words(prop)} that can be reduced, the camera says {said}: "
+        f"expected a {_name_of(prop)} that can be reduced, the camera says {reported}: "
         "turn its dial to M, neither bulb nor automatic ISO"
     )

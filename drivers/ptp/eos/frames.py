@@ -1,4 +1,4 @@
-"""The frames of an EOS: the one that is due, its fetching, and those that nobody wants any more."""
+"""The frames of an EOS: the one that is due, its fetching, and abandoned ones."""
 
 import math
 import re
@@ -14,21 +14,21 @@ from .transfer import EosTransfer
 
 _SUFFIX = re.compile(r"\.[a-z0-9]{1,5}")
 _JPEG_FORMAT = 0x3801
-#: So long after its end the frame of an exposure that a dead program began may still be offered.
+#: Time after which a frame of a dead program's exposure is no longer offered.
 LEFT_OVER_S = 2.0
 
 
 class EosFrames:
-    """Knows whether a frame is due, so that none is ever taken for another.
+    """Bookkeeping of the frame that is due, so that none is ever taken for another.
 
     Parameters
     ----------
     state
-        Where offered frames show up.
+        State in which offered frames appear.
     transfer
-        Fetches them.
+        Transfer that fetches the frames.
     clock
-        On which is waited for them.
+        Clock of the waiting for frames.
     timeout_s
         Seconds from the end of an exposure until its frame must have been offered.
     """
@@ -44,29 +44,29 @@ class EosFrames:
         self._left_over_until_s = -math.inf
 
     def expect(self, exposure_end_s: float) -> None:
-        """An exposure has begun, or may have, that ends at this clock time at the latest."""
+        """Note that an exposure has begun, or may have, and ends at this clock time at latest."""
         self._due_after_s = exposure_end_s
 
     def expect_none(self) -> None:
-        """No exposure is under way."""
+        """Note that no exposure is under way."""
         self._due_after_s = None
 
     def expect_left_over(self) -> None:
-        """Another program's exposure may have ended just now."""
+        """Note that another program's exposure may have ended just now."""
         self._left_over_until_s = self._clock.now() + LEFT_OVER_S
 
     def exposing_for_s(self) -> float:
-        """Seconds for which the camera may still expose."""
+        """Return the seconds for which the camera may still expose."""
         now_s = self._clock.now()
         return max(0.0, (self._due_after_s or now_s) - now_s)
 
     def fetch(self) -> tuple[bytes, str]:
-        """The frame that is due: its bytes and its suffix, such as `.cr2`.
+        """Return the bytes of the frame that is due and its suffix, such as `.cr2`.
 
         Raises
         ------
         DeviceError
-            None came, one that is no RAW file, or not as many bytes as announced.
+            No frame came, one that is no RAW file, or not as many bytes as announced.
         """
         if not self._wait():
             raise DeviceError(
@@ -81,7 +81,7 @@ class EosFrames:
         return data, suffix
 
     def discard_abandoned(self) -> None:
-        """Wait for frames that are due though nobody wants them, and discard all there are.
+        """Wait for abandoned frames that are due, and discard all frames.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class EosFrames:
         self.discard_offered()
 
     def discard_offered(self) -> None:
-        """Discard the frames that are there now.
+        """Discard the frames that have been offered.
 
         Raises
         ------

@@ -1,9 +1,10 @@
-"""Which sensitivities of an EOS are gains of its sensor, and which are numbers multiplied later.
+"""Native sensitivities of an EOS, which are gains of its sensor, and multiplied ones.
 
 An EOS amplifies in whole stops before it digitises. Thirds of a stop are made from the nearest of
 these by multiplication (×1.297, ×0.771 on a 30D), and so are the highest ones (×2 a stop, among
-them those called H): nothing is gained, and levels are missing or shared. Only models for which
-somebody looked are listed; with others, ISO 100 to 1600 is assumed. Canon says nothing about it.
+them those called H): nothing is gained, and levels are missing or shared. Only models with
+published measurements are listed; for others, ISO 100 to 1600 is assumed. Canon publishes nothing
+about it.
 
 Sources:
 - 30D: histograms of RAW files of every ISO (ruevski.com/rawhistogram, 2007): whole
@@ -12,7 +13,7 @@ Sources:
   stops, "6400 … are digital gains applied to 3200" (later: or amplified very late in the chain,
   "without improving noise").
 - 5D Mark III, 6D: electrons at saturation halve a stop from ISO 100 to 6400 (Magic Lantern forum,
-  topic 10111); higher ones are reached by the same registers to 12800, which nobody confirmed.
+  topic 10111); higher ones are reached by the same registers to 12800, which is unconfirmed.
 """
 
 from dataclasses import dataclass
@@ -42,15 +43,15 @@ _HIGHEST = MappingProxyType(
 
 @dataclass(frozen=True)
 class NativeIsos:
-    """The sensitivities that labrig uses, ascending, and who says that they are native."""
+    """Sensitivities that labrig uses, ascending, and the source of their being native."""
 
     values: tuple[int, ...]
     source: Literal["rig file", "model", "assumed"]
 
 
 def isos_of_model(model: str) -> NativeIsos:
-    """Whole stops from ISO 100 to the model's highest native one, or to an assumed one."""
-    known = model in _HIGHEST
+    """Return whole stops from ISO 100 to the model's highest native one, or to an assumed one."""
+    is_listed = model in _HIGHEST
     highest = _HIGHEST.get(model, ASSUMED_HIGHEST)
     values = tuple(iso for iso in WHOLE_STOPS if iso <= highest)
-    return NativeIsos(values, "model" if known else "assumed")
+    return NativeIsos(values, "model" if is_listed else "assumed")

@@ -1,4 +1,4 @@
-"""Canon's vendor operations and properties for remote control of an EOS, as far as spoken here.
+"""Canon's vendor operations and properties for remote control of an EOS, as far as used here.
 
 Source: the EOS part of libgphoto2's ptp.h and its DeviceInfo dumps of real cameras; vendor
 extension 0xB. None of it is documented by Canon: everything is read back.
@@ -12,7 +12,7 @@ from .codes import BULB_TV, F_NUMBERS, ISOS, shutter_time_s
 
 
 class Eos(IntEnum):
-    """Operations."""
+    """Codes of Canon's operations."""
 
     GetObject = 0x9104
     GetPartialObject = 0x9107
@@ -33,7 +33,7 @@ class Eos(IntEnum):
 
 
 class Property(IntEnum):
-    """Properties, with the words that messages use."""
+    """Codes of Canon's properties, with the words that messages use."""
 
     aperture = 0xD101
     shutter_time = 0xD102
@@ -73,27 +73,27 @@ HOST_ROOM = (0x0FFFFFFF, 0x1000, 1)
 FEW_SHOTS = 100
 
 
-def lacking_operations(known: Collection[int]) -> list[str]:
-    """What a camera that knows these operations lacks for being released by labrig."""
-    lacking = [f"0x{op:X}" for op in _NEEDED if op not in known]
-    two_stages = Eos.RemoteReleaseOn in known and Eos.RemoteReleaseOff in known
-    if not two_stages and Eos.RemoteRelease not in known:
+def lacking_operations(operations: Collection[int]) -> list[str]:
+    """Return the operations that a camera lacks for being released by labrig."""
+    lacking = [f"0x{op:X}" for op in _NEEDED if op not in operations]
+    two_stages = Eos.RemoteReleaseOn in operations and Eos.RemoteReleaseOff in operations
+    if not two_stages and Eos.RemoteRelease not in operations:
         lacking.append("0x9128 with 0x9129, or 0x910F")
     return lacking
 
 
 def number(value: int) -> bytes:
-    """A property's value as it goes over the wire."""
+    """Return the bytes of a property's value."""
     return struct.pack("<I", value)
 
 
 def property_dataset(prop: int, value: bytes) -> bytes:
-    """Data phase of SetDevicePropValueEx: u32 size of everything, u32 property, value."""
+    """Return the data phase of SetDevicePropValueEx: u32 size of all, u32 property, value."""
     return struct.pack("<II", 8 + len(value), prop) + value
 
 
 def value_text(prop: int, value: bytes) -> str:
-    """A property's value as a person can look it up: `0x68 (1/64 s)`."""
+    """Return a property's value as a person can look it up: `0x68 (1/64 s)`."""
     if not 0 < len(value) <= 4:
         return value.hex(" ") or "nothing"
     code = int.from_bytes(value, "little")

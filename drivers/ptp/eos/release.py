@@ -12,7 +12,7 @@ from .protocol import Eos
 HALF, FULL = 1, 2
 #: A slow lens keeps a 5D Mark II from answering for 8 s (libgphoto2).
 FOCUS_S = 12.0
-#: Busy at the full press is common; a frame later than so much belongs to no decay.
+#: Time for which a busy full press is repeated; a frame any later belongs to no decay.
 LATE_PRESS_S = 3.0
 
 _RESULTS = {
@@ -26,23 +26,23 @@ Command = tuple[Eos, *tuple[int, ...]]
 
 
 class Stage(Enum):
-    """Where something that can be held is, as far as is known."""
+    """Position of a stage that can be held, as far as is known."""
 
     UP = auto()
-    #: A command was sent, and not answered with OK.
+    #: State after a command that was not answered with OK.
     UNKNOWN = auto()
     DOWN = auto()
 
 
 class Held:
-    """Something that one command presses and another lets go of, after whatever has happened.
+    """A pair of commands that press and release a stage, in any state before.
 
     Parameters
     ----------
     session
-        Over which the camera is told.
+        Session with the camera.
     press, let_go
-        The two commands.
+        Operations that press and release the stage.
     """
 
     def __init__(self, session: Session, press: Command, let_go: Command) -> None:
@@ -53,16 +53,16 @@ class Held:
 
     @property
     def is_down(self) -> bool:
-        """Whether it is certainly held."""
+        """Whether the stage is certainly held."""
         return self._stage is Stage.DOWN
 
     def press(self, timeouts: Timeouts) -> Reply:
-        """Press it.
+        """Press the stage.
 
         Raises
         ------
         DeviceError
-            The camera did not say that it is down.
+            The camera did not confirm that it is down.
         """
         self._stage = Stage.UNKNOWN
         reply = self._session.transact(*self._press, timeouts=timeouts)
@@ -70,20 +70,20 @@ class Held:
         return reply
 
     def let_go(self, busy_s: float) -> Reply | None:
-        """Let go of it unless it is certainly up; a camera that exposes may be busy for `busy_s`.
+        """Release the stage unless it is surely up; a camera that exposes may be busy for `busy_s`.
 
         Returns
         -------
         Reply | None
-            None if there was nothing to let go of.
+            The camera's reply; None if there was nothing to release.
 
         Raises
         ------
         DeviceError
-            It may still be down.
+            The stage may still be down.
         """
-        before = self._stage
-        if before is Stage.UP:
+        previous = self._stage
+        if previous is Stage.UP:
             return None
         self._stage = Stage.UNKNOWN
         reply = None
@@ -91,32 +91,32 @@ class Held:
             reply = self._session.transact(*self._let_go, timeouts=Timeouts(FOCUS_S, busy_s))
         except RefusedError as refusal:
             if refusal.code == DEVICE_BUSY:
-                self._stage = before
+                self._stage = previous
                 raise
             # a camera may refuse to let go of what is not down: refused twice, it is not
-            if before is Stage.DOWN:
+            if previous is Stage.DOWN:
                 raise
         self._stage = Stage.UP
         return reply
 
     def doubt(self) -> None:
-        """What was pressed may not be down."""
+        """Note that a pressed stage may not be down."""
         self._stage = Stage.UNKNOWN
 
     def let_go_blindly(self) -> None:
-        """Let go of what another program, or this one before a reset, may hold.
+        """Release a stage that another program, or this one before a reset, may hold.
 
         Raises
         ------
         DeviceError
-            It may still be down.
+            The stage may still be down.
         """
         self.doubt()
         self.let_go(LATE_PRESS_S)
 
 
 class Release(ABC):
-    """Presses and lets go, and can let go after anything."""
+    """The release button, which can be released in any state."""
 
     @abstractmethod
     def press_half(self) -> None:
@@ -124,27 +124,27 @@ class Release(ABC):
 
     @abstractmethod
     def press_full(self, exposure_s: float) -> Reply:
-        """Begin an exposure of `exposure_s` seconds; the reply tells when.
+        """Begin an exposure of `exposure_s` seconds; the reply has the time.
 
         Raises
         ------
         RefusedError
             No exposure has begun.
         DeviceError
-            Nobody knows whether one has.
+            Whether an exposure has begun is unknown.
         """
 
     @abstractmethod
     def let_go_full(self, busy_s: float) -> None:
-        """Let go of the second stage; a camera that still exposes may be busy for `busy_s`."""
+        """Release the second stage; a camera that still exposes may be busy for `busy_s`."""
 
     @abstractmethod
     def let_go_half(self, busy_s: float) -> None:
-        """Let go of the first stage."""
+        """Release the first stage."""
 
     @abstractmethod
     def let_go_blindly(self) -> None:
-        """Let go of what another program, or this one before a reset, may have held."""
+        """Release a button that another program, or this one before a reset, may have held."""
 
 
 class TwoStageRelease(Release):
@@ -176,7 +176,7 @@ class TwoStageRelease(Release):
 
 
 class OneStageRelease(Release):
-    """RemoteRelease: presses and lets go by itself."""
+    """RemoteRelease: presses and releases by itself."""
 
     def __init__(self, session: Session) -> None:
         self._session = session
@@ -208,6 +208,6 @@ class OneStageRelease(Release):
 
 
 def release_of(info: DeviceInfo, session: Session) -> Release:
-    """The release that a camera has."""
+    """Return the release that a camera has."""
     two_stages = {Eos.RemoteReleaseOn, Eos.RemoteReleaseOff} <= info.operations
     return TwoStageRelease(session) if two_stages else OneStageRelease(session)

@@ -1,4 +1,4 @@
-"""The shutter of an EOS: opened and closed, when, and closed again after anything."""
+"""The shutter of an EOS: opened and closed, with times, and closed again after any error."""
 
 from labrig.clock import Clock
 from labrig.errors import DeviceError
@@ -12,24 +12,24 @@ from .release import LATE_PRESS_S, release_of
 
 
 class EosShutter:
-    """Exposes for a time that the camera counts, or at bulb the PC.
+    """Shutter of an EOS, timed by the camera, or at bulb by the PC.
 
     An exposure begins in the middle of its command's round trip, give or take half of it, plus the
-    camera's own lag; one at bulb ends in the middle of the second round trip. The frame is noted
-    as due before a command is sent: should it be broken off, nobody knows whether it was heard.
+    camera's own lag; one at bulb ends in the middle of the second round trip. The frame is noted as
+    due before a command is sent: whether a command that is broken off was received is unknown.
 
     Parameters
     ----------
     session
-        Over which the camera is told.
+        Session with the camera.
     clock
-        On which is waited for the end of an exposure.
+        Clock of the waiting for the end of an exposure.
     info
-        What the camera can do.
+        Abilities of the camera.
     frames
-        Where frames are noted as due.
+        Bookkeeping of frames that are due.
     lag_s
-        From a press to the open shutter.
+        Seconds from a press to the open shutter.
     """
 
     def __init__(
@@ -48,7 +48,7 @@ class EosShutter:
         return self._bulb is not None
 
     def get_ready(self, *, at_bulb: bool) -> None:
-        """Press half and hold, where the next exposure wants that.
+        """Press half and hold, where the next exposure needs it.
 
         Raises
         ------
@@ -59,7 +59,7 @@ class EosShutter:
             self._release.press_half()
 
     def expose(self, exposure_s: float) -> tuple[float, float]:
-        """Expose as the camera is set; clock times of the begin and the end.
+        """Expose with the camera's settings; return the clock times of the begin and the end.
 
         Raises
         ------
@@ -80,7 +80,7 @@ class EosShutter:
         return start_s, end_s
 
     def expose_at_bulb(self, exposure_s: float) -> tuple[float, float]:
-        """Expose until the clock says that it is enough; clock times of the begin and the end.
+        """Expose for a time on the clock; return the clock times of the begin and the end.
 
         Raises
         ------
@@ -109,7 +109,7 @@ class EosShutter:
         return start_s, end_s
 
     def close(self) -> None:
-        """Close the shutter at bulb; let go of the full stage. Other exposures run to their end.
+        """Close the shutter at bulb; release the full stage. Other exposures run to their end.
 
         Raises
         ------
@@ -126,7 +126,7 @@ class EosShutter:
         self._release.let_go_full(self._busy_s())
 
     def let_go(self) -> None:
-        """Let go of the first stage.
+        """Release the first stage.
 
         Raises
         ------
@@ -136,7 +136,7 @@ class EosShutter:
         self._release.let_go_half(self._busy_s())
 
     def let_go_blindly(self) -> None:
-        """Let go of what another program, or this one before a reset, may have held.
+        """Release a button that another program, or this one before a reset, may have held.
 
         Raises
         ------
@@ -148,7 +148,7 @@ class EosShutter:
         self._release.let_go_blindly()
 
     def _busy_s(self) -> float:
-        """How long the camera may be busy: to the end of an exposure, and a little more."""
+        """Return how long the camera may be busy: to the end of an exposure, and a little more."""
         return self._frames.exposing_for_s() + LATE_PRESS_S
 
 

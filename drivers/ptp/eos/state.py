@@ -1,4 +1,4 @@
-"""What an EOS says about itself, kept from its events; and setting its properties."""
+"""State of an EOS, kept from its events; and setting its properties."""
 
 from collections.abc import Collection
 from contextlib import suppress
@@ -13,9 +13,9 @@ from .events import ChoicesChanged, Event, ObjectOffered, ValueChanged, parse_ev
 from .protocol import Eos, Property, property_dataset, value_text
 
 POLL_PERIOD_S = 0.03
-#: A camera lists itself in a few answers; more than so many in a row is a babbling one.
+#: Largest number of answers in a row; a camera lists its state in a few.
 MOST_ANSWERS = 64
-#: Many times what fits into a camera's memory for the PC.
+#: Largest number of frames, many times what fits into a camera's memory for the PC.
 MOST_OFFERED = 1000
 _KNOWN = frozenset(Property)
 
@@ -23,19 +23,19 @@ _KNOWN = frozenset(Property)
 class EosState:
     """Mirror of the camera's properties and of the frames that it offers.
 
-    What the camera last said of a property is in doubt from a set that was not confirmed, or an
-    answer that was lost, until it speaks of it again: it is then set anew.
+    The last report of a property is in doubt from a set that was not confirmed, or an answer that
+    was lost, until the camera reports it again: it is then set anew.
 
     Parameters
     ----------
     session
-        Over which the camera is asked.
+        Session with the camera.
     clock
-        On which is waited for it.
+        Clock of the waiting for the camera.
     settle_s
-        Seconds within which it must have taken a setting.
+        Seconds within which the camera must have taken a setting.
     operations
-        Codes of what the camera can do.
+        Codes of the operations that the camera has.
     """
 
     def __init__(
@@ -57,21 +57,21 @@ class EosState:
         return tuple(self._offered.values())
 
     def value(self, prop: Property) -> int | None:
-        """A numeric property, None if the camera never spoke of it."""
+        """Return a numeric property, None if the camera never reported it."""
         value = self._values.get(prop)
         return int.from_bytes(value[:4], "little") if value else None
 
     def choices(self, prop: Property) -> tuple[int, ...]:
-        """Codes that a property can be set to, as the camera lists them."""
+        """Return the codes that a property can be set to, as the camera lists them."""
         return self._choices.get(prop, ())
 
     def refresh(self, busy_s: float = USUAL.busy_s) -> None:
-        """Take in all that the camera has to say; it may be busy for `busy_s` seconds.
+        """Take in all events that wait in the camera, which may be busy for `busy_s` seconds.
 
         Raises
         ------
         DeviceError
-            It does not answer, not in the protocol's terms, or never comes to an end.
+            The camera does not answer, violates the protocol, or never comes to an end.
         """
         for _ in range(MOST_ANSWERS):
             if not self.listen(busy_s):
@@ -82,12 +82,12 @@ class EosState:
         )
 
     def listen(self, busy_s: float = USUAL.busy_s) -> bool:
-        """Ask once for events; True if there were any. The camera may be busy for `busy_s`.
+        """Ask once for events; return whether there were any. The camera may be busy for `busy_s`.
 
         Raises
         ------
         DeviceError
-            The camera does not answer, or not in the protocol's terms.
+            The camera does not answer, or violates the protocol.
         """
         events = self._events(Timeouts(USUAL.answer_s, busy_s))
         for event in events:
@@ -110,16 +110,16 @@ class EosState:
         return bool(events)
 
     def forget(self, offered: ObjectOffered) -> None:
-        """A frame no longer waits in the camera."""
+        """Note that a frame no longer waits in the camera."""
         del self._offered[offered.handle]
 
     def set(self, prop: Property, value: bytes) -> None:
-        """Set a property unless it has the value already, and wait for the camera to say so.
+        """Set a property unless it has the value already, and wait for the camera's confirmation.
 
         Raises
         ------
         DeviceError
-            The camera refuses, or still says something else at the end of the settling time.
+            The camera refuses, or still reports another value at the end of the settling time.
         """
         if self._has(prop, value):
             return
@@ -132,11 +132,11 @@ class EosState:
             if self._clock.now() >= deadline_s:
                 if self._says(prop, value):
                     return  # it took it, and reports nothing that it had before
-                said = self._values.get(prop)
+                reported = self._values.get(prop)
                 raise DeviceError(
                     f"asked the camera for {prop.name.replace('_', ' ')} (0x{prop:X}) = "
                     f"{value_text(prop, value)}, it says "
-                    f"{'nothing' if said is None else value_text(prop, said)}: "
+                    f"{'nothing' if reported is None else value_text(prop, reported)}: "
                     "turn its dial to M, leave its menus, and try again"
                 )
             self._clock.sleep(POLL_PERIOD_S)
@@ -159,6 +159,6 @@ class EosState:
         return prop not in self._in_doubt and self._says(prop, value)
 
     def _says(self, prop: Property, value: bytes) -> bool:
-        """Models differ in how many zeros they write after a value."""
-        said = self._values.get(prop)
-        return said is not None and said.rstrip(b"\0") == value.rstrip(b"\0")
+        """Return whether the camera reports a value; models differ in the zeros after it."""
+        reported = self._values.get(prop)
+        return reported is not None and reported.rstrip(b"\0") == value.rstrip(b"\0")

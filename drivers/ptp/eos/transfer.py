@@ -1,4 +1,4 @@
-"""Fetching a frame from an EOS, and telling it so."""
+"""Transfer of a frame from an EOS, and its confirmation."""
 
 from labrig.clock import Clock
 
@@ -14,7 +14,7 @@ _IN_PARTS: tuple[Eos | Standard, ...] = (Eos.GetPartialObject, Standard.GetParti
 
 
 class EosTransfer:
-    """Fetches what the camera offers."""
+    """Transfer of the files that the camera offers."""
 
     def __init__(self, session: Session, clock: Clock, info: DeviceInfo) -> None:
         self._session = session
@@ -22,22 +22,22 @@ class EosTransfer:
         self._objects = ObjectTransfer(session, clock, Eos.GetObject, part)
 
     def fetch(self, offered: ObjectOffered) -> bytes:
-        """The file's bytes.
+        """Return the file's bytes.
 
         Raises
         ------
         DeviceError
-            The camera sends more or fewer than it announced, or fails to send.
+            The camera sends more or fewer bytes than it announced, or fails to send.
         """
         return self._objects.fetch(offered.handle, offered.name, offered.size_bytes)
 
     def complete(self, offered: ObjectOffered) -> None:
-        """Tell the camera that it may forget the file.
+        """Confirm the transfer, so that the camera may delete the file.
 
         Raises
         ------
         DeviceError
-            The camera did not take it.
+            The camera did not take the confirmation.
         """
         try:
             self._session.transact(Eos.TransferComplete, offered.handle, timeouts=PATIENT)

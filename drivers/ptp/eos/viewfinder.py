@@ -33,16 +33,16 @@ _JPEG_START = b"\xff\xd8"
 
 
 class EosViewfinder:
-    """Switches the viewfinder to the PC when a picture is first asked for, and off again.
+    """Viewfinder that is switched to the PC with the first picture, and off again.
 
     Parameters
     ----------
     session, state
-        Of the camera.
+        Session and state of the camera.
     clock
-        On which is waited for a picture.
+        Clock of the waiting for a picture.
     info
-        What the camera says it can do.
+        Abilities that the camera reports.
     """
 
     def __init__(self, session: Session, state: EosState, clock: Clock, info: DeviceInfo) -> None:
@@ -53,7 +53,7 @@ class EosViewfinder:
         self._is_on = False
 
     def picture(self) -> bytes:
-        """The next picture of the viewfinder, a JPEG.
+        """Return the next picture of the viewfinder, a JPEG.
 
         Raises
         ------
@@ -85,7 +85,7 @@ class EosViewfinder:
             self._clock.sleep(POLL_PERIOD_S)
 
     def off(self) -> None:
-        """Mirror down, sensor off; nothing if this object never switched the viewfinder on.
+        """Lower the mirror and switch the sensor off, if this object switched the viewfinder on.
 
         Raises
         ------
@@ -96,7 +96,7 @@ class EosViewfinder:
             self.off_whoever_switched_it_on()
 
     def off_whoever_switched_it_on(self) -> None:
-        """As `off`, also where a program that died left it on.
+        """Switch the viewfinder off, also where a program that died left it on.
 
         Raises
         ------
@@ -121,7 +121,7 @@ class EosViewfinder:
 
 
 def jpeg_in(data: bytes) -> bytes:
-    """The JPEG among the records of GetViewFinderData: u32 length of everything, u32 kind, data.
+    """Return the JPEG among GetViewFinderData's records: u32 length of everything, u32 kind, data.
 
     Raises
     ------

@@ -1,7 +1,7 @@
 """The network side: PTP/IP (CIPA DC-005), two TCP connections to one camera.
 
-The first carries transactions; the second their cancellation, the camera's questions whether the
-PC is still there, and events.
+The first carries transactions; the second their cancellation, the camera's probes of the PC, and
+events.
 """
 
 import select
@@ -25,14 +25,14 @@ LOOK_AT_NETWORK = "check that it is on, in the network, and free of other progra
 
 
 class PacketStream:
-    """Packets over one socket, of which this object takes care.
+    """Packets over one socket, which this object owns.
 
     Parameters
     ----------
     connected
-        The socket.
+        Connected socket.
     name
-        What messages call it.
+        Name of the camera in messages.
     """
 
     def __init__(self, connected: socket.socket, name: str) -> None:
@@ -40,75 +40,75 @@ class PacketStream:
         self._socket = connected
         self._name = name
         self._received = bytearray()
-        self._gone: str | None = None
+        self._loss: str | None = None
 
     def fileno(self) -> int:
-        """For `select`."""
+        """Return the socket's file descriptor, for `select`."""
         return self._socket.fileno()
 
     @property
     def beginning(self) -> bytes:
-        """What has come of a packet that is not all there."""
+        """Bytes that have come of an incomplete packet."""
         return bytes(self._received)
 
     def write(self, packets: bytes, doing: str) -> None:
-        """Send all of it.
+        """Send all of the data.
 
         Raises
         ------
         UnpluggedError
-            The camera does not take it, or is gone; `doing` says what for.
+            The camera does not take it, or is gone; `doing` is its purpose in the message.
         """
         self.check(doing)
         try:
             self._socket.sendall(packets)
         except OSError as failure:
-            self._gone = str(failure)  # half a packet may be out: nothing can follow it
+            self._loss = str(failure)  # half a packet may be out: nothing can follow it
             self.check(doing)
 
     def take_in(self) -> None:
-        """Receive what is there; should the camera be gone, what came before stays to be read."""
+        """Receive the bytes that have come; if the camera is gone, earlier bytes stay readable."""
         try:
             received = self._socket.recv(BLOCK_BYTES)
         except OSError as failure:
-            self._gone = str(failure)
+            self._loss = str(failure)
             return
         if not received:
-            self._gone = "it has hung up"
+            self._loss = "it has hung up"
         self._received += received
 
     def check(self, doing: str) -> None:
-        """Nothing, if the camera is still there.
+        """Check that the camera is still there.
 
         Raises
         ------
         UnpluggedError
-            It is gone.
+            The camera is gone.
         """
-        if self._gone is not None:
+        if self._loss is not None:
             raise UnpluggedError(
-                f"{self._name}: {doing}: it is gone ({self._gone}): {LOOK_AT_NETWORK}"
+                f"{self._name}: {doing}: it is gone ({self._loss}): {LOOK_AT_NETWORK}"
             )
 
     def next_packet(self, at_most_bytes: int) -> Packet | None:
-        """The next packet, if all of it has been taken in.
+        """Return the next packet, if all of it has been taken in.
 
         Raises
         ------
         MalformedError
-            What came is no packet, and nothing behind it can be understood any more.
+            The bytes are no packet; nothing behind them can be decoded any more.
         """
         return split(self._received, at_most_bytes)
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the socket."""
         self._socket.close()
 
 
 #: IANA's port for PTP/IP.
 PORT = 15740
 NAME = "labrig"
-#: By which a camera knows this program again, once it was allowed in.
+#: GUID by which a camera recognises this program, once it was allowed in.
 GUID = b"labrig initiator"
 #: Some cameras ask their owner first.
 INTRODUCTION_TIMEOUT_S = 20.0
@@ -117,7 +117,7 @@ CANCEL_TIMEOUT_S = 5.0
 _AROUND_DATA_BYTES = 12
 #: Longer than any packet that carries no data: an introduction with its name.
 _SHORT_PACKET_BYTES = 1024
-#: While cancelling, data of any length may still be on its way.
+#: Longest packet while cancelling, when data of any length may still be on its way.
 _MOST_PACKET_BYTES = 256 * 1024 * 1024
 #: An EOS reports without end what nobody listens to, because it says it again when asked.
 _MOST_EVENTS_KEPT = 256
@@ -133,16 +133,16 @@ class IpLink:
     Parameters
     ----------
     dial
-        Makes one TCP connection to the camera.
+        Function that makes one TCP connection to the camera.
     address
-        What messages call it.
+        Address of the camera, for messages.
     clock
-        On which time-outs count.
+        Clock of the time-outs.
 
     Raises
     ------
     DeviceError
-        Nobody there, not a camera, or it lets nobody in.
+        No camera is at the address, or it refuses the PC.
     """
 
     def __init__(self, dial: Callable[[], socket.socket], address: str, clock: Clock) -> None:
@@ -160,18 +160,18 @@ class IpLink:
         Raises
         ------
         DeviceError
-            The camera does not take it; `doing` says what for.
+            The camera does not take it; `doing` is its purpose in the message.
         """
         self._operation = request.code
         self._command(doing).write(packets.request(request, data), doing)
 
     def receive(self, doing: str, timeout_s: float, at_most_bytes: int) -> Container:
-        """The next data or response, each packet of it within `timeout_s`.
+        """Return the next data or response, each packet of it within `timeout_s`.
 
         Raises
         ------
         DeviceError
-            Nothing came, it is out of order, or longer than it says or than `at_most_bytes`.
+            Nothing came, it is out of order, or longer than announced or than `at_most_bytes`.
         """
         longest = at_most_bytes + _AROUND_DATA_BYTES + _SHORT_PACKET_BYTES
         packet = self._next(doing, timeout_s, longest)
@@ -199,28 +199,28 @@ class IpLink:
         return Container(Kind.DATA, self._operation, transaction_id, bytes(data))
 
     def event(self, timeout_s: float) -> Container | None:
-        """The next event, None if the camera reports none within `timeout_s`.
+        """Return the next event, None if the camera reports none within `timeout_s`.
 
         Raises
         ------
         DeviceError
-            The camera is gone, or what came is no event.
+            The camera is gone, or the packet is no event.
         """
         doing = "waiting for an event"
         deadline_s = self._clock.now() + timeout_s
         self._command(doing)
-        self._look_at_events(self._streams[1], doing)
+        self._poll_events(self._streams[1], doing)
         while not self._events and self._take_in(doing, deadline_s):
-            self._look_at_events(self._streams[1], doing)
+            self._poll_events(self._streams[1], doing)
         return packets.event(self._events.popleft()) if self._events else None
 
     def cancel(self, transaction_id: int) -> None:
-        """Have the camera give up `transaction_id` and forget what it still sends.
+        """Make the camera cancel `transaction_id` and discard what it still sends.
 
         Raises
         ------
         DeviceError
-            The camera does not answer that it has.
+            The camera does not confirm it.
         """
         doing = "cancelling a transaction"
         deadline_s = self._clock.now() + CANCEL_TIMEOUT_S
@@ -229,24 +229,24 @@ class IpLink:
         self._streams[1].write(packet, doing)
         is_over = False
         while not is_over:
-            left_s = deadline_s - self._clock.now()
-            answer = self._next(doing, max(0.0, left_s), _MOST_PACKET_BYTES)
+            remaining_s = deadline_s - self._clock.now()
+            answer = self._next(doing, max(0.0, remaining_s), _MOST_PACKET_BYTES)
             if answer.kind == PacketKind.OPERATION_RESPONSE:
                 is_over = packets.response(answer).transaction_id == transaction_id
 
     def reset(self) -> None:
-        """Hang up, which ends the camera's session, and dial again.
+        """Close the connection, which ends the camera's session, and dial again.
 
         Raises
         ------
         DeviceError
-            The camera does not let this PC in again.
+            The camera refuses this PC.
         """
         self.close()
         self._introduce()
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         for stream in self._streams:
             stream.close()
         self._streams.clear()
@@ -275,8 +275,8 @@ class IpLink:
         packet = self._wait_for_packet(stream, doing, INTRODUCTION_TIMEOUT_S, _SHORT_PACKET_BYTES)
         if packet.kind == PacketKind.INIT_FAIL:
             (reason,) = packet.fields("I")
-            said = _REFUSALS.get(reason, "switch it off and on")
-            raise DeviceError(f"{self._name}: {doing}: refused with reason {reason}: {said}")
+            remedy = _REFUSALS.get(reason, "switch it off and on")
+            raise DeviceError(f"{self._name}: {doing}: refused with reason {reason}: {remedy}")
         if packet.kind != expected:
             raise self._out_of_order(doing, expected.name, packet)
         return packet
@@ -290,15 +290,15 @@ class IpLink:
         return self._wait_for_packet(self._command(doing), doing, timeout_s, at_most_bytes)
 
     def _wait_for_packet(
-        self, wanted: PacketStream, doing: str, timeout_s: float, at_most_bytes: int
+        self, awaited: PacketStream, doing: str, timeout_s: float, at_most_bytes: int
     ) -> Packet:
         deadline_s = self._clock.now() + timeout_s
-        while (packet := wanted.next_packet(at_most_bytes)) is None:
+        while (packet := awaited.next_packet(at_most_bytes)) is None:
             for stream in self._streams[1:]:
-                if stream is not wanted:
-                    self._look_at_events(stream, doing)
+                if stream is not awaited:
+                    self._poll_events(stream, doing)
             if not self._take_in(doing, deadline_s):
-                only = f", only {shown(wanted.beginning)}" if wanted.beginning else ""
+                only = f", only {shown(awaited.beginning)}" if awaited.beginning else ""
                 raise NoAnswerError(
                     f"{self._name}: {doing}: no answer within {timeout_s:g} s{only}: "
                     f"{LOOK_AT_NETWORK}"
@@ -306,16 +306,16 @@ class IpLink:
         return packet
 
     def _take_in(self, doing: str, deadline_s: float) -> bool:
-        """Receive what comes, on either connection; False if nothing does until then."""
+        """Receive bytes on either connection; return False if none come until then."""
         for stream in self._streams:
             stream.check(doing)
-        left_s = deadline_s - self._clock.now()
-        readable, _, _ = select.select(self._streams, [], [], max(0.0, left_s))
+        remaining_s = deadline_s - self._clock.now()
+        readable, _, _ = select.select(self._streams, [], [], max(0.0, remaining_s))
         for stream in readable:
             stream.take_in()
-        return left_s > 0 and bool(readable)
+        return remaining_s > 0 and bool(readable)
 
-    def _look_at_events(self, stream: PacketStream, doing: str) -> None:
+    def _poll_events(self, stream: PacketStream, doing: str) -> None:
         while (packet := stream.next_packet(_SHORT_PACKET_BYTES)) is not None:
             if packet.kind == PacketKind.PING:
                 stream.write(packets.encode(PacketKind.PONG), doing)

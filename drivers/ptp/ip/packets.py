@@ -1,6 +1,6 @@
-"""PTP/IP packets (CIPA DC-005): bytes and back.
+"""PTP/IP packets (CIPA DC-005): encoding and decoding.
 
-Layout, little-endian: u32 length of everything, u32 kind, then what the kind says.
+Layout, little-endian: u32 length of everything, u32 kind, then the payload of the kind.
 """
 
 import struct
@@ -12,9 +12,9 @@ from ..failures import MalformedError
 
 HEADER_BYTES = 8
 VERSION = 0x00010000
-#: For `OperationRequest`: whether the PC sends data.
+#: Data phase of an `OperationRequest`: whether the PC sends data.
 NO_DATA_FROM_PC, DATA_FROM_PC = 1, 2
-#: A camera that does not know yet how long its data will be.
+#: Length of data that the camera does not know yet.
 UNKNOWN_LENGTH = 0xFFFFFFFFFFFFFFFF
 _GUID_BYTES = 16
 
@@ -22,7 +22,7 @@ _HEADER = struct.Struct("<II")
 
 
 class PacketKind(IntEnum):
-    """What a packet is for."""
+    """Kind of a packet."""
 
     INIT_COMMAND_REQUEST = 1
     INIT_COMMAND_ACK = 2
@@ -42,18 +42,18 @@ class PacketKind(IntEnum):
 
 @dataclass(frozen=True)
 class Packet:
-    """One packet; a kind that the standard does not know stays a number."""
+    """One packet; a kind that the standard does not define stays a number."""
 
     kind: int
     payload: bytes = b""
 
     def fields(self, layout: str) -> tuple[int, ...]:
-        """The numbers that the payload begins with, in `struct`'s letters.
+        """Return the numbers at the begin of the payload, in `struct`'s letters.
 
         Raises
         ------
         MalformedError
-            It is too short for them.
+            The payload is too short for them.
         """
         size = struct.calcsize("<" + layout)
         if len(self.payload) < size:
@@ -66,17 +66,17 @@ class Packet:
 
 
 def encode(kind: PacketKind, payload: bytes = b"") -> bytes:
-    """A packet as it goes over the network."""
+    """Return the bytes of a packet on the network."""
     return _HEADER.pack(HEADER_BYTES + len(payload), kind) + payload
 
 
 def split(received: bytearray, at_most_bytes: int) -> Packet | None:
-    """Take the packet that `received` begins with out of it; None if it is not all there.
+    """Remove the packet at the begin of `received` and return it; None if it is incomplete.
 
     Raises
     ------
     MalformedError
-        Its length cannot be, or is more than `at_most_bytes`; `received` is left as it is.
+        Its length is impossible, or more than `at_most_bytes`; `received` is left as it is.
     """
     if len(received) < HEADER_BYTES:
         return None
@@ -96,24 +96,24 @@ def split(received: bytearray, at_most_bytes: int) -> Packet | None:
 
 
 def init_command_request(guid: bytes, name: str) -> bytes:
-    """The PC introduces itself."""
+    """Return the packet that introduces the PC."""
     text = (name + "\0").encode("utf-16-le")
     return encode(PacketKind.INIT_COMMAND_REQUEST, guid + text + struct.pack("<I", VERSION))
 
 
 def connection_number(ack: Packet) -> int:
-    """The number under which the camera knows the PC, from its InitCommandAck.
+    """Return the camera's number for the PC, from its InitCommandAck.
 
     Raises
     ------
     MalformedError
-        It is cut short.
+        The packet is cut short.
     """
     return ack.fields(f"I{_GUID_BYTES}x")[0]
 
 
 def request(command: Container, data: bytes | None) -> bytes:
-    """Operation request with its data phase, if there is one from the PC, in one piece."""
+    """Return an operation request with its data phase, if the PC sends one, in one piece."""
     direction = NO_DATA_FROM_PC if data is None else DATA_FROM_PC
     tid = command.transaction_id
     head = struct.pack("<IHI", direction, command.code, tid)
@@ -125,23 +125,23 @@ def request(command: Container, data: bytes | None) -> bytes:
 
 
 def response(packet: Packet) -> Container:
-    """The response container in an OperationResponse.
+    """Return the response container in an OperationResponse.
 
     Raises
     ------
     MalformedError
-        Too short, or not whole parameters behind it.
+        The packet is too short, or its parameters are incomplete.
     """
     return _with_params(Kind.RESPONSE, packet)
 
 
 def event(packet: Packet) -> Container:
-    """The event container in an Event packet.
+    """Return the event container in an Event packet.
 
     Raises
     ------
     MalformedError
-        Too short, or not whole parameters behind it.
+        The packet is too short, or its parameters are incomplete.
     """
     return _with_params(Kind.EVENT, packet)
 

@@ -1,1 +1,1 @@
-"""Cameras without a maker's extension: what PIMA 15740 itself offers, and no more."""
+"""Cameras without a maker's extension: the abilities of PIMA 15740 itself."""

@@ -1,4 +1,4 @@
-"""A PTP camera without a maker's extension: what PIMA 15740 itself offers, and no more."""
+"""A PTP camera without a maker's extension: the abilities of PIMA 15740 itself."""
 
 from collections.abc import Callable, Sequence
 
@@ -17,9 +17,9 @@ from .exposure import StandardExposure
 from .frames import StandardFrames
 from .properties import StandardProperties
 
-#: A frame later than so much belongs to no decay.
+#: Longest delay of a frame of a decay.
 LATE_RELEASE_S = 3.0
-#: A lens that focuses keeps a camera from answering.
+#: Time for which a focusing lens keeps a camera from answering.
 FOCUS_S = 12.0
 #: An answer later than this and than the exposure's end comes when the shutter has closed.
 PROMPT_S = 0.25
@@ -45,11 +45,11 @@ class StandardCamera:
     Parameters
     ----------
     session
-        Over which it is spoken to.
+        Session with the camera.
     clock
-        On which it is waited for.
+        Clock of all waiting.
     info
-        What it says about itself.
+        Identity and abilities that the camera reports.
     settings
         The rig file's keys for this camera.
     """
@@ -70,7 +70,7 @@ class StandardCamera:
         self._frames = StandardFrames(session, clock, info, settings.transfer_timeout)
 
     def take_control(self) -> None:
-        """Manual exposure, manual focus, single shots, as far as the camera lets them be set.
+        """Set manual exposure, manual focus and single shots, as far as the camera allows it.
 
         Raises
         ------
@@ -81,25 +81,25 @@ class StandardCamera:
         prepare(self._properties)
 
     def take_over(self) -> None:
-        """As `take_control`: nothing is held that somebody could have left behind."""
+        """Take control: another program cannot have left anything held."""
         self.take_control()
 
     def give_back(self) -> None:
-        """Nothing: the camera was never kept from its own buttons."""
+        """Do nothing: the camera's own buttons were never locked."""
 
     def offers(self) -> CameraOffers:
-        """What it can be set to, as it is now.
+        """Return the exposure settings that the camera offers now.
 
         Raises
         ------
         DeviceError
-            Nothing that the rig file allows, or it does not tell.
+            The camera offers no settings that the rig file allows, or does not report them.
         """
         self._require_manual()
         return self._exposure.offers()
 
     def findings(self) -> Sequence[Finding]:
-        """How it is set, as far as the standard lets it tell.
+        """Return findings on the camera's settings, as far as the standard reports them.
 
         Raises
         ------
@@ -109,7 +109,7 @@ class StandardCamera:
         return findings(self._properties, identify(self._session), self._settings)
 
     def keep_awake(self) -> None:
-        """Speak to it, which is all that the standard has.
+        """Send a request, the standard's only means to keep a camera awake.
 
         Raises
         ------
@@ -119,17 +119,18 @@ class StandardCamera:
         identify(self._session)
 
     def configure(self, settings: ExposureSettings) -> ExposureSettings:
-        """Set and read back; returns the settings in force, with the shutter time as told.
+        """Set and read back; return the settings in force, with the nominal shutter time.
 
         Parameters
         ----------
         settings
-            The shutter time as offered, or another within a tenth of a stop of it.
+            Exposure settings; the shutter time as offered, or another within a tenth of a stop of
+            it.
 
         Raises
         ------
         DeviceError
-            The camera does not offer them or did not take them.
+            The camera does not offer the settings or did not take them.
         """
         self._in_force = None
         self._frames.discard_abandoned()
@@ -138,12 +139,12 @@ class StandardCamera:
         return self._exposure.in_force()
 
     def arm(self) -> None:
-        """Clear the card of earlier frames, read the settings in force.
+        """Delete earlier frames from the card, read the settings in force.
 
         Raises
         ------
         DeviceError
-            The camera does not answer, or stands at something that cannot be reduced.
+            The camera does not answer, or its settings cannot be reduced.
         """
         self._armed_with()
 
@@ -167,7 +168,7 @@ class StandardCamera:
         return Frame(data, suffix, start_s, end_s, settings)
 
     def preview(self) -> bytes:
-        """No picture: the standard has no live view.
+        """Raise an error: the standard has no live view.
 
         Raises
         ------
@@ -180,7 +181,7 @@ class StandardCamera:
         )
 
     def steps_to_safety(self) -> Sequence[Callable[[], None]]:
-        """Nothing pending; no button is ever held.
+        """Return the steps that leave nothing pending; no button is ever held.
 
         An exposure that has begun runs to its end in the camera; its frame is discarded later.
         """
@@ -195,7 +196,7 @@ class StandardCamera:
         return self._in_force
 
     def _release(self, exposure_s: float) -> float:
-        """Clock time at which the exposure began."""
+        """Release the shutter and return the clock time at which the exposure began."""
         # should it be broken off, nobody knows whether it has begun: assume so
         self._frames.expect(self._clock.now() + LATE_RELEASE_S + exposure_s)
         timeouts = Timeouts(answer_s=exposure_s + FOCUS_S, busy_s=LATE_RELEASE_S)
@@ -204,7 +205,7 @@ class StandardCamera:
         except RefusedError:
             self._frames.expect_none()
             raise
-        return _begun_s(reply, exposure_s) + self._settings.shutter_lag
+        return _exposure_begin_s(reply, exposure_s) + self._settings.shutter_lag
 
     def _require_manual(self) -> None:
         program = self._properties.describe(StandardProperty.exposure_program)
@@ -215,10 +216,10 @@ class StandardCamera:
             )
 
 
-def _begun_s(reply: Reply, exposure_s: float) -> float:
-    """Middle of the time in which an exposure can have begun.
+def _exposure_begin_s(reply: Reply, exposure_s: float) -> float:
+    """Return the middle of the time in which an exposure can have begun.
 
-    By the standard a camera answers when it has begun; some answer when it is over.
+    By the standard a camera answers when the exposure has begun; some answer when it is over.
     """
     round_trip_s = reply.answered_s - reply.sent_s
     latest_s = reply.answered_s

@@ -1,6 +1,6 @@
-"""What a camera without a maker's extension can tell of what would spoil photometry.
+"""Checks of the settings of a camera without a maker's extension that would spoil photometry.
 
-Values of properties: PIMA 15740, 13.5. What the standard has no word for is said to be unknown.
+Values of properties: PIMA 15740, 13.5. Settings that the standard does not cover are unknown.
 """
 
 import math
@@ -28,18 +28,18 @@ _STEPS_PER_STOP = (2, 3)
 
 @dataclass(frozen=True)
 class _Need:
-    """A property, the value that it needs, and what comes of another.
+    """A property, the value that it needs, and the effect of another value.
 
     Attributes
     ----------
     fine
-        What the needed value is called.
+        Name of the needed value.
     spoils
-        What another value does.
+        Effect of another value.
     remedy
-        What a person does about it.
+        Remedy for the user.
     severity
-        Of another value.
+        Severity of another value.
     """
 
     prop: StandardProperty
@@ -98,7 +98,7 @@ _NEEDS = (
 
 
 def prepare(properties: StandardProperties) -> None:
-    """Set what is needed, as far as the camera lets it be set; `findings` tells what was left.
+    """Set the needed values, as far as the camera allows it; `findings` reports the rest.
 
     Raises
     ------
@@ -116,7 +116,7 @@ def prepare(properties: StandardProperties) -> None:
 def findings(
     properties: StandardProperties, info: DeviceInfo, settings: PtpCameraSettings
 ) -> list[Finding]:
-    """All that can be told, by asking the camera.
+    """Return all findings on the camera's settings, by asking the camera.
 
     Raises
     ------
@@ -150,8 +150,8 @@ def _needs(properties: StandardProperties) -> Iterator[Finding]:
         if described is None:
             untold.append(need.fine)
         elif described.value != need.value:
-            said = f"{need.prop} = 0x{described.value:X}"
-            yield Finding(need.severity, f"{need.spoils} ({said})", need.remedy)
+            reported = f"{need.prop} = 0x{described.value:X}"
+            yield Finding(need.severity, f"{need.spoils} ({reported})", need.remedy)
         else:
             yield Finding("fine", need.fine)
     if untold:
@@ -213,7 +213,7 @@ def _shutter(described: PropertyDescription | None) -> Iterator[Finding]:
 
 
 def _off_true(time_s: float) -> float:
-    """How far off the nearest time that a shutter of whole, half or third stops has."""
+    """Return the deviation from the nearest time of a shutter of whole, half or third stops."""
     stops = math.log2(time_s)
     off_stops = min(abs(stops - round(stops * steps) / steps) for steps in _STEPS_PER_STOP)
     return math.expm1(off_stops * math.log(2.0))

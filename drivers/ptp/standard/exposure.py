@@ -1,7 +1,7 @@
 """Shutter time, aperture and sensitivity by the standard's own properties.
 
-The shutter time is a number of 0.1 ms, which the camera rounds, and most makers round to what the
-dial says (1/60 s is 16.6 ms), whatever the shutter does. The number is used as it comes.
+The shutter time is a number of 0.1 ms, which the camera rounds, and most makers round to the dial's
+nominal time (1/60 s is 16.6 ms), whatever the actual one. The number is used as it comes.
 """
 
 import math
@@ -15,18 +15,18 @@ from ..settings import PtpCameraSettings
 from .properties import StandardProperties
 from .property_description import PropertyDescription
 
-#: Of ExposureTime.
+#: Units of ExposureTime per second.
 UNITS_PER_S = 10_000
-#: Rounding is up to 2 % of so many units; shorter times are of no use for photometry.
+#: Fewest units, of which rounding is up to 2 %; shorter times are useless for photometry.
 FEWEST_UNITS = 25
-#: Of FNumber: hundredths.
+#: Units of FNumber: hundredths.
 F_NUMBER_UNITS = 100
-#: Of ExposureIndex; 0 is "undefined".
+#: Values of ExposureIndex; 0 is "undefined".
 AUTO_ISO, NO_ISO = 0xFFFF, 0
-#: Asked and offered are the same within so much: neighbours are 1/6 stop and 6 % apart.
+#: Tolerances of requested settings: neighbours are 1/6 stop and 6 % apart.
 SAME_SHUTTER_STOPS = 0.1
 SAME_F_NUMBER = 0.02
-#: Where a camera gives bounds only: thirds of a stop from 1/512 s to 1024 s.
+#: Shutter times where a camera gives bounds only: thirds of a stop from 1/512 s to 1024 s.
 _THIRDS_S = tuple(2.0 ** (third / 3) for third in range(-27, 31))
 
 
@@ -36,9 +36,9 @@ class StandardExposure:
     Parameters
     ----------
     properties
-        What the camera says.
+        Properties that the camera reports.
     settings
-        The rig file's keys for it.
+        The rig file's keys for the camera.
     isos
         Sensitivities that may be used.
     """
@@ -54,12 +54,12 @@ class StandardExposure:
         self._isos = isos
 
     def offers(self) -> CameraOffers:
-        """The camera's own lists, less what the rig file excludes.
+        """Return the camera's own lists, less what the rig file excludes.
 
         Raises
         ------
         DeviceError
-            The camera does not tell its shutter time or ISO, or offers none that the rig allows.
+            The camera does not report its shutter time or ISO, or offers none that the rig allows.
         """
         units = self._shutter_choices(self._shutter())
         isos = self._iso_choices(self._iso())
@@ -70,47 +70,47 @@ class StandardExposure:
                 "or correct the rig file"
             )
         return CameraOffers(
-            exposures_s=tuple(sorted(each / UNITS_PER_S for each in units)),
+            exposures_s=tuple(sorted(choice / UNITS_PER_S for choice in units)),
             isos=tuple(sorted(isos)),
             f_numbers=tuple(sorted(self._f_number_choices(self._aperture()))),
             overhead_s=self._settings.frame_time,
             frame_bytes=round(self._settings.frame_size),
         )
 
-    def apply(self, wanted: ExposureSettings) -> None:
+    def apply(self, requested: ExposureSettings) -> None:
         """Set what is not in force already, read back.
 
         Raises
         ------
         DeviceError
-            The camera does not offer it or did not take it.
+            The camera does not offer a setting or did not take it.
         """
-        if not wanted.exposure_s > 0:
+        if not requested.exposure_s > 0:
             raise DeviceError(
-                f"expected a shutter time longer than 0 s, asked for {wanted.exposure_s} s: "
+                f"expected a shutter time longer than 0 s, asked for {requested.exposure_s} s: "
                 "correct the protocol"
             )
         shutter, iso, aperture = self._shutter(), self._iso(), self._aperture()
-        units = _nearest(wanted.exposure_s * UNITS_PER_S, self._shutter_choices(shutter))
-        if units is None or wanted.iso not in self._iso_choices(iso):
-            what = "shutter time" if units is None else "ISO"
+        units = _nearest(requested.exposure_s * UNITS_PER_S, self._shutter_choices(shutter))
+        if units is None or requested.iso not in self._iso_choices(iso):
+            missing = "shutter time" if units is None else "ISO"
             raise DeviceError(
-                f"asked the camera for {wanted}, it does not offer this {what}: choose from what "
-                "'labrig rig check' shows, or set it to manual exposure"
+                f"asked the camera for {requested}, it does not offer this {missing}: choose from "
+                "what 'labrig rig check' shows, or set it to manual exposure"
             )
-        self._set(StandardProperty.exposure_time, shutter, units, wanted)
+        self._set(StandardProperty.exposure_time, shutter, units, requested)
         if iso is not None:
-            self._set(StandardProperty.exposure_index, iso, wanted.iso, wanted)
-        if wanted.f_number is not None:
-            self._set_aperture(aperture, wanted.f_number, wanted)
+            self._set(StandardProperty.exposure_index, iso, requested.iso, requested)
+        if requested.f_number is not None:
+            self._set_aperture(aperture, requested.f_number, requested)
 
     def in_force(self) -> ExposureSettings:
-        """What the camera says is set.
+        """Return the settings that the camera reports.
 
         Raises
         ------
         DeviceError
-            It does not tell, or stands at automatic ISO or at a shutter time without an end.
+            The camera reports none, or is at automatic ISO or at a shutter time without an end.
         """
         shutter, iso, aperture = self._shutter(), self._iso(), self._aperture()
         if not self._is_usable(shutter.value):
@@ -170,13 +170,13 @@ class StandardExposure:
         return [number for number in numbers if number is not None]
 
     def _set_aperture(
-        self, aperture: PropertyDescription | None, f_number: float, wanted: ExposureSettings
+        self, aperture: PropertyDescription | None, f_number: float, requested: ExposureSettings
     ) -> None:
         offered = self._f_number_choices(aperture)
-        near = [number for number in offered if abs(number / f_number - 1) < SAME_F_NUMBER]
-        if aperture is None or not near:
+        matching = [number for number in offered if abs(number / f_number - 1) < SAME_F_NUMBER]
+        if aperture is None or not matching:
             raise DeviceError(
-                f"asked the camera for {wanted}, "
+                f"asked the camera for {requested}, "
                 + (
                     f"its lens offers {', '.join(f'f/{number:g}' for number in offered)}: choose "
                     "one of these"
@@ -185,31 +185,31 @@ class StandardExposure:
                     "f_number out"
                 )
             )
-        units = round(near[0] * F_NUMBER_UNITS)
-        self._set(StandardProperty.f_number, aperture, units, wanted)
+        units = round(matching[0] * F_NUMBER_UNITS)
+        self._set(StandardProperty.f_number, aperture, units, requested)
 
     def _set(
         self,
         prop: StandardProperty,
         described: PropertyDescription,
         value: int,
-        wanted: ExposureSettings,
+        requested: ExposureSettings,
     ) -> None:
-        said = self._properties.set(prop, described, value)
-        if said != value:
+        reported = self._properties.set(prop, described, value)
+        if reported != value:
             raise DeviceError(
-                f"asked the camera for {wanted}, its {prop} = {value}, it says {said}: "
+                f"asked the camera for {requested}, its {prop} = {value}, it says {reported}: "
                 "set it to manual exposure, leave its menus, and try again"
             )
 
 
 def _f_number(units: int) -> float | None:
-    """None where the lens tells nothing."""
+    """Return the f-number; None where the lens reports none."""
     return units / F_NUMBER_UNITS if 0 < units < 0xFFFF else None
 
 
 def _nearest(units: float, among: Iterable[int]) -> int | None:
-    """The shutter time that is meant by `units`, as offered or as on a dial."""
-    off_stops = {each: abs(math.log2(each / units)) for each in among}
+    """Return the shutter time that `units` stands for, as offered or as on a dial."""
+    off_stops = {choice: abs(math.log2(choice / units)) for choice in among}
     nearest = min(off_stops, key=off_stops.__getitem__, default=None)
     return None if nearest is None or off_stops[nearest] > SAME_SHUTTER_STOPS else nearest

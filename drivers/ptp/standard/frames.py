@@ -12,13 +12,13 @@ from ..object_transfer import PATIENT, ObjectTransfer
 from ..session import Session
 from .object_info import FOLDER, ObjectInfo, parse_object_info
 
-#: Between two looks for Ctrl-C.
+#: Interval between two checks for Ctrl-C.
 LISTEN_S = 0.1
-#: A camera that has said nothing for so long has nothing left to say.
+#: Time of silence after which a camera has nothing left to report.
 SILENCE_S = 0.1
-#: From one file of a capture to its next, and to CaptureComplete.
+#: Time from one file of a capture to its next, and to CaptureComplete.
 NEXT_FILE_S = 3.0
-#: More than one capture reports.
+#: Number of events, more than one capture reports.
 MOST_EVENTS = 64
 
 
@@ -31,20 +31,20 @@ class _Stored:
 
 
 class StandardFrames:
-    """Knows whether a frame is due, so that none is ever taken for another.
+    """Bookkeeping of the frame that is due, so that none is ever taken for another.
 
-    A camera reports ObjectAdded for every file of a capture (RAW, JPEG, a copy on a second card,
-    a new folder) and CaptureComplete before, between or after them, or never. Files that somebody
-    took by hand are left alone.
+    A camera reports ObjectAdded for every file of a capture (RAW, JPEG, a copy on a second card, a
+    new folder) and CaptureComplete before, between or after them, or never. Files that were taken
+    by hand are left alone.
 
     Parameters
     ----------
     session
-        Over which the camera reports and files come.
+        Session that reports and transfers the files.
     clock
-        On which is waited for them.
+        Clock of the waiting for frames.
     info
-        What the camera says it can do.
+        Abilities that the camera reports.
     timeout_s
         Seconds from the end of an exposure until its frame must have been reported.
     """
@@ -54,8 +54,8 @@ class StandardFrames:
         self._clock = clock
         self._timeout_s = timeout_s
         part = Standard.GetPartialObject
-        known_part = part if part in info.operations else None
-        self._objects = ObjectTransfer(session, clock, Standard.GetObject, known_part)
+        partial_operation = part if part in info.operations else None
+        self._objects = ObjectTransfer(session, clock, Standard.GetObject, partial_operation)
         self._can_delete = Standard.DeleteObject in info.operations
         self._tells_end = StandardEvent.CaptureComplete in info.events
         self._due_after_s: float | None = None
@@ -66,22 +66,22 @@ class StandardFrames:
         self._last: ObjectInfo | None = None
 
     def expect(self, exposure_end_s: float) -> None:
-        """An exposure has begun, or may have, that ends at this clock time at the latest."""
+        """Note that an exposure has begun, or may have, and ends at this clock time at latest."""
         self._due_after_s = exposure_end_s
         self._is_ended = self._is_full = False
 
     def expect_none(self) -> None:
-        """No exposure is under way."""
+        """Note that no exposure is under way."""
         self._due_after_s = None
         self._is_ended = True
 
     def fetch(self) -> tuple[bytes, str]:
-        """The frame that is due: its bytes and its suffix, such as `.nef`.
+        """Return the bytes of the frame that is due and its suffix, such as `.nef`.
 
         Raises
         ------
         DeviceError
-            None came, none that is a RAW file, or not as many bytes as announced.
+            No frame came, none that is a RAW file, or not as many bytes as announced.
         """
         frame = self._wait()
         if frame is None:
@@ -94,9 +94,9 @@ class StandardFrames:
         return data, frame.info.suffix
 
     def discard_abandoned(self) -> None:
-        """Wait for a frame that is due though nobody wants it, and clear the card of all.
+        """Wait for an abandoned frame that is due, and delete all frames from the card.
 
-        Also of the last one delivered: whoever goes on has it on disk by now.
+        The last one delivered is among them: a caller that goes on has it on disk by now.
 
         Raises
         ------
@@ -115,7 +115,7 @@ class StandardFrames:
         self._due_after_s = None
 
     def discard_reported(self) -> None:
-        """Clear the card of the files that were reported until now and that nobody wants.
+        """Delete the abandoned files that were reported until now from the card.
 
         Raises
         ------
@@ -129,11 +129,11 @@ class StandardFrames:
             self._delete(self._added.pop())
 
     def _wait(self) -> _Stored | None:
-        """The frame that is due; None if there is none, only others, or no room for one."""
+        """Return the frame that is due; None if there is none, only others, or no room for one."""
         latest_s = (self._due_after_s or self._clock.now()) + self._timeout_s
         deadline_s = latest_s
-        while not self._is_full and (left_s := deadline_s - self._clock.now()) > 0:
-            heard = self._listen(min(LISTEN_S, left_s))
+        while not self._is_full and (remaining_s := deadline_s - self._clock.now()) > 0:
+            heard = self._listen(min(LISTEN_S, remaining_s))
             for stored in self._added:
                 if stored.info.is_raw and not self._is_copy(stored.info):
                     return stored
@@ -145,26 +145,26 @@ class StandardFrames:
 
     def _listen_for_end(self) -> None:
         deadline_s = self._clock.now() + NEXT_FILE_S
-        while not self._is_ended and (left_s := deadline_s - self._clock.now()) > 0:
-            self._listen(min(LISTEN_S, left_s))
+        while not self._is_ended and (remaining_s := deadline_s - self._clock.now()) > 0:
+            self._listen(min(LISTEN_S, remaining_s))
         self._tells_end = self._is_ended
 
     def _listen(self, timeout_s: float) -> int | None:
-        """Take in one event; its code, None if there was none."""
+        """Take in one event; return its code, None if there was none."""
         event = self._session.event(timeout_s)
         self._clock.sleep(0.0)
         if event is None:
             return None
         match event.code:
             case StandardEvent.ObjectAdded if event.params:
-                self._look_at(event.params[0])
+                self._inspect(event.params[0])
             case StandardEvent.CaptureComplete:
                 self._is_ended = True
             case StandardEvent.StoreFull:
                 self._is_full = True
         return event.code
 
-    def _look_at(self, handle: int) -> None:
+    def _inspect(self, handle: int) -> None:
         try:
             reply = self._session.transact(Standard.GetObjectInfo, handle, timeouts=PATIENT)
         except RefusedError as refusal:
@@ -172,17 +172,17 @@ class StandardFrames:
                 raise
             return  # it was deleted in the camera
         info = parse_object_info(reply.data)
-        is_new = handle not in {each.handle for each in self._added}
+        is_new = handle not in {stored.handle for stored in self._added}
         if is_new and info.object_format != FOLDER and self._is_ours(info):
             self._added.append(_Stored(handle, info))
 
     def _is_ours(self, info: ObjectInfo) -> bool:
-        """Whether it can be of the capture that is due, or is one more file of the last one."""
+        """Return whether a file can be of the capture that is due, or a further one of the last."""
         is_due = self._due_after_s is not None
         return is_due or (self._last is not None and info.stem == self._last.stem)
 
     def _is_copy(self, info: ObjectInfo) -> bool:
-        """Whether it is the last frame once more, on another card."""
+        """Return whether a file is the last frame once more, on another card."""
         if self._last is None or not info.captured:
             return False
         is_same = (info.name, info.captured) == (self._last.name, self._last.captured)
@@ -203,7 +203,7 @@ class StandardFrames:
                 "format its card or put in a larger one"
             )
         if self._added:
-            delivered = ", ".join(str(each.info) for each in self._added)
+            delivered = ", ".join(str(stored.info) for stored in self._added)
             return DeviceError(
                 f"expected a RAW file from the camera, it took {delivered}: set its image quality "
                 "to RAW alone"

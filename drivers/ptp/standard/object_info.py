@@ -20,15 +20,15 @@ class ObjectInfo:
     Attributes
     ----------
     storage
-        Id of the card that it is on.
+        Id of the file's card.
     object_format
         PTP object format code.
     size_bytes
-        As announced.
+        Announced size of the file, in bytes.
     name
-        File name.
+        Name of the file.
     captured
-        Date and time as the camera writes them; empty where it does not.
+        Date and time in the camera's form; empty where it gives none.
     """
 
     storage: int
@@ -50,7 +50,7 @@ class ObjectInfo:
 
     @property
     def is_raw(self) -> bool:
-        """Whether it can be a RAW file: makers give theirs no standard format but DNG."""
+        """Whether the file can be RAW: makers give RAW files no standard format but DNG."""
         return (
             can_be_raw(self.object_format)
             and self.suffix not in ("", *_DEVELOPED)
@@ -62,12 +62,12 @@ class ObjectInfo:
 
 
 def can_be_raw(object_format: int) -> bool:
-    """Whether a file of this format can be RAW."""
+    """Return whether a file of this format can be RAW."""
     return object_format in (_UNDEFINED, _TIFF_EP, _DNG) or object_format in _VENDOR
 
 
 def parse_object_info(data: bytes) -> ObjectInfo:
-    """ObjectInfo from the data phase of GetObjectInfo.
+    """Return the ObjectInfo in the data phase of GetObjectInfo.
 
     Raises
     ------

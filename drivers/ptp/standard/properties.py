@@ -20,37 +20,37 @@ _NOT_TOLD = (OPERATION_NOT_SUPPORTED, PROPERTY_NOT_SUPPORTED, ACCESS_DENIED)
 
 
 class StandardProperties:
-    """Asks the camera every time: nothing that is turned by hand is overlooked.
+    """Properties that are read from the camera every time, so that no manual change is missed.
 
     Parameters
     ----------
     session
-        Over which it is asked.
+        Session with the camera.
     clock
-        On which is waited for it.
-    known
-        Codes of the properties that it says it has.
+        Clock of the waiting for the camera.
+    codes
+        Codes of the properties that the camera reports.
     settle_s
-        Seconds within which it must have taken a setting.
+        Seconds within which the camera must have taken a setting.
     """
 
     def __init__(
-        self, session: Session, clock: Clock, known: Collection[int], settle_s: float
+        self, session: Session, clock: Clock, codes: Collection[int], settle_s: float
     ) -> None:
         self._session = session
         self._clock = clock
-        self._known = known
+        self._codes = codes
         self._settle_s = settle_s
 
     def describe(self, prop: StandardProperty) -> PropertyDescription | None:
-        """The property as it is now and what it can be set to; None if the camera has none.
+        """Return the property's value now and its choices; None if the camera has no such property.
 
         Raises
         ------
         DeviceError
-            The camera does not answer, or not in the protocol's terms.
+            The camera does not answer, or violates the protocol.
         """
-        if prop not in self._known:
+        if prop not in self._codes:
             return None
         try:
             data = self._session.transact(Standard.GetDevicePropDesc, prop).data
@@ -61,7 +61,7 @@ class StandardProperties:
         return parse_property_description(data)
 
     def set(self, prop: StandardProperty, described: PropertyDescription, value: int) -> int:
-        """Set unless it has the value already; the value that the camera then says it has.
+        """Set a property unless it has the value already; return the value reported then.
 
         Raises
         ------
@@ -72,9 +72,9 @@ class StandardProperties:
             return value
         self._session.transact(Standard.SetDevicePropValue, prop, data=described.encode(value))
         deadline_s = self._clock.now() + self._settle_s
-        while (said := self._ask(prop, described)) != value and self._clock.now() < deadline_s:
+        while (reported := self._ask(prop, described)) != value and self._clock.now() < deadline_s:
             self._clock.sleep(POLL_PERIOD_S)
-        return said
+        return reported
 
     def _ask(self, prop: StandardProperty, described: PropertyDescription) -> int:
         return described.decode(self._session.transact(Standard.GetDevicePropValue, prop).data)

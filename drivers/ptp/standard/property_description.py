@@ -1,4 +1,4 @@
-"""The DevicePropDesc dataset (PIMA 15740, 13.3.3): a property, and what it can be set to."""
+"""The DevicePropDesc dataset (PIMA 15740, 13.3.3): a property's value and its choices."""
 
 import struct
 from collections.abc import Iterable, Sequence
@@ -19,14 +19,14 @@ class PropertyDescription:
     Attributes
     ----------
     data_type
-        Code of its size and sign.
+        Code of the number's size and sign.
     is_settable
-        Whether it can be set over the wire at all.
+        Whether the property can be set over the wire at all.
     value
-        As it is now.
+        Value of the property now.
     choices
-        What it can be set to, as the camera lists it: a `range` where it gives bounds and a step.
-        Empty where it does not say.
+        Values that the camera lists for setting: a `range` where it gives bounds and a step. Empty
+        where it gives none.
     """
 
     data_type: int
@@ -35,9 +35,9 @@ class PropertyDescription:
     choices: Sequence[int]
 
     def settable_to(self, candidates: Iterable[int]) -> Sequence[int]:
-        """The camera's list; of bounds with a step, those of `candidates` that fit.
+        """Return the camera's list; of bounds with a step, those of `candidates` that fit.
 
-        What cannot be set, or not be known to be settable, stays as it is.
+        A property that cannot be set, or has no list, offers its present value only.
         """
         if not self.is_settable or not self.choices:
             return (self.value,)
@@ -46,16 +46,16 @@ class PropertyDescription:
         return self.choices
 
     def encode(self, value: int) -> bytes:
-        """A value as it goes over the wire."""
+        """Return the bytes of a value."""
         return struct.pack("<" + _LETTERS[self.data_type], value)
 
     def decode(self, data: bytes) -> int:
-        """A value as it came over the wire.
+        """Return the value in bytes.
 
         Raises
         ------
         MalformedError
-            Not of the type that the camera says.
+            The bytes do not fit the type that the camera reports.
         """
         letter = "<" + _LETTERS[self.data_type]
         if len(data) != struct.calcsize(letter):
@@ -68,7 +68,7 @@ class PropertyDescription:
 
 
 def parse_property_description(data: bytes) -> PropertyDescription | None:
-    """A description from the data phase of GetDevicePropDesc; None for what is no whole number.
+    """Return the description in the data phase of GetDevicePropDesc; None for no whole number.
 
     Raises
     ------

@@ -1,4 +1,4 @@
-"""A still image device through pyusb: bytes in and out, and what went wrong in one line.
+"""A still image device through pyusb: bytes in and out, and errors in one line.
 
 pyusb carries no types, so `Any` ends here.
 """
@@ -28,7 +28,7 @@ def usb_errors_explained(context: str) -> Iterator[None]:
     Parameters
     ----------
     context
-        Which device, and what was being done.
+        Name of the device, and the purpose of the call.
 
     Raises
     ------
@@ -90,9 +90,9 @@ def claim_still_image(device: Any, address: str) -> StillImageInterface:
     Raises
     ------
     DeviceError
-        It has none, or none with bulk endpoints.
+        The device has no such interface, or none with bulk endpoints.
     usb.core.USBError
-        It cannot be claimed.
+        The interface cannot be claimed.
     """
     configuration = _configuration(device)
     interface = usb.util.find_descriptor(configuration, bInterfaceClass=STILL_IMAGE_CLASS)
@@ -147,21 +147,21 @@ class UsbDevice:
     """Endpoints and class requests of the still image interface, which it claims.
 
     Every method raises `DeviceError` alone: `NoAnswerError`, `StallError`, `UnpluggedError` or
-    plain. `doing` says in its message what for.
+    plain. `doing` is the purpose of the call in its message.
 
     Parameters
     ----------
     device
         The `usb.core.Device`.
     address
-        What messages call it.
+        Address of the device, for messages.
     """
 
     def __init__(self, device: Any, address: str) -> None:
         self._device = device
         self._address = address
         self._is_gone = False
-        with self._named("opening its PTP interface"):
+        with self._naming_errors("opening its PTP interface"):
             self._endpoints = claim_still_image(device, address)
 
     @property
@@ -171,28 +171,28 @@ class UsbDevice:
 
     @property
     def has_events(self) -> bool:
-        """Whether there is an endpoint on which it can report by itself."""
+        """Whether there is an endpoint for events."""
         return self._endpoints.interrupt_in is not None
 
     def write(self, data: bytes, doing: str) -> int:
-        """Send one transfer; returns how many bytes it took."""
-        with self._named(doing):
+        """Send one transfer; return the number of bytes that the device took."""
+        with self._naming_errors(doing):
             return int(self._device.write(self._endpoints.bulk_out, data, _ms(WRITE_TIMEOUT_S)))
 
     def read(self, most_bytes: int, timeout_s: float, doing: str) -> bytes:
-        """One transfer, of whole packets but the last."""
-        with self._named(f"{doing} within {timeout_s:g} s"):
+        """Return one transfer, of whole packets but the last."""
+        with self._naming_errors(f"{doing} within {timeout_s:g} s"):
             return bytes(self._device.read(self._endpoints.bulk_in, most_bytes, _ms(timeout_s)))
 
     def read_event_packet(self, timeout_s: float, doing: str) -> bytes:
-        """One packet of an event: a longer read would wait for more behind a full last one."""
+        """Return one packet of an event: a longer read would wait for more after a full one."""
         size = self._endpoints.event_packet_bytes
-        with self._named(doing):
+        with self._naming_errors(doing):
             return bytes(self._device.read(self._endpoints.interrupt_in, size, _ms(timeout_s)))
 
     def request(self, request: int, data: bytes, doing: str) -> None:
-        """A class request with data."""
-        with self._named(doing):
+        """Send a class request with data."""
+        with self._naming_errors(doing):
             self._device.ctrl_transfer(
                 HOST_TO_INTERFACE,
                 request,
@@ -203,8 +203,8 @@ class UsbDevice:
             )
 
     def ask(self, request: int, doing: str) -> bytes:
-        """A class request that has an answer."""
-        with self._named(doing):
+        """Send a class request and return its answer."""
+        with self._naming_errors(doing):
             return bytes(
                 self._device.ctrl_transfer(
                     INTERFACE_TO_HOST,
@@ -218,23 +218,23 @@ class UsbDevice:
 
     def clear_bulk_halts(self) -> None:
         """Let both bulk endpoints go on after a stall."""
-        with self._named("clearing a halted endpoint"):
+        with self._naming_errors("clearing a halted endpoint"):
             for endpoint in (self._endpoints.bulk_in, self._endpoints.bulk_out):
                 self._device.clear_halt(endpoint)
 
     def clear_event_halt(self) -> None:
         """Let the interrupt endpoint go on after a stall."""
-        with self._named("clearing a halted endpoint"):
+        with self._naming_errors("clearing a halted endpoint"):
             self._device.clear_halt(self._endpoints.interrupt_in)
 
     def close(self) -> None:
-        """Release the interface; says nothing if the device is gone already."""
+        """Release the interface; does not raise if the device is gone already."""
         with suppress(usb.core.USBError, NotImplementedError):
             usb.util.dispose_resources(self._device)
 
     @contextmanager
-    def _named(self, doing: str) -> Iterator[None]:
-        """Name what pyusb could not do; a camera that is gone stays so."""
+    def _naming_errors(self, doing: str) -> Iterator[None]:
+        """Name pyusb's failed call in its error; a camera that is gone stays so."""
         context = f"camera {self._address}: {doing}"
         if self._is_gone:
             raise UnpluggedError(f"{context}: it is gone: {WAKE_UP}")

@@ -1,4 +1,4 @@
-"""The USB side: containers over bulk endpoints, and the class requests that bring them into step.
+"""The USB side: containers over bulk endpoints, and the class requests that resynchronise them.
 
 Source: USB still image capture device definition 1.0, sections 5.2 (class requests) and 7.1
 (containers on bulk endpoints).
@@ -18,22 +18,22 @@ from .device import UsbDevice
 
 
 class EventAssembler:
-    """Takes packet after packet, whether or not the camera ends a container with an empty one."""
+    """Assembler of packets, whether or not the camera ends a container with an empty one."""
 
     def __init__(self) -> None:
         self._received = bytearray()
 
     def discard(self) -> None:
-        """Forget the beginning of an event that will not be finished."""
+        """Discard the beginning of an event that will not be finished."""
         self._received.clear()
 
     def feed(self, packet: bytes) -> Container | None:
-        """The event of which `packet` is the end; None if it is not.
+        """Return the event of which `packet` is the end; None if it is not.
 
         Raises
         ------
         MalformedError
-            What came is no event; it is forgotten.
+            The packets are no event; they are discarded.
         """
         self._received += packet
         if len(self._received) < HEADER_BYTES:
@@ -62,7 +62,7 @@ STATUS_BYTES = 4
 
 #: One read asks for at most this much; a whole number of packets at any speed.
 BLOCK_BYTES = 256 * 1024
-#: A camera that has been silent for so long has nothing left to say.
+#: Time of silence after which a camera has nothing left to send.
 SILENCE_S = 0.05
 READY_TIMEOUT_S = 3.0
 READY_PERIOD_S = 0.05
@@ -78,14 +78,14 @@ class UsbLink:
     device
         The `usb.core.Device`.
     address
-        What messages call it.
+        Address of the device, for messages.
     clock
-        On which it waits for the device to become ready.
+        Clock of the waiting for the device to become ready.
 
     Raises
     ------
     DeviceError
-        No still image interface, or another program holds it.
+        The device has no still image interface, or another program holds it.
     """
 
     def __init__(self, device: Any, address: str, clock: Clock) -> None:
@@ -100,7 +100,7 @@ class UsbLink:
         Raises
         ------
         DeviceError
-            It was not taken; `doing` says what for.
+            The device did not take it; `doing` is its purpose in the message.
         """
         self._write(encode(request), doing)
         if data is not None:
@@ -108,22 +108,22 @@ class UsbLink:
             self._write(encode(outgoing), doing)
 
     def receive(self, doing: str, timeout_s: float, at_most_bytes: int) -> Container:
-        """One container with at most so much in it, within `timeout_s` a packet.
+        """Return one container of limited length, within `timeout_s` for each packet.
 
         Raises
         ------
         DeviceError
-            Nothing came, it was cut short, it is longer than it says or than `at_most_bytes`.
+            Nothing came, it was cut short, it is longer than announced or than `at_most_bytes`.
         """
         return decode(self._read(doing, timeout_s, HEADER_BYTES + at_most_bytes))
 
     def event(self, timeout_s: float) -> Container | None:
-        """The next event, None if the camera reports none within `timeout_s`.
+        """Return the next event, None if the camera reports none within `timeout_s`.
 
         Raises
         ------
         DeviceError
-            What came is no event, or the camera cannot report any.
+            The packet is no event, or the camera cannot report any.
         """
         doing = "waiting for an event"
         if not self._device.has_events:
@@ -133,9 +133,9 @@ class UsbLink:
             )
         deadline_s = self._clock.now() + timeout_s
         event, is_silent = None, True
-        while event is None and (left_s := deadline_s - self._clock.now()) > 0:
+        while event is None and (remaining_s := deadline_s - self._clock.now()) > 0:
             try:
-                packet = self._device.read_event_packet(left_s, doing)
+                packet = self._device.read_event_packet(remaining_s, doing)
             except NoAnswerError:
                 break
             except StallError:
@@ -148,7 +148,7 @@ class UsbLink:
         return event
 
     def cancel(self, transaction_id: int) -> None:
-        """Have the camera give up `transaction_id`, forget what it still sends, wait until ready.
+        """Make the camera cancel `transaction_id` and discard its rest; wait until it is ready.
 
         Raises
         ------
@@ -161,7 +161,7 @@ class UsbLink:
         self._wait_until_ready()
 
     def reset(self) -> None:
-        """Put the camera's PTP side back to where it was when plugged in; its session is closed.
+        """Reset the camera's PTP side to its state when plugged in; its session is closed.
 
         Raises
         ------
@@ -174,26 +174,26 @@ class UsbLink:
         self._drain()
 
     def close(self) -> None:
-        """Release the interface; says nothing if the device is gone already."""
+        """Release the interface; does not raise if the device is gone already."""
         self._device.close()
 
     def _write(self, data: bytes, doing: str) -> None:
         """Send one container; an empty packet ends it if nothing shorter does."""
         try:
-            sent = self._device.write(data, doing)
-            if sent == len(data) and len(data) % self._device.packet_bytes == 0:
+            sent_bytes = self._device.write(data, doing)
+            if sent_bytes == len(data) and len(data) % self._device.packet_bytes == 0:
                 self._device.write(b"", doing)
         except StallError:
             self._clear_halts()
             raise
-        if sent != len(data):
+        if sent_bytes != len(data):
             raise DeviceError(
-                f"{self._name}: {doing}: it took {sent} of {len(data)} bytes of {shown(data)}: "
-                "unplug it and plug it in again"
+                f"{self._name}: {doing}: it took {sent_bytes} of {len(data)} bytes of {shown(data)}"
+                ": unplug it and plug it in again"
             )
 
     def _read(self, doing: str, timeout_s: float, at_most_bytes: int) -> bytes:
-        """One container, whole."""
+        """Return one complete container."""
         packet_bytes = self._device.packet_bytes
         # The empty packet that ends a transfer of whole packets is still to be read, or never
         # came: cameras differ, so it is met at the head of the next one.
@@ -232,7 +232,7 @@ class UsbLink:
             raise
 
     def _event_from(self, packet: bytes) -> Container | None:
-        """The event that `packet` completes; behind what is none, nothing can be understood."""
+        """Return the event that `packet` completes; what follows no event is unreadable."""
         try:
             return self._events.feed(packet)
         except MalformedError:

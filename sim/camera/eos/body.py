@@ -18,7 +18,7 @@ from .events import EventQueue, object_added, record, transfer_request
 from .properties import SELF_TIMER_S, Destination, Drive, PropertyBank
 from .viewfinder import Viewfinder
 
-#: From a new value of a property to the event that says so.
+#: Time from a new value of a property to its event.
 PROPERTY_DELAY_S = 0.03
 #: More free photographs than the camera can show.
 _MOST_SHOTS = 9999
@@ -28,7 +28,7 @@ _FOCUS_OFF = 1
 
 @dataclass(frozen=True)
 class _Settings:
-    """How an exposure is taken, as it was when the button went down."""
+    """Settings of an exposure when the button went down."""
 
     exposure_s: float
     iso: int
@@ -37,20 +37,20 @@ class _Settings:
 
 
 class EosBody:
-    """Everything of the camera that outlives a session.
+    """State of the camera that outlives a session.
 
     Parameters
     ----------
     clock
-        Time; what happens later is worked out when somebody asks.
+        The room's clock; later events are computed when they are asked for.
     sensor
-        Makes the photographs.
+        Sensor that makes the photographs.
     shutter
         Button and shutter.
     faults
-        `busy_releases`, the spans and `lost_event` are the body's.
+        Faults of the camera, of which `busy_releases`, the spans and `lost_event` are the body's.
     settings
-        What somebody has set by hand.
+        Manual settings of the body.
     """
 
     def __init__(
@@ -83,11 +83,11 @@ class EosBody:
 
     @property
     def bulb_is_open(self) -> bool:
-        """Whether the exposure going on waits for its end to be told."""
+        """Whether the present exposure waits for the command to end it."""
         return self._shutter.is_endless
 
     def forget_host(self) -> None:
-        """The session is over: the button comes up, what waited for the host is lost."""
+        """End the session: the button comes up, events and files for the host are lost."""
         self._end_bulb()
         self._shutter.let_go(Stage.HALF | Stage.FULL)
         self.events.silence()
@@ -99,12 +99,12 @@ class EosBody:
         self._count_shots(0.0)
 
     def set_remote_mode(self, mode: int) -> ResponseCode:
-        """SetRemoteMode."""
+        """Do SetRemoteMode."""
         self._is_remote = mode != 0
         return ResponseCode.OK
 
     def set_event_mode(self, mode: int) -> ResponseCode:
-        """SetEventMode; whoever starts to listen is told everything once."""
+        """Do SetEventMode; a host that starts to listen gets every property once."""
         if mode == 0:
             self.events.silence()
         else:
@@ -113,7 +113,7 @@ class EosBody:
         return ResponseCode.OK
 
     def set_property(self, data: bytes) -> ResponseCode:
-        """SetDevicePropValueEx: length, property, value."""
+        """Do SetDevicePropValueEx: length, property, value."""
         if len(data) < 12 or int.from_bytes(data[:4], "little") != len(data):
             return ResponseCode.INVALID_DEVICE_PROP_FORMAT
         if not self._is_remote:
@@ -129,20 +129,20 @@ class EosBody:
         return answer
 
     def request_property(self, code: int) -> ResponseCode:
-        """RequestDevicePropValue: the value comes as an event."""
+        """Do RequestDevicePropValue: the value comes as an event."""
         if code not in self._properties:
             return ResponseCode.DEVICE_PROP_NOT_SUPPORTED
         self._report(code, 0.0)
         return ResponseCode.OK
 
     def announce_host_capacity(self, clusters: int, bytes_each: int, _reset: int) -> ResponseCode:
-        """PCHDDCapacity: room on the host's disk, without which nothing is taken for it."""
+        """Do PCHDDCapacity: room on the host's disk, without which it gets no photograph."""
         self._host_shots = min(clusters * bytes_each // SHOT_BYTES, _MOST_SHOTS)
         self._count_shots(0.0)
         return ResponseCode.OK
 
     def release_on(self, stages: int, focus: int = 0) -> ResponseCode:
-        """RemoteReleaseOn: 1 half, 2 full, 3 both; a `focus` of 1 leaves the lens alone."""
+        """Do RemoteReleaseOn: 1 half, 2 full, 3 both; a `focus` of 1 leaves the lens alone."""
         if stages not in (1, 2, 3):
             return ResponseCode.INVALID_PARAMETER
         settling_s = METERING_S if focus == _FOCUS_OFF else self._focus_s
@@ -154,7 +154,7 @@ class EosBody:
         return self._full_press(settling_s)
 
     def release_off(self, stages: int) -> ResponseCode:
-        """RemoteReleaseOff: the same stages, let go."""
+        """Do RemoteReleaseOff: release the same stages."""
         if stages not in (1, 2, 3):
             return ResponseCode.INVALID_PARAMETER
         self._shutter.let_go(Stage(stages))
@@ -163,14 +163,14 @@ class EosBody:
         return ResponseCode.OK
 
     def release_once(self) -> ResponseCode:
-        """RemoteRelease, the older way: focus, expose, let go."""
+        """Do RemoteRelease, the older way: focus, expose, release."""
         answer = self._full_press(self._focus_s)
         if answer is ResponseCode.OK:
             self._shutter.let_go(Stage.HALF | Stage.FULL)
         return answer
 
     def bulb_start(self) -> ResponseCode:
-        """BulbStart: only if the shutter is set to bulb."""
+        """Do BulbStart: only if the shutter is set to bulb."""
         if math.isfinite(self._settings().exposure_s):
             return ResponseCode.GENERAL_ERROR
         answer = self._full_press(METERING_S)
@@ -179,7 +179,7 @@ class EosBody:
         return answer
 
     def bulb_end(self) -> ResponseCode:
-        """BulbEnd."""
+        """Do BulbEnd."""
         return ResponseCode.OK if self._end_bulb() else ResponseCode.GENERAL_ERROR
 
     def _settings(self) -> _Settings:
@@ -220,7 +220,7 @@ class EosBody:
         return exposure
 
     def _file(self, exposure: Exposure, settings: _Settings) -> None:
-        """Keep the photograph, and say so when it is there."""
+        """Keep the photograph, and report it when it is there."""
         photograph = Photograph(
             self._sensor, exposure.start_s, settings.exposure_s, settings.iso, settings.f_number
         )

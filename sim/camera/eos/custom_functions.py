@@ -18,7 +18,7 @@ _SEVERAL_VALUES = {0x507: (0, 0xFF, 0, 0xFF, 0)}
 
 
 def custom_function_blocks(settings: BodySettings) -> tuple[bytes, ...]:
-    """The values of the property: a 5D Mark II reports every group by itself."""
+    """Return the values of the property: a 5D Mark II reports every group by itself."""
     switched_on = {
         _LONG_EXPOSURE_NOISE: settings.long_exposure_noise_reduction,
         _HIGHLIGHT_PRIORITY: settings.highlight_tone_priority,

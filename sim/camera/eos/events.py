@@ -1,4 +1,4 @@
-"""The queue behind GetEvent: records that become due, and the knock that says so."""
+"""The queue behind GetEvent: records that become due, and the interrupt that announces them."""
 
 import math
 import struct
@@ -14,24 +14,24 @@ _END = struct.pack("<II", 8, 0)
 
 
 def record(code: EosEvent, payload: bytes) -> bytes:
-    """One record of GetEvent's answer."""
+    """Return one record of GetEvent's answer."""
     return struct.pack("<II", 8 + len(payload), code) + payload
 
 
 def _file_name(name: str) -> bytes:
-    """Zero-terminated, padded to whole words."""
+    """Return the name, zero-terminated and padded to whole words."""
     return name.encode("ascii") + b"\0" * (4 - len(name) % 4)
 
 
 def transfer_request(stored: StoredObject) -> bytes:
-    """RequestObjectTransfer: the photograph waits in the camera's memory."""
+    """Return RequestObjectTransfer: the photograph waits in the camera's memory."""
     size = len(stored.photograph.raw)
     head = struct.pack("<IIIII", stored.handle, ObjectFormat.DNG, 0, size, 0)
     return record(EosEvent.REQUEST_OBJECT_TRANSFER, head + _file_name(stored.name))
 
 
 def object_added(stored: StoredObject, store: ObjectStore) -> bytes:
-    """ObjectAddedEx: the photograph is on the card."""
+    """Return ObjectAddedEx: the photograph is on the card."""
     size = len(stored.photograph.raw)
     head = struct.pack("<IIIII", stored.handle, stored.storage_id, ObjectFormat.DNG, 0, 0)
     tail = struct.pack("<III", size, store.parent(stored), 0)
@@ -58,7 +58,7 @@ class EventQueue:
         self._knocked = False
 
     def listen(self) -> None:
-        """Start to report (SetEventMode 1); what fell due while nobody listened is lost."""
+        """Start to report (SetEventMode 1); events before are lost."""
         if not self._listening:
             self._drop_due()
         self._listening = True
@@ -69,25 +69,25 @@ class EventQueue:
         self._listening = False
 
     def post(self, due_s: float, encode: Callable[[], bytes]) -> None:
-        """Report something at `due_s`."""
+        """Report an event at `due_s`."""
         self._events.append(_Event(due_s, encode))
         self._events.sort(key=lambda event: event.due_s)
 
     def fetch(self) -> bytes:
-        """Everything due, as GetEvent answers it; nothing is reported twice."""
+        """Return all due records, as GetEvent answers; each is reported once."""
         if not self._listening:
             return _END
         self._knocked = False
         return b"".join(event.encode() for event in self._drop_due()) + _END
 
     def knock_due_s(self) -> float:
-        """When the interrupt endpoint will next say that there is something to fetch."""
+        """Return the time at which the interrupt endpoint will next announce records."""
         if not self._listening or self._knocked or not self._events:
             return math.inf
         return self._events[0].due_s
 
     def knock(self) -> None:
-        """The host was told; once is enough until it fetches."""
+        """Note that the host was notified; once is enough until it fetches."""
         self._knocked = True
 
     def _drop_due(self) -> list[_Event]:

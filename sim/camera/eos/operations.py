@@ -1,4 +1,4 @@
-"""What each operation of an EOS does, and what it may be given."""
+"""Operations of an EOS and their parameters."""
 
 from .. import datasets
 from ..object_operations import ObjectOperations
@@ -17,7 +17,7 @@ _WHILE_EXPOSING = frozenset(
 
 
 def _text(data: bytes) -> str | None:
-    """A PTP string, or None if the bytes are no such thing."""
+    """Return a PTP string, or None if the bytes are none."""
     characters = data[0] if data else 0
     encoded = data[1:]
     if not data or len(encoded) != 2 * characters:
@@ -31,7 +31,7 @@ class EosOperations:
     Parameters
     ----------
     body
-        What the EOS operations act on.
+        Body on which the EOS operations act.
     serial
         Serial number of the camera.
     """
@@ -54,7 +54,7 @@ class EosOperations:
         return self._body.is_exposing
 
     def device_info(self) -> Response:
-        """GetDeviceInfo: lists what this camera really obeys, a part of what a 5D Mark II lists."""
+        """Return DeviceInfo with the operations that this camera obeys, some of a 5D Mark II's."""
         info = datasets.DeviceInfo(
             manufacturer="Canon Inc.",
             model=_MODEL,
@@ -70,21 +70,21 @@ class EosOperations:
         return Response(ResponseCode.OK, data=info.encode())
 
     def is_too_busy_for(self, opcode: int) -> bool:
-        """Whether this operation has to wait for the end of an exposure."""
+        """Return whether this operation has to wait for the end of an exposure."""
         if not self._body.is_exposing or opcode in _WHILE_EXPOSING:
             return False
         return not (self._body.bulb_is_open and opcode == Operation.EOS_BULB_END)
 
     def forget_host(self) -> None:
-        """The session is over."""
+        """End the session."""
         self._body.forget_host()
 
     def event_due_s(self) -> float:
-        """When the camera will next say by itself that there is something to fetch."""
+        """Return the time at which the camera will next announce records."""
         return self._body.events.knock_due_s()
 
     def take_event(self) -> Event:
-        """That there is something to fetch; sent once until the host fetches."""
+        """Return the announcement of records; sent once until the host fetches."""
         self._body.events.knock()
         return Event(EosEvent.REQUEST_GET_EVENT)
 

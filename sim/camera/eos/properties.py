@@ -1,4 +1,4 @@
-"""The EOS properties: what they are, what they may become, and the records that tell so."""
+"""The EOS properties: values, choices, and the records that report them."""
 
 import struct
 from enum import IntEnum
@@ -21,7 +21,7 @@ _RAW = struct.pack("<IIIII", 1, 0x10, 6, 0, 4)
 
 
 class Destination(IntEnum):
-    """Where photographs go."""
+    """Destinations of photographs."""
 
     CARD = 2
     HOST = 4
@@ -35,7 +35,7 @@ class Drive(IntEnum):
     SELF_TIMER_2_S = 0x11
 
 
-#: How long a drive mode waits after the button.
+#: Delay of a drive mode after the button.
 SELF_TIMER_S = {Drive.SINGLE: 0.0, Drive.SELF_TIMER_10_S: 10.0, Drive.SELF_TIMER_2_S: 2.0}
 
 
@@ -43,7 +43,7 @@ def _u32(*values: int) -> tuple[bytes, ...]:
     return tuple(struct.pack("<I", value) for value in values)
 
 
-#: What the host may set, and to what. Mirror lock-up can only be off.
+#: Properties that the host may set, and their choices. Mirror lock-up can only be off.
 _CHOICES: dict[EosProperty, tuple[bytes, ...]] = {
     EosProperty.AV: _u32(*codes.AV_CODES),
     EosProperty.TV: _u32(*codes.TV_CODES),
@@ -64,9 +64,9 @@ class PropertyBank:
     Parameters
     ----------
     available_shots
-        What the camera shows for its present destination.
+        Number of available shots at the present destination.
     settings
-        What somebody has set by hand.
+        Manual settings of the body.
     """
 
     def __init__(self, available_shots: int, settings: BodySettings) -> None:
@@ -93,15 +93,15 @@ class PropertyBank:
         return code in self._values
 
     def number(self, code: EosProperty) -> int:
-        """A property that is one number."""
+        """Return a property that is one number."""
         return int.from_bytes(self._values[code], "little")
 
     def put(self, code: EosProperty, value: int) -> None:
-        """The camera itself changes a number."""
+        """Change a number on behalf of the camera itself."""
         self._values[code] = struct.pack("<I", value)
 
     def set(self, code: int, value: bytes) -> ResponseCode:
-        """The host wants to change a property."""
+        """Change a property on behalf of the host."""
         if code not in self._values:
             return ResponseCode.DEVICE_PROP_NOT_SUPPORTED
         if code not in _CHOICES:
@@ -112,11 +112,11 @@ class PropertyBank:
         return ResponseCode.OK
 
     def value_record(self, code: int) -> bytes:
-        """PropValueChanged with the present value."""
+        """Return PropValueChanged with the present value."""
         return _value_record(code, self._values[code])
 
     def all_records(self) -> bytes:
-        """The flood of values, then of lists, when a host begins to listen."""
+        """Return the records of all values, then of all lists, for a host that begins to listen."""
         values = [self.value_record(code) for code in self._values]
         values += [
             _value_record(EosProperty.CUSTOM_FUNCTIONS, block) for block in self._custom_functions

@@ -12,9 +12,9 @@ from labrig.clock import Clock
 
 from ..sensor import Sensor
 
-#: From the command until the first picture: mirror up, shutter open, sensor running.
+#: Time from the command to the first picture: mirror up, shutter open, sensor running.
 START_S = 0.4
-#: A live picture is read out so often.
+#: Interval of live pictures.
 PICTURE_S = 1 / 30
 #: EVF output to the PC; the camera's own display is 1.
 TO_PC = 2
@@ -25,10 +25,10 @@ _JPEG_QUALITY = 85
 
 @runtime_checkable
 class LiveSensor(Protocol):
-    """A sensor that can also be looked through."""
+    """A sensor that also has a live view."""
 
     def preview(self, at_s: float) -> NDArray[np.uint8]:
-        """What it sees at a time, shape (height, width, 3): R, G, B as for a display."""
+        """Return the live picture at a time, shape (height, width, 3): R, G, B for a display."""
         ...
 
 
@@ -38,9 +38,9 @@ class Viewfinder:
     Parameters
     ----------
     clock
-        Time.
+        The room's clock.
     sensor
-        Only a `LiveSensor` gives pictures; with any other, none is ever ready.
+        Sensor; one that is no `LiveSensor` never has a picture ready.
     """
 
     def __init__(self, clock: Clock, sensor: Sensor) -> None:
@@ -49,14 +49,14 @@ class Viewfinder:
         self._ready_s = math.inf
 
     def send_to(self, output: int) -> None:
-        """EVF output was set."""
+        """Set the EVF output."""
         if output != TO_PC:
             self._ready_s = math.inf
         elif self._ready_s == math.inf:
             self._ready_s = self._clock.now() + START_S
 
     def records(self) -> bytes | None:
-        """The data of GetViewFinderData, or None while there is no picture."""
+        """Return the data of GetViewFinderData, or None while there is no picture."""
         now_s = self._clock.now()
         if now_s < self._ready_s or not isinstance(self._sensor, LiveSensor):
             return None

@@ -9,12 +9,12 @@ _MOST_AT_ONCE = 65536
 
 
 class Connection:
-    """A connection that somebody made to the server.
+    """A connection that a host made to the server.
 
     Parameters
     ----------
     accepted
-        The socket, of which this object takes care.
+        Accepted socket, which this object owns.
     """
 
     def __init__(self, accepted: socket.socket) -> None:
@@ -27,7 +27,7 @@ class Connection:
         self._head_is_cut = False
 
     def fileno(self) -> int:
-        """For `select`."""
+        """Return the socket's file descriptor, for `select`."""
         return self._socket.fileno()
 
     @property
@@ -36,7 +36,7 @@ class Connection:
         return bool(self._outgoing)
 
     def receive(self) -> bool:
-        """Take in what is there; False if the other side is gone."""
+        """Take in the bytes that have come; return False if the other side is gone."""
         try:
             received = self._socket.recv(_MOST_AT_ONCE)
         except BlockingIOError:
@@ -47,34 +47,34 @@ class Connection:
         return bool(received)
 
     def next_packet(self) -> Packet | None:
-        """The next packet that is there in full.
+        """Return the next complete packet.
 
         Raises
         ------
         MalformedPacketError
-            What came is no packet.
+            The bytes are no packet.
         """
         return self._reader.next_packet()
 
     def put(self, packets: list[bytes]) -> None:
-        """Send these packets after those that still wait."""
+        """Queue these packets after those that still wait."""
         self._outgoing.extend(memoryview(packet) for packet in packets)
 
     def put_instead(self, packets: list[bytes]) -> None:
-        """Send these packets instead of those that still wait; one that is half sent is ended."""
+        """Queue these packets in place of waiting ones; one that is half sent is completed."""
         half_sent = [self._outgoing[0]] if self._head_is_cut else []
         self._outgoing = deque(half_sent)
         self.put(packets)
 
     def send(self) -> bool:
-        """Send what the other side takes now; False if it is gone."""
+        """Send as much as the other side takes now; return False if it is gone."""
         try:
             while self._outgoing:
                 head = self._outgoing[0]
-                sent = self._socket.send(head)
-                self._head_is_cut = sent < len(head)
+                sent_bytes = self._socket.send(head)
+                self._head_is_cut = sent_bytes < len(head)
                 if self._head_is_cut:
-                    self._outgoing[0] = head[sent:]
+                    self._outgoing[0] = head[sent_bytes:]
                 else:
                     self._outgoing.popleft()
         except BlockingIOError:
@@ -84,5 +84,5 @@ class Connection:
         return True
 
     def close(self) -> None:
-        """Hang up."""
+        """Close the connection."""
         self._socket.close()

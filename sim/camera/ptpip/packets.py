@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from enum import IntEnum
 
 _HEADER = struct.Struct("<II")
-#: No host sends this camera more than a name or a property; a greater length is one gone wrong.
+#: Longest packet from a host, a name or a property; a longer one is damaged.
 _MAX_FROM_HOST = 65536
 _MAX_PARAMETERS = 5
 #: A photograph goes out in pieces of this many bytes, so that a host can cancel between them.
@@ -15,7 +15,7 @@ _VERSION = 0x00010000
 
 
 class PacketType(IntEnum):
-    """What a packet is for."""
+    """Type of a packet."""
 
     INIT_COMMAND_REQUEST = 1
     INIT_COMMAND_ACK = 2
@@ -34,14 +34,14 @@ class PacketType(IntEnum):
 
 
 class FailReason(IntEnum):
-    """Why a host is not let in."""
+    """Reason for which a host is refused."""
 
     REJECTED = 1
     BUSY = 2
 
 
 class MalformedPacketError(Exception):
-    """Bytes that are no packet, or a packet that does not belong here."""
+    """Bytes that are no packet, or a packet that is invalid at this point."""
 
 
 @dataclass(frozen=True)
@@ -52,35 +52,35 @@ class Packet:
     payload: bytes
 
     def fields(self, layout: str) -> tuple[int, ...]:
-        """The payload, which is exactly these numbers in `struct`'s letters."""
+        """Return the payload, which is exactly these numbers in `struct`'s letters."""
         try:
             return struct.unpack("<" + layout, self.payload)
         except struct.error:
             raise MalformedPacketError from None
 
     def split(self, layout: str) -> tuple[tuple[int, ...], bytes]:
-        """The numbers that the payload begins with, and the rest of it."""
+        """Return the numbers at the begin of the payload, and the rest of it."""
         size = struct.calcsize("<" + layout)
         return Packet(self.kind, self.payload[:size]).fields(layout), self.payload[size:]
 
 
 class PacketReader:
-    """Cuts what comes over TCP into packets."""
+    """Reader that splits the bytes of a TCP connection into packets."""
 
     def __init__(self) -> None:
         self._received = bytearray()
 
     def feed(self, received: bytes) -> None:
-        """Take what has come."""
+        """Take in bytes."""
         self._received += received
 
     def next_packet(self) -> Packet | None:
-        """The next packet that is there in full.
+        """Return the next complete packet.
 
         Raises
         ------
         MalformedPacketError
-            The length cannot be; where the next packet begins is not known.
+            The length is impossible; the begin of the next packet is unknown.
         """
         if len(self._received) < _HEADER.size:
             return None
@@ -95,38 +95,38 @@ class PacketReader:
 
 
 def parameters(payload: bytes) -> tuple[int, ...]:
-    """At most five u32 parameters.
+    """Return at most five u32 parameters.
 
     Raises
     ------
     MalformedPacketError
-        More of them, or not whole ones.
+        There are more parameters, or incomplete ones.
     """
-    count, rest = divmod(len(payload), 4)
-    if rest or count > _MAX_PARAMETERS:
+    count, remainder = divmod(len(payload), 4)
+    if remainder or count > _MAX_PARAMETERS:
         raise MalformedPacketError
     return struct.unpack(f"<{count}I", payload)
 
 
 def packet(kind: PacketType, payload: bytes = b"") -> bytes:
-    """One packet as bytes."""
+    """Return the bytes of one packet."""
     return _HEADER.pack(_HEADER.size + len(payload), kind) + payload
 
 
 def init_command_ack(connection: int, guid: bytes, name: str) -> bytes:
-    """The camera introduces itself."""
+    """Return the packet that introduces the camera."""
     text = (name + "\0").encode("utf-16-le")
     payload = struct.pack("<I", connection) + guid + text + struct.pack("<I", _VERSION)
     return packet(PacketType.INIT_COMMAND_ACK, payload)
 
 
 def init_fail(reason: FailReason) -> bytes:
-    """The host is not let in."""
+    """Return the packet that refuses the host."""
     return packet(PacketType.INIT_FAIL, struct.pack("<I", reason))
 
 
 def response(code: int, transaction_id: int, params: tuple[int, ...] = ()) -> bytes:
-    """The end of a transaction."""
+    """Return the packet that ends a transaction."""
     return packet(
         PacketType.OPERATION_RESPONSE,
         struct.pack(f"<HI{len(params)}I", code, transaction_id, *params),
@@ -134,12 +134,12 @@ def response(code: int, transaction_id: int, params: tuple[int, ...] = ()) -> by
 
 
 def event(code: int, params: tuple[int, ...] = ()) -> bytes:
-    """An event that belongs to no transaction."""
+    """Return an event that belongs to no transaction."""
     return packet(PacketType.EVENT, struct.pack(f"<HI{len(params)}I", code, 0xFFFFFFFF, *params))
 
 
 def data_phase(transaction_id: int, data: bytes) -> Iterator[bytes]:
-    """Packets of a data phase to the host."""
+    """Return the packets of a data phase to the host."""
     yield packet(PacketType.START_DATA, struct.pack("<IQ", transaction_id, len(data)))
     head = struct.pack("<I", transaction_id)
     last_at = max(0, len(data) - 1) // _PIECE_BYTES * _PIECE_BYTES

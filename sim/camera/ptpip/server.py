@@ -19,10 +19,10 @@ from .connection import Connection
 from .packets import FailReason, MalformedPacketError, Packet, PacketType
 from .transactions import Transactions
 
-#: Nobody outside this PC may reach a simulated camera.
+#: Address of the server, which no other PC can reach.
 LOOPBACK = "127.0.0.1"
-#: Connections that have not said what they are for; the oldest makes way for a new one.
-_MOST_STRANGERS = 8
+#: Largest number of unidentified connections; the oldest is closed for a new one.
+_MOST_UNIDENTIFIED = 8
 _GUID = b"labrig simulated"
 _GUID_BYTES = 16
 #: Longer than the 39 letters of the standard, because libgphoto2 sends the PC's name as it is.
@@ -31,7 +31,7 @@ _MOST_NAME_BYTES = 512
 
 @dataclass
 class _Host:
-    """Who uses the camera."""
+    """Host that uses the camera."""
 
     number: int
     command: Connection
@@ -40,14 +40,14 @@ class _Host:
 
 
 class PtpIpServer:
-    """Serves one camera; close it at the end.
+    """Server of one camera, to be closed at the end.
 
     Parameters
     ----------
     responder
-        The camera.
+        Responder of the camera.
     catch_up
-        Lets the camera's time pass, and tells it.
+        Function that advances the camera's time and returns it.
     port
         TCP port on 127.0.0.1; 0 for any that is free.
 
@@ -74,29 +74,29 @@ class PtpIpServer:
 
     @property
     def port(self) -> int:
-        """TCP port on which it listens."""
+        """TCP port on which the server listens."""
         port: int = self._listener.getsockname()[1]
         return port
 
     @property
     def address(self) -> str:
-        """What a rig file says to reach this camera."""
+        """Address of this camera in a rig file."""
         return f"ptpip://{LOOPBACK}:{self.port}"
 
     def serve(self, clock: Clock) -> NoReturn:
-        """Serve until somebody asks `clock` to stop.
+        """Serve until `clock` is interrupted.
 
         Raises
         ------
         Interrupted
-            Somebody has.
+            A stop was requested.
         """
         while True:
             self.serve_once(CHECK_INTERVAL_S)
             clock.sleep(0.0)
 
     def serve_once(self, patience_s: float) -> None:
-        """Do what there is to do; wait at most so long for something."""
+        """Serve the waiting packets; wait for some at most for that time."""
         self._report_events(self._catch_up())
         connections = self._connections()
         sending = [connection for connection in connections if connection.is_sending]
@@ -118,7 +118,7 @@ class PtpIpServer:
             self._accept()
 
     def close(self) -> None:
-        """Hang up on everybody and stop listening."""
+        """Close all connections and stop listening."""
         for connection in self._connections():
             self._hang_up(connection)
         self._listener.close()
@@ -133,7 +133,7 @@ class PtpIpServer:
         except OSError:
             return  # it has hung up already
         self._strangers.append(Connection(accepted))
-        if len(self._strangers) > _MOST_STRANGERS:
+        if len(self._strangers) > _MOST_UNIDENTIFIED:
             self._hang_up(self._strangers[0])
 
     def _report_events(self, now_s: float) -> None:
@@ -144,7 +144,7 @@ class PtpIpServer:
             self._send(host.event)
 
     def _advance(self, connection: Connection) -> None:
-        """Send what waits, then do what came, as long as both go on."""
+        """Send queued packets, then process received ones, as long as both go on."""
         try:
             while self._send(connection) and (packet := connection.next_packet()):
                 self._take(connection, packet)
@@ -152,7 +152,7 @@ class PtpIpServer:
             self._hang_up(connection)
 
     def _send(self, connection: Connection) -> bool:
-        """Whether all is sent and the other side is still there."""
+        """Return whether all is sent and the other side is still there."""
         if connection not in self._connections():
             return False
         if not connection.send():
@@ -211,20 +211,20 @@ class PtpIpServer:
         return ptpip.packet(PacketType.INIT_EVENT_ACK)
 
     def _hang_up(self, connection: Connection) -> None:
-        """Hang up; a host that loses one of its connections loses both and its session."""
+        """Close a connection; a host that loses one loses both of them and its session."""
         connection.close()
         if connection in self._strangers:
             self._strangers.remove(connection)
         elif self._host and connection in (self._host.command, self._host.event):
             used, self._host = (self._host.command, self._host.event), None
-            for other in used:
-                if other is not None:
-                    other.close()
+            for used_connection in used:
+                if used_connection is not None:
+                    used_connection.close()
             self._responder.disconnect()
 
 
 def _check_introduction(packet: Packet) -> None:
-    """GUID, name with its closing zero, version; any version is welcome."""
+    """Check GUID, name with its closing zero, version; any version is accepted."""
     name_bytes = len(packet.payload) - _GUID_BYTES - 4
     if not 2 <= name_bytes <= _MOST_NAME_BYTES or name_bytes % 2:
         raise MalformedPacketError

@@ -15,7 +15,7 @@ from .packets import (
 
 _DATA_TO_CAMERA = 2
 _NO_DATA_OR_TO_HOST = 1
-#: What a host may announce that does not know the size of what it will send.
+#: Announced size of data whose size the host does not know.
 _UNKNOWN_SIZE = 0xFFFFFFFFFFFFFFFF
 _MAX_DATA = 65536
 
@@ -32,12 +32,12 @@ class _Request:
 
 
 class Transactions:
-    """One host's transactions, a packet at a time; knows nothing of sockets.
+    """One host's transactions, a packet at a time, independent of sockets.
 
     Parameters
     ----------
     responder
-        The camera.
+        Responder of the camera.
     """
 
     def __init__(self, responder: Responder) -> None:
@@ -46,12 +46,12 @@ class Transactions:
         self._answering: int | None = None
 
     def take(self, packet: Packet) -> list[bytes]:
-        """One packet from the command connection; the packets that answer it.
+        """Process one packet from the command connection; return the packets that answer it.
 
         Raises
         ------
         MalformedPacketError
-            It has no place here: the connection cannot go on.
+            The packet is invalid at this point: the connection cannot go on.
         """
         match packet.kind:
             case PacketType.OPERATION_REQUEST:
@@ -67,9 +67,9 @@ class Transactions:
                 raise MalformedPacketError
 
     def cancel(self, packet: Packet) -> list[bytes]:
-        """The host gives up a transaction: what is to be sent instead of what is left of it.
+        """Cancel a transaction; return the packets to send instead of its remaining ones.
 
-        Nothing if that transaction is over.
+        Nothing is cancelled if that transaction is over.
         """
         (transaction_id,) = packet.fields("I")
         if self._request is not None and self._request.transaction_id == transaction_id:
@@ -81,12 +81,12 @@ class Transactions:
         return [response(ResponseCode.TRANSACTION_CANCELLED, transaction_id)]
 
     def answered(self) -> None:
-        """All of the last answer is on its way: it cannot be cancelled any more."""
+        """Note that all of the last answer is sent, so that it cannot be cancelled any more."""
         self._answering = None
 
     def _begin(self, packet: Packet) -> list[bytes]:
-        (direction, opcode, transaction_id), rest = packet.split("IHI")
-        params = parameters(rest)
+        (direction, opcode, transaction_id), remainder = packet.split("IHI")
+        params = parameters(remainder)
         if self._request is not None:
             raise MalformedPacketError
         if direction == _DATA_TO_CAMERA:

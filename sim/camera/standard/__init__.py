@@ -1,1 +1,1 @@
-"""The simulated camera as one that knows nothing but the PTP standard."""
+"""The simulated camera as one that implements nothing but the PTP standard."""

@@ -17,25 +17,25 @@ from ..shutter import FOCUS_S, METERING_S, READOUT_S, Exposure, Shutter, Stage
 from ..vocabulary import ObjectFormat, ResponseCode, StandardEvent
 from .properties import SHUTTER_TIMES, StandardProperties
 
-#: Between two files of a photograph, and before the report that it is over.
+#: Time between two files of a photograph, and before the report of its end.
 NEXT_FILE_S = 0.05
 _ANY = 0
 
 
 @dataclass(frozen=True)
 class StandardHabits:
-    """Where makers differ, within the standard or not quite.
+    """Peculiarities of makers, within the standard or not quite.
 
     Attributes
     ----------
     files
-        What is written of each photograph, in this order.
+        Files that are written of each photograph, in this order.
     end_reported
-        When CaptureComplete comes: after the files, before them, or never.
+        Time of CaptureComplete: after the files, before them, or never.
     has_second_card
-        On which everything is written once more.
+        Whether everything is written once more, on a second card.
     shutter_times
-        What the camera tells of each, in 0.1 ms → the true time in seconds.
+        Actual time in seconds by reported time, in 0.1 ms.
     """
 
     files: tuple[ObjectFormat, ...] = (ObjectFormat.DNG,)
@@ -45,7 +45,7 @@ class StandardHabits:
 
 
 class _Developed(Photograph):
-    """What the camera itself makes of a photograph; nothing can be measured in it."""
+    """Developed picture of a photograph, useless for measurements."""
 
     @cached_property
     def raw(self) -> bytes:
@@ -53,22 +53,22 @@ class _Developed(Photograph):
 
 
 class StandardBody:
-    """Everything of the camera that outlives a session.
+    """State of the camera that outlives a session.
 
     Parameters
     ----------
     clock
-        Time; what happens later is worked out when somebody asks.
+        The room's clock; later events are computed when they are asked for.
     sensor
-        Makes the photographs.
+        Sensor that makes the photographs.
     shutter
         Button and shutter.
     faults
-        `busy_releases`, the spans and `lost_event` are the body's.
+        Faults of the camera, of which `busy_releases`, the spans and `lost_event` are the body's.
     settings
-        What somebody has set by hand.
+        Manual settings of the body.
     habits
-        Its maker's.
+        Peculiarities of the maker.
     """
 
     def __init__(
@@ -100,15 +100,15 @@ class StandardBody:
 
     @property
     def formats(self) -> tuple[ObjectFormat, ...]:
-        """Of the files that are written of a photograph."""
+        """Formats of the files that are written of a photograph."""
         return self._habits.files
 
     def forget_host(self) -> None:
-        """The session is over: nobody is there to be told of what happens."""
+        """End the session: later events are lost."""
         self._events.clear()
 
     def initiate_capture(self, storage_id: int = _ANY, object_format: int = _ANY) -> ResponseCode:
-        """InitiateCapture."""
+        """Do InitiateCapture."""
         if storage_id not in (_ANY, *self.objects.cards):
             return ResponseCode.STORE_NOT_AVAILABLE
         if object_format not in (_ANY, *self._habits.files):
@@ -128,20 +128,20 @@ class StandardBody:
         return ResponseCode.OK
 
     def event_due_s(self) -> float:
-        """When the next event will be there."""
+        """Return the time of the next event."""
         return self._events[0][0] if self._events else math.inf
 
     def take_event(self) -> Event:
-        """The next event."""
+        """Return the next event."""
         return self._events.pop(0)[1]
 
     def _file(self, exposure: Exposure, exposure_s: float) -> None:
-        """Keep the photograph, and say so when it is there."""
+        """Keep the photograph, and report it when it is there."""
         properties = self.properties
-        taken = (self._sensor, exposure.start_s, exposure_s, properties.iso, properties.f_number)
+        exposed = (self._sensor, exposure.start_s, exposure_s, properties.iso, properties.f_number)
         files: dict[ObjectFormat, Photograph] = {
-            ObjectFormat.DNG: Photograph(*taken),
-            ObjectFormat.JPEG: _Developed(*taken),
+            ObjectFormat.DNG: Photograph(*exposed),
+            ObjectFormat.JPEG: _Developed(*exposed),
         }
         ready_s = exposure.end_s + READOUT_S
         if self._habits.end_reported == "before":

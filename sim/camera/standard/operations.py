@@ -1,4 +1,4 @@
-"""What each operation of a camera does that knows the PTP standard only."""
+"""Operations of a camera that implements the PTP standard only."""
 
 from .. import datasets
 from ..object_operations import ObjectOperations
@@ -16,7 +16,7 @@ class StandardOperations:
     Parameters
     ----------
     body
-        What they act on.
+        Body on which the operations act.
     serial
         Serial number of the camera.
     """
@@ -41,7 +41,7 @@ class StandardOperations:
         return self._body.is_exposing
 
     def device_info(self) -> Response:
-        """GetDeviceInfo."""
+        """Return DeviceInfo."""
         info = datasets.DeviceInfo(
             manufacturer="labrig",
             model=_MODEL,
@@ -57,29 +57,29 @@ class StandardOperations:
         return Response(ResponseCode.OK, data=info.encode())
 
     def is_too_busy_for(self, opcode: int) -> bool:
-        """Whether this operation has to wait for the end of an exposure."""
+        """Return whether this operation has to wait for the end of an exposure."""
         return self._body.is_exposing and opcode != Operation.GET_DEVICE_INFO
 
     def forget_host(self) -> None:
-        """The session is over."""
+        """End the session."""
         self._body.forget_host()
 
     def event_due_s(self) -> float:
-        """When it will next say something by itself."""
+        """Return the time of the next event."""
         return self._body.event_due_s()
 
     def take_event(self) -> Event:
-        """What that is; said once."""
+        """Return the event that is due; each is reported once."""
         return self._body.take_event()
 
     def _prop_desc(self, code: int) -> Response:
-        return _told(self._body.properties.description(code))
+        return _data_response(self._body.properties.description(code))
 
     def _prop_value(self, code: int) -> Response:
-        return _told(self._body.properties.value(code))
+        return _data_response(self._body.properties.value(code))
 
 
-def _told(data: bytes | None) -> Response:
+def _data_response(data: bytes | None) -> Response:
     if data is None:
         return Response(ResponseCode.DEVICE_PROP_NOT_SUPPORTED)
     return Response(ResponseCode.OK, data=data)

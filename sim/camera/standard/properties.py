@@ -1,4 +1,4 @@
-"""Device properties of a camera that knows the PTP standard only: values, descriptions, setting.
+"""Device properties of a camera that implements the PTP standard only: values, choices, setting.
 
 Meanings of values: ISO 15740, clause 13.5.
 """
@@ -11,7 +11,7 @@ from .. import codes
 from ..body_settings import BodySettings
 from ..vocabulary import ResponseCode, StandardProperty
 
-#: Shutter times are told in 0.1 ms.
+#: Units of a reported shutter time per second: 0.1 ms.
 UNITS_PER_S = 10_000
 AUTO_ISO = 0xFFFF
 #: Manual, program, aperture and shutter priority; the standard has no bulb.
@@ -43,7 +43,7 @@ SHUTTER_TIMES = {
 
 @dataclass
 class _Property:
-    """One property: its size as a letter of `struct`, its value, what the host may set it to."""
+    """One property: its size as a letter of `struct`, its value, its choices."""
 
     letter: str
     value: int
@@ -68,14 +68,14 @@ class _Property:
 
 
 class StandardProperties:
-    """Present values.
+    """Present values of the properties.
 
     Parameters
     ----------
     settings
-        What somebody has set by hand.
+        Manual settings of the body.
     shutter_times
-        What the camera tells of each, in 0.1 ms → the true time in seconds.
+        Actual time in seconds by reported time, in 0.1 ms.
     """
 
     def __init__(self, settings: BodySettings, shutter_times: dict[int, float]) -> None:
@@ -84,7 +84,7 @@ class StandardProperties:
         focus = _AUTOFOCUS if settings.autofocus else _MANUAL_FOCUS
         iso = AUTO_ISO if settings.iso == "auto" else settings.iso
         first_time = min(shutter_times, key=lambda units: abs(units - UNITS_PER_S / 60))
-        self._all: dict[int, _Property] = {
+        self._properties: dict[int, _Property] = {
             code.BATTERY_LEVEL: _Property("B", 100),
             code.COMPRESSION_SETTING: _Property("B", _RAW),
             code.F_NUMBER: _Property("H", 560, F_NUMBERS),
@@ -100,51 +100,51 @@ class StandardProperties:
 
     @property
     def known(self) -> tuple[int, ...]:
-        """Codes of those that there are."""
-        return tuple(self._all)
+        """Codes of the existing properties."""
+        return tuple(self._properties)
 
     @property
     def exposure_s(self) -> float:
-        """True shutter time."""
-        return self._shutter_times[self._all[StandardProperty.EXPOSURE_TIME].value]
+        """Actual shutter time in seconds."""
+        return self._shutter_times[self._properties[StandardProperty.EXPOSURE_TIME].value]
 
     @property
     def iso(self) -> int:
-        """Sensitivity; what the camera takes if that is left to it."""
-        iso = self._all[StandardProperty.EXPOSURE_INDEX].value
+        """Sensitivity; if it is automatic, the camera's choice."""
+        iso = self._properties[StandardProperty.EXPOSURE_INDEX].value
         return codes.AUTO_AT_M if iso == AUTO_ISO else iso
 
     @property
     def f_number(self) -> float:
-        """True relative aperture."""
-        return codes.true_f_number(self._all[StandardProperty.F_NUMBER].value / 100)
+        """Actual relative aperture."""
+        return codes.true_f_number(self._properties[StandardProperty.F_NUMBER].value / 100)
 
     @property
     def delay_s(self) -> float:
-        """Of the self-timer."""
-        return self._all[StandardProperty.CAPTURE_DELAY].value / 1000
+        """Delay of the self-timer in seconds."""
+        return self._properties[StandardProperty.CAPTURE_DELAY].value / 1000
 
     def description(self, code: int) -> bytes | None:
-        """DevicePropDesc."""
-        found = self._all.get(code)
-        return None if found is None else found.describe(code)
+        """Return the DevicePropDesc dataset of a property."""
+        prop = self._properties.get(code)
+        return None if prop is None else prop.describe(code)
 
     def value(self, code: int) -> bytes | None:
-        """The value alone."""
-        found = self._all.get(code)
-        return None if found is None else found.pack(found.value)
+        """Return the bytes of a property's value."""
+        prop = self._properties.get(code)
+        return None if prop is None else prop.pack(prop.value)
 
     def set(self, code: int, data: bytes) -> ResponseCode:
-        """The host wants to change a property."""
-        found = self._all.get(code)
-        if found is None:
+        """Change a property on behalf of the host."""
+        prop = self._properties.get(code)
+        if prop is None:
             return ResponseCode.DEVICE_PROP_NOT_SUPPORTED
-        if not found.choices:
+        if not prop.choices:
             return ResponseCode.ACCESS_DENIED
-        if len(data) != struct.calcsize(found.letter):
+        if len(data) != struct.calcsize(prop.letter):
             return ResponseCode.INVALID_DEVICE_PROP_FORMAT
         value = int.from_bytes(data, "little")
-        if value not in found.choices:
+        if value not in prop.choices:
             return ResponseCode.INVALID_DEVICE_PROP_VALUE
-        found.value = value
+        prop.value = value
         return ResponseCode.OK

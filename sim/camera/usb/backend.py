@@ -20,25 +20,25 @@ _INTERFACE = 0
 
 
 class _Handle:
-    """One opening of the device, good until it is closed or the cable comes out."""
+    """One opening of the device, valid until it is closed or the cable comes out."""
 
 
 class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is untyped
     """Bus with this one camera on it.
 
-    Every transfer lets virtual time pass; a time-out passes in full. A time-out of 0, for ever
-    with libusb, ends at once here: nobody else moves this clock meanwhile.
+    Every transfer takes virtual time; a time-out passes in full. A time-out of 0, for ever with
+    libusb, ends at once here: nothing else advances this clock meanwhile.
 
     Parameters
     ----------
     clock
-        The simulated room's.
+        The simulated room's clock.
     function
         The camera's endpoints.
     cable
-        Costs time, and can be pulled.
+        Cable, which costs time and can be pulled.
     identity
-        By what the camera is known on the bus.
+        Identity of the camera on the bus.
     """
 
     def __init__(
@@ -58,37 +58,37 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         self._claimed_by: _Handle | None = None
 
     def close_all(self) -> None:
-        """What an operating system does for a process that was killed: the camera is not told."""
+        """Close all handles, as an operating system does for a killed process."""
         self._handles.clear()
         self._claimed_by = None
 
     def enumerate_devices(self) -> Iterator[int]:
-        """Identify the camera by its address on the bus, if it is plugged in."""
+        """Yield the camera by its address on the bus, if it is plugged in."""
         self._notice_unplugging()
         if self._cable.is_plugged:
             yield self._cable.plugging
 
     def get_parent(self, dev: Any) -> None:
-        """No hub is simulated."""
+        """Return None: no hub is simulated."""
 
     def get_device_descriptor(self, dev: Any) -> SimpleNamespace:
-        """Device descriptor."""
+        """Return the device descriptor."""
         return descriptors.device(dev, self._identity)
 
     def get_configuration_descriptor(self, dev: Any, config: int) -> SimpleNamespace:
-        """The one configuration; IndexError ends pyusb's walk."""
+        """Return the one configuration; IndexError ends pyusb's walk."""
         return (descriptors.configuration(),)[config]
 
     def get_interface_descriptor(
         self, dev: Any, intf: int, alt: int, config: int
     ) -> SimpleNamespace:
-        """The one interface with its one setting; IndexError ends pyusb's walk."""
+        """Return the one interface with its one setting; IndexError ends pyusb's walk."""
         return (((descriptors.interface(),),),)[config][intf][alt]
 
     def get_endpoint_descriptor(
         self, dev: Any, ep: int, intf: int, alt: int, config: int
     ) -> SimpleNamespace:
-        """Endpoint by its place in the interface."""
+        """Return the endpoint by its place in the interface."""
         return descriptors.endpoints()[ep]
 
     def open_device(self, dev: int) -> _Handle:
@@ -101,30 +101,30 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         return handle
 
     def close_device(self, dev_handle: _Handle) -> None:
-        """Close, also what has been unplugged."""
+        """Close the handle, also of a device that has been unplugged."""
         self._handles.discard(dev_handle)
         if self._claimed_by is dev_handle:
             self._claimed_by = None
 
     def get_configuration(self, dev_handle: _Handle) -> int:
-        """The one configuration is always the active one."""
+        """Return the one configuration, which is always the active one."""
         self._use(dev_handle)
         return descriptors.CONFIGURATION_VALUE
 
     def set_configuration(self, dev_handle: _Handle, config_value: int) -> None:
-        """Nothing to choose from."""
+        """Do nothing: there is one configuration."""
         self._use(dev_handle)
         if config_value != descriptors.CONFIGURATION_VALUE:
             raise errors.not_found()
 
     def set_interface_altsetting(self, dev_handle: _Handle, intf: int, altsetting: int) -> None:
-        """Nothing to choose from."""
+        """Do nothing: there is one setting."""
         self._use(dev_handle)
         if (intf, altsetting) != (_INTERFACE, 0):
             raise errors.not_found()
 
     def claim_interface(self, dev_handle: _Handle, intf: int) -> None:
-        """One at a time."""
+        """Claim the interface, for one handle at a time."""
         self._use(dev_handle)
         if intf != _INTERFACE:
             raise errors.not_found()
@@ -133,19 +133,19 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         self._claimed_by = dev_handle
 
     def release_interface(self, dev_handle: _Handle, intf: int) -> None:
-        """Let others have it."""
+        """Release the interface."""
         self._use(dev_handle)
         if intf != _INTERFACE or self._claimed_by is not dev_handle:
             raise errors.not_found()
         self._claimed_by = None
 
     def is_kernel_driver_active(self, dev_handle: _Handle, intf: int) -> bool:
-        """No desktop has mounted this camera."""
+        """Return False: no desktop has mounted this camera."""
         self._use(dev_handle)
         return False
 
     def bulk_write(self, dev_handle: _Handle, ep: int, intf: int, data: Any, timeout: int) -> int:
-        """One bulk-out transfer."""
+        """Do one bulk-out transfer."""
         self._use(dev_handle)
         if ep != BULK_OUT:
             raise errors.not_found()
@@ -156,7 +156,7 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         return len(transfer)
 
     def bulk_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
-        """One bulk-in transfer."""
+        """Do one bulk-in transfer."""
         self._use(dev_handle)
         if ep != BULK_IN:
             raise errors.not_found()
@@ -167,7 +167,7 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         return self._deliver(transfer, target)
 
     def intr_read(self, dev_handle: _Handle, ep: int, intf: int, buff: Any, timeout: int) -> int:
-        """One interrupt transfer, as soon as the camera has something to say."""
+        """Do one interrupt transfer, as soon as the camera has an event."""
         self._use(dev_handle)
         if ep != INTERRUPT_IN:
             raise errors.not_found()
@@ -188,13 +188,13 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         data: Any,
         timeout: int,
     ) -> int:
-        """String descriptors and the class requests; anything else stalls, for this once."""
+        """Answer string descriptors and the class requests; anything else stalls, for this once."""
         self._use(dev_handle)
         if bmRequestType == _TO_INTERFACE:
-            sent = data.tobytes()
+            content = data.tobytes()
             self._cable.carry(0)
-            self._function.request_out(bRequest, sent)
-            return len(sent)
+            self._function.request_out(bRequest, content)
+            return len(content)
         if bmRequestType == _FROM_INTERFACE:
             answer = self._function.request_in(bRequest)
         elif (bmRequestType, bRequest, wValue >> 8) == _GET_STRING:
@@ -208,7 +208,7 @@ class CameraBackend(usb.backend.IBackend):  # type: ignore[misc]  # pyusb is unt
         return n_bytes
 
     def clear_halt(self, dev_handle: _Handle, ep: int) -> None:
-        """Un-stall one endpoint."""
+        """Clear the halt of one endpoint."""
         self._use(dev_handle)
         self._cable.carry(0)
         self._function.clear_halt(ep)

@@ -1,4 +1,4 @@
-"""The USB cable: what a transfer costs in time, and being pulled out."""
+"""The USB cable: the time of a transfer, and being pulled out."""
 
 import math
 
@@ -8,23 +8,23 @@ from ..faults import CameraFaults
 from ..power import AutoPowerOff
 from . import errors
 
-#: Host controller and scheduler, for every transfer however small (one high-speed microframe).
+#: Time of host controller and scheduler for every transfer (one high-speed microframe).
 TRANSACTION_S = 125e-6
-#: What a high-speed bulk pipe really carries.
+#: Actual rate of a high-speed bulk pipe.
 BYTES_PER_S = 35e6
 
 
 class Cable:
-    """Lets time pass for every transfer, and may be unplugged once.
+    """Cable whose transfers take time, and which may be unplugged once.
 
     Parameters
     ----------
     clock
-        The simulated room's.
+        The simulated room's clock.
     faults
-        When the cable is pulled and put back.
+        Faults, with the times at which the cable is pulled and plugged in again.
     power
-        A camera that is off is not on the bus either.
+        Power of the camera: one that is off is not on the bus either.
     """
 
     def __init__(self, clock: VirtualClock, faults: CameraFaults, power: AutoPowerOff) -> None:
@@ -45,11 +45,11 @@ class Cable:
 
     @property
     def plugging(self) -> int:
-        """How often the cable was put in: a camera that comes back is another device."""
+        """Number of times that the cable was plugged in: a camera that returns is a new device."""
         return 2 if self._clock.now() >= self._unplug_at_s else 1
 
     def carry(self, n_bytes: int) -> None:
-        """Let one transfer of so many bytes pass.
+        """Take the time of one transfer of that number of bytes.
 
         Raises
         ------
@@ -67,7 +67,7 @@ class Cable:
         self._pass(TRANSACTION_S + n_bytes / BYTES_PER_S)
 
     def wait(self, duration_s: float) -> None:
-        """Let time pass with nothing on the wire."""
+        """Wait with nothing on the wire."""
         self._pass(duration_s)
 
     def _pass(self, duration_s: float) -> None:

@@ -7,7 +7,7 @@ from typing import NoReturn
 
 _HEADER = struct.Struct("<IHHI")
 _MAX_PARAMETERS = 5
-#: Nobody sends this camera more than a property; a greater length is a header gone wrong.
+#: Longest container from the host, a property; a longer one is a damaged header.
 _MAX_FROM_HOST = 65536
 #: Bytes before the parameters or the payload.
 HEADER_SIZE = _HEADER.size
@@ -23,7 +23,7 @@ class ContainerType(IntEnum):
 
 
 class MalformedContainerError(Exception):
-    """Bytes that are no container, or not the one that this phase needs."""
+    """Bytes that are no container, or not the one of this phase."""
 
 
 @dataclass(frozen=True)
@@ -37,27 +37,27 @@ class Container:
 
     def parameters(self) -> tuple[int, ...]:
         """The payload read as at most five parameters."""
-        count, rest = divmod(len(self.payload), 4)
-        if rest or count > _MAX_PARAMETERS:
+        count, remainder = divmod(len(self.payload), 4)
+        if remainder or count > _MAX_PARAMETERS:
             raise MalformedContainerError
         return struct.unpack(f"<{count}I", self.payload)
 
 
 def encode(kind: ContainerType, code: int, transaction_id: int, payload: bytes) -> bytes:
-    """One container as bytes."""
+    """Return the bytes of one container."""
     return _HEADER.pack(HEADER_SIZE + len(payload), kind, code, transaction_id) + payload
 
 
 def encode_parameters(
     kind: ContainerType, code: int, transaction_id: int, parameters: tuple[int, ...]
 ) -> bytes:
-    """One container whose payload is parameters."""
+    """Return the bytes of one container whose payload is parameters."""
     payload = struct.pack(f"<{len(parameters)}I", *parameters)
     return encode(kind, code, transaction_id, payload)
 
 
 class Assembler:
-    """Puts one container together from the packets that the host sends.
+    """Assembler of one container from the packets that the host sends.
 
     Parameters
     ----------
@@ -70,11 +70,11 @@ class Assembler:
         self._received = bytearray()
 
     def discard(self) -> None:
-        """Forget a container that will not be finished."""
+        """Discard a container that will not be finished."""
         self._received.clear()
 
     def feed(self, transfer: bytes) -> Container | None:
-        """Take one transfer; the container if that was the last of it.
+        """Take one transfer; return the container if that was the last of it.
 
         An empty transfer between containers is the end of one that filled its last packet.
         """

@@ -18,7 +18,7 @@ _MANUFACTURER, _PRODUCT, _SERIAL = 1, 2, 3
 
 @dataclass(frozen=True)
 class UsbIdentity:
-    """By what a device is known on the bus; one without a serial number has an empty one."""
+    """Identity of a device on the bus; one without a serial number has an empty one."""
 
     vendor_id: int
     product_id: int
@@ -28,7 +28,7 @@ class UsbIdentity:
 
 
 def device(address: int, identity: UsbIdentity) -> SimpleNamespace:
-    """Device descriptor, and where the device is plugged in."""
+    """Return the device descriptor, with the device's place on the bus."""
     return SimpleNamespace(
         bLength=18,
         bDescriptorType=1,
@@ -53,7 +53,7 @@ def device(address: int, identity: UsbIdentity) -> SimpleNamespace:
 
 
 def configuration() -> SimpleNamespace:
-    """The one configuration."""
+    """Return the one configuration."""
     return SimpleNamespace(
         bLength=9,
         bDescriptorType=2,
@@ -68,7 +68,7 @@ def configuration() -> SimpleNamespace:
 
 
 def interface() -> SimpleNamespace:
-    """The one interface: still image capture."""
+    """Return the one interface: still image capture."""
     return SimpleNamespace(
         bLength=9,
         bDescriptorType=4,
@@ -98,7 +98,7 @@ def _endpoint(address: int, attributes: int, packet: int, interval: int) -> Simp
 
 
 def endpoints() -> tuple[SimpleNamespace, ...]:
-    """The three endpoints, in their order."""
+    """Return the three endpoints, in their order."""
     return (
         _endpoint(BULK_IN, _BULK, BULK_PACKET, 0),
         _endpoint(BULK_OUT, _BULK, BULK_PACKET, 0),
@@ -107,7 +107,7 @@ def endpoints() -> tuple[SimpleNamespace, ...]:
 
 
 def string(index: int, identity: UsbIdentity) -> bytes:
-    """String descriptor of that index; the list of languages is number 0.
+    """Return the string descriptor of that index; the list of languages is number 0.
 
     Raises
     ------

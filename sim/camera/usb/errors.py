@@ -6,33 +6,33 @@ import usb.core
 
 
 def stalled() -> Exception:
-    """The endpoint is halted."""
+    """Return the error of a halted endpoint."""
     return _usb_error("Pipe error", -9, errno.EPIPE)
 
 
 def timed_out() -> Exception:
-    """Nothing came, or nothing was taken, in the time given."""
+    """Return the error of a transfer that did not happen in the time given."""
     error: Exception = usb.core.USBTimeoutError("Operation timed out", -7, errno.ETIMEDOUT)
     return error
 
 
 def unplugged() -> Exception:
-    """The device is gone, or went and came back as another one."""
+    """Return the error of a device that is gone, or came back as another one."""
     return _usb_error("No such device (it may have been disconnected)", -4, errno.ENODEV)
 
 
 def overflowed() -> Exception:
-    """A packet was longer than what was left of the host's buffer."""
+    """Return the error of a packet longer than the rest of the host's buffer."""
     return _usb_error("Overflow", -8, errno.EOVERFLOW)
 
 
 def claimed_by_another() -> Exception:
-    """Somebody else holds the interface."""
+    """Return the error of an interface that another program holds."""
     return _usb_error("Resource busy", -6, errno.EBUSY)
 
 
 def not_found() -> Exception:
-    """No such interface, setting or endpoint."""
+    """Return the error of a missing interface, setting or endpoint."""
     return _usb_error("Entity not found", -5, errno.ENOENT)
 
 

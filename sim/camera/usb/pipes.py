@@ -30,23 +30,23 @@ class InPipe:
         self._transfers.append(memoryview(container))
 
     def discard(self) -> None:
-        """Forget everything that was not read."""
+        """Discard everything that was not read."""
         self._transfers.clear()
 
     def take(self, room: int) -> memoryview:
-        """What a read of `room` bytes gets of the container in front."""
-        rest = self._transfers.popleft()
+        """Return what a read of `room` bytes receives of the first container."""
+        transfer = self._transfers.popleft()
         whole_packets = room // self._packet_size * self._packet_size
-        if room >= len(rest):
+        if room >= len(transfer):
             # A read that is filled exactly ends without seeing the empty packet behind it.
-            if len(rest) and room == len(rest) and room == whole_packets:
+            if len(transfer) and room == len(transfer) and room == whole_packets:
                 self._transfers.appendleft(memoryview(b""))
-            return rest
+            return transfer
         if room == 0 or room != whole_packets:
             # The packet that did not fit has been acknowledged: it is lost.
             lost = whole_packets + self._packet_size
-            if lost <= len(rest):
-                self._transfers.appendleft(rest[lost:])
+            if lost <= len(transfer):
+                self._transfers.appendleft(transfer[lost:])
             raise errors.overflowed()
-        self._transfers.appendleft(rest[room:])
-        return rest[:room]
+        self._transfers.appendleft(transfer[room:])
+        return transfer[:room]

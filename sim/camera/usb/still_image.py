@@ -32,16 +32,16 @@ _UNSOLICITED = 0xFFFFFFFF
 
 
 class StillImageFunction:
-    """Takes packets from the host, gives packets to it; knows nothing of pyusb's objects.
+    """Packets from and to the host, independent of pyusb's objects.
 
     Parameters
     ----------
     clock
-        Time.
+        The room's clock.
     responder
-        The camera.
+        Responder of the camera.
     faults
-        `stall_at` and `timeout_once_at` happen here.
+        Faults of the camera, of which `stall_at` and `timeout_once_at` are here.
     """
 
     def __init__(self, clock: Clock, responder: Responder, faults: CameraFaults) -> None:
@@ -58,18 +58,18 @@ class StillImageFunction:
         self._cancelling_until_s = 0.0
 
     def reset(self) -> None:
-        """Back to the state after plugging in, the camera's session included."""
+        """Restore the state after plugging in, the camera's session included."""
         self._discard_transaction()
         self._interrupt.discard()
         self._halted.clear()
         self._responder.disconnect()
 
     def clear_halt(self, endpoint: int) -> None:
-        """ClearFeature(ENDPOINT_HALT)."""
+        """Do ClearFeature(ENDPOINT_HALT)."""
         self._halted.discard(endpoint)
 
     def write(self, transfer: bytes) -> bool:
-        """One bulk-out transfer; False if the camera does not take it.
+        """Do one bulk-out transfer; return False if the camera does not take it.
 
         The camera takes nothing while an answer waits to be read.
         """
@@ -86,17 +86,17 @@ class StillImageFunction:
         return True
 
     def read(self, room: int) -> memoryview | None:
-        """One bulk-in transfer of at most `room` bytes; None if there is nothing to read."""
+        """Return one bulk-in transfer of at most `room` bytes; None if there is nothing to read."""
         if BULK_IN in self._halted:
             raise errors.stalled()
         return self._in.take(room) if self._in else None
 
     def interrupt_due_s(self) -> float:
-        """When the interrupt endpoint will have something to say."""
+        """Return the time at which the interrupt endpoint will have an event."""
         return self._clock.now() if self._interrupt else self._responder.event_due_s()
 
     def read_interrupt(self, room: int) -> memoryview:
-        """One interrupt transfer, when one is due."""
+        """Return one interrupt transfer, when one is due."""
         if not self._interrupt:
             event = self._responder.take_event()
             self._interrupt.put(
@@ -105,7 +105,7 @@ class StillImageFunction:
         return self._interrupt.take(room)
 
     def request_out(self, request: int, data: bytes) -> None:
-        """A class request from the host."""
+        """Do a class request from the host."""
         if request == RESET and not data:
             self.reset()
         elif request == CANCEL and len(data) == 6:
@@ -114,7 +114,7 @@ class StillImageFunction:
             raise errors.stalled()
 
     def request_in(self, request: int) -> bytes:
-        """A class request to the host."""
+        """Return the answer to a class request of the host."""
         if request != GET_STATUS:
             raise errors.stalled()
         if self._halted:
