@@ -14,12 +14,30 @@ from labrig.yaml_file import did_you_mean
 
 
 def read_run_protocol(run: Path) -> ProtocolModel:
-    """The protocol in a run folder.
+    """Read the protocol in a run folder.
+
+    Parameters
+    ----------
+    run
+        A run folder.
+
+    Returns
+    -------
+    ProtocolModel
+        The protocol as it was when the run was recorded.
 
     Raises
     ------
     UsageError
-        Not a run folder.
+        The folder has no protocol.yaml, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.analyse import read_run_protocol
+    >>> protocol = read_run_protocol(Path("runs/decay"))
+    >>> protocol.protocol, protocol.sample.name, list(protocol.patches)
+    ('decay', 'sample', ['sample'])
     """
     path = run / "protocol.yaml"
     if not path.is_file():

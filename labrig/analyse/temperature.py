@@ -23,7 +23,28 @@ CHECK_IT = "check it before the next run (labrig rig check)"
 
 
 def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, ...]:
-    """A temperature that moved while frames of these roles were taken; a silent thermometer."""
+    """Warn of a temperature that changed while a sample glowed, and of a silent thermometer.
+
+    Parameters
+    ----------
+    run
+        A recorded run.
+    roles
+        Roles of the frames that show the glow.
+
+    Returns
+    -------
+    tuple of str
+        The warnings, a line each; empty if the temperature was steady or no thermometer was there.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.analyse import temperature_warnings
+    >>> run = labrig.read_run("runs/decay")
+    >>> temperature_warnings(run, ["decay"])
+    ()
+    """
     photographs = in_roles(run, roles)
     if not photographs or "thermometer" not in run.attempts[-1].start.get("devices", {}):
         return ()

@@ -64,15 +64,40 @@ class DarkModel:
 
 
 def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
-    """Weighted least squares of b + d·T through dark levels.
+    """Fit the dark level b + d·T of each channel by weighted least squares.
+
+    Where the frames scatter by more than `sigma` (the camera's black level drifts), the covariance
+    is raised to the observed scatter.
 
     Parameters
     ----------
     exposure_s
-        Shape (n,).
-    level, sigma
-        Shape (n, C), DN above black. If frames scatter by more than sigma (the camera's black
-        drifts), the covariance is raised to what they scatter by.
+        Exposure time T of each dark frame in seconds, shape (n,).
+    level
+        Mean dark levels in DN above black, shape (n, C).
+    sigma
+        Standard uncertainties of the levels in DN, shape (n, C).
+
+    Returns
+    -------
+    DarkModel
+        Black offset b in DN and dark current d in DN/s of each channel, with their covariance.
+
+    Raises
+    ------
+    DataError
+        There are no dark frames.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.reduce import fit_dark
+    >>> exposure_s = np.array([0.1, 1.0, 10.0])
+    >>> level = np.array([[2.01], [2.10], [3.00]])  # DN, one channel
+    >>> model = fit_dark(exposure_s, level, sigma=np.full((3, 1), 0.01))
+    >>> dark_dn, sigma_dn = model.dark_level(5.0)
+    >>> print(f"{dark_dn[0]:.2f} ± {sigma_dn[0]:.3f} DN")
+    2.50 ± 0.006 DN
     """
     if len(exposure_s) == 0:
         raise DataError("expected dark frames, got none; take some before charging")
@@ -105,18 +130,35 @@ def same_exposure(one_s: float, other_s: float) -> bool:
 
 
 def hot_pixels(darks: Sequence[RawFrame]) -> PixelMask:
-    """Pixels of the sensor, shape (height, width), that are bright in the dark.
+    """Find the pixels of the sensor that are bright in the dark.
+
+    A pixel is hot if it exceeds the median of the 24 nearest pixels of its CFA position by more
+    than 8 robust standard deviations in two frames.
 
     Parameters
     ----------
     darks
-        Two or more dark frames, the longest there are: a pixel is hot if it exceeds the median of
-        the 24 nearest of its CFA position by more than 8 robust standard deviations in two of them.
+        Two or more dark frames, best those of the longest exposure.
+
+    Returns
+    -------
+    ndarray of bool
+        True where a pixel is hot, shape (height, width).
 
     Raises
     ------
     DataError
-        Fewer than two frames, or of different sizes or sensors.
+        There are fewer than two frames, or frames of different sizes or sensors.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.reduce import hot_pixels
+    >>> run = labrig.read_run("runs/decay")
+    >>> longest = run.frames("dark")[-4:]
+    >>> mask = hot_pixels([labrig.read_raw(frame.path) for frame in longest])
+    >>> mask.shape, int(mask.sum())
+    ((64, 96), 1)
     """
     if len(darks) < HOT_FRAMES:
         raise DataError(

@@ -196,7 +196,27 @@ def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
 
 
 def saturated_cells(raw: RawFrame) -> PixelMask:
-    """(rows, columns) whether some pixel of a cell of `cell_means_dn` is saturated."""
+    """Mark the cells of the colour filter in which some pixel is saturated.
+
+    Parameters
+    ----------
+    raw
+        The RAW frame.
+
+    Returns
+    -------
+    ndarray of bool
+        True where a cell is saturated, shape (rows, columns) of the picture by `binned`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.reduce import saturated_cells
+    >>> saturated = saturated_cells(labrig.read_raw(Path("frame.dng")))
+    >>> saturated.shape, bool(saturated.any())
+    ((32, 48), False)
+    """
     side = max(raw.cfa_side, 2)
     rows, columns = raw.height // side, raw.width // side
     whole = raw.mosaic[: side * rows, : side * columns].reshape(rows, side, columns, side)

@@ -60,7 +60,40 @@ class HdrFrame:
 
 
 def read_hdr_frame(frames: Iterable[Exposure], hot: PixelMask | None = None) -> HdrFrame:
-    """As `hdr_frame`, from files."""
+    """Read several exposures of one scene and combine them into one frame of larger range.
+
+    Parameters
+    ----------
+    frames
+        Frames on disk, with their actual exposure times in seconds.
+    hot
+        Hot pixels to leave out, shape (height, width); None leaves out none.
+
+    Returns
+    -------
+    HdrFrame
+        Signal of each pixel in DN/s above black, NaN where all exposures clip or the pixel is hot.
+
+    Raises
+    ------
+    DataError
+        There is no frame, or the frames are of different sensors.
+    UsageError, FrameError
+        A file cannot be read, or is no RAW file of a known sensor.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> import labrig
+    >>> from labrig.reduce import read_hdr_frame
+    >>> run = labrig.read_run("runs/decay")
+    >>> bracketed = run.frames("meter")
+    >>> [f"{frame.exposure_s:.4f} s" for frame in bracketed]
+    ['0.0008 s', '0.0062 s', '0.0496 s', '0.3969 s', '3.1748 s']
+    >>> hdr = read_hdr_frame(bracketed)
+    >>> hdr.rate.shape, f"{np.nanmax(hdr.rate):.2g} DN/s"
+    ((64, 96), '3.9e+03 DN/s')
+    """
     return hdr_frame(((read_raw(frame.path), frame.exposure_s) for frame in frames), hot)
 
 

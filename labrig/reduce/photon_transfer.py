@@ -74,6 +74,30 @@ class NoiseModel:
 
 
 def variance_terms(level_dn: FloatArray) -> FloatArray:
-    """(…, 3) 1, L and L² of levels (…,) in DN above black, none below 0."""
+    """Return the terms 1, L and L² of the photon-transfer model at levels L.
+
+    Parameters
+    ----------
+    level_dn
+        Levels in DN above black, of any shape; levels below 0 count as 0.
+
+    Returns
+    -------
+    ndarray
+        The three terms along a new last axis, in units of 1, DN and DN², shape (…, 3).
+
+    References
+    ----------
+    J. R. Janesick, *Photon Transfer*, SPIE Press, 2007.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.reduce import NoiseModel, variance_terms
+    >>> variance_terms(np.array([0.0, 100.0])).tolist()
+    [[1.0, 0.0, 0.0], [1.0, 100.0, 10000.0]]
+    >>> NoiseModel(read_dn2=4.0, photon_dn=0.5).variance_dn2(np.array([0.0, 100.0])).tolist()
+    [4.0, 54.0]
+    """
     level = np.maximum(level_dn, 0.0)
     return np.stack([np.ones_like(level), level, level**2], axis=-1)

@@ -87,9 +87,27 @@ logging.getLogger("exifread").setLevel(logging.CRITICAL)
 
 
 def read_exif(content: bytes) -> Exif:
-    """EXIF in the bytes of a RAW file.
+    """Read the EXIF of a RAW file.
 
-    Damaged EXIF is as good as none: the picture can be reduced without it.
+    Damaged EXIF counts as missing: the picture can be reduced without it.
+
+    Parameters
+    ----------
+    content
+        The bytes of the RAW file.
+
+    Returns
+    -------
+    Exif
+        Settings of the exposure, camera and lens; None where absent or unreadable.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.reduce import read_exif
+    >>> exif = read_exif(Path("frame.dng").read_bytes())
+    >>> exif.exposure_s, exif.iso, exif.f_number
+    (0.5, 400.0, 4.0)
     """
     import exifread  # with its maker-note tables, only when a RAW file is read
 
@@ -290,7 +308,19 @@ class RawFrame:
 
 
 def read_raw(source: Path | bytes, name: str = "the frame") -> RawFrame:
-    """The RAW file `source`, a path or the bytes of one (then `name` names it in messages).
+    """Read the mosaic of a RAW file, undemosaiced, with its black and saturation levels.
+
+    Parameters
+    ----------
+    source
+        Path of the RAW file, or the bytes of one.
+    name
+        Name of the frame in messages, if `source` is bytes.
+
+    Returns
+    -------
+    RawFrame
+        The visible mosaic in DN, shape (height, width), and the settings of the exposure.
 
     Raises
     ------
@@ -299,7 +329,17 @@ def read_raw(source: Path | bytes, name: str = "the frame") -> RawFrame:
     DiskError
         The disk does not give it back.
     FrameError
-        Not a RAW file, cut off or damaged, or from a sensor of another kind.
+        The file is no RAW file, is cut off or damaged, or is from a sensor of another kind.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> raw = labrig.read_raw(Path("frame.dng"))
+    >>> raw.mosaic.shape, raw.cfa, raw.black[0], raw.white
+    ((64, 96), 'RGGB', 1024.0, 15600.0)
+    >>> raw.exposure_s, raw.iso, raw.f_number
+    (0.5, 400.0, 4.0)
     """
     if isinstance(source, Path):
         name = str(source)

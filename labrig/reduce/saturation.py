@@ -59,18 +59,31 @@ _LEVELS_BELOW = 16
 
 
 def is_clipped(saturated: npt.ArrayLike, pixels: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-    """Whether the mean of a region is too small because pixels of it are full.
+    """Return whether saturated pixels make the mean of a region too small.
 
-    It is if more than 0.1 % of them are. Fewer say nothing about the light: a sensor's hot pixels
-    are up to that many, and in a long exposure they are full whatever is seen. And fewer do no
-    harm: noise whose tail beyond white holds 0.1 % of the pixels lacks 3e-4 of a pixel's standard
-    deviation in the mean, and highlights twice as bright as white lack 0.1 % of white, a seventh
-    of what a shutter flickers by.
+    A region is clipped if more than 0.1 % of its pixels are saturated. Fewer say nothing about the
+    light: a sensor's hot pixels are up to that many, and in a long exposure they are full at any
+    light. Nor do fewer bias the mean: noise whose tail beyond white holds 0.1 % of the pixels lacks
+    3e-4 of a pixel's standard deviation in the mean, and highlights twice as bright as white lack
+    0.1 % of white, a seventh of a shutter's flicker.
 
     Parameters
     ----------
-    saturated, pixels
-        How many pixels of one colour are at white or above, of how many.
+    saturated
+        Number of pixels of one colour at white or above, of any shape.
+    pixels
+        Number of pixels of that colour, of the same shape.
+
+    Returns
+    -------
+    ndarray of bool
+        True where the region is clipped, of the shape of `saturated`.
+
+    Examples
+    --------
+    >>> from labrig.reduce import is_clipped
+    >>> is_clipped([0, 1, 5], [1000, 1000, 1000]).tolist()
+    [False, False, True]
     """
     return np.asarray(np.asarray(saturated) > CLIPPED_FRACTION * np.asarray(pixels))
 

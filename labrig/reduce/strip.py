@@ -83,12 +83,31 @@ class FoundStrip:
 
 
 def find_strip(frame: HdrFrame) -> FoundStrip:
-    """The brightest elongated rectangle in an otherwise dark frame.
+    """Find the brightest elongated rectangle in an otherwise dark frame.
+
+    Parameters
+    ----------
+    frame
+        Frame of a lit strip of a linear variable filter, one exposure or several combined.
+
+    Returns
+    -------
+    FoundStrip
+        Corners, tilt and size of the lit rectangle in pixels.
 
     Raises
     ------
     DataError
-        There is none, it is tilted by more than 5°, or too short to be read.
+        No strip is lit, it is tilted by more than 5°, or it is too short to be read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.reduce import HdrFrame, find_strip
+    >>> rate = np.zeros((120, 200), np.float32)
+    >>> rate[50:70, 20:180] = 1000.0  # DN/s
+    >>> print(find_strip(HdrFrame(rate, cfa="L", cfa_side=1, channels=("L",))))
+    161 x 21 pixels, tilted by +0.0°
     """
     light = frame.light()
     height, width = light.shape
@@ -130,21 +149,39 @@ def find_strip(frame: HdrFrame) -> FoundStrip:
 
 
 def strip_profile(frame: HdrFrame, strip: Strip) -> StripProfile:
-    """Means across the strip, one for every cell of the colour filter along it.
+    """Average a frame across a strip, one value for every cell of the colour filter along it.
 
-    Each channel is read where its own pixels are, and drawn straight in between.
+    Each channel is read where its own pixels are, and interpolated linearly in between.
 
     Parameters
     ----------
     frame
-        Whole, from one exposure or several.
+        The whole frame, one exposure or several combined.
     strip
-        Where it lies; which way its wavelengths rise does not matter.
+        Place of the strip in the frame; the direction of its wavelengths does not matter.
+
+    Returns
+    -------
+    StripProfile
+        Mean signal in DN/s at n positions from the left end (0) to the right end (1), shape
+        (n, channels).
 
     Raises
     ------
     DataError
         Some part of the strip clips in all frames.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import Strip
+    >>> from labrig.reduce import HdrFrame, strip_profile
+    >>> rate = np.tile(np.linspace(0.0, 1000.0, 200, dtype=np.float32), (120, 1))  # DN/s
+    >>> frame = HdrFrame(rate, cfa="L", cfa_side=1, channels=("L",))
+    >>> strip = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.2, rising=True)
+    >>> profile = strip_profile(frame, strip)
+    >>> profile.value_dn_per_s.shape, profile.value_dn_per_s[[0, -1], 0].round().tolist()
+    ((80, 1), [103.0, 897.0])
     """
     height, width = frame.rate.shape
     along, inside = _along(strip, width, height)
@@ -169,23 +206,45 @@ def slice_values(
     darks: Sequence[SeriesFrame],
     camera: CameraModel | None,
 ) -> Mapping[str, SliceValues]:
-    """Light in every slice of a strip, scene by scene.
+    """Measure the light in every slice of a strip, scene by scene.
 
     Parameters
     ----------
     frames
-        Those of one unit show one scene at several exposures.
+        Light frames; those of one unit show one scene at several exposures.
     strip
-        Where it lies in all of them.
+        Place of the strip, the same in all frames.
     darks
-        Dark frames at their exposures.
+        Dark frames at their exposure times.
     camera
-        Its calibration, where there is one.
+        Calibration of the camera; None uses the values as they are.
 
     Returns
     -------
-    dict
-        Unit → values in DN/s.
+    dict of str to SliceValues
+        Signal in DN/s and its standard uncertainty by unit, shape (slices, channels).
+
+    Raises
+    ------
+    DataError
+        ISO or f-number differ within a unit, no dark frames match, or the calibration is of another
+        camera or aperture.
+    FrameError, UsageError
+        A frame cannot be read, or the strip leaves it.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.optics import Strip
+    >>> from labrig.reduce import SeriesFrame, slice_values
+    >>> run = labrig.read_run("runs/decay")
+    >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
+    >>> first = run.frames("decay")[0]
+    >>> frames = [SeriesFrame(first.path, 1.06, first.exposure_s, unit="lit")]
+    >>> strip = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.2, rising=True)
+    >>> values = slice_values(frames, strip, darks, camera=None)
+    >>> values["lit"].value.shape
+    (31, 3)
     """
     series = reduce_patches(frames, strip.slices(), darks, camera=camera)
     units = dict.fromkeys(frame.unit for frame in frames)

@@ -22,7 +22,25 @@ MANY_TIMES = 20.0
 
 
 def spans_decades(charge_s: FloatArray) -> bool:
-    """Whether charges are so different that they go along a logarithmic axis."""
+    """Return whether charge durations differ so much that a logarithmic axis suits them.
+
+    Parameters
+    ----------
+    charge_s
+        Duration of each charge in seconds, shape (n,).
+
+    Returns
+    -------
+    bool
+        True if the shortest is above 0 s and the longest is more than 20 times as long.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.results import spans_decades
+    >>> spans_decades(np.array([1.0, 10.0, 100.0])), spans_decades(np.array([10.0, 20.0]))
+    (True, False)
+    """
     low = float(charge_s.min())
     return low > 0 and float(charge_s.max()) > MANY_TIMES * low
 

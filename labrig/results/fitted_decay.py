@@ -296,23 +296,58 @@ class FittedDecay:
 
 
 def write_fitted_decay(path: Path, result: FittedDecay) -> None:
-    """Write `fit.json`.
+    """Write the fit of a decay to a JSON file.
+
+    Parameters
+    ----------
+    path
+        Path of the file, `fit.json` in a result folder.
+    result
+        The fitted decay.
 
     Raises
     ------
     DiskError
-        It cannot be written.
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.results import read_fitted_decay, write_fitted_decay
+    >>> result = labrig.read_result("runs/decay")
+    >>> write_fitted_decay(Path("fit.json"), result.patches["sample"].fit)
+    >>> read_fitted_decay(Path("fit.json")).n_states
+    2
     """
     write_json(path, result.to_dict())
 
 
 def read_fitted_decay(path: Path) -> FittedDecay:
-    """Read `fit.json`.
+    """Read the fit of a decay from a JSON file.
+
+    Parameters
+    ----------
+    path
+        Path of a `fit.json`, as `write_fitted_decay` writes it.
+
+    Returns
+    -------
+    FittedDecay
+        Rates, amplitudes and offsets with their standard uncertainties and covariance.
 
     Raises
     ------
     DataError
-        It is missing, damaged, or of another version.
+        The file is missing, damaged, or of another version.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.results import read_fitted_decay
+    >>> fit = read_fitted_decay(Path("runs/decay/result/fit.json"))
+    >>> [f"{rate.value:.2g} {rate.unit}" for rate in fit.rates]
+    ['0.2 1/s', '0.01 1/s']
     """
     try:
         return _from_dict(json.loads(path.read_text(encoding="utf-8")))
@@ -324,9 +359,26 @@ def read_fitted_decay(path: Path) -> FittedDecay:
 
 
 def find_fitted_decays(folder: Path) -> dict[str, Path]:
-    """The `fit.json` of every patch in a result folder, by the name of the patch's folder.
+    """Find the fit of every patch in a result folder.
 
-    A run with one patch has its fit in the result folder itself, under the name "".
+    Parameters
+    ----------
+    folder
+        A result folder.
+
+    Returns
+    -------
+    dict of str to Path
+        Path of each `fit.json` by the name of the patch's folder. A run with one patch has its fit
+        in the result folder itself, under the name "".
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.results import find_fitted_decays
+    >>> for name, path in find_fitted_decays(Path("runs/decay/result")).items():
+    ...     print(repr(name), path.as_posix())
+    '' runs/decay/result/fit.json
     """
     return {
         path.parent.name if path.parent != folder else "": path
@@ -335,12 +387,30 @@ def find_fitted_decays(folder: Path) -> dict[str, Path]:
 
 
 def read_fitted_decays(folder: Path) -> dict[str, FittedDecay]:
-    """What was fitted to every patch, by name as in `find_fitted_decays`; none if nothing was.
+    """Read the fit of every patch in a result folder.
+
+    Parameters
+    ----------
+    folder
+        A result folder.
+
+    Returns
+    -------
+    dict of str to FittedDecay
+        The fits by name of the patch, as in `find_fitted_decays`; empty if nothing was fitted.
 
     Raises
     ------
     DataError
         A file is damaged.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.results import read_fitted_decays
+    >>> for name, fit in read_fitted_decays(Path("runs/decay/result")).items():
+    ...     print(repr(name), fit.n_states, fit.brightest_channel)
+    '' 2 G
     """
     return {name: read_fitted_decay(path) for name, path in find_fitted_decays(folder).items()}
 

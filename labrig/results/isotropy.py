@@ -18,7 +18,27 @@ SIGMAS = 2.0
 
 
 def is_within_paper(ratio: Measured) -> bool:
-    """Whether a ratio of two views may be as near to 1 as the paper's samples are."""
+    """Return whether a ratio of two views deviates from 1 by no more than the paper's samples do.
+
+    The paper's samples fluctuate by 5 % at most (section 4); a deviation beyond that counts if it
+    is significant by 2 σ.
+
+    Parameters
+    ----------
+    ratio
+        Radiance of a view relative to the straight view, with its standard uncertainty.
+
+    Returns
+    -------
+    bool
+        True if the deviation is within 5 % and 2 σ.
+
+    Examples
+    --------
+    >>> from labrig.results import Measured, is_within_paper
+    >>> is_within_paper(Measured(0.93, 0.02)), is_within_paper(Measured(0.93, 0.005))
+    (True, False)
+    """
     return abs(ratio.value - 1) < PAPER_REACH + SIGMAS * ratio.sigma
 
 

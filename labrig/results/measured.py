@@ -100,7 +100,27 @@ class Measured:
 
 
 def with_uncertainty(value: float, sigma: float) -> str:
-    """`0.0802(13)`: the value to two digits of its σ; `0.08` if σ is 0, `0.08(?)` if unknown."""
+    """Write a value to two digits of its standard uncertainty, as in `0.0802(13)`.
+
+    Parameters
+    ----------
+    value
+        The value.
+    sigma
+        Its standard uncertainty in the same unit; 0 of an exact value, infinite if unknown.
+
+    Returns
+    -------
+    str
+        The value and, in brackets, σ in units of its last digits: `0.08` if σ is 0, `0.08(?)` if it
+        is unknown. A σ of 1 or more has its decimal point, as in `12.5(1.3)`.
+
+    Examples
+    --------
+    >>> from labrig.results import with_uncertainty
+    >>> with_uncertainty(0.0802, 0.0013), with_uncertainty(12.47, 1.3), with_uncertainty(0.08, 0.0)
+    ('0.0802(13)', '12.5(1.3)', '0.08')
+    """
     if sigma == 0:
         return f"{value:.6g}"
     if not math.isfinite(sigma):
@@ -142,20 +162,35 @@ Path = tuple[str, ...]
 
 
 def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
-    """Every plain value in a result and where it is: names of fields, keys, or numbers from 1.
+    """Iterate over every plain value in a result and its path.
 
-    A plain value is a number, a text, an array, a `Measured` or a sequence of such. Results within
+    A plain value is a number, a text, an array, a `Measured` or a sequence of these. Results within
     a result, such as the parts of a chain, are left out.
+
+    Parameters
+    ----------
+    value
+        A result, or a dataclass, mapping or sequence in one.
+    path
+        Path of `value` itself, before those of the plain values in it.
+
+    Yields
+    ------
+    path : tuple of str
+        Names of fields, keys of mappings, or positions in a sequence from 1.
+    value : object
+        The plain value.
 
     Examples
     --------
-    >>> from dataclasses import dataclass
-    >>> @dataclass(frozen=True)
-    ... class Peak:
-    ...     wavelength_nm: float
-    ...     height: Measured
-    >>> [path for path, _ in leaves({"first": Peak(450.0, Measured(1.0, 0.1))})]
-    [('first', 'wavelength_nm'), ('first', 'height')]
+    >>> import labrig
+    >>> from labrig.results import leaves
+    >>> fit = labrig.read_result("runs/decay").patches["sample"].fit
+    >>> for path, value in leaves(fit):
+    ...     if path[-1] == "k_r_per_s":
+    ...         print("/".join(path), f"{value:.2g}")
+    states/1/k_r_per_s 0.2
+    states/2/k_r_per_s 0.01
     """
     inner = _inner(value)
     if inner is None:
@@ -167,7 +202,24 @@ def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
 
 
 def unit_of(name: str) -> str:
-    """The unit that the name of a field ends with, that of a σ being its value's; empty if none."""
+    """Return the unit that the name of a field ends with.
+
+    Parameters
+    ----------
+    name
+        Name of a field of a result; that of a standard uncertainty has the unit of its value.
+
+    Returns
+    -------
+    str
+        The unit; empty if the name has none.
+
+    Examples
+    --------
+    >>> from labrig.results import unit_of
+    >>> unit_of("k_r_sigma_per_s"), unit_of("centre_nm"), unit_of("chi2")
+    ('1/s', 'nm', '')
+    """
     base = name.removesuffix("_sigma").replace("_sigma_", "_")
     return next((unit for end, unit in _UNITS.items() if base.endswith(end)), "")
 

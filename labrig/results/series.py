@@ -109,7 +109,14 @@ class Series:
 
 
 def write_series(path: Path, series: Sequence[Series]) -> None:
-    """Write several patches into one series.csv, one below the other.
+    """Write the series of several patches into one CSV file, one below the other.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+    series
+        Series of patches with the same channels.
 
     Raises
     ------
@@ -117,6 +124,18 @@ def write_series(path: Path, series: Sequence[Series]) -> None:
         The patches have different channels.
     DiskError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.results import write_series
+    >>> left = labrig.read_series("series.csv")[0]
+    >>> right = replace(left, region="right", values=1.1 * left.values)
+    >>> write_series(Path("two-patches.csv"), [left, right])
+    >>> [series.region for series in labrig.read_series("two-patches.csv")]
+    ['sample', 'right']
     """
     channels = {part.channels for part in series}
     if len(channels) != 1:
@@ -195,11 +214,47 @@ def _is_plain(text: str) -> bool:
 
 
 def is_usable(flag: str) -> bool:
-    """Whether no word in `flag` excludes its row."""
+    """Return whether no flag excludes its row from a fit.
+
+    Parameters
+    ----------
+    flag
+        Flags of a row, joined by `+`; empty if there are none.
+
+    Returns
+    -------
+    bool
+        False if `clipped`, `excluded` or `afterglow` is among the flags.
+
+    Examples
+    --------
+    >>> from labrig.results import is_usable
+    >>> is_usable(""), is_usable("late"), is_usable("late+clipped")
+    (True, True, False)
+    """
     return EXCLUDING.isdisjoint(flag.split(FLAG_JOINER))
 
 
 def add_flag(flag: str, word: str) -> str:
-    """`flag` with `word` in it, once."""
+    """Add a flag to those of a row, once.
+
+    Parameters
+    ----------
+    flag
+        Flags of the row, joined by `+`; empty if there are none.
+    word
+        The flag to add.
+
+    Returns
+    -------
+    str
+        The flags with `word` among them.
+
+    Examples
+    --------
+    >>> from labrig.results import add_flag
+    >>> add_flag("late", "clipped"), add_flag("late+clipped", "clipped")
+    ('late+clipped', 'late+clipped')
+    """
     words = [known for known in flag.split(FLAG_JOINER) if known]
     return FLAG_JOINER.join(dict.fromkeys([*words, word]))

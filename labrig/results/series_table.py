@@ -16,7 +16,30 @@ from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 
 
 def joined(parts: Sequence[Series]) -> Series:
-    """One below the other; what they have in common is taken from the first."""
+    """Join series one below the other.
+
+    Parameters
+    ----------
+    parts
+        Series of the same channels; name of the patch, dark level and correlations are taken from
+        the first.
+
+    Returns
+    -------
+    Series
+        All rows in the given order.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> import labrig
+    >>> from labrig.results import joined
+    >>> first = labrig.read_series("series.csv")[0]
+    >>> second = replace(first, unit=("decay-2",) * len(first.unit))
+    >>> both = joined([first, second])
+    >>> len(first.t_s), len(both.t_s), sorted(set(both.unit))
+    (18, 36, ['decay-1', 'decay-2'])
+    """
     return replace(
         parts[0],
         t_s=np.concatenate([part.t_s for part in parts]),
@@ -49,24 +72,77 @@ class _Table:
 
 
 def read_series(path: str | os.PathLike[str]) -> list[Series]:
-    """The series in a table, one for each region and unit in it, in order of appearance.
+    """Read the series in a table, one for each region and unit in it.
 
-    The header may be missing: then the columns are time, value and perhaps sigma. `#` begins a
-    comment. Every column that is not reserved (`RESERVED`) is a channel, except one that only
-    the first row fills: some programs put the settings of a measurement there.
+    The delimiter is a comma, a tab, a semicolon or blanks. The header may be missing: then the
+    columns are time, value and perhaps sigma. `#` begins a comment. Every column that is not
+    reserved (region, unit, flag and the like) is a channel, except one that only the first row
+    fills: some programs put the settings of a measurement there.
+
+    Parameters
+    ----------
+    path
+        Path of the table, labrig's series.csv or that of another program.
+
+    Returns
+    -------
+    list of Series
+        The series in order of appearance.
 
     Raises
     ------
     UsageError
-        No such file, or not such a table.
+        The file does not exist, or is not such a table.
     DataError
-        A number that is not finite, a missing value, or no rows.
+        A number is not finite, a value is missing, or there are no rows.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> series = labrig.read_series("series.csv")[0]
+    >>> series.region, series.channels, series.values.shape
+    ('sample', ('R', 'G', 'B'), (18, 3))
+    >>> for start_s, value in zip(series.t_s[:2], series.values[:2, 1]):
+    ...     print(f"{start_s:.2f} s: {value:.0f} DN/s")
+    1.06 s: 8894 DN/s
+    6.06 s: 4806 DN/s
     """
     return parse_series(read_text(Path(path)), str(path))
 
 
 def parse_series(text: str, source: str) -> list[Series]:
-    """As `read_series`, from text; `source` names it in messages."""
+    """Parse the series in the text of a table, one for each region and unit in it.
+
+    Parameters
+    ----------
+    text
+        Content of a table, in the form that `read_series` reads.
+    source
+        Name of the table in messages.
+
+    Returns
+    -------
+    list of Series
+        The series in order of appearance.
+
+    Raises
+    ------
+    UsageError
+        The text is not such a table.
+    DataError
+        A number is not finite, a value is missing, or there are no rows.
+
+    Examples
+    --------
+    >>> from labrig.results import parse_series
+    >>> table = '''time_s,value,sigma
+    ... 1,100,2
+    ... 2,61,1.6
+    ... 4,22,1'''
+    >>> series = parse_series(table, "clipboard")[0]
+    >>> series.t_s.tolist(), series.values[:, 0].tolist(), series.sigma[:, 0].tolist()
+    ([1.0, 2.0, 4.0], [100.0, 61.0, 22.0], [2.0, 1.6, 1.0])
+    """
     try:
         return _series(_table(text))
     except LabrigError as error:
