@@ -1,4 +1,4 @@
-"""A blank, from its frames to its result."""
+"""Analysis of a blank, from its frames to its result."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -20,24 +20,27 @@ from labrig.protocols.blank import BLANK_FRAMES
 from labrig.reduce import FrameMeasurement, fit_dark, measure, read_raw, reduce_patches
 from labrig.results import BlankResult, FloatArray, Series, StrayLight
 
-#: Fraction of the frames, the latest ones, that tell the constant level.
+#: Fraction of the frames, the latest ones, that determine the constant level.
 LATE = 1 / 2
-#: Fewer frames tell nothing about what stays.
+#: Fewest frames that determine the constant level.
 FEWEST = 4
 
 
 def stray_light(series: Series, sigmas: float, least_dn: float) -> StrayLight:
-    """What `series` shows.
+    """Measure the stray light in a series.
 
     Parameters
     ----------
+    series
+        Series of a region without glow, in DN/s.
     sigmas, least_dn
-        A frame is clean if it is less than that above the constant level: in its own σ, or in DN.
+        A frame is clean if it exceeds the constant level by less than `sigmas` of its own σ, or by
+        less than `least_dn` in DN.
 
     Raises
     ------
     DataError
-        Too few frames.
+        There are too few frames.
     """
     middle_s = series.t_s + series.exposure_s / 2
     order = np.argsort(middle_s, kind="stable")
@@ -70,10 +73,20 @@ def stray_light(series: Series, sigmas: float, least_dn: float) -> StrayLight:
 
 
 def ambient(darks: Sequence[FrameMeasurement]) -> tuple[FloatArray, FloatArray]:
-    """Light in the dark frames in DN/s beyond dark current and its σ, each (channels,).
+    """Measure the ambient light in dark frames.
 
-    Dark current is the same in all channels, light is not: what a channel has more than the one
-    with least is light. It is a lower limit.
+    Dark current is the same in all channels, light is not: the excess of a channel over the one
+    with the smallest signal is light. It is a lower limit.
+
+    Parameters
+    ----------
+    darks
+        Measured dark frames.
+
+    Returns
+    -------
+    tuple of ndarray
+        Light beyond dark current and its standard uncertainty in DN/s, shape (channels,) each.
     """
     exposure_s = np.array([one.exposure_s or 0.0 for one in darks])
     pairs = [[(c.mean, c.sigma) for c in one.channels.values()] for one in darks]
@@ -87,7 +100,7 @@ def ambient(darks: Sequence[FrameMeasurement]) -> tuple[FloatArray, FloatArray]:
 
 
 def _mean(values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weighted mean of rows, and its σ by their own and by how they scatter."""
+    """Return the weighted mean of rows, and its σ by their own σ and by their scatter."""
     weights = 1 / np.square(sigma)
     mean = np.average(values, axis=0, weights=weights)
     misfit = (weights * np.square(values - mean)).sum(axis=0) / max(len(values) - 1, 1)
@@ -95,7 +108,7 @@ def _mean(values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def analyse(part: Part) -> BlankResult:
-    """Find what light there is after lamp-off where nothing glows.
+    """Measure the light after lamp-off where nothing glows.
 
     Raises
     ------
@@ -140,7 +153,7 @@ def analyse(part: Part) -> BlankResult:
 
 
 def _rows_worth_keeping(found: StrayLight) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
-    """Up to the first clean frame, its time not twice."""
+    """Return the rows up to the first clean frame, each time once."""
     last = len(found.t_s)
     if found.first_clean_s is not None:
         last = int(np.searchsorted(found.start_s, found.first_clean_s)) + 1

@@ -14,7 +14,7 @@ from labrig.results import add_flag
 
 
 def camera_identity(run: RunRecord) -> str:
-    """How the camera introduced itself in a run; empty if the journal does not say."""
+    """Return the camera's identification in the journal of a run; empty if there is none."""
     for attempt in run.attempts:
         if identity := dict(attempt.start.get("devices", {})).get("camera"):
             return str(identity)
@@ -22,19 +22,19 @@ def camera_identity(run: RunRecord) -> str:
 
 
 def lens_of(frames: Sequence[FrameRecord]) -> str | None:
-    """What the first frame says of the lens: its name and focal length; None: nothing."""
+    """Return name and focal length of the lens by the first frame's EXIF; None if absent."""
     return read_exif(frames[0].path.read_bytes()).lens if frames else None
 
 
 def require_calibrated_camera(
     camera: CameraFile | None, run: RunRecord, frames: Sequence[FrameRecord]
 ) -> None:
-    """Refuse a calibration that is not of these frames; nothing is done where there is none.
+    """Refuse a calibration that is not of these frames; do nothing without a calibration.
 
     Raises
     ------
     DataError
-        It is of another body, lens or aperture.
+        The calibration is of another body, lens or aperture.
     """
     if camera is None or not frames:
         return
@@ -43,7 +43,7 @@ def require_calibrated_camera(
         camera.require_match(camera_identity(run), lens, f_number)
 
 
-#: Damaged frames named in a message.
+#: Most damaged frames that a message names.
 MOST_NAMED = 4
 
 
@@ -53,13 +53,13 @@ def require_intact(run: RunRecord, roles: Sequence[str], overrides: Overrides) -
     Raises
     ------
     DataError
-        Names them, and how to leave them out.
+        Frames are damaged; the message names them and how to leave them out.
     """
     require(run, damaged_frames(run, roles), overrides)
 
 
 def damaged_frames(run: RunRecord, roles: Sequence[str]) -> dict[FrameRecord, str]:
-    """Frames of completed units that are not what their checksums say, and what is wrong."""
+    """Return frames of completed units that do not match their checksums, and their damage."""
     frames = [
         frame
         for attempt in run.completed().values()
@@ -70,12 +70,12 @@ def damaged_frames(run: RunRecord, roles: Sequence[str]) -> dict[FrameRecord, st
 
 
 def require(run: RunRecord, damaged: Mapping[FrameRecord, str], overrides: Overrides) -> None:
-    """Refuse those of the damaged frames that a person has not excluded.
+    """Refuse damaged frames that the user has not excluded.
 
     Raises
     ------
     DataError
-        As `require_intact`.
+        Frames are damaged; the message names them and how to leave them out.
     """
     refused = {f: damage for f, damage in damaged.items() if not overrides.excludes(f)}
     if refused:
@@ -83,7 +83,7 @@ def require(run: RunRecord, damaged: Mapping[FrameRecord, str], overrides: Overr
 
 
 def _told(damaged: Mapping[FrameRecord, str]) -> str:
-    """In one line, with what to do."""
+    """Return a line that names damaged frames and the remedy."""
     named = list(damaged.items())[:MOST_NAMED]
     more = f" and {len(damaged) - len(named)} more are damaged" if len(damaged) > len(named) else ""
     leave_out = " ".join(f"--exclude {frame.path.name}" for frame, _ in named)
@@ -94,7 +94,7 @@ def _told(damaged: Mapping[FrameRecord, str]) -> str:
 
 
 def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
-    """Frames of completed units with one of the roles, those a person excludes left out.
+    """Return frames of completed units with one of the roles, without those the user excludes.
 
     Raises
     ------
@@ -111,12 +111,12 @@ def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
 
 
 def part_region(part: Part, region: Region) -> Region:
-    """The protocol's one `region`, or the one that a person wants instead.
+    """Return the protocol's only `region`, or the user's region instead.
 
     Raises
     ------
     UsageError
-        A region of another name is asked for.
+        The user names a region.
     """
     if named := [name for name in part.overrides.regions if name]:
         raise UsageError(
@@ -126,22 +126,24 @@ def part_region(part: Part, region: Region) -> Region:
     return part.overrides.regions.get("", region)
 
 
-#: Of a frame that begins while something else than the glow still fades.
+#: Flag of a frame that begins before the bench is dark.
 AFTERGLOW = "afterglow"
 
 
 @dataclass(frozen=True)
 class IntactFrames:
-    """Frames of completed units, those left out that are missing or were changed.
+    """Frames of completed units, without those that are missing or were changed.
 
     Attributes
     ----------
-    decay, dark
-        To be reduced; excluded decay frames are flagged, excluded dark ones left out.
+    decay
+        Frames of the glow; excluded ones are flagged.
+    dark
+        Dark frames without the excluded ones.
     daylight
-        To be shown.
+        Frames for the report only.
     warnings
-        About frames that cannot be shown.
+        Warnings about frames that cannot be shown.
     """
 
     decay: list[SeriesFrame]
@@ -153,10 +155,10 @@ class IntactFrames:
 def without_stray_light(
     frames: IntactFrames, blank: BlankFile | None
 ) -> tuple[IntactFrames, tuple[str, ...]]:
-    """Frames that begin too early flagged, so that nothing is made of them; and what to say of it.
+    """Flag frames that begin before the blank is clean, and return the warnings about them.
 
-    How much of the lamp's afterglow a sample throws back is not what the blank does: it cannot be
-    subtracted.
+    Stray light cannot be subtracted: the sample reflects another part of the lamp's afterglow than
+    the blank does.
 
     Raises
     ------
@@ -174,7 +176,14 @@ def without_stray_light(
 
 
 def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
-    """What to say of frames that begin so long after lamp-off, where the bench is still bright.
+    """Return warnings about frames that begin before the blank is clean.
+
+    Parameters
+    ----------
+    t_s
+        Begins of the frames in seconds after lamp-off.
+    blank
+        Stray light of the bench.
 
     Raises
     ------
@@ -196,12 +205,12 @@ def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
     )
 
 
-#: As many tell; reading more takes time.
+#: Most dark frames in which hot pixels are searched; reading more takes time.
 ENOUGH = 5
 
 
 def hot_pixels_of(darks: Sequence[SeriesFrame]) -> PixelMask | None:
-    """Pixels that are bright in the dark; None where there are too few frames to tell."""
+    """Find pixels that are bright in the dark; None if there are too few frames."""
     longest_s = max((dark.exposure_s for dark in darks), default=0.0)
     longest = [dark for dark in darks if dark.exposure_s == longest_s]
     if len(longest) < 2:
@@ -209,19 +218,23 @@ def hot_pixels_of(darks: Sequence[SeriesFrame]) -> PixelMask | None:
     return hot_pixels([read_raw(dark.path) for dark in longest[:ENOUGH]])
 
 
-#: A frame later than this after its planned time is worth a warning; its measured time is used.
+#: Delay in seconds after the planned time from which a warning is given; the measured time counts.
 LATE_S = 0.05
 
 
 def intact_frames(
     run: RunRecord, overrides: Overrides, role: str = FrameRole.DECAY
 ) -> IntactFrames:
-    """Every frame held against its checksum; those after lamp off timed from it.
+    """Check every frame against its checksum, and time those after lamp-off from it.
 
     Parameters
     ----------
+    run
+        A recorded run.
+    overrides
+        The user's choices.
     role
-        Of the frames of the glow.
+        Role of the frames of the glow.
 
     Raises
     ------
@@ -257,7 +270,7 @@ def intact_frames(
 
 
 def steady_frames(run: RunRecord, overrides: Overrides, role: str) -> list[SeriesFrame]:
-    """Frames of that role under a steady light, each held against its checksum.
+    """Return frames of a role under steady light, each checked against its checksum.
 
     Raises
     ------
@@ -273,7 +286,7 @@ def steady_frames(run: RunRecord, overrides: Overrides, role: str) -> list[Serie
 
 
 def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[str]:
-    """What is odd about the times in the journal."""
+    """Return warnings about irregular times in the journal."""
     warnings = []
     if run.torn:
         warnings.append(
@@ -293,29 +306,29 @@ def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[str]:
 def _damaged(
     run: RunRecord, overrides: Overrides, measured: tuple[str, ...]
 ) -> dict[FrameRecord, str]:
-    """What is wrong with frames, those that are `measured` only if they are excluded."""
+    """Return damaged frames and their damage; frames of `measured` roles must be excluded."""
     damaged = damaged_frames(run, (*measured, FrameRole.DAYLIGHT))
     require(run, {f: damage for f, damage in damaged.items() if f.role in measured}, overrides)
     return damaged
 
 
 def untimed(frame: FrameRecord) -> SeriesFrame:
-    """A frame whose time does not matter."""
+    """Return a frame whose time is not used."""
     return SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
 
 
 def timed(frame: FrameRecord, zero_time: float) -> SeriesFrame:
-    """A frame that begins so long after `zero_time`, in seconds since 1970."""
+    """Return a frame timed from `zero_time`, in seconds since 1970."""
     return replace(untimed(frame), t_s=frame.start_time - zero_time)
 
 
 def switched_time(attempt: Attempt, frame: FrameRecord, state: str) -> float:
-    """When the lamp went `on` or `off` for the last time before a frame.
+    """Return the time of the lamp's last switch to `on` or `off` before a frame.
 
     Raises
     ------
     DataError
-        The journal does not say.
+        The journal has no such switch.
     """
     switches = [
         action.middle_time
@@ -331,7 +344,7 @@ def switched_time(attempt: Attempt, frame: FrameRecord, state: str) -> float:
 
 
 def _flagged(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> SeriesFrame:
-    """Timed from lamp-off."""
+    """Return a frame timed from lamp-off, with its flags."""
     flag = "late" if frame.late_s > LATE_S else ""
     flag = add_flag(flag, "excluded") if overrides.excludes(frame) else flag
     return replace(timed(frame, switched_time(attempt, frame, "off")), flag=flag)

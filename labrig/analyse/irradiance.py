@@ -1,4 +1,4 @@
-"""Irradiance of the lamp on the sample, by itself and through the LVF, from pictures of a card."""
+"""Irradiance of the lamp on the sample, directly and through the LVF, from frames of a card."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -25,24 +25,24 @@ from labrig.protocols.irradiance import CardFrames
 from labrig.reduce import FLICKER, slice_values
 from labrig.results import CardRatio, FloatArray, IrradianceResult, SliceValues, StripScale
 
-#: Change of the lamp between rounds that is worth a warning.
+#: Relative change of the lamp between rounds that causes a warning.
 DRIFT = 0.03
-#: Along a strip, what it lets through in all runs as a parabola, in logarithms, but for this,
+#: Standard deviation of ln transmittance along a strip from a parabola,
 UNEVEN = 0.04
-#: over such a distance.
+#: and its correlation length in nm.
 UNEVEN_OVER_NM = 60.0
-#: What is known of the parabola beforehand: bend and slope from the middle to the ends, height.
+#: Prior σ of the parabola: bend and slope from the middle to the ends, height.
 PARABOLA = (0.2, 0.3, 10.0)
-#: What every position scatters by on its own, besides what is known of it: strips are not smooth.
+#: Relative scatter of every position beyond its σ: strips are not smooth.
 ROUGH = 0.02
-#: Factors have logarithms; no light at all is so much.
+#: Least factor, for its logarithm.
 LEAST = 1e-6
-#: Steps of derivatives by a band's figures, in their σ.
+#: Step of derivatives by a band's parameters, in their σ.
 _STEP = 0.5
 
 
 def analyse(part: Part) -> IrradianceResult:
-    """Find E of every band, of the lamp by itself and behind every place of the filter.
+    """Measure the irradiance in bands, by the lamp itself and behind every place of the filter.
 
     Raises
     ------
@@ -85,7 +85,13 @@ def _card_ratio(part: Part, frames: StripFrames, strip: Strip) -> CardRatio:
 
 
 def mean_ratio(pairs: Sequence[tuple[SliceValues, SliceValues]]) -> CardRatio:
-    """Of the rounds, each a picture of the card by itself and one through the LVF."""
+    """Average the ratios of the rounds.
+
+    Parameters
+    ----------
+    pairs
+        Slice values of each round, of the card by itself and through the LVF.
+    """
     ratios = np.stack([through.value / direct.value for direct, through in pairs])
     relative = [
         np.hypot(through.sigma / direct.value, ratio * direct.sigma / direct.value)
@@ -132,7 +138,10 @@ def _file(
 
 
 def _direct_sigma(lamp: Spectrum, edges: FloatArray, norm: float) -> FloatArray:
-    """By what the lamp's file says; errors of neighbouring wavelengths taken to go together."""
+    """Return σ of the direct irradiance by the lamp's file.
+
+    Errors of neighbouring wavelengths count as fully correlated.
+    """
     if lamp.sigma is None:
         return np.zeros(len(edges) - 1)
     return norm * band_integrals(lamp.wavelength_nm, lamp.sigma, edges)
@@ -154,27 +163,27 @@ def strip_scale(
     camera: CameraResponse,
     curve_error: CurveError = CurveError(),  # noqa: B008 (frozen)
 ) -> StripScale:
-    """One factor for each position, such that lamp × LVF explains what the card shows.
+    """Fit one factor for each position, such that lamp × LVF × factor explains the card's ratios.
 
-    The camera's curves say how bright a narrow band looks against the whole lamp, and are wrong by
-    some per cent, more in the violet. What a strip lets through runs smoothly along it; both are
-    weighed by their covariances.
+    The camera's curves determine how bright a narrow band appears relative to the whole lamp, with
+    errors of some per cent, more in the violet. The transmittance of a strip varies smoothly along
+    it. Both are weighted by their covariances.
 
     Parameters
     ----------
     ratio
-        What the card shows at p positions; of it only what positions do not share.
+        Ratios of the card at p positions; only their independent uncertainty is used.
     lvf
         The filter at these positions.
     lamp, card
-        The lamp's spectrum and the card's reflectance.
+        Spectrum of the lamp and reflectance of the card.
     camera, curve_error
-        The camera's curves, and by how much they may be wrong.
+        Curves of the camera and their error model.
 
     Raises
     ------
     DataError
-        A position at which no colour was measured.
+        No colour was measured at some position.
     """
     low, high = float(camera.wavelength_nm[0]), float(camera.wavelength_nm[-1])
     nodes, weights = quadrature(
@@ -208,9 +217,10 @@ def strip_scale(
 def _weights(
     seen: FloatArray, expected: FloatArray, unsure: FloatArray, of_curves: FloatArray
 ) -> FloatArray:
-    """(channels,) by which what was seen of a position adds up to its factor.
+    """Return the generalised-least-squares weights of a position's ratios, shape (channels,).
 
-    By generalised least squares: noise, and curves that are wrong by so much (modes, channels).
+    The weighted sum of the ratios is the position's factor. The covariance is that of noise
+    `unsure` (channels,) and of the curves' modes (modes, channels).
     """
     start = max(float(seen @ expected / (expected @ expected)), LEAST)
     covariance = np.diag(unsure**2) + start**2 * of_curves.T @ of_curves
@@ -220,9 +230,10 @@ def _weights(
 
 
 def _by_figures(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatArray:
-    """(figures, p, q) light let through, by one σ of a band's place, width and shape at its area.
+    """Return the change of the transmitted light by one σ of each band parameter, (figures, p, q).
 
-    What is let through in all is measured here; how it is spread is as the calibration says.
+    Centre, width and shape of a band change at its area: the total transmittance is measured here,
+    its distribution is that of the calibration.
     """
     if lvf.sigma is None:
         return np.zeros((1, len(lvf.position), len(nodes)))
@@ -237,7 +248,7 @@ def _by_figures(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatArray:
 
 
 def _smoothed(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> StripScale:
-    """Weigh logarithms of light through every place against a smooth course of them."""
+    """Combine the logarithms of the factors with a smooth prior along the strip."""
     centre = lvf.bands.centre_nm
     area = np.log(lvf.bands.peak * lvf.bands.fwhm_nm)
     apart = (centre[:, np.newaxis] - centre) / UNEVEN_OVER_NM
@@ -256,7 +267,7 @@ def _smoothed(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> StripScale
 
 
 def in_bands(lvf: Lvf, lamp: Spectrum, edges_nm: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """∫ L T_p dλ over bands, (p, bands), and one σ by what is not known of the filter's bands.
+    """Return ∫ L T_p dλ over bands and its σ by the parameters of the filter, (p, bands) each.
 
     The height of a band is left out: `strip_scale` measures it.
     """

@@ -1,4 +1,4 @@
-"""From the frames of an isotropy run to the glow at several angles over the glow seen straight."""
+"""Analysis of an isotropy run, from its frames to the glow at several angles."""
 
 from collections.abc import Iterator, Mapping
 
@@ -29,7 +29,7 @@ BEFORE, AFTER = "angle-before", "angle-after"
 
 
 def analyse(part: Part) -> IsotropyResult:
-    """Find the radiance at each angle, 1 if the emission is isotropic.
+    """Measure the radiance at each angle relative to the straight view.
 
     Raises
     ------
@@ -98,7 +98,7 @@ def _angular_glow(
 
 
 def _log_ratio(view: Series, straight: Series, flicker: float) -> tuple[float, float]:
-    """Log of how bright a view is over the straight one at the same times, and its σ."""
+    """Return the logarithm of a view over the straight one at the same times, and its σ."""
     best = int(np.argmax(np.mean(straight.values / straight.sigma, axis=0)))
     y, s = _usable(view, best)
     reference, of_reference = _usable(straight, best)
@@ -118,7 +118,7 @@ def _log_ratio(view: Series, straight: Series, flicker: float) -> tuple[float, f
 
 
 def _usable(series: Series, channel: int) -> tuple[FloatArray, FloatArray]:
-    """Values of a channel, and σ."""
+    """Return the usable values of a channel, and their σ."""
     return series.values[series.usable, channel], series.sigma[series.usable, channel]
 
 
@@ -127,8 +127,10 @@ def _middle_s(series: Series) -> FloatArray:
 
 
 def _log_at(wanted_s: FloatArray, t_s: FloatArray, log_value: FloatArray) -> FloatArray:
-    """A decay's logarithm at some times: a straight line over log t through the points, as a
-    power law is and an exponential nearly, over so short a time.
+    """Interpolate the logarithm of a decay to some times, in the same unit.
+
+    Beyond the points it is a straight line over log t, as a power law is exactly and an exponential
+    approximately over so short a time.
     """
     slope, start = np.polyfit(np.log(t_s), log_value, 1)
     within = np.interp(wanted_s, t_s, log_value)

@@ -1,4 +1,4 @@
-"""A chain of protocols, from its frames to the results of its parts and the materials they make."""
+"""Analysis of a chain of protocols, to the results of its parts and the materials from them."""
 
 from labrig import plugins
 from labrig.analyse.part import Part
@@ -7,14 +7,14 @@ from labrig.results import PhosphorResult, RunResult
 
 
 def analyse(part: Part) -> PhosphorResult:
-    """Analyse every part; each may use what earlier ones found.
+    """Analyse every part of a chain; each may use the results of earlier ones.
 
     A part that cannot be analysed is a warning, as long as another one can.
 
     Raises
     ------
     DataError, FitError
-        No part can.
+        No part can be analysed.
     """
     parts: dict[str, RunResult] = {}
     failures: dict[str, DataError | FitError] = {}

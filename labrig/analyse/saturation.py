@@ -1,13 +1,13 @@
-"""A saturation run, from its frames to its result.
+"""Analysis of a saturation run, from its frames to its result.
 
-How far a state is charged follows from how much less it glows after a weaker light. Under a
+The level of charge of a state follows from how much less it glows after a weaker light. Under a
 constant light r(t) = κ/s (1 − e^(−s t)), s = κ + k. A light weaker by the factor q gives q κ: where
 r is small the glow falls by q, where it is near 1 hardly at all. Amplitudes are only compared, so
-that neither Λ nor the camera's scale matter.
+that neither Λ nor the camera's scale enters.
 
-Decays after several charges have rates in common or rates of their own. All are one channel wide
-here: the channels of a frame, weighed as the fit of the brightest decay has them, say the same with
-less noise. Amplitudes are linear, so only the rates are searched for (variable projection).
+Decays after several charges have shared rates or individual ones. All are one channel wide here:
+the channels of a frame are combined with the weights of the brightest decay's fit, which lowers the
+noise. Amplitudes are linear, so only the rates are searched for (variable projection).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -44,14 +44,14 @@ from labrig.results import (
 )
 from labrig.written_numbers import plus_minus
 
-#: Lights searched, in multiples of the rate of re-radiation: r∞ of 1e-4 to 0.9999.
+#: Range of lights κ in multiples of the rate of re-radiation: r∞ of 1e-4 to 0.9999.
 FAINTEST, STRONGEST = 1e-4, 1e4
 #: Relative step of the derivatives.
 STEP = 1e-3
 
 
 def charged(kappa_per_s: float, k_per_s: float, charge_s: float) -> float:
-    """The level r after a charge from the dark (physics: exact for constant light)."""
+    """Return the level r after a charge from the dark under constant light (exact)."""
     s = kappa_per_s + k_per_s
     return float(kappa_per_s / s * -np.expm1(-s * charge_s))
 
@@ -64,16 +64,18 @@ def charge_level(
     k_per_s: float,
     charges_s: tuple[float, float],
 ) -> ChargeLevel:
-    """The level under the full light.
+    """Return the level of a state under the full light.
 
     Parameters
     ----------
     ratio, ratio_sigma
-        Amplitude after the weaker light over that after the full one.
+        Amplitude after the weaker light over that after the full one, and its standard uncertainty.
     fraction, fraction_sigma
-        What is left of the light, q; its σ relative.
+        Weaker light over the full one, q, and its relative standard uncertainty.
+    k_per_s
+        Rate of the state in 1/s.
     charges_s
-        Under the weaker and under the full light.
+        Duration of the charges under the weaker and under the full light in seconds.
     """
     r = _level(ratio, fraction, k_per_s, charges_s)
     by_ratio = (_level(ratio * (1 + STEP), fraction, k_per_s, charges_s) - r) / STEP
@@ -99,7 +101,7 @@ def _level(ratio: float, fraction: float, k_per_s: float, charges_s: tuple[float
 
 
 def curve(series: Series, fit: FittedDecay) -> Curve:
-    """A series with its channels weighed as in `fit`, flicker in its σ."""
+    """Combine the channels of a series with the weights of `fit`, flicker in its σ."""
     rows = series.usable
     weights = np.array(fit.channel_weights)
     y, s = series.values[rows], series.sigma[rows]
@@ -112,7 +114,7 @@ def curve(series: Series, fit: FittedDecay) -> Curve:
 
 
 def flicker_dof(fit: FittedDecay) -> float:
-    """Degrees of freedom from which a fit estimated its flicker; infinite if it was given."""
+    """Return the degrees of freedom from which a fit estimated its flicker; infinite if given."""
     if not fit.flicker_sigma > 0:
         return np.inf
     return max(0.5 * (fit.flicker / fit.flicker_sigma) ** 2, 1.0)
@@ -121,19 +123,21 @@ def flicker_dof(fit: FittedDecay) -> float:
 def compare_rates(
     curves: Sequence[Curve], start_per_s: Sequence[float], noise_dof: float = np.inf
 ) -> RatesTest:
-    """Fit all decays with shared rates, then each with its own, as many states each.
+    """Fit all decays with shared rates, then each with its own, with the same number of states.
 
     Parameters
     ----------
+    curves
+        The decays.
     start_per_s
-        Rates to start from; their number is that of the states.
+        Initial rates in 1/s, one for each state.
     noise_dof
         Degrees of freedom from which the curves' σ was estimated; infinite if it is known.
 
     Raises
     ------
     FitError
-        Too few frames, or some decay that has none of these states.
+        There are too few frames, or some decay lacks these states.
     """
     start = np.log(np.asarray(start_per_s, dtype=np.float64))
     states = len(start)
@@ -149,7 +153,7 @@ def compare_rates(
     amplitudes = [_amplitudes(one, np.exp(shared)) for one in curves]
     added = states * (len(curves) - 1)
     gain = max(shared_chi2 - own_chi2, 0.0) / added
-    # σ may be a little too large, never too small by less scatter than it says.
+    # A smaller scatter than σ does not lower it: σ may be a little too large, never too small.
     scatter = max(own_chi2 / dof, 1.0)
     falling = np.argsort(-shared)
     return RatesTest(
@@ -168,7 +172,7 @@ def compare_rates(
 
 
 def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float, FloatArray]:
-    """Log rates (s,), χ² and σ of the log rates."""
+    """Return the logarithms of the rates (s,), χ² and the σ of these logarithms."""
 
     def residuals(log_rates: FloatArray) -> tuple[FloatArray, FloatArray]:
         rest, slopes = zip(*(_misfit(one, np.exp(log_rates)) for one in curves), strict=True)
@@ -179,9 +183,10 @@ def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float,
 
 
 def _misfit(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n + 1,) model − value of the best amplitudes, whitened; (n + 1, s) its slopes by log rates.
+    """Return model − value with the best amplitudes, whitened, and its slopes by the log rates.
 
-    The slopes are Kaufman's (BIT 15, 1975): what other amplitudes explain as well is taken off.
+    The shapes are (n + 1,) and (n + 1, s). The slopes are Kaufman's (BIT 15, 1975), without the
+    part that other amplitudes explain.
     """
     means, by_log_rate = exponential_means_and_slopes(rates_per_s, one.t_s, one.exposure_s)
     design, target = _design(one, means), _target(one)
@@ -200,7 +205,7 @@ def _amplitudes(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatA
 
 
 def _design(one: Curve, shapes: FloatArray) -> FloatArray:
-    """(n + 1, s + 1) of shapes (n, s), whitened; its last row the offset's prior."""
+    """Return the whitened design (n + 1, s + 1) of shapes (n, s), with the offset's prior last."""
     offset = np.full((len(one.t_s), 1), one.offset_sigma)
     rows = np.hstack([shapes, offset]) / one.sigma[:, np.newaxis]
     prior = np.zeros((1, rows.shape[1]))
@@ -209,17 +214,17 @@ def _design(one: Curve, shapes: FloatArray) -> FloatArray:
 
 
 def _target(one: Curve) -> FloatArray:
-    """(n + 1,) whitened."""
+    """Return the whitened values and the offset's prior, shape (n + 1,)."""
     return np.append(one.value / one.sigma, 0.0)
 
 
 def analyse(part: Part) -> SaturationResult:
-    """Compare plateaus, levels where there were two lights, and rates shared and not.
+    """Compare plateaus, levels of charge under two lights, and shared with individual rates.
 
     Raises
     ------
     DataError
-        Fewer than two decays under the full light, or frames are damaged.
+        There are fewer than two decays under the full light, or frames are damaged.
     FitError
         The decays do not allow a fit.
     """
@@ -246,7 +251,7 @@ def analyse(part: Part) -> SaturationResult:
 
 
 def _charges_s(run: RunRecord) -> dict[str, float]:
-    """How long the lamp really shone before the decay of each unit."""
+    """Return the measured duration of the charge before the decay of each unit in seconds."""
     units = [
         unit
         for unit, attempt in run.completed().items()
@@ -284,7 +289,7 @@ def _patch(series: Series, lasted_s: Mapping[str, float], part: Part) -> PatchSa
 def _levels(
     rates: RatesTest, charge_s: FloatArray, dim: int, bright: int, weaker: WeakerLight
 ) -> Iterator[ChargeLevel]:
-    """Of every state, by the decays after the longest charges under the weaker and full light."""
+    """Iterate over the level of every state, after the longest charges under both lights."""
     for state, k_per_s in enumerate(rates.shared_per_s):
         a, b = rates.amplitude[[dim, bright], state]
         of_a, of_b = rates.amplitude_sigma[[dim, bright], state]
@@ -300,7 +305,7 @@ def _levels(
 
 
 def _growths(before: Curve, last: Curve) -> Iterator[Measured]:
-    """Of the glow from one decay to the next, as a fraction, at the begin and the end of both."""
+    """Iterate over the relative growth of the glow between two decays, at their begin and end."""
     count = min(len(before.value), len(last.value))
     ratio = last.value[:count] / before.value[:count]
     sigma = np.abs(ratio) * np.hypot(

@@ -1,4 +1,4 @@
-"""From a series to its decay fit: what a run's processing and `labrig fit decay` have in common."""
+"""The fit of one series: common to a run's processing and `labrig fit decay`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,12 +12,12 @@ from labrig.fit import DecayFit, fit_decay
 from labrig.quantity import FRACTION, parse
 from labrig.results import Series, joined, read_series
 
-#: Counts below which a Poisson weight would trust a point too much.
+#: Least counts in a Poisson weight, since fewer would weigh a point too much.
 LEAST_COUNTS = 5.0
-#: Fewer frames do not tell their flicker; shutters and apertures scatter by 0.5-1 %.
+#: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
 TYPICAL_FLICKER = 0.007
-#: A decay whose every amplitude is less certain than this was not seen.
+#: Significance in σ of some amplitude from which a decay is detected.
 SEEN_SIGMA = 3.0
 
 
@@ -172,7 +172,7 @@ def fit_table(
 
 
 def _by_region(parts: Sequence[Series]) -> list[Series]:
-    """Repeats of a decay joined: they share rates and amplitudes."""
+    """Join the repeats of each region's decay: they share rates and amplitudes."""
     regions: dict[str, list[Series]] = {}
     for part in parts:
         regions.setdefault(part.region, []).append(part)

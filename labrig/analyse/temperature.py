@@ -1,4 +1,4 @@
-"""What a run's temperature says of its rates."""
+"""Effect of a run's temperature on its rates."""
 
 from collections.abc import Collection
 from itertools import groupby
@@ -17,7 +17,7 @@ from labrig.record import (
     written_time,
 )
 
-#: From here on it is said: rates then change by 4 %, more than their usual σ.
+#: Change in K from which a warning is given: rates then change by 4 %, more than their usual σ.
 MOVED_K = 0.5
 CHECK_IT = "check it before the next run (labrig rig check)"
 
@@ -69,7 +69,7 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
 
 
 def at_temperature(material: Material, run: RunRecord, roles: Collection[str]) -> Material:
-    """`material` with the temperature of such frames in its provenance, where it is known."""
+    """Return `material` with the mean temperature of such frames in its provenance, if known."""
     mean = glow_temperature_c(run, roles)
     if mean is None or material.provenance is None:
         return material

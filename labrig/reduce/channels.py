@@ -16,11 +16,11 @@ from labrig.region import Region, region_pixels
 
 Indices: TypeAlias = npt.NDArray[np.intp]
 
-#: Standard deviations by which an outlier exceeds the median of its neighbours …
+#: Standard deviations by which an outlier exceeds the median of its neighbours.
 OUTLIER_SIGMAS = 8.0
-#: … and the greatest of them, so that an edge of the sample is none.
+#: Standard deviations by which it exceeds all neighbours, which excludes edges of the sample.
 _ABOVE_ALL_SIGMAS = 4.0
-#: Where the nearest pixels of the same CFA position are, in repeats of the CFA.
+#: Offsets of the nearest pixels of the same CFA position, in periods of the CFA.
 _NEIGHBOURS = [(y, x) for y in (-1, 0, 1) for x in (-1, 0, 1) if (y, x) != (0, 0)]
 
 
@@ -30,18 +30,23 @@ def isolated_outliers(
     side: int,
     noises: Mapping[tuple[int, int], PlaneNoise],
 ) -> tuple[Indices, Indices]:
-    """Rows and columns, on the sensor, of the outliers in `window`.
+    """Find isolated pixels in a window that are far brighter than their neighbours.
 
     Parameters
     ----------
     window
-        Part of a mosaic, at least three repeats of the CFA wide and high.
+        Part of a mosaic in DN, at least three repeats of the CFA wide and high.
     corner
-        Row and column of its first pixel on the sensor.
+        Row and column of the window's first pixel on the sensor.
     side
-        Pixels after which the CFA repeats: 2 of a Bayer sensor.
+        Period of the CFA in pixels: 2 of a Bayer sensor.
     noises
         Noise of each CFA position by row and column within the repeat.
+
+    Returns
+    -------
+    tuple of ndarray
+        Rows and columns of the outliers on the sensor.
     """
     import cv2  # SIMD over the whole mosaic: 20 ms for 21 megapixels
 
@@ -79,7 +84,7 @@ def _deviation(
     side: int,
     noises: Mapping[tuple[int, int], PlaneNoise],
 ) -> Floats:
-    """Standard deviation of the noise at `level` in the pixels (y, x) of the sensor."""
+    """Return the noise σ in DN of the pixels (y, x) of the sensor at `level`."""
     variance = np.zeros(len(level))
     for (row, column), noise in noises.items():
         here = (y % side == row) & (x % side == column)
@@ -88,7 +93,10 @@ def _deviation(
 
 
 def _median_of_neighbours(window: Mosaic, y: Indices, x: Indices, side: int) -> Floats:
-    """Median of the eight same-position neighbours; beyond a border, of the opposite ones."""
+    """Return the median of the eight neighbours of the same CFA position.
+
+    Beyond a border of the window the opposite neighbour takes the place of the missing one.
+    """
     values = np.empty((len(_NEIGHBOURS), len(y)))
     for values_there, repeats in zip(values, _NEIGHBOURS, strict=True):
         down, right = (number * side for number in repeats)
@@ -101,13 +109,29 @@ def _median_of_neighbours(window: Mosaic, y: Indices, x: Indices, side: int) -> 
 
 PixelMask: TypeAlias = npt.NDArray[np.bool_]
 
-#: Noise of a smaller region is told from its surroundings of so many pixels of each position.
+#: Side of the surroundings, in pixels of each position, from which noise is estimated.
 _LEAST_WINDOW = 2 * TILE
 
 
 @dataclass(frozen=True, eq=False)
 class PlaneCount:
-    """Pixels of one position of the CFA: how many (`count`) have which `value` (DN above black)."""
+    """Histogram of the pixels of one CFA position in a region.
+
+    Attributes
+    ----------
+    colour
+        Channel of the position.
+    value
+        Levels that occur, in DN above black, rising, shape (k,).
+    count
+        Number of pixels at each level, shape (k,).
+    saturated
+        Number of pixels at white or above.
+    hot
+        Number of isolated outliers.
+    noise
+        Temporal noise of the pixels.
+    """
 
     colour: str
     value: Floats
@@ -120,7 +144,22 @@ class PlaneCount:
 def count_planes(
     raw: RawFrame, areas: Sequence[tuple[int, int, int, int]], hot: PixelMask | None
 ) -> list[list[PlaneCount]]:
-    """Every position of the CFA of `raw` in each of `areas` (x, y, width, height) but `hot`."""
+    """Count the pixels of every CFA position in each area, without the hot ones.
+
+    Parameters
+    ----------
+    raw
+        The RAW frame.
+    areas
+        Areas as x, y, width and height in pixels.
+    hot
+        Hot pixels to leave out, shape (height, width); None leaves out none.
+
+    Returns
+    -------
+    list of list of PlaneCount
+        Counts of each area, for each CFA position row by row.
+    """
     windows = [_Window.about(area, raw) for area in areas]
     planes = [plane for window in windows for plane in window.planes()]
     noises = plane_noise(planes)
@@ -133,7 +172,17 @@ def count_planes(
 
 @dataclass(frozen=True, eq=False)
 class _Window:
-    """The surroundings of a region from which its noise is told; `top`, `left` on the sensor."""
+    """Surroundings of a region, from which its noise is estimated.
+
+    Attributes
+    ----------
+    pixels
+        Part of the mosaic in DN.
+    top, left
+        Row and column of its first pixel on the sensor.
+    cfa_side
+        Period of the CFA in pixels.
+    """
 
     pixels: Mosaic
     top: int
@@ -142,14 +191,14 @@ class _Window:
 
     @classmethod
     def about(cls, area: tuple[int, int, int, int], raw: RawFrame) -> "_Window":
-        """The window of a region of `raw`."""
+        """Cut out the surroundings of an area of `raw`."""
         x, y, width, height = area
         left, wide = _grown(x, width, raw.width, raw.cfa_side)
         top, high = _grown(y, height, raw.height, raw.cfa_side)
         return cls(raw.mosaic[top : top + high, left : left + wide], top, left, raw.cfa_side)
 
     def planes(self) -> Iterator[Mosaic]:
-        """Its pixels of every position of the CFA, row by row of the CFA."""
+        """Iterate over the pixels of every CFA position, row by row of the CFA."""
         side = self.cfa_side
         for row, column in np.ndindex(side, side):
             yield self.pixels[(row - self.top) % side :: side, (column - self.left) % side :: side]
@@ -162,7 +211,7 @@ def _counted(
     window: _Window,
     noises: Sequence[PlaneNoise],
 ) -> list[PlaneCount]:
-    """A region's planes; `noises` are those of its window."""
+    """Count the pixels of every CFA position in a region; `noises` are those of its window."""
     x, y, width, height = area
     side = raw.cfa_side
     by_place = dict(zip(np.ndindex(side, side), noises, strict=True))
@@ -196,36 +245,36 @@ def _counted(
 
 
 def _grown(start: int, length: int, limit: int, side: int) -> tuple[int, int]:
-    """A side of a region, grown about its middle to what noise needs, inside the frame."""
+    """Grow a side of a region about its middle to the length that noise needs, inside the frame."""
     grown = min(max(length, _LEAST_WINDOW * side), limit)
     return min(max(start - (grown - length) // 2, 0), limit - grown), grown
 
 
-#: The quantile that says how close to clipping a channel is: a few hot pixels do not reach it.
+#: Quantile that measures how close to clipping a channel is, insensitive to a few hot pixels.
 PEAK_QUANTILE = 0.995
 
 
 @dataclass(frozen=True)
 class ChannelStats:
-    """One colour channel in a region, in DN above black.
+    """Statistics of one colour channel in a region, in DN above black.
 
     Parameters
     ----------
     mean
         Mean of the pixels.
     sigma
-        Standard uncertainty of `mean` from photon and read noise in this frame: what a repeated
-        frame would scatter by. Flicker, dark level and the sensor's pattern are not in it.
+        Standard uncertainty of `mean` by photon and read noise of this frame: the scatter of
+        repeated frames. Flicker, dark level and fixed pattern are not in it.
     std
-        Standard deviation of the pixels, the sample's structure and shading included.
+        Standard deviation of the pixels, with the sample's structure and shading.
     peak
-        The 99.5 % quantile.
+        99.5 % quantile of the pixels.
     n
-        Pixels counted.
+        Number of pixels.
     saturated
-        Pixels at or above white.
+        Number of pixels at or above white.
     hot
-        Pixels that stand out from their neighbours by more than 8 standard deviations.
+        Number of pixels that exceed their neighbours by more than 8 standard deviations.
     """
 
     mean: float
@@ -244,7 +293,17 @@ class ChannelStats:
 
 @dataclass(frozen=True)
 class FrameMeasurement:
-    """The channels `R`, `G` (all greens) and `B`, or `L`; the rest is as in `RawFrame`."""
+    """Statistics of the channels of a region, and the settings of the frame.
+
+    Attributes
+    ----------
+    channels
+        Statistics of `R`, `G` (all greens) and `B`, or of `L`, in DN above black.
+    cfa, black, white, exposure_s, iso, f_number, make, model
+        Colour filter array, levels and settings as in `RawFrame`.
+    width, height
+        Size of the frame in pixels.
+    """
 
     channels: Mapping[str, ChannelStats]
     cfa: str
@@ -260,16 +319,16 @@ class FrameMeasurement:
 
     @property
     def clipped(self) -> bool:
-        """Whether any channel is."""
+        """Whether any channel is clipped."""
         return any(stats.clipped for stats in self.channels.values())
 
     @property
     def range_dn(self) -> float:
-        """From black to white."""
+        """Range from black to white in DN."""
         return self.white - max(self.black)
 
     def to_json(self) -> dict[str, Any]:
-        """What `labrig frame --json` prints."""
+        """Return the object that `labrig frame --json` prints."""
         return {
             "channels": {
                 name: {
@@ -295,7 +354,7 @@ class FrameMeasurement:
         }
 
     def __str__(self) -> str:
-        """A table for people; values in DN above black."""
+        """Return a table for people, values in DN above black."""
         make = self.make if self.make and self.make not in (self.model or "") else None
         body = " ".join(filter(None, (make, self.model))) or "unknown camera"
         taken = [
@@ -364,23 +423,28 @@ def measure(
 def measure_regions(
     raw: RawFrame, regions: Sequence[Region | None], hot: PixelMask | None = None
 ) -> list[FrameMeasurement]:
-    """Statistics of each channel of `raw` in each region.
+    """Measure each channel of a frame in each region.
 
     Parameters
     ----------
     raw
-        The frame.
+        The RAW frame.
     regions
-        Where; None is the whole frame.
+        Regions as (x, y, width, height) in fractions of the frame; None is the whole frame.
     hot
-        Shape (height, width): pixels to leave out, as `hot_pixels` finds them in dark frames.
+        Hot pixels to leave out, shape (height, width), as `hot_pixels` finds them in dark frames.
+
+    Returns
+    -------
+    list of FrameMeasurement
+        The statistics of each region.
 
     Raises
     ------
     UsageError
         A region leaves the frame.
     DataError
-        `hot` is of another sensor, or leaves no pixel of a channel.
+        The mask `hot` is of another sensor, or leaves no pixel of a channel.
     """
     if hot is not None and hot.shape != raw.mosaic.shape:
         raise DataError(
@@ -416,7 +480,7 @@ def _measured(raw: RawFrame, planes: Sequence[PlaneCount]) -> FrameMeasurement:
 
 
 def _channel(name: str, planes: list[PlaneCount]) -> ChannelStats:
-    """Statistics over all CFA positions of a colour."""
+    """Return the statistics over all CFA positions of a colour."""
     value = np.concatenate([plane.value for plane in planes])
     count = np.concatenate([plane.count for plane in planes])
     n = float(count.sum())

@@ -1,4 +1,4 @@
-"""What the sensor counts in the dark: its level over exposure time, and its hot pixels."""
+"""Signal of the sensor in the dark: its level over exposure time, and its hot pixels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from labrig.reduce.noise import Floats
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.saturation import histogram
 
-#: Exposures that differ by less than cameras round them by are one exposure.
+#: Relative difference within which two exposure times are the same, by the rounding of cameras.
 SAME_EXPOSURE = 0.02
-#: A pixel is hot if it stands out in this many frames: a cosmic ray does not strike twice.
+#: Frames in which a hot pixel is bright: a cosmic ray does not hit the same pixel twice.
 HOT_FRAMES = 2
 
 
@@ -24,12 +24,15 @@ class DarkModel:
 
     Parameters
     ----------
-    base, rate_per_s
-        b in DN and d in DN/s, each of shape (C,).
+    base
+        Offset b in DN, shape (C,).
+    rate_per_s
+        Dark current d in DN/s, shape (C,).
     covariance
-        Shape (C, 2, 2), of b and d.
+        Covariance of b and d, shape (C, 2, 2).
     only_exposure_s
-        Set if all dark frames had one exposure: the model holds there only (and d is 0).
+        Exposure time in seconds if all dark frames had the same: the model holds there only (and d
+        is 0); None if they had several.
     """
 
     base: Floats
@@ -38,12 +41,12 @@ class DarkModel:
     only_exposure_s: float | None
 
     def dark_level(self, exposure_s: float) -> tuple[Floats, Floats]:
-        """Level and its standard uncertainty in DN, each of shape (C,).
+        """Return the dark level and its standard uncertainty in DN, each of shape (C,).
 
         Raises
         ------
         DataError
-            All dark frames had another exposure.
+            All dark frames had another exposure time.
         """
         only = self.only_exposure_s
         if only is not None and not same_exposure(only, exposure_s):
@@ -55,8 +58,10 @@ class DarkModel:
         return self.base + self.rate_per_s * exposure_s, np.sqrt(at @ self.covariance @ at)
 
     def current(self, exposure_s: float) -> Floats:
-        """What dark current adds during an exposure, in DN, shape (C,); at most so much if all
-        dark frames had one exposure, which does not tell it from an error of the black level.
+        """Return the signal of the dark current during an exposure in DN, shape (C,).
+
+        It is an upper limit if all dark frames had one exposure time: they cannot separate it from
+        an error of the black level.
         """
         if self.only_exposure_s is not None:
             return self.base
@@ -125,7 +130,7 @@ def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
 
 
 def same_exposure(one_s: float, other_s: float) -> bool:
-    """Whether two exposures differ by no more than cameras round them by."""
+    """Return whether two exposure times agree within the rounding of cameras."""
     return abs(one_s - other_s) <= SAME_EXPOSURE * max(one_s, other_s)
 
 
@@ -177,7 +182,7 @@ def hot_pixels(darks: Sequence[RawFrame]) -> PixelMask:
 
 
 def _bright(dark: RawFrame) -> PixelMask:
-    """Pixels far above the median of their surroundings."""
+    """Mark the pixels far above the median of their surroundings."""
     import cv2  # its median filter is the fast one
 
     side = dark.cfa_side
@@ -195,7 +200,7 @@ def _bright(dark: RawFrame) -> PixelMask:
 
 
 def _median(counts: npt.NDArray[np.int64]) -> float:
-    """Of whole numbers that occur so many times: 0, 1, …"""
+    """Return the median of the whole numbers 0, 1, … that occur `counts` times."""
     up_to = np.cumsum(counts)
     middle = np.searchsorted(up_to, [(up_to[-1] + 1) // 2, up_to[-1] // 2 + 1])
     return float(middle.mean())

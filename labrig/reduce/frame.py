@@ -1,6 +1,6 @@
-"""A frame in linear numbers: light above black and dark, its variance, and what is saturated.
+"""A frame in linear numbers: signal above black and dark, its variance, and its saturated pixels.
 
-Pixels are worked out where and when they are asked for: of a region no more than the region.
+Pixels are computed on demand, those of a region without the rest of the frame.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,14 +26,18 @@ Area = tuple[int, int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class RegionSums:
-    """The pixels of each channel in a region, added up row by row of the sensor.
+    """Sums over the pixels of each channel in a region, row by row of the sensor.
 
     Attributes
     ----------
-    value_dn, variance_dn2
-        (rows, C) sums of the values and of their variances; hot pixels are left out.
-    pixels, saturated
-        (rows, C) how many there are, and how many of them are saturated.
+    value_dn
+        Sum of the values in DN without hot pixels, shape (rows, C).
+    variance_dn2
+        Sum of the variances in DN² without hot pixels, shape (rows, C).
+    pixels
+        Number of pixels without hot ones, shape (rows, C).
+    saturated
+        Number of those that are saturated, shape (rows, C).
     """
 
     value_dn: Floats
@@ -43,21 +47,21 @@ class RegionSums:
 
     @property
     def mean_dn(self) -> Floats:
-        """(C,) mean over the pixels; NaN without any."""
+        """Mean over the pixels in DN, shape (C,); NaN without any pixel."""
         return self._over_pixels(self.value_dn.sum(axis=0))
 
     @property
     def sigma_dn(self) -> Floats:
-        """(C,) σ of the mean by the noise of the pixels; NaN where that is not known."""
+        """Standard uncertainty of the mean by pixel noise in DN, shape (C,); NaN if unknown."""
         return self._over_pixels(np.sqrt(self.variance_dn2.sum(axis=0)))
 
     @property
     def is_clipped(self) -> npt.NDArray[np.bool_]:
-        """(C,) whether the mean is too small because pixels are full."""
+        """Whether saturated pixels make the mean too small, shape (C,)."""
         return is_clipped(self.saturated.sum(axis=0), self.pixels.sum(axis=0))
 
     def strip_means_dn(self, strips: int) -> Floats:
-        """(strips, C) means over bands of rows as equal as can be."""
+        """Return the means over bands of rows, as equal as possible, in DN, shape (strips, C)."""
         starts = np.arange(strips) * len(self.pixels) // strips
         pixels = np.add.reduceat(self.pixels, starts)
         return np.asarray(np.add.reduceat(self.value_dn, starts) / np.maximum(pixels, 1))
@@ -69,21 +73,21 @@ class RegionSums:
 
 @dataclass(frozen=True, eq=False)
 class LinearFrame:
-    """A RAW frame and what is known of its camera.
+    """A RAW frame with the calibration of its camera.
 
     Parameters
     ----------
     raw
-        The frame.
+        The RAW frame.
     dark_dn
-        (C,) what each channel counts above black without light, such as a `DarkModel` says for the
-        exposure; None: nothing.
+        Dark level of each channel in DN above black, shape (C,), as a `DarkModel` gives it for the
+        exposure time; None subtracts nothing.
     flat
-        Fall-off of the lens, divided out; None: there is none.
+        Vignetting of the lens, which is divided out; None leaves it.
     noise
-        Of a pixel of each of the C channels; None: not known.
+        Noise of a pixel of each of the C channels; None if unknown.
     hot
-        (height, width) pixels that no sum counts.
+        Hot pixels that no sum counts, shape (height, width).
     """
 
     raw: RawFrame
@@ -93,7 +97,7 @@ class LinearFrame:
     hot: PixelMask | None = None
 
     def value_dn(self, area: Area | None = None) -> Floats:
-        """(rows, columns) light in DN, as it would be in the middle of the lens."""
+        """Return the signal in DN, vignetting divided out, shape (rows, columns)."""
         light = self._window(self.raw.mosaic, area).astype(np.float64)
         dark = np.zeros(len(self.raw.channels)) if self.dark_dn is None else self.dark_dn
         for plane in self._planes(area):
@@ -103,7 +107,7 @@ class LinearFrame:
         return light
 
     def variance_dn2(self, area: Area | None = None) -> Floats:
-        """(rows, columns) variance of `value_dn` by photons and reading; NaN if not known."""
+        """Return the variance of `value_dn` by photon and read noise in DN²; NaN if unknown."""
         level = self._window(self.raw.mosaic, area).astype(np.float64)
         variance = np.full_like(level, np.nan)
         if self.noise is None:
@@ -116,11 +120,11 @@ class LinearFrame:
         return variance
 
     def is_saturated(self, area: Area | None = None) -> PixelMask:
-        """(rows, columns) whether a pixel is at white or above."""
+        """Return whether each pixel is at white or above, shape (rows, columns)."""
         return np.asarray(self._window(self.raw.mosaic, area) >= self.raw.white)
 
     def sums(self, area: Area) -> RegionSums:
-        """What each channel adds up to in an area of the frame."""
+        """Return the sums of each channel in an area of the frame."""
         value, variance = self.value_dn(area), self.variance_dn2(area)
         saturated = self.is_saturated(area)
         kept = np.ones_like(saturated) if self.hot is None else ~self._window(self.hot, area)
@@ -134,11 +138,11 @@ class LinearFrame:
         return RegionSums(total, spread, pixels, full)
 
     def of_region(self, region: Region) -> RegionSums:
-        """What each channel adds up to in a region, in fractions of the frame."""
+        """Return the sums of each channel in a region, in fractions of the frame."""
         return self.sums(region_pixels(region, self.raw.width, self.raw.height))
 
     def middle_columns(self, region: Region) -> Floats:
-        """(C,) mean place of each channel's pixels across the frame, their middles at .5."""
+        """Return the mean column of each channel's pixels, shape (C,); pixel centres are at .5."""
         area = region_pixels(region, self.raw.width, self.raw.height)
         x, _, width, height = area
         pixels = np.zeros((len(self.raw.channels), width))
@@ -152,7 +156,7 @@ class LinearFrame:
         return pixels[y : y + height, x : x + width]
 
     def _planes(self, area: Area | None) -> Iterator["_Plane"]:
-        """The positions of the colour filter in an area."""
+        """Iterate over the positions of the colour filter in an area."""
         raw, (x, y, *_) = self.raw, area or (0, 0)
         side = raw.cfa_side
         for row, column in np.ndindex(side, side):
@@ -161,7 +165,7 @@ class LinearFrame:
             yield _Plane(raw.channels.index(raw.cfa[position]), raw.black[position], here)
 
     def _falloff(self, flat: Flat, plane: "_Plane", area: Area | None) -> Floats:
-        """What is left of the light at the pixels of a plane."""
+        """Return the transmission of the lens relative to its axis at the pixels of a plane."""
         raw, (x, y, width, height) = self.raw, area or (0, 0, self.raw.width, self.raw.height)
         rows, columns = plane.here
         across, down = np.meshgrid(
@@ -171,7 +175,17 @@ class LinearFrame:
 
 
 class _Plane(NamedTuple):
-    """The pixels of one position of the colour filter: their channel, black level and place."""
+    """Pixels of one position of the colour filter.
+
+    Attributes
+    ----------
+    channel
+        Number of their channel.
+    black
+        Their black level in DN.
+    here
+        Their rows and columns in the area.
+    """
 
     channel: int
     black: float
@@ -179,9 +193,10 @@ class _Plane(NamedTuple):
 
 
 def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
-    """A picture (rows, columns, C): means above black of each channel in the colour filter's cells.
+    """Return the means of each channel in the cells of the colour filter, in DN above black.
 
-    Binning and not demosaicing: nothing is invented. Without a filter, cells have 2 × 2 pixels.
+    The picture has the shape (rows, columns, C). It is binned and not demosaiced, so that no value
+    is interpolated. Without a colour filter, cells have 2 × 2 pixels.
     """
     side = max(raw.cfa_side, 2)
     rows, columns = raw.height // side, raw.width // side

@@ -1,4 +1,4 @@
-"""Several exposures of one scene as one frame with more range than any of them."""
+"""Several exposures of one scene combined into one frame of larger range."""
 
 from collections.abc import Iterable
 from dataclasses import dataclass
@@ -17,8 +17,8 @@ from labrig.reduce.raw import RawFrame, read_raw
 FloatArray = NDArray[np.float64]
 Image = NDArray[np.float32]
 
-#: Single pixels fuller than this are left out: noise carries some of their like beyond the range,
-#: which `is_clipped` allows a mean over many.
+#: Fraction of the range above which single pixels are left out: noise carries some of those at the
+#: same light beyond the range, which `is_clipped` allows a mean over many.
 FULL = 0.95
 
 
@@ -27,23 +27,24 @@ class Exposure(Protocol):
 
     @property
     def path(self) -> Path:
-        """Of its file."""
+        """Path of the file."""
 
     @property
     def exposure_s(self) -> float:
-        """Its shutter time."""
+        """Exposure time in seconds."""
 
 
 @dataclass(frozen=True, eq=False)
 class HdrFrame:
-    """What a sensor saw, undemosaiced.
+    """Undemosaiced frame of combined exposures.
 
     Attributes
     ----------
     rate
-        (height, width) DN/s above black; NaN where all frames clip, or a pixel is hot.
+        Signal in DN/s above black, shape (height, width); NaN where all exposures clip, or a pixel
+        is hot.
     cfa, cfa_side, channels
-        As of a `RawFrame`.
+        Colour filter array, its period in pixels and its channels, as in `RawFrame`.
     """
 
     rate: Image
@@ -52,7 +53,10 @@ class HdrFrame:
     channels: tuple[str, ...]
 
     def light(self) -> Image:
-        """(height, width) mean of the colours about every pixel; what is NaN counts as bright."""
+        """Return the mean of the colours about every pixel in DN/s, shape (height, width).
+
+        Pixels that are NaN count as bright.
+        """
         filled = np.where(np.isnan(self.rate), np.nanmax(self.rate), self.rate)
         size = (max(self.cfa_side, 2),) * 2
         smooth = cv2.blur(filled.astype(np.float32), size, borderType=cv2.BORDER_REFLECT)
@@ -98,12 +102,19 @@ def read_hdr_frame(frames: Iterable[Exposure], hot: PixelMask | None = None) -> 
 
 
 def hdr_frame(frames: Iterable[tuple[RawFrame, float]], hot: PixelMask | None = None) -> HdrFrame:
-    """Frames and their shutter times in seconds, added up where they do not clip.
+    """Combine frames where they do not clip: the sum of their signals over that of their exposures.
+
+    Parameters
+    ----------
+    frames
+        Frames of one scene and their exposure times in seconds.
+    hot
+        Hot pixels to leave out, shape (height, width).
 
     Raises
     ------
     DataError
-        No frame, or frames of different sensors.
+        There is no frame, or the frames are of different sensors.
     """
     counts: FloatArray | None = None
     for raw, exposure_s in frames:

@@ -29,11 +29,22 @@ from labrig.results import Series, add_flag, is_usable
 def calibrated(
     series: Series, camera: CameraModel, region: Region, width: int, height: int
 ) -> Series:
-    """`series` of a region of frames of `width` × `height` pixels, in DN/s of its first row's
-    settings in the middle of the lens.
+    """Correct the series of a region by the camera's calibration.
 
-    How well the factors are known is not in `sigma`: such errors are common to all frames of a
-    setting, and cancel where there is but one.
+    The values are in DN/s of the first row's settings on the axis of the lens. Uncertainties of the
+    calibration factors are not in `sigma`: such errors are common to all frames of a setting, and
+    cancel where there is only one.
+
+    Parameters
+    ----------
+    series
+        Series of the region in DN/s.
+    camera
+        Calibration of the camera.
+    region
+        The region in fractions of the frame.
+    width, height
+        Size of the frame in pixels.
 
     Raises
     ------
@@ -71,15 +82,25 @@ def calibrated(
 #: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before
 #: the decay, and 20 min of warming up leave a camera a degree or two to go.
 TWO_DEGREES = 2 ** (2 / 6) - 1
-#: Correlation that errors of different channels have at most.
+#: Largest correlation of the errors of different channels.
 MOST_COMMON = 0.99
-#: Dark frames held in memory at once, to look for hot pixels.
+#: Dark frames held in memory at once, to find hot pixels.
 _DARKS_FOR_HOT = 5
 
 
 @dataclass(frozen=True, eq=False)
 class _Dark:
-    """A patch in the dark frames of one ISO, of one `kind` of frame."""
+    """Dark level of a patch at one ISO.
+
+    Attributes
+    ----------
+    kind
+        Width, height and channels of the dark frames.
+    model
+        Dark level over exposure time.
+    frames
+        The patch in the dark frames.
+    """
 
     kind: tuple[int, int, tuple[str, ...]]
     model: DarkModel
@@ -201,7 +222,7 @@ def reduce_patches(
     longest = _read_longest(darks)
     hot = hot_pixels(list(longest.values())) if longest else None
     dark = {} if background else _measured_darks(darks, patches, hot, longest)
-    longest.clear()  # five frames of 42 MB that nobody needs any more
+    longest.clear()  # five frames of 42 MB that are not needed any more
     shots = measure_frames(frames, patches, background, hot, {})
     _check_settings(shots)
     series = {name: _patch_series(name, shots, dark) for name in patches}
@@ -214,7 +235,7 @@ def reduce_patches(
 
 
 def _read_longest(darks: Sequence[SeriesFrame]) -> dict[Path, RawFrame]:
-    """Some of the longest darks; none if they are too few to tell hot pixels."""
+    """Read some of the longest dark frames; none if they are too few to find hot pixels."""
     longest_s = max((dark.exposure_s for dark in darks), default=0.0)
     longest = [dark for dark in darks if dark.exposure_s >= longest_s * (1 - SAME_EXPOSURE)]
     if len(longest) < HOT_FRAMES:
@@ -228,7 +249,7 @@ def _measured_darks(
     hot: PixelMask | None,
     read: Mapping[Path, RawFrame],
 ) -> dict[tuple[str, float], _Dark]:
-    """The dark by patch and ISO."""
+    """Return the dark level by patch and ISO."""
     by_iso: dict[float, list[MeasuredFrame]] = defaultdict(list)
     for shot in measure_frames(darks, patches, None, hot, read):
         by_iso[_key(shot.iso)].append(shot)
@@ -312,7 +333,11 @@ def _patch_series(
 
 
 def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | None:
-    """Of a dark level's errors (C,): warming is common to all channels, noise as it correlates."""
+    """Return the correlation (C, C) of the dark level's errors.
+
+    Errors by the sensor's warming are common to all channels; those by noise correlate as the
+    noise.
+    """
     if not (sigma > 0).all():
         return None
     of_model = np.sqrt(np.maximum(np.square(sigma) - np.square(drift), 0.0)) / sigma
@@ -323,7 +348,7 @@ def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | N
 
 
 def _size(shot: MeasuredFrame) -> tuple[int, int]:
-    """Width and height of a frame in pixels."""
+    """Return width and height of a frame in pixels."""
     width, height, _ = next(iter(shot.patches.values())).kind
     return width, height
 
@@ -339,7 +364,7 @@ def _flag(shot: MeasuredFrame, name: str) -> str:
 
 
 def _check_settings(shots: Sequence[MeasuredFrame]) -> None:
-    """DN/s compare only at one gain and one aperture."""
+    """Refuse frames of several gains or apertures in one unit: their DN/s are not comparable."""
     for unit in {shot.frame.unit for shot in shots}:
         for what, found in (
             ("ISO", {_key(shot.iso) for shot in shots if shot.frame.unit == unit}),
@@ -353,5 +378,5 @@ def _check_settings(shots: Sequence[MeasuredFrame]) -> None:
 
 
 def _key(number: float) -> float:
-    """`number`, or −1 for NaN, which as a key would not equal itself."""
+    """Return `number`, or −1 for NaN, which as a key would not equal itself."""
     return -1.0 if np.isnan(number) else number

@@ -1,4 +1,4 @@
-"""A RAW file as the numbers the sensor counted, with what the camera says about them."""
+"""The mosaic of a RAW file in DN, with the camera's metadata."""
 
 import io
 import logging
@@ -29,7 +29,7 @@ from labrig.reduce.noise import Floats, Mosaic
 from labrig.reduce.saturation import clip_level
 
 _STDERR = 2
-#: How LibRaw's lines begin (it names the file, which a buffer has not), and those of its libjpeg.
+#: First bytes of LibRaw's lines (a buffer has no file name), and of those of its libjpeg.
 _PREFIXES = (b"unknown file:", b"Corrupt JPEG data:", b"Premature end of JPEG file")
 #: The process has one stderr: two redirections at once would restore each other's.
 _lock = threading.Lock()
@@ -37,7 +37,7 @@ _lock = threading.Lock()
 
 @contextmanager
 def quiet_stderr() -> Iterator[None]:
-    """While open, LibRaw's lines on the process's stderr are dropped.
+    """Drop LibRaw's lines on the process's stderr.
 
     Lines that other threads write meanwhile are passed on at the end.
     """
@@ -63,8 +63,18 @@ def quiet_stderr() -> Iterator[None]:
 class Exif:
     """EXIF of one frame; None where absent, unreadable or a placeholder such as 0.
 
-    `lens` is its name and focal length, as far as the camera tells. `dng`: the file says that it is
-    a DNG.
+    Attributes
+    ----------
+    exposure_s
+        Nominal exposure time in seconds.
+    iso, f_number
+        ISO and f-number.
+    make, model
+        Manufacturer and model of the camera.
+    lens
+        Name and focal length of the lens, as far as the camera records them.
+    dng
+        Whether the file declares itself a DNG.
     """
 
     exposure_s: float | None = None
@@ -76,9 +86,9 @@ class Exif:
     dng: bool = False
 
 
-#: The value by which EXIF 2.3 says "more than 65534, look elsewhere".
+#: Value of EXIF 2.3 for an ISO above 65534, which is in another tag.
 _ISO_OVERFLOW = 65535
-#: What exifread calls the tag that only DNG files have: by its number, as long as it has no name.
+#: Names that exifread gives the tag of DNG files: by its number, or by its name.
 _DNG_VERSION = ("Image Tag 0xC612", "Image DNGVersion")
 
 
@@ -128,7 +138,7 @@ def read_exif(content: bytes) -> Exif:
 
 
 def _positive(tags: dict[str, Any], name: str) -> float | None:
-    """First value of a tag, in the EXIF directory or, as TIFF/EP has it, beside the image."""
+    """Return the first value of a tag in the EXIF directory or, as TIFF/EP has it, the image's."""
     for directory in ("EXIF", "Image"):
         values = getattr(tags.get(f"{directory} {name}"), "values", None)
         try:
@@ -141,14 +151,14 @@ def _positive(tags: dict[str, Any], name: str) -> float | None:
 
 
 def _lens(tags: dict[str, Any]) -> str | None:
-    """`EF50mm f/1.4 USM, 50 mm`."""
+    """Return the lens as in `EF50mm f/1.4 USM, 50 mm`."""
     focal_mm = _positive(tags, "FocalLength")
     said = (_text(tags, "EXIF LensModel"), None if focal_mm is None else f"{focal_mm:g} mm")
     return ", ".join(filter(None, said)) or None
 
 
 def _text(tags: dict[str, Any], name: str) -> str | None:
-    """A tag's text without the padding cameras write, None if nothing legible is left."""
+    """Return a tag's text without the padding of cameras; None if no legible text remains."""
     words = str(tags.get(name, "")).split()
     text = " ".join(words)
     return text if text.isprintable() and text else None
@@ -163,14 +173,15 @@ _X_TRANS = 6
 
 
 def sensor_pattern(raw: Any, dng: bytes | None) -> tuple[str, tuple[float, ...]]:
-    """`cfa` and `black` of a `RawFrame`.
+    """Return `cfa` and `black` of a `RawFrame`.
 
     Parameters
     ----------
     raw
         An open rawpy file.
     dng
-        Its bytes if it is a DNG, whose own tags then go before what LibRaw makes of them.
+        The bytes of the file if it is a DNG, whose own tags then have priority over LibRaw's; else
+        None.
 
     Raises
     ------
@@ -185,7 +196,7 @@ def sensor_pattern(raw: Any, dng: bytes | None) -> tuple[str, tuple[float, ...]]
 
 
 def _from_first_pixel(raw: Any, found: DngPattern) -> tuple[Letters, Floats]:
-    """Both repeats of a DNG, shifted to where LibRaw's visible part begins."""
+    """Return colours and black levels of a DNG, shifted to the first pixel visible to LibRaw."""
     shift = (found.corner[0] - raw.sizes.top_margin, found.corner[1] - raw.sizes.left_margin)
     colours = np.roll(found.colours, shift, axis=(0, 1))
     if found.black is not None:
@@ -197,7 +208,7 @@ def _from_first_pixel(raw: Any, found: DngPattern) -> tuple[Letters, Floats]:
 
 
 def _by_libraw(raw: Any) -> tuple[Letters, Floats]:
-    """Colours and black levels as LibRaw says; its patterns begin at the first visible pixel."""
+    """Return colours and black levels by LibRaw, from the first visible pixel on."""
     pattern, levels = raw.raw_pattern, raw.black_level_per_channel
     if pattern is None or pattern.shape == (1, 1):
         return np.array([[MONOCHROME]]), np.array([[float(levels[0])]])
@@ -218,18 +229,18 @@ def _by_libraw(raw: Any) -> tuple[Letters, Floats]:
     return colours, np.asarray(levels, dtype=np.float64)[pattern]
 
 
-#: No camera's file is larger.
+#: Largest size of a RAW file in bytes.
 MOST_BYTES = 1_000_000_000
-#: Rows and columns of one position of the CFA, the least from which noise can be told.
+#: Fewest rows and columns of one position of the CFA from which noise can be estimated.
 _LEAST_PIXELS = 3
 _EXPECTED = "expected a RAW file with one colour in every pixel"
-#: How files begin that hold what a sensor counted: TIFF (most, NEF, ARW and DNG among them) and its
-#: kin of Olympus, Panasonic and Phase One; CIFF; Fujifilm; Minolta; Sigma.
+#: First bytes of RAW files: TIFF (most, NEF, ARW and DNG among them) and its variants of Olympus,
+#: Panasonic and Phase One; CIFF; Fujifilm; Minolta; Sigma.
 _CONTAINERS = (
     b"II*\0", b"MM\0*", b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"IIII", b"MMMM",
     b"II\x1a\0\0\0HEAPCCDR", b"FUJIFILMCCD-RAW", b"\0MRM", b"FOVb",
 )  # fmt: skip
-#: Canon's CR3, a kind of MPEG-4, says so here.
+#: File type of Canon's CR3, a kind of MPEG-4, and its place in the file.
 _CR3, _CR3_AT = b"ftypcrx", 4
 
 
@@ -240,16 +251,18 @@ class RawFrame:
     Parameters
     ----------
     mosaic
-        Shape (height, width), uint16, DN with the black level in it.
+        Pixels in DN with the black level in them, uint16, shape (height, width).
     cfa
-        Colours of the smallest square that repeats, from the top-left pixel in reading order:
-        four letters such as `RGGB`, 36 of an X-Trans sensor, `L` of a monochrome one.
+        Colours of the smallest square that repeats, from the top-left pixel in reading order: four
+        letters such as `RGGB`, 36 of an X-Trans sensor, `L` of a monochrome one.
     black
-        Black level in DN of those pixels, in the same order.
+        Black levels of those pixels in DN, in the same order.
     white
         Level in DN from which a pixel is saturated.
-    exposure_s, iso, f_number, make, model
-        From EXIF; None where absent or a placeholder.
+    exposure_s
+        Nominal exposure time in seconds by EXIF; None where absent or a placeholder.
+    iso, f_number, make, model
+        Settings and camera by EXIF; None where absent or a placeholder.
     """
 
     mosaic: Mosaic
@@ -288,22 +301,22 @@ class RawFrame:
 
     @property
     def width(self) -> int:
-        """Columns of the visible mosaic."""
+        """Number of columns of the visible mosaic."""
         return int(self.mosaic.shape[1])
 
     @property
     def height(self) -> int:
-        """Rows of the visible mosaic."""
+        """Number of rows of the visible mosaic."""
         return int(self.mosaic.shape[0])
 
     @property
     def cfa_side(self) -> int:
-        """Pixels after which `cfa` repeats, down and across."""
+        """Period of `cfa` in pixels, down and across."""
         return side_of(self.cfa)
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """R, G and B, or L."""
+        """Names of the channels: R, G and B, or L."""
         return channels_of(self.cfa)
 
 
@@ -387,7 +400,7 @@ def _decode(content: bytes) -> RawFrame:
 
 
 def _frame(raw: Any, flat: Any, content: bytes, exif: Exif) -> RawFrame:
-    """`raw`, an open rawpy file, if it is undemosaiced."""
+    """Return the frame of `raw`, an open rawpy file, if it is undemosaiced."""
     if raw.raw_type != flat:
         raise FrameError(
             f"{_EXPECTED}, got an image with all colours in every pixel (linear DNG, sRAW or "

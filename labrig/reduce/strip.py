@@ -1,4 +1,4 @@
-"""The strip of a linear variable filter in frames: where it is lit, and what is read along it."""
+"""The strip of a linear variable filter in frames: finding it, and measuring the light along it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -15,46 +15,45 @@ from labrig.reduce.measured_frames import SeriesFrame
 from labrig.reduce.patches import reduce_patches
 from labrig.results import FloatArray, SliceValues, StripProfile
 
-#: Lit is what is brighter than so many times the noise of the dark surroundings,
+#: Least brightness of a lit pixel in units of the noise of the dark surroundings,
 SEEN_SIGMA = 6.0
-#: than this fraction of the brightest light near by,
+#: as a fraction of the brightest light near by,
 EDGE = 0.4
-#: and than this fraction of the brightest of all: less is stray light.
+#: and as a fraction of the brightest of all: less is stray light.
 FAINTEST = 3e-4
-#: How near, as a fraction of the frame's width. Along the strip the light may double within it.
+#: Neighbourhood as a fraction of the frame's width, within which the strip's light may double.
 NEAR = 0.01
-#: Regions read upright along a strip that is tilted more would be of too many wavelengths.
+#: Largest tilt: upright regions along the strip would mix too many wavelengths beyond it.
 MOST_TILT_DEGREES = 5.0
-#: A strip is so many times as long as it is high, and fills this fraction of the frame at the
-#: least.
+#: Least ratio of a strip's length to its height, and least fraction of the frame that it fills.
 LEAST_ELONGATION = 2.0
 LEAST_FRACTION = 0.005
-#: How much of the rectangle is lit; more than all is rounding.
+#: Fraction of the rectangle that is lit; more than 1 is rounding.
 FULL = (0.9, 1.1)
-#: Left out at each long side and at each end, as fractions of the strip's height and length.
+#: Margins at each long side and at each end, as fractions of the strip's height and length.
 LONG_MARGIN, END_MARGIN = 0.12, 0.01
-#: A slice is two pixels wide at the least: a cell of the colour filter.
+#: Least width of a slice in pixels: a cell of the colour filter.
 _LEAST_SLICE = 2
-#: Lamp, shutter and aperture from one scene to the next, relative; all colours and places alike.
+#: Relative change of lamp, shutter and aperture between scenes, common to colours and places.
 FLICKER = 0.005
-#: Relative errors that no two frames share: the sensor's pattern, dust.
+#: Relative independent error of a place: the sensor's pattern, dust.
 PATTERN = 0.002
 
 
 @dataclass(frozen=True)
 class FoundStrip:
-    """A lit rectangle.
+    """A lit rectangle in a frame.
 
     Attributes
     ----------
     corners
-        (x, y) in pixels, clockwise from the upper left.
+        Corners (x, y) in pixels, clockwise from the upper left.
     tilt_degrees
-        Of its long side; > 0 falls to the right.
+        Tilt of the long side in degrees; > 0 falls to the right.
     length, height
-        In pixels.
+        Size of the rectangle in pixels.
     width_of_frame, height_of_frame
-        In pixels.
+        Size of the frame in pixels.
     """
 
     corners: tuple[tuple[float, float], ...]
@@ -65,7 +64,7 @@ class FoundStrip:
     height_of_frame: int
 
     def strip(self, rising: bool) -> Strip:
-        """Its inner part in fractions of the frame."""
+        """Return the inner part of the rectangle in fractions of the frame."""
         upper_left, upper_right, lower_right, lower_left = np.array(self.corners)
         left, right = (upper_left + lower_left) / 2, (upper_right + lower_right) / 2
         inwards = END_MARGIN * (right - left)
@@ -78,7 +77,7 @@ class FoundStrip:
         )
 
     def __str__(self) -> str:
-        """Its size and tilt."""
+        """Return size and tilt of the rectangle."""
         return f"{self.length:.0f} x {self.height:.0f} pixels, tilted by {self.tilt_degrees:+.1f}°"
 
 
@@ -261,7 +260,7 @@ def slice_values(
 
 
 def _lit(light: Image) -> NDArray[np.uint8] | None:
-    """(height, width) 1 in the largest lit patch; None without light."""
+    """Mark the largest lit patch by 1, shape (height, width); None without light."""
     ground = float(np.median(light))
     noise = 1.4826 * float(np.median(np.abs(light - ground)))
     above = light - np.float32(ground)
@@ -280,9 +279,9 @@ def _lit(light: Image) -> NDArray[np.uint8] | None:
 
 
 def _rectangle(lit: NDArray[np.uint8]) -> tuple[tuple[float, float], float, float, float]:
-    """Middle, length, height in pixels and tilt in degrees of the rectangle of equal moments.
+    """Return the rectangle of equal moments: centre, length, height in pixels, tilt in degrees.
 
-    Moments are of all pixels: they tell a tilt of a fraction of a pixel, which corners do not.
+    Moments involve all pixels: they resolve a tilt of a fraction of a pixel, which corners do not.
     """
     m = cv2.moments(lit, binaryImage=True)
     middle = m["m10"] / m["m00"] + 0.5, m["m01"] / m["m00"] + 0.5
@@ -299,7 +298,7 @@ def _point(xy: NDArray[np.float64]) -> tuple[float, float]:
 
 
 def _along(strip: Strip, width: int, height: int) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Position of every pixel along the strip, and whether it is inside; (height, width)."""
+    """Return every pixel's position along the strip, and whether it is inside; (height, width)."""
     x, y = np.arange(width) + 0.5, np.arange(height)[:, np.newaxis] + 0.5
     left = np.array([strip.left[0] * width, strip.left[1] * height])
     right = np.array([strip.right[0] * width, strip.right[1] * height])
@@ -314,7 +313,7 @@ def _along(strip: Strip, width: int, height: int) -> tuple[FloatArray, NDArray[n
 def _read_at(
     at: FloatArray, value: FloatArray, edges: FloatArray, position: FloatArray
 ) -> FloatArray:
-    """Mean value and mean place of the pixels between `edges`, read at `position`."""
+    """Interpolate the mean of the pixels between `edges`, at their mean place, to `position`."""
     pixels, _ = np.histogram(at, edges)
     if (pixels == 0).any():
         raise DataError(
@@ -328,7 +327,7 @@ def _read_at(
 def _weighted_mean(
     value: FloatArray, sigma: FloatArray, dark_sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(channels,) of the frames (n, channels) of one scene, weighted."""
+    """Return the weighted mean of frames (n, channels) of one scene and its σ, (channels,) each."""
     if not len(value):
         return np.full_like(dark_sigma, np.nan), np.full_like(dark_sigma, np.nan)
     weight = 1 / sigma**2

@@ -1,4 +1,4 @@
-"""How fast light of each band charges a sample, and the material that follows."""
+"""Result of an excitation run: excitation rates by band, and the material from them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,7 +17,7 @@ from labrig.results.run_result import RunResult
 from labrig.results.series import Series
 from labrig.results.text_files import finite, write_json
 
-#: Charges whose longest is so many times the shortest go along a logarithmic axis.
+#: Ratio of the longest to the shortest charge from which an axis is logarithmic.
 MANY_TIMES = 20.0
 
 
@@ -47,18 +47,19 @@ def spans_decades(charge_s: FloatArray) -> bool:
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """Levels after n charges in DN/s, measured against predicted; nothing is fitted to them.
+    """Measured against predicted levels after n charges; nothing is fitted to them.
 
     Attributes
     ----------
     charge_s
-        (n,) how long the lamp shone; its fade counts as so much longer at full light.
+        Duration of each charge in seconds, corrected for the lamp's transients, shape (n,).
     measured, predicted
-        (n,) levels.
+        Levels in DN/s, shape (n,).
     sigma
-        (n,) by how much the two may differ.
+        Standard uncertainty of their difference in DN/s, shape (n,).
     curve_charge_s, curve
-        (m,) charges from the shortest to the longest, and the levels predicted after them.
+        Durations in seconds from the shortest to the longest charge, and predicted levels in DN/s
+        after them, shape (m,).
     """
 
     charge_s: FloatArray
@@ -76,7 +77,7 @@ class Closure:
 
     @property
     def rms_sigma(self) -> float:
-        """RMS deviation in σ: about 1 if noise and what the prediction may be off by explain it."""
+        """RMS deviation in σ: about 1 if noise and the uncertainty of the prediction explain it."""
         return _rms((self.measured - self.predicted) / self.sigma)
 
 
@@ -86,17 +87,17 @@ def _rms(values: FloatArray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PatchCharging:
-    """What was measured of a patch at P places along the filter.
+    """Charging of a patch at P places along the filter.
 
     Attributes
     ----------
     through, direct
-        Charges through the filter and by the lamp itself, at the same places; values are even:
-        what lens and sample do from place to place is divided out.
+        Charges through the filter and by the lamp itself, at the same places. Their values are
+        divided by `evenness`.
     evenness
-        (P,) by which they were divided, 1 on average.
+        Relative signal of each place in even light, by lens and sample, 1 on average, shape (P,).
     whole
-        The whole strip after the last charge by the lamp itself.
+        Series of the whole strip after the last charge by the lamp itself.
     """
 
     through: ChargingSeries
@@ -107,19 +108,19 @@ class PatchCharging:
 
 @dataclass(frozen=True, eq=False)
 class PatchExcitation:
-    """What was found of a patch.
+    """Excitation of a patch.
 
     Attributes
     ----------
     charging
         Light, charges, and photographs after each.
     decay
-        Of the whole strip after the last charge; where the fit of the charges started.
+        Decay of the whole strip after the last charge; where the fit of the charges started.
     fit
-        Of all charges together; its residuals are those of `charging.through`, then of
+        Fit of all charges together; its residuals are those of `charging.through`, then of
         `charging.direct`.
     material
-        As these rates say; with re-radiance where the emission spectrum is known.
+        Material by these rates, with re-radiance where the emission spectrum is known.
     closure
         Charging by the lamp itself, as predicted from charges through the filter; None if there
         were too few charges to test it.
@@ -139,9 +140,9 @@ class ExcitationResult(RunResult):
     Attributes
     ----------
     irradiance
-        The lamp's light on the sample, as it was known.
+        Irradiance calibration that the analysis used.
     patches
-        By name; under "" the only one.
+        Excitation of each patch by its name; that of the only one under "".
 
     Examples
     --------
@@ -158,7 +159,7 @@ class ExcitationResult(RunResult):
 
     @property
     def position_nm(self) -> FloatArray:
-        """(P,) mean wavelength of the light at every place behind the filter."""
+        """Mean wavelength of the light at every place behind the filter in nm, shape (P,)."""
         edges, through = np.array(self.irradiance.bands_nm), np.array(self.irradiance.through)
         middles = (edges[1:] + edges[:-1]) / 2
         # Squared, so that what leaks all over does not pull.
@@ -166,7 +167,7 @@ class ExcitationResult(RunResult):
         return found
 
     def provides(self) -> Mapping[str, Any]:
-        """The materials."""
+        """Return the materials by patch."""
         return {"materials": {name: patch.material for name, patch in self.patches.items()}}
 
     def write_files(self, folder: Path) -> None:

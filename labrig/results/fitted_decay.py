@@ -1,4 +1,4 @@
-"""What a decay told: rates, amplitudes and how well they are known; the file `fit.json`."""
+"""Fit of a decay: rates and amplitudes with their uncertainties; the file `fit.json`."""
 
 import json
 import math
@@ -16,7 +16,7 @@ from labrig.results.measured import FloatArray, Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text, write_json
 
 FILE = "fit.json"
-#: Of that file: another number says that keys were renamed or mean something else.
+#: Version of that file: another number means renamed keys or other meanings.
 SCHEMA_VERSION = 1
 
 
@@ -27,9 +27,9 @@ class DecayState:
     Attributes
     ----------
     k_r_per_s, k_r_sigma_per_s
-        Rate; σ 0 if it was held.
+        Rate k in 1/s; σ is 0 if it was held.
     amplitude, amplitude_sigma
-        At lamp off, in the brightest channel, in the values' units.
+        Amplitude a at lamp off in the brightest channel, in the unit of the values.
     """
 
     k_r_per_s: float
@@ -40,18 +40,18 @@ class DecayState:
 
 @dataclass(frozen=True)
 class Candidate:
-    """What n states achieved, all candidates at the same weights.
+    """Quality of the fit with n states, all candidates at the same weights.
 
     Attributes
     ----------
     n_states
-        States tried.
+        Number of states.
     reduced_chi2
         χ² per degree of freedom; NaN if there are none.
     bic
-        χ² + parameters · log(independent data).
+        Bayesian information criterion: χ² + parameters · log(independent data).
     f_p_value
-        Chance of such a gain over one state fewer if that were enough; None for the first tried.
+        p-value of the F-test against one state fewer; None for the first candidate.
     """
 
     n_states: int
@@ -62,14 +62,18 @@ class Candidate:
 
 @dataclass(frozen=True)
 class AlternativeModel:
-    """A alternative model fitted, in the brightest channel, in the values' units.
+    """An alternative decay model fitted, in the brightest channel.
 
     Attributes
     ----------
     name, formula
-        Which, and how it reads.
-    amplitude, tau_s, exponent, exponent_sigma
-        A at lamp off, τ, p or β and its σ.
+        Name and formula of the model.
+    amplitude
+        Amplitude A at lamp off in the unit of the values.
+    tau_s
+        Time constant τ in seconds.
+    exponent, exponent_sigma
+        Exponent p or β and its standard uncertainty.
     bic
         Bayesian information criterion, comparable with the candidates'.
     """
@@ -85,35 +89,37 @@ class AlternativeModel:
 
 @dataclass(frozen=True)
 class FittedDecay:
-    """Σ_i a_i e^(−k_i t) times one weight per channel, plus its offset; with uncertainties.
+    """Decay model Σ_i a_i e^(−k_i t), times a weight and plus an offset for each channel.
 
     Attributes
     ----------
     states
-        By falling rate.
-    channels, channel_weights, channel_weights_sigma
-        Names, weights (maximum 1, which is held), their σ.
+        Exponentials by falling rate.
+    channels
+        Names of the C channels.
+    channel_weights, channel_weights_sigma
+        Weights of the channels, whose maximum is held at 1, and their σ.
     offsets, offsets_sigma
-        Of the channels, in the values' units; σ 0 if held at 0.
+        Offsets of the channels in the unit of the values; σ is 0 if held at 0.
     repeats, levels
-        Names of the charges, and how bright the decay after each was over their mean.
+        Names of the charges, and brightness of the decay after each relative to their mean.
     flicker, flicker_sigma
-        Relative noise common to the channels of a frame; σ 0 if given.
+        Relative noise common to the channels of a frame; σ is 0 if it was given.
     chi2, dof
-        Sum of squared residuals in units of the noise, and its degrees of freedom.
+        Sum of squared normalised residuals and its degrees of freedom.
     bic
-        χ² + parameters · log(independent data).
+        Bayesian information criterion: χ² + parameters · log(independent data).
     covariance
-        Of the `covariance_parameters`; channel weights and the other channels' offsets
+        Covariance of the `covariance_parameters`; channel weights and the other channels' offsets
         marginalised.
     warnings
-        What to distrust, and what to do about it.
+        Limits of the fit and remedies, a line each.
     candidates
-        The numbers of states tried.
+        Fits with each number of states that was tried.
     alternative_models
         Power law and stretched exponential, fitted to the same series.
     better_model
-        The one of them that does clearly better than exponentials, if one does.
+        Alternative model that is clearly better than exponentials; None if none is.
     """
 
     states: tuple[DecayState, ...]
@@ -156,7 +162,7 @@ class FittedDecay:
         return self.channels[self.brightest]
 
     def amplitudes_in(self, channel: str) -> tuple[Measured, ...]:
-        """Amplitude of every state in the DN/s of a channel.
+        """Return the amplitude of every state in the DN/s of a channel.
 
         Raises
         ------
@@ -181,17 +187,17 @@ class FittedDecay:
 
     @property
     def brightest(self) -> int:
-        """The channel of weight 1, in whose units the amplitudes are."""
+        """Index of the channel of weight 1, in whose unit the amplitudes are."""
         return int(np.argmax(self.channel_weights))
 
     @property
     def offset(self) -> float:
-        """Of the brightest channel."""
+        """Offset of the brightest channel in the unit of the values."""
         return self.offsets[self.brightest]
 
     @property
     def offset_sigma(self) -> float:
-        """Of the brightest channel."""
+        """Standard uncertainty of the brightest channel's offset."""
         return self.offsets_sigma[self.brightest]
 
     @property
@@ -200,19 +206,19 @@ class FittedDecay:
         return self.chi2 / self.dof if self.dof > 0 else math.nan
 
     def predict(self, t_s: ArrayLike, exposure_s: ArrayLike = 0.0) -> FloatArray:
-        """Mean signal during exposures, (n, C), offsets included.
+        """Return the mean signal during exposures, offsets included, shape (n, C).
 
         Parameters
         ----------
         t_s
-            (n,) start of the exposures after lamp off, ≥ 0.
+            Begin of each exposure in seconds after lamp off, ≥ 0, shape (n,).
         exposure_s
-            Their length ≥ 0, one for all or (n,).
+            Exposure time in seconds, ≥ 0, one for all or shape (n,).
 
         Raises
         ------
         FitError
-            Shapes that do not agree.
+            The shapes do not agree.
         """
         t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
         exposure = np.asarray(exposure_s, dtype=np.float64)
@@ -228,7 +234,7 @@ class FittedDecay:
         return predicted
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of `fit.json`; None for what is not finite."""
+        """Return the content of `fit.json`; values that are not finite are None."""
         fields: dict[str, Any] = {
             "schema_version": SCHEMA_VERSION,
             "n_states": self.n_states,
@@ -257,11 +263,11 @@ class FittedDecay:
         return content
 
     def to_json(self) -> str:
-        """The text of `fit.json`."""
+        """Return the text of `fit.json`."""
         return json_text(self.to_dict())
 
     def __str__(self) -> str:
-        """A table for people; digits in brackets are σ in units of the last places."""
+        """Return a table for people; digits in brackets are σ in units of the last places."""
         rows = [
             [
                 str(number),
@@ -464,7 +470,7 @@ def _in_order(channels: Mapping[str, Any], sigma: Mapping[str, float | None]) ->
 
 
 def _known(value: float | None, unknown: float = math.inf) -> float:
-    """JSON has no infinity: what nothing is known of is null there."""
+    """Return the number of a JSON value, whose null stands for infinity or another `unknown`."""
     return unknown if value is None else float(value)
 
 

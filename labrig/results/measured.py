@@ -13,7 +13,7 @@ from labrig.results.run_result import RunResult
 
 
 def _listed(array: NDArray[Any]) -> Any:
-    """Nested lists; JSON has no infinity and no NaN, which become texts."""
+    """Return nested lists, in which infinity and NaN, unknown to JSON, are texts."""
     if array.dtype.kind != "f" or np.isfinite(array).all():
         return array.tolist()
     texts = array.astype(object)
@@ -39,7 +39,7 @@ IntArray = Annotated[
 ]
 
 
-#: A σ of more digits than this before its point is written with a power of ten.
+#: Fewest decimals of a rounded value; a larger σ is written with a power of ten.
 MOST_ROUNDED = -2
 
 
@@ -54,7 +54,7 @@ class Measured:
     sigma
         Its standard uncertainty ≥ 0; infinite where nothing is known of the value.
     unit
-        Such as `1/s` or `DN/s`; empty for a pure number.
+        Unit such as `1/s` or `DN/s`; empty for a pure number.
 
     Examples
     --------
@@ -67,13 +67,13 @@ class Measured:
     unit: str = ""
 
     def times(self, other: "Measured") -> "Measured":
-        """The product with a quantity that was measured independently."""
+        """Return the product with an independently measured quantity."""
         sigma = math.hypot(self.sigma * other.value, self.value * other.sigma)
         unit = " ".join(filter(None, (self.unit, other.unit)))
         return Measured(self.value * other.value, sigma, unit)
 
     def over(self, other: "Measured") -> "Measured":
-        """The ratio to a quantity of the same unit that was measured independently.
+        """Return the ratio to an independently measured quantity of the same unit.
 
         Raises
         ------
@@ -87,15 +87,15 @@ class Measured:
         return ratio
 
     def sigmas_from(self, other: "Measured") -> float:
-        """The difference `self` − `other` in its own σ, both measured independently.
+        """Return the difference `self` − `other` in its own σ, both measured independently.
 
-        NaN where nothing is known of that σ.
+        It is NaN where that σ is 0 or infinite.
         """
         sigma = math.hypot(self.sigma, other.sigma)
         return (self.value - other.value) / sigma if 0 < sigma < math.inf else math.nan
 
     def __str__(self) -> str:
-        """The value to two digits of its σ, and the unit."""
+        """Return the value to two digits of its σ, and the unit."""
         return " ".join(filter(None, (with_uncertainty(self.value, self.sigma), self.unit)))
 
 
@@ -155,7 +155,7 @@ _UNITS = {
     "_c": "degC",
     "_s": "s",
 }
-#: What stands for the only one of things that have no name.
+#: Name of the only entry of a mapping, whose key is empty.
 ONLY = "only"
 
 Path = tuple[str, ...]
@@ -225,7 +225,7 @@ def unit_of(name: str) -> str:
 
 
 def _inner(value: Any) -> list[tuple[str, Any]] | None:
-    """What is in a value; None for a plain one."""
+    """Return the named values in a value; None for a plain one."""
     if isinstance(value, Measured):
         return None
     if isinstance(value, BaseModel):

@@ -1,4 +1,4 @@
-"""What the analysis of a run gives: a frozen type for each protocol, and its file `result.json`."""
+"""Result of a run's analysis: a frozen type for each protocol, and its file `result.json`."""
 
 import json
 import math
@@ -18,21 +18,21 @@ FILE = "result.json"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunResult:
-    """What one protocol's analysis found.
+    """Result of one protocol's analysis.
 
     A result holds numbers, with units in the names of its fields or in a `Measured`; arrays are
-    `FloatArray`, `BoolArray` or `IntArray`. All that a report shows, an export writes or a
-    notebook computes with is in it. A protocol's own type is a frozen dataclass on top of this,
-    registered by an entry point in `labrig.results` under the protocol's name.
+    `FloatArray`, `BoolArray` or `IntArray`. It contains everything that a report shows, an export
+    writes or a notebook computes with. A protocol's own type is a frozen dataclass derived from
+    this one, registered by an entry point in `labrig.results` under the protocol's name.
 
     Attributes
     ----------
     kind
         Name of the protocol, as it is registered.
     schema_version
-        Of the type's fields: another number says that fields were renamed or mean something else.
+        Version of the type's fields: another number means renamed fields or other meanings.
     warnings
-        What to distrust, and what to do about it, a line each.
+        Limits of the result and remedies, a line each.
     """
 
     kind: ClassVar[str]
@@ -44,15 +44,15 @@ class RunResult:
     warnings: tuple[str, ...] = ()
 
     def provides(self) -> Mapping[str, Any]:
-        """What later parts of a chain may use, by the name of a field of their `Inputs`."""
+        """Return values for later parts of a chain, by the name of a field of their `Inputs`."""
         return {}
 
     def failures(self) -> tuple[str, ...]:
-        """Why there is no result at all, a line each; none if there is one."""
+        """Return the reasons why there is no result at all, a line each; none if there is one."""
         return ()
 
     def write_files(self, folder: Path) -> None:
-        """Write what later runs and other programs read into a folder, such as a material file.
+        """Write the files for later runs and other programs into a folder, such as a material file.
 
         Raises
         ------
@@ -61,7 +61,7 @@ class RunResult:
         """
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of `result.json`; what is not finite is the text `Infinity` or `NaN`."""
+        """Return the content of `result.json`, in which infinity and NaN are texts."""
         fields = TypeAdapter(type(self)).dump_python(self, mode="json")
         content: dict[str, Any] = finite(
             {"kind": self.kind, "schema_version": self.schema_version} | fields, _spelled
@@ -69,7 +69,7 @@ class RunResult:
         return content
 
     def to_json(self) -> str:
-        """The text of `result.json`, a field of the result a line."""
+        """Return the text of `result.json`, one field of the result a line."""
         lines = [
             f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False, allow_nan=False)}"
             for key, value in self.to_dict().items()
@@ -78,12 +78,12 @@ class RunResult:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """The result whose `to_dict` is `content`.
+        """Construct the result whose `to_dict` is `content`.
 
         Raises
         ------
         ValueError
-            It is another protocol's, of another version, or no result at all.
+            The content is that of another protocol or version, or of no result at all.
         """
         fields = dict(content)
         kind, version = fields.pop("kind", None), fields.pop("schema_version", None)
@@ -96,7 +96,7 @@ class RunResult:
 
 
 def _of_its_kind(content: Any) -> RunResult:
-    """A result as its protocol's own type; one that is already is left as it is."""
+    """Convert the content of a result to its protocol's own type; a result stays as it is."""
     if isinstance(content, RunResult):
         return content
     if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
@@ -195,5 +195,5 @@ def _first(error: Exception) -> str:
 
 
 def _spelled(number: float) -> str:
-    """As pydantic spells what JSON has no number for."""
+    """Return the text for a number that is not finite, in pydantic's spelling."""
     return "NaN" if math.isnan(number) else "Infinity" if number > 0 else "-Infinity"

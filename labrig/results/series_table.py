@@ -1,4 +1,7 @@
-"""Reads series.csv, and anybody's table of a decay: comma, tab, semicolon or blanks."""
+"""Reader of series.csv and of other programs' tables of a decay.
+
+The delimiter is a comma, a tab, a semicolon or blanks.
+"""
 
 import csv
 import math
@@ -64,7 +67,17 @@ _EXPECTED = "expected a table with a column t_s (or t, time_s) and one or more o
 
 @dataclass(frozen=True)
 class _Table:
-    """Cells of a table, as many in each row as in the header; `lines` are their line numbers."""
+    """Cells of a table.
+
+    Attributes
+    ----------
+    header
+        Names of the columns.
+    rows
+        Cells of each row, as many as in the header.
+    lines
+        Line number of each row.
+    """
 
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -187,7 +200,7 @@ def _cells(line: str, delimiter: str | None, number: int) -> list[str]:
 
 
 def _fitted(row: list[str], columns: int, line: int) -> tuple[str, ...]:
-    """`row` with as many cells as the header: empty ones at its end may be left out or too many."""
+    """Return `row` with as many cells as the header, empty ones at its end added or removed."""
     if any(cell.strip() for cell in row[columns:]):
         raise UsageError(
             f"line {line}: expected {columns} columns as in the first line, got {len(row)}"
@@ -236,7 +249,7 @@ def _series(table: _Table) -> list[Series]:
 
 
 def _columns(table: _Table) -> dict[str, list[str]]:
-    """Cells by column name, without the columns that hold no series."""
+    """Return the cells by column name, without the columns that hold no series."""
     columns: dict[str, list[str]] = {}
     for position, name in enumerate(table.header):
         cells = [row[position] for row in table.rows]
@@ -254,7 +267,7 @@ def _columns(table: _Table) -> dict[str, list[str]]:
 
 
 def _only(names: Sequence[str], wanted: frozenset[str]) -> str | None:
-    """The one of `names` that is among the `wanted`."""
+    """Return the one of `names` that is among the `wanted`; None if none is."""
     found = [name for name in names if name.lower() in wanted]
     if len(found) > 1:
         raise UsageError(f"expected one of the columns {', '.join(found)}, got several; keep one")
@@ -281,7 +294,7 @@ def _sigma_name(channel: str, channels: Sequence[str], others: Sequence[str]) ->
 def _numbers(
     name: str, cells: Sequence[str], lines: Sequence[int], empty: float | None
 ) -> FloatArray:
-    """The cells of a column as numbers, blank ones as `empty` (None: there may be none)."""
+    """Return the cells of a column as numbers, blank ones as `empty` (None forbids them)."""
     values = np.empty(len(cells))
     for row, (cell, line) in enumerate(zip(cells, lines, strict=True)):
         if not cell.strip():

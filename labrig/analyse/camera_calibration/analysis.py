@@ -1,4 +1,4 @@
-"""A camera calibration, from its frames to its result."""
+"""Analysis of a camera calibration, from its frames to its result."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -28,23 +28,23 @@ from labrig.results import (
 from labrig.written_numbers import exposure_text, plus_minus
 
 LIT = tuple(CardFrames)
-#: Where a sensor is further from a straight line, its frames tell nothing of a shutter.
+#: Deviation from linearity beyond which frames are not used for settings.
 MOST_BENT = 0.02
-#: χ² per degree of freedom beyond which the photon-transfer line is none.
+#: χ² per degree of freedom beyond which the photon transfer is not linear.
 STRAIGHT_CHI2 = 6.0
-#: Deviations from linear, shutter times and gradients of light that are worth a warning.
+#: Deviations from linearity and of exposure times, and gradients of light, that cause a warning.
 BENT, OFF, UNEVEN = 0.01, 0.05, 0.2
-#: Numbers of σ from which a difference is one.
+#: Significance of a difference in σ.
 CLEAR_SIGMAS = 4.0
 
 
 def analyse(part: Part) -> CameraCalibrationResult:
-    """Find noise, linearity, factors of settings and flat fields.
+    """Measure noise, linearity, factors of settings and flat fields.
 
     Raises
     ------
     DataError
-        Some unit is missing, or its frames are of no use.
+        Some unit is missing, or its frames are unusable.
     """
     protocol, run = part.protocol, part.run
     region, iso = part_region(part, protocol.card), protocol.camera.iso
@@ -93,31 +93,39 @@ def analyse(part: Part) -> CameraCalibrationResult:
 
 @dataclass(frozen=True, eq=False)
 class CardLevels:
-    """The card in n frames of C channels, row by row the frames of `series`."""
+    """Signal of the card in n frames of C channels.
+
+    Attributes
+    ----------
+    frames
+        Records of the frames.
+    series
+        Signal of each frame in DN/s, row by row.
+    """
 
     frames: tuple[FrameRecord, ...]
     series: Series
 
     @property
     def level_dn(self) -> FloatArray:
-        """(n, C) above dark."""
+        """Signal above dark in DN, shape (n, C)."""
         return self.series.values * self.series.exposure_s[:, np.newaxis]
 
     @property
     def sigma_dn(self) -> FloatArray:
-        """(n, C) of `level_dn`."""
+        """Standard uncertainty of `level_dn` in DN, shape (n, C)."""
         return self.series.sigma * self.series.exposure_s[:, np.newaxis]
 
     @property
     def clipped(self) -> int:
-        """How many frames clip that are not meant to."""
+        """Number of frames that clip, except brackets, which are meant to."""
         rows = zip(self.frames, self.series.usable, strict=True)
         return sum(frame.role != CardFrames.BRACKET and not usable for frame, usable in rows)
 
     def linearity(
         self, iso: float, range_dn: float, saturation_dn: float | None
     ) -> Linearity | None:
-        """From the frames at one ISO."""
+        """Fit the deviation from linearity to the frames at one ISO."""
         rows = self.series.usable & np.array([frame.iso == iso for frame in self.frames])
         stops = [frame.f_number for frame in self.frames]
         known = list(dict.fromkeys(stops))
@@ -126,7 +134,7 @@ class CardLevels:
         return fit_linearity(level, self.sigma_dn, group, range_dn, saturation_dn)
 
     def card_frames(self, roles: Sequence[str], linearity: Linearity | None) -> list[CardFrame]:
-        """What brackets and repeats show, put right for what is not linear."""
+        """Return the light of the card in frames of the roles, corrected for non-linearity."""
         bent = deviation(linearity, self.level_dn)
         straight = self.level_dn * np.exp(-bent)
         used = self.series.usable & (np.abs(bent).max(axis=1) < MOST_BENT)
@@ -149,7 +157,7 @@ def card_levels(
     Raises
     ------
     DataError
-        There are none, or no dark frames at their ISO.
+        There are no lit frames, or no dark frames at their ISO.
     """
     if not lit:
         raise DataError("expected frames of the lit card, got none; resume the run")
@@ -167,12 +175,12 @@ def card_levels(
 def _transfer(
     iso: float, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord], card: Region
 ) -> PhotonTransfer:
-    """Photon transfer at one ISO.
+    """Fit the photon transfer at one ISO.
 
     Raises
     ------
     DataError
-        Too few frames.
+        There are too few frames.
     """
     shortest_s = min((frame.exposure_s for frame in darks if frame.iso == iso), default=0.0)
     dark = [frame for frame in darks if frame.iso == iso and frame.exposure_s == shortest_s]
@@ -184,7 +192,7 @@ def _transfer(
 
 
 def _dark_levels(darks: Sequence[FrameRecord], card: Region) -> FloatArray:
-    """Mean of each channel above black, (channels,)."""
+    """Return the mean of each channel above black in DN, shape (channels,)."""
     measured = [measure(read_raw(frame.path), card) for frame in darks]
     levels = [[channel.mean for channel in one.channels.values()] for one in measured]
     mean: FloatArray = np.mean(levels, axis=0)
@@ -192,7 +200,10 @@ def _dark_levels(darks: Sequence[FrameRecord], card: Region) -> FloatArray:
 
 
 def _saturation(brightest: FrameRecord, card: Region) -> tuple[float, float | None]:
-    """From black to white, and the level above black at which most of the card clips; or None."""
+    """Return the range from black to white and the saturation level above black, in DN.
+
+    The saturation level is None if less than half of the card clips.
+    """
     seen = measure(read_raw(brightest.path), card)
     clips = any(channel.saturated > channel.n / 2 for channel in seen.channels.values())
     return seen.range_dn, seen.range_dn if clips else None

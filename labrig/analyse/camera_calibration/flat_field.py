@@ -1,4 +1,4 @@
-"""The flat field of a lens at one aperture, from frames of an evenly lit card."""
+"""Vignetting of a lens at one aperture, from frames of an evenly lit card."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,24 +15,30 @@ from labrig.results import FittedFlat, FloatArray
 
 #: Blocks across and down the card whose means are fitted.
 BLOCKS = (16, 12)
-#: ρ⁴ takes part if it is so many σ from nothing.
+#: Significance in σ from which the ρ⁴ term is kept.
 EVIDENT_SIGMAS = 4.0
 
 
 def fit_flat(
     frames: Sequence[RawFrame], card: Region, dark_dn: FloatArray, f_number: float | None
 ) -> FittedFlat:
-    """Least squares of A (1 + g·x + c₁ρ² + c₂ρ⁴) to blocks of the card, channel by channel.
+    """Fit A (1 + g·x + c₁ρ² + c₂ρ⁴) to blocks of the card by least squares, channel by channel.
 
     Parameters
     ----------
+    frames
+        Frames of the card.
+    card
+        Region of the card in fractions of the frame.
     dark_dn
-        (channels,) level of the dark above black.
+        Dark level above black in DN, shape (channels,).
+    f_number
+        F-number of the frames; None if the lens has none.
 
     Raises
     ------
     DataError
-        No frames, or the card is not lit.
+        There are no frames, or the card is not lit.
     """
     if not frames:
         raise DataError("expected frames of the lit card, got none")
@@ -50,7 +56,7 @@ def fit_flat(
 
 
 class _Fit(NamedTuple):
-    """Of one channel; `light` of the blocks is over the middle's, the gradient taken off."""
+    """Fit of one channel; `light` is that of the blocks over the centre's, without the gradient."""
 
     falloff: FloatArray
     powers: int
@@ -63,7 +69,14 @@ class _Fit(NamedTuple):
 def _blocks(
     frames: Sequence[RawFrame], card: Region, dark_dn: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Middles in pixels of blocks of the card, (blocks,) each; their light, (blocks, channels)."""
+    """Return the light of blocks of the card.
+
+    Returns
+    -------
+    tuple of ndarray
+        Centres x and y of the blocks in pixels, shape (blocks,), and their light in DN, shape
+        (blocks, channels).
+    """
     left, top, width, height = region_pixels(card, frames[0].width, frames[0].height)
     side = frames[0].cfa_side
     across = _edges(left, width, BLOCKS[0], side)
@@ -80,7 +93,7 @@ def _blocks(
 
 
 def _edges(start: int, length: int, blocks: int, side: int) -> NDArray[np.intp]:
-    """Of blocks that are whole cells of the colour filter, one cell wide at the least."""
+    """Return the edges of blocks of whole cells of the colour filter, one cell wide at least."""
     cells = length // side
     return start + side * np.linspace(0, cells, min(blocks, cells) + 1).round().astype(np.intp)
 

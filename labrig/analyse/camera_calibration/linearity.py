@@ -1,14 +1,14 @@
-"""How far a sensor is from linear, from the colours of one grey card.
+"""Deviation of a sensor from linearity, from the colours of one grey card.
 
 A grey card has one colour. If the sensor were linear the channels of all its photographs would have
 the same ratios, whatever shutter, aperture and lamp did in that frame: all of that is common to the
-channels. The channels stand at different levels, so that a deviation D(level) shows in their
-ratios, free of flicker and drift:
+channels. The channels are at different levels, so that a deviation D(level) changes their ratios,
+free of flicker and drift:
 
     ln s_fc = λ_f + κ_c + δ_c / s_fc + D(s_fc),   D piecewise linear, D(0) = 0,
 
-δ the little by which the dark level that was subtracted is wrong. A deviation that is the same
-power at all levels cannot be seen in this way.
+with δ the error of the subtracted dark level. A deviation that is the same power at all levels is
+not observable in this way.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from labrig.results import FloatArray
 
 #: Knots of D, as fractions of the range up to saturation.
 KNOTS = (0.15, 0.35, 0.55, 0.75, 0.95)
-#: Below this fraction noise of reading is most of a value.
+#: Fraction of the range below which read noise dominates.
 LEAST_FRACTION = 0.005
 
 
@@ -31,18 +31,20 @@ def fit_linearity(
     range_dn: float,
     saturation_dn: float | None,
 ) -> Linearity | None:
-    """D at a few levels; None where the frames cannot tell.
+    """Fit the deviation D at a few levels; None where the frames do not determine it.
 
     Parameters
     ----------
     level_dn, sigma_dn
-        (frames, channels) above dark; NaN where a value is not to be used.
+        Levels above dark and their standard uncertainties in DN, shape (frames, channels); NaN
+        where a value is not to be used.
     group
-        (frames,) what the lens does to the card's colour is the same within a group.
+        Group of each frame, shape (frames,), within which the lens has the same effect on the
+        card's colour.
     range_dn
-        From black to white.
+        Range from black to white in DN.
     saturation_dn
-        To be noted.
+        Saturation level in DN, which is passed on to the result.
     """
     used = np.isfinite(level_dn) & (level_dn > LEAST_FRACTION * range_dn)
     used &= (used.sum(axis=1) > 1)[:, np.newaxis]
@@ -83,7 +85,7 @@ def fit_linearity(
 
 
 def deviation(linearity: Linearity | None, level_dn: FloatArray) -> FloatArray:
-    """D at some levels."""
+    """Return the deviation D at levels in DN; zero without a fit."""
     if linearity is None:
         return np.zeros_like(level_dn)
     return np.interp(level_dn, [0.0, *linearity.level_dn], [0.0, *linearity.deviation])

@@ -1,12 +1,12 @@
 """Gain and read noise of a sensor from pairs of frames of the same light.
 
-The model is that of `labrig.reduce.photon_transfer`; the gain is one over its photons' part. The
-difference of two frames holds no pattern of pixels, card or lens.
+The model is that of `labrig.reduce.photon_transfer`; the gain is the reciprocal of its photons'
+part. The difference of two frames holds no pattern of pixels, card or lens.
 
-Where pixels share charge with their neighbours each one scatters less than its photons do. The
-covariances with the eight next ones make up for it: what one pixel loses its neighbours have (A. C.
-Moore, Z. Ninkov, W. J. Forrest, Optical Engineering 45, 2006). They are always added: to leave them
-out where they are lost in the noise would make a gain more certain than it is.
+Where pixels share charge with their neighbours, each one scatters less than its photons do. The
+covariances with the eight neighbours compensate for it: a pixel's lost charge is in its neighbours
+(A. C. Moore, Z. Ninkov, W. J. Forrest, Optical Engineering 45, 2006). They are always added: a gain
+without those that are lost in the noise would appear more certain than it is.
 """
 
 from collections.abc import Sequence
@@ -20,23 +20,27 @@ from labrig.reduce import ROUNDING_VARIANCE, LinearFrame, NoiseModel, RawFrame, 
 from labrig.region import Region, region_pixels
 from labrig.results import FloatArray, PairScatter, PhotonTransfer
 
-#: Pixels that differ by more standard deviations are hot, or were struck by a cosmic ray.
+#: Standard deviations beyond which a pixel is hot, or was hit by a cosmic ray.
 OUTLIER_SIGMAS = 6.0
-#: A frame that is brighter than so many standard deviations of its pixels is lit.
+#: Brightness of a lit frame in standard deviations of its pixels.
 LIT_SIGMAS = 3.0
-#: More pixels across or down take memory and tell nothing more.
+#: Most pixels across and down; more take memory without more precision.
 MOST_PIXELS = 1024
-#: Half of the eight neighbours; the others see the same.
+#: Offsets of half of the eight neighbours; the others are symmetric.
 _NEIGHBOURS = ((0, 1), (1, -1), (1, 0), (1, 1))
 
 
 def scatter(one: RawFrame, other: RawFrame, region: Region, dark_dn: float) -> PairScatter:
-    """What two frames of one exposure differ by in a region.
+    """Measure the scatter between two frames of one exposure in a region.
 
     Parameters
     ----------
+    one, other
+        The two frames.
+    region
+        Region in fractions of the frame.
     dark_dn
-        Level of the dark above black.
+        Dark level above black in DN.
 
     Raises
     ------
@@ -63,7 +67,7 @@ def scatter(one: RawFrame, other: RawFrame, region: Region, dark_dn: float) -> P
 
 
 def _middle(area: tuple[int, int, int, int]) -> tuple[int, int, int, int]:
-    """Of an area x, y, width, height: as many pixels as tell the noise to 0.2 %."""
+    """Return the middle of an area x, y, width, height, large enough to measure noise to 0.2 %."""
     x, y, width, height = area
     wide, high = min(width, MOST_PIXELS), min(height, MOST_PIXELS)
     return x + (width - wide) // 2, y + (height - high) // 2, wide, high
@@ -90,7 +94,7 @@ def _scatter(difference: FloatArray, level_dn: float) -> PairScatter:
 
 
 def _covariance(values: FloatArray, down: int, right: int) -> float:
-    """With the pixel so far down and to the right."""
+    """Return the covariance with the pixel `down` rows below and `right` columns to the right."""
     rows, columns = values.shape
     shifted = values[down:, max(right, 0) : columns + min(right, 0)]
     unmoved = values[: rows - down, max(-right, 0) : columns - max(right, 0)]
@@ -100,12 +104,12 @@ def _covariance(values: FloatArray, down: int, right: int) -> float:
 def photon_transfer(
     iso: float, lit: Sequence[PairScatter], dark: Sequence[PairScatter]
 ) -> PhotonTransfer:
-    """Gain from the lit pairs, read noise from the dark ones.
+    """Fit the gain to lit pairs, and measure the read noise of dark ones.
 
     Raises
     ------
     DataError
-        Too few pairs, or a variance that does not rise with the light.
+        There are too few pairs, or the variance does not rise with the light.
     """
     if len(lit) < 2 or not dark:
         raise DataError(
@@ -141,7 +145,7 @@ def photon_transfer(
 
 
 def _shared(lit: Sequence[PairScatter]) -> tuple[float, float]:
-    """What neighbours share over all pairs, and its σ if they share nothing."""
+    """Return the neighbours' covariance over a pixel's variance, and its σ if there is none."""
     pixels = np.array([point.pixels for point in lit])
     ratio = np.array(
         [point.neighbours_dn2 / max(point.variance_dn2, ROUNDING_VARIANCE) for point in lit]
@@ -153,7 +157,7 @@ def _shared(lit: Sequence[PairScatter]) -> tuple[float, float]:
 def _line(
     level: FloatArray, variance: FloatArray, dark_variance: float, freedom: FloatArray
 ) -> tuple[float, float, float]:
-    """Slope, its σ and reduced χ² of variance = dark + slope · level."""
+    """Return slope, its σ and reduced χ² of variance = dark + slope · level."""
     expected = variance
     for _ in range(3):
         unsure = np.maximum(expected, ROUNDING_VARIANCE) * np.sqrt(2 / freedom)
@@ -166,7 +170,7 @@ def _line(
 
 
 def pairs_of(frames: Sequence[FrameRecord]) -> list[tuple[FrameRecord, FrameRecord]]:
-    """Frames that follow each other with the same shutter time, two by two."""
+    """Return successive frames of the same exposure time, two by two."""
     found: list[tuple[FrameRecord, FrameRecord]] = []
     waiting: FrameRecord | None = None
     for frame in frames:

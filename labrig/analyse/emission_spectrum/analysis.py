@@ -1,4 +1,4 @@
-"""An emission spectrum, from its frames to Λ* of each patch, and whether it is one at all."""
+"""Analysis of an emission spectrum, from its frames to Λ* of each patch."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -42,15 +42,15 @@ from labrig.results import (
     is_usable,
 )
 
-#: Draws of the spectrum, and of those that are only shown.
+#: Number of draws of the spectrum, and of those that are only shown.
 SAMPLES, FEW_SAMPLES = 400, 60
-#: After another lamp the glow must be so much brighter than what was left of the one before.
+#: Least brightness after another lamp relative to the glow left of the previous charge.
 CHARGED_ANEW = 1.05
 
 
 @dataclass(frozen=True, eq=False)
 class _Charge:
-    """The glow after one charge: its frames, and all of them as one."""
+    """The glow after one charge: its frames, and all of them combined."""
 
     lamp: str
     frames: FilterFrames
@@ -58,17 +58,17 @@ class _Charge:
 
 
 def analyse(part: Part) -> EmissionSpectrumResult:
-    """Find Λ* of every patch, whether it is constant, and whether it depends on the lamp.
+    """Measure Λ* of every patch, and test whether it depends on time and on the lamp.
 
     Raises
     ------
     UsageError
-        No calibrated LVF, no camera curves.
+        There is no calibrated LVF, or there are no camera curves.
     DataError
         No spectrum is complete, frames are damaged, nothing glows in them, or no patch lies below
         the filter.
     FitError
-        Too much clips.
+        Too many values clip.
     """
     intact = intact_frames(part.run, part.overrides, SpectrumFrames.GLOW)
     frames, stray = without_stray_light(intact, part.inputs.blank)
@@ -103,7 +103,7 @@ def _of_patch(
     *,
     white: bool,
 ) -> tuple[PatchSpectrum, list[str]]:
-    """The patch's spectrum, and warnings."""
+    """Return the patch's spectrum, and warnings."""
     model, warnings = with_white_reference(
         model, part, reduction.of_unit("white") if white else None
     )
@@ -153,7 +153,7 @@ def _of_patch(
 def _charges(
     reduction: PatchReduction, frames: Sequence[SeriesFrame]
 ) -> tuple[list[_Charge], list[str]]:
-    """Those after which something glows, and a warning for each of the others.
+    """Return the charges after which something glows, and a warning for each of the others.
 
     Raises
     ------
@@ -192,7 +192,7 @@ def _differences(found: PatchSpectrum) -> Iterator[str]:
 
 
 def _not_charged(charges: Sequence[_Charge]) -> Iterator[str]:
-    """Lamps after which the glow went on fading as if they had not been lit."""
+    """Warn of lamps after which the glow continued to fade as if they had not been lit."""
     for before, after in pairwise(charges):
         seen = np.isfinite(before.combined.value) & np.isfinite(after.combined.value)
         left = before.combined.value[seen] * before.combined.brightness[-1]

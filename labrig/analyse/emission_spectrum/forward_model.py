@@ -1,8 +1,8 @@
-"""What a spectrum comes to in a frame through the LVF: filter, camera curves, white reference.
+"""Forward model of a frame through the LVF: filter, camera curves, white reference.
 
-A camera's curves from another laboratory are off by some per cent, and so is every spectrum found
-with them. A grey card under a known lamp, seen through the same filter, shows by how much in every
-position and channel: the errors that the model may have are known ones from then on.
+Camera curves from another laboratory are off by some per cent, and so is every spectrum obtained
+with them. A grey card under a known lamp, seen through the same filter, measures the deviation in
+every position and channel, and constrains the model's errors.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,33 +30,33 @@ from labrig.reduce import LinearFrame, RawFrame, SeriesFrame, read_raw
 from labrig.region import Region
 from labrig.results import FilterFrames, FloatArray
 
-#: From where to where the holder is read, in heights of the strip from its middle; the filter's own
+#: Range in which the holder is read, in heights of the strip from its middle; the filter's own
 #: blurred edges end at 0.7.
 HOLDER = (0.8, 1.1)
-#: Of the spectrum fitted: finer than the filter's 25 nm, and beyond the grid that is told.
+#: Knots of the fitted spectrum: finer than the filter's 25 nm, and beyond the grid of results.
 KNOTS_NM: FloatArray = np.arange(380.0, 721.0, 5.0)
-#: What is not known of a lamp's spectrum whose file says nothing, relative.
+#: Relative uncertainty of a lamp's spectrum whose file has none.
 LAMP_SIGMA = 0.01
-#: How bright the picture is may be anything.
+#: Prior σ of the frame's relative brightness, uninformative.
 ANY_BRIGHTNESS = 1e3
 
 
 @dataclass(frozen=True, eq=False)
 class ForwardModel:
-    """From the spectrum of one patch to the values of a frame.
+    """Model of a frame's values by the spectrum of one patch.
 
     Attributes
     ----------
     slices, holder
-        Where in the frame the filter is read, and where its opaque holder is seen beside it.
+        Regions in which the filter is read, and those of its opaque holder beside it.
     lvfs
         The filter at the middle of each slice's own pixels, for every channel.
     camera
-        Its curves.
+        Curves of the camera.
     system
-        From a spectrum to the values read, and how that may be wrong.
+        Linear model of the values by a spectrum, and its error modes.
     white_reference
-        Whether a grey card under the known lamp told what the curves are off by.
+        Whether the curves were corrected by a grey card under the known lamp.
     """
 
     slices: Mapping[str, Region]
@@ -68,11 +68,11 @@ class ForwardModel:
 
     @property
     def centre_nm(self) -> FloatArray:
-        """(positions · channels,) of the band in which each value is read."""
+        """Centre of the band in which each value is read in nm, shape (positions · channels,)."""
         return np.stack([lvf.bands.centre_nm for lvf in self.lvfs], axis=1).ravel()
 
     def expected_of(self, light: Spectrum) -> FloatArray:
-        """(positions · channels,) what a light comes to."""
+        """Return the values of a light by the model, shape (positions · channels,)."""
         columns = [
             seen_through(lvf, one, light)[:, 0]
             for lvf, one in zip(self.lvfs, _channels(self.camera), strict=True)
@@ -83,17 +83,19 @@ class ForwardModel:
 def forward_models(
     part: Part, frame: SeriesFrame
 ) -> tuple[dict[StripPatch, ForwardModel], tuple[str, ...]]:
-    """The model of every patch of a part; and why a patch has none, a line each.
+    """Return the model of every patch of a part, and the reasons for patches without one.
 
     Parameters
     ----------
+    part
+        Part of a run.
     frame
-        One of the part's: tells the camera's pixels and channels.
+        Any of the part's frames, for the camera's pixels and channels.
 
     Raises
     ------
     UsageError
-        No LVF calibrated for this place, or no camera curves.
+        There is no LVF calibrated for this place, or there are no camera curves.
     DataError
         No patch lies below the filter.
     """
@@ -119,12 +121,12 @@ def forward_models(
 def with_white_reference(
     model: ForwardModel, part: Part, white: FilterFrames | None
 ) -> tuple[ForwardModel, tuple[str, ...]]:
-    """The model after frames of the grey card, if there are any; and warnings.
+    """Condition the model on frames of the grey card, if there are any; return it with warnings.
 
     Raises
     ------
     UsageError
-        The files of lamp or grey card are no good.
+        The files of lamp or grey card are malformed.
     """
     if white is None:
         return model, ()
@@ -151,19 +153,22 @@ def conditioned_on_white(
     light: Spectrum,
     expected: FloatArray,
 ) -> SpectralSystem:
-    """The system after a picture of a known light.
+    """Condition the system on a frame of a known light.
 
     With value = g (expected + Σ_k z_k modes_k · light) + noise, z and g normal, this is the mean
-    and covariance of z given the picture.
+    and covariance of z given the frame.
 
     Parameters
     ----------
+    system
+        Linear model with error modes.
     value, sigma
-        (m,) of the picture, in any unit; NaN where it clips.
+        Values of the frame in any unit and their standard uncertainties, shape (m,); NaN where it
+        clips.
     light
-        What was photographed.
+        Spectrum of the light that was photographed.
     expected
-        (m,) what the system's own curves make of it, wavelengths beyond its knots included.
+        Values by the system's own curves, wavelengths beyond its knots included, shape (m,).
     """
     known = np.isfinite(value) & np.isfinite(sigma)
     gain = float(expected[known] @ value[known] / (expected[known] @ expected[known]))
@@ -183,7 +188,7 @@ def conditioned_on_white(
 
 
 def _holder(strip: Strip) -> dict[str, Region]:
-    """Dark stripes above and below the strip, as far as the frame reaches."""
+    """Return dark stripes above and below the strip, as far as they lie in the frame."""
     (left, left_y), (right, right_y) = strip.left, strip.right
     upper, lower = min(left_y, right_y), max(left_y, right_y)
     near, far = (fraction * strip.height for fraction in HOLDER)
@@ -196,7 +201,7 @@ def _holder(strip: Strip) -> dict[str, Region]:
 
 
 def _positions(raw: RawFrame, strip: Strip, slices: Slices) -> FloatArray:
-    """Middle of each channel's own pixels in every slice, (channels, positions).
+    """Return the middle of each channel's own pixels in every slice, shape (channels, positions).
 
     Pixels of one colour are two apart: where slices are few pixels wide, that is some nanometres.
     """
@@ -208,7 +213,7 @@ def _positions(raw: RawFrame, strip: Strip, slices: Slices) -> FloatArray:
 
 
 def _system(lvfs: Sequence[Lvf], camera: CameraResponse) -> SpectralSystem:
-    """The system whose channels each see the filter in a place of their own.
+    """Return the system whose channels each see the filter in a place of their own.
 
     An error of the filter is common to the channels of a slice, one of a curve is the channel's.
     """
@@ -237,7 +242,7 @@ def _system(lvfs: Sequence[Lvf], camera: CameraResponse) -> SpectralSystem:
 
 
 def _channels(camera: CameraResponse) -> list[CameraResponse]:
-    """Each channel as a camera of its own."""
+    """Return each channel as a camera of its own."""
     return [
         CameraResponse(camera.name, camera.wavelength_nm, column[:, np.newaxis], (name,))
         for column, name in zip(camera.sensitivity.T, camera.channels, strict=True)
@@ -245,7 +250,7 @@ def _channels(camera: CameraResponse) -> list[CameraResponse]:
 
 
 def _light(lamp: Spectrum, card: Transmittance) -> Spectrum:
-    """The lamp's light as the card throws it back."""
+    """Return the spectrum of the lamp's light that the card reflects."""
     inside = (card.wavelength_nm > lamp.wavelength_nm[0]) & (
         card.wavelength_nm < lamp.wavelength_nm[-1]
     )
@@ -254,7 +259,7 @@ def _light(lamp: Spectrum, card: Transmittance) -> Spectrum:
 
 
 def _camera(part: Part, channels: tuple[str, ...]) -> CameraResponse:
-    """Its curves, in the order of a frame's channels."""
+    """Return the curves of the camera, in the order of a frame's channels."""
     if len(channels) == 1:
         name = part.overrides.camera or part.rig.optics.camera
         if name is not None:

@@ -1,8 +1,8 @@
-"""From frames through the LVF to DN/s at its places: noise, dark and fall-off.
+"""Reduction of frames through the LVF to DN/s at its places: noise, dark and vignetting.
 
-A place on a small sensor is a few pixels wide, too few to tell their noise, and its surroundings
+A place on a small sensor is a few pixels wide, too few to measure their noise, and its surroundings
 are brighter or darker. But all pixels of a channel are alike, so one photon transfer holds for all.
-Pairs of successive frames, one scaled to the other, tell it: what stands still cancels.
+It is measured on pairs of successive frames, one scaled to the other: everything static cancels.
 """
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -34,16 +34,16 @@ from labrig.results import FilterFrames, FloatArray, is_usable
 
 Patch = TypeVar("Patch", bound=Hashable)
 
-#: Rounds in which the weights follow the line.
+#: Iterations of the weights by the line.
 ROUNDS = 8
-#: A scatter so many times what it should be is none of noise.
+#: Scatter relative to the expected one from which it is not noise.
 OUTLIER = 10.0
-#: Strips from which a place tells its noise.
+#: Fewest strips that determine the noise of a place.
 FEWEST_STRIPS = 2
 
 
 def sigma_dn(noise: Sequence[NoiseModel], level_dn: FloatArray, pixels: FloatArray) -> FloatArray:
-    """σ of means (…, C) over so many pixels (…, C) by the noise of each channel's pixels."""
+    """Return σ of means (…, C) over so many pixels (…, C) by the noise of each channel's pixels."""
     variance = [one.variance_dn2(level_dn[..., number]) for number, one in enumerate(noise)]
     least = np.maximum(np.stack(variance, axis=-1), ROUNDING_VARIANCE)
     return np.asarray(np.sqrt(least / pixels))
@@ -51,14 +51,21 @@ def sigma_dn(noise: Sequence[NoiseModel], level_dn: FloatArray, pixels: FloatArr
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPlaces:
-    """One frame of `width` × `height` pixels in all places.
+    """Measurement of one frame in p places.
 
     Attributes
     ----------
-    level_dn, pixels
-        (p, C) means above black, NaN where a place clips; over so many pixels.
+    frame
+        The frame.
+    width, height
+        Size of the frame in pixels.
+    level_dn
+        Means above black in DN, shape (p, C); NaN where a place clips.
+    pixels
+        Number of pixels of each mean, shape (p, C).
     strips
-        (p, C, s) means of strips over the width of a place, less its own; NaN where it has fewer.
+        Deviations of strips across a place from its mean in DN, shape (p, C, s); NaN where it has
+        fewer strips.
     """
 
     frame: SeriesFrame
@@ -69,7 +76,7 @@ class MeasuredPlaces:
     strips: FloatArray
 
     def take(self, places: Sequence[int]) -> "MeasuredPlaces":
-        """Some of the places."""
+        """Return the measurement of the given places."""
         some = list(places)
         return replace(
             self, level_dn=self.level_dn[some], pixels=self.pixels[some], strips=self.strips[some]
@@ -83,17 +90,17 @@ class PatchReduction:
     Attributes
     ----------
     frames
-        As measured.
+        Measurement of each frame.
     slices
-        The places.
+        Regions of the places.
     holder
-        Dark parts of the frame beside the filter, measured after the places.
+        Dark regions of the frame beside the filter, measured after the places.
     camera
-        Its calibration, where there is one.
+        Calibration of the camera; None if there is none.
     noise
-        Of its pixels.
+        Noise of the pixels of each channel.
     dark
-        Level of each place in the dark.
+        Dark level of each place.
     """
 
     frames: Sequence[MeasuredPlaces]
@@ -104,7 +111,7 @@ class PatchReduction:
     dark: Sequence[DarkModel]
 
     def of_unit(self, unit: str) -> FilterFrames:
-        """The frames of a unit, those a person excludes left out."""
+        """Return the frames of a unit, without those the user excludes."""
         rows = [one for one in self.frames if one.frame.unit == unit and is_usable(one.frame.flag)]
         if not rows:
             raise DataError(f"expected frames of {unit}, got none that are not excluded")
@@ -114,7 +121,7 @@ class PatchReduction:
         return FilterFrames(np.array(middles_s), value, sigma, dark_sigma)
 
     def _reduced(self, one: MeasuredPlaces) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Value, σ and the σ of what all have in common, each (places · channels,) in DN/s."""
+        """Return signal, σ and common-mode σ of a frame in DN/s, (places · channels,) each."""
         frame, camera, exposure_s = one.frame, self.camera, one.frame.exposure_s
         levels = [model.dark_level(exposure_s) for model in self.dark]
         level, known = (np.array(column) for column in zip(*levels, strict=True))
@@ -149,13 +156,14 @@ def reduce_places(
     camera: CameraFile | None,
     holder: Mapping[str, Region] | None = None,
 ) -> dict[Patch, PatchReduction]:
-    """Read every frame once, in every place of each patch, and in the holder, whose light is
-    subtracted.
+    """Read every frame once, in every place of each patch.
+
+    The light of the holder is subtracted.
 
     Raises
     ------
     DataError
-        No dark frames, or some at another ISO.
+        There are no dark frames, or some are at another ISO.
     """
     isos = {frame.iso for frame in (*frames, *darks)}
     if not darks or len(isos) > 1:
@@ -210,13 +218,19 @@ def _reduction(
 def _measured_frames(
     frames: Sequence[SeriesFrame], places: Sequence[Region], darks: Sequence[SeriesFrame]
 ) -> list[MeasuredPlaces]:
-    """Every frame in every place, hot pixels left out."""
+    """Measure every frame in every place, without hot pixels."""
     hot = hot_pixels_of(darks)
     return [_measured(frame, read_raw(frame.path), places, hot) for frame in frames]
 
 
 def pixel_noise(groups: Sequence[Sequence[MeasuredPlaces]]) -> list[NoiseModel]:
-    """Each channel's, from groups of frames that show the same, brighter or darker, by time."""
+    """Fit the noise of each channel's pixels.
+
+    Parameters
+    ----------
+    groups
+        Groups of frames by time that show one scene at different brightness.
+    """
     levels, scatters = zip(*(pair for group in groups for pair in _pairs(group)), strict=True)
     level, scatter = np.concatenate(levels), np.concatenate(scatters)
     known = np.isfinite(scatter)
@@ -238,7 +252,7 @@ def _measured(
 
 
 def _pairs(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Level that a pair's noise belongs to and its variance per pixel, each (p, C)."""
+    """Iterate over a pair's level in DN and the variance per pixel at it in DN², (p, C) each."""
     for one, other in pairwise(group):
         # Brought to the same brightness all over, as nearly as the noisiest place allows.
         a, b = np.nan_to_num(one.level_dn), np.nan_to_num(other.level_dn)
@@ -257,7 +271,7 @@ def _pairs(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray, FloatA
 
 
 def _line(level: FloatArray, scatter: FloatArray) -> NoiseModel:
-    """Reading and photons through scatters, each as uncertain as it is large."""
+    """Fit read and photon noise to scatters whose uncertainty is proportional to their size."""
     level = np.maximum(level, 0.0)
     terms = variance_terms(level)[:, :2]
     # Medians begin, so that a hot pixel or a cosmic ray cannot.

@@ -1,4 +1,4 @@
-"""An excitation run, from its frames to rates and a material of every patch."""
+"""Analysis of an excitation run, from its frames to rates and a material of every patch."""
 
 from collections.abc import Sequence
 
@@ -26,11 +26,11 @@ from labrig.results import (
     PatchExcitation,
 )
 
-#: Of a lamp's brightness from charge to charge.
+#: Relative scatter of a lamp's brightness from charge to charge.
 LAMP = 0.01
-#: What a lamp lacks that was just switched on, where nobody has measured it.
+#: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
-#: No dark level is known better, in DN/s.
+#: Least standard uncertainty of a dark level in DN/s.
 LEAST_DARK = 1e-3
 
 
@@ -40,9 +40,9 @@ def analyse(part: Part) -> ExcitationResult:
     Raises
     ------
     DataError
-        Nothing is known of the light on the sample, or charges are missing.
+        The light on the sample is unknown, or charges are missing.
     FitError
-        Nothing glows, or what glows cannot be fitted.
+        Nothing glows, or the glow cannot be fitted.
     """
     irradiance, fade, blank = part.inputs.irradiance, part.inputs.fade, part.inputs.blank
     if irradiance is None:
@@ -73,7 +73,7 @@ def _of_patch(
     irradiance: IrradianceFile,
     warming: Warming,
 ) -> tuple[PatchExcitation, Sequence[str]]:
-    """The patch's excitation, and warnings."""
+    """Return the patch's excitation, and warnings."""
     decay = fit_series(charging.whole, _states(part, patch))
     dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), LEAST_DARK).tolist())
     uncertain = RelativeSigmas(
@@ -81,7 +81,7 @@ def _of_patch(
         lamp=LAMP,
         cold=warming.deficit_sigma,
         offset=dark,
-        # The sensor warms and cools over hours of long exposures, more than dark frames tell.
+        # The sensor warms and cools over hours of long exposures, more than dark frames show.
         common_mode=dark,
         scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
@@ -109,7 +109,7 @@ def _of_patch(
 
 
 def _states(part: Part, patch: StripPatch) -> int | None:
-    """As many as are asked for, or as a decay of this patch had; None chooses."""
+    """Return the requested number of states, or that of an earlier decay of this patch; or None."""
     asked = part.protocol.states
     states = part.overrides.states or (None if asked == "auto" else asked)
     if states is None and (known := patch.own(part.inputs.decays)) is not None:

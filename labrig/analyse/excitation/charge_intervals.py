@@ -1,4 +1,4 @@
-"""When the lamp shone on the sample, and which charge every photograph of the glow belongs to."""
+"""Intervals in which the lamp charged the sample, and the charge before every photograph."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,22 +11,22 @@ from labrig.errors import DataError
 from labrig.protocols.excitation import ExcitationFrames, UnitKind
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord
 
-#: Frames that show the glow after a charge; those of a metering are exposed too long or too short.
+#: Roles of frames of the glow after a charge; metering frames are exposed too long or too short.
 GLOWING = (*ExcitationFrames, FrameRole.REST)
 
 
 @dataclass(frozen=True)
 class ChargeInterval:
-    """When a unit charged, in seconds since 1970.
+    """Interval in which a unit charged, in seconds since 1970.
 
     Attributes
     ----------
     unit
-        Its name.
+        Name of the unit.
     on_s, off_s
-        When the lamp was switched.
+        Times at which the lamp was switched on and off.
     cold
-        Part of what a cold lamp lacks that it lacked in this charge on average, 0 to 1.
+        Mean warm-up deficit during this charge as a fraction of a cold lamp's, 0 to 1.
     """
 
     unit: str
@@ -36,22 +36,22 @@ class ChargeInterval:
 
     @property
     def is_direct(self) -> bool:
-        """Whether it charged by the lamp itself."""
+        """Whether the lamp charged directly, without the filter."""
         return UnitKind.DIRECT.has(self.unit)
 
 
 @dataclass(frozen=True)
 class ChargeFrames:
-    """The charges, by time, and the photographs after them.
+    """Charges by time, and the photographs after them.
 
     Attributes
     ----------
     intervals
         The charges.
     charge_of
-        Photographs by time, each with the charge that it belongs to.
+        Charge before each photograph, by time.
     left_out
-        What to say of photographs that begin before the bench is dark.
+        Warnings about photographs that begin before the bench is dark.
     """
 
     intervals: Sequence[ChargeInterval]
@@ -60,29 +60,35 @@ class ChargeFrames:
 
     @property
     def zero_s(self) -> float:
-        """When the first charge began; from there times count."""
+        """Begin of the first charge in seconds since 1970, from which times count."""
         return self.intervals[0].on_s
 
     def after(self, one: ChargeInterval) -> list[FrameRecord]:
-        """The photographs of one charge."""
+        """Return the photographs after one charge."""
         return [frame for frame, charge in self.charge_of.items() if charge is one]
 
 
 def charge_frames(
     run: RunRecord, overrides: Overrides, time_constant_s: float, blank: BlankFile | None = None
 ) -> ChargeFrames:
-    """What a run says; photographs that begin before the bench is dark, by its blank, left out.
+    """Return a run's charges and photographs, without those before its blank is clean.
 
     Parameters
     ----------
+    run
+        A recorded run.
+    overrides
+        The user's settings.
     time_constant_s
-        Time constant with which the lamp's housing warms and cools.
+        Time constant in seconds with which the lamp's housing warms and cools.
+    blank
+        Stray light of the bench; None if it was not measured.
 
     Raises
     ------
     DataError
-        There are no charges through the filter, or none without it, or no photographs; or the
-        blank never became clean.
+        There are no charges through the filter, or none without it, or no photographs; or the blank
+        never became clean.
     """
     units = (_interval(attempt) for attempt in run.completed().values())
     lit = sorted((one for one in units if one is not None), key=lambda one: one.on_s)
@@ -115,7 +121,10 @@ def _cleaned(
 def with_warmth(
     intervals: Sequence[ChargeInterval], time_constant_s: float
 ) -> list[ChargeInterval]:
-    """By Newton's law: cold before the first charge, warmer in each one, cooler after it."""
+    """Set the warm-up deficit of each charge by Newton's law.
+
+    The lamp is cold before the first charge, warms in each one and cools after it.
+    """
     found: list[ChargeInterval] = []
     lacking, since_s = 1.0, 0.0
     for one in intervals:
@@ -140,7 +149,10 @@ def _interval(attempt: Attempt) -> ChargeInterval | None:
 def _interval_before(
     intervals: Sequence[ChargeInterval], frame: FrameRecord
 ) -> ChargeInterval | None:
-    """The last one; None if there was none in the same arrangement of filter and lamp."""
+    """Return the last charge before a frame.
+
+    It is None if there was none, or none in the same arrangement of filter and lamp.
+    """
     before = [one for one in intervals if one.off_s < frame.start_time]
     if not before or before[-1].is_direct is not UnitKind.DIRECT.has(frame.unit):
         return None

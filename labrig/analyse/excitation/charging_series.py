@@ -17,29 +17,31 @@ from labrig.reduce import LinearFrame, RawFrame, read_raw, reduce_patches
 from labrig.region import Region
 from labrig.results import BoolArray, Charge, ChargingSeries, FloatArray, PatchCharging, Series
 
-#: All of the strip, from which the rates to start with are taken.
+#: Name of the region around all sites, from which the initial rates are taken.
 WHOLE = "whole strip"
-#: Of a series whose values are still to come.
+#: Placeholder for the values of a series.
 NOTHING: FloatArray = np.empty((0, 0, 0))
 
 
 def patch_chargings(
     part: Part, irradiance: IrradianceFile, warming: Warming
 ) -> tuple[dict[StripPatch, PatchCharging], tuple[str, ...]]:
-    """Read and reduce all frames of the run: what each patch shows, and what to say of the rest.
+    """Read and reduce all frames of the run to the charging of each patch, and warnings.
 
     Parameters
     ----------
+    part
+        Part of a run.
     irradiance
-        On the sample.
+        Irradiance on the sample.
     warming
-        What the lamp lacks while its housing is cold.
+        Warm-up deficit of the lamp.
 
     Raises
     ------
     DataError
-        Charges or frames are missing, no patch lies below the filter, or the camera was not this
-        one.
+        Charges or frames are missing, no patch lies below the filter, or the camera is not the
+        calibrated one.
     """
     known, overrides, protocol = part.inputs, part.overrides, part.protocol
     frames = charge_frames(part.run, overrides, warming.time_constant_s, known.blank)
@@ -109,18 +111,24 @@ def _centred(
     strip: Strip,
     raw: RawFrame,
 ) -> FloatArray:
-    """Values (n, P, C) at the positions (P,) along the strip, by the slope to the neighbours.
+    """Interpolate values (n, P, C) to the positions (P,) along the strip, by the neighbours' slope.
 
-    A slice consists of whole pixels, and of a Bayer cell's colours some lie left of others: what a
-    channel shows of a slice belongs to a place up to a pixel away from the slice's middle. Along
+    A slice consists of whole pixels, and some of a Bayer cell's colours lie left of others: a
+    channel's value of a slice belongs to a place up to a pixel away from the slice's middle. Along
     the filter the glow is steep, so that a pixel matters where slices are a few pixels wide.
 
     Parameters
     ----------
+    values
+        Values of the slices.
     slices
-        Where the values were measured.
+        Regions in which the values were measured.
+    position
+        Positions along the strip, 0 at the blue end to 1 at the red end.
+    strip
+        Place of the strip.
     raw
-        Any frame: its size and colours.
+        Any frame, for its size and colours.
     """
     along = position if strip.rising else 1 - position
     left, right = strip.left[0] * raw.width, strip.right[0] * raw.width
@@ -141,7 +149,7 @@ def _evened(
     whole: Series,
     frames: ChargeFrames,
 ) -> PatchCharging:
-    """One patch: (n, P, C) of all photographs, brought into the two series."""
+    """Divide one patch's values (n, P, C) of all photographs by the evenness, into two series."""
     is_direct = np.array([one.is_direct for one in frames.charge_of.values()])
     evenness = _evenness(values[is_direct], sigma[is_direct])
     values, sigma = values / evenness[:, None], sigma / evenness[:, None]
@@ -171,17 +179,17 @@ def _charge(
 
 
 def _key(patch: StripPatch, name: str) -> str:
-    """Of a place among those of all patches."""
+    """Return the name of a place among those of all patches."""
     return f"{patch.folder} {name}".strip()
 
 
 def _blanked(series: Series, numbers: FloatArray) -> FloatArray:
-    """NaN where a row must not be used."""
+    """Replace numbers by NaN in rows that must not be used."""
     return np.where(series.usable[:, None], numbers, np.nan)
 
 
 def _around(sites: Slices) -> Region:
-    """The upright rectangle around all sites."""
+    """Return the upright rectangle around all sites."""
     left, top = (min(region[k] for region in sites.values()) for k in (0, 1))
     right = max(region[0] + region[2] for region in sites.values())
     bottom = max(region[1] + region[3] for region in sites.values())
@@ -189,7 +197,7 @@ def _around(sites: Slices) -> Region:
 
 
 def _evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:
-    """(P,) how bright every place is after the same light, 1 on average; all frames together."""
+    """Return the brightness of every place after the same light, 1 on average, shape (P,)."""
     weight = np.where(np.isfinite(values) & (sigma > 0), 1 / np.square(sigma), 0.0)
     known = weight.min(axis=1, keepdims=True) > 0
     frame = np.where(known, np.nanmean(np.where(known, values, 0.0), axis=1, keepdims=True), 0.0)

@@ -1,4 +1,4 @@
-"""Whether what charges through the filter tell predicts charging by the lamp itself."""
+"""Closure: charging by the lamp itself, predicted from charges through the filter."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,7 +9,7 @@ from labrig.calibration import IrradianceFile
 from labrig.fit.excitation import Charging, RelativeSigmas, closure, levels_at_off
 from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray, PatchCharging
 
-#: Of σ, for derivatives.
+#: Step of the derivatives as a fraction of σ.
 STEP = 0.01
 
 
@@ -19,15 +19,21 @@ def predicted_charging(
     uncertain: RelativeSigmas,
     fit_of: Callable[[PatchCharging], FittedExcitation],
 ) -> Closure | None:
-    """Charging by the lamp itself as predicted from charges through the filter.
+    """Predict charging by the lamp itself from charges through the filter.
 
-    The longest charge by the lamp itself stays in the fit, since it tells how far the sample is
-    charged; the shorter ones are predicted. With fewer than two of those there is no test.
+    The longest charge by the lamp itself stays in the fit, since it determines the level of charge;
+    the shorter ones are predicted. With fewer than two of those there is no test.
 
     Parameters
     ----------
+    charging
+        Charging of a patch.
+    irradiance
+        Irradiance on the sample.
+    uncertain
+        Relative uncertainties of the measurement.
     fit_of
-        Fits what is left without the charges that are predicted.
+        Function that fits the charging without the charges that are predicted.
     """
     direct = charging.direct
     lengths = np.array([charge.off_s - charge.on_s for charge in direct.charges])
@@ -58,7 +64,7 @@ def predicted_charging(
     left = _left(direct, fit)[list(first)]
 
     def predicted(theta: FloatArray) -> FloatArray:
-        """By k_r, amplitudes, k_e and ln of the light."""
+        """Return the levels by k_r, amplitudes, k_e and ln of the light."""
         n = len(fit.states)
         light = np.array(irradiance.direct) * np.exp(theta[-1])
         sample = Charging(theta[2 * n : -1].reshape(n, -1), theta[:n], theta[n : 2 * n], light)
@@ -94,7 +100,7 @@ def predicted_charging(
 
 
 def _at_full_light(direct: ChargingSeries, fit: FittedExcitation, steady: FloatArray) -> FloatArray:
-    """(K,) s: how long the charges would have lasted by the steady lamp, for what they charge."""
+    """Return the durations of the K charges in seconds, corrected for the lamp's transients."""
     weight = fit.k_e().sum(axis=0) * steady
     weight /= weight.sum()
     lost_s = direct.rise.duration_s @ (1 - direct.rise.fraction @ weight)
@@ -105,7 +111,7 @@ def _at_full_light(direct: ChargingSeries, fit: FittedExcitation, steady: FloatA
 
 
 def _left(direct: ChargingSeries, fit: FittedExcitation) -> FloatArray:
-    """(K, N) concentrations that each charge finds, of the one before it."""
+    """Return the concentrations left of the previous charge at the begin of each charge, (K, N)."""
     k_r = np.array([state.k_r_per_s for state in fit.states])
     ended = levels_at_off(direct, k_r, fit.k_e()).value.mean(axis=1)
     on_s, off_s = (
@@ -120,6 +126,6 @@ def _left(direct: ChargingSeries, fit: FittedExcitation) -> FloatArray:
 def _slopes(
     of: Callable[[FloatArray], FloatArray], theta: FloatArray, unsure: FloatArray
 ) -> FloatArray:
-    """(θ, n), by differences of a part of each one's σ."""
+    """Return the slopes (θ, n), by differences of a fraction of each parameter's σ."""
     steps = np.diag(STEP * np.maximum(unsure, 1e-12))
     return np.array([(of(theta + step) - of(theta - step)) / (2 * step.sum()) for step in steps])

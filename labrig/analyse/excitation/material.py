@@ -1,4 +1,4 @@
-"""The material that an excitation, with the emission spectrum, says there is."""
+"""Material from a fitted excitation and the emission spectrum."""
 
 from importlib.metadata import version
 
@@ -23,7 +23,7 @@ def excited_material(
     run: str,
     frames: tuple[str, ...],
 ) -> Material:
-    """Everything the fit knows; Λ only with a spectrum."""
+    """Return the material of a fitted excitation, with Λ if there is a spectrum."""
     at_off = fit.at_off[-1]
     bands = np.array(irradiance.bands_nm)
     return Material(
@@ -57,7 +57,7 @@ def _reradiation(
     spectrum: EmissionSpectrum | None,
     bands_nm: FloatArray,
 ) -> dict[str, tuple[float, ...]]:
-    """Λ of every band: A_i / k_r,i times the spectrum's mean there, errors of all three."""
+    """Return Λ and its σ by band: A_i / k_r,i times the spectrum's mean, with all their errors."""
     if spectrum is None:
         return {}
     states = len(fit.states)

@@ -1,4 +1,4 @@
-"""A fade, from its frames to its result."""
+"""Analysis of a fade run, from its frames to its result."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -26,27 +26,28 @@ from labrig.region import Region
 from labrig.results import FadeResult, FloatArray, LampChange, WarmingLight
 from labrig.written_numbers import plus_minus
 
-#: Of a photograph's light where no camera file says.
+#: Relative flicker of a photograph without a camera file.
 TYPICAL_FLICKER = 0.007
-#: Wavelengths on which curves are integrated, nm.
+#: Step in nm of the wavelengths on which curves are integrated.
 STEP_NM = 10.0
-#: Times of the table, denser at first; until the slowest band is so near to its end.
+#: Number of times of the table, exponent by which they are denser at first, fraction of the light
+#: at which the slowest band has reached its end, and longest time in seconds.
 TIMES, DENSER = 81, 1.5
 GONE = 1e-4
 LONGEST_S = 5.0
-#: By which a relay may close sooner or later than it opens.
+#: Standard deviation in seconds between the delays of a relay's closing and opening.
 RELAY_S = 1e-3
-#: χ² per degree of freedom beyond which the lamp is no glowing body.
+#: χ² per degree of freedom beyond which the lamp is no black-body emitter.
 BAD_CHI2 = 3.0
 
 
 def analyse(part: Part) -> FadeResult:
-    """Find how the lamp goes dark, comes on and warms.
+    """Measure the lamp's turn-off, turn-on and warm-up transients.
 
     Raises
     ------
     DataError, FitError
-        The photographs show no lamp that is switched.
+        The photographs show no switched lamp.
     UsageError
         The rig file does not name the curves of lamp and camera.
     """
@@ -112,7 +113,7 @@ def _places(
     lamp: Spectrum,
     nm: FloatArray,
 ) -> tuple[Mapping[str, Region], FloatArray]:
-    """Regions, and what each channel of each of them sees of the steady lamp at `nm`."""
+    """Return regions, and the weights of the steady lamp at `nm` in each of their channels."""
     seen = (lamp.at(nm)[:, np.newaxis] * curves.at(nm)).T
     if not part.protocol.through_lvf:
         return {"card": part_region(part, part.protocol.card)}, _normalised(seen)
@@ -134,7 +135,7 @@ def _normalised(weights: FloatArray) -> FloatArray:
 
 
 def _band_weights(edges_nm: FloatArray, lamp: Spectrum, nm: FloatArray) -> FloatArray:
-    """(bands, wavelengths) the lamp's light in each band; evenly where it has none."""
+    """Return the lamp's light in each band, (bands, wavelengths); uniform where it has none."""
     middles = (edges_nm[1:] + edges_nm[:-1]) / 2
     inside = (nm >= edges_nm[:-1, np.newaxis]) & (nm <= edges_nm[1:, np.newaxis])
     for row, middle in enumerate(middles):
@@ -159,7 +160,7 @@ def _table(change: FittedChange, bands: FloatArray, nm: FloatArray) -> Change:
 
 
 def _over_at(change: FittedChange, bands: FloatArray, nm: FloatArray) -> float:
-    """When all bands are as good as at their end."""
+    """Return the time in seconds at which all bands have reached their end."""
     t_s = np.linspace(0, LONGEST_S, 2001)
     fraction, _ = change.in_bands(bands, nm, t_s)
     left = 1 - fraction if change.rises else fraction

@@ -1,4 +1,4 @@
-"""What photographs of the card hold after a switch of the lamp, and while its housing warms."""
+"""Photographs of the card after a switch of the lamp, and while its housing warms."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -15,9 +15,9 @@ from labrig.reduce import reduce_patches
 from labrig.region import Region
 from labrig.results import FloatArray, Series, SwitchedFrames, WarmingLight
 
-#: Of a change, fewer tell nothing.
+#: Fewest photographs of a transient.
 FEWEST = 6
-#: Time constants that a housing may have.
+#: Time constants of a housing in seconds that are compared.
 TAU_S: FloatArray = np.geomspace(15.0, 1500.0, 93)
 
 
@@ -29,19 +29,27 @@ def frames_after_switch(
     camera: CameraFile | None,
     role: str,
 ) -> SwitchedFrames:
-    """Photographs of a `role`, `fade` or `rise`, over those of the steady lamp in their pass.
+    """Return photographs of a transient relative to those of the steady lamp in their pass.
 
     Parameters
     ----------
+    run
+        A recorded run.
     frames
-        Of that role, and those called `steady`.
+        Frames of that role, and those of the steady lamp.
+    darks
+        Dark frames.
     places
-        Regions that are seen, by name.
+        Regions on the card by name.
+    camera
+        Calibration of the camera; None if there is none.
+    role
+        Role of the frames, `fade` or `rise`.
 
     Raises
     ------
     DataError
-        Too few of them are of any use.
+        Too few of the frames are usable.
     """
     state = "on" if role == LampFrames.RISE else "off"
     attempts = run.completed()
@@ -80,14 +88,14 @@ def frames_after_switch(
 
 
 def brightest_channels(frames: SwitchedFrames, channels: int) -> NDArray[np.intp]:
-    """Columns of the brightest channel in every place, (S / channels,)."""
+    """Return the columns of the brightest channel in every place, shape (S / channels,)."""
     places = frames.steady_dn_per_s.reshape(-1, channels)
     columns: NDArray[np.intp] = np.arange(len(places)) * channels + places.argmax(axis=1)
     return columns
 
 
 def take_columns(frames: SwitchedFrames, columns: NDArray[np.intp]) -> SwitchedFrames:
-    """Some of the places or colours."""
+    """Return the given places or colours."""
     return replace(
         frames,
         light_s=frames.light_s[:, columns],
@@ -97,7 +105,7 @@ def take_columns(frames: SwitchedFrames, columns: NDArray[np.intp]) -> SwitchedF
 
 
 def _of_place(series: Series, taken: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Values and σ of the photographs that were taken, (n, C) each, and the steady signal (C,)."""
+    """Return light and σ of the `taken` photographs, (n, C) each, and the steady signal (C,)."""
     unit = np.array(series.unit)
     is_steady = np.arange(len(unit)) >= taken
     value, sigma = np.full((2, taken, len(series.channels)), np.nan)
@@ -126,7 +134,7 @@ def warming(
     camera: CameraFile | None,
     flicker: float,
 ) -> tuple[Warming, WarmingLight]:
-    """What a lamp lacks while its housing is cold, and the light that shows it.
+    """Fit the warm-up deficit of the lamp, and return the light that it was fitted to.
 
     The light is 1 − d e^(−t/τ) of that of the warm lamp, by the housing's Newtonian warming.
     """
@@ -158,7 +166,10 @@ def warming(
 def _fit_warming(
     t_s: FloatArray, level: FloatArray, one: FloatArray, tau_s: float
 ) -> tuple[float, float, float, float]:
-    """What is lacking and its σ, χ², the warm lamp's level; values already over their σ."""
+    """Return the deficit and its σ, χ², and the warm lamp's level.
+
+    Values are in units of their σ, and `one` is the warm light in that unit.
+    """
     rows = np.stack([one, -one * np.exp(-t_s / tau_s)], axis=1)
     covariance = np.linalg.inv(rows.T @ rows)
     warm, less = covariance @ (rows.T @ level)

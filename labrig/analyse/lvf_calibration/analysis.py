@@ -1,4 +1,4 @@
-"""The calibration of a variable filter, from its frames to its result."""
+"""Analysis of the calibration of a variable filter, from its frames to its result."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -42,21 +42,22 @@ from labrig.results import (
     Stripes,
 )
 
-#: Misfit of the filters beyond which the curves are worth a look.
+#: Misfit of the filters in σ beyond which a warning is given.
 BAD_MISFIT = 3.0
-#: Shift of the sample that is worth a word.
+#: Shift of the sample in nm beyond which a warning is given.
 SHIFTED_NM = 2.0
 
 
 def analyse(part: Part) -> LvfCalibrationResult:
-    """Find the strip and its lines, then fit what the colour filters say.
+    """Locate the strip and its lines, then fit its bands to the frames of the colour filters.
 
     Raises
     ------
     DataError
         Frames are missing or damaged, or show no strip, or one that is tilted.
     FitError
-        No mercury lines, the filter the wrong way round, or too few filters.
+        There are no mercury lines, the filter is the wrong way round, or there are too few colour
+        filters.
     """
     protocol, frames = part.protocol, StripFrames(part)
     strip = find_strip(frames.hdr(LvfFrames.FILTER, filter_unit(None))).strip(rising=True)
@@ -132,7 +133,7 @@ def _stripes(
     found: LvfCalibration,
     wavelengths: WavelengthMap,
 ) -> tuple[Stripes | None, str]:
-    """The stripes that glow, or why there are none."""
+    """Locate the stripes that glow, or return the reason why there are none."""
     if part.protocol.stripes == "none":
         return None, "no stripes were asked for"
     nm = wavelengths.wavelength_nm([0.0, 1.0])

@@ -12,13 +12,13 @@ from labrig.optics import Lvf, Strip, WavelengthMap
 from labrig.reduce import HdrFrame, strip_profile
 from labrig.results import PlacedStrip, Stripes, StripLines
 
-#: From blue end to red end.
+#: Range of positions, from the blue end to the red end.
 WHOLE = (0.0, 1.0)
-#: Lines that excite phosphors, in nm; those of longer wavelength seldom do.
+#: Mercury lines in nm that excite phosphors; those of longer wavelength seldom do.
 EXCITING_NM = (365.02, 404.6565, 407.7837, 435.8335, 546.0750)
-#: Doors let the sample shift by no more, as a fraction of the strip's length.
+#: Largest shift of the sample by the door, as a fraction of the strip's length.
 MOST_SHIFT = 0.08
-#: Stripes are seen if they explain this fraction of what varies along the strip.
+#: Fraction of the variance along the strip that detected stripes explain at least.
 LEAST_EXPLAINED = 0.7
 
 
@@ -27,15 +27,17 @@ def strip_lines(frame: HdrFrame, strip: Strip, rising: bool | None) -> StripLine
 
     Parameters
     ----------
+    frame
+        Frame of the strip under the mercury lamp.
     strip
-        Which way its wavelengths rise is not asked.
+        Place of the strip; the direction of its wavelengths does not matter.
     rising
-        Which way they are expected to rise from left to right; None: as they do.
+        Whether wavelengths are expected to rise from left to right; None accepts both directions.
 
     Raises
     ------
     FitError
-        There are none, or the strip is the wrong way round.
+        There are no lines, or the strip is the wrong way round.
     """
     profile = strip_profile(frame, strip)
     lines = locate_lines(profile.position, profile.value_dn_per_s, rising=rising)
@@ -48,14 +50,14 @@ def strip_lines(frame: HdrFrame, strip: Strip, rising: bool | None) -> StripLine
 
 
 def wavelengths_along(found: StripLines) -> WavelengthFit:
-    """Position → wavelength from the blue end to the red end."""
+    """Fit the wavelength by the position from the blue end to the red end."""
     return fit_wavelengths(found.lines, WHOLE)
 
 
 def place_on_sample(found: StripLines, wavelengths: WavelengthMap) -> PlacedStrip:
-    """Move the ends of a strip until its lines are where the filter has them.
+    """Move the ends of a strip until its lines agree with the filter's map.
 
-    The lamp comes in obliquely and the camera sees the strip from another distance: it is shifted
+    The lamp's light is oblique and the camera sees the strip from another distance: it is shifted
     and stretched, but the filter is the same.
 
     Raises
@@ -81,7 +83,7 @@ def place_on_sample(found: StripLines, wavelengths: WavelengthMap) -> PlacedStri
 
 
 def _moved(strip: Strip, blue: float, red: float) -> Strip:
-    """The strip whose blue and red ends are at these positions along the old one."""
+    """Return the strip whose blue and red ends are at these positions along the old one."""
     start, end = (blue, red) if strip.rising else (1 - red, 1 - blue)
     left, right = np.array(strip.left), np.array(strip.right)
     ends = [left + fraction * (right - left) for fraction in (start, end)]
@@ -97,14 +99,14 @@ def _moved(strip: Strip, blue: float, red: float) -> Strip:
 
 
 def shifted_by_stripes(frame: HdrFrame, strip: Strip, lvf: Lvf, nm_per_strip: float) -> Stripes:
-    """Shift the strip until the stripes of glow are where the filter lets mercury lines through.
+    """Shift the strip until the stripes of glow lie where the filter transmits mercury lines.
 
-    Heights of the lines are free: how strongly each of them excites is not known yet.
+    Heights of the lines are free: how strongly each of them excites is unknown here.
 
     Raises
     ------
     FitError
-        No stripes are seen.
+        No stripes are detected.
     """
     profile = strip_profile(frame, strip)
     position = profile.position if strip.rising else 1 - profile.position
