@@ -38,13 +38,13 @@ def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
     rows = np.flatnonzero(series.usable & (signal > LEAST_SIGNAL * series.sigma[:, brightest]))
     if len(rows) <= _TERMS:
         return None
-    used, signal = series.take(rows), signal[rows]
-    parts = np.sqrt(noise_parts(used, brightest, signal)) / signal[:, np.newaxis]
-    first = np.flatnonzero(np.array(used.unit) == used.unit[0])
-    first = first[np.argsort(used.t_s[first], kind="stable")]
-    dark_sigma = np.nan_to_num(used.dark_sigma[brightest])
+    fitted, signal = series.take(rows), signal[rows]
+    parts = np.sqrt(noise_parts(fitted, brightest, signal)) / signal[:, np.newaxis]
+    first = np.flatnonzero(np.array(fitted.unit) == fitted.unit[0])
+    first = first[np.argsort(fitted.t_s[first], kind="stable")]
+    dark_sigma = np.nan_to_num(fitted.dark_sigma[brightest])
     return NoiseBudget(
-        t_s=(used.t_s + used.exposure_s / 2)[first],
+        t_s=(fitted.t_s + fitted.exposure_s / 2)[first],
         photons=parts[first, 1],
         reading=parts[first, 0],
         uneven=parts[first, 2],
@@ -94,7 +94,7 @@ def analyse(part: Part) -> DecayResult:
     only = protocol.sample.name if len(fits) == 1 else None
     return DecayResult(
         patches={
-            name: _patch(regions[name], series[name], fit, only or name, part, temperature_c)
+            name: _decay_patch(regions[name], series[name], fit, only or name, part, temperature_c)
             for name, fit in fits.items()
         },
         background=background,
@@ -119,7 +119,10 @@ def _fit_all(
     Shutter and aperture flicker alike for all patches of a frame. The flicker is taken from the
     patch that determines it best, for those that are dim or fade within a few frames.
     """
-    fits = {name: _fit(one, states, fixed_rates_per_s, None) for name, one in series.items()}
+    fits = {
+        name: _fit(patch_series, states, fixed_rates_per_s, None)
+        for name, patch_series in series.items()
+    }
     measured = [fit for fit in fits.values() if isinstance(fit, DecayFit) and fit.flicker > 0]
     if len(fits) == 1 or not measured:
         return fits
@@ -143,7 +146,7 @@ def _fit(
         return str(error)
 
 
-def _patch(
+def _decay_patch(
     region: Region,
     series: Series,
     fit: DecayFit | str,
@@ -190,21 +193,21 @@ def _material(
 
 
 def _clipping_warnings(series: Mapping[str, Series]) -> Iterator[str]:
-    for name, one in series.items():
-        clipped = sum("clipped" in flag for flag in one.flag)
+    for name, patch_series in series.items():
+        clipped = sum("clipped" in flag for flag in patch_series.flag)
         if clipped:
             yield (
-                f"{_of(name, series)}{clipped} of {len(one.flag)} frames are clipped and left "
-                "out; expose for less or lower the ISO"
+                f"{_prefix(name, series)}{clipped} of {len(patch_series.flag)} frames are clipped "
+                "and left out; expose for less or lower the ISO"
             )
 
 
 def _fit_warnings(fits: Mapping[str, DecayFit | str]) -> Iterator[str]:
     """Iterate over the warnings of fits, with the names of patches where there are several."""
     for name, fit in fits.items():
-        said = [f"not fitted: {fit}"] if isinstance(fit, str) else fit.warnings
-        yield from (f"{_of(name, fits)}{text}" for text in said)
+        lines = [f"not fitted: {fit}"] if isinstance(fit, str) else fit.warnings
+        yield from (f"{_prefix(name, fits)}{text}" for text in lines)
 
 
-def _of(name: str, patches: Mapping[str, object]) -> str:
+def _prefix(name: str, patches: Mapping[str, object]) -> str:
     return f"{name}: " if len(patches) > 1 else ""

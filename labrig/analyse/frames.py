@@ -79,17 +79,19 @@ def require(run: RunRecord, damaged: Mapping[FrameRecord, str], overrides: Overr
     """
     refused = {f: damage for f, damage in damaged.items() if not overrides.excludes(f)}
     if refused:
-        raise DataError(f"{run.folder}: {_told(refused)}")
+        raise DataError(f"{run.folder}: {_damage_text(refused)}")
 
 
-def _told(damaged: Mapping[FrameRecord, str]) -> str:
+def _damage_text(damaged: Mapping[FrameRecord, str]) -> str:
     """Return a line that names damaged frames and the remedy."""
-    named = list(damaged.items())[:MOST_NAMED]
-    more = f" and {len(damaged) - len(named)} more are damaged" if len(damaged) > len(named) else ""
-    leave_out = " ".join(f"--exclude {frame.path.name}" for frame, _ in named)
+    listed = list(damaged.items())[:MOST_NAMED]
+    remainder = (
+        f" and {len(damaged) - len(listed)} more are damaged" if len(damaged) > len(listed) else ""
+    )
+    leave_out = " ".join(f"--exclude {frame.path.name}" for frame, _ in listed)
     return (
-        f"{', '.join(f'{frame.path.name} {damage}' for frame, damage in named)}{more}; restore "
-        f"from a copy, or leave out: {leave_out}"
+        f"{', '.join(f'{frame.path.name} {damage}' for frame, damage in listed)}{remainder}; "
+        f"restore from a copy, or leave out: {leave_out}"
     )
 
 
@@ -190,7 +192,7 @@ def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
     DataError
         The blank never became clean, or no frame begins late enough.
     """
-    early = [t for t in t_s if not blank.is_clean(t)]
+    early = [start_s for start_s in t_s if not blank.is_clean(start_s)]
     if not early:
         return ()
     if len(early) == len(t_s):
@@ -241,9 +243,9 @@ def intact_frames(
     DataError
         No decay is complete, or a frame is missing or was changed and is not excluded.
     """
-    damaged = _damaged(run, overrides, (role, FrameRole.DARK))
+    damaged = _check_damage(run, overrides, (role, FrameRole.DARK))
     decay = [
-        _flagged(frame, attempt, overrides)
+        _flag_frame(frame, attempt, overrides)
         for attempt in run.completed().values()
         for frame in attempt.frames
         if frame.role == role and frame not in damaged
@@ -277,7 +279,7 @@ def steady_frames(run: RunRecord, overrides: Overrides, role: str) -> list[Serie
     DataError
         A frame is missing or was changed and is not excluded.
     """
-    damaged = _damaged(run, overrides, (role,))
+    damaged = _check_damage(run, overrides, (role,))
     return [
         untimed(frame)
         for frame in run.frames(role)
@@ -295,15 +297,15 @@ def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[str]:
         )
     late = [frame for frame in run.frames(role) if frame.late_s > LATE_S]
     if late:
-        worst = max(late, key=lambda frame: frame.late_s)
+        latest = max(late, key=lambda frame: frame.late_s)
         warnings.append(
-            f"{len(late)} frames began late, {worst.path.name} by {worst.late_s:.2f} s; their "
+            f"{len(late)} frames began late, {latest.path.name} by {latest.late_s:.2f} s; their "
             "measured times are used (leave more time between frames)"
         )
     return warnings
 
 
-def _damaged(
+def _check_damage(
     run: RunRecord, overrides: Overrides, measured: tuple[str, ...]
 ) -> dict[FrameRecord, str]:
     """Return damaged frames and their damage; frames of `measured` roles must be excluded."""
@@ -343,7 +345,7 @@ def switched_time(attempt: Attempt, frame: FrameRecord, state: str) -> float:
     return switches[-1]
 
 
-def _flagged(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> SeriesFrame:
+def _flag_frame(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> SeriesFrame:
     """Return a frame timed from lamp-off, with its flags."""
     flag = "late" if frame.late_s > LATE_S else ""
     flag = add_flag(flag, "excluded") if overrides.excludes(frame) else flag

@@ -101,8 +101,8 @@ def mean_ratio(pairs: Sequence[tuple[SliceValues, SliceValues]]) -> CardRatio:
     total = weight.sum(axis=0)
     mean = (weight * ratios).sum(axis=0) / total
     clear = mean > 30 / np.sqrt(total)
-    each = [float(np.median((ratio / mean)[clear])) for ratio in ratios]
-    drift = float(np.std(each, ddof=1)) if len(each) > 1 else 0.0
+    round_ratios = [float(np.median((ratio / mean)[clear])) for ratio in ratios]
+    drift = float(np.std(round_ratios, ddof=1)) if len(round_ratios) > 1 else 0.0
     common = float(np.hypot(FLICKER * np.sqrt(2), drift) / np.sqrt(len(pairs)))
     return CardRatio(mean, 1 / np.sqrt(total), common, drift, len(pairs))
 
@@ -192,44 +192,50 @@ def strip_scale(
     light = weights * lamp.at(nodes) * card.at(nodes)
     passed = lvf.transmission(nodes) * light
     sensitivity = camera.at(nodes)
-    whole = light @ sensitivity
-    expected = passed @ sensitivity / whole
+    total = light @ sensitivity
+    expected = passed @ sensitivity / total
     modes = curve_modes(curve_error, nodes, sensitivity, camera.sensitivity.max(axis=0))
     # (modes, p, channels) of the expected ratio.
-    wrong = np.stack([passed @ mode / whole - expected * (light @ mode / whole) for mode in modes])
-    shifted = _by_figures(lvf, nodes, light) @ sensitivity / whole
-    value, noise, by_curves = np.empty(len(expected)), np.empty(len(expected)), []
+    curve_errors = np.stack(
+        [passed @ mode / total - expected * (light @ mode / total) for mode in modes]
+    )
+    figure_changes = _parameter_changes(lvf, nodes, light) @ sensitivity / total
+    value, noise, curve_factors = np.empty(len(expected)), np.empty(len(expected)), []
     for k in range(len(expected)):
         used = np.isfinite(ratio.value[k]) & (expected[k] > 0)
         if not used.any():
             raise DataError(f"position p{k:02d}: no light was measured; expose longer")
-        seen, unsure, of_curves = ratio.value[k, used], ratio.sigma[k, used], wrong[:, k, used]
-        weight = _weights(seen, expected[k, used], unsure, of_curves)
-        value[k] = max(float(weight @ seen), LEAST)
-        of_noise = (weight**2) @ unsure**2 / value[k] ** 2
-        of_figures = ((shifted[:, k, used] @ weight) ** 2).sum()
-        noise[k] = float(np.sqrt(of_noise + of_figures + ROUGH**2))
-        by_curves.append(of_curves @ weight)
-    curves = np.array(by_curves)
-    return _smoothed(value, np.diag(noise**2) + curves @ curves.T, lvf)
+        measured, measured_sigma, position_errors = (
+            ratio.value[k, used],
+            ratio.sigma[k, used],
+            curve_errors[:, k, used],
+        )
+        weight = _weights(measured, expected[k, used], measured_sigma, position_errors)
+        value[k] = max(float(weight @ measured), LEAST)
+        noise_variance = (weight**2) @ measured_sigma**2 / value[k] ** 2
+        figure_variance = ((figure_changes[:, k, used] @ weight) ** 2).sum()
+        noise[k] = float(np.sqrt(noise_variance + figure_variance + ROUGH**2))
+        curve_factors.append(position_errors @ weight)
+    curves = np.array(curve_factors)
+    return _smooth(value, np.diag(noise**2) + curves @ curves.T, lvf)
 
 
 def _weights(
-    seen: FloatArray, expected: FloatArray, unsure: FloatArray, of_curves: FloatArray
+    measured: FloatArray, expected: FloatArray, sigma: FloatArray, curve_errors: FloatArray
 ) -> FloatArray:
     """Return the generalised-least-squares weights of a position's ratios, shape (channels,).
 
     The weighted sum of the ratios is the position's factor. The covariance is that of noise
     `unsure` (channels,) and of the curves' modes (modes, channels).
     """
-    start = max(float(seen @ expected / (expected @ expected)), LEAST)
-    covariance = np.diag(unsure**2) + start**2 * of_curves.T @ of_curves
+    start = max(float(measured @ expected / (expected @ expected)), LEAST)
+    covariance = np.diag(sigma**2) + start**2 * curve_errors.T @ curve_errors
     weight = np.linalg.solve(covariance, expected)
     weights: FloatArray = weight / (weight @ expected)
     return weights
 
 
-def _by_figures(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatArray:
+def _parameter_changes(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatArray:
     """Return the change of the transmitted light by one σ of each band parameter, (figures, p, q).
 
     Centre, width and shape of a band change at its area: the total transmittance is measured here,
@@ -239,28 +245,28 @@ def _by_figures(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatArray:
         return np.zeros((1, len(lvf.position), len(nodes)))
     changes = []
     for name in ("centre_nm", "fwhm_nm", "skew", "leakage"):
-        moved = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
-        bands = replace(lvf.bands, **{name: moved})
+        changed = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
+        bands = replace(lvf.bands, **{name: changed})
         bands = replace(bands, peak=bands.peak * lvf.bands.fwhm_nm / bands.fwhm_nm)
         change = bands.transmission(nodes) - lvf.bands.transmission(nodes)
         changes.append(change * light / _STEP)
     return np.array(changes)
 
 
-def _smoothed(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> StripScale:
+def _smooth(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> StripScale:
     """Combine the logarithms of the factors with a smooth prior along the strip."""
     centre = lvf.bands.centre_nm
     area = np.log(lvf.bands.peak * lvf.bands.fwhm_nm)
-    apart = (centre[:, np.newaxis] - centre) / UNEVEN_OVER_NM
+    distance = (centre[:, np.newaxis] - centre) / UNEVEN_OVER_NM
     powers = np.vander((centre - centre.mean()) / np.ptp(centre) * 2, 3)
     parabola = (powers * np.square(PARABOLA)) @ powers.T
-    before = UNEVEN**2 * np.exp(-(apart**2) / 2) + parabola
-    gain = np.linalg.solve(before + covariance, before).T
+    prior = UNEVEN**2 * np.exp(-(distance**2) / 2) + parabola
+    gain = np.linalg.solve(prior + covariance, prior).T
     course = gain @ (np.log(value) + area)
-    after = before - gain @ before
+    posterior = prior - gain @ prior
     return StripScale(
         np.exp(course - area),
-        (after + after.T) / 2,
+        (posterior + posterior.T) / 2,
         value,
         np.sqrt(np.diag(covariance)),
     )
@@ -276,9 +282,9 @@ def in_bands(lvf: Lvf, lamp: Spectrum, edges_nm: FloatArray) -> tuple[FloatArray
         return value, np.zeros_like(value)
     variance = np.zeros_like(value)
     for name in ("centre_nm", "fwhm_nm", "skew", "leakage"):
-        moved = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
-        other = replace(lvf, bands=replace(lvf.bands, **{name: moved}))
-        variance += ((_in_bands(other, lamp, edges_nm) - value) / _STEP) ** 2
+        changed = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
+        changed_lvf = replace(lvf, bands=replace(lvf.bands, **{name: changed}))
+        variance += ((_in_bands(changed_lvf, lamp, edges_nm) - value) / _STEP) ** 2
     return value, np.sqrt(variance)
 
 

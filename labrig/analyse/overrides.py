@@ -104,8 +104,8 @@ class Overrides:
         UsageError
             A region, a rate or a calibration is malformed.
         """
-        if wrong := [rate for rate in fixed_rates_per_s if not 0 < rate < math.inf]:
-            raise UsageError(f"--rate: expected a rate > 0 in 1/s, got {wrong[0]}")
+        if invalid := [rate for rate in fixed_rates_per_s if not 0 < rate < math.inf]:
+            raise UsageError(f"--rate: expected a rate > 0 in 1/s, got {invalid[0]}")
         named = {}
         for text in regions:
             name, _, numbers = text.rpartition("=")
@@ -116,7 +116,7 @@ class Overrides:
             states,
             tuple(fixed_rates_per_s),
             camera,
-            dict(_calibration(text) for text in optics),
+            dict(_parse_calibration(text) for text in optics),
         )
 
     def bench(self, run: Path) -> RigFile:
@@ -168,7 +168,7 @@ class Overrides:
             raise UsageError(f"--exclude: the run has no frame {', '.join(sorted(unknown))}{there}")
 
 
-def _calibration(text: str) -> tuple[str, str]:
+def _parse_calibration(text: str) -> tuple[str, str]:
     """Return key and path of a calibration, an existing path as an absolute one."""
     key, _, named = text.partition("=")
     if key not in Optics.model_fields or not named:

@@ -141,16 +141,16 @@ def compare_rates(
     """
     start = np.log(np.asarray(start_per_s, dtype=np.float64))
     states = len(start)
-    dof = sum(len(one.t_s) for one in curves) - 2 * states * len(curves)
-    if dof < 1 or min(len(one.t_s) for one in curves) <= 2 * states:
+    dof = sum(len(decay.t_s) for decay in curves) - 2 * states * len(curves)
+    if dof < 1 or min(len(decay.t_s) for decay in curves) <= 2 * states:
         raise FitError(
             f"expected more than {2 * states} frames of each decay for {states} state(s); record "
             "more, or ask for fewer states"
         )
     shared, shared_chi2, _ = _fit(curves, start)
-    alone = [_fit([one], shared) for one in curves]
-    own_chi2 = sum(chi2 for _, chi2, _ in alone)
-    amplitudes = [_amplitudes(one, np.exp(shared)) for one in curves]
+    own_fits = [_fit([decay], shared) for decay in curves]
+    own_chi2 = sum(chi2 for _, chi2, _ in own_fits)
+    amplitudes = [_amplitudes(decay, np.exp(shared)) for decay in curves]
     added = states * (len(curves) - 1)
     gain = max(shared_chi2 - own_chi2, 0.0) / added
     # A smaller scatter than σ does not lower it: σ may be a little too large, never too small.
@@ -158,11 +158,13 @@ def compare_rates(
     falling = np.argsort(-shared)
     return RatesTest(
         shared_per_s=np.exp(shared)[falling],
-        own_per_s=np.array([np.exp(found)[falling] for found, _, _ in alone]),
-        own_sigma_per_s=np.array([(np.exp(found) * sigma)[falling] for found, _, sigma in alone]),
+        own_per_s=np.array([np.exp(log_rates)[falling] for log_rates, _, _ in own_fits]),
+        own_sigma_per_s=np.array(
+            [(np.exp(log_rates) * sigma)[falling] for log_rates, _, sigma in own_fits]
+        ),
         amplitude=np.array([value[falling] for value, _ in amplitudes]),
         amplitude_sigma=np.array([sigma[falling] for _, sigma in amplitudes]),
-        residuals=tuple(-_misfit(one, np.exp(shared)[falling])[0][:-1] for one in curves),
+        residuals=tuple(-_misfit(decay, np.exp(shared)[falling])[0][:-1] for decay in curves),
         chi2_shared=shared_chi2,
         chi2_own=own_chi2,
         dof_own=dof,
@@ -175,47 +177,47 @@ def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float,
     """Return the logarithms of the rates (s,), χ² and the σ of these logarithms."""
 
     def residuals(log_rates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        rest, slopes = zip(*(_misfit(one, np.exp(log_rates)) for one in curves), strict=True)
-        return np.concatenate(rest), np.concatenate(slopes)
+        misfits, slopes = zip(*(_misfit(decay, np.exp(log_rates)) for decay in curves), strict=True)
+        return np.concatenate(misfits), np.concatenate(slopes)
 
-    found = least_squares(residuals, start)
-    return found.parameters, found.chi2, found.sigma
+    result = least_squares(residuals, start)
+    return result.parameters, result.chi2, result.sigma
 
 
-def _misfit(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+def _misfit(decay: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
     """Return model − value with the best amplitudes, whitened, and its slopes by the log rates.
 
     The shapes are (n + 1,) and (n + 1, s). The slopes are Kaufman's (BIT 15, 1975), without the
     part that other amplitudes explain.
     """
-    means, by_log_rate = exponential_means_and_slopes(rates_per_s, one.t_s, one.exposure_s)
-    design, target = _design(one, means), _target(one)
+    means, by_log_rate = exponential_means_and_slopes(rates_per_s, decay.t_s, decay.exposure_s)
+    design, target = _design(decay, means), _target(decay)
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)
-    moved = np.zeros((len(target), len(rates_per_s)))
-    moved[:-1] = by_log_rate * solution[:-1] / one.sigma[:, np.newaxis]
-    known = np.linalg.qr(design)[0]
-    return np.asarray(design @ solution - target), moved - known @ (known.T @ moved)
+    slopes = np.zeros((len(target), len(rates_per_s)))
+    slopes[:-1] = by_log_rate * solution[:-1] / decay.sigma[:, np.newaxis]
+    basis = np.linalg.qr(design)[0]
+    return np.asarray(design @ solution - target), slopes - basis @ (basis.T @ slopes)
 
 
-def _amplitudes(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    design = _design(one, exponential_means(rates_per_s, one.t_s, one.exposure_s))
+def _amplitudes(decay: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    design = _design(decay, exponential_means(rates_per_s, decay.t_s, decay.exposure_s))
     covariance = np.linalg.pinv(design.T @ design, rcond=1e3 * EPSILON)
-    solution = covariance @ design.T @ _target(one)
+    solution = covariance @ design.T @ _target(decay)
     return solution[:-1], np.sqrt(np.diag(covariance))[:-1]
 
 
-def _design(one: Curve, shapes: FloatArray) -> FloatArray:
+def _design(decay: Curve, shapes: FloatArray) -> FloatArray:
     """Return the whitened design (n + 1, s + 1) of shapes (n, s), with the offset's prior last."""
-    offset = np.full((len(one.t_s), 1), one.offset_sigma)
-    rows = np.hstack([shapes, offset]) / one.sigma[:, np.newaxis]
+    offset = np.full((len(decay.t_s), 1), decay.offset_sigma)
+    rows = np.hstack([shapes, offset]) / decay.sigma[:, np.newaxis]
     prior = np.zeros((1, rows.shape[1]))
     prior[0, -1] = 1.0
     return np.vstack([rows, prior])
 
 
-def _target(one: Curve) -> FloatArray:
+def _target(decay: Curve) -> FloatArray:
     """Return the whitened values and the offset's prior, shape (n + 1,)."""
-    return np.append(one.value / one.sigma, 0.0)
+    return np.append(decay.value / decay.sigma, 0.0)
 
 
 def analyse(part: Part) -> SaturationResult:
@@ -233,8 +235,11 @@ def analyse(part: Part) -> SaturationResult:
     require_calibrated_camera(camera, run, run.frames(FrameRole.DECAY))
     regions = part.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
-    lasted_s, weaker = _charges_s(run), protocol.weaker
-    patches = {name: _patch(one, lasted_s, part) for name, one in series.items()}
+    charge_s, weaker = _charges_s(run), protocol.weaker
+    patches = {
+        name: _patch_saturation(patch_series, charge_s, part)
+        for name, patch_series in series.items()
+    }
     return SaturationResult(
         patches=patches,
         weaker_light=weaker and Measured(weaker.fraction, weaker.fraction * weaker.fraction_sigma),
@@ -260,25 +265,29 @@ def _charges_s(run: RunRecord) -> dict[str, float]:
     return dict(zip(units, charges_s(run), strict=True))
 
 
-def _patch(series: Series, lasted_s: Mapping[str, float], part: Part) -> PatchSaturation:
-    decays = {one.unit[0]: one for one in series.by_unit()}
+def _patch_saturation(
+    series: Series, unit_charge_s: Mapping[str, float], part: Part
+) -> PatchSaturation:
+    decays = {decay.unit[0]: decay for decay in series.by_unit()}
     units = list(decays)
     light = tuple(Light.of(unit).value for unit in units)
-    full, weaker = ([row for row, one in enumerate(light) if one == kind] for kind in Light)
+    full, weaker = (
+        [row for row, decay_light in enumerate(light) if decay_light == kind] for kind in Light
+    )
     if len(full) < 2:
         raise DataError(
             "expected two or more complete decays under the full light, got "
             f"{len(full)}; go on with labrig resume"
         )
-    asked = part.overrides.states or (
+    states = part.overrides.states or (
         None if part.protocol.states == "auto" else part.protocol.states
     )
     longest = decays[units[full[-1]]]
-    fit = fit_series(longest, asked, fixed_rates_per_s=part.overrides.fixed_rates_per_s)
-    curves = {unit: curve(one, fit) for unit, one in decays.items()}
+    fit = fit_series(longest, states, fixed_rates_per_s=part.overrides.fixed_rates_per_s)
+    curves = {unit: curve(decay, fit) for unit, decay in decays.items()}
     start_per_s = [state.k_r_per_s for state in fit.states]
     rates = compare_rates(list(curves.values()), start_per_s, flicker_dof(fit))
-    charge_s = np.array([lasted_s[unit] for unit in units])
+    charge_s = np.array([unit_charge_s[unit] for unit in units])
     levels: Iterable[ChargeLevel] = ()
     if part.protocol.weaker is not None and weaker:
         levels = _levels(rates, charge_s, weaker[-1], full[-1], part.protocol.weaker)
@@ -292,15 +301,15 @@ def _levels(
     """Iterate over the level of every state, after the longest charges under both lights."""
     for state, k_per_s in enumerate(rates.shared_per_s):
         a, b = rates.amplitude[[dim, bright], state]
-        of_a, of_b = rates.amplitude_sigma[[dim, bright], state]
+        a_sigma, b_sigma = rates.amplitude_sigma[[dim, bright], state]
         if b <= 0:
             yield ChargeLevel(0.0, 1.0)
             continue
         ratio = max(a / b, 1e-6)
-        sigma = float(np.hypot(of_a / b, a / b * of_b / b))
-        both_s = (charge_s[dim], charge_s[bright])
+        sigma = float(np.hypot(a_sigma / b, a / b * b_sigma / b))
+        durations_s = (charge_s[dim], charge_s[bright])
         yield charge_level(
-            ratio, sigma, weaker.fraction, weaker.fraction_sigma, float(k_per_s), both_s
+            ratio, sigma, weaker.fraction, weaker.fraction_sigma, float(k_per_s), durations_s
         )
 
 
@@ -324,8 +333,8 @@ def _warnings(patch: PatchSaturation) -> Iterator[str]:
             "the glow still grows at the longest charge: charge for longer before decays whose "
             "amplitudes are to be compared"
         )
-    if any(one.assessment == "no" for one in patch.levels):
-        levels = ", ".join(plus_minus(one.r, one.sigma) for one in patch.levels)
+    if any(level.assessment == "no" for level in patch.levels):
+        levels = ", ".join(plus_minus(level.r, level.sigma) for level in patch.levels)
         yield (
             f"r(0) = 1 does not hold after the longest charge: r(0) = {levels}; Λ from the decay "
             "alone would be too small by that factor, in each state by another: fit excitation "

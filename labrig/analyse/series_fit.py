@@ -154,12 +154,12 @@ def fit_table(
     """
     offset_sigma = {"zero": 0.0, "free": np.inf}.get(offset)
     if offset_sigma is None:
-        offset_sigma = _sigma(offset)
-    rho = None if flicker == "auto" else _flicker(flicker)
+        offset_sigma = _parse_sigma(offset)
+    rho = None if flicker == "auto" else _parse_flicker(flicker)
     if weights not in ("given", "counts"):
         raise UsageError(f"--weights: expected 'given' or 'counts', got '{weights}'")
     fits = []
-    for series in _by_region(read_series(path)):
+    for series in _join_regions(read_series(path)):
         rows = np.flatnonzero(series.t_s >= (-np.inf if from_s is None else from_s))
         if not len(rows):
             raise UsageError(f"{path}: no point at {from_s:g} s or later; give an earlier --from")
@@ -171,7 +171,7 @@ def fit_table(
     return fits
 
 
-def _by_region(parts: Sequence[Series]) -> list[Series]:
+def _join_regions(parts: Sequence[Series]) -> list[Series]:
     """Join the repeats of each region's decay: they share rates and amplitudes."""
     regions: dict[str, list[Series]] = {}
     for part in parts:
@@ -179,7 +179,7 @@ def _by_region(parts: Sequence[Series]) -> list[Series]:
     return [joined(same) for same in regions.values()]
 
 
-def _sigma(text: str) -> float:
+def _parse_sigma(text: str) -> float:
     try:
         sigma = float(text)
     except ValueError:
@@ -192,7 +192,7 @@ def _sigma(text: str) -> float:
     return sigma
 
 
-def _flicker(text: str) -> float:
+def _parse_flicker(text: str) -> float:
     try:
         return parse(text, FRACTION) if "%" in text else float(text)
     except ValueError:

@@ -100,14 +100,14 @@ class StripPatch:
         """Name of the patch's folder below a result; empty for the only patch."""
         return "" if self.alone else self.name
 
-    def own(self, found: Mapping[str, Found]) -> Found | None:
+    def own(self, entries: Mapping[str, Found]) -> Found | None:
         """Return the patch's entry in an earlier result by patch.
 
         The only patch takes the only entry, whatever its name.
         """
-        if self.alone and len(found) == 1:
-            return next(iter(found.values()))
-        return found.get(self.name)
+        if self.alone and len(entries) == 1:
+            return next(iter(entries.values()))
+        return entries.get(self.name)
 
 
 def strip_patches(part: Part) -> list[StripPatch]:
@@ -150,40 +150,40 @@ def slice_strip(
     DataError
         No patch has any slices.
     """
-    found, refused = {}, []
+    slices, reasons = {}, []
     for patch in patches:
         try:
-            found[patch] = _rows(patch, strip, raw, count)
+            slices[patch] = _patch_slices(patch, strip, raw, count)
         except DataError as error:
-            refused.append(str(error))
-    if not found:
-        raise DataError("; ".join(refused))
-    return found, tuple(refused)
+            reasons.append(str(error))
+    if not slices:
+        raise DataError("; ".join(reasons))
+    return slices, tuple(reasons)
 
 
-def _rows(patch: StripPatch, strip: Strip, raw: RawFrame, count: int) -> Slices:
-    whole = strip.slices(count)
+def _patch_slices(patch: StripPatch, strip: Strip, raw: RawFrame, count: int) -> Slices:
+    strip_slices = strip.slices(count)
     if patch.region is None:
-        return whole
+        return strip_slices
     x, y, wide, high = region_pixels(patch.region, raw.width, raw.height)
     top, bottom = y / raw.height, (y + high) / raw.height
-    found: Slices = {}
-    for name, (left, upper, width, height) in whole.items():
+    slices: Slices = {}
+    for name, (left, upper, width, height) in strip_slices.items():
         first, last = max(upper, top), min(upper + height, bottom)
-        found[name] = (left, first, width, last - first)
-    rows = [round((y + h) * raw.height) - round(y * raw.height) for _, y, _, h in found.values()]
+        slices[name] = (left, first, width, last - first)
+    rows = [round((y + h) * raw.height) - round(y * raw.height) for _, y, _, h in slices.values()]
     ends = [round(end[0] * raw.width) for end in (strip.left, strip.right)]
     if min(rows) >= LEAST_CELLS * raw.cfa_side and x <= ends[0] and x + wide >= ends[1]:
-        return found
-    upper = min(y for _, y, _, _ in whole.values()) * raw.height
-    lower = max(y + h for _, y, _, h in whole.values()) * raw.height
-    where = (
+        return slices
+    upper = min(y for _, y, _, _ in strip_slices.values()) * raw.height
+    lower = max(y + h for _, y, _, h in strip_slices.values()) * raw.height
+    problem = (
         f"expected patch {patch.name} below the filter from end to end, in "
         f"{LEAST_CELLS * raw.cfa_side} rows or more of its own: the filter lies in columns "
         f"{ends[0]} to {ends[1]} and rows {upper:.0f} to {lower:.0f}, the patch in columns {x} to "
         f"{x + wide} and rows {y} to {y + high} ({max(min(rows), 0)} in common)"
     )
-    raise DataError(f"{where}; move it: labrig process RUN --roi {patch.name}=x,y,width,height")
+    raise DataError(f"{problem}; move it: labrig process RUN --roi {patch.name}=x,y,width,height")
 
 
 def tilt_offset(strip: Strip, slices: Slices, raw: RawFrame) -> FloatArray:
@@ -220,11 +220,11 @@ def for_each_patch(
     for patch in patches:
         prefix = "" if patch.alone else f"{patch.name}: "
         try:
-            results[patch.folder], own = analyse(patch)
+            results[patch.folder], patch_warnings = analyse(patch)
         except DataError as error:
             failures.append(type(error)(f"{prefix}{error}"))
-            own = [str(error)]
-        warnings += [f"{prefix}{warning}" for warning in own]
+            patch_warnings = [str(error)]
+        warnings += [f"{prefix}{warning}" for warning in patch_warnings]
     if not results:
         raise failures[0]
     return results, tuple(warnings)

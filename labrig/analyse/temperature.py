@@ -52,14 +52,15 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
         return (f"the thermometer told nothing: {CHECK_IT}",)
     course, warnings = TemperatureHistory(run), []
     for part, group in groupby(photographs, key=lambda frame: frame.unit.rpartition("/")[0]):
-        known = course.during(list(group))
-        if known.size and np.ptp(known) >= MOVED_K:
-            change = relative_rate_change(known.min(), known.max())
-            what = f"the glow of {part}" if part else "the glow"
+        temperatures_c = course.during(list(group))
+        if temperatures_c.size and np.ptp(temperatures_c) >= MOVED_K:
+            change = relative_rate_change(temperatures_c.min(), temperatures_c.max())
+            glow = f"the glow of {part}" if part else "the glow"
             warnings.append(
-                f"the temperature moved by {np.ptp(known):.1f} K while {what} was photographed "
-                f"({degrees_text(known)}): k_r changes by about {100 * change:.0f} % over that, if "
-                "traps are 0.65 eV deep; keep the room steadier or measure for a shorter time"
+                f"the temperature moved by {np.ptp(temperatures_c):.1f} K while {glow} was "
+                f"photographed ({degrees_text(temperatures_c)}): k_r changes by about "
+                f"{100 * change:.0f} % over that, if traps are 0.65 eV deep; keep the room "
+                "steadier or measure for a shorter time"
             )
     if photographs[-1].end_time > course.time[-1] + KNOWN_FOR_S:
         warnings.append(

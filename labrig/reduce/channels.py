@@ -61,20 +61,22 @@ def isolated_outliers(
         return np.asarray(_ABOVE_ALL_SIGMAS * np.sqrt(quietest))
 
     # By a row's darkest, then by level, then by the noise of their own plane: few are left.
-    least = np.minimum(limit(window.min(axis=1).astype(np.float64)), 65535).astype(np.uint16)
-    passed = np.flatnonzero(excess > least[:, np.newaxis])
-    passed = passed[excess.ravel()[passed] > limit(greatest.ravel()[passed].astype(np.float64))]
-    y, x = np.divmod(passed, window.shape[1])
+    row_limit = np.minimum(limit(window.min(axis=1).astype(np.float64)), 65535).astype(np.uint16)
+    candidates = np.flatnonzero(excess > row_limit[:, np.newaxis])
+    candidates = candidates[
+        excess.ravel()[candidates] > limit(greatest.ravel()[candidates].astype(np.float64))
+    ]
+    y, x = np.divmod(candidates, window.shape[1])
     level = greatest[y, x].astype(np.float64)
-    alone = excess[y, x] > _ABOVE_ALL_SIGMAS * _deviation(
+    is_isolated = excess[y, x] > _ABOVE_ALL_SIGMAS * _deviation(
         level, y + corner[0], x + corner[1], side, noises
     )
-    y, x = y[alone], x[alone]
+    y, x = y[is_isolated], x[is_isolated]
     level = _median_of_neighbours(window, y, x, side)
-    far = window[y, x] > level + OUTLIER_SIGMAS * _deviation(
+    is_outlier = window[y, x] > level + OUTLIER_SIGMAS * _deviation(
         level, y + corner[0], x + corner[1], side, noises
     )
-    return y[far] + corner[0], x[far] + corner[1]
+    return y[is_outlier] + corner[0], x[is_outlier] + corner[1]
 
 
 def _deviation(
@@ -87,8 +89,8 @@ def _deviation(
     """Return the noise σ in DN of the pixels (y, x) of the sensor at `level`."""
     variance = np.zeros(len(level))
     for (row, column), noise in noises.items():
-        here = (y % side == row) & (x % side == column)
-        variance[here] = noise.variance_at(level[here])
+        at_position = (y % side == row) & (x % side == column)
+        variance[at_position] = noise.variance_at(level[at_position])
     return np.sqrt(variance)
 
 
@@ -98,12 +100,12 @@ def _median_of_neighbours(window: Mosaic, y: Indices, x: Indices, side: int) -> 
     Beyond a border of the window the opposite neighbour takes the place of the missing one.
     """
     values = np.empty((len(_NEIGHBOURS), len(y)))
-    for values_there, repeats in zip(values, _NEIGHBOURS, strict=True):
+    for neighbour_values, repeats in zip(values, _NEIGHBOURS, strict=True):
         down, right = (number * side for number in repeats)
         row, column = y + down, x + right
         row = np.where((row < 0) | (row >= window.shape[0]), y - down, row)
         column = np.where((column < 0) | (column >= window.shape[1]), x - right, column)
-        values_there[:] = window[row, column]
+        neighbour_values[:] = window[row, column]
     return np.asarray(np.median(values, axis=0))
 
 
@@ -165,7 +167,7 @@ def count_planes(
     noises = plane_noise(planes)
     positions = raw.cfa_side**2
     return [
-        _counted(raw, area, hot, window, noises[positions * index : positions * (index + 1)])
+        _count_region(raw, area, hot, window, noises[positions * index : positions * (index + 1)])
         for index, (area, window) in enumerate(zip(areas, windows, strict=True))
     ]
 
@@ -193,9 +195,14 @@ class _Window:
     def about(cls, area: tuple[int, int, int, int], raw: RawFrame) -> "_Window":
         """Cut out the surroundings of an area of `raw`."""
         x, y, width, height = area
-        left, wide = _grown(x, width, raw.width, raw.cfa_side)
-        top, high = _grown(y, height, raw.height, raw.cfa_side)
-        return cls(raw.mosaic[top : top + high, left : left + wide], top, left, raw.cfa_side)
+        left, window_width = _grow(x, width, raw.width, raw.cfa_side)
+        top, window_height = _grow(y, height, raw.height, raw.cfa_side)
+        return cls(
+            raw.mosaic[top : top + window_height, left : left + window_width],
+            top,
+            left,
+            raw.cfa_side,
+        )
 
     def planes(self) -> Iterator[Mosaic]:
         """Iterate over the pixels of every CFA position, row by row of the CFA."""
@@ -204,7 +211,7 @@ class _Window:
             yield self.pixels[(row - self.top) % side :: side, (column - self.left) % side :: side]
 
 
-def _counted(
+def _count_region(
     raw: RawFrame,
     area: tuple[int, int, int, int],
     hot: PixelMask | None,
@@ -214,21 +221,23 @@ def _counted(
     """Count the pixels of every CFA position in a region; `noises` are those of its window."""
     x, y, width, height = area
     side = raw.cfa_side
-    by_place = dict(zip(np.ndindex(side, side), noises, strict=True))
-    out_y, out_x = isolated_outliers(window.pixels, (window.top, window.left), side, by_place)
+    noise_by_position = dict(zip(np.ndindex(side, side), noises, strict=True))
+    out_y, out_x = isolated_outliers(
+        window.pixels, (window.top, window.left), side, noise_by_position
+    )
     inside = (y <= out_y) & (out_y < y + height) & (x <= out_x) & (out_x < x + width)
     out_y, out_x = out_y[inside], out_x[inside]
     if hot is not None:
-        known = hot[out_y, out_x]
-        out_y, out_x = out_y[~known], out_x[~known]
+        is_hot = hot[out_y, out_x]
+        out_y, out_x = out_y[~is_hot], out_x[~is_hot]
     planes = []
-    for (row, column), noise in by_place.items():
-        here = (
+    for (row, column), noise in noise_by_position.items():
+        slices = (
             slice(y + (row - y) % side, y + height, side),
             slice(x + (column - x) % side, x + width, side),
         )
-        plane = np.ascontiguousarray(raw.mosaic[here])
-        level, pixels = counted(plane, None if hot is None else hot[here])
+        plane = np.ascontiguousarray(raw.mosaic[slices])
+        level, pixels = counted(plane, None if hot is None else hot[slices])
         count = pixels.astype(np.float64)
         position = side * row + column
         planes.append(
@@ -244,10 +253,10 @@ def _counted(
     return planes
 
 
-def _grown(start: int, length: int, limit: int, side: int) -> tuple[int, int]:
+def _grow(start: int, length: int, limit: int, side: int) -> tuple[int, int]:
     """Grow a side of a region about its middle to the length that noise needs, inside the frame."""
-    grown = min(max(length, _LEAST_WINDOW * side), limit)
-    return min(max(start - (grown - length) // 2, 0), limit - grown), grown
+    window_length = min(max(length, _LEAST_WINDOW * side), limit)
+    return min(max(start - (window_length - length) // 2, 0), limit - window_length), window_length
 
 
 #: Quantile that measures how close to clipping a channel is, insensitive to a few hot pixels.
@@ -357,7 +366,7 @@ class FrameMeasurement:
         """Return a table for people, values in DN above black."""
         make = self.make if self.make and self.make not in (self.model or "") else None
         body = " ".join(filter(None, (make, self.model))) or "unknown camera"
-        taken = [
+        settings = [
             None if self.exposure_s is None else f"{self.exposure_s:.4g} s",
             None if self.iso is None else f"ISO {self.iso:g}",
             None if self.f_number is None else f"f/{self.f_number:g}",
@@ -370,7 +379,7 @@ class FrameMeasurement:
         ]
         return "\n".join(
             [
-                f"{body}, {', '.join(filter(None, taken)) or 'exposure not recorded'}",
+                f"{body}, {', '.join(filter(None, settings)) or 'exposure not recorded'}",
                 f"{self.width} x {self.height} pixels, {self.cfa}, black {black}, "
                 f"white {self.white:g}",
                 f"    {'mean / DN':>12}{'σ':>10}{'std':>10}{'pixels':>11}{'clipped':>9}{'hot':>6}",

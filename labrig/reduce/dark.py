@@ -54,8 +54,8 @@ class DarkModel:
                 f"expected dark frames of {exposure_s:g} s or of several exposures, got only "
                 f"{only:g} s; take dark frames at the shortest and the longest exposure"
             )
-        at = np.array([1.0, exposure_s])
-        return self.base + self.rate_per_s * exposure_s, np.sqrt(at @ self.covariance @ at)
+        terms = np.array([1.0, exposure_s])
+        return self.base + self.rate_per_s * exposure_s, np.sqrt(terms @ self.covariance @ terms)
 
     def current(self, exposure_s: float) -> Floats:
         """Return the signal of the dark current during an exposure in DN, shape (C,).
@@ -106,32 +106,34 @@ def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
     """
     if len(exposure_s) == 0:
         raise DataError("expected dark frames, got none; take some before charging")
-    one = same_exposure(float(exposure_s.min()), float(exposure_s.max()))
+    single_exposure = same_exposure(float(exposure_s.min()), float(exposure_s.max()))
     design = np.ones((len(exposure_s), 1))
-    if not one:
+    if not single_exposure:
         design = np.stack([np.ones_like(exposure_s), exposure_s], axis=1)
     channels = level.shape[1]
-    found, covariance = np.zeros((channels, 2)), np.zeros((channels, 2, 2))
-    used = design.shape[1]
-    freedom = len(exposure_s) - used
+    coefficients, covariance = np.zeros((channels, 2)), np.zeros((channels, 2, 2))
+    terms = design.shape[1]
+    dof = len(exposure_s) - terms
     for channel in range(channels):
         weighted = design / sigma[:, channel, np.newaxis]
         inverse = np.linalg.inv(weighted.T @ weighted)
-        found[channel, :used] = inverse @ weighted.T @ (level[:, channel] / sigma[:, channel])
-        misfit = (level[:, channel] - design @ found[channel, :used]) / sigma[:, channel]
-        scatter = float(misfit @ misfit) / freedom if freedom else 1.0
-        covariance[channel, :used, :used] = inverse * max(scatter, 1.0)
+        coefficients[channel, :terms] = (
+            inverse @ weighted.T @ (level[:, channel] / sigma[:, channel])
+        )
+        misfit = (level[:, channel] - design @ coefficients[channel, :terms]) / sigma[:, channel]
+        scatter = float(misfit @ misfit) / dof if dof else 1.0
+        covariance[channel, :terms, :terms] = inverse * max(scatter, 1.0)
     return DarkModel(
-        base=found[:, 0],
-        rate_per_s=found[:, 1],
+        base=coefficients[:, 0],
+        rate_per_s=coefficients[:, 1],
         covariance=covariance,
-        only_exposure_s=float(exposure_s.mean()) if one else None,
+        only_exposure_s=float(exposure_s.mean()) if single_exposure else None,
     )
 
 
-def same_exposure(one_s: float, other_s: float) -> bool:
+def same_exposure(first_s: float, second_s: float) -> bool:
     """Return whether two exposure times agree within the rounding of cameras."""
-    return abs(one_s - other_s) <= SAME_EXPOSURE * max(one_s, other_s)
+    return abs(first_s - second_s) <= SAME_EXPOSURE * max(first_s, second_s)
 
 
 def hot_pixels(darks: Sequence[RawFrame]) -> PixelMask:
@@ -189,13 +191,13 @@ def _bright(dark: RawFrame) -> PixelMask:
     bright = np.zeros(dark.mosaic.shape, bool)
     for row in range(side):
         for column in range(side):
-            here = (slice(row, None, side), slice(column, None, side))
-            plane = np.ascontiguousarray(dark.mosaic[here])
-            usual = cv2.medianBlur(plane, 5)
-            deviation = 1.4826 * _median(histogram(np.asarray(cv2.absdiff(plane, usual))))
+            position = (slice(row, None, side), slice(column, None, side))
+            plane = np.ascontiguousarray(dark.mosaic[position])
+            median = cv2.medianBlur(plane, 5)
+            deviation = 1.4826 * _median(histogram(np.asarray(cv2.absdiff(plane, median))))
             # Whole numbers: a quiet sensor's median deviation may be 0 though it is not silent.
             limit = int(OUTLIER_SIGMAS * max(deviation, 1.0))
-            bright[here] = np.asarray(cv2.subtract(plane, usual)) > limit
+            bright[position] = np.asarray(cv2.subtract(plane, median)) > limit
     return bright
 
 

@@ -58,18 +58,18 @@ def smallest_square(colours: Letters, black: Floats) -> tuple[str, tuple[float, 
             f"expected colours and black levels that repeat after {_LARGEST_SIDE} pixels or fewer, "
             f"got {side}; labrig cannot reduce this kind of sensor"
         )
-    letters, levels = _repeated(colours, side), _repeated(black, side)
+    letters, levels = _repeat(colours, side), _repeat(black, side)
     for shorter in (length for length in range(1, side) if side % length == 0):
         corner = (slice(shorter), slice(shorter))
-        if np.array_equal(_repeated(letters[corner], side), letters) and np.array_equal(
-            _repeated(levels[corner], side), levels
+        if np.array_equal(_repeat(letters[corner], side), letters) and np.array_equal(
+            _repeat(levels[corner], side), levels
         ):
             letters, levels = letters[corner], levels[corner]
             break
     return "".join(letters.ravel().tolist()), tuple(levels.ravel().tolist())
 
 
-def _repeated(tile: npt.NDArray[Scalar], side: int) -> npt.NDArray[Scalar]:
+def _repeat(tile: npt.NDArray[Scalar], side: int) -> npt.NDArray[Scalar]:
     return np.tile(tile, (side // tile.shape[0], side // tile.shape[1]))
 
 

@@ -101,9 +101,9 @@ class LinearFrame:
         light = self._window(self.raw.mosaic, area).astype(np.float64)
         dark = np.zeros(len(self.raw.channels)) if self.dark_dn is None else self.dark_dn
         for plane in self._planes(area):
-            light[plane.here] -= plane.black + dark[plane.channel]
+            light[plane.slices] -= plane.black + dark[plane.channel]
             if self.flat is not None:
-                light[plane.here] /= self._falloff(self.flat, plane, area)
+                light[plane.slices] /= self._falloff(self.flat, plane, area)
         return light
 
     def variance_dn2(self, area: Area | None = None) -> Floats:
@@ -113,10 +113,12 @@ class LinearFrame:
         if self.noise is None:
             return variance
         for plane in self._planes(area):
-            of_pixel = self.noise[plane.channel].variance_dn2(level[plane.here] - plane.black)
-            variance[plane.here] = np.maximum(of_pixel, ROUNDING_VARIANCE)
+            pixel_variance = self.noise[plane.channel].variance_dn2(
+                level[plane.slices] - plane.black
+            )
+            variance[plane.slices] = np.maximum(pixel_variance, ROUNDING_VARIANCE)
             if self.flat is not None:
-                variance[plane.here] /= self._falloff(self.flat, plane, area) ** 2
+                variance[plane.slices] /= self._falloff(self.flat, plane, area) ** 2
         return variance
 
     def is_saturated(self, area: Area | None = None) -> PixelMask:
@@ -128,14 +130,16 @@ class LinearFrame:
         value, variance = self.value_dn(area), self.variance_dn2(area)
         saturated = self.is_saturated(area)
         kept = np.ones_like(saturated) if self.hot is None else ~self._window(self.hot, area)
-        total, spread, pixels, full = np.zeros((4, len(value), len(self.raw.channels)))
+        value_sum, variance_sum, pixels, saturated_pixels = np.zeros(
+            (4, len(value), len(self.raw.channels))
+        )
         for plane in self._planes(area):
-            rows, own = (plane.here[0], plane.channel), kept[plane.here]
-            total[rows] += value[plane.here].sum(axis=1, where=own)
-            spread[rows] += variance[plane.here].sum(axis=1, where=own)
-            pixels[rows] += own.sum(axis=1)
-            full[rows] += (saturated[plane.here] & own).sum(axis=1)
-        return RegionSums(total, spread, pixels, full)
+            rows, counted = (plane.slices[0], plane.channel), kept[plane.slices]
+            value_sum[rows] += value[plane.slices].sum(axis=1, where=counted)
+            variance_sum[rows] += variance[plane.slices].sum(axis=1, where=counted)
+            pixels[rows] += counted.sum(axis=1)
+            saturated_pixels[rows] += (saturated[plane.slices] & counted).sum(axis=1)
+        return RegionSums(value_sum, variance_sum, pixels, saturated_pixels)
 
     def of_region(self, region: Region) -> RegionSums:
         """Return the sums of each channel in a region, in fractions of the frame."""
@@ -147,7 +151,7 @@ class LinearFrame:
         x, _, width, height = area
         pixels = np.zeros((len(self.raw.channels), width))
         for plane in self._planes(area):
-            rows, columns = plane.here
+            rows, columns = plane.slices
             pixels[plane.channel, columns] += len(range(height)[rows])
         return np.asarray(pixels @ (np.arange(x, x + width) + 0.5) / pixels.sum(axis=1))
 
@@ -161,13 +165,13 @@ class LinearFrame:
         side = raw.cfa_side
         for row, column in np.ndindex(side, side):
             position = side * ((y + row) % side) + (x + column) % side
-            here = slice(row, None, side), slice(column, None, side)
-            yield _Plane(raw.channels.index(raw.cfa[position]), raw.black[position], here)
+            slices = slice(row, None, side), slice(column, None, side)
+            yield _Plane(raw.channels.index(raw.cfa[position]), raw.black[position], slices)
 
     def _falloff(self, flat: Flat, plane: "_Plane", area: Area | None) -> Floats:
         """Return the transmission of the lens relative to its axis at the pixels of a plane."""
         raw, (x, y, width, height) = self.raw, area or (0, 0, self.raw.width, self.raw.height)
-        rows, columns = plane.here
+        rows, columns = plane.slices
         across, down = np.meshgrid(
             np.arange(x, x + width)[columns] + 0.5, np.arange(y, y + height)[rows] + 0.5
         )
@@ -183,13 +187,13 @@ class _Plane(NamedTuple):
         Number of their channel.
     black
         Their black level in DN.
-    here
+    slices
         Their rows and columns in the area.
     """
 
     channel: int
     black: float
-    here: tuple[slice, slice]
+    slices: tuple[slice, slice]
 
 
 def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
@@ -234,5 +238,5 @@ def saturated_cells(raw: RawFrame) -> PixelMask:
     """
     side = max(raw.cfa_side, 2)
     rows, columns = raw.height // side, raw.width // side
-    whole = raw.mosaic[: side * rows, : side * columns].reshape(rows, side, columns, side)
-    return np.asarray((whole >= raw.white).any(axis=(1, 3)))
+    cells = raw.mosaic[: side * rows, : side * columns].reshape(rows, side, columns, side)
+    return np.asarray((cells >= raw.white).any(axis=(1, 3)))

@@ -119,18 +119,18 @@ def hdr_frame(frames: Iterable[tuple[RawFrame, float]], hot: PixelMask | None = 
     counts: FloatArray | None = None
     for raw, exposure_s in frames:
         if counts is None:
-            first, counts = raw, np.zeros(raw.mosaic.shape)
+            reference, counts = raw, np.zeros(raw.mosaic.shape)
             seconds = np.zeros(raw.mosaic.shape)
-        if raw.mosaic.shape != counts.shape or raw.cfa != first.cfa:
+        if raw.mosaic.shape != counts.shape or raw.cfa != reference.cfa:
             raise DataError("expected frames of one sensor and size; choose those of one camera")
         light = LinearFrame(raw).value_dn()
-        is_open = light < FULL * (raw.white - max(raw.black))
-        counts += np.where(is_open, light, 0.0)
-        seconds += np.where(is_open, exposure_s, 0.0)
+        is_unclipped = light < FULL * (raw.white - max(raw.black))
+        counts += np.where(is_unclipped, light, 0.0)
+        seconds += np.where(is_unclipped, exposure_s, 0.0)
     if counts is None:
         raise DataError("expected frames of the strip, got none; take them again")
     if hot is not None:
         seconds[hot] = 0.0
     rate = np.full(counts.shape, np.nan, dtype=np.float32)
     np.divide(counts, seconds, out=rate, where=seconds > 0, casting="same_kind")
-    return HdrFrame(rate, first.cfa, first.cfa_side, first.channels)
+    return HdrFrame(rate, reference.cfa, reference.cfa_side, reference.channels)

@@ -124,13 +124,13 @@ def measure_frames(
 
     def shot(frame: SeriesFrame) -> MeasuredFrame:
         raw = read.get(frame.path) or read_raw(frame.path)
-        return _shot(frame, raw, patches, background, hot)
+        return _measure_frame(frame, raw, patches, background, hot)
 
     with ThreadPoolExecutor(_FRAMES_AT_ONCE) as pool:
         return list(pool.map(shot, frames))
 
 
-def _shot(
+def _measure_frame(
     frame: SeriesFrame,
     raw: RawFrame,
     patches: Mapping[str, Region],

@@ -98,13 +98,15 @@ def plane_noise(planes: Sequence[Mosaic]) -> list[PlaneNoise]:
     """
     tiles = [_tiles(plane) for plane in planes]
     noises: dict[int, PlaneNoise] = {}
-    for shape in {of_plane.shape[1:] for of_plane in tiles}:
-        alike = [index for index, of_plane in enumerate(tiles) if of_plane.shape[1:] == shape]
-        stacked = np.concatenate([tiles[index] for index in alike])
+    for shape in {plane_tiles.shape[1:] for plane_tiles in tiles}:
+        same_shape = [
+            index for index, plane_tiles in enumerate(tiles) if plane_tiles.shape[1:] == shape
+        ]
+        stacked = np.concatenate([tiles[index] for index in same_shape])
         level, variance = stacked.mean(axis=(1, 2)), _second_difference_variance(stacked)
         sharing = _autocovariance(stacked) if shape == (TILE, TILE) else None
         end = 0
-        for index in alike:
+        for index in same_shape:
             start, end = end, end + len(tiles[index])
             noises[index] = _noise_of_plane(
                 level[start:end],
@@ -141,18 +143,18 @@ def _noise_of_plane(
     if sharing is not None:
         # Only tiles on the line show shared noise: the others are dominated by the sample.
         by_line = line.variance_dn2(above)
-        plain = variance <= _ROUGH * by_line
+        on_line = variance <= _ROUGH * by_line
         autocovariance, clean = sharing
-        correlation = _correlation(autocovariance[plain & clean], by_line[plain & clean])
+        correlation = _correlation(autocovariance[on_line & clean], by_line[on_line & clean])
         if correlation > 1:
             # Differences of pixels that share noise are too small: take C(0) itself.
-            variance = np.where(plain, autocovariance[:, 0], np.inf)
-            line = _photon_line(above[plain], variance[plain])
+            variance = np.where(on_line, autocovariance[:, 0], np.inf)
+            line = _photon_line(above[on_line], variance[on_line])
     expected = line.variance_dn2(above)
     smooth = np.where(variance <= _ROUGH * expected, variance, expected)
     # Few tiles may miss how much of the plane is bright, thousands of single pixels do not.
-    missed = line.photon_dn * (brightness - float(level.mean()))
-    mean_variance = max(float(smooth.mean()) + missed, 0.0) * correlation
+    correction = line.photon_dn * (brightness - float(level.mean()))
+    mean_variance = max(float(smooth.mean()) + correction, 0.0) * correlation
     return PlaneNoise(darkest, line, mean_variance, correlation)
 
 
@@ -215,11 +217,11 @@ def _photon_line(level: Floats, variance: Floats) -> NoiseModel:
     x, y = _medians_of_groups(level, variance, groups)
     if groups == 1:
         return NoiseModel(float(y[0]), 0.0)
-    one, other = np.triu_indices(len(x), k=1)
-    rising = (x[other] > x[one]) & (y[other] > y[one])
-    one, other = one[rising], other[rising]
-    slope = np.append((y[other] - y[one]) / (x[other] - x[one]), np.zeros(len(x)))
-    intercept = np.append(y[one], y) - slope * np.append(x[one], x)
+    first, second = np.triu_indices(len(x), k=1)
+    rising = (x[second] > x[first]) & (y[second] > y[first])
+    first, second = first[rising], second[rising]
+    slope = np.append((y[second] - y[first]) / (x[second] - x[first]), np.zeros(len(x)))
+    intercept = np.append(y[first], y) - slope * np.append(x[first], x)
     slope, intercept = slope[intercept >= 0], intercept[intercept >= 0]
     line = intercept[:, np.newaxis] + slope[:, np.newaxis] * level
     misfit = np.log((variance + ROUNDING_VARIANCE) / (line + ROUNDING_VARIANCE))
@@ -251,10 +253,10 @@ def _autocovariance(tiles: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
     clean = np.all(np.abs(residual) <= limit[:, np.newaxis], axis=1)
     square = residual.reshape(-1, TILE, TILE)
     products = [
-        np.einsum("nyx,nyx->n", a, b) / (a.shape[1] * a.shape[2]) for a, b in _shifted(square)
+        np.einsum("nyx,nyx->n", a, b) / (a.shape[1] * a.shape[2]) for a, b in _lagged_pairs(square)
     ]
-    found = np.stack(products, axis=1)
-    return found @ inverse.T, clean
+    covariance = np.stack(products, axis=1)
+    return covariance @ inverse.T, clean
 
 
 def _correlation(autocovariance: Floats, line: Floats) -> float:
@@ -279,7 +281,7 @@ def _correlation(autocovariance: Floats, line: Floats) -> float:
     return 1 + excess if significant and not reaches_far else 1.0
 
 
-def _shifted(square: NumberArray) -> list[tuple[NumberArray, NumberArray]]:
+def _lagged_pairs(square: NumberArray) -> list[tuple[NumberArray, NumberArray]]:
     """Return both factors of the autocovariance of `square`, shape (…, TILE, TILE), by lag."""
     pairs = []
     for down, right in _NEAR + _FAR:
@@ -303,12 +305,14 @@ def _cubic_surface() -> tuple[Floats, Floats]:
     remover = np.eye(TILE**2) - basis @ basis.T
     pixel = np.arange(TILE**2).reshape(TILE, TILE)
     shifts, counts = [], []
-    for first, second in _shifted(pixel):
+    for first, second in _lagged_pairs(pixel):
         shift = np.zeros((TILE**2, TILE**2))
         shift[first.ravel(), second.ravel()] = 1
         shift[second.ravel(), first.ravel()] = 1
         shifts.append(shift)
         counts.append(shift.sum())
-    seen = [remover @ shift @ remover for shift in shifts]
-    effect = [[float(np.sum(s * h)) / n for h in shifts] for s, n in zip(seen, counts, strict=True)]
+    filtered = [remover @ shift @ remover for shift in shifts]
+    effect = [
+        [float(np.sum(s * h)) / n for h in shifts] for s, n in zip(filtered, counts, strict=True)
+    ]
     return np.asarray(basis, dtype=np.float64), np.linalg.inv(np.array(effect))

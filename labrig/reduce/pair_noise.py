@@ -98,9 +98,9 @@ class PatchFrames:
         """Return pairs of frames that differ by noise only, whatever the dark current's pattern."""
         rising = np.argsort(self.exposure_s, kind="stable").tolist()
         return [
-            (one, other)
-            for one, other in pairwise(rising)
-            if same_exposure(self.exposure_s[one], self.exposure_s[other])
+            (first, second)
+            for first, second in pairwise(rising)
+            if same_exposure(self.exposure_s[first], self.exposure_s[second])
         ]
 
 
@@ -122,14 +122,14 @@ def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Fl
     total, count = np.zeros((2, len(raw.channels), strips))
     for position, letter in enumerate(raw.cfa):
         row, column = divmod(position, side)
-        here = (
+        slices = (
             slice(y + (row - y) % side, y + height, side),
             slice(x + (column - x) % side, x + width, side),
         )
-        plane = raw.mosaic[here]
+        plane = raw.mosaic[slices]
         if len(plane) < strips:
             continue
-        kept = np.ones(plane.shape, bool) if hot is None else ~hot[here]
+        kept = np.ones(plane.shape, bool) if hot is None else ~hot[slices]
         pixels = kept.sum(axis=1)
         light = plane.sum(axis=1, dtype=np.int64, where=kept) - raw.black[position] * pixels
         starts = np.arange(strips) * len(plane) // strips
@@ -164,28 +164,28 @@ def paired_noise(
     darks
         Dark frames at the ISO of each unit, where there are any.
     """
-    found = frames.sigma.copy()
-    channels = found.shape[1]
+    sigma = frames.sigma.copy()
+    channels = sigma.shape[1]
     products = LEAST_PRODUCT * np.eye(channels)
-    for one in dict.fromkeys(unit):
-        rows = np.array([row for row, name in enumerate(unit) if name == one])
+    for name in dict.fromkeys(unit):
+        rows = np.array([row for row, row_unit in enumerate(unit) if row_unit == name])
         paired = np.flatnonzero(usable[rows])
         paired = paired[np.argsort(t_s[rows[paired]], kind="stable")]
         pairs = list(pairwise(paired.tolist()))
         if len(pairs) * (frames.deviations.shape[2] - 1) < FEWEST_DOF:
             continue
         part = frames.take(rows)
-        if one in darks:
-            dark_pairs = darks[one].pairs_of_like_exposure()
+        if name in darks:
+            dark_pairs = darks[name].pairs_of_like_exposure()
             pairs += [(len(rows) + first, len(rows) + second) for first, second in dark_pairs]
-            part = part.and_then(darks[one])
+            part = part.and_then(darks[name])
         first, second = np.array(pairs).T
         for channel in range(channels):
-            found[rows, channel] = _sigma_of_means(part, channel, first, second)[: len(rows)]
+            sigma[rows, channel] = _sigma_of_means(part, channel, first, second)[: len(rows)]
         light = second < len(rows)
-        products += _cross_products(frames.take(rows), found[rows], first[light], second[light])
+        products += _cross_products(frames.take(rows), sigma[rows], first[light], second[light])
     length = np.sqrt(np.diag(products))
-    return PatchNoise(found, products / np.outer(length, length))
+    return PatchNoise(sigma, products / np.outer(length, length))
 
 
 def paired_dark_sigma(darks: PatchFrames) -> Floats:
@@ -203,18 +203,18 @@ def paired_dark_sigma(darks: PatchFrames) -> Floats:
 
 
 def _cross_products(
-    frames: PatchFrames, sigma: Floats, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
+    frames: PatchFrames, sigma: Floats, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
 ) -> Floats:
     """Sum products of the channels' normalised differences over paired frames, shape (C, C)."""
-    scales, differences = _differences(frames, sigma, one, other)
-    expected = np.square(sigma[other]) + np.square(scales * sigma[one])
+    scales, differences = _differences(frames, sigma, first, second)
+    expected = np.square(sigma[second]) + np.square(scales * sigma[first])
     normal = differences / np.sqrt(expected)[..., np.newaxis]
     products: Floats = np.einsum("pcs,pds->cd", normal, normal)
     return products
 
 
 def _differences(
-    frames: PatchFrames, sigma: Floats, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
+    frames: PatchFrames, sigma: Floats, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
 ) -> tuple[Floats, Floats]:
     """Return scales and differences of p pairs of frames.
 
@@ -222,29 +222,29 @@ def _differences(
     (p, C, s). A frame that is nothing but noise is not scaled.
     """
     light = np.maximum(frames.light, 0)
-    bright = light[one] > SCALED_SIGMAS * sigma[one]
-    scales = np.where(bright, light[other] / np.where(bright, light[one], 1.0), 1.0)
-    return scales, frames.deviations[other] - scales[..., np.newaxis] * frames.deviations[one]
+    bright = light[first] > SCALED_SIGMAS * sigma[first]
+    scales = np.where(bright, light[second] / np.where(bright, light[first], 1.0), 1.0)
+    return scales, frames.deviations[second] - scales[..., np.newaxis] * frames.deviations[first]
 
 
 def _sigma_of_means(
-    frames: PatchFrames, channel: int, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
+    frames: PatchFrames, channel: int, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
 ) -> Floats:
     """Return σ of the means of one channel in DN, shape (n,), from pairs of frames.
 
     The uneven part is proportional to the light but not common to the patch.
     """
-    scales, differences = _differences(frames, frames.sigma, one, other)
+    scales, differences = _differences(frames, frames.sigma, first, second)
     scale, difference, sigma = scales[:, channel], differences[:, channel], frames.sigma[:, channel]
     strips = difference.shape[1]
     light = frames.light[:, channel]
     scatter = np.square(difference).sum(axis=1) / (strips - 1) / strips
     terms = variance_terms(light)
-    of_pair = terms[other] + np.square(scale)[:, np.newaxis] * terms[one]
+    pair_terms = terms[second] + np.square(scale)[:, np.newaxis] * terms[first]
     variance = np.square(sigma)
     least = LEAST_FRACTION**2 * variance
     for _ in range(REWEIGHTINGS):
-        expected = variance[other] + np.square(scale) * variance[one]
-        noise = NoiseModel.fit(of_pair, scatter, sigma_dn2=expected)
+        expected = variance[second] + np.square(scale) * variance[first]
+        noise = NoiseModel.fit(pair_terms, scatter, sigma_dn2=expected)
         variance = np.maximum(noise.variance_dn2(light), least)
     return np.sqrt(variance)

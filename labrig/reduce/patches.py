@@ -60,18 +60,22 @@ def calibrated(
         (float(iso), None if np.isnan(f_number) else float(f_number))
         for iso, f_number in zip(series.iso, series.f_number, strict=True)
     ]
-    first, _ = camera.scale(*settings[0])
+    reference_gain, _ = camera.scale(*settings[0])
     gain = {
-        one: camera.flat(one[1], region, width, height) * camera.scale(*one)[0] / first
-        for one in set(settings)
+        setting: camera.flat(setting[1], region, width, height)
+        * camera.scale(*setting)[0]
+        / reference_gain
+        for setting in set(settings)
     }
-    true_s = np.array([camera.exposure_s(told_s)[0] for told_s in series.exposure_s])
-    per_row = (true_s / series.exposure_s)[:, None] * np.array([gain[one] for one in settings])
+    actual_s = np.array([camera.exposure_s(nominal_s)[0] for nominal_s in series.exposure_s])
+    per_row = (actual_s / series.exposure_s)[:, None] * np.array(
+        [gain[setting] for setting in settings]
+    )
     # As the offset acts on a fit, most where weights are highest.
     weights = 1 / np.square(series.sigma)
     return replace(
         series,
-        exposure_s=true_s,
+        exposure_s=actual_s,
         values=series.values / per_row,
         sigma=series.sigma / per_row,
         dark_sigma=series.dark_sigma / np.average(per_row, axis=0, weights=weights),
@@ -89,7 +93,7 @@ _DARKS_FOR_HOT = 5
 
 
 @dataclass(frozen=True, eq=False)
-class _Dark:
+class _PatchDark:
     """Dark level of a patch at one ISO.
 
     Attributes
@@ -221,7 +225,7 @@ def reduce_patches(
         raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
     longest = _read_longest(darks)
     hot = hot_pixels(list(longest.values())) if longest else None
-    dark = {} if background else _measured_darks(darks, patches, hot, longest)
+    dark = {} if background else _patch_darks(darks, patches, hot, longest)
     longest.clear()  # five frames of 42 MB that are not needed any more
     shots = measure_frames(frames, patches, background, hot, {})
     _check_settings(shots)
@@ -229,8 +233,8 @@ def reduce_patches(
     if camera is None:
         return series
     return {
-        name: calibrated(one, camera, patches[name], *_size(shots[0]))
-        for name, one in series.items()
+        name: calibrated(patch_series, camera, patches[name], *_frame_size(shots[0]))
+        for name, patch_series in series.items()
     }
 
 
@@ -243,34 +247,34 @@ def _read_longest(darks: Sequence[SeriesFrame]) -> dict[Path, RawFrame]:
     return {dark.path: read_raw(dark.path) for dark in longest[:_DARKS_FOR_HOT]}
 
 
-def _measured_darks(
+def _patch_darks(
     darks: Sequence[SeriesFrame],
     patches: Mapping[str, Region],
     hot: PixelMask | None,
     read: Mapping[Path, RawFrame],
-) -> dict[tuple[str, float], _Dark]:
+) -> dict[tuple[str, float], _PatchDark]:
     """Return the dark level by patch and ISO."""
     by_iso: dict[float, list[MeasuredFrame]] = defaultdict(list)
     for shot in measure_frames(darks, patches, None, hot, read):
-        by_iso[_key(shot.iso)].append(shot)
+        by_iso[_setting_key(shot.iso)].append(shot)
     return {
-        (name, iso): _dark([shot.frame.exposure_s for shot in shots], _views(name, shots))
+        (name, iso): _patch_dark([shot.frame.exposure_s for shot in shots], _views(name, shots))
         for iso, shots in by_iso.items()
         for name in patches
     }
 
 
-def _dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]) -> _Dark:
+def _patch_dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]) -> _PatchDark:
     exposure_s = np.array(exposures_s)
     level, sigma = levels(views)
     light = level - fit_dark(exposure_s, level, sigma).base
     frames = PatchFrames(exposure_s, strips(views), light, sigma)
     frames = replace(frames, sigma=paired_dark_sigma(frames))
-    return _Dark(views[0].kind, fit_dark(exposure_s, level, frames.sigma), frames)
+    return _PatchDark(views[0].kind, fit_dark(exposure_s, level, frames.sigma), frames)
 
 
 def _patch_series(
-    name: str, shots: Sequence[MeasuredFrame], darks: Mapping[tuple[str, float], _Dark]
+    name: str, shots: Sequence[MeasuredFrame], darks: Mapping[tuple[str, float], _PatchDark]
 ) -> Series:
     exposure_s = np.array([shot.frame.exposure_s for shot in shots])
     t_s = np.array([shot.frame.t_s for shot in shots])
@@ -295,19 +299,19 @@ def _patch_series(
         dark_sigma = np.zeros_like(level)
     elif darks:
         for row, (shot, view) in enumerate(zip(shots, views, strict=True)):
-            found = darks.get((name, _key(shot.iso)))
-            if found is None or found.kind != view.kind:
+            patch_dark = darks.get((name, _setting_key(shot.iso)))
+            if patch_dark is None or patch_dark.kind != view.kind:
                 raise DataError(
                     f"{shot.frame.path}: expected dark frames at ISO {shot.iso:g} as this frame, "
                     "of the same sensor, got none; take some, or name a background region"
                 )
-            dark[row], of_model = found.model.dark_level(shot.frame.exposure_s)
-            unexposed[row] = found.model.base
-            drift[row] = TWO_DEGREES * np.abs(found.model.current(shot.frame.exposure_s))
-            dark_sigma[row] = np.hypot(of_model, drift[row])
-            dark_of_unit[shot.frame.unit] = found.frames
-    own = noise(views, level - (dark if backgrounds else unexposed), sigma)
-    sigma = np.hypot(own.sigma, dark_noise) if backgrounds else own.sigma
+            dark[row], model_sigma = patch_dark.model.dark_level(shot.frame.exposure_s)
+            unexposed[row] = patch_dark.model.base
+            drift[row] = TWO_DEGREES * np.abs(patch_dark.model.current(shot.frame.exposure_s))
+            dark_sigma[row] = np.hypot(model_sigma, drift[row])
+            dark_of_unit[shot.frame.unit] = patch_dark.frames
+    patch_noise = noise(views, level - (dark if backgrounds else unexposed), sigma)
+    sigma = np.hypot(patch_noise.sigma, dark_noise) if backgrounds else patch_noise.sigma
     per_second = exposure_s[:, np.newaxis]
     sigma = sigma / per_second
     # As the offset acts on a fit, most where weights are highest.
@@ -327,8 +331,8 @@ def _patch_series(
         unit=unit,
         flag=flags,
         region=name,
-        correlation=own.correlation,
-        dark_correlation=_dark_correlation(dark_sigma, drift_sigma, own.correlation),
+        correlation=patch_noise.correlation,
+        dark_correlation=_dark_correlation(dark_sigma, drift_sigma, patch_noise.correlation),
     )
 
 
@@ -340,14 +344,16 @@ def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | N
     """
     if not (sigma > 0).all():
         return None
-    of_model = np.sqrt(np.maximum(np.square(sigma) - np.square(drift), 0.0)) / sigma
-    common = drift / sigma
-    correlation = noise * np.outer(of_model, of_model) + np.outer(common, common)
+    model_fraction = np.sqrt(np.maximum(np.square(sigma) - np.square(drift), 0.0)) / sigma
+    drift_fraction = drift / sigma
+    correlation = noise * np.outer(model_fraction, model_fraction) + np.outer(
+        drift_fraction, drift_fraction
+    )
     # A dark level known without noise would make the errors all one.
     return np.where(np.eye(len(sigma), dtype=np.bool_), 1.0, MOST_COMMON * correlation)
 
 
-def _size(shot: MeasuredFrame) -> tuple[int, int]:
+def _frame_size(shot: MeasuredFrame) -> tuple[int, int]:
     """Return width and height of a frame in pixels."""
     width, height, _ = next(iter(shot.patches.values())).kind
     return width, height
@@ -366,17 +372,20 @@ def _flag(shot: MeasuredFrame, name: str) -> str:
 def _check_settings(shots: Sequence[MeasuredFrame]) -> None:
     """Refuse frames of several gains or apertures in one unit: their DN/s are not comparable."""
     for unit in {shot.frame.unit for shot in shots}:
-        for what, found in (
-            ("ISO", {_key(shot.iso) for shot in shots if shot.frame.unit == unit}),
-            ("f-number", {_key(shot.f_number) for shot in shots if shot.frame.unit == unit}),
+        for setting, values in (
+            ("ISO", {_setting_key(shot.iso) for shot in shots if shot.frame.unit == unit}),
+            (
+                "f-number",
+                {_setting_key(shot.f_number) for shot in shots if shot.frame.unit == unit},
+            ),
         ):
-            if len(found) > 1:
+            if len(values) > 1:
                 raise DataError(
-                    f"expected one {what} in unit '{unit}', got {sorted(found)}; DN/s of different "
-                    "settings do not compare: reduce them apart"
+                    f"expected one {setting} in unit '{unit}', got {sorted(values)}; DN/s of "
+                    "different settings do not compare: reduce them apart"
                 )
 
 
-def _key(number: float) -> float:
+def _setting_key(number: float) -> float:
     """Return `number`, or −1 for NaN, which as a key would not equal itself."""
     return -1.0 if np.isnan(number) else number

@@ -60,11 +60,11 @@ class NoiseModel:
         read_dn2
             Variance measured without light in DN², which is then held; None fits it.
         """
-        held = 0.0 if read_dn2 is None else read_dn2
-        free = terms if read_dn2 is None else terms[:, 1:]
-        target = variance_dn2 - held * terms[:, 0]
-        found = nonnegative_least_squares(free / sigma_dn2[:, np.newaxis], target / sigma_dn2)
-        return cls(*([] if read_dn2 is None else [read_dn2]), *found.tolist())
+        fixed_read_dn2 = 0.0 if read_dn2 is None else read_dn2
+        free_terms = terms if read_dn2 is None else terms[:, 1:]
+        target = variance_dn2 - fixed_read_dn2 * terms[:, 0]
+        parts = nonnegative_least_squares(free_terms / sigma_dn2[:, np.newaxis], target / sigma_dn2)
+        return cls(*([] if read_dn2 is None else [read_dn2]), *parts.tolist())
 
     def parts_dn2(self, level_dn: FloatArray) -> FloatArray:
         """Return the parts of the variance in DN² at levels (…,), shape (…, 3).

@@ -41,20 +41,20 @@ def quiet_stderr() -> Iterator[None]:
 
     Lines that other threads write meanwhile are passed on at the end.
     """
-    with _lock, tempfile.TemporaryFile() as caught:
+    with _lock, tempfile.TemporaryFile() as captured:
         try:
-            kept = os.dup(_STDERR)
+            original = os.dup(_STDERR)
         except OSError:  # a process without stderr has nothing to keep quiet
             yield
             return
-        os.dup2(caught.fileno(), _STDERR)
+        os.dup2(captured.fileno(), _STDERR)
         try:
             yield
         finally:
-            os.dup2(kept, _STDERR)
-            os.close(kept)
-            caught.seek(0)
-            for line in caught:
+            os.dup2(original, _STDERR)
+            os.close(original)
+            captured.seek(0)
+            for line in captured:
                 if not line.startswith(_PREFIXES):
                     os.write(_STDERR, line)
 
@@ -153,8 +153,8 @@ def _positive(tags: dict[str, Any], name: str) -> float | None:
 def _lens(tags: dict[str, Any]) -> str | None:
     """Return the lens as in `EF50mm f/1.4 USM, 50 mm`."""
     focal_mm = _positive(tags, "FocalLength")
-    said = (_text(tags, "EXIF LensModel"), None if focal_mm is None else f"{focal_mm:g} mm")
-    return ", ".join(filter(None, said)) or None
+    parts = (_text(tags, "EXIF LensModel"), None if focal_mm is None else f"{focal_mm:g} mm")
+    return ", ".join(filter(None, parts)) or None
 
 
 def _text(tags: dict[str, Any], name: str) -> str | None:
@@ -189,25 +189,25 @@ def sensor_pattern(raw: Any, dng: bytes | None) -> tuple[str, tuple[float, ...]]
         The sensor has other colours, or no pattern that is known for certain.
     """
     if dng is not None:
-        found = read_dng(dng, raw.sizes.raw_height, raw.sizes.raw_width)
-        if found is not None:
-            return smallest_square(*_from_first_pixel(raw, found))
-    return smallest_square(*_by_libraw(raw))
+        pattern = read_dng(dng, raw.sizes.raw_height, raw.sizes.raw_width)
+        if pattern is not None:
+            return smallest_square(*_visible_pattern(raw, pattern))
+    return smallest_square(*_libraw_pattern(raw))
 
 
-def _from_first_pixel(raw: Any, found: DngPattern) -> tuple[Letters, Floats]:
+def _visible_pattern(raw: Any, pattern: DngPattern) -> tuple[Letters, Floats]:
     """Return colours and black levels of a DNG, shifted to the first pixel visible to LibRaw."""
-    shift = (found.corner[0] - raw.sizes.top_margin, found.corner[1] - raw.sizes.left_margin)
-    colours = np.roll(found.colours, shift, axis=(0, 1))
-    if found.black is not None:
-        return colours, np.roll(found.black, shift, axis=(0, 1))
+    shift = (pattern.corner[0] - raw.sizes.top_margin, pattern.corner[1] - raw.sizes.left_margin)
+    colours = np.roll(pattern.colours, shift, axis=(0, 1))
+    if pattern.black is not None:
+        return colours, np.roll(pattern.black, shift, axis=(0, 1))
     # LibRaw then has measured it in the masked borders, or knows the camera.
     by_number = raw.black_level_per_channel
     numbers = [_BLACK_NUMBER.get(str(letter), 0) for letter in colours.flat]
     return colours, np.array([float(by_number[i]) for i in numbers]).reshape(colours.shape)
 
 
-def _by_libraw(raw: Any) -> tuple[Letters, Floats]:
+def _libraw_pattern(raw: Any) -> tuple[Letters, Floats]:
     """Return colours and black levels by LibRaw, from the first visible pixel on."""
     pattern, levels = raw.raw_pattern, raw.black_level_per_channel
     if pattern is None or pattern.shape == (1, 1):
@@ -392,8 +392,8 @@ def _decode(content: bytes) -> RawFrame:
             ) from None
         # A damaged file can fail anywhere in rawpy, with any exception: all mean the same.
         except Exception as error:
-            said = error.args[0] if error.args else type(error).__name__
-            text = said.decode(errors="replace") if isinstance(said, bytes) else str(said)
+            reason = error.args[0] if error.args else type(error).__name__
+            text = reason.decode(errors="replace") if isinstance(reason, bytes) else str(reason)
             raise FrameError(
                 f"{_EXPECTED}, got a damaged one ({' '.join(text.split())}); transfer it again"
             ) from None

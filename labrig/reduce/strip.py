@@ -110,13 +110,13 @@ def find_strip(frame: HdrFrame) -> FoundStrip:
     """
     light = frame.light()
     height, width = light.shape
-    lit = _lit(light)
-    if lit is None:
+    lit_mask = _largest_lit_patch(light)
+    if lit_mask is None:
         raise DataError(
             "no strip is lit in the picture: the lamp is out, the filter is not in its place, or "
             "the frames are too short"
         )
-    (middle_x, middle_y), across, down, angle = _rectangle(lit)
+    (middle_x, middle_y), across, down, angle = _rectangle(lit_mask)
     if across * down < LEAST_FRACTION * width * height or across < LEAST_ELONGATION * down:
         raise DataError(
             f"expected a long strip on a dark ground, found {across:.0f} x {down:.0f} pixels that "
@@ -132,7 +132,7 @@ def find_strip(frame: HdrFrame) -> FoundStrip:
             f"the strip is {across:.0f} pixels long, {_LEAST_SLICE * SLICES} or more are needed "
             f"for {SLICES} positions; move the camera nearer"
         )
-    if not FULL[0] < np.count_nonzero(lit) / (across * down) < FULL[1]:
+    if not FULL[0] < np.count_nonzero(lit_mask) / (across * down) < FULL[1]:
         raise DataError(
             "what is lit is no rectangle; keep other light away and the holder round the filter "
             "dark"
@@ -183,18 +183,18 @@ def strip_profile(frame: HdrFrame, strip: Strip) -> StripProfile:
     ((80, 1), [103.0, 897.0])
     """
     height, width = frame.rate.shape
-    along, inside = _along(strip, width, height)
+    along, inside = _strip_position(strip, width, height)
     rows, columns = np.nonzero(inside)
-    at, value = along[inside], frame.rate[inside].astype(np.float64)
+    place, value = along[inside], frame.rate[inside].astype(np.float64)
     side = frame.cfa_side
     colour = np.array(list(frame.cfa)).reshape(side, side)[rows % side, columns % side]
     cells = (strip.right[0] - strip.left[0]) * width / max(side, 2)
     edges = np.linspace(0.0, 1.0, int(cells) + 1)
     position = (edges[1:] + edges[:-1]) / 2
-    seen = np.isfinite(value)
+    is_finite = np.isfinite(value)
     columns_of_value = [
-        _read_at(at[own], value[own], edges, position)
-        for own in (seen & (colour == name) for name in frame.channels)
+        _interpolate_means(place[in_channel], value[in_channel], edges, position)
+        for in_channel in (is_finite & (colour == name) for name in frame.channels)
     ]
     return StripProfile(position, np.stack(columns_of_value, axis=1))
 
@@ -247,45 +247,51 @@ def slice_values(
     """
     series = reduce_patches(frames, strip.slices(), darks, camera=camera)
     units = dict.fromkeys(frame.unit for frame in frames)
-    found = {}
+    values_by_unit = {}
     for unit in units:
         pairs = []
-        for one in series.values():
-            rows = np.array(one.unit) == unit
-            usable = rows & one.usable & np.isfinite(one.sigma).all(axis=1)
-            pairs.append(_weighted_mean(one.values[usable], one.sigma[usable], one.dark_sigma))
+        for slice_series in series.values():
+            rows = np.array(slice_series.unit) == unit
+            usable = rows & slice_series.usable & np.isfinite(slice_series.sigma).all(axis=1)
+            pairs.append(
+                _weighted_mean(
+                    slice_series.values[usable], slice_series.sigma[usable], slice_series.dark_sigma
+                )
+            )
         value, sigma = np.moveaxis(np.array(pairs), 1, 0)
-        found[unit] = SliceValues(value, sigma)
-    return found
+        values_by_unit[unit] = SliceValues(value, sigma)
+    return values_by_unit
 
 
-def _lit(light: Image) -> NDArray[np.uint8] | None:
+def _largest_lit_patch(light: Image) -> NDArray[np.uint8] | None:
     """Mark the largest lit patch by 1, shape (height, width); None without light."""
     ground = float(np.median(light))
     noise = 1.4826 * float(np.median(np.abs(light - ground)))
     above = light - np.float32(ground)
     height, width = light.shape
-    near = np.ones((height // 2 * 2 + 1, int(NEAR * width) // 2 * 2 + 1), np.uint8)
-    local = cv2.dilate(above, near)
+    neighbourhood = np.ones((height // 2 * 2 + 1, int(NEAR * width) // 2 * 2 + 1), np.uint8)
+    local = cv2.dilate(above, neighbourhood)
     least = max(SEEN_SIGMA * noise, FAINTEST * float(above.max()))
-    lit = ((above > least) & (above > EDGE * local)).astype(np.uint8)
+    lit_mask = ((above > least) & (above > EDGE * local)).astype(np.uint8)
     cell = np.ones((3, 3), np.uint8)
-    whole = cv2.morphologyEx(cv2.morphologyEx(lit, cv2.MORPH_OPEN, cell), cv2.MORPH_CLOSE, cell)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(whole)
+    cleaned = cv2.morphologyEx(
+        cv2.morphologyEx(lit_mask, cv2.MORPH_OPEN, cell), cv2.MORPH_CLOSE, cell
+    )
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(cleaned)
     if count < 2:
         return None
     largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
     return np.asarray(labels == largest, dtype=np.uint8)
 
 
-def _rectangle(lit: NDArray[np.uint8]) -> tuple[tuple[float, float], float, float, float]:
+def _rectangle(lit_mask: NDArray[np.uint8]) -> tuple[tuple[float, float], float, float, float]:
     """Return the rectangle of equal moments: centre, length, height in pixels, tilt in degrees.
 
     Moments involve all pixels: they resolve a tilt of a fraction of a pixel, which corners do not.
     """
-    m = cv2.moments(lit, binaryImage=True)
-    middle = m["m10"] / m["m00"] + 0.5, m["m01"] / m["m00"] + 0.5
-    xx, yy, xy = (m[name] / m["m00"] for name in ("mu20", "mu02", "mu11"))
+    moments = cv2.moments(lit_mask, binaryImage=True)
+    middle = moments["m10"] / moments["m00"] + 0.5, moments["m01"] / moments["m00"] + 0.5
+    xx, yy, xy = (moments[name] / moments["m00"] for name in ("mu20", "mu02", "mu11"))
     (short, long), axes = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
     angle = math.degrees(math.atan2(axes[1, 1], axes[0, 1]))
     # n pixels side by side have the variance (n² − 1)/12.
@@ -297,7 +303,7 @@ def _point(xy: NDArray[np.float64]) -> tuple[float, float]:
     return float(xy[0]), float(xy[1])
 
 
-def _along(strip: Strip, width: int, height: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+def _strip_position(strip: Strip, width: int, height: int) -> tuple[FloatArray, NDArray[np.bool_]]:
     """Return every pixel's position along the strip, and whether it is inside; (height, width)."""
     x, y = np.arange(width) + 0.5, np.arange(height)[:, np.newaxis] + 0.5
     left = np.array([strip.left[0] * width, strip.left[1] * height])
@@ -310,18 +316,18 @@ def _along(strip: Strip, width: int, height: int) -> tuple[FloatArray, NDArray[n
     return along, inside
 
 
-def _read_at(
-    at: FloatArray, value: FloatArray, edges: FloatArray, position: FloatArray
+def _interpolate_means(
+    place: FloatArray, value: FloatArray, edges: FloatArray, position: FloatArray
 ) -> FloatArray:
     """Interpolate the mean of the pixels between `edges`, at their mean place, to `position`."""
-    pixels, _ = np.histogram(at, edges)
+    pixels, _ = np.histogram(place, edges)
     if (pixels == 0).any():
         raise DataError(
             "some of the strip clips in every frame; close the aperture, or lower the ISO"
         )
-    place = np.histogram(at, edges, weights=at)[0] / pixels
-    mean = np.histogram(at, edges, weights=value)[0] / pixels
-    return np.asarray(np.interp(position, place, mean), dtype=np.float64)
+    mean_place = np.histogram(place, edges, weights=place)[0] / pixels
+    mean_value = np.histogram(place, edges, weights=value)[0] / pixels
+    return np.asarray(np.interp(position, mean_place, mean_value), dtype=np.float64)
 
 
 def _weighted_mean(

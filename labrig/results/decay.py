@@ -122,7 +122,7 @@ class DecayResult(RunResult):
     @property
     def fits(self) -> dict[str, FittedDecay]:
         """Fits of the patches that could be fitted, by name."""
-        return {name: one.fit for name, one in self.patches.items() if one.fit is not None}
+        return {name: patch.fit for name, patch in self.patches.items() if patch.fit is not None}
 
     def provides(self) -> dict[str, dict[str, FittedDecay]]:
         """Return the fits by patch."""
@@ -130,7 +130,7 @@ class DecayResult(RunResult):
 
     def failures(self) -> tuple[str, ...]:
         """Return the reasons why no patch at all could be fitted."""
-        return () if self.fits else tuple(one.failure for one in self.patches.values())
+        return () if self.fits else tuple(patch.failure for patch in self.patches.values())
 
     def write_files(self, folder: Path) -> None:
         """Write the files of each patch; of several patches, each into a folder of its name."""

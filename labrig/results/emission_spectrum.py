@@ -134,12 +134,17 @@ class EmissionSpectrum(BaseModel):
         A cubic spline through the running sum of the values divides them where an edge of a band
         lies between grid points; linear interpolation would fill valleys.
         """
-        ends = edges_about(np.array(self.wavelength_nm))
-        sums = np.vstack([np.zeros(len(ends) - 1), np.tril(np.ones((len(ends) - 1,) * 2))])
-        sums[1:] *= np.diff(ends)
+        grid_edges = edges_about(np.array(self.wavelength_nm))
+        sums = np.vstack(
+            [np.zeros(len(grid_edges) - 1), np.tril(np.ones((len(grid_edges) - 1,) * 2))]
+        )
+        sums[1:] *= np.diff(grid_edges)
         edges = np.asarray(edges_nm, dtype=np.float64)
-        inside = np.clip(edges, ends[0], ends[-1])
-        means = np.diff(CubicSpline(ends, sums)(inside), axis=0) / np.diff(edges)[:, np.newaxis]
+        clipped_edges = np.clip(edges, grid_edges[0], grid_edges[-1])
+        means = (
+            np.diff(CubicSpline(grid_edges, sums)(clipped_edges), axis=0)
+            / np.diff(edges)[:, np.newaxis]
+        )
         return means @ np.array(self.value), means @ np.array(self.covariance) @ means.T
 
     def for_material(self) -> Spectrum:
@@ -199,12 +204,12 @@ class FilterFrames:
 
     def take(self, rows: Sequence[int]) -> "FilterFrames":
         """Return the given frames."""
-        some = list(rows)
+        indices = list(rows)
         return FilterFrames(
-            self.t_s[some],
-            self.value_dn_per_s[some],
-            self.sigma_dn_per_s[some],
-            self.dark_sigma_dn_per_s[some],
+            self.t_s[indices],
+            self.value_dn_per_s[indices],
+            self.sigma_dn_per_s[indices],
+            self.dark_sigma_dn_per_s[indices],
         )
 
 

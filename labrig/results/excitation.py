@@ -160,11 +160,13 @@ class ExcitationResult(RunResult):
     @property
     def position_nm(self) -> FloatArray:
         """Mean wavelength of the light at every place behind the filter in nm, shape (P,)."""
-        edges, through = np.array(self.irradiance.bands_nm), np.array(self.irradiance.through)
+        edges, transmitted = np.array(self.irradiance.bands_nm), np.array(self.irradiance.through)
         middles = (edges[1:] + edges[:-1]) / 2
         # Squared, so that what leaks all over does not pull.
-        found: FloatArray = through**2 @ middles / np.maximum((through**2).sum(axis=1), 1e-300)
-        return found
+        position_nm: FloatArray = (
+            transmitted**2 @ middles / np.maximum((transmitted**2).sum(axis=1), 1e-300)
+        )
+        return position_nm
 
     def provides(self) -> Mapping[str, Any]:
         """Return the materials by patch."""

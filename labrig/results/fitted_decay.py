@@ -144,12 +144,12 @@ class FittedDecay:
     @property
     def covariance_parameters(self) -> tuple[str, ...]:
         """Names of the rows of `covariance`: rate and amplitude of each state, then the offset."""
-        of_states = [
+        state_parameters = [
             name
             for number in range(1, self.n_states + 1)
             for name in (f"k_r_per_s {number}", f"amplitude {number}")
         ]
-        return (*of_states, "offset")
+        return (*state_parameters, "offset")
 
     @property
     def rates(self) -> tuple[Measured, ...]:
@@ -174,8 +174,8 @@ class FittedDecay:
                 f"expected the same channels in both runs, got {channel} in one of them and "
                 f"{', '.join(self.channels)} in the other"
             )
-        at = self.channels.index(channel)
-        weight = Measured(self.channel_weights[at], self.channel_weights_sigma[at])
+        index = self.channels.index(channel)
+        weight = Measured(self.channel_weights[index], self.channel_weights_sigma[index])
         return tuple(
             Measured(s.amplitude, s.amplitude_sigma, "DN/s").times(weight) for s in self.states
         )
@@ -278,9 +278,11 @@ class FittedDecay:
             for number, state in enumerate(self.states, start=1)
         ]
         lines = _table([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
-        lines.append(f"weights  {self._written(self.channel_weights, self.channel_weights_sigma)}")
+        lines.append(
+            f"weights  {self._values_text(self.channel_weights, self.channel_weights_sigma)}"
+        )
         if any(self.offsets_sigma):
-            lines.append(f"offsets  {self._written(self.offsets, self.offsets_sigma)}")
+            lines.append(f"offsets  {self._values_text(self.offsets, self.offsets_sigma)}")
         if len(self.repeats) > 1:
             pairs = zip(self.repeats, self.levels, strict=True)
             lines.append(f"levels   {', '.join(f'{name} {level:.4f}' for name, level in pairs)}")
@@ -294,7 +296,7 @@ class FittedDecay:
     def _by_channel(self, values: tuple[float, ...]) -> dict[str, float]:
         return dict(zip(self.channels, values, strict=True))
 
-    def _written(self, values: tuple[float, ...], sigmas: tuple[float, ...]) -> str:
+    def _values_text(self, values: tuple[float, ...], sigmas: tuple[float, ...]) -> str:
         return ", ".join(
             f"{name} {with_uncertainty(value, sigma)}"
             for name, value, sigma in zip(self.channels, values, sigmas, strict=True)
@@ -426,50 +428,55 @@ def _from_dict(content: Any) -> FittedDecay:
         raise ValueError(f"schema_version {content['schema_version']}, not {SCHEMA_VERSION}")
     weights: Mapping[str, float] = content["channel_weights"]
     alternative_models = tuple(
-        AlternativeModel(**one | {"exponent_sigma": _known(one["exponent_sigma"])})
-        for one in content["alternative_models"]
+        AlternativeModel(**model | {"exponent_sigma": _number_or(model["exponent_sigma"])})
+        for model in content["alternative_models"]
     )
     better = content["better_model"]
     return FittedDecay(
         states=tuple(
             DecayState(
-                k_r_per_s=float(one["k_r_per_s"]),
-                k_r_sigma_per_s=_known(one["k_r_sigma_per_s"]),
-                amplitude=float(one["amplitude"]),
-                amplitude_sigma=_known(one["amplitude_sigma"]),
+                k_r_per_s=float(state["k_r_per_s"]),
+                k_r_sigma_per_s=_number_or(state["k_r_sigma_per_s"]),
+                amplitude=float(state["amplitude"]),
+                amplitude_sigma=_number_or(state["amplitude_sigma"]),
             )
-            for one in content["states"]
+            for state in content["states"]
         ),
         channels=tuple(weights),
         channel_weights=tuple(map(float, weights.values())),
-        channel_weights_sigma=_in_order(weights, content["channel_weights_sigma"]),
+        channel_weights_sigma=_by_channel_order(weights, content["channel_weights_sigma"]),
         offsets=tuple(float(content["offsets"][name]) for name in weights),
-        offsets_sigma=_in_order(weights, content["offsets_sigma"]),
+        offsets_sigma=_by_channel_order(weights, content["offsets_sigma"]),
         repeats=tuple(content["levels"]),
         levels=tuple(map(float, content["levels"].values())),
         flicker=float(content["flicker"]),
-        flicker_sigma=_known(content["flicker_sigma"]),
+        flicker_sigma=_number_or(content["flicker_sigma"]),
         chi2=float(content["chi2"]),
         dof=int(content["dof"]),
         bic=float(content["bic"]),
         covariance=np.array(
-            [[_known(value) for value in row] for row in content["covariance"]], dtype=np.float64
+            [[_number_or(value) for value in row] for row in content["covariance"]],
+            dtype=np.float64,
         ),
         warnings=tuple(content["warnings"]),
         candidates=tuple(
-            Candidate(**one | {"reduced_chi2": _known(one["reduced_chi2"], math.nan)})
-            for one in content["candidates"]
+            Candidate(
+                **candidate | {"reduced_chi2": _number_or(candidate["reduced_chi2"], math.nan)}
+            )
+            for candidate in content["candidates"]
         ),
         alternative_models=alternative_models,
-        better_model=next((one for one in alternative_models if one.name == better), None),
+        better_model=next((model for model in alternative_models if model.name == better), None),
     )
 
 
-def _in_order(channels: Mapping[str, Any], sigma: Mapping[str, float | None]) -> tuple[float, ...]:
-    return tuple(_known(sigma[name]) for name in channels)
+def _by_channel_order(
+    channels: Mapping[str, Any], sigma: Mapping[str, float | None]
+) -> tuple[float, ...]:
+    return tuple(_number_or(sigma[name]) for name in channels)
 
 
-def _known(value: float | None, unknown: float = math.inf) -> float:
+def _number_or(value: float | None, unknown: float = math.inf) -> float:
     """Return the number of a JSON value, whose null stands for infinity or another `unknown`."""
     return unknown if value is None else float(value)
 

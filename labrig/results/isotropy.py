@@ -65,15 +65,17 @@ class AngularGlow:
     @property
     def worst(self) -> Measured:
         """Ratio with the largest deviation from 1."""
-        return Measured(float(self.ratio[self._worst]), float(self.ratio_sigma[self._worst]))
+        return Measured(
+            float(self.ratio[self._worst_index]), float(self.ratio_sigma[self._worst_index])
+        )
 
     @property
     def worst_angle_deg(self) -> int:
         """Angle of the largest deviation in degrees."""
-        return int(self.angle_deg[self._worst])
+        return int(self.angle_deg[self._worst_index])
 
     @property
-    def _worst(self) -> int:
+    def _worst_index(self) -> int:
         return int(np.argmax(np.abs(self.ratio - 1)))
 
 

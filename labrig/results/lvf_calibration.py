@@ -73,8 +73,8 @@ class LocatedLines:
 
     def __str__(self) -> str:
         """Return the lines and the direction of rising wavelength."""
-        way = "rising" if self.rising else "falling"
-        return f"{', '.join(f'{nm:.0f}' for nm in self.wavelength_nm)} nm, {way} to the right"
+        direction = "rising" if self.rising else "falling"
+        return f"{', '.join(f'{nm:.0f}' for nm in self.wavelength_nm)} nm, {direction} to the right"
 
 
 @dataclass(frozen=True, eq=False)

@@ -12,7 +12,7 @@ from pydantic import BaseModel, PlainSerializer, PlainValidator
 from labrig.results.run_result import RunResult
 
 
-def _listed(array: NDArray[Any]) -> Any:
+def _to_lists(array: NDArray[Any]) -> Any:
     """Return nested lists, in which infinity and NaN, unknown to JSON, are texts."""
     if array.dtype.kind != "f" or np.isfinite(array).all():
         return array.tolist()
@@ -23,19 +23,19 @@ def _listed(array: NDArray[Any]) -> Any:
     return texts.tolist()
 
 
-_LISTED = PlainSerializer(_listed)
+_AS_LISTS = PlainSerializer(_to_lists)
 
 #: Real numbers of any shape.
 FloatArray = Annotated[
-    NDArray[np.float64], PlainValidator(lambda values: np.asarray(values, np.float64)), _LISTED
+    NDArray[np.float64], PlainValidator(lambda values: np.asarray(values, np.float64)), _AS_LISTS
 ]
 #: Truth values of any shape.
 BoolArray = Annotated[
-    NDArray[np.bool_], PlainValidator(lambda values: np.asarray(values, np.bool_)), _LISTED
+    NDArray[np.bool_], PlainValidator(lambda values: np.asarray(values, np.bool_)), _AS_LISTS
 ]
 #: Whole numbers of any shape.
 IntArray = Annotated[
-    NDArray[np.intp], PlainValidator(lambda values: np.asarray(values, np.intp)), _LISTED
+    NDArray[np.intp], PlainValidator(lambda values: np.asarray(values, np.intp)), _AS_LISTS
 ]
 
 
@@ -192,13 +192,13 @@ def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
     states/1/k_r_per_s 0.2
     states/2/k_r_per_s 0.01
     """
-    inner = _inner(value)
+    inner = _members(value)
     if inner is None:
         yield path, value
         return
-    for name, one in inner:
-        if not isinstance(one, RunResult):
-            yield from leaves(one, (*path, name))
+    for name, item in inner:
+        if not isinstance(item, RunResult):
+            yield from leaves(item, (*path, name))
 
 
 def unit_of(name: str) -> str:
@@ -224,16 +224,16 @@ def unit_of(name: str) -> str:
     return next((unit for end, unit in _UNITS.items() if base.endswith(end)), "")
 
 
-def _inner(value: Any) -> list[tuple[str, Any]] | None:
+def _members(value: Any) -> list[tuple[str, Any]] | None:
     """Return the named values in a value; None for a plain one."""
     if isinstance(value, Measured):
         return None
     if isinstance(value, BaseModel):
         return [(name, getattr(value, name)) for name in type(value).model_fields]
     if is_dataclass(value) and not isinstance(value, type):
-        return [(one.name, getattr(value, one.name)) for one in fields(value)]
+        return [(member.name, getattr(value, member.name)) for member in fields(value)]
     if isinstance(value, Mapping):
-        return [(str(key) or ONLY, one) for key, one in value.items()]
-    if isinstance(value, tuple | list) and any(_inner(one) is not None for one in value):
-        return [(str(number), one) for number, one in enumerate(value, start=1)]
+        return [(str(key) or ONLY, item) for key, item in value.items()]
+    if isinstance(value, tuple | list) and any(_members(item) is not None for item in value):
+        return [(str(number), item) for number, item in enumerate(value, start=1)]
     return None

@@ -64,7 +64,7 @@ class RunResult:
         """Return the content of `result.json`, in which infinity and NaN are texts."""
         fields = TypeAdapter(type(self)).dump_python(self, mode="json")
         content: dict[str, Any] = finite(
-            {"kind": self.kind, "schema_version": self.schema_version} | fields, _spelled
+            {"kind": self.kind, "schema_version": self.schema_version} | fields, _nonfinite_text
         )
         return content
 
@@ -95,7 +95,7 @@ class RunResult:
         return TypeAdapter(cls).validate_python(fields)
 
 
-def _of_its_kind(content: Any) -> RunResult:
+def _to_own_type(content: Any) -> RunResult:
     """Convert the content of a result to its protocol's own type; a result stays as it is."""
     if isinstance(content, RunResult):
         return content
@@ -107,7 +107,7 @@ def _of_its_kind(content: Any) -> RunResult:
 
 #: A field that holds the result of any protocol.
 AnyResult = Annotated[
-    RunResult, PlainValidator(_of_its_kind), PlainSerializer(lambda result: result.to_dict())
+    RunResult, PlainValidator(_to_own_type), PlainSerializer(lambda result: result.to_dict())
 ]
 
 
@@ -179,21 +179,21 @@ def read_result(run: Path | str) -> RunResult:
             f"{place}: expected a run with a result; make it with: labrig process {place}"
         )
     try:
-        return _of_its_kind(json.loads(path.read_text(encoding="utf-8")))
+        return _to_own_type(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise DataError(
             f"{path}: expected a result as this labrig writes it, got something else "
-            f"({_first(error)}); make it again: labrig process {place}"
+            f"({_first_error(error)}); make it again: labrig process {place}"
         ) from None
 
 
-def _first(error: Exception) -> str:
+def _first_error(error: Exception) -> str:
     if isinstance(error, ValidationError):
         first = error.errors()[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
     return " ".join(str(error).split())
 
 
-def _spelled(number: float) -> str:
+def _nonfinite_text(number: float) -> str:
     """Return the text for a number that is not finite, in pydantic's spelling."""
     return "NaN" if math.isnan(number) else "Infinity" if number > 0 else "-Infinity"

@@ -157,15 +157,15 @@ class PatchSaturation:
     def in_time(self) -> Literal["saturated in time", "not saturated", "not decided"]:
         """Whether a longer charge still brightens the glow."""
         growths = self.growth_at_begin, self.growth_at_end
-        if any(one.value - SIGMAS * one.sigma > PLATEAU for one in growths):
+        if any(growth.value - SIGMAS * growth.sigma > PLATEAU for growth in growths):
             return "not saturated"
-        if all(one.value + SIGMAS * one.sigma < 2 * PLATEAU for one in growths):
+        if all(growth.value + SIGMAS * growth.sigma < 2 * PLATEAU for growth in growths):
             return "saturated in time"
         return "not decided"
 
     def rows(self, light: str) -> list[int]:
         """Return the numbers of the decays under a light, in the order of `curves`."""
-        return [row for row, one in enumerate(self.light) if one == light]
+        return [row for row, decay_light in enumerate(self.light) if decay_light == light]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -199,13 +199,13 @@ class SaturationResult(RunResult):
             rates = patch.rates
             for light in LIGHTS:
                 for row in patch.rows(light):
-                    of_states = zip(
+                    state_values = zip(
                         rates.shared_per_s,
                         rates.amplitude[row],
                         rates.amplitude_sigma[row],
                         strict=True,
                     )
-                    for numbers in of_states:
+                    for numbers in state_values:
                         texts = (f"{number:.6g}" for number in (patch.charge_s[row], *numbers))
                         rows.append((name, light, *texts))
         write_csv(folder / "saturation.csv", head, rows)

@@ -204,11 +204,11 @@ def _check_numbers(series: Series) -> None:
 
 
 def _check_texts(series: Series) -> None:
-    taken = {TIME, EXPOSURE, *RESERVED}
+    reserved = {TIME, EXPOSURE, *RESERVED}
     for name in series.channels:
-        if not name or name in taken or name.endswith(SIGMA_SUFFIX) or not _is_plain(name):
+        if not name or name in reserved or name.endswith(SIGMA_SUFFIX) or not _is_plain(name):
             raise DataError(f"{name!r} cannot name a channel; rename it")
-        taken.add(name)
+        reserved.add(name)
     for text in {*series.frame, *series.unit, *series.flag, series.region}:
         if not _is_plain(text):
             raise DataError(f"expected a text on one line without outer spaces, got {text!r}")
@@ -261,5 +261,5 @@ def add_flag(flag: str, word: str) -> str:
     >>> add_flag("late", "clipped"), add_flag("late+clipped", "clipped")
     ('late+clipped', 'late+clipped')
     """
-    words = [known for known in flag.split(FLAG_JOINER) if known]
+    words = [part for part in flag.split(FLAG_JOINER) if part]
     return FLAG_JOINER.join(dict.fromkeys([*words, word]))

@@ -186,7 +186,7 @@ def _table(text: str) -> _Table:
     if not cells:
         raise DataError(f"{_EXPECTED}, got a header without rows")
     numbers = tuple(number for number, _ in content)
-    rows = [_fitted(row, len(header), line) for row, line in zip(cells, numbers, strict=True)]
+    rows = [_padded(row, len(header), line) for row, line in zip(cells, numbers, strict=True)]
     return _Table(header, tuple(rows), numbers)
 
 
@@ -199,7 +199,7 @@ def _cells(line: str, delimiter: str | None, number: int) -> list[str]:
         raise UsageError(f"line {number}: not a row of a table ({error})") from None
 
 
-def _fitted(row: list[str], columns: int, line: int) -> tuple[str, ...]:
+def _padded(row: list[str], columns: int, line: int) -> tuple[str, ...]:
     """Return `row` with as many cells as the header, empty ones at its end added or removed."""
     if any(cell.strip() for cell in row[columns:]):
         raise UsageError(
@@ -211,15 +211,15 @@ def _fitted(row: list[str], columns: int, line: int) -> tuple[str, ...]:
 def _series(table: _Table) -> list[Series]:
     columns = _columns(table)
     names = list(columns)
-    time = _only(names, _TIME_NAMES)
+    time = _only_match(names, _TIME_NAMES)
     if time is None:
         raise UsageError(f"{_EXPECTED}, got {', '.join(names)}")
-    exposure = _only(names, _EXPOSURE_NAMES)
-    others = [name for name in names if name not in (time, exposure, *RESERVED)]
-    channels = [name for name in others if not _is_sigma(name, others)]
+    exposure = _only_match(names, _EXPOSURE_NAMES)
+    value_columns = [name for name in names if name not in (time, exposure, *RESERVED)]
+    channels = [name for name in value_columns if not _is_sigma(name, value_columns)]
     if not channels:
         raise UsageError(f"{_EXPECTED}, got {', '.join(names)}; a column of values is missing")
-    sigmas = [_sigma_name(channel, channels, others) for channel in channels]
+    sigmas = [_sigma_name(channel, channels, value_columns) for channel in channels]
 
     def numbers(name: str | None, empty: float | None) -> FloatArray:
         if name is None:
@@ -229,7 +229,7 @@ def _series(table: _Table) -> list[Series]:
     def texts(name: str) -> tuple[str, ...]:
         return tuple(columns.get(name, [""] * len(table.rows)))
 
-    whole = Series(
+    table_series = Series(
         t_s=numbers(time, None),
         exposure_s=numbers(exposure, 0.0),
         values=np.stack([numbers(channel, None) for channel in channels], axis=1),
@@ -243,9 +243,9 @@ def _series(table: _Table) -> list[Series]:
         flag=texts("flag"),
     )
     groups: dict[tuple[str, str], list[int]] = {}
-    for row, key in enumerate(zip(texts("region"), whole.unit, strict=True)):
+    for row, key in enumerate(zip(texts("region"), table_series.unit, strict=True)):
         groups.setdefault(key, []).append(row)
-    return [whole.take(np.array(rows), region) for (region, _), rows in groups.items()]
+    return [table_series.take(np.array(rows), region) for (region, _), rows in groups.items()]
 
 
 def _columns(table: _Table) -> dict[str, list[str]]:
@@ -266,22 +266,22 @@ def _columns(table: _Table) -> dict[str, list[str]]:
     return columns
 
 
-def _only(names: Sequence[str], wanted: frozenset[str]) -> str | None:
+def _only_match(names: Sequence[str], accepted: frozenset[str]) -> str | None:
     """Return the one of `names` that is among the `wanted`; None if none is."""
-    found = [name for name in names if name.lower() in wanted]
-    if len(found) > 1:
-        raise UsageError(f"expected one of the columns {', '.join(found)}, got several; keep one")
-    return found[0] if found else None
+    matches = [name for name in names if name.lower() in accepted]
+    if len(matches) > 1:
+        raise UsageError(f"expected one of the columns {', '.join(matches)}, got several; keep one")
+    return matches[0] if matches else None
 
 
-def _is_sigma(name: str, others: Sequence[str]) -> bool:
-    return name == _LONE_SIGMA or name.removesuffix(SIGMA_SUFFIX) in set(others) - {name}
+def _is_sigma(name: str, columns: Sequence[str]) -> bool:
+    return name == _LONE_SIGMA or name.removesuffix(SIGMA_SUFFIX) in set(columns) - {name}
 
 
-def _sigma_name(channel: str, channels: Sequence[str], others: Sequence[str]) -> str | None:
-    if channel + SIGMA_SUFFIX in others:
+def _sigma_name(channel: str, channels: Sequence[str], columns: Sequence[str]) -> str | None:
+    if channel + SIGMA_SUFFIX in columns:
         return channel + SIGMA_SUFFIX
-    if _LONE_SIGMA not in others:
+    if _LONE_SIGMA not in columns:
         return None
     if len(channels) > 1:
         raise UsageError(

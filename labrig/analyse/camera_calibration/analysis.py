@@ -52,32 +52,34 @@ def analyse(part: Part) -> CameraCalibrationResult:
     lit = part_frames(part, *LIT)
     card = card_levels(lit, darks, region)
     photon = [frame for frame in lit if frame.role == CardFrames.PHOTON]
-    transfers = tuple(_transfer(one, photon, darks, region) for one in protocol.isos)
+    transfers = tuple(
+        _fit_transfer(noise_iso, photon, darks, region) for noise_iso in protocol.isos
+    )
     bracket = [frame for frame in lit if frame.unit == LINEARITY]
     if not bracket:
         raise DataError("expected the brackets of 'linearity', got none; resume the run")
-    range_dn, full_dn = _saturation(max(bracket, key=lambda frame: frame.exposure_s), region)
+    range_dn, full_dn = _saturation_levels(max(bracket, key=lambda frame: frame.exposure_s), region)
     linearity = card.linearity(iso, range_dn, full_dn)
     factors = fit_factors(
         card.card_frames((CardFrames.REPEAT, CardFrames.BRACKET), linearity),
         iso,
         protocol.camera.f_number,
     )
-    flats = _flats(part, lit, darks)
+    flats = _fit_flats(part, lit, darks)
     file = CameraFile(
         camera=camera_identity(run),
         lens=lens_of(lit),
         iso=iso,
         f_number=protocol.camera.f_number,
         channels=card.series.channels,
-        noise=tuple(one.noise for one in transfers),
+        noise=tuple(transfer.noise for transfer in transfers),
         linearity=linearity,
         flicker=factors.flicker.value,
         flicker_sigma=factors.flicker.sigma,
         shutter=factors.shutter,
         iso_gain=factors.iso_gain,
         aperture=factors.aperture,
-        flats=tuple(one.flat for one in flats),
+        flats=tuple(fitted.flat for fitted in flats),
         source="measured with labrig, camera_calibration",
         run=run.folder.resolve().name,
     )
@@ -128,8 +130,8 @@ class CardLevels:
         """Fit the deviation from linearity to the frames at one ISO."""
         rows = self.series.usable & np.array([frame.iso == iso for frame in self.frames])
         stops = [frame.f_number for frame in self.frames]
-        known = list(dict.fromkeys(stops))
-        group = np.array([known.index(stop) for stop in stops], dtype=np.intp)
+        stop_values = list(dict.fromkeys(stops))
+        group = np.array([stop_values.index(stop) for stop in stops], dtype=np.intp)
         level = np.where(rows[:, np.newaxis], self.level_dn, np.nan)
         return fit_linearity(level, self.sigma_dn, group, range_dn, saturation_dn)
 
@@ -172,7 +174,7 @@ def card_levels(
     return CardLevels(tuple(lit), reduce_patches(frames, {"card": card}, dark)["card"])
 
 
-def _transfer(
+def _fit_transfer(
     iso: float, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord], card: Region
 ) -> PhotonTransfer:
     """Fit the photon transfer at one ISO.
@@ -185,55 +187,59 @@ def _transfer(
     shortest_s = min((frame.exposure_s for frame in darks if frame.iso == iso), default=0.0)
     dark = [frame for frame in darks if frame.iso == iso and frame.exposure_s == shortest_s]
     dark_dn = float(np.mean(_dark_levels(dark, card))) if dark else 0.0
-    own = [frame for frame in lit if frame.iso == iso]
+    iso_frames = [frame for frame in lit if frame.iso == iso]
     return photon_transfer(
-        iso, _scatters(pairs_of(own), card, dark_dn), _scatters(pairs_of(dark), card, dark_dn)
+        iso,
+        _measure_scatters(pairs_of(iso_frames), card, dark_dn),
+        _measure_scatters(pairs_of(dark), card, dark_dn),
     )
 
 
 def _dark_levels(darks: Sequence[FrameRecord], card: Region) -> FloatArray:
     """Return the mean of each channel above black in DN, shape (channels,)."""
     measured = [measure(read_raw(frame.path), card) for frame in darks]
-    levels = [[channel.mean for channel in one.channels.values()] for one in measured]
+    levels = [
+        [channel.mean for channel in frame_stats.channels.values()] for frame_stats in measured
+    ]
     mean: FloatArray = np.mean(levels, axis=0)
     return mean
 
 
-def _saturation(brightest: FrameRecord, card: Region) -> tuple[float, float | None]:
+def _saturation_levels(brightest: FrameRecord, card: Region) -> tuple[float, float | None]:
     """Return the range from black to white and the saturation level above black, in DN.
 
     The saturation level is None if less than half of the card clips.
     """
-    seen = measure(read_raw(brightest.path), card)
-    clips = any(channel.saturated > channel.n / 2 for channel in seen.channels.values())
-    return seen.range_dn, seen.range_dn if clips else None
+    measured = measure(read_raw(brightest.path), card)
+    clips = any(channel.saturated > channel.n / 2 for channel in measured.channels.values())
+    return measured.range_dn, measured.range_dn if clips else None
 
 
-def _scatters(
+def _measure_scatters(
     pairs: Sequence[tuple[FrameRecord, FrameRecord]], card: Region, dark_dn: float
 ) -> list[PairScatter]:
-    found = []
-    for one, other in pairs:
-        first, second = read_raw(one.path), read_raw(other.path)
+    scatters = []
+    for first_record, second_record in pairs:
+        first, second = read_raw(first_record.path), read_raw(second_record.path)
         if not measure(first, card).clipped:
-            found.append(scatter(first, second, card, dark_dn))
-    return found
+            scatters.append(scatter(first, second, card, dark_dn))
+    return scatters
 
 
-def _flats(
+def _fit_flats(
     part: Part, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord]
 ) -> tuple[FittedFlat, ...]:
     card, reference = part_region(part, part.protocol.card), part.protocol.camera.iso
     dark_dn = _dark_levels([frame for frame in darks if frame.iso == reference], card)
-    of_flats = [frame for frame in lit if frame.role == CardFrames.FLAT]
+    flat_frames = [frame for frame in lit if frame.role == CardFrames.FLAT]
     return tuple(
         fit_flat(
-            [read_raw(frame.path) for frame in of_flats if frame.f_number == f_number],
+            [read_raw(frame.path) for frame in flat_frames if frame.f_number == f_number],
             card,
             dark_dn,
             f_number,
         )
-        for f_number in dict.fromkeys(frame.f_number for frame in of_flats)
+        for f_number in dict.fromkeys(frame.f_number for frame in flat_frames)
     )
 
 
@@ -243,19 +249,19 @@ def _warnings(
     factors: Factors,
     card: CardLevels,
 ) -> Iterator[str]:
-    for one in transfers:
-        if one.reduced_chi2 > STRAIGHT_CHI2:
+    for transfer in transfers:
+        if transfer.reduced_chi2 > STRAIGHT_CHI2:
             yield (
-                f"the noise at ISO {one.noise.iso:g} does not rise evenly with the light (χ² "
-                f"{one.reduced_chi2:.1f} a degree of freedom): does the camera filter its RAW "
+                f"the noise at ISO {transfer.noise.iso:g} does not rise evenly with the light (χ² "
+                f"{transfer.reduced_chi2:.1f} a degree of freedom): does the camera filter its RAW "
                 "frames, or did something move?"
             )
-    evident = [one for one in transfers if one.neighbours_share_noise]
+    evident = [transfer for transfer in transfers if transfer.neighbours_share_noise]
     if evident:
-        most = max(evident, key=lambda one: one.shared)
+        largest = max(evident, key=lambda transfer: transfer.shared)
         yield (
-            f"neighbouring pixels share noise ({100 * most.shared:.0f} % of a pixel's variance): "
-            "the gain takes it into account"
+            f"neighbouring pixels share noise ({100 * largest.shared:.0f} % of a pixel's variance)"
+            ": the gain takes it into account"
         )
     flicker, repeated = factors.flicker.value, factors.repeated.value
     if flicker - repeated > CLEAR_SIGMAS * factors.repeated.sigma:
@@ -275,10 +281,15 @@ def _warnings(
             )
         if file.linearity.saturation_dn is None:
             yield "no frame saturated; the level at which the sensor is full is not known"
-    off = [o for o in file.shutter if abs(o.factor - 1) > max(OFF, CLEAR_SIGMAS * o.sigma)][:3]
-    if off:
+    shutter_errors = [
+        factor
+        for factor in file.shutter
+        if abs(factor.factor - 1) > max(OFF, CLEAR_SIGMAS * factor.sigma)
+    ][:3]
+    if shutter_errors:
         named = ", ".join(
-            f"{exposure_text(one.setting)}, × {plus_minus(one.factor, one.sigma)}" for one in off
+            f"{exposure_text(factor.setting)}, × {plus_minus(factor.factor, factor.sigma)}"
+            for factor in shutter_errors
         )
         yield f"shutter times are off by more than 5 % ({named}): longer ones are more exact"
     if any(max(map(abs, row)) > UNEVEN for flat in file.flats for row in flat.gradient):

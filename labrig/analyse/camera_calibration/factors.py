@@ -97,34 +97,36 @@ def fit_factors(frames: Sequence[CardFrame], iso: float, f_number: Setting) -> F
     stops = sorted({frame.f_number for frame in frames if frame.f_number is not None})
     columns: list[tuple[str, Setting]] = [
         *(("shutter", time_s) for time_s in times[:-1]),
-        *(("iso", one) for one in isos if one != iso),
+        *(("iso", iso_setting) for iso_setting in isos if iso_setting != iso),
         *(("aperture", stop) for stop in stops if stop != f_number),
     ]
-    design = np.hstack([_settings(frames, columns), _lamp(frames)])
-    target = np.array([frame.light - _labelled(frame, iso, f_number) for frame in frames])
+    design = np.hstack([_settings_design(frames, columns), _lamp_design(frames)])
+    target = np.array([frame.light - _nominal_light(frame, iso, f_number) for frame in frames])
     noise = np.array([frame.sigma for frame in frames])
     values, sigma, determined, flicker = _solve(design, target, noise)
 
     def of(kind: str, fixed: Setting) -> tuple[Factor, ...]:
-        found = [] if fixed is None else [Factor(setting=fixed, factor=1.0, sigma=0.0)]
+        factors = [] if fixed is None else [Factor(setting=fixed, factor=1.0, sigma=0.0)]
         for number, (name, setting) in enumerate(columns):
             if name == kind and determined[number] and setting is not None:
                 factor = float(np.exp(values[number]))
-                found.append(
+                factors.append(
                     Factor(setting=setting, factor=factor, sigma=factor * float(sigma[number]))
                 )
-        return tuple(sorted(found, key=lambda one: one.setting))
+        return tuple(sorted(factors, key=lambda factor: factor.setting))
 
     return Factors(
         shutter=of("shutter", times[-1]),
         iso_gain=of("iso", iso),
         aperture=of("aperture", f_number),
         flicker=flicker,
-        repeated=_scatter(repeats),
+        repeated=_repeat_flicker(repeats),
     )
 
 
-def _settings(frames: Sequence[CardFrame], columns: Sequence[tuple[str, Setting]]) -> FloatArray:
+def _settings_design(
+    frames: Sequence[CardFrame], columns: Sequence[tuple[str, Setting]]
+) -> FloatArray:
     design = np.zeros((len(frames), len(columns)))
     for row, frame in enumerate(frames):
         own = {("shutter", frame.exposure_s), ("iso", frame.iso), ("aperture", frame.f_number)}
@@ -132,7 +134,7 @@ def _settings(frames: Sequence[CardFrame], columns: Sequence[tuple[str, Setting]
     return design
 
 
-def _lamp(frames: Sequence[CardFrame]) -> FloatArray:
+def _lamp_design(frames: Sequence[CardFrame]) -> FloatArray:
     """Return the design of a level and a linear drift of the lamp for every unit."""
     units = list(dict.fromkeys(frame.unit for frame in frames))
     design = np.zeros((len(frames), 2 * len(units)))
@@ -145,7 +147,7 @@ def _lamp(frames: Sequence[CardFrame]) -> FloatArray:
     return design
 
 
-def _labelled(frame: CardFrame, iso: float, f_number: Setting) -> float:
+def _nominal_light(frame: CardFrame, iso: float, f_number: Setting) -> float:
     """Return the logarithm of the nominal light relative to the reference's."""
     labelled = np.log(frame.exposure_s * frame.iso / iso)
     if frame.f_number is not None and f_number is not None:
@@ -164,24 +166,24 @@ def _solve(
         kept = s > 1e-9 * s[0]
         inverse = v[kept].T / s[kept]
         values = inverse @ (u[:, kept].T @ (target * weight))
-        freedom = len(target) - int(kept.sum())
-        if freedom < 1:
+        dof = len(target) - int(kept.sum())
+        if dof < 1:
             raise DataError("expected more frames than settings; raise 'cycles'")
-        squares = np.square(target - design @ values) * len(target) / freedom
+        squares = np.square(target - design @ values) * len(target) / dof
         flicker = _common_scatter(squares, noise)
     sigma = np.sqrt(np.square(inverse).sum(axis=1))
     determined = np.square(v[kept]).sum(axis=0) > DETERMINED
-    return values, sigma, determined, Measured(flicker, float(flicker / np.sqrt(2 * freedom)))
+    return values, sigma, determined, Measured(flicker, float(flicker / np.sqrt(2 * dof)))
 
 
-def _scatter(frames: Sequence[CardFrame]) -> Measured:
+def _repeat_flicker(frames: Sequence[CardFrame]) -> Measured:
     """Return the flicker of frames with equal settings about a straight line."""
-    light, design = np.array([frame.light for frame in frames]), _lamp(frames)
-    found, *_ = np.linalg.lstsq(design, light)
-    freedom = max(len(light) - design.shape[1], 1)
-    squares = np.square(light - design @ found) * len(light) / freedom
+    light, design = np.array([frame.light for frame in frames]), _lamp_design(frames)
+    coefficients, *_ = np.linalg.lstsq(design, light)
+    dof = max(len(light) - design.shape[1], 1)
+    squares = np.square(light - design @ coefficients) * len(light) / dof
     flicker = _common_scatter(squares, np.array([frame.sigma for frame in frames]))
-    return Measured(flicker, float(np.sqrt(squares.mean() / (2 * freedom))))
+    return Measured(flicker, float(np.sqrt(squares.mean() / (2 * dof))))
 
 
 def _common_scatter(squares: FloatArray, noise: FloatArray) -> float:

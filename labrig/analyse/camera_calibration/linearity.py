@@ -46,12 +46,12 @@ def fit_linearity(
     saturation_dn
         Saturation level in DN, which is passed on to the result.
     """
-    used = np.isfinite(level_dn) & (level_dn > LEAST_FRACTION * range_dn)
-    used &= (used.sum(axis=1) > 1)[:, np.newaxis]
-    if not used.any():
+    is_used = np.isfinite(level_dn) & (level_dn > LEAST_FRACTION * range_dn)
+    is_used &= (is_used.sum(axis=1) > 1)[:, np.newaxis]
+    if not is_used.any():
         return None
-    frame, channel = np.nonzero(used)
-    level, relative = level_dn[used], sigma_dn[used] / level_dn[used]
+    frame, channel = np.nonzero(is_used)
+    level, relative = level_dn[is_used], sigma_dn[is_used] / level_dn[is_used]
     highest = float(level.max())
     between = [fraction * range_dn for fraction in KNOTS if fraction * range_dn < highest]
     knots = np.array([0.0, *between, highest])
@@ -65,20 +65,23 @@ def fit_linearity(
     dark = np.equal.outer(channel, np.arange(channels)) / level[:, np.newaxis]
     nuisance = np.hstack([light, colour, dark * level.min()]) * weight[:, np.newaxis]
     # What light, colour and dark level explain is taken out; D is what is left.
-    left, weights, _ = np.linalg.svd(nuisance, full_matrices=False)
-    own = left[:, weights > 1e-10 * weights.max()]
+    left_vectors, singular_values, _ = np.linalg.svd(nuisance, full_matrices=False)
+    nuisance_basis = left_vectors[:, singular_values > 1e-10 * singular_values.max()]
     target, design = np.log(level) * weight, bends * weight[:, np.newaxis]
-    target, design = target - own @ (own.T @ target), design - own @ (own.T @ design)
+    target, design = (
+        target - nuisance_basis @ (nuisance_basis.T @ target),
+        design - nuisance_basis @ (nuisance_basis.T @ design),
+    )
     singular = np.linalg.svd(design, compute_uv=False)
     if singular[-1] < 1e-6 * singular[0]:
         return None
-    found, *_ = np.linalg.lstsq(design, target)
-    freedom = len(level) - own.shape[1] - len(found)
-    misfit = np.square(target - design @ found).sum() / max(freedom, 1)
+    coefficients, *_ = np.linalg.lstsq(design, target)
+    dof = len(level) - nuisance_basis.shape[1] - len(coefficients)
+    misfit = np.square(target - design @ coefficients).sum() / max(dof, 1)
     covariance = np.linalg.inv(design.T @ design) * max(misfit, 1.0)
     return Linearity(
         level_dn=tuple(knots[1:].tolist()),
-        deviation=tuple(found.tolist()),
+        deviation=tuple(coefficients.tolist()),
         sigma=tuple(np.sqrt(np.diag(covariance)).tolist()),
         saturation_dn=saturation_dn,
     )

@@ -57,8 +57,8 @@ def combined(frames: FilterFrames) -> CombinedFrame:
         total = (weight * brightness[:, np.newaxis] ** 2).sum(axis=0)
         with np.errstate(invalid="ignore", divide="ignore"):
             mean = (weight * value * brightness[:, np.newaxis]).sum(axis=0) / total
-        known = np.nan_to_num(mean)
-        brightness = (weight * value) @ known / (weight @ known**2)
+        finite_mean = np.nan_to_num(mean)
+        brightness = (weight * value) @ finite_mean / (weight @ finite_mean**2)
         brightness = brightness / (brightness[0] or 1.0)
     with np.errstate(divide="ignore"):
         sigma = np.where(total > 0, 1 / np.sqrt(total), np.nan)
@@ -84,7 +84,7 @@ def visible(frames: FilterFrames) -> FilterFrames:
 
 def differ(comparisons: Sequence[SpectralComparison]) -> bool:
     """Return whether any of several comparisons is significant."""
-    return any(one.p_value < LEVEL / len(comparisons) for one in comparisons)
+    return any(comparison.p_value < LEVEL / len(comparisons) for comparison in comparisons)
 
 
 def over_time(frames: FilterFrames, centre_nm: FloatArray) -> list[SpectralComparison]:
@@ -97,11 +97,13 @@ def over_time(frames: FilterFrames, centre_nm: FloatArray) -> list[SpectralCompa
     centre_nm
         Centre of the filter's band of every value in nm, shape (m,).
     """
-    found = []
+    comparisons = []
     for row in range(len(frames)):
         others = combined(frames.take([other for other in range(len(frames)) if other != row]))
-        found.append(compared(f"{frames.t_s[row]:.3g} s", frames.take([row]), others, centre_nm))
-    return found
+        comparisons.append(
+            compared(f"{frames.t_s[row]:.3g} s", frames.take([row]), others, centre_nm)
+        )
+    return comparisons
 
 
 def compared(
@@ -109,24 +111,24 @@ def compared(
 ) -> SpectralComparison:
     """Compare frames with others that are combined."""
     mean = combined(frames)
-    known = np.isfinite(mean.value) & np.isfinite(reference.value)
-    y, m = mean.value[known], reference.value[known]
+    is_finite = np.isfinite(mean.value) & np.isfinite(reference.value)
+    y, m = mean.value[is_finite], reference.value[is_finite]
     gain, chi2 = float(y @ m / (m @ m)), 0.0
     for _ in range(COMPARING_ROUNDS):
-        variance = mean.sigma[known] ** 2 + gain**2 * reference.sigma[known] ** 2
-        inverse = _inverse(variance)
+        variance = mean.sigma[is_finite] ** 2 + gain**2 * reference.sigma[is_finite] ** 2
+        inverse = _inverse_covariance(variance)
         gain = float(m @ inverse @ y / (m @ inverse @ m))
         residual = y - gain * m
         chi2 = float(residual @ inverse @ residual)
     dof = len(y) - 2
     excess = max(chi2 - dof, 0.0) / float(gain**2 * (m @ inverse @ m))
-    shift, sigma = _shift(y, m, gain, variance, centre_nm[known])
+    shift, sigma = _centroid_shift(y, m, gain, variance, centre_nm[is_finite])
     return SpectralComparison(
         what, gain, chi2, dof, float(chdtrc(dof, chi2)), float(np.sqrt(excess)), shift, sigma
     )
 
 
-def _inverse(variance: FloatArray) -> FloatArray:
+def _inverse_covariance(variance: FloatArray) -> FloatArray:
     """Return the inverse covariance of values with a free common offset.
 
     A sensor that has warmed since its dark frames is brighter everywhere by the same amount.
@@ -136,7 +138,7 @@ def _inverse(variance: FloatArray) -> FloatArray:
     return inverse
 
 
-def _shift(
+def _centroid_shift(
     y: FloatArray, m: FloatArray, gain: float, variance: FloatArray, centre_nm: FloatArray
 ) -> tuple[float, float]:
     """Return the difference of the centroids in nm where m has its light, and its σ."""

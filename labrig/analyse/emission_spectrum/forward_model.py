@@ -74,8 +74,8 @@ class ForwardModel:
     def expected_of(self, light: Spectrum) -> FloatArray:
         """Return the values of a light by the model, shape (positions · channels,)."""
         columns = [
-            seen_through(lvf, one, light)[:, 0]
-            for lvf, one in zip(self.lvfs, _channels(self.camera), strict=True)
+            seen_through(lvf, channel, light)[:, 0]
+            for lvf, channel in zip(self.lvfs, _channel_cameras(self.camera), strict=True)
         ]
         return np.stack(columns, axis=1).ravel()
 
@@ -99,21 +99,21 @@ def forward_models(
     DataError
         No patch lies below the filter.
     """
-    known = part.inputs.lvf
-    if known is None or known.before_camera is None:
+    calibration = part.inputs.lvf
+    if calibration is None or calibration.before_camera is None:
         raise UsageError(
             "a spectrum needs the LVF calibrated before the camera: run the protocol "
             "lvf_calibration, and name its run in the rig file (optics: {lvf: …}) or to labrig "
             "process --optics"
         )
-    raw, strip, lvf = read_raw(frame.path), known.before_camera, known.lvf
-    camera, holder = _camera(part, raw.channels), _holder(strip)
+    raw, strip, lvf = read_raw(frame.path), calibration.before_camera, calibration.lvf
+    camera, holder = _camera_curves(part, raw.channels), _holder_regions(strip)
     patches, refused = slice_strip(strip_patches(part), strip, raw)
     models = {}
     for patch, slices in patches.items():
         # At either end pixels reach a little beyond the places that were calibrated.
         places = np.clip(_positions(raw, strip, slices), lvf.position[0], lvf.position[-1])
-        lvfs = tuple(lvf.at(own) for own in places)
+        lvfs = tuple(lvf.at(channel_positions) for channel_positions in places)
         models[patch] = ForwardModel(slices, holder, lvfs, camera, _system(lvfs, camera))
     return models, refused
 
@@ -136,12 +136,12 @@ def with_white_reference(
             "the white picture says nothing, since the spectra of lamp and grey card are not "
             "known: name them in the rig file (optics: {lamp: …, grey_card: …})",
         )
-    light = _light(lamp_spectrum(part.rig), card_reflectance(part.rig))
-    seen = combined(white)
-    if not seen.shows_light:
+    light = _card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
+    white_frame = combined(white)
+    if not white_frame.shows_light:
         return model, ("the white picture is dark or clips throughout; the spectrum does without",)
     system = conditioned_on_white(
-        model.system, seen.value, seen.sigma, light, model.expected_of(light)
+        model.system, white_frame.value, white_frame.sigma, light, model.expected_of(light)
     )
     return replace(model, system=system, white_reference=True), ()
 
@@ -170,15 +170,17 @@ def conditioned_on_white(
     expected
         Values by the system's own curves, wavelengths beyond its knots included, shape (m,).
     """
-    known = np.isfinite(value) & np.isfinite(sigma)
-    gain = float(expected[known] @ value[known] / (expected[known] @ expected[known]))
-    y, s = value[known] / gain, sigma[known] / gain
-    seen = system.modes[:, known] @ light.at(system.knots_nm)
-    levers = np.vstack([seen, ANY_BRIGHTNESS * expected[known]])
-    noise = np.hypot(s, LAMP_SIGMA * expected[known])
+    is_finite = np.isfinite(value) & np.isfinite(sigma)
+    gain = float(
+        expected[is_finite] @ value[is_finite] / (expected[is_finite] @ expected[is_finite])
+    )
+    y, s = value[is_finite] / gain, sigma[is_finite] / gain
+    mode_values = system.modes[:, is_finite] @ light.at(system.knots_nm)
+    levers = np.vstack([mode_values, ANY_BRIGHTNESS * expected[is_finite]])
+    noise = np.hypot(s, LAMP_SIGMA * expected[is_finite])
     whitened = levers / noise
     precision = np.eye(len(levers)) + whitened @ whitened.T
-    mean = np.linalg.solve(precision, whitened @ ((y - expected[known]) / noise))
+    mean = np.linalg.solve(precision, whitened @ ((y - expected[is_finite]) / noise))
     # Rows of the root of the covariance: independent again, each of unit variance.
     root = np.linalg.inv(np.linalg.cholesky(precision))[:, :-1]
     design = system.design + np.tensordot(mean[:-1], system.modes, axes=1)
@@ -187,7 +189,7 @@ def conditioned_on_white(
     )
 
 
-def _holder(strip: Strip) -> dict[str, Region]:
+def _holder_regions(strip: Strip) -> dict[str, Region]:
     """Return dark stripes above and below the strip, as far as they lie in the frame."""
     (left, left_y), (right, right_y) = strip.left, strip.right
     upper, lower = min(left_y, right_y), max(left_y, right_y)
@@ -219,21 +221,21 @@ def _system(lvfs: Sequence[Lvf], camera: CameraResponse) -> SpectralSystem:
     """
     error = CurveError()
     parts = [
-        system_through_lvf(lvf, one, KNOTS_NM, error)
-        for lvf, one in zip(lvfs, _channels(camera), strict=True)
+        system_through_lvf(lvf, channel, KNOTS_NM, error)
+        for lvf, channel in zip(lvfs, _channel_cameras(camera), strict=True)
     ]
-    of_filter = sum(
-        int(np.count_nonzero(getattr(lvfs[0].sigma, one.name))) for one in fields(Bands)
+    filter_modes = sum(
+        int(np.count_nonzero(getattr(lvfs[0].sigma, parameter.name))) for parameter in fields(Bands)
     )
-    curves = len(parts[0].modes) - of_filter
+    curves = len(parts[0].modes) - filter_modes
     count, knots = len(parts), len(KNOTS_NM)
     shape = (len(parts[0].design), count, knots)
     design = np.stack([part.design for part in parts], axis=1)
     modes = []
     for number, part in enumerate(parts):
-        own = np.zeros((curves, *shape))
-        own[:, :, number] = part.modes[:curves]
-        modes.append(own)
+        channel_modes = np.zeros((curves, *shape))
+        channel_modes[:, :, number] = part.modes[:curves]
+        modes.append(channel_modes)
     modes.append(np.stack([part.modes[curves:] for part in parts], axis=2))
     rows = shape[0] * count
     return SpectralSystem(
@@ -241,7 +243,7 @@ def _system(lvfs: Sequence[Lvf], camera: CameraResponse) -> SpectralSystem:
     )
 
 
-def _channels(camera: CameraResponse) -> list[CameraResponse]:
+def _channel_cameras(camera: CameraResponse) -> list[CameraResponse]:
     """Return each channel as a camera of its own."""
     return [
         CameraResponse(camera.name, camera.wavelength_nm, column[:, np.newaxis], (name,))
@@ -249,7 +251,7 @@ def _channels(camera: CameraResponse) -> list[CameraResponse]:
     ]
 
 
-def _light(lamp: Spectrum, card: Transmittance) -> Spectrum:
+def _card_light(lamp: Spectrum, card: Transmittance) -> Spectrum:
     """Return the spectrum of the lamp's light that the card reflects."""
     inside = (card.wavelength_nm > lamp.wavelength_nm[0]) & (
         card.wavelength_nm < lamp.wavelength_nm[-1]
@@ -258,7 +260,7 @@ def _light(lamp: Spectrum, card: Transmittance) -> Spectrum:
     return Spectrum(lamp.name, fine, lamp.at(fine) * card.at(fine))
 
 
-def _camera(part: Part, channels: tuple[str, ...]) -> CameraResponse:
+def _camera_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
     """Return the curves of the camera, in the order of a frame's channels."""
     if len(channels) == 1:
         name = part.overrides.camera or part.rig.optics.camera

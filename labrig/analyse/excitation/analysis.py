@@ -55,7 +55,7 @@ def analyse(part: Part) -> ExcitationResult:
     chargings, left_out = patch_chargings(part, irradiance, warming)
     patches, warnings = for_each_patch(
         list(chargings),
-        lambda patch: _of_patch(part, patch, chargings[patch], irradiance, warming),
+        lambda patch: _patch_excitation(part, patch, chargings[patch], irradiance, warming),
     )
     unmeasured = () if fade else ("the lamp's fade was not measured: a usual one was taken",)
     leaks = blank.leaks() if blank else ()
@@ -66,7 +66,7 @@ def analyse(part: Part) -> ExcitationResult:
     )
 
 
-def _of_patch(
+def _patch_excitation(
     part: Part,
     patch: StripPatch,
     charging: PatchCharging,
@@ -88,7 +88,7 @@ def _of_patch(
     )
     fit = _fit(charging, decay, uncertain)
     closure = predicted_charging(
-        charging, irradiance, uncertain, lambda without: _fit(without, decay, uncertain, fit)
+        charging, irradiance, uncertain, lambda reduced: _fit(reduced, decay, uncertain, fit)
     )
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
@@ -110,10 +110,10 @@ def _of_patch(
 
 def _states(part: Part, patch: StripPatch) -> int | None:
     """Return the requested number of states, or that of an earlier decay of this patch; or None."""
-    asked = part.protocol.states
-    states = part.overrides.states or (None if asked == "auto" else asked)
-    if states is None and (known := patch.own(part.inputs.decays)) is not None:
-        return known.n_states
+    protocol_states = part.protocol.states
+    states = part.overrides.states or (None if protocol_states == "auto" else protocol_states)
+    if states is None and (decay := patch.own(part.inputs.decays)) is not None:
+        return decay.n_states
     return states
 
 

@@ -63,9 +63,9 @@ class ChargeFrames:
         """Begin of the first charge in seconds since 1970, from which times count."""
         return self.intervals[0].on_s
 
-    def after(self, one: ChargeInterval) -> list[FrameRecord]:
+    def after(self, interval: ChargeInterval) -> list[FrameRecord]:
         """Return the photographs after one charge."""
-        return [frame for frame, charge in self.charge_of.items() if charge is one]
+        return [frame for frame, charge in self.charge_of.items() if charge is interval]
 
 
 def charge_frames(
@@ -91,18 +91,20 @@ def charge_frames(
         never became clean.
     """
     units = (_interval(attempt) for attempt in run.completed().values())
-    lit = sorted((one for one in units if one is not None), key=lambda one: one.on_s)
-    intervals = with_warmth(lit, time_constant_s)
+    charges = sorted(
+        (interval for interval in units if interval is not None), key=lambda interval: interval.on_s
+    )
+    intervals = with_warmth(charges, time_constant_s)
     frames = [
         frame for role in GLOWING for frame in run.frames(role) if not overrides.excludes(frame)
     ]
     frames.sort(key=lambda frame: frame.start_time)
-    of_frames = {frame: _interval_before(intervals, frame) for frame in frames}
-    charge_of = {frame: one for frame, one in of_frames.items() if one is not None}
+    interval_of = {frame: _interval_before(intervals, frame) for frame in frames}
+    charge_of = {frame: interval for frame, interval in interval_of.items() if interval is not None}
     left_out: tuple[str, ...] = ()
     if blank is not None and charge_of:
-        charge_of, left_out = _cleaned(charge_of, blank)
-    if not charge_of or len({one.is_direct for one in intervals}) < 2:
+        charge_of, left_out = _without_stray_light(charge_of, blank)
+    if not charge_of or len({interval.is_direct for interval in intervals}) < 2:
         raise DataError(
             f"{run.folder}: expected complete charges through the filter and without it; go on "
             f"with: labrig resume {run.folder}"
@@ -110,10 +112,10 @@ def charge_frames(
     return ChargeFrames(intervals, charge_of, left_out)
 
 
-def _cleaned(
+def _without_stray_light(
     charge: Mapping[FrameRecord, ChargeInterval], blank: BlankFile
 ) -> tuple[dict[FrameRecord, ChargeInterval], tuple[str, ...]]:
-    after_s = {frame: frame.start_time - one.off_s for frame, one in charge.items()}
+    after_s = {frame: frame.start_time - interval.off_s for frame, interval in charge.items()}
     left_out = left_out_lines(list(after_s.values()), blank)
     return {frame: charge[frame] for frame, t in after_s.items() if blank.is_clean(t)}, left_out
 
@@ -125,16 +127,16 @@ def with_warmth(
 
     The lamp is cold before the first charge, warms in each one and cools after it.
     """
-    found: list[ChargeInterval] = []
-    lacking, since_s = 1.0, 0.0
-    for one in intervals:
-        if found:
-            lacking = 1 - (1 - lacking) * math.exp(-(one.on_s - since_s) / time_constant_s)
-        charge_s = one.off_s - one.on_s
-        mean = -math.expm1(-charge_s / time_constant_s) * time_constant_s / charge_s
-        found.append(replace(one, cold=lacking * mean))
-        lacking, since_s = lacking * math.exp(-charge_s / time_constant_s), one.off_s
-    return found
+    warmed: list[ChargeInterval] = []
+    deficit, since_s = 1.0, 0.0
+    for interval in intervals:
+        if warmed:
+            deficit = 1 - (1 - deficit) * math.exp(-(interval.on_s - since_s) / time_constant_s)
+        charge_s = interval.off_s - interval.on_s
+        mean_fraction = -math.expm1(-charge_s / time_constant_s) * time_constant_s / charge_s
+        warmed.append(replace(interval, cold=deficit * mean_fraction))
+        deficit, since_s = deficit * math.exp(-charge_s / time_constant_s), interval.off_s
+    return warmed
 
 
 def _interval(attempt: Attempt) -> ChargeInterval | None:
@@ -153,7 +155,7 @@ def _interval_before(
 
     It is None if there was none, or none in the same arrangement of filter and lamp.
     """
-    before = [one for one in intervals if one.off_s < frame.start_time]
-    if not before or before[-1].is_direct is not UnitKind.DIRECT.has(frame.unit):
+    earlier = [interval for interval in intervals if interval.off_s < frame.start_time]
+    if not earlier or earlier[-1].is_direct is not UnitKind.DIRECT.has(frame.unit):
         return None
-    return before[-1]
+    return earlier[-1]

@@ -43,46 +43,47 @@ def patch_chargings(
         Charges or frames are missing, no patch lies below the filter, or the camera is not the
         calibrated one.
     """
-    known, overrides, protocol = part.inputs, part.overrides, part.protocol
-    frames = charge_frames(part.run, overrides, warming.time_constant_s, known.blank)
-    require_calibrated_camera(known.camera, part.run, list(frames.charge_of))
+    inputs, overrides, protocol = part.inputs, part.overrides, part.protocol
+    frames = charge_frames(part.run, overrides, warming.time_constant_s, inputs.blank)
+    require_calibrated_camera(inputs.camera, part.run, list(frames.charge_of))
     raw = read_raw(next(iter(frames.charge_of)).path)
-    sites, refused = slice_strip(
+    sites, reasons = slice_strip(
         strip_patches(part), irradiance.strip, raw, len(irradiance.position)
     )
     series = reduce_patches(
         [
-            replace(timed(frame, frames.zero_s), unit=one.unit)
-            for frame, one in frames.charge_of.items()
+            replace(timed(frame, frames.zero_s), unit=interval.unit)
+            for frame, interval in frames.charge_of.items()
         ],
         {
-            _key(patch, name): region
+            _place_name(patch, name): region
             for patch, slices in sites.items()
-            for name, region in {**slices, WHOLE: _around(slices)}.items()
+            for name, region in {**slices, WHOLE: _bounding_region(slices)}.items()
         },
         [
             untimed(frame)
             for frame in part.run.frames(FrameRole.DARK)
             if not overrides.excludes(frame)
         ],
-        camera=known.camera,
+        camera=inputs.camera,
     )
-    rise, fade = lamp_transients(known.fade, np.array(irradiance.bands_nm))
+    rise, fade = lamp_transients(inputs.fade, np.array(irradiance.bands_nm))
     longest = max(
-        (one for one in frames.intervals if one.is_direct), key=lambda one: one.off_s - one.on_s
+        (interval for interval in frames.intervals if interval.is_direct),
+        key=lambda interval: interval.off_s - interval.on_s,
     )
 
     def charges(direct: bool) -> tuple[Charge, ...]:
         return tuple(
             _charge(
-                one,
+                interval,
                 frames,
                 warming.deficit,
                 fresh=protocol.samples > 1,
-                saturated=protocol.saturated and one is longest,
+                saturated=protocol.saturated and interval is longest,
             )
-            for one in frames.intervals
-            if one.is_direct is direct
+            for interval in frames.intervals
+            if interval.is_direct is direct
         )
 
     through = ChargingSeries(
@@ -93,18 +94,26 @@ def patch_chargings(
     direct = ChargingSeries(
         "by the lamp itself", charges(True), rise, fade, everywhere, NOTHING, NOTHING
     )  # fmt: skip
-    found = {}
+    chargings = {}
     for patch, slices in sites.items():
-        own = [series[_key(patch, name)] for name in slices]
-        values = np.stack([_blanked(one, one.values) for one in own], axis=1)
-        sigma = np.stack([_blanked(one, one.sigma) for one in own], axis=1)
-        values = _centred(values, slices, np.array(irradiance.position), irradiance.strip, raw)
-        whole = series[_key(patch, WHOLE)]
-        found[patch] = _evened(values, sigma, through, direct, whole, frames)
-    return found, (*frames.left_out, *refused)
+        patch_series = [series[_place_name(patch, name)] for name in slices]
+        values = np.stack(
+            [_with_unusable_nan(site_series, site_series.values) for site_series in patch_series],
+            axis=1,
+        )
+        sigma = np.stack(
+            [_with_unusable_nan(site_series, site_series.sigma) for site_series in patch_series],
+            axis=1,
+        )
+        values = _interpolate_to_positions(
+            values, slices, np.array(irradiance.position), irradiance.strip, raw
+        )
+        whole = series[_place_name(patch, WHOLE)]
+        chargings[patch] = _divide_by_evenness(values, sigma, through, direct, whole, frames)
+    return chargings, (*frames.left_out, *reasons)
 
 
-def _centred(
+def _interpolate_to_positions(
     values: FloatArray,
     slices: Slices,
     position: FloatArray,
@@ -132,16 +141,16 @@ def _centred(
     """
     along = position if strip.rising else 1 - position
     left, right = strip.left[0] * raw.width, strip.right[0] * raw.width
-    wanted = left + (along - tilt_offset(strip, slices, raw)) * (right - left)
-    moved = values.copy()
+    centre_column = left + (along - tilt_offset(strip, slices, raw)) * (right - left)
+    interpolated = values.copy()
     middles = np.array([LinearFrame(raw).middle_columns(region) for region in slices.values()])
     for number, x in enumerate(middles.T):
         slope = np.nan_to_num(np.gradient(values[..., number], x, axis=1))
-        moved[..., number] += slope * (wanted - x)
-    return moved
+        interpolated[..., number] += slope * (centre_column - x)
+    return interpolated
 
 
-def _evened(
+def _divide_by_evenness(
     values: FloatArray,
     sigma: FloatArray,
     through: ChargingSeries,
@@ -150,45 +159,45 @@ def _evened(
     frames: ChargeFrames,
 ) -> PatchCharging:
     """Divide one patch's values (n, P, C) of all photographs by the evenness, into two series."""
-    is_direct = np.array([one.is_direct for one in frames.charge_of.values()])
+    is_direct = np.array([interval.is_direct for interval in frames.charge_of.values()])
     evenness = _evenness(values[is_direct], sigma[is_direct])
     values, sigma = values / evenness[:, None], sigma / evenness[:, None]
-    last = np.array([one is frames.intervals[-1] for one in frames.charge_of.values()])
+    last = np.array([interval is frames.intervals[-1] for interval in frames.charge_of.values()])
     return PatchCharging(
         replace(through, values=values[~is_direct], sigma=sigma[~is_direct]),
         replace(direct, values=values[is_direct], sigma=sigma[is_direct]),
         evenness,
-        _after_off(whole, last, frames),
+        _final_decay(whole, last, frames),
     )
 
 
 def _charge(
-    one: ChargeInterval, frames: ChargeFrames, deficit: float, *, fresh: bool, saturated: bool
+    interval: ChargeInterval, frames: ChargeFrames, deficit: float, *, fresh: bool, saturated: bool
 ) -> Charge:
-    after = frames.after(one)
+    after = frames.after(interval)
     return Charge(
-        on_s=one.on_s - frames.zero_s,
-        off_s=one.off_s - frames.zero_s,
+        on_s=interval.on_s - frames.zero_s,
+        off_s=interval.off_s - frames.zero_s,
         start_s=np.array([frame.start_time - frames.zero_s for frame in after]),
         exposure_s=np.array([frame.exposure_s for frame in after]),
-        brightness=1 - deficit * one.cold,
-        cold=one.cold,
+        brightness=1 - deficit * interval.cold,
+        cold=interval.cold,
         fresh=fresh,
         saturated=saturated,
     )
 
 
-def _key(patch: StripPatch, name: str) -> str:
+def _place_name(patch: StripPatch, name: str) -> str:
     """Return the name of a place among those of all patches."""
     return f"{patch.folder} {name}".strip()
 
 
-def _blanked(series: Series, numbers: FloatArray) -> FloatArray:
+def _with_unusable_nan(series: Series, numbers: FloatArray) -> FloatArray:
     """Replace numbers by NaN in rows that must not be used."""
     return np.where(series.usable[:, None], numbers, np.nan)
 
 
-def _around(sites: Slices) -> Region:
+def _bounding_region(sites: Slices) -> Region:
     """Return the upright rectangle around all sites."""
     left, top = (min(region[k] for region in sites.values()) for k in (0, 1))
     right = max(region[0] + region[2] for region in sites.values())
@@ -199,19 +208,21 @@ def _around(sites: Slices) -> Region:
 def _evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:
     """Return the brightness of every place after the same light, 1 on average, shape (P,)."""
     weight = np.where(np.isfinite(values) & (sigma > 0), 1 / np.square(sigma), 0.0)
-    known = weight.min(axis=1, keepdims=True) > 0
-    frame = np.where(known, np.nanmean(np.where(known, values, 0.0), axis=1, keepdims=True), 0.0)
-    weight = np.where(known, weight, 0.0)
-    total = (weight * frame**2).sum(axis=(0, 2))
+    is_known = weight.min(axis=1, keepdims=True) > 0
+    frame_mean = np.where(
+        is_known, np.nanmean(np.where(is_known, values, 0.0), axis=1, keepdims=True), 0.0
+    )
+    weight = np.where(is_known, weight, 0.0)
+    total = (weight * frame_mean**2).sum(axis=(0, 2))
     if not (total > 0).all():
         raise DataError(
             "expected a glow all along the filter's place after charges by the lamp itself, got "
             "none somewhere, or it is clipped; check where the sample and the filter lie"
         )
-    found = (weight * frame * np.nan_to_num(values)).sum(axis=(0, 2)) / total
-    return np.asarray(found / found.mean())
+    signal = (weight * frame_mean * np.nan_to_num(values)).sum(axis=(0, 2)) / total
+    return np.asarray(signal / signal.mean())
 
 
-def _after_off(whole: Series, rows: BoolArray, frames: ChargeFrames) -> Series:
+def _final_decay(whole: Series, rows: BoolArray, frames: ChargeFrames) -> Series:
     part = whole.take(np.flatnonzero(rows))
     return replace(part, t_s=part.t_s - (frames.intervals[-1].off_s - frames.zero_s))

@@ -48,16 +48,18 @@ def site_modes(irradiance: IrradianceFile) -> FloatArray:
     fraction = np.clip(1 - np.abs(position - knots[:, None]) / (knots[1] - knots[0]), 0.0, None)
     smooth = np.sin(np.pi / 2 * fraction)[..., None]
     nm = np.ptp(irradiance.bands_nm) * (position - position[0]) / np.ptp(position)
-    by_nm = np.gradient(np.log(_some(through)), nm, axis=0)
-    beyond = np.sqrt(np.clip((sigma / _some(through)) ** 2 - light_sigma**2, 0.0, WORST**2))
+    slope_per_nm = np.gradient(np.log(_positive_light(through)), nm, axis=0)
+    shape_sigma = np.sqrt(
+        np.clip((sigma / _positive_light(through)) ** 2 - light_sigma**2, 0.0, WORST**2)
+    )
     bands = np.ones(through.shape[1])
-    alone = LEAST_SITE_SIGMA * np.eye(len(position))[..., None]
+    independent = LEAST_SITE_SIGMA * np.eye(len(position))[..., None]
     return np.concatenate(
         [
             smooth * light_sigma * bands,
-            smooth * WAVELENGTH_SIGMA_NM * by_nm,
-            smooth * beyond,
-            alone * bands,
+            smooth * WAVELENGTH_SIGMA_NM * slope_per_nm,
+            smooth * shape_sigma,
+            independent * bands,
         ]
     )
 
@@ -67,12 +69,12 @@ def across_sites(irradiance: IrradianceFile) -> FloatArray:
 
     The two places are Gauss's: with them a mean over a site is exact up to third order.
     """
-    position, through = np.array(irradiance.position), _some(np.array(irradiance.through))
+    position, through = np.array(irradiance.position), _positive_light(np.array(irradiance.through))
     course = PchipInterpolator(position, np.log(through), axis=0)
-    off = np.gradient(position)[:, None] / 2 / np.sqrt(3)
-    here, slope = course(position), course(position, 1)
+    offset = np.gradient(position)[:, None] / 2 / np.sqrt(3)
+    log_light, slope = course(position), course(position, 1)
     # At the ends there is nothing to look up beyond the last place's middle.
-    pair: FloatArray = np.exp(np.stack([here - slope * off, here + slope * off]))
+    pair: FloatArray = np.exp(np.stack([log_light - slope * offset, log_light + slope * offset]))
     mean: FloatArray = pair.mean(axis=0)
     return pair / mean
 
@@ -102,12 +104,12 @@ def lamp_transients(fade: FadeFile | None, bands_nm: FloatArray) -> tuple[Transi
     cools.
     """
     if fade is None:
-        dark = _usual(bands_nm)
-        return _upside_down(dark), dark
-    found = _transient(fade, fade.fade, bands_nm, end=0.0)
+        usual_fade = _typical_fade(bands_nm)
+        return _inverted(usual_fade), usual_fade
+    measured_fade = _measured_transient(fade, fade.fade, bands_nm, end=0.0)
     if fade.rise is None:
-        return _upside_down(found), found
-    return _transient(fade, fade.rise, bands_nm, end=1.0), found
+        return _inverted(measured_fade), measured_fade
+    return _measured_transient(fade, fade.rise, bands_nm, end=1.0), measured_fade
 
 
 def _relative_sigma(irradiance: IrradianceFile) -> FloatArray:
@@ -117,12 +119,14 @@ def _relative_sigma(irradiance: IrradianceFile) -> FloatArray:
     return relative
 
 
-def _some(light: FloatArray) -> FloatArray:
-    some: FloatArray = np.maximum(light, LEAST_LIGHT * light.max())
-    return some
+def _positive_light(light: FloatArray) -> FloatArray:
+    positive: FloatArray = np.maximum(light, LEAST_LIGHT * light.max())
+    return positive
 
 
-def _transient(file: FadeFile, change: Change, bands_nm: FloatArray, end: float) -> Transient:
+def _measured_transient(
+    file: FadeFile, change: Change, bands_nm: FloatArray, end: float
+) -> Transient:
     """Return the transient in steps short enough, until the lamp has reached its `end`."""
     times_s, fraction = file.in_bands(change, bands_nm)
     fine_s = np.linspace(0.0, times_s[-1], STEPS + 1)
@@ -131,7 +135,7 @@ def _transient(file: FadeFile, change: Change, bands_nm: FloatArray, end: float)
     return Transient.sampled(fine_s, fine)
 
 
-def _usual(bands_nm: FloatArray) -> Transient:
+def _typical_fade(bands_nm: FloatArray) -> Transient:
     middles_nm = (bands_nm[1:] + bands_nm[:-1]) / 2
     tau_s = np.interp(middles_nm, USUAL_NM, USUAL_1_E_S)
     times_s = np.linspace(0.0, DARK_S, STEPS + 1)
@@ -140,5 +144,5 @@ def _usual(bands_nm: FloatArray) -> Transient:
     return Transient.sampled(times_s, fraction)
 
 
-def _upside_down(fade: Transient) -> Transient:
+def _inverted(fade: Transient) -> Transient:
     return Transient(fade.duration_s, 1 - fade.fraction)

@@ -67,17 +67,17 @@ def analyse(part: Part) -> FadeResult:
     lag = ANY_LAG
     for role in SWITCHED if protocol.rise else SWITCHED[:1]:
         switched = frames_after_switch(part.run, frames, darks, places, camera, role)
-        seen = weights
+        channel_weights = weights
         if protocol.through_lvf:
             # All channels of a place see the same band: one of them is enough.
             columns = brightest_channels(switched, len(curves.channels))
-            switched, seen = take_columns(switched, columns), weights[columns]
+            switched, channel_weights = take_columns(switched, columns), weights[columns]
         rises = role == LampFrames.RISE
-        change = fit_change(switched, seen, nm, flicker, rises=rises, lag=lag)
+        change = fit_change(switched, channel_weights, nm, flicker, rises=rises, lag=lag)
         lag = replace(change.lag, sigma=float(np.hypot(change.lag.sigma, RELAY_S)))
         changes[role] = change.result(switched)
         tables[role] = _table(change, bands, nm)
-    warm, warming_light = _warming(part, darks, flicker)
+    warm, warming_light = _fit_warming(part, darks, flicker)
     file = FadeFile(
         lamp=lamp.name,
         bands_nm=protocol.bands,
@@ -96,7 +96,7 @@ def analyse(part: Part) -> FadeResult:
     )
 
 
-def _warming(
+def _fit_warming(
     part: Part, darks: Sequence[FrameRecord], flicker: float
 ) -> tuple[Warming, WarmingLight] | tuple[None, None]:
     frames = part_frames(part, LampFrames.WARMING)
@@ -114,9 +114,9 @@ def _places(
     nm: FloatArray,
 ) -> tuple[Mapping[str, Region], FloatArray]:
     """Return regions, and the weights of the steady lamp at `nm` in each of their channels."""
-    seen = (lamp.at(nm)[:, np.newaxis] * curves.at(nm)).T
+    channel_light = (lamp.at(nm)[:, np.newaxis] * curves.at(nm)).T
     if not part.protocol.through_lvf:
-        return {"card": part_region(part, part.protocol.card)}, _normalised(seen)
+        return {"card": part_region(part, part.protocol.card)}, _normalise(channel_light)
     lvf = part.inputs.lvf
     if lvf is None or lvf.before_camera is None:
         raise DataError(
@@ -125,11 +125,11 @@ def _places(
         )
     strip, frame = lvf.before_camera, read_raw(frames[0].path)
     transmission = lvf.lvf.at(strip.positions(frame.width, frame.height)).transmission(nm)
-    through = transmission[:, np.newaxis, :] * seen
-    return strip.slices(), _normalised(through.reshape(-1, len(nm)))
+    through = transmission[:, np.newaxis, :] * channel_light
+    return strip.slices(), _normalise(through.reshape(-1, len(nm)))
 
 
-def _normalised(weights: FloatArray) -> FloatArray:
+def _normalise(weights: FloatArray) -> FloatArray:
     result: FloatArray = weights / weights.sum(axis=1, keepdims=True)
     return result
 
@@ -141,34 +141,34 @@ def _band_weights(edges_nm: FloatArray, lamp: Spectrum, nm: FloatArray) -> Float
     for row, middle in enumerate(middles):
         if not inside[row].any():
             inside[row, np.argmin(np.abs(nm - middle))] = True
-    even = inside.astype(np.float64)
-    lit = even * np.maximum(lamp.at(nm), 0.0)
-    return _normalised(np.where(lit.sum(axis=1, keepdims=True) > 0, lit, even))
+    uniform = inside.astype(np.float64)
+    lamp_light = uniform * np.maximum(lamp.at(nm), 0.0)
+    return _normalise(np.where(lamp_light.sum(axis=1, keepdims=True) > 0, lamp_light, uniform))
 
 
 def _table(change: FittedChange, bands: FloatArray, nm: FloatArray) -> Change:
-    last_s = _over_at(change, bands, nm)
+    last_s = _end_s(change, bands, nm)
     t_s = last_s * np.linspace(0, 1, TIMES) ** DENSER
     fraction, sigma = change.in_bands(bands, nm, t_s)
     first = 0.0 if change.rises else 1.0
     fraction[0], sigma[0] = first, 0.0
     return Change(
-        t_s=tuple(_short(value) for value in t_s),
-        fraction=tuple(tuple(_short(value) for value in row) for row in fraction),
-        sigma=tuple(tuple(_short(value) for value in row) for row in sigma),
+        t_s=tuple(_rounded(value) for value in t_s),
+        fraction=tuple(tuple(_rounded(value) for value in row) for row in fraction),
+        sigma=tuple(tuple(_rounded(value) for value in row) for row in sigma),
     )
 
 
-def _over_at(change: FittedChange, bands: FloatArray, nm: FloatArray) -> float:
+def _end_s(change: FittedChange, bands: FloatArray, nm: FloatArray) -> float:
     """Return the time in seconds at which all bands have reached their end."""
     t_s = np.linspace(0, LONGEST_S, 2001)
     fraction, _ = change.in_bands(bands, nm, t_s)
-    left = 1 - fraction if change.rises else fraction
-    over = np.flatnonzero((left < GONE).all(axis=1))
-    return float(t_s[over[0]]) if len(over) else LONGEST_S
+    remaining = 1 - fraction if change.rises else fraction
+    ended = np.flatnonzero((remaining < GONE).all(axis=1))
+    return float(t_s[ended[0]]) if len(ended) else LONGEST_S
 
 
-def _short(value: float) -> float:
+def _rounded(value: float) -> float:
     return float(f"{value:.5g}")
 
 

@@ -250,15 +250,15 @@ class FittedChange:
             Times after the switch in seconds.
         """
         fractions, sigmas = zip(*(fit.in_bands(weights, nm, t_s) for fit in self.fits), strict=True)
-        return self._averaged(np.array(fractions), np.array(sigmas))
+        return self._average(np.array(fractions), np.array(sigmas))
 
     def _mean(self, parameter: int, unit: str = "") -> Measured:
         values = np.array([fit.parameters[parameter] for fit in self.fits])
         sigmas = [np.sqrt(fit.covariance[parameter, parameter]) for fit in self.fits]
-        mean, sigma = self._averaged(values, np.array(sigmas))
+        mean, sigma = self._average(values, np.array(sigmas))
         return Measured(float(mean), float(sigma), unit)
 
-    def _averaged(self, values: FloatArray, sigmas: FloatArray) -> tuple[FloatArray, FloatArray]:
+    def _average(self, values: FloatArray, sigmas: FloatArray) -> tuple[FloatArray, FloatArray]:
         """Average over the fits, the first axis; σ includes their scatter."""
         mean = np.tensordot(self.likely, values, axes=1)
         variance = np.square(sigmas) + np.square(values - mean)

@@ -62,7 +62,11 @@ class FilterScenes:
 
     def without(self, names: set[str]) -> "FilterScenes":
         """Return the scenes without the filters of these names."""
-        kept = [number for number, one in enumerate(self.filters) if one.name not in names]
+        kept = [
+            number
+            for number, transmittance in enumerate(self.filters)
+            if transmittance.name not in names
+        ]
         return replace(
             self,
             filters=[self.filters[number] for number in kept],
@@ -96,11 +100,13 @@ class Bench:
 
     def relative(self, lvf: Lvf, filters: Sequence[Transmittance]) -> FloatArray:
         """Return values relative to those without a filter, shape (filters, p, channels)."""
-        nodes, light = self._light(*(one.wavelength_nm for one in filters))
-        seen = lvf.transmission(nodes) * light
+        nodes, light = self._light(*(transmittance.wavelength_nm for transmittance in filters))
+        through_strip = lvf.transmission(nodes) * light
         sensitivity = self.camera.at(nodes)
-        bare = seen @ sensitivity
-        passed = [(seen * one.at(nodes)) @ sensitivity for one in filters]
+        bare = through_strip @ sensitivity
+        passed = [
+            (through_strip * transmittance.at(nodes)) @ sensitivity for transmittance in filters
+        ]
         relative: FloatArray = np.stack(passed) / np.maximum(bare, 1e-12 * bare.max())
         return relative
 
@@ -122,20 +128,24 @@ def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> l
     bare = scenes.values[0].value
     # In its brightest colour a place sees its band, in the others and at dim ends what leaks.
     fraction = np.nan_to_num(bare / scenes.card.value)
-    own = np.argmax(fraction, axis=1)
+    brightest = np.argmax(fraction, axis=1)
     bright = fraction.max(axis=1) > BRIGHT * fraction.max()
-    at = np.flatnonzero(bright), own[bright]
-    found = []
-    for number, seen in enumerate(scenes.values[1:], start=1):
-        ratio = seen.value[at] / bare[at]
-        off = np.sqrt(np.nanmean((expected[:, *at] - ratio) ** 2, axis=1))
-        best = int(np.argmin(off))
+    places = np.flatnonzero(bright), brightest[bright]
+    filter_misfits = []
+    for number, scene in enumerate(scenes.values[1:], start=1):
+        ratio = scene.value[places] / bare[places]
+        deviation = np.sqrt(np.nanmean((expected[:, *places] - ratio) ** 2, axis=1))
+        best = int(np.argmin(deviation))
         name = scenes.filters[number].name
         like = scenes.filters[best].name
-        another = like != name and off[number] > BETTER * off[best]
-        wrong = off[number] > FAR_OFF or (off[number] > EXPECTED and another)
-        found.append(FilterMisfit(name, float(off[number]), float(off[best]), like, bool(wrong)))
-    return found
+        another = like != name and deviation[number] > BETTER * deviation[best]
+        is_left_out = deviation[number] > FAR_OFF or (deviation[number] > EXPECTED and another)
+        filter_misfits.append(
+            FilterMisfit(
+                name, float(deviation[number]), float(deviation[best]), like, bool(is_left_out)
+            )
+        )
+    return filter_misfits
 
 
 def left_out_text(misfit: FilterMisfit) -> str:
@@ -158,10 +168,11 @@ def calibrated(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -
     so is the ratio of the camera's channels under this lamp.
     """
     reference = bench.card_values() / scenes.card.value
-    value = np.stack([one.value * reference for one in scenes.values], axis=1)
+    value = np.stack([scene.value * reference for scene in scenes.values], axis=1)
     sigma = [
-        np.hypot(seen.sigma, (FLICKER if one is NO_FILTER else TABLE) * seen.value) * reference
-        for one, seen in zip(scenes.filters, scenes.values, strict=True)
+        np.hypot(scene.sigma, (FLICKER if transmittance is NO_FILTER else TABLE) * scene.value)
+        * reference
+        for transmittance, scene in zip(scenes.filters, scenes.values, strict=True)
     ]
     return calibrate_lvf(
         scenes.position,
@@ -187,8 +198,10 @@ def residuals(scenes: FilterScenes, bench: Bench, lvf: Lvf) -> FloatArray:
     weight = np.where(clear, bare.value, 0.0)
     total = weight.sum(axis=1)
     rows = []
-    for one, want in zip(scenes.values, expected, strict=True):
-        off = np.where(clear, one.value / np.where(clear, bare.value, 1.0) - want, 0.0)
-        mean = (weight * np.nan_to_num(off)).sum(axis=1) / np.where(total > 0, total, 1.0)
+    for scene, expected_ratio in zip(scenes.values, expected, strict=True):
+        residual = np.where(
+            clear, scene.value / np.where(clear, bare.value, 1.0) - expected_ratio, 0.0
+        )
+        mean = (weight * np.nan_to_num(residual)).sum(axis=1) / np.where(total > 0, total, 1.0)
         rows.append(np.where(total > 0, mean, np.nan))
     return np.array(rows)
