@@ -143,7 +143,7 @@ class IntactFrames:
     dark
         Dark frames without the excluded ones.
     daylight
-        Frames for the report only.
+        Daylight frames, which are only shown.
     warnings
         Warnings about frames that cannot be shown.
     """

@@ -100,8 +100,8 @@ def mean_ratio(pairs: Sequence[tuple[SliceValues, SliceValues]]) -> CardRatio:
     weight = 1 / np.stack(relative) ** 2
     total = weight.sum(axis=0)
     mean = (weight * ratios).sum(axis=0) / total
-    clear = mean > 30 / np.sqrt(total)
-    round_ratios = [float(np.median((ratio / mean)[clear])) for ratio in ratios]
+    is_clear = mean > 30 / np.sqrt(total)
+    round_ratios = [float(np.median((ratio / mean)[is_clear])) for ratio in ratios]
     drift = float(np.std(round_ratios, ddof=1)) if len(round_ratios) > 1 else 0.0
     common = float(np.hypot(FLICKER * np.sqrt(2), drift) / np.sqrt(len(pairs)))
     return CardRatio(mean, 1 / np.sqrt(total), common, drift, len(pairs))
@@ -190,14 +190,14 @@ def strip_scale(
         low, high, camera.wavelength_nm, lamp.wavelength_nm, card.wavelength_nm
     )
     light = weights * lamp.at(nodes) * card.at(nodes)
-    passed = lvf.transmission(nodes) * light
+    transmitted = lvf.transmission(nodes) * light
     sensitivity = camera.at(nodes)
     total = light @ sensitivity
-    expected = passed @ sensitivity / total
+    expected = transmitted @ sensitivity / total
     modes = curve_modes(curve_error, nodes, sensitivity, camera.sensitivity.max(axis=0))
     # (modes, p, channels) of the expected ratio.
     curve_errors = np.stack(
-        [passed @ mode / total - expected * (light @ mode / total) for mode in modes]
+        [transmitted @ mode / total - expected * (light @ mode / total) for mode in modes]
     )
     figure_changes = _parameter_changes(lvf, nodes, light) @ sensitivity / total
     value, noise, curve_factors = np.empty(len(expected)), np.empty(len(expected)), []
@@ -226,7 +226,7 @@ def _weights(
     """Return the generalised-least-squares weights of a position's ratios, shape (channels,).
 
     The weighted sum of the ratios is the position's factor. The covariance is that of noise
-    `unsure` (channels,) and of the curves' modes (modes, channels).
+    `sigma` (channels,) and of the curves' modes (modes, channels).
     """
     start = max(float(measured @ expected / (expected @ expected)), LEAST)
     covariance = np.diag(sigma**2) + start**2 * curve_errors.T @ curve_errors

@@ -135,8 +135,8 @@ def _interpolate_log(at_s: FloatArray, t_s: FloatArray, log_value: FloatArray) -
     """
     slope, start = np.polyfit(np.log(t_s), log_value, 1)
     interpolated = np.interp(at_s, t_s, log_value)
-    beyond = (at_s < t_s[0]) | (at_s > t_s[-1])
-    return np.where(beyond, start + slope * np.log(at_s), interpolated)
+    is_beyond = (at_s < t_s[0]) | (at_s > t_s[-1])
+    return np.where(is_beyond, start + slope * np.log(at_s), interpolated)
 
 
 def _warnings(glow: AngularGlow) -> Iterator[str]:

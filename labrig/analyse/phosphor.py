@@ -23,9 +23,9 @@ def analyse(part: Part) -> PhosphorResult:
     for link in part.protocol.chain():
         kind = link.protocol.protocol
         analyse_link = plugins.load(plugins.ANALYSES, kind, str(part.run.folder))
-        own = Part(part.run.part(link.name), link.protocol, part.rig, part.overrides, inputs)
+        link_part = Part(part.run.part(link.name), link.protocol, part.rig, part.overrides, inputs)
         try:
-            result: RunResult = analyse_link(own)
+            result: RunResult = analyse_link(link_part)
             if result.failures():
                 raise FitError("; ".join(result.failures()))
         except (DataError, FitError) as error:

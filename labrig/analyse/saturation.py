@@ -52,8 +52,8 @@ STEP = 1e-3
 
 def charged(kappa_per_s: float, k_per_s: float, charge_s: float) -> float:
     """Return the level r after a charge from the dark under constant light (exact)."""
-    s = kappa_per_s + k_per_s
-    return float(kappa_per_s / s * -np.expm1(-s * charge_s))
+    total_rate = kappa_per_s + k_per_s
+    return float(kappa_per_s / total_rate * -np.expm1(-total_rate * charge_s))
 
 
 def charge_level(
@@ -104,12 +104,12 @@ def curve(series: Series, fit: FittedDecay) -> Curve:
     """Combine the channels of a series with the weights of `fit`, flicker in its σ."""
     rows = series.usable
     weights = np.array(fit.channel_weights)
-    y, s = series.values[rows], series.sigma[rows]
-    information = (weights / s**2) @ weights
-    value = (y / s**2) @ weights / information
-    sigma = np.hypot(1 / np.sqrt(information), fit.flicker * np.maximum(value, 0.0))
+    values, sigmas = series.values[rows], series.sigma[rows]
+    weight_sum = (weights / sigmas**2) @ weights
+    value = (values / sigmas**2) @ weights / weight_sum
+    sigma = np.hypot(1 / np.sqrt(weight_sum), fit.flicker * np.maximum(value, 0.0))
     dark = np.nan_to_num(series.dark_sigma)
-    fractions = np.mean(weights / s**2, axis=0) / np.mean(information)
+    fractions = np.mean(weights / sigmas**2, axis=0) / np.mean(weight_sum)
     return Curve(series.t_s[rows], series.exposure_s[rows], value, sigma, float(fractions @ dark))
 
 

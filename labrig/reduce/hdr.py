@@ -59,8 +59,8 @@ class HdrFrame:
         """
         filled = np.where(np.isnan(self.rate), np.nanmax(self.rate), self.rate)
         size = (max(self.cfa_side, 2),) * 2
-        smooth = cv2.blur(filled.astype(np.float32), size, borderType=cv2.BORDER_REFLECT)
-        return np.asarray(cv2.medianBlur(smooth, 3), dtype=np.float32)
+        smoothed = cv2.blur(filled.astype(np.float32), size, borderType=cv2.BORDER_REFLECT)
+        return np.asarray(cv2.medianBlur(smoothed, 3), dtype=np.float32)
 
 
 def read_hdr_frame(frames: Iterable[Exposure], hot: PixelMask | None = None) -> HdrFrame:

@@ -122,12 +122,12 @@ def measure_frames(
         Frames that are already decoded, by path.
     """
 
-    def shot(frame: SeriesFrame) -> MeasuredFrame:
+    def decode_and_measure(frame: SeriesFrame) -> MeasuredFrame:
         raw = read.get(frame.path) or read_raw(frame.path)
         return _measure_frame(frame, raw, patches, background, hot)
 
     with ThreadPoolExecutor(_FRAMES_AT_ONCE) as pool:
-        return list(pool.map(shot, frames))
+        return list(pool.map(decode_and_measure, frames))
 
 
 def _measure_frame(

@@ -104,14 +104,16 @@ def plane_noise(planes: Sequence[Mosaic]) -> list[PlaneNoise]:
         ]
         stacked = np.concatenate([tiles[index] for index in same_shape])
         level, variance = stacked.mean(axis=(1, 2)), _second_difference_variance(stacked)
-        sharing = _autocovariance(stacked) if shape == (TILE, TILE) else None
+        covariances = _autocovariance(stacked) if shape == (TILE, TILE) else None
         end = 0
         for index in same_shape:
             start, end = end, end + len(tiles[index])
             noises[index] = _noise_of_plane(
                 level[start:end],
                 variance[start:end],
-                None if sharing is None else (sharing[0][start:end], sharing[1][start:end]),
+                None
+                if covariances is None
+                else (covariances[0][start:end], covariances[1][start:end]),
                 _brightness(planes[index]),
             )
     return [noises[index] for index in range(len(planes))]
@@ -120,7 +122,7 @@ def plane_noise(planes: Sequence[Mosaic]) -> list[PlaneNoise]:
 def _noise_of_plane(
     level: Floats,
     variance: Floats,
-    sharing: tuple[Floats, npt.NDArray[np.bool_]] | None,
+    covariances: tuple[Floats, npt.NDArray[np.bool_]] | None,
     brightness: float,
 ) -> PlaneNoise:
     """Estimate the noise of a plane from its n tiles.
@@ -131,7 +133,7 @@ def _noise_of_plane(
         Mean of each tile in DN, shape (n,).
     variance
         Variance of each tile by second differences in DN², shape (n,).
-    sharing
+    covariances
         Autocovariance of each tile, and whether it is clean; None of tiles that are too small.
     brightness
         Mean of the plane in DN.
@@ -140,11 +142,11 @@ def _noise_of_plane(
     above = level - darkest
     line = _photon_line(above, variance)
     correlation = 1.0
-    if sharing is not None:
+    if covariances is not None:
         # Only tiles on the line show shared noise: the others are dominated by the sample.
         by_line = line.variance_dn2(above)
         on_line = variance <= _ROUGH * by_line
-        autocovariance, clean = sharing
+        autocovariance, clean = covariances
         correlation = _correlation(autocovariance[on_line & clean], by_line[on_line & clean])
         if correlation > 1:
             # Differences of pixels that share noise are too small: take C(0) itself.

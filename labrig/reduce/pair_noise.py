@@ -222,8 +222,8 @@ def _differences(
     (p, C, s). A frame that is nothing but noise is not scaled.
     """
     light = np.maximum(frames.light, 0)
-    bright = light[first] > SCALED_SIGMAS * sigma[first]
-    scales = np.where(bright, light[second] / np.where(bright, light[first], 1.0), 1.0)
+    is_bright = light[first] > SCALED_SIGMAS * sigma[first]
+    scales = np.where(is_bright, light[second] / np.where(is_bright, light[first], 1.0), 1.0)
     return scales, frames.deviations[second] - scales[..., np.newaxis] * frames.deviations[first]
 
 

@@ -28,7 +28,7 @@ MOST_TILT_DEGREES = 5.0
 #: Least ratio of a strip's length to its height, and least fraction of the frame that it fills.
 LEAST_ELONGATION = 2.0
 LEAST_FRACTION = 0.005
-#: Fraction of the rectangle that is lit; more than 1 is rounding.
+#: Range of the lit fraction of the rectangle; more than 1 is rounding.
 FULL = (0.9, 1.1)
 #: Margins at each long side and at each end, as fractions of the strip's height and length.
 LONG_MARGIN, END_MARGIN = 0.12, 0.01

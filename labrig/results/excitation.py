@@ -181,7 +181,7 @@ class ExcitationResult(RunResult):
             write_json(place / "excitation.json", finite(self._fit_content(patch.fit)))
 
     def _fit_content(self, fit: FittedExcitation) -> dict[str, Any]:
-        off = fit.at_off[-1]
+        level_at_off = fit.at_off[-1]
         return {
             "schema_version": self.schema_version,
             "bands_nm": self.irradiance.bands_nm,
@@ -195,8 +195,8 @@ class ExcitationResult(RunResult):
                     "k_e_per_s": state.k_e_per_s.tolist(),
                     "k_e_sigma_per_s": state.k_e_sigma_per_s.tolist(),
                     "k_e_upper_per_s": state.k_e_upper_per_s.tolist(),
-                    "r0": float(off.r0[number]),
-                    "r0_sigma": float(off.r0_sigma[number]),
+                    "r0": float(level_at_off.r0[number]),
+                    "r0_sigma": float(level_at_off.r0_sigma[number]),
                 }
                 for number, state in enumerate(fit.states)
             ],

@@ -267,7 +267,7 @@ def _columns(table: _Table) -> dict[str, list[str]]:
 
 
 def _only_match(names: Sequence[str], accepted: frozenset[str]) -> str | None:
-    """Return the one of `names` that is among the `wanted`; None if none is."""
+    """Return the one of `names` that is among the `accepted`; None if none is."""
     matches = [name for name in names if name.lower() in accepted]
     if len(matches) > 1:
         raise UsageError(f"expected one of the columns {', '.join(matches)}, got several; keep one")

@@ -137,10 +137,10 @@ class CardLevels:
 
     def card_frames(self, roles: Sequence[str], linearity: Linearity | None) -> list[CardFrame]:
         """Return the light of the card in frames of the roles, corrected for non-linearity."""
-        bent = deviation(linearity, self.level_dn)
-        straight = self.level_dn * np.exp(-bent)
-        used = self.series.usable & (np.abs(bent).max(axis=1) < MOST_BENT)
-        light, noise = straight.sum(axis=1), np.sqrt(np.square(self.sigma_dn).sum(axis=1))
+        nonlinearity = deviation(linearity, self.level_dn)
+        linear_level = self.level_dn * np.exp(-nonlinearity)
+        used = self.series.usable & (np.abs(nonlinearity).max(axis=1) < MOST_BENT)
+        light, noise = linear_level.sum(axis=1), np.sqrt(np.square(self.sigma_dn).sum(axis=1))
         return [
             CardFrame(
                 frame.unit, frame.role, frame.start_time, frame.exposure_s, frame.iso,
@@ -273,11 +273,11 @@ def _warnings(
         curve = zip(
             file.linearity.level_dn, file.linearity.deviation, file.linearity.sigma, strict=True
         )
-        bent = [level for level, d, s in curve if abs(d) > max(BENT, CLEAR_SIGMAS * s)]
-        if bent:
+        bent_levels = [level for level, d, s in curve if abs(d) > max(BENT, CLEAR_SIGMAS * s)]
+        if bent_levels:
             yield (
-                f"the sensor is off a straight line by more than 1 % at {bent[0]:.0f} DN above "
-                "dark: keep the brightest level of a measurement well below"
+                f"the sensor is off a straight line by more than 1 % at {bent_levels[0]:.0f} DN "
+                "above dark: keep the brightest level of a measurement well below"
             )
         if file.linearity.saturation_dn is None:
             yield "no frame saturated; the level at which the sensor is full is not known"

@@ -129,8 +129,12 @@ def _settings_design(
 ) -> FloatArray:
     design = np.zeros((len(frames), len(columns)))
     for row, frame in enumerate(frames):
-        own = {("shutter", frame.exposure_s), ("iso", frame.iso), ("aperture", frame.f_number)}
-        design[row] = [column in own for column in columns]
+        frame_settings = {
+            ("shutter", frame.exposure_s),
+            ("iso", frame.iso),
+            ("aperture", frame.f_number),
+        }
+        design[row] = [column in frame_settings for column in columns]
     return design
 
 

@@ -37,7 +37,7 @@ def scatter(
 
     Parameters
     ----------
-    one, other
+    first_frame, second_frame
         The two frames.
     region
         Region in fractions of the frame.

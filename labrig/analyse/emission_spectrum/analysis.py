@@ -220,8 +220,8 @@ def _faint_warnings(count: int, frames: Sequence[SeriesFrame]) -> Iterator[str]:
 def _clipping_warnings(frames: FilterFrames) -> Iterator[str]:
     clipped = np.isnan(frames.value_dn_per_s)
     if clipped.any():
-        lost = int(clipped.all(axis=0).sum())
+        clipped_everywhere = int(clipped.all(axis=0).sum())
         yield (
-            f"{clipped.mean():.0%} of the values clip and are left out, {lost} of "
+            f"{clipped.mean():.0%} of the values clip and are left out, {clipped_everywhere} of "
             f"{clipped.shape[1]} in every frame; expose for less or lower the ISO"
         )

@@ -112,17 +112,19 @@ def compared(
     """Compare frames with others that are combined."""
     mean = combined(frames)
     is_finite = np.isfinite(mean.value) & np.isfinite(reference.value)
-    y, m = mean.value[is_finite], reference.value[is_finite]
-    gain, chi2 = float(y @ m / (m @ m)), 0.0
+    value, reference_value = mean.value[is_finite], reference.value[is_finite]
+    gain, chi2 = float(value @ reference_value / (reference_value @ reference_value)), 0.0
     for _ in range(COMPARING_ROUNDS):
         variance = mean.sigma[is_finite] ** 2 + gain**2 * reference.sigma[is_finite] ** 2
         inverse = _inverse_covariance(variance)
-        gain = float(m @ inverse @ y / (m @ inverse @ m))
-        residual = y - gain * m
+        gain = float(
+            reference_value @ inverse @ value / (reference_value @ inverse @ reference_value)
+        )
+        residual = value - gain * reference_value
         chi2 = float(residual @ inverse @ residual)
-    dof = len(y) - 2
-    excess = max(chi2 - dof, 0.0) / float(gain**2 * (m @ inverse @ m))
-    shift, sigma = _centroid_shift(y, m, gain, variance, centre_nm[is_finite])
+    dof = len(value) - 2
+    excess = max(chi2 - dof, 0.0) / float(gain**2 * (reference_value @ inverse @ reference_value))
+    shift, sigma = _centroid_shift(value, reference_value, gain, variance, centre_nm[is_finite])
     return SpectralComparison(
         what, gain, chi2, dof, float(chdtrc(dof, chi2)), float(np.sqrt(excess)), shift, sigma
     )
@@ -139,12 +141,21 @@ def _inverse_covariance(variance: FloatArray) -> FloatArray:
 
 
 def _centroid_shift(
-    y: FloatArray, m: FloatArray, gain: float, variance: FloatArray, centre_nm: FloatArray
+    value: FloatArray,
+    reference: FloatArray,
+    gain: float,
+    variance: FloatArray,
+    centre_nm: FloatArray,
 ) -> tuple[float, float]:
-    """Return the difference of the centroids in nm where m has its light, and its σ."""
-    bright = m > BRIGHT * m.max()
-    y, m, variance, centre_nm = y[bright], m[bright], variance[bright], centre_nm[bright]
-    light = float(m.sum())
-    middle = float(centre_nm @ m) / light
-    lever = (centre_nm - middle) / (gain * light)
-    return float(lever @ (y - gain * m)), float(np.sqrt(lever**2 @ variance))
+    """Return the difference of the centroids in nm where the reference has its light, and its σ."""
+    is_bright = reference > BRIGHT * reference.max()
+    value, reference, variance, centre_nm = (
+        value[is_bright],
+        reference[is_bright],
+        variance[is_bright],
+        centre_nm[is_bright],
+    )
+    light = float(reference.sum())
+    centroid_nm = float(centre_nm @ reference) / light
+    lever = (centre_nm - centroid_nm) / (gain * light)
+    return float(lever @ (value - gain * reference)), float(np.sqrt(lever**2 @ variance))

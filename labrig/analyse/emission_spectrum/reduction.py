@@ -204,21 +204,21 @@ def reduce_places(
     # Patches fade differently: the frames of a pair are brought to the same brightness in each.
     noise = pixel_noise(
         [
-            [measured.take(own) for measured in group]
-            for own in places.values()
+            [measured.take(place_numbers) for measured in group]
+            for place_numbers in places.values()
             for group in (*groups, rising)
         ]
     )
     return {
         patch: _patch_reduction(
-            [measured.take(own) for measured in lit],
-            [measured.take(own) for measured in dark],
+            [measured.take(place_numbers) for measured in lit],
+            [measured.take(place_numbers) for measured in dark],
             patches[patch],
             holder_regions,
             camera,
             noise,
         )
-        for patch, own in places.items()
+        for patch, place_numbers in places.items()
     }
 
 
@@ -309,9 +309,9 @@ def _fit_line(level: FloatArray, scatter: FloatArray) -> NoiseModel:
     level = np.maximum(level, 0.0)
     terms = variance_terms(level)[:, :2]
     # Medians begin, so that a hot pixel or a cosmic ray cannot.
-    dark = level <= np.median(level)
-    at_black = float(np.median(scatter[dark]))
-    rise = (scatter[~dark] - at_black) / np.maximum(level[~dark], 1.0)
+    is_dark = level <= np.median(level)
+    at_black = float(np.median(scatter[is_dark]))
+    rise = (scatter[~is_dark] - at_black) / np.maximum(level[~is_dark], 1.0)
     noise = NoiseModel(at_black, max(float(np.median(rise)) if rise.size else 0.0, 0.0))
     for _ in range(ROUNDS):
         expected = np.maximum(noise.variance_dn2(level), ROUNDING_VARIANCE)

@@ -76,7 +76,7 @@ def _patch_excitation(
     """Return the patch's excitation, and warnings."""
     decay = fit_series(charging.whole, _states(part, patch))
     dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), LEAST_DARK).tolist())
-    uncertain = RelativeSigmas(
+    relative_sigmas = RelativeSigmas(
         flicker=_flicker(part, decay),
         lamp=LAMP,
         cold=warming.deficit_sigma,
@@ -86,9 +86,12 @@ def _patch_excitation(
         scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
     )
-    fit = _fit(charging, decay, uncertain)
+    fit = _fit(charging, decay, relative_sigmas)
     closure = predicted_charging(
-        charging, irradiance, uncertain, lambda reduced: _fit(reduced, decay, uncertain, fit)
+        charging,
+        irradiance,
+        relative_sigmas,
+        lambda reduced: _fit(reduced, decay, relative_sigmas, fit),
     )
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
@@ -120,13 +123,15 @@ def _states(part: Part, patch: StripPatch) -> int | None:
 def _fit(
     charging: PatchCharging,
     decay: FittedDecay,
-    uncertain: RelativeSigmas,
+    relative_sigmas: RelativeSigmas,
     near: FittedExcitation | None = None,
 ) -> FittedExcitation:
     rates = [state.k_r_per_s for state in decay.states]
     amplitudes = np.array([state.amplitude for state in decay.states])
     fractions = np.maximum(amplitudes / amplitudes.sum(), 1e-3)
-    return fit_excitation([charging.through, charging.direct], rates, fractions, uncertain, near)
+    return fit_excitation(
+        [charging.through, charging.direct], rates, fractions, relative_sigmas, near
+    )
 
 
 def _flicker(part: Part, decay: FittedDecay) -> float:

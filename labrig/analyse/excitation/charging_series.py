@@ -108,8 +108,8 @@ def patch_chargings(
         values = _interpolate_to_positions(
             values, slices, np.array(irradiance.position), irradiance.strip, raw
         )
-        whole = series[_place_name(patch, WHOLE)]
-        chargings[patch] = _divide_by_evenness(values, sigma, through, direct, whole, frames)
+        strip_series = series[_place_name(patch, WHOLE)]
+        chargings[patch] = _divide_by_evenness(values, sigma, through, direct, strip_series, frames)
     return chargings, (*frames.left_out, *reasons)
 
 
@@ -155,19 +155,19 @@ def _divide_by_evenness(
     sigma: FloatArray,
     through: ChargingSeries,
     direct: ChargingSeries,
-    whole: Series,
+    strip_series: Series,
     frames: ChargeFrames,
 ) -> PatchCharging:
     """Divide one patch's values (n, P, C) of all photographs by the evenness, into two series."""
     is_direct = np.array([interval.is_direct for interval in frames.charge_of.values()])
     evenness = _evenness(values[is_direct], sigma[is_direct])
     values, sigma = values / evenness[:, None], sigma / evenness[:, None]
-    last = np.array([interval is frames.intervals[-1] for interval in frames.charge_of.values()])
+    is_last = np.array([interval is frames.intervals[-1] for interval in frames.charge_of.values()])
     return PatchCharging(
         replace(through, values=values[~is_direct], sigma=sigma[~is_direct]),
         replace(direct, values=values[is_direct], sigma=sigma[is_direct]),
         evenness,
-        _final_decay(whole, last, frames),
+        _final_decay(strip_series, is_last, frames),
     )
 
 
@@ -223,6 +223,6 @@ def _evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:
     return np.asarray(signal / signal.mean())
 
 
-def _final_decay(whole: Series, rows: BoolArray, frames: ChargeFrames) -> Series:
-    part = whole.take(np.flatnonzero(rows))
-    return replace(part, t_s=part.t_s - (frames.intervals[-1].off_s - frames.zero_s))
+def _final_decay(strip_series: Series, rows: BoolArray, frames: ChargeFrames) -> Series:
+    final = strip_series.take(np.flatnonzero(rows))
+    return replace(final, t_s=final.t_s - (frames.intervals[-1].off_s - frames.zero_s))

@@ -16,7 +16,7 @@ STEP = 0.01
 def predicted_charging(
     charging: PatchCharging,
     irradiance: IrradianceFile,
-    uncertain: RelativeSigmas,
+    relative_sigmas: RelativeSigmas,
     fit_of: Callable[[PatchCharging], FittedExcitation],
 ) -> Closure | None:
     """Predict charging by the lamp itself from charges through the filter.
@@ -30,7 +30,7 @@ def predicted_charging(
         Charging of a patch.
     irradiance
         Irradiance on the sample.
-    uncertain
+    relative_sigmas
         Relative uncertainties of the measurement.
     fit_of
         Function that fits the charging without the charges that are predicted.
@@ -56,7 +56,9 @@ def predicted_charging(
     charges = [direct.charges[number] for number in first]
     values, sigma = direct.values[rows, :, channel], direct.sigma[rows, :, channel]
     level = values.mean(axis=1)
-    noise = np.hypot(np.sqrt((sigma**2).sum(axis=1)) / sigma.shape[1], uncertain.flicker * level)
+    noise = np.hypot(
+        np.sqrt((sigma**2).sum(axis=1)) / sigma.shape[1], relative_sigmas.flicker * level
+    )
     charge_s = _equivalent_charge_s(direct, fit, np.array(irradiance.direct))[list(first)]
     starts, exposures = (
         np.concatenate([getattr(charge, name) for charge in direct.charges])[rows]
@@ -80,11 +82,11 @@ def predicted_charging(
             0.0,
         ]
     )
-    theta_sigma = np.sqrt(np.append(np.diag(fit.covariance), max(uncertain.scale, 1e-6) ** 2))
+    theta_sigma = np.sqrt(np.append(np.diag(fit.covariance), max(relative_sigmas.scale, 1e-6) ** 2))
     slopes = _slopes(predicted, theta, theta_sigma)
     cold = np.array([charge.cold for charge in charges])
     charge_variance = slopes[-1] ** 2 * (
-        uncertain.scale**2 + uncertain.lamp**2 + (uncertain.cold * cold) ** 2
+        relative_sigmas.scale**2 + relative_sigmas.lamp**2 + (relative_sigmas.cold * cold) ** 2
     )
     rate_variance = np.einsum("ic,ij,jc->c", slopes[:-1], fit.covariance, slopes[:-1])
     return closure(

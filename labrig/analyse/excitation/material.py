@@ -62,9 +62,9 @@ def _reradiation(
         return {}
     states = len(fit.states)
     level = state.amplitude / state.k_r_per_s
-    both = [number, states + number]
+    indices = [number, states + number]
     slope = np.array([-1 / state.k_r_per_s, 1 / max(state.amplitude, 1e-300)])
-    relative = float(slope @ fit.covariance[np.ix_(both, both)] @ slope)
+    relative = float(slope @ fit.covariance[np.ix_(indices, indices)] @ slope)
     shape, covariance = spectrum.in_bands(bands_nm)
     shape_sigma = np.sqrt(np.diag(covariance))
     value = level * shape

@@ -176,20 +176,22 @@ class _Problem:
         """Set the covariances to those of the model at these parameters."""
         value, slope = self.model(theta)
         self._along, self._common = self._common_mode(value, slope, jitter_s)
-        own = np.log(np.square(self._frames.light_sigma_s[self._used]))
-        self.log_determinant = float(own.sum() + np.log1p(self._common).sum())
+        log_variance = np.log(np.square(self._frames.light_sigma_s[self._used]))
+        self.log_determinant = float(log_variance.sum() + np.log1p(self._common).sum())
 
     def likeliest_jitter(self, theta: FloatArray) -> float:
         """Return the most probable of `JITTERS_S` by the residuals of the photographs."""
         value, slope = self.model(theta)
-        rest = self._scaled_residuals(value)
+        residual = self._scaled_residuals(value)
 
-        def unlikely(jitter_s: float) -> float:
+        def negative_log_likelihood(jitter_s: float) -> float:
             along, common = self._common_mode(value, slope, jitter_s)
-            explained = np.square(np.einsum("nsk,ns->nk", along, rest)) * common / (1 + common)
+            explained = np.square(np.einsum("nsk,ns->nk", along, residual)) * common / (1 + common)
             return float(np.log1p(common).sum() - explained.sum())
 
-        return float(JITTERS_S[np.argmin([unlikely(jitter_s) for jitter_s in JITTERS_S])])
+        return float(
+            JITTERS_S[np.argmin([negative_log_likelihood(jitter_s) for jitter_s in JITTERS_S])]
+        )
 
     def _scaled_residuals(self, value: FloatArray) -> FloatArray:
         """Return the residuals of a model in σ; 0 of values that are not used."""
@@ -211,9 +213,11 @@ class _Problem:
 
     def _whitened_residuals(self, theta: FloatArray) -> FloatArray:
         """Multiply the residuals by (1 + Σ v e eᵀ)^(−1/2), with unit vectors e and variances v."""
-        rest = self._scaled_residuals(self.model(theta)[0])
-        shared = np.einsum("nsk,ns->nk", self._along, rest) * (1 - 1 / np.sqrt(1 + self._common))
-        result: FloatArray = (rest - np.einsum("nsk,nk->ns", self._along, shared)).ravel()
+        residual = self._scaled_residuals(self.model(theta)[0])
+        common_part = np.einsum("nsk,ns->nk", self._along, residual) * (
+            1 - 1 / np.sqrt(1 + self._common)
+        )
+        result: FloatArray = (residual - np.einsum("nsk,nk->ns", self._along, common_part)).ravel()
         return result
 
     def chi2(self, theta: FloatArray) -> float:

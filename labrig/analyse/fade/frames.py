@@ -107,7 +107,7 @@ def take_columns(frames: SwitchedFrames, columns: NDArray[np.intp]) -> SwitchedF
 
 
 def _place_light(series: Series, count: int) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Return light and σ of the `taken` photographs, (n, C) each, and the steady signal (C,)."""
+    """Return light and σ of the first `count` photographs, (n, C) each, and the steady signal."""
     unit = np.array(series.unit)
     is_steady = np.arange(len(unit)) >= count
     value, sigma = np.full((2, count, len(series.channels)), np.nan)
@@ -172,7 +172,7 @@ def _fit_warming(
 ) -> tuple[float, float, float, float]:
     """Return the deficit and its σ, χ², and the warm lamp's level.
 
-    Values are in units of their σ, and `one` is the warm light in that unit.
+    The light is given in units of its σ.
     """
     rows = np.stack([inverse_sigma, -inverse_sigma * np.exp(-t_s / tau_s)], axis=1)
     covariance = np.linalg.inv(rows.T @ rows)

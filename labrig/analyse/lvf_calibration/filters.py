@@ -103,11 +103,13 @@ class Bench:
         nodes, light = self._light(*(transmittance.wavelength_nm for transmittance in filters))
         through_strip = lvf.transmission(nodes) * light
         sensitivity = self.camera.at(nodes)
-        bare = through_strip @ sensitivity
-        passed = [
+        unfiltered = through_strip @ sensitivity
+        transmitted = [
             (through_strip * transmittance.at(nodes)) @ sensitivity for transmittance in filters
         ]
-        relative: FloatArray = np.stack(passed) / np.maximum(bare, 1e-12 * bare.max())
+        relative: FloatArray = np.stack(transmitted) / np.maximum(
+            unfiltered, 1e-12 * unfiltered.max()
+        )
         return relative
 
     def _light(self, *knots: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -125,24 +127,26 @@ def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> l
     """
     lvf = nominal_lvf(wavelengths, wavelengths.wavelength_nm(scenes.position))
     expected = bench.relative(lvf, scenes.filters)
-    bare = scenes.values[0].value
+    unfiltered = scenes.values[0].value
     # In its brightest colour a place sees its band, in the others and at dim ends what leaks.
-    fraction = np.nan_to_num(bare / scenes.card.value)
+    fraction = np.nan_to_num(unfiltered / scenes.card.value)
     brightest = np.argmax(fraction, axis=1)
     bright = fraction.max(axis=1) > BRIGHT * fraction.max()
     places = np.flatnonzero(bright), brightest[bright]
     filter_misfits = []
     for number, scene in enumerate(scenes.values[1:], start=1):
-        ratio = scene.value[places] / bare[places]
+        ratio = scene.value[places] / unfiltered[places]
         deviation = np.sqrt(np.nanmean((expected[:, *places] - ratio) ** 2, axis=1))
         best = int(np.argmin(deviation))
         name = scenes.filters[number].name
-        like = scenes.filters[best].name
-        another = like != name and deviation[number] > BETTER * deviation[best]
-        is_left_out = deviation[number] > FAR_OFF or (deviation[number] > EXPECTED and another)
+        best_name = scenes.filters[best].name
+        is_other_filter = best_name != name and deviation[number] > BETTER * deviation[best]
+        is_left_out = deviation[number] > FAR_OFF or (
+            deviation[number] > EXPECTED and is_other_filter
+        )
         filter_misfits.append(
             FilterMisfit(
-                name, float(deviation[number]), float(deviation[best]), like, bool(is_left_out)
+                name, float(deviation[number]), float(deviation[best]), best_name, bool(is_left_out)
             )
         )
     return filter_misfits
@@ -150,13 +154,13 @@ def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> l
 
 def left_out_text(misfit: FilterMisfit) -> str:
     """Return a warning about a filter that was not in its place."""
-    looks = "it looks like none of the others"
+    likeness = "it looks like none of the others"
     if misfit.like != misfit.name and misfit.own > BETTER * misfit.best:
-        like = "no filter" if misfit.like == NO_FILTER.name else misfit.like
-        looks = f"it looks like {like} ({misfit.best:.3f})"
+        best_name = "no filter" if misfit.like == NO_FILTER.name else misfit.like
+        likeness = f"it looks like {best_name} ({misfit.best:.3f})"
     return (
         f"colour filter {misfit.name}: its picture is off its transmittance by {misfit.own:.3f} "
-        f"(rms along the strip), {looks}; it was not in its place, and is left out (put it in "
+        f"(rms along the strip), {likeness}; it was not in its place, and is left out (put it in "
         "and take its unit again, or correct its file)"
     )
 
@@ -193,14 +197,14 @@ def residuals(scenes: FilterScenes, bench: Bench, lvf: Lvf) -> FloatArray:
     It is the mean of the channels weighted by their light; NaN where it is undetermined.
     """
     expected = bench.relative(lvf, scenes.filters)
-    bare = scenes.values[0]
-    clear = bare.value > CLEAR * bare.sigma
-    weight = np.where(clear, bare.value, 0.0)
+    unfiltered = scenes.values[0]
+    is_clear = unfiltered.value > CLEAR * unfiltered.sigma
+    weight = np.where(is_clear, unfiltered.value, 0.0)
     total = weight.sum(axis=1)
     rows = []
     for scene, expected_ratio in zip(scenes.values, expected, strict=True):
         residual = np.where(
-            clear, scene.value / np.where(clear, bare.value, 1.0) - expected_ratio, 0.0
+            is_clear, scene.value / np.where(is_clear, unfiltered.value, 1.0) - expected_ratio, 0.0
         )
         mean = (weight * np.nan_to_num(residual)).sum(axis=1) / np.where(total > 0, total, 1.0)
         rows.append(np.where(total > 0, mean, np.nan))

@@ -74,11 +74,11 @@ def place_on_sample(lamp_strip: StripLines, wavelengths: WavelengthMap) -> Place
     )
     strip = _move_ends(lamp_strip.strip, float(shift), float(shift + stretch))
     position = (lines.position - shift) / stretch
-    at = np.array([map_position.mean(), 1.0])
+    terms = np.array([map_position.mean(), 1.0])
     return PlacedStrip(
         strip,
         wavelengths.wavelength_nm(position) - lines.wavelength_nm,
-        float(slope * np.sqrt(at @ covariance @ at)),
+        float(slope * np.sqrt(terms @ covariance @ terms)),
     )
 
 
@@ -118,8 +118,8 @@ def shifted_by_stripes(frame: HdrFrame, strip: Strip, lvf: Lvf, nm_per_strip: fl
         unshifted = np.clip(position - shift, lvf.position[0], lvf.position[-1])
         columns = [np.interp(unshifted, lvf.position, shape) for shape in shapes]
         design = np.column_stack([*columns, np.ones_like(unshifted)])
-        rest = glow - design @ nonnegative_least_squares(design, glow)
-        return float(rest @ rest)
+        residual = glow - design @ nonnegative_least_squares(design, glow)
+        return float(residual @ residual)
 
     coarse = np.linspace(-MOST_SHIFT, MOST_SHIFT, 33)
     best = coarse[np.argmin([residual_square(shift) for shift in coarse])]
