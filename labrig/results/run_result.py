@@ -132,7 +132,7 @@ def write_result(folder: Path, result: RunResult) -> None:
     >>> import labrig
     >>> from labrig.results import write_result
     >>> folder = Path("copied-result")
-    >>> folder.mkdir()
+    >>> folder.mkdir(exist_ok=True)
     >>> write_result(folder, labrig.read_result("runs/decay"))
     >>> sorted(path.name for path in folder.iterdir())
     ['fit.json', 'material.yaml', 'result.json', 'series.csv']
