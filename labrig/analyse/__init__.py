@@ -1,4 +1,4 @@
-"""From the frames of a run to numbers: one file or package a protocol, each to its typed result."""
+"""From the frames of a run to its typed result: one module or package for each protocol."""
 
 from labrig.analyse.overrides import Overrides, read_run_protocol
 from labrig.analyse.part import Inputs, Part

@@ -1,4 +1,4 @@
-"""A blank, from its frames to its result."""
+"""Analysis of a blank, from its frames to its result."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -20,24 +20,27 @@ from labrig.protocols.blank import BLANK_FRAMES
 from labrig.reduce import FrameMeasurement, fit_dark, measure, read_raw, reduce_patches
 from labrig.results import BlankResult, FloatArray, Series, StrayLight
 
-#: Fraction of the frames, the latest ones, that tell the constant level.
+#: Fraction of the frames, the latest ones, that determine the constant level.
 LATE = 1 / 2
-#: Fewer frames tell nothing about what stays.
+#: Fewest frames that determine the constant level.
 FEWEST = 4
 
 
 def stray_light(series: Series, sigmas: float, least_dn: float) -> StrayLight:
-    """What `series` shows.
+    """Measure the stray light in a series.
 
     Parameters
     ----------
+    series
+        Series of a region without glow, in DN/s.
     sigmas, least_dn
-        A frame is clean if it is less than that above the constant level: in its own σ, or in DN.
+        A frame is clean if it exceeds the constant level by less than `sigmas` of its own σ, or by
+        less than `least_dn` in DN.
 
     Raises
     ------
     DataError
-        Too few frames.
+        There are too few frames.
     """
     middle_s = series.t_s + series.exposure_s / 2
     order = np.argsort(middle_s, kind="stable")
@@ -49,10 +52,10 @@ def stray_light(series: Series, sigmas: float, least_dn: float) -> StrayLight:
             f"expected {FEWEST} frames or more in the later half of a blank, got {len(late)}; "
             "record it for longer"
         )
-    constant, own_sigma = _mean(series.values[late], series.sigma[late])
+    constant, own_sigma = _weighted_mean(series.values[late], series.sigma[late])
     half = len(late) // 2
-    early_level, early_sigma = _mean(series.values[late[:half]], series.sigma[late[:half]])
-    last_level, last_sigma = _mean(series.values[late[half:]], series.sigma[late[half:]])
+    early_level, early_sigma = _weighted_mean(series.values[late[:half]], series.sigma[late[:half]])
+    last_level, last_sigma = _weighted_mean(series.values[late[half:]], series.sigma[late[half:]])
     fades = bool(((early_level - last_level) > sigmas * np.hypot(early_sigma, last_sigma)).any())
     rate = series.values[order] - constant
     sigma = np.hypot(series.sigma[order], own_sigma)
@@ -60,8 +63,8 @@ def stray_light(series: Series, sigmas: float, least_dn: float) -> StrayLight:
     unclean = ((rate > sigmas * sigma) & (counts > least_dn)).any(axis=1)
     unclean |= ~series.usable[order]
     start_s = series.t_s[order]
-    last = int(np.flatnonzero(unclean)[-1]) + 1 if unclean.any() else 0
-    clean_s = None if fades or last >= len(start_s) else float(start_s[last])
+    first_clean = int(np.flatnonzero(unclean)[-1]) + 1 if unclean.any() else 0
+    clean_s = None if fades or first_clean >= len(start_s) else float(start_s[first_clean])
     dark = np.where(np.isnan(series.dark_sigma), 0.0, series.dark_sigma)
     return StrayLight(
         start_s, middle_s[order], rate, sigma, constant, np.hypot(own_sigma, dark), fades,
@@ -70,24 +73,34 @@ def stray_light(series: Series, sigmas: float, least_dn: float) -> StrayLight:
 
 
 def ambient(darks: Sequence[FrameMeasurement]) -> tuple[FloatArray, FloatArray]:
-    """Light in the dark frames in DN/s beyond dark current and its σ, each (channels,).
+    """Measure the ambient light in dark frames.
 
-    Dark current is the same in all channels, light is not: what a channel has more than the one
-    with least is light. It is a lower limit.
+    Dark current is the same in all channels, light is not: the excess of a channel over the one
+    with the smallest signal is light. It is a lower limit.
+
+    Parameters
+    ----------
+    darks
+        Measured dark frames.
+
+    Returns
+    -------
+    tuple of ndarray
+        Light beyond dark current and its standard uncertainty in DN/s, shape (channels,) each.
     """
-    exposure_s = np.array([one.exposure_s or 0.0 for one in darks])
-    pairs = [[(c.mean, c.sigma) for c in one.channels.values()] for one in darks]
+    exposure_s = np.array([dark.exposure_s or 0.0 for dark in darks])
+    pairs = [[(c.mean, c.sigma) for c in dark.channels.values()] for dark in darks]
     level, sigma = np.moveaxis(np.array(pairs), 2, 0)
     model = fit_dark(exposure_s, level, sigma)
-    rate, of_rate = model.rate_per_s, np.sqrt(model.covariance[:, 1, 1])
+    rate, rate_sigma = model.rate_per_s, np.sqrt(model.covariance[:, 1, 1])
     least = int(np.argmin(rate))
-    apart = np.hypot(of_rate, of_rate[least])
-    apart[least] = of_rate[least]
-    return rate - rate[least], apart
+    excess_sigma = np.hypot(rate_sigma, rate_sigma[least])
+    excess_sigma[least] = rate_sigma[least]
+    return rate - rate[least], excess_sigma
 
 
-def _mean(values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """Weighted mean of rows, and its σ by their own and by how they scatter."""
+def _weighted_mean(values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return the weighted mean of rows, and its σ by their own σ and by their scatter."""
     weights = 1 / np.square(sigma)
     mean = np.average(values, axis=0, weights=weights)
     misfit = (weights * np.square(values - mean)).sum(axis=0) / max(len(values) - 1, 1)
@@ -95,7 +108,7 @@ def _mean(values: FloatArray, sigma: FloatArray) -> tuple[FloatArray, FloatArray
 
 
 def analyse(part: Part) -> BlankResult:
-    """Find what light there is after lamp-off where nothing glows.
+    """Measure the light after lamp-off where nothing glows.
 
     Raises
     ------
@@ -114,42 +127,42 @@ def analyse(part: Part) -> BlankResult:
         for frame in frames.dark
     ]
     least_dn = protocol.clean.fraction * darks[0].range_dn
-    found = stray_light(series, protocol.clean.sigmas, least_dn)
+    light = stray_light(series, protocol.clean.sigmas, least_dn)
     leak, leak_sigma = ambient(darks)
-    rows = _rows_worth_keeping(found)
+    rows = _rows_until_clean(light)
     file = BlankFile(
         iso=protocol.camera.iso,
         f_number=protocol.camera.f_number,
         channels=series.channels,
-        t_s=tuple(found.t_s[rows].tolist()),
-        rate_dn_per_s=tuple(tuple(row) for row in found.rate[rows].tolist()),
-        sigma_dn_per_s=tuple(tuple(row) for row in found.sigma[rows].tolist()),
-        constant_dn_per_s=tuple(found.constant.tolist()),
-        constant_sigma_dn_per_s=tuple(found.constant_sigma.tolist()),
+        t_s=tuple(light.t_s[rows].tolist()),
+        rate_dn_per_s=tuple(tuple(row) for row in light.rate[rows].tolist()),
+        sigma_dn_per_s=tuple(tuple(row) for row in light.sigma[rows].tolist()),
+        constant_dn_per_s=tuple(light.constant.tolist()),
+        constant_sigma_dn_per_s=tuple(light.constant_sigma.tolist()),
         ambient_dn_per_s=tuple(leak.tolist()),
         ambient_sigma_dn_per_s=tuple(leak_sigma.tolist()),
-        first_clean_s=found.first_clean_s,
+        first_clean_s=light.first_clean_s,
         source="measured with labrig, blank",
         run=run.folder.resolve().name,
     )
     return BlankResult(
         calibration=file,
-        stray_light=found,
-        warnings=(*timing_warnings(run, "blank"), *_warnings(file, found)),
+        stray_light=light,
+        warnings=(*timing_warnings(run, "blank"), *_warnings(file, light)),
     )
 
 
-def _rows_worth_keeping(found: StrayLight) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
-    """Up to the first clean frame, its time not twice."""
-    last = len(found.t_s)
-    if found.first_clean_s is not None:
-        last = int(np.searchsorted(found.start_s, found.first_clean_s)) + 1
-    _, once = np.unique(found.t_s[:last], return_index=True)
-    return once
+def _rows_until_clean(light: StrayLight) -> "np.ndarray[tuple[int], np.dtype[np.intp]]":
+    """Return the rows up to the first clean frame, each time once."""
+    last = len(light.t_s)
+    if light.first_clean_s is not None:
+        last = int(np.searchsorted(light.start_s, light.first_clean_s)) + 1
+    _, rows = np.unique(light.t_s[:last], return_index=True)
+    return rows
 
 
-def _warnings(file: BlankFile, found: StrayLight) -> Iterator[str]:
-    if found.fades:
+def _warnings(file: BlankFile, light: StrayLight) -> Iterator[str]:
+    if light.fades:
         yield (
             "the blank still gets darker at its end: the lamp glows on for long (use a shield), or "
             "the card itself glows (take another); record it for longer"

@@ -1,4 +1,4 @@
-"""From the frames of a decay to a fit of every patch."""
+"""Analysis of a decay, from its frames to a fit of every patch."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from importlib.metadata import version
@@ -23,25 +23,28 @@ from labrig.results import DecayPatch, DecayResult, FittedDecay, FloatArray, Noi
 
 #: Terms of the photon-transfer line: constant, ∝ light, ∝ light².
 _TERMS = 3
-#: Signal over σ below which a frame has nothing to relate σ to.
+#: Least signal of a frame in σ for relative uncertainties.
 LEAST_SIGNAL = 1e-3
 
 
 def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
-    """The budget of the first decay's fitted frames; None if they are too few, or σ is unknown."""
+    """Return the noise budget of the first decay's fitted frames.
+
+    It is None if the frames are too few, or σ is unknown.
+    """
     brightest = fit.brightest
     signal = fit.predict(series.t_s, series.exposure_s)[:, brightest] - fit.offset
     # Comparisons with an unknown σ are false.
     rows = np.flatnonzero(series.usable & (signal > LEAST_SIGNAL * series.sigma[:, brightest]))
     if len(rows) <= _TERMS:
         return None
-    used, signal = series.take(rows), signal[rows]
-    parts = np.sqrt(noise_parts(used, brightest, signal)) / signal[:, np.newaxis]
-    first = np.flatnonzero(np.array(used.unit) == used.unit[0])
-    first = first[np.argsort(used.t_s[first], kind="stable")]
-    dark_sigma = np.nan_to_num(used.dark_sigma[brightest])
+    fitted, signal = series.take(rows), signal[rows]
+    parts = np.sqrt(noise_parts(fitted, brightest, signal)) / signal[:, np.newaxis]
+    first = np.flatnonzero(np.array(fitted.unit) == fitted.unit[0])
+    first = first[np.argsort(fitted.t_s[first], kind="stable")]
+    dark_sigma = np.nan_to_num(fitted.dark_sigma[brightest])
     return NoiseBudget(
-        t_s=(used.t_s + used.exposure_s / 2)[first],
+        t_s=(fitted.t_s + fitted.exposure_s / 2)[first],
         photons=parts[first, 1],
         reading=parts[first, 0],
         uneven=parts[first, 2],
@@ -51,10 +54,15 @@ def noise_budget(series: Series, fit: FittedDecay) -> NoiseBudget | None:
 
 
 def noise_parts(series: Series, channel: int, signal: FloatArray) -> FloatArray:
-    """The variances of one channel's values in three parts, shape (n, 3), in the values' unit².
+    """Divide the variances of one channel's values into those of reading, photons and uneven light.
 
-    The photon-transfer model through all frames says in which proportions each frame's σ² is shared
-    out to reading, photons and uneven light, by its `signal`, shape (n,).
+    The photon-transfer model fitted to all frames gives the proportions of the three parts in each
+    frame's σ², at its `signal`, shape (n,).
+
+    Returns
+    -------
+    ndarray
+        Variances in the values' unit², shape (n, 3).
     """
     exposure_s = np.where(series.exposure_s > 0, series.exposure_s, 1.0)
     variance = np.square(series.sigma[:, channel] * exposure_s)
@@ -66,13 +74,13 @@ def noise_parts(series: Series, channel: int, signal: FloatArray) -> FloatArray:
 
 
 def analyse(part: Part) -> DecayResult:
-    """Reduce and fit every patch; one that cannot be fitted has the reason in its place.
+    """Reduce and fit every patch; a patch that cannot be fitted has the reason instead.
 
     Raises
     ------
     DataError
-        No decay is complete, a frame is missing or was changed after the run, or the camera file
-        that is known is of another camera, lens or aperture.
+        No decay is complete, a frame is missing or was changed after the run, or the camera file is
+        of another camera, lens or aperture.
     """
     run, protocol, overrides = part.run, part.protocol, part.overrides
     regions = overrides.patches(protocol)
@@ -86,7 +94,7 @@ def analyse(part: Part) -> DecayResult:
     only = protocol.sample.name if len(fits) == 1 else None
     return DecayResult(
         patches={
-            name: _patch(regions[name], series[name], fit, only or name, part, temperature_c)
+            name: _decay_patch(regions[name], series[name], fit, only or name, part, temperature_c)
             for name, fit in fits.items()
         },
         background=background,
@@ -106,10 +114,15 @@ def analyse(part: Part) -> DecayResult:
 def _fit_all(
     series: Mapping[str, Series], states: int | None, fixed_rates_per_s: Sequence[float]
 ) -> dict[str, DecayFit | str]:
-    """Fits by patch. Shutter and aperture flicker alike for all patches of a frame, so the patch
-    that tells their flicker best tells it for those that are dim or fade within a few frames.
+    """Fit every patch, and return the fit or the reason why there is none, by patch.
+
+    Shutter and aperture flicker alike for all patches of a frame. The flicker is taken from the
+    patch that determines it best, for those that are dim or fade within a few frames.
     """
-    fits = {name: _fit(one, states, fixed_rates_per_s, None) for name, one in series.items()}
+    fits = {
+        name: _fit(patch_series, states, fixed_rates_per_s, None)
+        for name, patch_series in series.items()
+    }
     measured = [fit for fit in fits.values() if isinstance(fit, DecayFit) and fit.flicker > 0]
     if len(fits) == 1 or not measured:
         return fits
@@ -126,14 +139,14 @@ def _fit(
     fixed_rates_per_s: Sequence[float],
     flicker: float | None,
 ) -> DecayFit | str:
-    """The fit, or why there is none."""
+    """Return the fit, or the reason why there is none."""
     try:
         return fit_series(series, states, flicker=flicker, fixed_rates_per_s=fixed_rates_per_s)
     except FitError as error:
         return str(error)
 
 
-def _patch(
+def _decay_patch(
     region: Region,
     series: Series,
     fit: DecayFit | str,
@@ -156,7 +169,7 @@ def _patch(
 def _material(
     series: Series, fit: DecayFit, name: str, run: str, temperature_c: float | None
 ) -> Material:
-    """What the decay alone says: rates and amplitudes; r0, k_e and Λ stay unknown."""
+    """Return the material by this decay alone: rates and amplitudes, without r0, k_e and Λ."""
     return Material(
         name=name,
         kind="phosphor",
@@ -180,21 +193,21 @@ def _material(
 
 
 def _clipping_warnings(series: Mapping[str, Series]) -> Iterator[str]:
-    for name, one in series.items():
-        clipped = sum("clipped" in flag for flag in one.flag)
+    for name, patch_series in series.items():
+        clipped = sum("clipped" in flag for flag in patch_series.flag)
         if clipped:
             yield (
-                f"{_of(name, series)}{clipped} of {len(one.flag)} frames are clipped and left "
-                "out; expose for less or lower the ISO"
+                f"{_prefix(name, series)}{clipped} of {len(patch_series.flag)} frames are clipped "
+                "and left out; expose for less or lower the ISO"
             )
 
 
 def _fit_warnings(fits: Mapping[str, DecayFit | str]) -> Iterator[str]:
-    """What fits warn of, with the names of patches where there are several."""
+    """Iterate over the warnings of fits, with the names of patches where there are several."""
     for name, fit in fits.items():
-        said = [f"not fitted: {fit}"] if isinstance(fit, str) else fit.warnings
-        yield from (f"{_of(name, fits)}{text}" for text in said)
+        lines = [f"not fitted: {fit}"] if isinstance(fit, str) else fit.warnings
+        yield from (f"{_prefix(name, fits)}{text}" for text in lines)
 
 
-def _of(name: str, patches: Mapping[str, object]) -> str:
+def _prefix(name: str, patches: Mapping[str, object]) -> str:
     return f"{name}: " if len(patches) > 1 else ""

@@ -14,7 +14,7 @@ from labrig.results import add_flag
 
 
 def camera_identity(run: RunRecord) -> str:
-    """How the camera introduced itself in a run; empty if the journal does not say."""
+    """Return the camera's identification in the journal of a run; empty if there is none."""
     for attempt in run.attempts:
         if identity := dict(attempt.start.get("devices", {})).get("camera"):
             return str(identity)
@@ -22,19 +22,19 @@ def camera_identity(run: RunRecord) -> str:
 
 
 def lens_of(frames: Sequence[FrameRecord]) -> str | None:
-    """What the first frame says of the lens: its name and focal length; None: nothing."""
+    """Return name and focal length of the lens by the first frame's EXIF; None if absent."""
     return read_exif(frames[0].path.read_bytes()).lens if frames else None
 
 
 def require_calibrated_camera(
     camera: CameraFile | None, run: RunRecord, frames: Sequence[FrameRecord]
 ) -> None:
-    """Refuse a calibration that is not of these frames; nothing is done where there is none.
+    """Refuse a calibration that is not of these frames; do nothing without a calibration.
 
     Raises
     ------
     DataError
-        It is of another body, lens or aperture.
+        The calibration is of another body, lens or aperture.
     """
     if camera is None or not frames:
         return
@@ -43,7 +43,7 @@ def require_calibrated_camera(
         camera.require_match(camera_identity(run), lens, f_number)
 
 
-#: Damaged frames named in a message.
+#: Most damaged frames that a message names.
 MOST_NAMED = 4
 
 
@@ -53,13 +53,13 @@ def require_intact(run: RunRecord, roles: Sequence[str], overrides: Overrides) -
     Raises
     ------
     DataError
-        Names them, and how to leave them out.
+        Frames are damaged; the message names them and how to leave them out.
     """
     require(run, damaged_frames(run, roles), overrides)
 
 
 def damaged_frames(run: RunRecord, roles: Sequence[str]) -> dict[FrameRecord, str]:
-    """Frames of completed units that are not what their checksums say, and what is wrong."""
+    """Return frames of completed units that do not match their checksums, and their damage."""
     frames = [
         frame
         for attempt in run.completed().values()
@@ -70,31 +70,33 @@ def damaged_frames(run: RunRecord, roles: Sequence[str]) -> dict[FrameRecord, st
 
 
 def require(run: RunRecord, damaged: Mapping[FrameRecord, str], overrides: Overrides) -> None:
-    """Refuse those of the damaged frames that a person has not excluded.
+    """Refuse damaged frames that the user has not excluded.
 
     Raises
     ------
     DataError
-        As `require_intact`.
+        Frames are damaged; the message names them and how to leave them out.
     """
     refused = {f: damage for f, damage in damaged.items() if not overrides.excludes(f)}
     if refused:
-        raise DataError(f"{run.folder}: {_told(refused)}")
+        raise DataError(f"{run.folder}: {_damage_text(refused)}")
 
 
-def _told(damaged: Mapping[FrameRecord, str]) -> str:
-    """In one line, with what to do."""
-    named = list(damaged.items())[:MOST_NAMED]
-    more = f" and {len(damaged) - len(named)} more are damaged" if len(damaged) > len(named) else ""
-    leave_out = " ".join(f"--exclude {frame.path.name}" for frame, _ in named)
+def _damage_text(damaged: Mapping[FrameRecord, str]) -> str:
+    """Return a line that names damaged frames and the remedy."""
+    listed = list(damaged.items())[:MOST_NAMED]
+    remainder = (
+        f" and {len(damaged) - len(listed)} more are damaged" if len(damaged) > len(listed) else ""
+    )
+    leave_out = " ".join(f"--exclude {frame.path.name}" for frame, _ in listed)
     return (
-        f"{', '.join(f'{frame.path.name} {damage}' for frame, damage in named)}{more}; restore "
-        f"from a copy, or leave out: {leave_out}"
+        f"{', '.join(f'{frame.path.name} {damage}' for frame, damage in listed)}{remainder}; "
+        f"restore from a copy, or leave out: {leave_out}"
     )
 
 
 def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
-    """Frames of completed units with one of the roles, those a person excludes left out.
+    """Return frames of completed units with one of the roles, without those the user excludes.
 
     Raises
     ------
@@ -111,12 +113,12 @@ def part_frames(part: Part, *roles: str) -> list[FrameRecord]:
 
 
 def part_region(part: Part, region: Region) -> Region:
-    """The protocol's one `region`, or the one that a person wants instead.
+    """Return the protocol's only `region`, or the user's region instead.
 
     Raises
     ------
     UsageError
-        A region of another name is asked for.
+        The user names a region.
     """
     if named := [name for name in part.overrides.regions if name]:
         raise UsageError(
@@ -126,22 +128,24 @@ def part_region(part: Part, region: Region) -> Region:
     return part.overrides.regions.get("", region)
 
 
-#: Of a frame that begins while something else than the glow still fades.
+#: Flag of a frame that begins before the bench is dark.
 AFTERGLOW = "afterglow"
 
 
 @dataclass(frozen=True)
 class IntactFrames:
-    """Frames of completed units, those left out that are missing or were changed.
+    """Frames of completed units, without those that are missing or were changed.
 
     Attributes
     ----------
-    decay, dark
-        To be reduced; excluded decay frames are flagged, excluded dark ones left out.
+    decay
+        Frames of the glow; excluded ones are flagged.
+    dark
+        Dark frames without the excluded ones.
     daylight
-        To be shown.
+        Daylight frames, which are only shown.
     warnings
-        About frames that cannot be shown.
+        Warnings about frames that cannot be shown.
     """
 
     decay: list[SeriesFrame]
@@ -153,10 +157,10 @@ class IntactFrames:
 def without_stray_light(
     frames: IntactFrames, blank: BlankFile | None
 ) -> tuple[IntactFrames, tuple[str, ...]]:
-    """Frames that begin too early flagged, so that nothing is made of them; and what to say of it.
+    """Flag frames that begin before the blank is clean, and return the warnings about them.
 
-    How much of the lamp's afterglow a sample throws back is not what the blank does: it cannot be
-    subtracted.
+    Stray light cannot be subtracted: the sample reflects another part of the lamp's afterglow than
+    the blank does.
 
     Raises
     ------
@@ -174,14 +178,21 @@ def without_stray_light(
 
 
 def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
-    """What to say of frames that begin so long after lamp-off, where the bench is still bright.
+    """Return warnings about frames that begin before the blank is clean.
+
+    Parameters
+    ----------
+    t_s
+        Begins of the frames in seconds after lamp-off.
+    blank
+        Stray light of the bench.
 
     Raises
     ------
     DataError
         The blank never became clean, or no frame begins late enough.
     """
-    early = [t for t in t_s if not blank.is_clean(t)]
+    early = [start_s for start_s in t_s if not blank.is_clean(start_s)]
     if not early:
         return ()
     if len(early) == len(t_s):
@@ -197,12 +208,12 @@ def left_out_lines(t_s: Sequence[float], blank: BlankFile) -> tuple[str, ...]:
     )
 
 
-#: As many tell; reading more takes time.
+#: Most dark frames in which hot pixels are searched; reading more takes time.
 ENOUGH = 5
 
 
 def hot_pixels_of(darks: Sequence[SeriesFrame]) -> PixelMask | None:
-    """Pixels that are bright in the dark; None where there are too few frames to tell."""
+    """Find pixels that are bright in the dark; None if there are too few frames."""
     longest_s = max((dark.exposure_s for dark in darks), default=0.0)
     longest = [dark for dark in darks if dark.exposure_s == longest_s]
     if len(longest) < 2:
@@ -210,28 +221,32 @@ def hot_pixels_of(darks: Sequence[SeriesFrame]) -> PixelMask | None:
     return hot_pixels([read_raw(dark.path) for dark in longest[:ENOUGH]])
 
 
-#: A frame later than this after its planned time is worth a warning; its measured time is used.
+#: Delay in seconds after the planned time from which a warning is given; the measured time counts.
 LATE_S = 0.05
 
 
 def intact_frames(
     run: RunRecord, overrides: Overrides, role: str = FrameRole.DECAY
 ) -> IntactFrames:
-    """Every frame held against its checksum; those after lamp off timed from it.
+    """Check every frame against its checksum, and time those after lamp-off from it.
 
     Parameters
     ----------
+    run
+        A recorded run.
+    overrides
+        The user's choices.
     role
-        Of the frames of the glow.
+        Role of the frames of the glow.
 
     Raises
     ------
     DataError
         No decay is complete, or a frame is missing or was changed and is not excluded.
     """
-    damaged = _damaged(run, overrides, (role, FrameRole.DARK))
+    damaged = _check_damage(run, overrides, (role, FrameRole.DARK))
     decay = [
-        _flagged(frame, attempt, overrides)
+        _flag_frame(frame, attempt, overrides)
         for attempt in run.completed().values()
         for frame in attempt.frames
         if frame.role == role and frame not in damaged
@@ -258,14 +273,14 @@ def intact_frames(
 
 
 def steady_frames(run: RunRecord, overrides: Overrides, role: str) -> list[SeriesFrame]:
-    """Frames of that role under a steady light, each held against its checksum.
+    """Return frames of a role under steady light, each checked against its checksum.
 
     Raises
     ------
     DataError
         A frame is missing or was changed and is not excluded.
     """
-    damaged = _damaged(run, overrides, (role,))
+    damaged = _check_damage(run, overrides, (role,))
     return [
         untimed(frame)
         for frame in run.frames(role)
@@ -274,7 +289,7 @@ def steady_frames(run: RunRecord, overrides: Overrides, role: str) -> list[Serie
 
 
 def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[str]:
-    """What is odd about the times in the journal."""
+    """Return warnings about irregular times in the journal."""
     warnings = []
     if run.torn:
         warnings.append(
@@ -283,40 +298,40 @@ def timing_warnings(run: RunRecord, role: str = FrameRole.DECAY) -> list[str]:
         )
     late = [frame for frame in run.frames(role) if frame.late_s > LATE_S]
     if late:
-        worst = max(late, key=lambda frame: frame.late_s)
+        latest = max(late, key=lambda frame: frame.late_s)
         warnings.append(
-            f"{len(late)} frames began late, {worst.path.name} by {worst.late_s:.2f} s; their "
+            f"{len(late)} frames began late, {latest.path.name} by {latest.late_s:.2f} s; their "
             "measured times are used (leave more time between frames)"
         )
     return warnings
 
 
-def _damaged(
+def _check_damage(
     run: RunRecord, overrides: Overrides, measured: tuple[str, ...]
 ) -> dict[FrameRecord, str]:
-    """What is wrong with frames, those that are `measured` only if they are excluded."""
+    """Return damaged frames and their damage; frames of `measured` roles must be excluded."""
     damaged = damaged_frames(run, (*measured, FrameRole.DAYLIGHT))
     require(run, {f: damage for f, damage in damaged.items() if f.role in measured}, overrides)
     return damaged
 
 
 def untimed(frame: FrameRecord) -> SeriesFrame:
-    """A frame whose time does not matter."""
+    """Return a frame whose time is not used."""
     return SeriesFrame(frame.path, 0.0, frame.exposure_s, frame.iso, frame.f_number, frame.unit)
 
 
 def timed(frame: FrameRecord, zero_time: float) -> SeriesFrame:
-    """A frame that begins so long after `zero_time`, in seconds since 1970."""
+    """Return a frame timed from `zero_time`, in seconds since 1970."""
     return replace(untimed(frame), t_s=frame.start_time - zero_time)
 
 
 def switched_time(attempt: Attempt, frame: FrameRecord, state: str) -> float:
-    """When the lamp went `on` or `off` for the last time before a frame.
+    """Return the time of the lamp's last switch to `on` or `off` before a frame.
 
     Raises
     ------
     DataError
-        The journal does not say.
+        The journal has no such switch.
     """
     switches = [
         action.middle_time
@@ -331,8 +346,8 @@ def switched_time(attempt: Attempt, frame: FrameRecord, state: str) -> float:
     return switches[-1]
 
 
-def _flagged(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> SeriesFrame:
-    """Timed from lamp-off."""
+def _flag_frame(frame: FrameRecord, attempt: Attempt, overrides: Overrides) -> SeriesFrame:
+    """Return a frame timed from lamp-off, with its flags."""
     flag = "late" if frame.late_s > LATE_S else ""
     flag = add_flag(flag, "excluded") if overrides.excludes(frame) else flag
     return replace(timed(frame, switched_time(attempt, frame, "off")), flag=flag)

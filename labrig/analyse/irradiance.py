@@ -1,4 +1,4 @@
-"""Irradiance of the lamp on the sample, by itself and through the LVF, from pictures of a card."""
+"""Irradiance of the lamp on the sample, directly and through the LVF, from frames of a card."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import replace
@@ -25,24 +25,24 @@ from labrig.protocols.irradiance import CardFrames
 from labrig.reduce import FLICKER, slice_values
 from labrig.results import CardRatio, FloatArray, IrradianceResult, SliceValues, StripScale
 
-#: Change of the lamp between rounds that is worth a warning.
+#: Relative change of the lamp between rounds that causes a warning.
 DRIFT = 0.03
-#: Along a strip, what it lets through in all runs as a parabola, in logarithms, but for this,
+#: Standard deviation of ln transmittance along a strip from a parabola,
 UNEVEN = 0.04
-#: over such a distance.
+#: and its correlation length in nm.
 UNEVEN_OVER_NM = 60.0
-#: What is known of the parabola beforehand: bend and slope from the middle to the ends, height.
+#: Prior σ of the parabola: bend and slope from the middle to the ends, height.
 PARABOLA = (0.2, 0.3, 10.0)
-#: What every position scatters by on its own, besides what is known of it: strips are not smooth.
+#: Relative scatter of every position beyond its σ: strips are not smooth.
 ROUGH = 0.02
-#: Factors have logarithms; no light at all is so much.
+#: Least factor, for its logarithm.
 LEAST = 1e-6
-#: Steps of derivatives by a band's figures, in their σ.
+#: Step of derivatives by a band's parameters, in their σ.
 _STEP = 0.5
 
 
 def analyse(part: Part) -> IrradianceResult:
-    """Find E of every band, of the lamp by itself and behind every place of the filter.
+    """Measure the irradiance in bands, by the lamp itself and behind every place of the filter.
 
     Raises
     ------
@@ -85,7 +85,13 @@ def _card_ratio(part: Part, frames: StripFrames, strip: Strip) -> CardRatio:
 
 
 def mean_ratio(pairs: Sequence[tuple[SliceValues, SliceValues]]) -> CardRatio:
-    """Of the rounds, each a picture of the card by itself and one through the LVF."""
+    """Average the ratios of the rounds.
+
+    Parameters
+    ----------
+    pairs
+        Slice values of each round, of the card by itself and through the LVF.
+    """
     ratios = np.stack([through.value / direct.value for direct, through in pairs])
     relative = [
         np.hypot(through.sigma / direct.value, ratio * direct.sigma / direct.value)
@@ -94,9 +100,9 @@ def mean_ratio(pairs: Sequence[tuple[SliceValues, SliceValues]]) -> CardRatio:
     weight = 1 / np.stack(relative) ** 2
     total = weight.sum(axis=0)
     mean = (weight * ratios).sum(axis=0) / total
-    clear = mean > 30 / np.sqrt(total)
-    each = [float(np.median((ratio / mean)[clear])) for ratio in ratios]
-    drift = float(np.std(each, ddof=1)) if len(each) > 1 else 0.0
+    is_clear = mean > 30 / np.sqrt(total)
+    round_ratios = [float(np.median((ratio / mean)[is_clear])) for ratio in ratios]
+    drift = float(np.std(round_ratios, ddof=1)) if len(round_ratios) > 1 else 0.0
     common = float(np.hypot(FLICKER * np.sqrt(2), drift) / np.sqrt(len(pairs)))
     return CardRatio(mean, 1 / np.sqrt(total), common, drift, len(pairs))
 
@@ -132,7 +138,10 @@ def _file(
 
 
 def _direct_sigma(lamp: Spectrum, edges: FloatArray, norm: float) -> FloatArray:
-    """By what the lamp's file says; errors of neighbouring wavelengths taken to go together."""
+    """Return σ of the direct irradiance by the lamp's file.
+
+    Errors of neighbouring wavelengths count as fully correlated.
+    """
     if lamp.sigma is None:
         return np.zeros(len(edges) - 1)
     return norm * band_integrals(lamp.wavelength_nm, lamp.sigma, edges)
@@ -154,109 +163,117 @@ def strip_scale(
     camera: CameraResponse,
     curve_error: CurveError = CurveError(),  # noqa: B008 (frozen)
 ) -> StripScale:
-    """One factor for each position, such that lamp × LVF explains what the card shows.
+    """Fit one factor for each position, such that lamp × LVF × factor explains the card's ratios.
 
-    The camera's curves say how bright a narrow band looks against the whole lamp, and are wrong by
-    some per cent, more in the violet. What a strip lets through runs smoothly along it; both are
-    weighed by their covariances.
+    The camera's curves determine how bright a narrow band appears relative to the whole lamp, with
+    errors of some per cent, more in the violet. The transmittance of a strip varies smoothly along
+    it. Both are weighted by their covariances.
 
     Parameters
     ----------
     ratio
-        What the card shows at p positions; of it only what positions do not share.
+        Ratios of the card at p positions; only their independent uncertainty is used.
     lvf
         The filter at these positions.
     lamp, card
-        The lamp's spectrum and the card's reflectance.
+        Spectrum of the lamp and reflectance of the card.
     camera, curve_error
-        The camera's curves, and by how much they may be wrong.
+        Curves of the camera and their error model.
 
     Raises
     ------
     DataError
-        A position at which no colour was measured.
+        No colour was measured at some position.
     """
     low, high = float(camera.wavelength_nm[0]), float(camera.wavelength_nm[-1])
     nodes, weights = quadrature(
         low, high, camera.wavelength_nm, lamp.wavelength_nm, card.wavelength_nm
     )
     light = weights * lamp.at(nodes) * card.at(nodes)
-    passed = lvf.transmission(nodes) * light
+    transmitted = lvf.transmission(nodes) * light
     sensitivity = camera.at(nodes)
-    whole = light @ sensitivity
-    expected = passed @ sensitivity / whole
+    total = light @ sensitivity
+    expected = transmitted @ sensitivity / total
     modes = curve_modes(curve_error, nodes, sensitivity, camera.sensitivity.max(axis=0))
     # (modes, p, channels) of the expected ratio.
-    wrong = np.stack([passed @ mode / whole - expected * (light @ mode / whole) for mode in modes])
-    shifted = _by_figures(lvf, nodes, light) @ sensitivity / whole
-    value, noise, by_curves = np.empty(len(expected)), np.empty(len(expected)), []
+    curve_errors = np.stack(
+        [transmitted @ mode / total - expected * (light @ mode / total) for mode in modes]
+    )
+    figure_changes = _parameter_changes(lvf, nodes, light) @ sensitivity / total
+    value, noise, curve_factors = np.empty(len(expected)), np.empty(len(expected)), []
     for k in range(len(expected)):
         used = np.isfinite(ratio.value[k]) & (expected[k] > 0)
         if not used.any():
             raise DataError(f"position p{k:02d}: no light was measured; expose longer")
-        seen, unsure, of_curves = ratio.value[k, used], ratio.sigma[k, used], wrong[:, k, used]
-        weight = _weights(seen, expected[k, used], unsure, of_curves)
-        value[k] = max(float(weight @ seen), LEAST)
-        of_noise = (weight**2) @ unsure**2 / value[k] ** 2
-        of_figures = ((shifted[:, k, used] @ weight) ** 2).sum()
-        noise[k] = float(np.sqrt(of_noise + of_figures + ROUGH**2))
-        by_curves.append(of_curves @ weight)
-    curves = np.array(by_curves)
-    return _smoothed(value, np.diag(noise**2) + curves @ curves.T, lvf)
+        measured, measured_sigma, position_errors = (
+            ratio.value[k, used],
+            ratio.sigma[k, used],
+            curve_errors[:, k, used],
+        )
+        weight = _weights(measured, expected[k, used], measured_sigma, position_errors)
+        value[k] = max(float(weight @ measured), LEAST)
+        noise_variance = (weight**2) @ measured_sigma**2 / value[k] ** 2
+        figure_variance = ((figure_changes[:, k, used] @ weight) ** 2).sum()
+        noise[k] = float(np.sqrt(noise_variance + figure_variance + ROUGH**2))
+        curve_factors.append(position_errors @ weight)
+    curves = np.array(curve_factors)
+    return _smooth(value, np.diag(noise**2) + curves @ curves.T, lvf)
 
 
 def _weights(
-    seen: FloatArray, expected: FloatArray, unsure: FloatArray, of_curves: FloatArray
+    measured: FloatArray, expected: FloatArray, sigma: FloatArray, curve_errors: FloatArray
 ) -> FloatArray:
-    """(channels,) by which what was seen of a position adds up to its factor.
+    """Return the generalised-least-squares weights of a position's ratios, shape (channels,).
 
-    By generalised least squares: noise, and curves that are wrong by so much (modes, channels).
+    The weighted sum of the ratios is the position's factor. The covariance is that of noise
+    `sigma` (channels,) and of the curves' modes (modes, channels).
     """
-    start = max(float(seen @ expected / (expected @ expected)), LEAST)
-    covariance = np.diag(unsure**2) + start**2 * of_curves.T @ of_curves
+    start = max(float(measured @ expected / (expected @ expected)), LEAST)
+    covariance = np.diag(sigma**2) + start**2 * curve_errors.T @ curve_errors
     weight = np.linalg.solve(covariance, expected)
     weights: FloatArray = weight / (weight @ expected)
     return weights
 
 
-def _by_figures(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatArray:
-    """(figures, p, q) light let through, by one σ of a band's place, width and shape at its area.
+def _parameter_changes(lvf: Lvf, nodes: FloatArray, light: FloatArray) -> FloatArray:
+    """Return the change of the transmitted light by one σ of each band parameter, (figures, p, q).
 
-    What is let through in all is measured here; how it is spread is as the calibration says.
+    Centre, width and shape of a band change at its area: the total transmittance is measured here,
+    its distribution is that of the calibration.
     """
     if lvf.sigma is None:
         return np.zeros((1, len(lvf.position), len(nodes)))
     changes = []
     for name in ("centre_nm", "fwhm_nm", "skew", "leakage"):
-        moved = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
-        bands = replace(lvf.bands, **{name: moved})
+        changed = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
+        bands = replace(lvf.bands, **{name: changed})
         bands = replace(bands, peak=bands.peak * lvf.bands.fwhm_nm / bands.fwhm_nm)
         change = bands.transmission(nodes) - lvf.bands.transmission(nodes)
         changes.append(change * light / _STEP)
     return np.array(changes)
 
 
-def _smoothed(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> StripScale:
-    """Weigh logarithms of light through every place against a smooth course of them."""
+def _smooth(value: FloatArray, covariance: FloatArray, lvf: Lvf) -> StripScale:
+    """Combine the logarithms of the factors with a smooth prior along the strip."""
     centre = lvf.bands.centre_nm
     area = np.log(lvf.bands.peak * lvf.bands.fwhm_nm)
-    apart = (centre[:, np.newaxis] - centre) / UNEVEN_OVER_NM
+    distance = (centre[:, np.newaxis] - centre) / UNEVEN_OVER_NM
     powers = np.vander((centre - centre.mean()) / np.ptp(centre) * 2, 3)
     parabola = (powers * np.square(PARABOLA)) @ powers.T
-    before = UNEVEN**2 * np.exp(-(apart**2) / 2) + parabola
-    gain = np.linalg.solve(before + covariance, before).T
+    prior = UNEVEN**2 * np.exp(-(distance**2) / 2) + parabola
+    gain = np.linalg.solve(prior + covariance, prior).T
     course = gain @ (np.log(value) + area)
-    after = before - gain @ before
+    posterior = prior - gain @ prior
     return StripScale(
         np.exp(course - area),
-        (after + after.T) / 2,
+        (posterior + posterior.T) / 2,
         value,
         np.sqrt(np.diag(covariance)),
     )
 
 
 def in_bands(lvf: Lvf, lamp: Spectrum, edges_nm: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """∫ L T_p dλ over bands, (p, bands), and one σ by what is not known of the filter's bands.
+    """Return ∫ L T_p dλ over bands and its σ by the parameters of the filter, (p, bands) each.
 
     The height of a band is left out: `strip_scale` measures it.
     """
@@ -265,9 +282,9 @@ def in_bands(lvf: Lvf, lamp: Spectrum, edges_nm: FloatArray) -> tuple[FloatArray
         return value, np.zeros_like(value)
     variance = np.zeros_like(value)
     for name in ("centre_nm", "fwhm_nm", "skew", "leakage"):
-        moved = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
-        other = replace(lvf, bands=replace(lvf.bands, **{name: moved}))
-        variance += ((_in_bands(other, lamp, edges_nm) - value) / _STEP) ** 2
+        changed = getattr(lvf.bands, name) + _STEP * getattr(lvf.sigma, name)
+        changed_lvf = replace(lvf, bands=replace(lvf.bands, **{name: changed}))
+        variance += ((_in_bands(changed_lvf, lamp, edges_nm) - value) / _STEP) ** 2
     return value, np.sqrt(variance)
 
 

@@ -1,4 +1,4 @@
-"""From the frames of an isotropy run to the glow at several angles over the glow seen straight."""
+"""Analysis of an isotropy run, from its frames to the glow at several angles."""
 
 from collections.abc import Iterator, Mapping
 
@@ -29,7 +29,7 @@ BEFORE, AFTER = "angle-before", "angle-after"
 
 
 def analyse(part: Part) -> IsotropyResult:
-    """Find the radiance at each angle, 1 if the emission is isotropic.
+    """Measure the radiance at each angle relative to the straight view.
 
     Raises
     ------
@@ -47,7 +47,8 @@ def analyse(part: Part) -> IsotropyResult:
     around = protocol.patch == "around"
     angles_deg = {f"angle-{angle}": angle for angle in protocol.angles}
     patches = {
-        name: _angular_glow(one, angles_deg, flicker, around) for name, one in series.items()
+        name: _angular_glow(patch_series, angles_deg, flicker, around)
+        for name, patch_series in series.items()
     }
     return IsotropyResult(
         patches=patches,
@@ -67,7 +68,7 @@ def analyse(part: Part) -> IsotropyResult:
 def _angular_glow(
     series: Series, angles_deg: Mapping[str, int], flicker: float, around: bool
 ) -> AngularGlow:
-    units = {one.unit[0]: one for one in series.by_unit()}
+    units = {view.unit[0]: view for view in series.by_unit()}
     if BEFORE not in units or AFTER not in units or not angles_deg.keys() & units.keys():
         raise DataError(
             "expected views at some angle between two straight ones, not all of them are "
@@ -76,10 +77,10 @@ def _angular_glow(
     log_drift, drift_sigma = _log_ratio(units[AFTER], units[BEFORE], flicker)
     drift = float(np.exp(log_drift))
     views = []
-    for number, (unit, one) in enumerate(units.items()):
+    for number, (unit, view) in enumerate(units.items()):
         if unit not in angles_deg:
             continue
-        log_ratio, sigma = _log_ratio(one, units[BEFORE], flicker)
+        log_ratio, sigma = _log_ratio(view, units[BEFORE], flicker)
         # What lamp and sample drifted by comes evenly between the two straight views.
         fraction = number / (len(units) - 1)
         log_ratio -= fraction * np.log(drift)
@@ -98,27 +99,27 @@ def _angular_glow(
 
 
 def _log_ratio(view: Series, straight: Series, flicker: float) -> tuple[float, float]:
-    """Log of how bright a view is over the straight one at the same times, and its σ."""
+    """Return the logarithm of a view over the straight one at the same times, and its σ."""
     best = int(np.argmax(np.mean(straight.values / straight.sigma, axis=0)))
-    y, s = _usable(view, best)
-    reference, of_reference = _usable(straight, best)
-    if (y <= 0).any() or (reference <= 0).any() or len(y) == 0 or len(reference) < 2:
+    value, value_sigma = _usable(view, best)
+    reference, reference_sigma = _usable(straight, best)
+    if (value <= 0).any() or (reference <= 0).any() or len(value) == 0 or len(reference) < 2:
         raise DataError(
             f"{view.unit[0]}: expected a glow in every frame, got none above the noise; charge for "
             "longer, raise camera.iso or photograph earlier (first:)"
         )
     # A frame's own flicker, and that of all frames that it is held against.
-    logs = np.log(y) - _log_at(_middle_s(view), _middle_s(straight), np.log(reference))
-    sigma = np.hypot(s / y, flicker)
+    logs = np.log(value) - _interpolate_log(_middle_s(view), _middle_s(straight), np.log(reference))
+    sigma = np.hypot(value_sigma / value, flicker)
     weight = 1 / sigma**2
-    common = np.sqrt(np.mean((of_reference / reference) ** 2) + flicker**2) / np.sqrt(
+    common = np.sqrt(np.mean((reference_sigma / reference) ** 2) + flicker**2) / np.sqrt(
         len(reference)
     )
     return float(weight @ logs / weight.sum()), float(np.hypot(1 / np.sqrt(weight.sum()), common))
 
 
 def _usable(series: Series, channel: int) -> tuple[FloatArray, FloatArray]:
-    """Values of a channel, and σ."""
+    """Return the usable values of a channel, and their σ."""
     return series.values[series.usable, channel], series.sigma[series.usable, channel]
 
 
@@ -126,14 +127,16 @@ def _middle_s(series: Series) -> FloatArray:
     return np.asarray((series.t_s + series.exposure_s / 2)[series.usable])
 
 
-def _log_at(wanted_s: FloatArray, t_s: FloatArray, log_value: FloatArray) -> FloatArray:
-    """A decay's logarithm at some times: a straight line over log t through the points, as a
-    power law is and an exponential nearly, over so short a time.
+def _interpolate_log(at_s: FloatArray, t_s: FloatArray, log_value: FloatArray) -> FloatArray:
+    """Interpolate the logarithm of a decay to some times, in the same unit.
+
+    Beyond the points it is a straight line over log t, as a power law is exactly and an exponential
+    approximately over so short a time.
     """
     slope, start = np.polyfit(np.log(t_s), log_value, 1)
-    within = np.interp(wanted_s, t_s, log_value)
-    beyond = (wanted_s < t_s[0]) | (wanted_s > t_s[-1])
-    return np.where(beyond, start + slope * np.log(wanted_s), within)
+    interpolated = np.interp(at_s, t_s, log_value)
+    is_beyond = (at_s < t_s[0]) | (at_s > t_s[-1])
+    return np.where(is_beyond, start + slope * np.log(at_s), interpolated)
 
 
 def _warnings(glow: AngularGlow) -> Iterator[str]:

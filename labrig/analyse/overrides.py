@@ -1,4 +1,4 @@
-"""What is asked of a run's processing: by its protocol, and by a person who wants it otherwise."""
+"""Settings of a run's processing: those of its protocol, and the user's instead."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -14,12 +14,30 @@ from labrig.yaml_file import did_you_mean
 
 
 def read_run_protocol(run: Path) -> ProtocolModel:
-    """The protocol in a run folder.
+    """Read the protocol in a run folder.
+
+    Parameters
+    ----------
+    run
+        A run folder.
+
+    Returns
+    -------
+    ProtocolModel
+        The protocol as it was when the run was recorded.
 
     Raises
     ------
     UsageError
-        Not a run folder.
+        The folder has no protocol.yaml, or it is malformed.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.analyse import read_run_protocol
+    >>> protocol = read_run_protocol(Path("runs/decay"))
+    >>> protocol.protocol, protocol.sample.name, list(protocol.patches)
+    ('decay', 'sample', ['sample'])
     """
     path = run / "protocol.yaml"
     if not path.is_file():
@@ -29,22 +47,22 @@ def read_run_protocol(run: Path) -> ProtocolModel:
 
 @dataclass(frozen=True)
 class Overrides:
-    """What a person wants otherwise than the protocol says.
+    """The user's settings that replace the protocol's.
 
     Attributes
     ----------
     regions
-        Patch name → region; the name "" stands for the only patch there is.
+        Region of each patch by its name; the name "" stands for the only patch there is.
     excluded
         Frames to leave out, by file name or number.
     states
-        Number of states; None leaves it to the protocol.
+        Number of states; None takes the protocol's.
     fixed_rates_per_s
-        Rates known from elsewhere, which take part and are held; they count as states.
+        Rates in 1/s known from elsewhere, which are held in the fit; they count as states.
     camera
-        Other camera curves than the rig file names, for the report's colours.
+        Camera curves for the report's colours instead of the rig file's.
     optics
-        Keys of the rig file's `optics:` as they should be: calibrations that came later.
+        Keys of the rig file's `optics:` to replace: calibrations that were made later.
     """
 
     regions: Mapping[str, Region] = field(default_factory=dict)
@@ -64,16 +82,30 @@ class Overrides:
         camera: str | None = None,
         optics: Sequence[str] = (),
     ) -> Self:
-        """From the texts of a command line: `NAME=x,y,w,h` or `x,y,w,h`, frame numbers or names,
-        `KEY=PATH` of optics.
+        """Parse the texts of a command line.
+
+        Parameters
+        ----------
+        regions
+            Regions as `NAME=x,y,w,h` or `x,y,w,h`.
+        excluded
+            Numbers or names of frames.
+        states
+            Number of states.
+        fixed_rates_per_s
+            Rates in 1/s.
+        camera
+            Camera curves.
+        optics
+            Calibrations as `KEY=PATH` of the rig file's `optics:`.
 
         Raises
         ------
         UsageError
-            A region, a rate or a calibration that is none.
+            A region, a rate or a calibration is malformed.
         """
-        if wrong := [rate for rate in fixed_rates_per_s if not 0 < rate < math.inf]:
-            raise UsageError(f"--rate: expected a rate > 0 in 1/s, got {wrong[0]}")
+        if invalid := [rate for rate in fixed_rates_per_s if not 0 < rate < math.inf]:
+            raise UsageError(f"--rate: expected a rate > 0 in 1/s, got {invalid[0]}")
         named = {}
         for text in regions:
             name, _, numbers = text.rpartition("=")
@@ -84,11 +116,11 @@ class Overrides:
             states,
             tuple(fixed_rates_per_s),
             camera,
-            dict(_calibration(text) for text in optics),
+            dict(_parse_calibration(text) for text in optics),
         )
 
     def bench(self, run: Path) -> RigFile:
-        """The rig of a run as it was, but for the calibrations that a person names instead.
+        """Return the rig of a run as it was, with the user's calibrations instead.
 
         Raises
         ------
@@ -99,7 +131,7 @@ class Overrides:
         return rig.model_copy(update={"optics": rig.optics.model_copy(update=dict(self.optics))})
 
     def patches(self, protocol: Any) -> dict[str, Region]:
-        """The patches of a protocol that has some, moved where a person wants them.
+        """Return the patches of a protocol, with the user's regions instead.
 
         Raises
         ------
@@ -119,16 +151,16 @@ class Overrides:
         return patches
 
     def excludes(self, frame: FrameRecord) -> bool:
-        """Whether `frame` is to be left out."""
+        """Return whether `frame` is to be left out."""
         return bool(self.excluded & _names(frame))
 
     def check(self, frames: Sequence[FrameRecord]) -> None:
-        """Refuse to exclude what is not there.
+        """Refuse to exclude frames that the run does not have.
 
         Raises
         ------
         UsageError
-            Names the frames that are not in the run.
+            Frames are not in the run; the message names them.
         """
         unknown = self.excluded.difference(*(_names(frame) for frame in frames))
         if unknown:
@@ -136,8 +168,8 @@ class Overrides:
             raise UsageError(f"--exclude: the run has no frame {', '.join(sorted(unknown))}{there}")
 
 
-def _calibration(text: str) -> tuple[str, str]:
-    """The key and the path, absolute if it is one."""
+def _parse_calibration(text: str) -> tuple[str, str]:
+    """Return key and path of a calibration, an existing path as an absolute one."""
     key, _, named = text.partition("=")
     if key not in Optics.model_fields or not named:
         raise UsageError(

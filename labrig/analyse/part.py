@@ -1,4 +1,4 @@
-"""What the analysis of one protocol is given."""
+"""Input of the analysis of one protocol."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field, fields, replace
@@ -25,7 +25,7 @@ FileT = TypeVar("FileT")
 
 @dataclass(frozen=True)
 class Inputs:
-    """Calibrations and earlier results; None or empty where nothing is known.
+    """Calibrations and earlier results; None or empty where there are none.
 
     Attributes
     ----------
@@ -35,11 +35,12 @@ class Inputs:
     others
         Calibrations of kinds that packages add, by the names of their kinds.
     spectra
-        By patch; under "" of the only one.
+        Emission spectrum of each patch; that of the only one under "".
     decays
-        By patch.
+        Fitted decay of each patch.
     materials
-        As excitation, decay and spectrum together say, by patch; under "" the only one.
+        Material of each patch by excitation, decay and spectrum together; that of the only one
+        under "".
     """
 
     camera: CameraFile | None = None
@@ -54,12 +55,12 @@ class Inputs:
 
     @classmethod
     def of(cls, rig: RigFile) -> Self:
-        """Read the files that the rig file names.
+        """Read the calibrations that the rig file names.
 
         Raises
         ------
         UsageError
-            One is missing or malformed.
+            A file is missing or malformed.
         """
         named = {kind.name: calibration(rig, kind) for kind in kinds()}
         return cls()._with(named)
@@ -70,7 +71,7 @@ class Inputs:
         return found
 
     def with_those_of(self, result: RunResult) -> Self:
-        """These, and what a result provides; of mappings by patch, the other patches stay."""
+        """Return these inputs updated by a result; mappings by patch keep the other patches."""
         provided: dict[str, Any] = {
             name: {**getattr(self, name, {}), **value} if isinstance(value, Mapping) else value
             for name, value in result.provides().items()
@@ -90,20 +91,20 @@ class Inputs:
 
 @dataclass(frozen=True)
 class Part:
-    """One protocol's part of a run; all of it, unless it is a chain.
+    """One protocol's part of a run, or all of a run that is not a chain.
 
     Attributes
     ----------
     run
-        Its units alone, by their own names.
+        Record of the part's units, by their own names.
     protocol
-        Its model.
+        Model of the protocol.
     rig
-        The bench as it was.
-    choices
-        What a person wants otherwise.
+        Rig file of the bench during the run.
+    overrides
+        The user's settings.
     inputs
-        Calibrations that the rig file names, and what earlier parts of a chain found.
+        Calibrations that the rig file names, and results of earlier parts of a chain.
     """
 
     run: RunRecord

@@ -1,4 +1,4 @@
-"""A chain of protocols, from its frames to the results of its parts and the materials they make."""
+"""Analysis of a chain of protocols, to the results of its parts and the materials from them."""
 
 from labrig import plugins
 from labrig.analyse.part import Part
@@ -7,14 +7,14 @@ from labrig.results import PhosphorResult, RunResult
 
 
 def analyse(part: Part) -> PhosphorResult:
-    """Analyse every part; each may use what earlier ones found.
+    """Analyse every part of a chain; each may use the results of earlier ones.
 
     A part that cannot be analysed is a warning, as long as another one can.
 
     Raises
     ------
     DataError, FitError
-        No part can.
+        No part can be analysed.
     """
     parts: dict[str, RunResult] = {}
     failures: dict[str, DataError | FitError] = {}
@@ -23,9 +23,9 @@ def analyse(part: Part) -> PhosphorResult:
     for link in part.protocol.chain():
         kind = link.protocol.protocol
         analyse_link = plugins.load(plugins.ANALYSES, kind, str(part.run.folder))
-        own = Part(part.run.part(link.name), link.protocol, part.rig, part.overrides, inputs)
+        link_part = Part(part.run.part(link.name), link.protocol, part.rig, part.overrides, inputs)
         try:
-            result: RunResult = analyse_link(own)
+            result: RunResult = analyse_link(link_part)
             if result.failures():
                 raise FitError("; ".join(result.failures()))
         except (DataError, FitError) as error:

@@ -1,13 +1,13 @@
-"""A saturation run, from its frames to its result.
+"""Analysis of a saturation run, from its frames to its result.
 
-How far a state is charged follows from how much less it glows after a weaker light. Under a
+The level of charge of a state follows from how much less it glows after a weaker light. Under a
 constant light r(t) = κ/s (1 − e^(−s t)), s = κ + k. A light weaker by the factor q gives q κ: where
 r is small the glow falls by q, where it is near 1 hardly at all. Amplitudes are only compared, so
-that neither Λ nor the camera's scale matter.
+that neither Λ nor the camera's scale enters.
 
-Decays after several charges have rates in common or rates of their own. All are one channel wide
-here: the channels of a frame, weighed as the fit of the brightest decay has them, say the same with
-less noise. Amplitudes are linear, so only the rates are searched for (variable projection).
+Decays after several charges have shared rates or individual ones. All are one channel wide here:
+the channels of a frame are combined with the weights of the brightest decay's fit, which lowers the
+noise. Amplitudes are linear, so only the rates are searched for (variable projection).
 """
 
 from collections.abc import Iterable, Iterator, Mapping, Sequence
@@ -44,16 +44,16 @@ from labrig.results import (
 )
 from labrig.written_numbers import plus_minus
 
-#: Lights searched, in multiples of the rate of re-radiation: r∞ of 1e-4 to 0.9999.
+#: Range of lights κ in multiples of the rate of re-radiation: r∞ of 1e-4 to 0.9999.
 FAINTEST, STRONGEST = 1e-4, 1e4
 #: Relative step of the derivatives.
 STEP = 1e-3
 
 
 def charged(kappa_per_s: float, k_per_s: float, charge_s: float) -> float:
-    """The level r after a charge from the dark (physics: exact for constant light)."""
-    s = kappa_per_s + k_per_s
-    return float(kappa_per_s / s * -np.expm1(-s * charge_s))
+    """Return the level r after a charge from the dark under constant light (exact)."""
+    total_rate = kappa_per_s + k_per_s
+    return float(kappa_per_s / total_rate * -np.expm1(-total_rate * charge_s))
 
 
 def charge_level(
@@ -64,16 +64,18 @@ def charge_level(
     k_per_s: float,
     charges_s: tuple[float, float],
 ) -> ChargeLevel:
-    """The level under the full light.
+    """Return the level of a state under the full light.
 
     Parameters
     ----------
     ratio, ratio_sigma
-        Amplitude after the weaker light over that after the full one.
+        Amplitude after the weaker light over that after the full one, and its standard uncertainty.
     fraction, fraction_sigma
-        What is left of the light, q; its σ relative.
+        Weaker light over the full one, q, and its relative standard uncertainty.
+    k_per_s
+        Rate of the state in 1/s.
     charges_s
-        Under the weaker and under the full light.
+        Duration of the charges under the weaker and under the full light in seconds.
     """
     r = _level(ratio, fraction, k_per_s, charges_s)
     by_ratio = (_level(ratio * (1 + STEP), fraction, k_per_s, charges_s) - r) / STEP
@@ -99,20 +101,20 @@ def _level(ratio: float, fraction: float, k_per_s: float, charges_s: tuple[float
 
 
 def curve(series: Series, fit: FittedDecay) -> Curve:
-    """A series with its channels weighed as in `fit`, flicker in its σ."""
+    """Combine the channels of a series with the weights of `fit`, flicker in its σ."""
     rows = series.usable
     weights = np.array(fit.channel_weights)
-    y, s = series.values[rows], series.sigma[rows]
-    information = (weights / s**2) @ weights
-    value = (y / s**2) @ weights / information
-    sigma = np.hypot(1 / np.sqrt(information), fit.flicker * np.maximum(value, 0.0))
+    values, sigmas = series.values[rows], series.sigma[rows]
+    weight_sum = (weights / sigmas**2) @ weights
+    value = (values / sigmas**2) @ weights / weight_sum
+    sigma = np.hypot(1 / np.sqrt(weight_sum), fit.flicker * np.maximum(value, 0.0))
     dark = np.nan_to_num(series.dark_sigma)
-    fractions = np.mean(weights / s**2, axis=0) / np.mean(information)
+    fractions = np.mean(weights / sigmas**2, axis=0) / np.mean(weight_sum)
     return Curve(series.t_s[rows], series.exposure_s[rows], value, sigma, float(fractions @ dark))
 
 
 def flicker_dof(fit: FittedDecay) -> float:
-    """Degrees of freedom from which a fit estimated its flicker; infinite if it was given."""
+    """Return the degrees of freedom from which a fit estimated its flicker; infinite if given."""
     if not fit.flicker_sigma > 0:
         return np.inf
     return max(0.5 * (fit.flicker / fit.flicker_sigma) ** 2, 1.0)
@@ -121,44 +123,48 @@ def flicker_dof(fit: FittedDecay) -> float:
 def compare_rates(
     curves: Sequence[Curve], start_per_s: Sequence[float], noise_dof: float = np.inf
 ) -> RatesTest:
-    """Fit all decays with shared rates, then each with its own, as many states each.
+    """Fit all decays with shared rates, then each with its own, with the same number of states.
 
     Parameters
     ----------
+    curves
+        The decays.
     start_per_s
-        Rates to start from; their number is that of the states.
+        Initial rates in 1/s, one for each state.
     noise_dof
         Degrees of freedom from which the curves' σ was estimated; infinite if it is known.
 
     Raises
     ------
     FitError
-        Too few frames, or some decay that has none of these states.
+        There are too few frames, or some decay lacks these states.
     """
     start = np.log(np.asarray(start_per_s, dtype=np.float64))
     states = len(start)
-    dof = sum(len(one.t_s) for one in curves) - 2 * states * len(curves)
-    if dof < 1 or min(len(one.t_s) for one in curves) <= 2 * states:
+    dof = sum(len(decay.t_s) for decay in curves) - 2 * states * len(curves)
+    if dof < 1 or min(len(decay.t_s) for decay in curves) <= 2 * states:
         raise FitError(
             f"expected more than {2 * states} frames of each decay for {states} state(s); record "
             "more, or ask for fewer states"
         )
     shared, shared_chi2, _ = _fit(curves, start)
-    alone = [_fit([one], shared) for one in curves]
-    own_chi2 = sum(chi2 for _, chi2, _ in alone)
-    amplitudes = [_amplitudes(one, np.exp(shared)) for one in curves]
+    own_fits = [_fit([decay], shared) for decay in curves]
+    own_chi2 = sum(chi2 for _, chi2, _ in own_fits)
+    amplitudes = [_amplitudes(decay, np.exp(shared)) for decay in curves]
     added = states * (len(curves) - 1)
     gain = max(shared_chi2 - own_chi2, 0.0) / added
-    # σ may be a little too large, never too small by less scatter than it says.
+    # A smaller scatter than σ does not lower it: σ may be a little too large, never too small.
     scatter = max(own_chi2 / dof, 1.0)
     falling = np.argsort(-shared)
     return RatesTest(
         shared_per_s=np.exp(shared)[falling],
-        own_per_s=np.array([np.exp(found)[falling] for found, _, _ in alone]),
-        own_sigma_per_s=np.array([(np.exp(found) * sigma)[falling] for found, _, sigma in alone]),
+        own_per_s=np.array([np.exp(log_rates)[falling] for log_rates, _, _ in own_fits]),
+        own_sigma_per_s=np.array(
+            [(np.exp(log_rates) * sigma)[falling] for log_rates, _, sigma in own_fits]
+        ),
         amplitude=np.array([value[falling] for value, _ in amplitudes]),
         amplitude_sigma=np.array([sigma[falling] for _, sigma in amplitudes]),
-        residuals=tuple(-_misfit(one, np.exp(shared)[falling])[0][:-1] for one in curves),
+        residuals=tuple(-_misfit(decay, np.exp(shared)[falling])[0][:-1] for decay in curves),
         chi2_shared=shared_chi2,
         chi2_own=own_chi2,
         dof_own=dof,
@@ -168,58 +174,59 @@ def compare_rates(
 
 
 def _fit(curves: Sequence[Curve], start: FloatArray) -> tuple[FloatArray, float, FloatArray]:
-    """Log rates (s,), χ² and σ of the log rates."""
+    """Return the logarithms of the rates (s,), χ² and the σ of these logarithms."""
 
     def residuals(log_rates: FloatArray) -> tuple[FloatArray, FloatArray]:
-        rest, slopes = zip(*(_misfit(one, np.exp(log_rates)) for one in curves), strict=True)
-        return np.concatenate(rest), np.concatenate(slopes)
+        misfits, slopes = zip(*(_misfit(decay, np.exp(log_rates)) for decay in curves), strict=True)
+        return np.concatenate(misfits), np.concatenate(slopes)
 
-    found = least_squares(residuals, start)
-    return found.parameters, found.chi2, found.sigma
+    result = least_squares(residuals, start)
+    return result.parameters, result.chi2, result.sigma
 
 
-def _misfit(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    """(n + 1,) model − value of the best amplitudes, whitened; (n + 1, s) its slopes by log rates.
+def _misfit(decay: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    """Return model − value with the best amplitudes, whitened, and its slopes by the log rates.
 
-    The slopes are Kaufman's (BIT 15, 1975): what other amplitudes explain as well is taken off.
+    The shapes are (n + 1,) and (n + 1, s). The slopes are Kaufman's (BIT 15, 1975), without the
+    part that other amplitudes explain.
     """
-    means, by_log_rate = exponential_means_and_slopes(rates_per_s, one.t_s, one.exposure_s)
-    design, target = _design(one, means), _target(one)
+    means, by_log_rate = exponential_means_and_slopes(rates_per_s, decay.t_s, decay.exposure_s)
+    design, target = _design(decay, means), _target(decay)
     solution, *_ = np.linalg.lstsq(design, target, rcond=None)
-    moved = np.zeros((len(target), len(rates_per_s)))
-    moved[:-1] = by_log_rate * solution[:-1] / one.sigma[:, np.newaxis]
-    known = np.linalg.qr(design)[0]
-    return np.asarray(design @ solution - target), moved - known @ (known.T @ moved)
+    slopes = np.zeros((len(target), len(rates_per_s)))
+    slopes[:-1] = by_log_rate * solution[:-1] / decay.sigma[:, np.newaxis]
+    basis = np.linalg.qr(design)[0]
+    return np.asarray(design @ solution - target), slopes - basis @ (basis.T @ slopes)
 
 
-def _amplitudes(one: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
-    design = _design(one, exponential_means(rates_per_s, one.t_s, one.exposure_s))
+def _amplitudes(decay: Curve, rates_per_s: FloatArray) -> tuple[FloatArray, FloatArray]:
+    design = _design(decay, exponential_means(rates_per_s, decay.t_s, decay.exposure_s))
     covariance = np.linalg.pinv(design.T @ design, rcond=1e3 * EPSILON)
-    solution = covariance @ design.T @ _target(one)
+    solution = covariance @ design.T @ _target(decay)
     return solution[:-1], np.sqrt(np.diag(covariance))[:-1]
 
 
-def _design(one: Curve, shapes: FloatArray) -> FloatArray:
-    """(n + 1, s + 1) of shapes (n, s), whitened; its last row the offset's prior."""
-    offset = np.full((len(one.t_s), 1), one.offset_sigma)
-    rows = np.hstack([shapes, offset]) / one.sigma[:, np.newaxis]
+def _design(decay: Curve, shapes: FloatArray) -> FloatArray:
+    """Return the whitened design (n + 1, s + 1) of shapes (n, s), with the offset's prior last."""
+    offset = np.full((len(decay.t_s), 1), decay.offset_sigma)
+    rows = np.hstack([shapes, offset]) / decay.sigma[:, np.newaxis]
     prior = np.zeros((1, rows.shape[1]))
     prior[0, -1] = 1.0
     return np.vstack([rows, prior])
 
 
-def _target(one: Curve) -> FloatArray:
-    """(n + 1,) whitened."""
-    return np.append(one.value / one.sigma, 0.0)
+def _target(decay: Curve) -> FloatArray:
+    """Return the whitened values and the offset's prior, shape (n + 1,)."""
+    return np.append(decay.value / decay.sigma, 0.0)
 
 
 def analyse(part: Part) -> SaturationResult:
-    """Compare plateaus, levels where there were two lights, and rates shared and not.
+    """Compare plateaus, levels of charge under two lights, and shared with individual rates.
 
     Raises
     ------
     DataError
-        Fewer than two decays under the full light, or frames are damaged.
+        There are fewer than two decays under the full light, or frames are damaged.
     FitError
         The decays do not allow a fit.
     """
@@ -228,8 +235,11 @@ def analyse(part: Part) -> SaturationResult:
     require_calibrated_camera(camera, run, run.frames(FrameRole.DECAY))
     regions = part.overrides.patches(protocol)
     series = reduce_patches(frames.decay, regions, frames.dark, camera=camera)
-    lasted_s, weaker = _charges_s(run), protocol.weaker
-    patches = {name: _patch(one, lasted_s, part) for name, one in series.items()}
+    charge_s, weaker = _charges_s(run), protocol.weaker
+    patches = {
+        name: _patch_saturation(patch_series, charge_s, part)
+        for name, patch_series in series.items()
+    }
     return SaturationResult(
         patches=patches,
         weaker_light=weaker and Measured(weaker.fraction, weaker.fraction * weaker.fraction_sigma),
@@ -246,7 +256,7 @@ def analyse(part: Part) -> SaturationResult:
 
 
 def _charges_s(run: RunRecord) -> dict[str, float]:
-    """How long the lamp really shone before the decay of each unit."""
+    """Return the measured duration of the charge before the decay of each unit in seconds."""
     units = [
         unit
         for unit, attempt in run.completed().items()
@@ -255,25 +265,29 @@ def _charges_s(run: RunRecord) -> dict[str, float]:
     return dict(zip(units, charges_s(run), strict=True))
 
 
-def _patch(series: Series, lasted_s: Mapping[str, float], part: Part) -> PatchSaturation:
-    decays = {one.unit[0]: one for one in series.by_unit()}
+def _patch_saturation(
+    series: Series, unit_charge_s: Mapping[str, float], part: Part
+) -> PatchSaturation:
+    decays = {decay.unit[0]: decay for decay in series.by_unit()}
     units = list(decays)
     light = tuple(Light.of(unit).value for unit in units)
-    full, weaker = ([row for row, one in enumerate(light) if one == kind] for kind in Light)
+    full, weaker = (
+        [row for row, decay_light in enumerate(light) if decay_light == kind] for kind in Light
+    )
     if len(full) < 2:
         raise DataError(
             "expected two or more complete decays under the full light, got "
             f"{len(full)}; go on with labrig resume"
         )
-    asked = part.overrides.states or (
+    states = part.overrides.states or (
         None if part.protocol.states == "auto" else part.protocol.states
     )
     longest = decays[units[full[-1]]]
-    fit = fit_series(longest, asked, fixed_rates_per_s=part.overrides.fixed_rates_per_s)
-    curves = {unit: curve(one, fit) for unit, one in decays.items()}
+    fit = fit_series(longest, states, fixed_rates_per_s=part.overrides.fixed_rates_per_s)
+    curves = {unit: curve(decay, fit) for unit, decay in decays.items()}
     start_per_s = [state.k_r_per_s for state in fit.states]
     rates = compare_rates(list(curves.values()), start_per_s, flicker_dof(fit))
-    charge_s = np.array([lasted_s[unit] for unit in units])
+    charge_s = np.array([unit_charge_s[unit] for unit in units])
     levels: Iterable[ChargeLevel] = ()
     if part.protocol.weaker is not None and weaker:
         levels = _levels(rates, charge_s, weaker[-1], full[-1], part.protocol.weaker)
@@ -284,23 +298,23 @@ def _patch(series: Series, lasted_s: Mapping[str, float], part: Part) -> PatchSa
 def _levels(
     rates: RatesTest, charge_s: FloatArray, dim: int, bright: int, weaker: WeakerLight
 ) -> Iterator[ChargeLevel]:
-    """Of every state, by the decays after the longest charges under the weaker and full light."""
+    """Iterate over the level of every state, after the longest charges under both lights."""
     for state, k_per_s in enumerate(rates.shared_per_s):
         a, b = rates.amplitude[[dim, bright], state]
-        of_a, of_b = rates.amplitude_sigma[[dim, bright], state]
+        a_sigma, b_sigma = rates.amplitude_sigma[[dim, bright], state]
         if b <= 0:
             yield ChargeLevel(0.0, 1.0)
             continue
         ratio = max(a / b, 1e-6)
-        sigma = float(np.hypot(of_a / b, a / b * of_b / b))
-        both_s = (charge_s[dim], charge_s[bright])
+        sigma = float(np.hypot(a_sigma / b, a / b * b_sigma / b))
+        durations_s = (charge_s[dim], charge_s[bright])
         yield charge_level(
-            ratio, sigma, weaker.fraction, weaker.fraction_sigma, float(k_per_s), both_s
+            ratio, sigma, weaker.fraction, weaker.fraction_sigma, float(k_per_s), durations_s
         )
 
 
 def _growths(before: Curve, last: Curve) -> Iterator[Measured]:
-    """Of the glow from one decay to the next, as a fraction, at the begin and the end of both."""
+    """Iterate over the relative growth of the glow between two decays, at their begin and end."""
     count = min(len(before.value), len(last.value))
     ratio = last.value[:count] / before.value[:count]
     sigma = np.abs(ratio) * np.hypot(
@@ -319,8 +333,8 @@ def _warnings(patch: PatchSaturation) -> Iterator[str]:
             "the glow still grows at the longest charge: charge for longer before decays whose "
             "amplitudes are to be compared"
         )
-    if any(one.assessment == "no" for one in patch.levels):
-        levels = ", ".join(plus_minus(one.r, one.sigma) for one in patch.levels)
+    if any(level.assessment == "no" for level in patch.levels):
+        levels = ", ".join(plus_minus(level.r, level.sigma) for level in patch.levels)
         yield (
             f"r(0) = 1 does not hold after the longest charge: r(0) = {levels}; Λ from the decay "
             "alone would be too small by that factor, in each state by another: fit excitation "

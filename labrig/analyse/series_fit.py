@@ -1,4 +1,4 @@
-"""From a series to its decay fit: what a run's processing and `labrig fit decay` have in common."""
+"""The fit of one series: common to a run's processing and `labrig fit decay`."""
 
 from collections.abc import Sequence
 from dataclasses import replace
@@ -12,12 +12,12 @@ from labrig.fit import DecayFit, fit_decay
 from labrig.quantity import FRACTION, parse
 from labrig.results import Series, joined, read_series
 
-#: Counts below which a Poisson weight would trust a point too much.
+#: Least counts in a Poisson weight, since fewer would weigh a point too much.
 LEAST_COUNTS = 5.0
-#: Fewer frames do not tell their flicker; shutters and apertures scatter by 0.5-1 %.
+#: Fewest frames that determine their flicker; shutters and apertures scatter by 0.5-1 %.
 FRAMES_FOR_FLICKER = 6
 TYPICAL_FLICKER = 0.007
-#: A decay whose every amplitude is less certain than this was not seen.
+#: Significance in σ of some amplitude from which a decay is detected.
 SEEN_SIGMA = 3.0
 
 
@@ -28,25 +28,43 @@ def fit_series(
     flicker: float | None = None,
     fixed_rates_per_s: Sequence[float] = (),
 ) -> DecayFit:
-    """Fit the usable rows of `series`.
+    """Fit a sum of exponentials to the usable rows of a series.
 
     Parameters
     ----------
+    series
+        Time series of a patch.
     states
-        Number of states; None chooses.
+        Number of states; None chooses it.
     offset_sigma
-        Prior σ of a constant background, one for all channels or one each, in the unit of the
-        values: 0 fixes it at zero, infinity leaves it free. None takes what the dark subtraction
-        left uncertain in each channel.
+        Prior standard uncertainty of a constant background in the unit of the values, one for all
+        channels or one each: 0 fixes it at zero, infinity leaves it free. None takes what the dark
+        subtraction left uncertain in each channel.
     flicker
         Relative scatter common to the channels of a frame; None measures it.
     fixed_rates_per_s
-        Rates that take part and are held; they count as states.
+        Rates in 1/s that take part and are held; they count as states.
+
+    Returns
+    -------
+    DecayFit
+        Rates in 1/s and amplitudes in the unit of the values, with standard uncertainties,
+        covariance and residuals.
 
     Raises
     ------
     FitError
-        The data do not allow a fit.
+        The data do not allow a fit, or no decay stands out of the noise.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> series = labrig.read_series("series.csv")[0]
+    >>> fit = labrig.fit_series(series)
+    >>> for state in fit.states:
+    ...     print(f"k_r = {state.k_r_per_s:.2g} 1/s, amplitude {state.amplitude:.2g} DN/s")
+    k_r = 0.2 1/s, amplitude 8e+03 DN/s
+    k_r = 0.01 1/s, amplitude 2.8e+03 DN/s
     """
     if not series.usable.any():
         raise FitError(
@@ -89,23 +107,59 @@ def fit_table(
     origin_s: float,
     from_s: float | None,
 ) -> list[tuple[str, DecayFit]]:
-    """Fit every region in anybody's table; see `labrig fit decay --help` for the texts.
+    """Fit a sum of exponentials to every region in a table, from the texts of a command line.
+
+    Parameters
+    ----------
+    path
+        Path of the table, as `read_series` reads it.
+    states
+        Number of states; None chooses it.
+    offset
+        Constant background: `zero`, `free`, or its prior standard uncertainty in the data's unit.
+    flicker
+        Relative scatter common to the channels of a frame: `auto`, a percentage, or a fraction.
+    weights
+        Uncertainties of the values: `given` in the table, or those of `counts` (Poisson).
+    origin_s
+        Time of lamp-off in the table's seconds.
+    from_s
+        Time in the table's seconds from which points are fitted; None takes all.
+
+    Returns
+    -------
+    list of (str, DecayFit)
+        Name and fit of each region in order of appearance.
 
     Raises
     ------
     UsageError
-        A text that is none of those.
+        A text is none of those, no point is left, or the table is malformed.
     DataError
-        The table or the data in it.
+        The table has values that are missing or not finite.
+    FitError
+        The data do not allow a fit.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.analyse import fit_table
+    >>> fits = fit_table(
+    ...     Path("series.csv"), states=2, offset="zero", flicker="auto", weights="given",
+    ...     origin_s=0.0, from_s=None,
+    ... )
+    >>> for region, fit in fits:
+    ...     print(region, [f"{rate.value:.2g} {rate.unit}" for rate in fit.rates])
+    sample ['0.2 1/s', '0.01 1/s']
     """
     offset_sigma = {"zero": 0.0, "free": np.inf}.get(offset)
     if offset_sigma is None:
-        offset_sigma = _sigma(offset)
-    rho = None if flicker == "auto" else _flicker(flicker)
+        offset_sigma = _parse_sigma(offset)
+    rho = None if flicker == "auto" else _parse_flicker(flicker)
     if weights not in ("given", "counts"):
         raise UsageError(f"--weights: expected 'given' or 'counts', got '{weights}'")
     fits = []
-    for series in _by_region(read_series(path)):
+    for series in _join_regions(read_series(path)):
         rows = np.flatnonzero(series.t_s >= (-np.inf if from_s is None else from_s))
         if not len(rows):
             raise UsageError(f"{path}: no point at {from_s:g} s or later; give an earlier --from")
@@ -121,15 +175,15 @@ def fit_table(
     return fits
 
 
-def _by_region(parts: Sequence[Series]) -> list[Series]:
-    """Repeats of a decay joined: they share rates and amplitudes."""
+def _join_regions(parts: Sequence[Series]) -> list[Series]:
+    """Join the repeats of each region's decay: they share rates and amplitudes."""
     regions: dict[str, list[Series]] = {}
     for part in parts:
         regions.setdefault(part.region, []).append(part)
     return [joined(same) for same in regions.values()]
 
 
-def _sigma(text: str) -> float:
+def _parse_sigma(text: str) -> float:
     try:
         sigma = float(text)
     except ValueError:
@@ -142,7 +196,7 @@ def _sigma(text: str) -> float:
     return sigma
 
 
-def _flicker(text: str) -> float:
+def _parse_flicker(text: str) -> float:
     try:
         return parse(text, FRACTION) if "%" in text else float(text)
     except ValueError:

@@ -1,7 +1,7 @@
 """The filter's strip in a run: its frames, and its slices in every patch.
 
-A patch is seen in those rows of the strip's slices that lie in its region. The light there is that
-of the same place along the strip.
+The slices of a patch are those rows of the strip's slices that lie in its region. Their light is
+that of the same place along the strip.
 """
 
 from collections.abc import Callable, Mapping, Sequence
@@ -22,13 +22,13 @@ from labrig.region import Region, region_pixels
 
 
 class StripFrames:
-    """By role; those of completed units, as they were recorded.
+    """Frames of a run's completed units by role, as they were recorded.
 
     Raises
     ------
     DataError
-        None with a role that is asked for, or they are damaged, or of another camera than the
-        one that is known.
+        There are no frames of a role, they are damaged, or they are of another camera than the
+        calibrated one.
     """
 
     def __init__(self, part: Part) -> None:
@@ -37,7 +37,7 @@ class StripFrames:
         require_calibrated_camera(part.inputs.camera, part.run, part.run.frames(FrameRole.DARK))
 
     def of(self, role: str, unit: str | None = None) -> list[SeriesFrame]:
-        """Of a role, and of one unit where that matters."""
+        """Return the frames of a role, and of one unit if it is given."""
         frames = [
             frame
             for frame in steady_frames(self._part.run, self._part.overrides, role)
@@ -51,18 +51,18 @@ class StripFrames:
         return frames
 
     def hdr(self, role: str, unit: str | None = None) -> HdrFrame:
-        """All of them together."""
+        """Return all frames of a role combined into one."""
         return read_hdr_frame(self.of(role, unit), self.hot)
 
     @cached_property
     def size(self) -> tuple[int, int]:
-        """Width and height in pixels."""
+        """Width and height of the frames in pixels."""
         raw = read_raw(self.dark[0].path)
         return raw.width, raw.height
 
     @cached_property
     def hot(self) -> PixelMask | None:
-        """Pixels that are bright in the dark, where there are frames to tell."""
+        """Pixels that are bright in the dark; None if there are too few frames."""
         return hot_pixels_of(self.dark)
 
 
@@ -70,24 +70,24 @@ FloatArray = NDArray[np.float64]
 Found = TypeVar("Found")
 Slices = dict[str, Region]
 
-#: Rows of cells of the colour filter that a patch has at least: one tells no noise.
+#: Fewest rows of colour-filter cells of a patch: a single one does not determine the noise.
 LEAST_CELLS = 2
 
 
 @dataclass(frozen=True)
 class StripPatch:
-    """Rows of a strip.
+    """Rows of a strip that a patch covers.
 
     Attributes
     ----------
     name
-        As the protocol has it; empty where it names none.
+        Name of the patch in the protocol; empty where it names none.
     material
-        What the sample in it is called.
+        Name of the sample in the patch.
     region
-        In the frame; None: all of the strip.
+        Region of the patch in the frame; None is all of the strip.
     alone
-        Whether it is the only one.
+        Whether it is the only patch.
     """
 
     name: str
@@ -97,23 +97,26 @@ class StripPatch:
 
     @property
     def folder(self) -> str:
-        """Below a result, where there are several."""
+        """Name of the patch's folder below a result; empty for the only patch."""
         return "" if self.alone else self.name
 
-    def own(self, found: Mapping[str, Found]) -> Found | None:
-        """What belongs to it of what an earlier part found by patch; one alone has the only one."""
-        if self.alone and len(found) == 1:
-            return next(iter(found.values()))
-        return found.get(self.name)
+    def own(self, entries: Mapping[str, Found]) -> Found | None:
+        """Return the patch's entry in an earlier result by patch.
+
+        The only patch takes the only entry, whatever its name.
+        """
+        if self.alone and len(entries) == 1:
+            return next(iter(entries.values()))
+        return entries.get(self.name)
 
 
 def strip_patches(part: Part) -> list[StripPatch]:
-    """Those of a part's protocol, moved where a person wants them.
+    """Return the patches of a part's protocol, with the user's regions instead.
 
     Raises
     ------
     UsageError
-        There is no patch of a name that a person wants moved.
+        There is no patch of a name that the user gives a region.
     """
     protocol = part.protocol
     if not protocol.patches:
@@ -129,59 +132,65 @@ def strip_patches(part: Part) -> list[StripPatch]:
 def slice_strip(
     patches: Sequence[StripPatch], strip: Strip, raw: RawFrame, count: int = SLICES
 ) -> tuple[dict[StripPatch, Slices], tuple[str, ...]]:
-    """The strip's slices in the rows of every patch, and why a patch has none, a line each.
+    """Return the strip's slices in the rows of every patch, and the reason for patches without any.
 
     Parameters
     ----------
+    patches
+        Patches on the strip.
+    strip
+        Place of the strip in the frames.
     raw
-        Any frame: its size and colours.
+        Any frame, for its size and colours.
+    count
+        Number of slices.
 
     Raises
     ------
     DataError
-        No patch has any.
+        No patch has any slices.
     """
-    found, refused = {}, []
+    slices, reasons = {}, []
     for patch in patches:
         try:
-            found[patch] = _rows(patch, strip, raw, count)
+            slices[patch] = _patch_slices(patch, strip, raw, count)
         except DataError as error:
-            refused.append(str(error))
-    if not found:
-        raise DataError("; ".join(refused))
-    return found, tuple(refused)
+            reasons.append(str(error))
+    if not slices:
+        raise DataError("; ".join(reasons))
+    return slices, tuple(reasons)
 
 
-def _rows(patch: StripPatch, strip: Strip, raw: RawFrame, count: int) -> Slices:
-    whole = strip.slices(count)
+def _patch_slices(patch: StripPatch, strip: Strip, raw: RawFrame, count: int) -> Slices:
+    strip_slices = strip.slices(count)
     if patch.region is None:
-        return whole
+        return strip_slices
     x, y, wide, high = region_pixels(patch.region, raw.width, raw.height)
     top, bottom = y / raw.height, (y + high) / raw.height
-    found: Slices = {}
-    for name, (left, upper, width, height) in whole.items():
+    slices: Slices = {}
+    for name, (left, upper, width, height) in strip_slices.items():
         first, last = max(upper, top), min(upper + height, bottom)
-        found[name] = (left, first, width, last - first)
-    rows = [round((y + h) * raw.height) - round(y * raw.height) for _, y, _, h in found.values()]
+        slices[name] = (left, first, width, last - first)
+    rows = [round((y + h) * raw.height) - round(y * raw.height) for _, y, _, h in slices.values()]
     ends = [round(end[0] * raw.width) for end in (strip.left, strip.right)]
     if min(rows) >= LEAST_CELLS * raw.cfa_side and x <= ends[0] and x + wide >= ends[1]:
-        return found
-    upper = min(y for _, y, _, _ in whole.values()) * raw.height
-    lower = max(y + h for _, y, _, h in whole.values()) * raw.height
-    where = (
+        return slices
+    upper = min(y for _, y, _, _ in strip_slices.values()) * raw.height
+    lower = max(y + h for _, y, _, h in strip_slices.values()) * raw.height
+    problem = (
         f"expected patch {patch.name} below the filter from end to end, in "
         f"{LEAST_CELLS * raw.cfa_side} rows or more of its own: the filter lies in columns "
         f"{ends[0]} to {ends[1]} and rows {upper:.0f} to {lower:.0f}, the patch in columns {x} to "
         f"{x + wide} and rows {y} to {y + high} ({max(min(rows), 0)} in common)"
     )
-    raise DataError(f"{where}; move it: labrig process RUN --roi {patch.name}=x,y,width,height")
+    raise DataError(f"{problem}; move it: labrig process RUN --roi {patch.name}=x,y,width,height")
 
 
 def tilt_offset(strip: Strip, slices: Slices, raw: RawFrame) -> FloatArray:
-    """(P,) by how much further right along a tilted strip slices lie than their columns say.
+    """Return the offset of slices along a tilted strip from the position of their columns, (P,).
 
-    0 in its middle rows; rows above and below belong to other places of it, in fractions of its
-    length.
+    It is 0 in the strip's middle rows, and a fraction of its length, positive to the right, in the
+    rows above and below, which belong to other places of the strip.
     """
     size = np.array([raw.width, raw.height])
     left, right = np.array(strip.left) * size, np.array(strip.right) * size
@@ -196,14 +205,14 @@ def for_each_patch(
     patches: Sequence[StripPatch],
     analyse: Callable[[StripPatch], tuple[Found, Sequence[str]]],
 ) -> tuple[dict[str, Found], tuple[str, ...]]:
-    """What `analyse` finds of every patch by its folder, and its warnings.
+    """Analyse every patch, and return the results by the patch's folder, and warnings.
 
     A patch that cannot be analysed is a warning, as long as another one can.
 
     Raises
     ------
     DataError
-        No patch can.
+        No patch can be analysed.
     """
     results: dict[str, Found] = {}
     warnings: list[str] = []
@@ -211,11 +220,11 @@ def for_each_patch(
     for patch in patches:
         prefix = "" if patch.alone else f"{patch.name}: "
         try:
-            results[patch.folder], own = analyse(patch)
+            results[patch.folder], patch_warnings = analyse(patch)
         except DataError as error:
             failures.append(type(error)(f"{prefix}{error}"))
-            own = [str(error)]
-        warnings += [f"{prefix}{warning}" for warning in own]
+            patch_warnings = [str(error)]
+        warnings += [f"{prefix}{warning}" for warning in patch_warnings]
     if not results:
         raise failures[0]
     return results, tuple(warnings)

@@ -1,4 +1,4 @@
-"""What a run's temperature says of its rates."""
+"""Effect of a run's temperature on its rates."""
 
 from collections.abc import Collection
 from itertools import groupby
@@ -17,13 +17,34 @@ from labrig.record import (
     time_text,
 )
 
-#: From here on it is said: rates then change by 4 %, more than their usual σ.
+#: Change in K from which a warning is given: rates then change by 4 %, more than their usual σ.
 MOVED_K = 0.5
 CHECK_IT = "check it before the next run (labrig rig check)"
 
 
 def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, ...]:
-    """A temperature that moved while frames of these roles were taken; a silent thermometer."""
+    """Warn of a temperature that changed while a sample glowed, and of a silent thermometer.
+
+    Parameters
+    ----------
+    run
+        A recorded run.
+    roles
+        Roles of the frames that show the glow.
+
+    Returns
+    -------
+    tuple of str
+        The warnings, a line each; empty if the temperature was steady or no thermometer was there.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.analyse import temperature_warnings
+    >>> run = labrig.read_run("runs/decay")
+    >>> temperature_warnings(run, ["decay"])
+    ()
+    """
     photographs = frames_in_roles(run, roles)
     if not photographs or "thermometer" not in run.attempts[-1].start.get("devices", {}):
         return ()
@@ -31,14 +52,15 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
         return (f"the thermometer told nothing: {CHECK_IT}",)
     course, warnings = TemperatureHistory(run), []
     for part, group in groupby(photographs, key=lambda frame: frame.unit.rpartition("/")[0]):
-        known = course.during(list(group))
-        if known.size and np.ptp(known) >= MOVED_K:
-            change = relative_rate_change(known.min(), known.max())
-            what = f"the glow of {part}" if part else "the glow"
+        temperatures_c = course.during(list(group))
+        if temperatures_c.size and np.ptp(temperatures_c) >= MOVED_K:
+            change = relative_rate_change(temperatures_c.min(), temperatures_c.max())
+            glow = f"the glow of {part}" if part else "the glow"
             warnings.append(
-                f"the temperature moved by {np.ptp(known):.1f} K while {what} was photographed "
-                f"({degrees_text(known)}): k_r changes by about {100 * change:.0f} % over that, if "
-                "traps are 0.65 eV deep; keep the room steadier or measure for a shorter time"
+                f"the temperature moved by {np.ptp(temperatures_c):.1f} K while {glow} was "
+                f"photographed ({degrees_text(temperatures_c)}): k_r changes by about "
+                f"{100 * change:.0f} % over that, if traps are 0.65 eV deep; keep the room "
+                "steadier or measure for a shorter time"
             )
     if photographs[-1].end_time > course.time[-1] + KNOWN_FOR_S:
         warnings.append(
@@ -48,7 +70,7 @@ def temperature_warnings(run: RunRecord, roles: Collection[str]) -> tuple[str, .
 
 
 def at_temperature(material: Material, run: RunRecord, roles: Collection[str]) -> Material:
-    """`material` with the temperature of such frames in its provenance, where it is known."""
+    """Return `material` with the mean temperature of such frames in its provenance, if known."""
     mean = glow_temperature_c(run, roles)
     if mean is None or material.provenance is None:
         return material

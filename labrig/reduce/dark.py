@@ -1,4 +1,4 @@
-"""What the sensor counts in the dark: its level over exposure time, and its hot pixels."""
+"""Signal of the sensor in the dark: its level over exposure time, and its hot pixels."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -12,9 +12,9 @@ from labrig.reduce.noise import Floats
 from labrig.reduce.raw import RawFrame
 from labrig.reduce.saturation import histogram
 
-#: Exposures that differ by less than cameras round them by are one exposure.
+#: Relative difference within which two exposure times are the same, by the rounding of cameras.
 SAME_EXPOSURE = 0.02
-#: A pixel is hot if it stands out in this many frames: a cosmic ray does not strike twice.
+#: Frames in which a hot pixel is bright: a cosmic ray does not hit the same pixel twice.
 HOT_FRAMES = 2
 
 
@@ -24,12 +24,15 @@ class DarkModel:
 
     Parameters
     ----------
-    base, rate_per_s
-        b in DN and d in DN/s, each of shape (C,).
+    base
+        Offset b in DN, shape (C,).
+    rate_per_s
+        Dark current d in DN/s, shape (C,).
     covariance
-        Shape (C, 2, 2), of b and d.
+        Covariance of b and d, shape (C, 2, 2).
     only_exposure_s
-        Set if all dark frames had one exposure: the model holds there only (and d is 0).
+        Exposure time in seconds if all dark frames had the same: the model holds there only (and d
+        is 0); None if they had several.
     """
 
     base: Floats
@@ -38,12 +41,12 @@ class DarkModel:
     only_exposure_s: float | None
 
     def dark_level(self, exposure_s: float) -> tuple[Floats, Floats]:
-        """Level and its standard uncertainty in DN, each of shape (C,).
+        """Return the dark level and its standard uncertainty in DN, each of shape (C,).
 
         Raises
         ------
         DataError
-            All dark frames had another exposure.
+            All dark frames had another exposure time.
         """
         only = self.only_exposure_s
         if only is not None and not same_exposure(only, exposure_s):
@@ -51,12 +54,14 @@ class DarkModel:
                 f"expected dark frames of {exposure_s:g} s or of several exposures, got only "
                 f"{only:g} s; take dark frames at the shortest and the longest exposure"
             )
-        at = np.array([1.0, exposure_s])
-        return self.base + self.rate_per_s * exposure_s, np.sqrt(at @ self.covariance @ at)
+        terms = np.array([1.0, exposure_s])
+        return self.base + self.rate_per_s * exposure_s, np.sqrt(terms @ self.covariance @ terms)
 
     def current(self, exposure_s: float) -> Floats:
-        """What dark current adds during an exposure, in DN, shape (C,); at most so much if all
-        dark frames had one exposure, which does not tell it from an error of the black level.
+        """Return the signal of the dark current during an exposure in DN, shape (C,).
+
+        It is an upper limit if all dark frames had one exposure time: they cannot separate it from
+        an error of the black level.
         """
         if self.only_exposure_s is not None:
             return self.base
@@ -64,59 +69,103 @@ class DarkModel:
 
 
 def fit_dark(exposure_s: Floats, level: Floats, sigma: Floats) -> DarkModel:
-    """Weighted least squares of b + d·T through dark levels.
+    """Fit the dark level b + d·T of each channel by weighted least squares.
+
+    Where the frames scatter by more than `sigma` (the camera's black level drifts), the covariance
+    is raised to the observed scatter.
 
     Parameters
     ----------
     exposure_s
-        Shape (n,).
-    level, sigma
-        Shape (n, C), DN above black. If frames scatter by more than sigma (the camera's black
-        drifts), the covariance is raised to what they scatter by.
-    """
-    if len(exposure_s) == 0:
-        raise DataError("expected dark frames, got none; take some before charging")
-    one = same_exposure(float(exposure_s.min()), float(exposure_s.max()))
-    design = np.ones((len(exposure_s), 1))
-    if not one:
-        design = np.stack([np.ones_like(exposure_s), exposure_s], axis=1)
-    channels = level.shape[1]
-    found, covariance = np.zeros((channels, 2)), np.zeros((channels, 2, 2))
-    used = design.shape[1]
-    freedom = len(exposure_s) - used
-    for channel in range(channels):
-        weighted = design / sigma[:, channel, np.newaxis]
-        inverse = np.linalg.inv(weighted.T @ weighted)
-        found[channel, :used] = inverse @ weighted.T @ (level[:, channel] / sigma[:, channel])
-        misfit = (level[:, channel] - design @ found[channel, :used]) / sigma[:, channel]
-        scatter = float(misfit @ misfit) / freedom if freedom else 1.0
-        covariance[channel, :used, :used] = inverse * max(scatter, 1.0)
-    return DarkModel(
-        base=found[:, 0],
-        rate_per_s=found[:, 1],
-        covariance=covariance,
-        only_exposure_s=float(exposure_s.mean()) if one else None,
-    )
+        Exposure time T of each dark frame in seconds, shape (n,).
+    level
+        Mean dark levels in DN above black, shape (n, C).
+    sigma
+        Standard uncertainties of the levels in DN, shape (n, C).
 
-
-def same_exposure(one_s: float, other_s: float) -> bool:
-    """Whether two exposures differ by no more than cameras round them by."""
-    return abs(one_s - other_s) <= SAME_EXPOSURE * max(one_s, other_s)
-
-
-def hot_pixels(darks: Sequence[RawFrame]) -> PixelMask:
-    """Pixels of the sensor, shape (height, width), that are bright in the dark.
-
-    Parameters
-    ----------
-    darks
-        Two or more dark frames, the longest there are: a pixel is hot if it exceeds the median of
-        the 24 nearest of its CFA position by more than 8 robust standard deviations in two of them.
+    Returns
+    -------
+    DarkModel
+        Black offset b in DN and dark current d in DN/s of each channel, with their covariance.
 
     Raises
     ------
     DataError
-        Fewer than two frames, or of different sizes or sensors.
+        There are no dark frames.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.reduce import fit_dark
+    >>> exposure_s = np.array([0.1, 1.0, 10.0])
+    >>> level = np.array([[2.01], [2.10], [3.00]])  # DN, one channel
+    >>> model = fit_dark(exposure_s, level, sigma=np.full((3, 1), 0.01))
+    >>> dark_dn, sigma_dn = model.dark_level(5.0)
+    >>> print(f"{dark_dn[0]:.2f} ± {sigma_dn[0]:.3f} DN")
+    2.50 ± 0.006 DN
+    """
+    if len(exposure_s) == 0:
+        raise DataError("expected dark frames, got none; take some before charging")
+    single_exposure = same_exposure(float(exposure_s.min()), float(exposure_s.max()))
+    design = np.ones((len(exposure_s), 1))
+    if not single_exposure:
+        design = np.stack([np.ones_like(exposure_s), exposure_s], axis=1)
+    channels = level.shape[1]
+    coefficients, covariance = np.zeros((channels, 2)), np.zeros((channels, 2, 2))
+    terms = design.shape[1]
+    dof = len(exposure_s) - terms
+    for channel in range(channels):
+        weighted = design / sigma[:, channel, np.newaxis]
+        inverse = np.linalg.inv(weighted.T @ weighted)
+        coefficients[channel, :terms] = (
+            inverse @ weighted.T @ (level[:, channel] / sigma[:, channel])
+        )
+        misfit = (level[:, channel] - design @ coefficients[channel, :terms]) / sigma[:, channel]
+        scatter = float(misfit @ misfit) / dof if dof else 1.0
+        covariance[channel, :terms, :terms] = inverse * max(scatter, 1.0)
+    return DarkModel(
+        base=coefficients[:, 0],
+        rate_per_s=coefficients[:, 1],
+        covariance=covariance,
+        only_exposure_s=float(exposure_s.mean()) if single_exposure else None,
+    )
+
+
+def same_exposure(first_s: float, second_s: float) -> bool:
+    """Return whether two exposure times agree within the rounding of cameras."""
+    return abs(first_s - second_s) <= SAME_EXPOSURE * max(first_s, second_s)
+
+
+def hot_pixels(darks: Sequence[RawFrame]) -> PixelMask:
+    """Find the pixels of the sensor that are bright in the dark.
+
+    A pixel is hot if it exceeds the median of the 24 nearest pixels of its CFA position by more
+    than 8 robust standard deviations in two frames.
+
+    Parameters
+    ----------
+    darks
+        Two or more dark frames, best those of the longest exposure.
+
+    Returns
+    -------
+    ndarray of bool
+        True where a pixel is hot, shape (height, width).
+
+    Raises
+    ------
+    DataError
+        There are fewer than two frames, or frames of different sizes or sensors.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.reduce import hot_pixels
+    >>> run = labrig.read_run("runs/decay")
+    >>> longest = run.frames("dark")[-4:]
+    >>> mask = hot_pixels([labrig.read_raw(frame.path) for frame in longest])
+    >>> mask.shape, int(mask.sum())
+    ((64, 96), 1)
     """
     if len(darks) < HOT_FRAMES:
         raise DataError(
@@ -135,25 +184,25 @@ def hot_pixels(darks: Sequence[RawFrame]) -> PixelMask:
 
 
 def _bright(dark: RawFrame) -> PixelMask:
-    """Pixels far above the median of their surroundings."""
+    """Mark the pixels far above the median of their surroundings."""
     import cv2  # its median filter is the fast one
 
     side = dark.cfa_side
     bright = np.zeros(dark.mosaic.shape, bool)
     for row in range(side):
         for column in range(side):
-            here = (slice(row, None, side), slice(column, None, side))
-            plane = np.ascontiguousarray(dark.mosaic[here])
-            usual = cv2.medianBlur(plane, 5)
-            deviation = 1.4826 * _median(histogram(np.asarray(cv2.absdiff(plane, usual))))
+            position = (slice(row, None, side), slice(column, None, side))
+            plane = np.ascontiguousarray(dark.mosaic[position])
+            median = cv2.medianBlur(plane, 5)
+            deviation = 1.4826 * _median(histogram(np.asarray(cv2.absdiff(plane, median))))
             # Whole numbers: a quiet sensor's median deviation may be 0 though it is not silent.
             limit = int(OUTLIER_SIGMAS * max(deviation, 1.0))
-            bright[here] = np.asarray(cv2.subtract(plane, usual)) > limit
+            bright[position] = np.asarray(cv2.subtract(plane, median)) > limit
     return bright
 
 
 def _median(counts: npt.NDArray[np.int64]) -> float:
-    """Of whole numbers that occur so many times: 0, 1, …"""
+    """Return the median of the whole numbers 0, 1, … that occur `counts` times."""
     up_to = np.cumsum(counts)
     middle = np.searchsorted(up_to, [(up_to[-1] + 1) // 2, up_to[-1] // 2 + 1])
     return float(middle.mean())

@@ -1,8 +1,8 @@
 """Filter colours and black levels of a DNG file, by its own tags (DNG 1.6, chapter 4).
 
 LibRaw reads DNG, too, but moves an odd corner of the active area to an even one and then pairs
-black levels with the wrong pixels; it puts the mean of masked borders in place of the file's
-black level, knows one black level per colour, and takes patterns larger than it knows for others.
+black levels with the wrong pixels; it replaces the file's black level by the mean of masked
+borders, supports one black level per colour, and misreads patterns larger than it supports.
 """
 
 import io
@@ -23,34 +23,34 @@ Scalar = TypeVar("Scalar", np.str_, np.float64)
 
 #: The one channel of a sensor without colour filters.
 MONOCHROME = "L"
-#: X-Trans repeats after 6 pixels; beyond this, too few pixels share a place to tell their noise.
+#: Largest period: X-Trans repeats after 6 pixels; beyond 12, too few pixels share a position.
 _LARGEST_SIDE = 12
 
 
 def side_of(cfa: str) -> int:
-    """Rows, and columns, of the square that `cfa` spells row by row."""
+    """Return the side, in pixels, of the square that `cfa` spells row by row."""
     return math.isqrt(len(cfa))
 
 
 def channels_of(cfa: str) -> tuple[str, ...]:
-    """Names of the channels in `cfa`: R, G, B in this order, or L."""
+    """Return the names of the channels in `cfa`: R, G, B in this order, or L."""
     return (MONOCHROME,) if set(cfa) == {MONOCHROME} else ("R", "G", "B")
 
 
 def smallest_square(colours: Letters, black: Floats) -> tuple[str, tuple[float, ...]]:
-    """Letters and black levels of the smallest square that repeats both, row by row.
+    """Return letters and black levels of the smallest square that repeats both, row by row.
 
     Parameters
     ----------
     colours
-        Shape (rows, columns): one letter per pixel, repeating from the first visible pixel.
+        One letter per pixel, repeating from the first visible pixel, shape (rows, columns).
     black
-        Likewise, in DN; may repeat after other numbers of rows and columns.
+        Black levels in DN; their numbers of rows and columns may differ from those of `colours`.
 
     Raises
     ------
     FrameError
-        Both together repeat too rarely to be reduced.
+        The period of both together is too large to be reduced.
     """
     side = math.lcm(*colours.shape, *black.shape)
     if side > _LARGEST_SIDE:
@@ -58,18 +58,18 @@ def smallest_square(colours: Letters, black: Floats) -> tuple[str, tuple[float, 
             f"expected colours and black levels that repeat after {_LARGEST_SIDE} pixels or fewer, "
             f"got {side}; labrig cannot reduce this kind of sensor"
         )
-    letters, levels = _repeated(colours, side), _repeated(black, side)
+    letters, levels = _repeat(colours, side), _repeat(black, side)
     for shorter in (length for length in range(1, side) if side % length == 0):
         corner = (slice(shorter), slice(shorter))
-        if np.array_equal(_repeated(letters[corner], side), letters) and np.array_equal(
-            _repeated(levels[corner], side), levels
+        if np.array_equal(_repeat(letters[corner], side), letters) and np.array_equal(
+            _repeat(levels[corner], side), levels
         ):
             letters, levels = letters[corner], levels[corner]
             break
     return "".join(letters.ravel().tolist()), tuple(levels.ravel().tolist())
 
 
-def _repeated(tile: npt.NDArray[Scalar], side: int) -> npt.NDArray[Scalar]:
+def _repeat(tile: npt.NDArray[Scalar], side: int) -> npt.NDArray[Scalar]:
     return np.tile(tile, (side // tile.shape[0], side // tile.shape[1]))
 
 
@@ -88,17 +88,17 @@ _FRACTIONS = (5, 10)
 
 @dataclass(frozen=True, eq=False)
 class DngPattern:
-    """What repeats over the sensor.
+    """Repeating pattern of a sensor.
 
     Parameters
     ----------
     corner
         Row and column of the sensor where the repeats begin.
     colours
-        Shape (rows, columns), one letter per pixel.
+        Letter of each pixel's colour, shape (rows, columns).
     black
-        Black levels in DN, shape (rows, columns), not necessarily those of `colours`; None if the
-        file has none.
+        Black levels in DN, whose shape (rows, columns) may differ from that of `colours`; None if
+        the file has none.
     """
 
     corner: tuple[int, int]
@@ -107,16 +107,28 @@ class DngPattern:
 
 
 def read_dng(content: bytes, height: int, width: int) -> DngPattern | None:
-    """The pattern of the raw image of that size, masked borders included; None if there is none.
+    """Read the pattern of the raw image of a DNG, masked borders included.
+
+    Parameters
+    ----------
+    content
+        The bytes of the file.
+    height, width
+        Size of the raw image in pixels.
+
+    Returns
+    -------
+    DngPattern or None
+        Colours and black levels; None if the file has no such image.
 
     Raises
     ------
     FrameError
-        The sensor's rows are staggered.
+        The rows of the sensor are staggered.
     """
     import tifffile  # exifread does not look into the sub-images, where many a DNG has its raw one
 
-    # It warns through logging of every odd tag; what matters is looked at here.
+    # tifffile warns through logging of every odd tag; the relevant ones are checked here.
     logging.getLogger("tifffile").setLevel(logging.CRITICAL)
     with tifffile.TiffFile(io.BytesIO(content)) as file:
         for page in _pages(file):
@@ -129,7 +141,7 @@ def read_dng(content: bytes, height: int, width: int) -> DngPattern | None:
 
 
 def _pages(file: Any) -> Iterator[Any]:
-    """The first image of an open file, often a preview, and the ones inside it."""
+    """Iterate over the first image of an open file, often a preview, and those inside it."""
     yield file.pages[0]
     yield from file.pages[0].pages or ()
 
@@ -158,12 +170,21 @@ def _pattern(tags: Any, colours: Letters) -> DngPattern:
 
 
 def _numbers(tags: Any, code: int, absent: list[float] | None = None) -> list[float]:
-    """Values of a tag.
+    """Return the values of a tag.
+
+    Parameters
+    ----------
+    tags
+        Tags of an image.
+    code
+        Number of the tag.
+    absent
+        Values if the tag is absent; None requires it.
 
     Raises
     ------
     ValueError
-        It is absent and must not be.
+        The tag is absent and has no default.
     """
     tag = tags.get(code)
     if tag is None:

@@ -1,6 +1,6 @@
-"""A frame in linear numbers: light above black and dark, its variance, and what is saturated.
+"""A frame in linear numbers: signal above black and dark, its variance, and its saturated pixels.
 
-Pixels are worked out where and when they are asked for: of a region no more than the region.
+Pixels are computed on demand, those of a region without the rest of the frame.
 """
 
 from collections.abc import Iterator, Sequence
@@ -26,14 +26,18 @@ Area = tuple[int, int, int, int]
 
 @dataclass(frozen=True, eq=False)
 class RegionSums:
-    """The pixels of each channel in a region, added up row by row of the sensor.
+    """Sums over the pixels of each channel in a region, row by row of the sensor.
 
     Attributes
     ----------
-    value_dn, variance_dn2
-        (rows, C) sums of the values and of their variances; hot pixels are left out.
-    pixels, saturated
-        (rows, C) how many there are, and how many of them are saturated.
+    value_dn
+        Sum of the values in DN without hot pixels, shape (rows, C).
+    variance_dn2
+        Sum of the variances in DN² without hot pixels, shape (rows, C).
+    pixels
+        Number of pixels without hot ones, shape (rows, C).
+    saturated
+        Number of those that are saturated, shape (rows, C).
     """
 
     value_dn: Floats
@@ -43,21 +47,21 @@ class RegionSums:
 
     @property
     def mean_dn(self) -> Floats:
-        """(C,) mean over the pixels; NaN without any."""
+        """Mean over the pixels in DN, shape (C,); NaN without any pixel."""
         return self._over_pixels(self.value_dn.sum(axis=0))
 
     @property
     def sigma_dn(self) -> Floats:
-        """(C,) σ of the mean by the noise of the pixels; NaN where that is not known."""
+        """Standard uncertainty of the mean by pixel noise in DN, shape (C,); NaN if unknown."""
         return self._over_pixels(np.sqrt(self.variance_dn2.sum(axis=0)))
 
     @property
     def is_clipped(self) -> npt.NDArray[np.bool_]:
-        """(C,) whether the mean is too small because pixels are full."""
+        """Whether saturated pixels make the mean too small, shape (C,)."""
         return is_clipped(self.saturated.sum(axis=0), self.pixels.sum(axis=0))
 
     def strip_means_dn(self, strips: int) -> Floats:
-        """(strips, C) means over bands of rows as equal as can be."""
+        """Return the means over bands of rows, as equal as possible, in DN, shape (strips, C)."""
         starts = np.arange(strips) * len(self.pixels) // strips
         pixels = np.add.reduceat(self.pixels, starts)
         return np.asarray(np.add.reduceat(self.value_dn, starts) / np.maximum(pixels, 1))
@@ -69,21 +73,21 @@ class RegionSums:
 
 @dataclass(frozen=True, eq=False)
 class LinearFrame:
-    """A RAW frame and what is known of its camera.
+    """A RAW frame with the calibration of its camera.
 
     Parameters
     ----------
     raw
-        The frame.
+        The RAW frame.
     dark_dn
-        (C,) what each channel counts above black without light, such as a `DarkModel` says for the
-        exposure; None: nothing.
+        Dark level of each channel in DN above black, shape (C,), as a `DarkModel` gives it for the
+        exposure time; None subtracts nothing.
     flat
-        Fall-off of the lens, divided out; None: there is none.
+        Vignetting of the lens, which is divided out; None leaves it.
     noise
-        Of a pixel of each of the C channels; None: not known.
+        Noise of a pixel of each of the C channels; None if unknown.
     hot
-        (height, width) pixels that no sum counts.
+        Hot pixels that no sum counts, shape (height, width).
     """
 
     raw: RawFrame
@@ -93,57 +97,61 @@ class LinearFrame:
     hot: PixelMask | None = None
 
     def value_dn(self, area: Area | None = None) -> Floats:
-        """(rows, columns) light in DN, as it would be in the middle of the lens."""
+        """Return the signal in DN, vignetting divided out, shape (rows, columns)."""
         light = self._window(self.raw.mosaic, area).astype(np.float64)
         dark = np.zeros(len(self.raw.channels)) if self.dark_dn is None else self.dark_dn
         for plane in self._planes(area):
-            light[plane.here] -= plane.black + dark[plane.channel]
+            light[plane.slices] -= plane.black + dark[plane.channel]
             if self.flat is not None:
-                light[plane.here] /= self._falloff(self.flat, plane, area)
+                light[plane.slices] /= self._falloff(self.flat, plane, area)
         return light
 
     def variance_dn2(self, area: Area | None = None) -> Floats:
-        """(rows, columns) variance of `value_dn` by photons and reading; NaN if not known."""
+        """Return the variance of `value_dn` by photon and read noise in DN²; NaN if unknown."""
         level = self._window(self.raw.mosaic, area).astype(np.float64)
         variance = np.full_like(level, np.nan)
         if self.noise is None:
             return variance
         for plane in self._planes(area):
-            of_pixel = self.noise[plane.channel].variance_dn2(level[plane.here] - plane.black)
-            variance[plane.here] = np.maximum(of_pixel, ROUNDING_VARIANCE)
+            pixel_variance = self.noise[plane.channel].variance_dn2(
+                level[plane.slices] - plane.black
+            )
+            variance[plane.slices] = np.maximum(pixel_variance, ROUNDING_VARIANCE)
             if self.flat is not None:
-                variance[plane.here] /= self._falloff(self.flat, plane, area) ** 2
+                variance[plane.slices] /= self._falloff(self.flat, plane, area) ** 2
         return variance
 
     def is_saturated(self, area: Area | None = None) -> PixelMask:
-        """(rows, columns) whether a pixel is at white or above."""
+        """Return whether each pixel is at white or above, shape (rows, columns)."""
         return np.asarray(self._window(self.raw.mosaic, area) >= self.raw.white)
 
     def sums(self, area: Area) -> RegionSums:
-        """What each channel adds up to in an area of the frame."""
+        """Return the sums of each channel in an area of the frame."""
         value, variance = self.value_dn(area), self.variance_dn2(area)
         saturated = self.is_saturated(area)
         kept = np.ones_like(saturated) if self.hot is None else ~self._window(self.hot, area)
-        total, spread, pixels, full = np.zeros((4, len(value), len(self.raw.channels)))
+        value_sum, variance_sum, pixels, saturated_pixels = np.zeros(
+            (4, len(value), len(self.raw.channels))
+        )
         for plane in self._planes(area):
-            rows, own = (plane.here[0], plane.channel), kept[plane.here]
-            total[rows] += value[plane.here].sum(axis=1, where=own)
-            spread[rows] += variance[plane.here].sum(axis=1, where=own)
-            pixels[rows] += own.sum(axis=1)
-            full[rows] += (saturated[plane.here] & own).sum(axis=1)
-        return RegionSums(total, spread, pixels, full)
+            rows, counted = (plane.slices[0], plane.channel), kept[plane.slices]
+            value_sum[rows] += value[plane.slices].sum(axis=1, where=counted)
+            variance_sum[rows] += variance[plane.slices].sum(axis=1, where=counted)
+            pixels[rows] += counted.sum(axis=1)
+            saturated_pixels[rows] += (saturated[plane.slices] & counted).sum(axis=1)
+        return RegionSums(value_sum, variance_sum, pixels, saturated_pixels)
 
     def of_region(self, region: Region) -> RegionSums:
-        """What each channel adds up to in a region, in fractions of the frame."""
+        """Return the sums of each channel in a region, in fractions of the frame."""
         return self.sums(region_pixels(region, self.raw.width, self.raw.height))
 
     def middle_columns(self, region: Region) -> Floats:
-        """(C,) mean place of each channel's pixels across the frame, their middles at .5."""
+        """Return the mean column of each channel's pixels, shape (C,); pixel centres are at .5."""
         area = region_pixels(region, self.raw.width, self.raw.height)
         x, _, width, height = area
         pixels = np.zeros((len(self.raw.channels), width))
         for plane in self._planes(area):
-            rows, columns = plane.here
+            rows, columns = plane.slices
             pixels[plane.channel, columns] += len(range(height)[rows])
         return np.asarray(pixels @ (np.arange(x, x + width) + 0.5) / pixels.sum(axis=1))
 
@@ -152,18 +160,18 @@ class LinearFrame:
         return pixels[y : y + height, x : x + width]
 
     def _planes(self, area: Area | None) -> Iterator["_Plane"]:
-        """The positions of the colour filter in an area."""
+        """Iterate over the positions of the colour filter in an area."""
         raw, (x, y, *_) = self.raw, area or (0, 0)
         side = raw.cfa_side
         for row, column in np.ndindex(side, side):
             position = side * ((y + row) % side) + (x + column) % side
-            here = slice(row, None, side), slice(column, None, side)
-            yield _Plane(raw.channels.index(raw.cfa[position]), raw.black[position], here)
+            slices = slice(row, None, side), slice(column, None, side)
+            yield _Plane(raw.channels.index(raw.cfa[position]), raw.black[position], slices)
 
     def _falloff(self, flat: Flat, plane: "_Plane", area: Area | None) -> Floats:
-        """What is left of the light at the pixels of a plane."""
+        """Return the transmission of the lens relative to its axis at the pixels of a plane."""
         raw, (x, y, width, height) = self.raw, area or (0, 0, self.raw.width, self.raw.height)
-        rows, columns = plane.here
+        rows, columns = plane.slices
         across, down = np.meshgrid(
             np.arange(x, x + width)[columns] + 0.5, np.arange(y, y + height)[rows] + 0.5
         )
@@ -171,17 +179,28 @@ class LinearFrame:
 
 
 class _Plane(NamedTuple):
-    """The pixels of one position of the colour filter: their channel, black level and place."""
+    """Pixels of one position of the colour filter.
+
+    Attributes
+    ----------
+    channel
+        Number of their channel.
+    black
+        Their black level in DN.
+    slices
+        Their rows and columns in the area.
+    """
 
     channel: int
     black: float
-    here: tuple[slice, slice]
+    slices: tuple[slice, slice]
 
 
 def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
-    """A picture (rows, columns, C): means above black of each channel in the colour filter's cells.
+    """Return the means of each channel in the cells of the colour filter, in DN above black.
 
-    Binning and not demosaicing: nothing is invented. Without a filter, cells have 2 × 2 pixels.
+    The picture has the shape (rows, columns, C). It is binned and not demosaiced, so that no value
+    is interpolated. Without a colour filter, cells have 2 × 2 pixels.
     """
     side = max(raw.cfa_side, 2)
     rows, columns = raw.height // side, raw.width // side
@@ -196,8 +215,28 @@ def cell_means_dn(raw: RawFrame) -> npt.NDArray[np.float32]:
 
 
 def saturated_cells(raw: RawFrame) -> PixelMask:
-    """(rows, columns) whether some pixel of a cell of `cell_means_dn` is saturated."""
+    """Mark the cells of the colour filter in which some pixel is saturated.
+
+    Parameters
+    ----------
+    raw
+        The RAW frame.
+
+    Returns
+    -------
+    ndarray of bool
+        True where a cell is saturated, shape (rows, columns) of the picture by `binned`.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.reduce import saturated_cells
+    >>> saturated = saturated_cells(labrig.read_raw(Path("frame.dng")))
+    >>> saturated.shape, bool(saturated.any())
+    ((32, 48), False)
+    """
     side = max(raw.cfa_side, 2)
     rows, columns = raw.height // side, raw.width // side
-    whole = raw.mosaic[: side * rows, : side * columns].reshape(rows, side, columns, side)
-    return np.asarray((whole >= raw.white).any(axis=(1, 3)))
+    cells = raw.mosaic[: side * rows, : side * columns].reshape(rows, side, columns, side)
+    return np.asarray((cells >= raw.white).any(axis=(1, 3)))

@@ -1,4 +1,4 @@
-"""The frames of a run, each read once and seen in every patch of the sample."""
+"""The frames of a run, each read once and measured in every patch of the sample."""
 
 from collections.abc import Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor
@@ -24,12 +24,18 @@ class SeriesFrame:
 
     Parameters
     ----------
-    t_s, exposure_s
-        Start of the exposure (after lamp off) and its length. Of a dark frame, `t_s` is not used.
+    path
+        Path of the RAW file.
+    t_s
+        Begin of the exposure in seconds after lamp off; not used of a dark frame.
+    exposure_s
+        Exposure time in seconds.
     iso, f_number
-        None: as the file's EXIF says.
-    unit, flag
-        Unit of the run, and flags it already has.
+        ISO and f-number; None takes those of the file's EXIF.
+    unit
+        Unit of the run.
+    flag
+        Flags that the frame already has.
     """
 
     path: Path
@@ -43,21 +49,39 @@ class SeriesFrame:
 
 @dataclass(frozen=True, eq=False)
 class RegionMeasurement:
-    """A region of a frame: what is in it, and how its strips (C, strips) deviate from its mean."""
+    """Measurement of a region of a frame.
+
+    Attributes
+    ----------
+    measured
+        Statistics of the channels.
+    strips
+        Deviations of the region's strips from its mean in DN, shape (C, strips).
+    """
 
     measured: FrameMeasurement
     strips: Floats
 
     @property
     def kind(self) -> tuple[int, int, tuple[str, ...]]:
-        """What frames that belong together have in common: size and channels."""
+        """Width, height and channels, which frames of one sensor have in common."""
         measured = self.measured
         return (measured.width, measured.height, tuple(measured.channels))
 
 
 @dataclass(frozen=True)
 class MeasuredFrame:
-    """A frame, seen in every patch and in the background, if there is one."""
+    """A frame measured in every patch.
+
+    Attributes
+    ----------
+    frame
+        The frame.
+    patches
+        Measurement of each patch by its name.
+    background
+        Measurement of the background region; None if there is none.
+    """
 
     frame: SeriesFrame
     patches: Mapping[str, RegionMeasurement]
@@ -65,12 +89,12 @@ class MeasuredFrame:
 
     @property
     def iso(self) -> float:
-        """NaN where neither the run nor the file says."""
+        """ISO by the run or the file's EXIF; NaN if neither has it."""
         return _first(self.frame.iso, *(view.measured.iso for view in self.patches.values()))
 
     @property
     def f_number(self) -> float:
-        """NaN where neither the run nor the file says."""
+        """F-number by the run or the file's EXIF; NaN if neither has it."""
         views = self.patches.values()
         return _first(self.frame.f_number, *(view.measured.f_number for view in views))
 
@@ -82,17 +106,31 @@ def measure_frames(
     hot: PixelMask | None,
     read: Mapping[Path, RawFrame],
 ) -> list[MeasuredFrame]:
-    """All `frames` in order; one is decoded, unless it is `read`, while another is measured."""
+    """Measure all frames in their order; one is decoded while another is measured.
 
-    def shot(frame: SeriesFrame) -> MeasuredFrame:
+    Parameters
+    ----------
+    frames
+        Frames on disk.
+    patches
+        Region of each patch by its name.
+    background
+        Region of the background; None if there is none.
+    hot
+        Hot pixels to leave out, shape (height, width).
+    read
+        Frames that are already decoded, by path.
+    """
+
+    def decode_and_measure(frame: SeriesFrame) -> MeasuredFrame:
         raw = read.get(frame.path) or read_raw(frame.path)
-        return _shot(frame, raw, patches, background, hot)
+        return _measure_frame(frame, raw, patches, background, hot)
 
     with ThreadPoolExecutor(_FRAMES_AT_ONCE) as pool:
-        return list(pool.map(shot, frames))
+        return list(pool.map(decode_and_measure, frames))
 
 
-def _shot(
+def _measure_frame(
     frame: SeriesFrame,
     raw: RawFrame,
     patches: Mapping[str, Region],
@@ -117,7 +155,7 @@ def _shot(
 
 
 def levels(views: Sequence[RegionMeasurement]) -> tuple[Floats, Floats]:
-    """Means and what each frame by itself says of their sigma in DN, each of shape (n, C)."""
+    """Return means and their σ by each frame alone, in DN, shape (n, C) each."""
     kinds = {view.kind for view in views}
     if len(kinds) > 1:
         raise DataError(f"expected frames of one sensor and size, got {sorted(kinds)}")
@@ -127,7 +165,7 @@ def levels(views: Sequence[RegionMeasurement]) -> tuple[Floats, Floats]:
 
 
 def strips(views: Sequence[RegionMeasurement]) -> Floats:
-    """Their strips' deviations in DN, shape (n, C, strips)."""
+    """Return the deviations of the strips in DN, shape (n, C, strips)."""
     return np.stack([view.strips for view in views])
 
 

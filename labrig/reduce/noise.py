@@ -1,21 +1,21 @@
 """Temporal noise of one colour plane, estimated from a single frame.
 
-Wanted is the variance of a *mean over pixels* under photon and read noise alone: the pattern of
-the sample, vignetting and the lamp's gradient must not count, hot pixels must not count, and noise
-that neighbouring pixels share must count more. Small tiles spread over the plane serve for all
-three:
+The quantity estimated is the variance of a *mean over pixels* under photon and read noise alone:
+the sample's structure, vignetting and the lamp's gradient must not count, hot pixels must not
+count, and noise that neighbouring pixels share must count more. Small tiles spread over the plane
+serve for all three:
 
 - the second difference across rows and columns, [1 −2 1]ᵀ[1 −2 1]/6, removes every structure of
   the form f(x) + g(y) and keeps white noise (Immerkær, CVIU 64, 1996);
 - its outliers are trimmed in each tile (hot pixels), and tiles that are rougher than others of
   the same brightness are left out (edges of the sample);
 - the residual of a cubic surface in each tile gives the autocovariance C(h) of the noise at
-  short lags h, from which Var(mean) = Σ_h C(h)/n; it is believed only if it is significant, alike
+  short lags h, from which Var(mean) = Σ_h C(h)/n; it is used only if it is significant, alike
   in all tiles and gone at longer lags: structure varies and reaches far, shared noise does not.
 
-Two things one frame cannot tell. Structure as fine as a pixel all over the region counts as
-noise: the variance comes out too large. Noise shared by whole rows does not: too small. Pairs of
-frames tell both (`labrig.reduce.pair_noise`).
+A single frame has two limits. Structure as fine as a pixel all over the region counts as noise:
+the variance comes out too large. Noise shared by whole rows does not: too small. Pairs of frames
+resolve both (`labrig.reduce.pair_noise`).
 """
 
 from collections.abc import Sequence
@@ -34,26 +34,26 @@ NumberArray = TypeVar("NumberArray", npt.NDArray[np.float64], npt.NDArray[np.int
 
 #: Side of a tile in pixels of one colour: a cubic describes smooth light over 24 sensor pixels.
 TILE = 12
-#: Tiles looked at per plane and direction: 256 tiles give the variance to 2 %.
+#: Tiles per plane and direction: 256 tiles determine the variance to 2 %.
 TILES_ACROSS = 16
-#: Pixels per direction from which the brightness of a plane is told.
+#: Pixels per direction from which the brightness of a plane is estimated.
 _SAMPLES_ACROSS = 256
-#: Lags of one half-plane (row, column): where noise may be shared …
+#: Lags (row, column) of one half-plane at which noise may be correlated.
 _NEAR = tuple((y, x) for y in range(3) for x in range(-2, 3) if (y, x) >= (0, 0))
-#: … and where only structure reaches.
+#: Lags at which only structure is correlated.
 _FAR = tuple(lag for far in (3, 4, 5, 6) for lag in ((0, far), (far, 0)))
-#: Standard deviations by which a correlation must stand out to be corrected for.
+#: Significance in standard deviations from which a correlation is corrected for.
 _SIGNIFICANT = 4.0
-#: Correlation with some neighbour below which there is none worth a correction.
+#: Correlation with some neighbour below which no correction is made.
 _CLEAR = 0.05
 #: Spread over the tiles of ln(C(0)/variance by differences). Shared noise raises it alike in all
-#: (0.2 to 0.6 with noise made for the role), detail of a scene does not (1.6 to 2.9 in photos).
+#: (0.2 to 0.6 with synthetic noise), detail of a scene does not (1.6 to 2.9 in photos).
 _UNIFORM = 1.0
 #: Fraction of the nearest neighbours' correlation that may remain at the far lags.
 _FAR_FRACTION = 0.15
-#: Chance scatters the variance of a tile by a quarter: at this multiple it has structure in it.
+#: Multiple of the line's variance from which a tile has structure; noise scatters it by a quarter.
 _ROUGH = 2.0
-#: |ln| of a tile's variance over the line's beyond which it says nothing about the line.
+#: |ln| of a tile's variance over the line's at which its misfit is capped.
 _MISFIT_CAP = 1.0
 
 
@@ -63,12 +63,15 @@ class PlaneNoise:
 
     Parameters
     ----------
-    darkest_level, above_darkest
-        Temporal variance of a pixel by its level (DN) above that of the darkest tile.
+    darkest_level
+        Mean of the darkest tile in DN.
+    above_darkest
+        Temporal variance of a pixel in DN² by its level in DN above that of the darkest tile.
     mean_variance
-        n · Var(mean over n pixels), DN²: the pixels' variance times their correlation.
+        n · Var(mean over n pixels) in DN²: the variance of the pixels times `correlation`.
     correlation
-        That factor: 1 where pixels are independent.
+        Factor by which correlated noise raises the variance of a mean: 1 where pixels are
+        independent.
     """
 
     darkest_level: float
@@ -77,31 +80,40 @@ class PlaneNoise:
     correlation: float
 
     def variance_at(self, level: Floats) -> Floats:
-        """Temporal variance in DN² of pixels at `level`, never below that of rounding."""
+        """Return the temporal variance of pixels at `level` in DN², at least that of rounding."""
         line = self.above_darkest
         rise = line.photon_dn * (level - self.darkest_level)
         return np.maximum(line.read_dn2 + rise, ROUNDING_VARIANCE)
 
 
 def plane_noise(planes: Sequence[Mosaic]) -> list[PlaneNoise]:
-    """Noise of each of `planes`, shape (rows, columns) ≥ (3, 3), pixels of one colour.
+    """Estimate the noise of each of several colour planes.
 
-    They are looked at together: many small planes cost little more than one.
+    The planes are processed together: many small planes cost little more than one.
+
+    Parameters
+    ----------
+    planes
+        Pixels of one colour in DN, shape (rows, columns) ≥ (3, 3) each.
     """
     tiles = [_tiles(plane) for plane in planes]
     noises: dict[int, PlaneNoise] = {}
-    for shape in {of_plane.shape[1:] for of_plane in tiles}:
-        alike = [index for index, of_plane in enumerate(tiles) if of_plane.shape[1:] == shape]
-        stacked = np.concatenate([tiles[index] for index in alike])
+    for shape in {plane_tiles.shape[1:] for plane_tiles in tiles}:
+        same_shape = [
+            index for index, plane_tiles in enumerate(tiles) if plane_tiles.shape[1:] == shape
+        ]
+        stacked = np.concatenate([tiles[index] for index in same_shape])
         level, variance = stacked.mean(axis=(1, 2)), _second_difference_variance(stacked)
-        sharing = _autocovariance(stacked) if shape == (TILE, TILE) else None
+        covariances = _autocovariance(stacked) if shape == (TILE, TILE) else None
         end = 0
-        for index in alike:
+        for index in same_shape:
             start, end = end, end + len(tiles[index])
             noises[index] = _noise_of_plane(
                 level[start:end],
                 variance[start:end],
-                None if sharing is None else (sharing[0][start:end], sharing[1][start:end]),
+                None
+                if covariances is None
+                else (covariances[0][start:end], covariances[1][start:end]),
                 _brightness(planes[index]),
             )
     return [noises[index] for index in range(len(planes))]
@@ -110,65 +122,67 @@ def plane_noise(planes: Sequence[Mosaic]) -> list[PlaneNoise]:
 def _noise_of_plane(
     level: Floats,
     variance: Floats,
-    sharing: tuple[Floats, npt.NDArray[np.bool_]] | None,
+    covariances: tuple[Floats, npt.NDArray[np.bool_]] | None,
     brightness: float,
 ) -> PlaneNoise:
-    """Noise of a plane from its n tiles.
+    """Estimate the noise of a plane from its n tiles.
 
     Parameters
     ----------
-    level, variance
-        Mean and variance by differences of each tile, shape (n,).
-    sharing
+    level
+        Mean of each tile in DN, shape (n,).
+    variance
+        Variance of each tile by second differences in DN², shape (n,).
+    covariances
         Autocovariance of each tile, and whether it is clean; None of tiles that are too small.
     brightness
-        Mean of the plane.
+        Mean of the plane in DN.
     """
     darkest = float(level.min())
     above = level - darkest
     line = _photon_line(above, variance)
     correlation = 1.0
-    if sharing is not None:
-        # Only tiles on the line say whether noise is shared: in the others it is the sample.
+    if covariances is not None:
+        # Only tiles on the line show shared noise: the others are dominated by the sample.
         by_line = line.variance_dn2(above)
-        plain = variance <= _ROUGH * by_line
-        autocovariance, clean = sharing
-        correlation = _correlation(autocovariance[plain & clean], by_line[plain & clean])
+        on_line = variance <= _ROUGH * by_line
+        autocovariance, clean = covariances
+        correlation = _correlation(autocovariance[on_line & clean], by_line[on_line & clean])
         if correlation > 1:
             # Differences of pixels that share noise are too small: take C(0) itself.
-            variance = np.where(plain, autocovariance[:, 0], np.inf)
-            line = _photon_line(above[plain], variance[plain])
+            variance = np.where(on_line, autocovariance[:, 0], np.inf)
+            line = _photon_line(above[on_line], variance[on_line])
     expected = line.variance_dn2(above)
     smooth = np.where(variance <= _ROUGH * expected, variance, expected)
     # Few tiles may miss how much of the plane is bright, thousands of single pixels do not.
-    missed = line.photon_dn * (brightness - float(level.mean()))
-    mean_variance = max(float(smooth.mean()) + missed, 0.0) * correlation
+    correction = line.photon_dn * (brightness - float(level.mean()))
+    mean_variance = max(float(smooth.mean()) + correction, 0.0) * correlation
     return PlaneNoise(darkest, line, mean_variance, correlation)
 
 
 def _tiles(plane: Mosaic) -> Floats:
-    """Tiles of `plane`, shape (n, side, side), spread evenly from border to border."""
+    """Cut tiles of `plane`, shape (n, side, side), spread evenly from border to border."""
     rows, columns = (_tile_pixels(side) for side in plane.shape)
     tiles = plane[rows[:, np.newaxis, :, np.newaxis], columns[:, np.newaxis, :]]
     return tiles.reshape(-1, rows.shape[1], columns.shape[1]).astype(np.float64)
 
 
 def _brightness(plane: Mosaic) -> float:
-    """Mean of `plane` from evenly spread pixels."""
+    """Return the mean of `plane` from evenly spread pixels."""
     down, right = (-(-side // _SAMPLES_ACROSS) for side in plane.shape)
     return float(plane[::down, ::right].mean())
 
 
 @cache
 def _tile_pixels(side: int) -> npt.NDArray[np.intp]:
-    """Indices of the pixels of each tile along a side, shape (tiles, pixels)."""
+    """Return the indices of the pixels of each tile along a side, shape (tiles, pixels)."""
     pixels = min(TILE, side)
     starts = np.linspace(0, side - pixels, min(TILES_ACROSS, side // pixels))
     return np.rint(starts).astype(np.intp)[:, np.newaxis] + np.arange(pixels)
 
 
 def _second_difference_variance(tiles: Floats) -> Floats:
-    """Variance of each tile's noise in DN², shape (n,)."""
+    """Return the variance of each tile's noise in DN², shape (n,)."""
     across = tiles[:, :-2] - 2 * tiles[:, 1:-1] + tiles[:, 2:]
     residual = np.abs(across[:, :, :-2] - 2 * across[:, :, 1:-1] + across[:, :, 2:]) / 6
     residual = residual.reshape(len(tiles), -1)
@@ -176,40 +190,40 @@ def _second_difference_variance(tiles: Floats) -> Floats:
 
 
 def _trimmed_mean_square(magnitude: Floats, sigmas: float) -> Floats:
-    """Mean square along the last axis of what lies within `sigmas` robust deviations."""
+    """Return the mean square along the last axis of values within `sigmas` robust deviations."""
     limit = sigmas * np.sqrt(_robust_variance(magnitude) + ROUNDING_VARIANCE)
     kept = magnitude <= limit[..., np.newaxis]
     return np.asarray(np.sum(np.square(magnitude), axis=-1, where=kept) / kept.sum(axis=-1))
 
 
 def _robust_variance(magnitude: Floats) -> Floats:
-    """Variance of a zero-mean normal from the median of |x| along the last axis."""
+    """Return the variance of a zero-mean normal from the median of |x| along the last axis."""
     return np.square(1.4826 * _median(magnitude))
 
 
 def _median(values: Floats) -> Floats:
-    """Median along the last axis: `np.median` is five times as slow where there are few values."""
+    """Return the median along the last axis, five times as fast as `np.median` for few values."""
     low, high = (values.shape[-1] - 1) // 2, values.shape[-1] // 2
     parted = np.partition(values, (low, high), axis=-1)
     return np.asarray((parted[..., low] + parted[..., high]) / 2)
 
 
 def _photon_line(level: Floats, variance: Floats) -> NoiseModel:
-    """The photon-transfer line that most tiles lie on.
+    """Fit the photon-transfer line that most tiles lie on.
 
-    No least squares: of the lines through the medians of two groups of like brightness (or flat
-    through one), the one with the least capped misfit, in logarithms: tiles with structure, however
-    many at one brightness and however rough, pull no more than the cap.
+    Of the lines through the medians of two groups of similar brightness (or flat through one), it
+    is the one with the least capped misfit, in logarithms: unlike in a least-squares fit, tiles
+    with structure, however many at one brightness and however rough, pull no more than the cap.
     """
     groups = max(1, min(16, len(level) // 6))
     x, y = _medians_of_groups(level, variance, groups)
     if groups == 1:
         return NoiseModel(float(y[0]), 0.0)
-    one, other = np.triu_indices(len(x), k=1)
-    rising = (x[other] > x[one]) & (y[other] > y[one])
-    one, other = one[rising], other[rising]
-    slope = np.append((y[other] - y[one]) / (x[other] - x[one]), np.zeros(len(x)))
-    intercept = np.append(y[one], y) - slope * np.append(x[one], x)
+    first, second = np.triu_indices(len(x), k=1)
+    rising = (x[second] > x[first]) & (y[second] > y[first])
+    first, second = first[rising], second[rising]
+    slope = np.append((y[second] - y[first]) / (x[second] - x[first]), np.zeros(len(x)))
+    intercept = np.append(y[first], y) - slope * np.append(x[first], x)
     slope, intercept = slope[intercept >= 0], intercept[intercept >= 0]
     line = intercept[:, np.newaxis] + slope[:, np.newaxis] * level
     misfit = np.log((variance + ROUNDING_VARIANCE) / (line + ROUNDING_VARIANCE))
@@ -218,7 +232,7 @@ def _photon_line(level: Floats, variance: Floats) -> NoiseModel:
 
 
 def _medians_of_groups(level: Floats, variance: Floats, groups: int) -> tuple[Floats, Floats]:
-    """Medians of both in groups of like level, as equal in number as can be; shape (groups,)."""
+    """Return medians of level and variance in groups of similar level and size, shape (groups,)."""
     rising = np.argsort(level, kind="stable")
     sizes = np.full(groups, len(level) // groups)
     sizes[: len(level) % groups] += 1
@@ -229,9 +243,9 @@ def _medians_of_groups(level: Floats, variance: Floats, groups: int) -> tuple[Fl
 
 
 def _autocovariance(tiles: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
-    """Covariance of the noise of each tile at the near, then the far lags, shape (n, lags).
+    """Return the covariance of each tile's noise at the near, then the far lags, shape (n, lags).
 
-    With it, shape (n,): whether the tile is free of pixels that stick out.
+    The second array, shape (n,), states whether the tile is free of outliers.
     """
     basis, inverse = _cubic_surface()
     flat = tiles.reshape(len(tiles), -1)
@@ -241,14 +255,14 @@ def _autocovariance(tiles: Floats) -> tuple[Floats, npt.NDArray[np.bool_]]:
     clean = np.all(np.abs(residual) <= limit[:, np.newaxis], axis=1)
     square = residual.reshape(-1, TILE, TILE)
     products = [
-        np.einsum("nyx,nyx->n", a, b) / (a.shape[1] * a.shape[2]) for a, b in _shifted(square)
+        np.einsum("nyx,nyx->n", a, b) / (a.shape[1] * a.shape[2]) for a, b in _lagged_pairs(square)
     ]
-    found = np.stack(products, axis=1)
-    return found @ inverse.T, clean
+    covariance = np.stack(products, axis=1)
+    return covariance @ inverse.T, clean
 
 
 def _correlation(autocovariance: Floats, line: Floats) -> float:
-    """Factor by which shared noise raises the variance of a mean; 1 if none is evident.
+    """Return the factor by which shared noise raises the variance of a mean; 1 if none is evident.
 
     `line`, shape (n,), is each tile's variance by differences of neighbours.
     """
@@ -269,8 +283,8 @@ def _correlation(autocovariance: Floats, line: Floats) -> float:
     return 1 + excess if significant and not reaches_far else 1.0
 
 
-def _shifted(square: NumberArray) -> list[tuple[NumberArray, NumberArray]]:
-    """Both factors of the autocovariance of `square`, shape (…, TILE, TILE), at every lag."""
+def _lagged_pairs(square: NumberArray) -> list[tuple[NumberArray, NumberArray]]:
+    """Return both factors of the autocovariance of `square`, shape (…, TILE, TILE), by lag."""
     pairs = []
     for down, right in _NEAR + _FAR:
         first = square[..., : TILE - down, max(0, -right) : TILE - max(0, right)]
@@ -281,7 +295,7 @@ def _shifted(square: NumberArray) -> list[tuple[NumberArray, NumberArray]]:
 
 @cache
 def _cubic_surface() -> tuple[Floats, Floats]:
-    """Orthonormal cubics of a tile, and what undoes their effect on autocovariances.
+    """Return orthonormal cubics of a tile, and the inverse of their effect on autocovariances.
 
     With R = 1 − QQᵀ the residual of noise of covariance Σ_h C(h) S_h (S_h: the shift by h and
     back) has the autocovariances A = M C, M_gh = tr(R S_g R S_h)/(2 N_g); the inverse of M is
@@ -293,12 +307,14 @@ def _cubic_surface() -> tuple[Floats, Floats]:
     remover = np.eye(TILE**2) - basis @ basis.T
     pixel = np.arange(TILE**2).reshape(TILE, TILE)
     shifts, counts = [], []
-    for first, second in _shifted(pixel):
+    for first, second in _lagged_pairs(pixel):
         shift = np.zeros((TILE**2, TILE**2))
         shift[first.ravel(), second.ravel()] = 1
         shift[second.ravel(), first.ravel()] = 1
         shifts.append(shift)
         counts.append(shift.sum())
-    seen = [remover @ shift @ remover for shift in shifts]
-    effect = [[float(np.sum(s * h)) / n for h in shifts] for s, n in zip(seen, counts, strict=True)]
+    filtered = [remover @ shift @ remover for shift in shifts]
+    effect = [
+        [float(np.sum(s * h)) / n for h in shifts] for s, n in zip(filtered, counts, strict=True)
+    ]
     return np.asarray(basis, dtype=np.float64), np.linalg.inv(np.array(effect))

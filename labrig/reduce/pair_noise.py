@@ -1,15 +1,16 @@
 """Temporal noise of a patch's mean, from pairs of successive frames.
 
-What differs between two frames of the same patch, apart from its brightness, is noise: whatever
-stands still cancels (the sample's structure, its edges, each pixel's own response). So a pair tells
-what a single frame (`labrig.reduce.noise`) cannot: noise that the pixels of a row share, and that
-of a patch too small to be told from its surroundings. It is the photon transfer from pairs of
-Janesick (2007) and EMVA 1288, on strips as wide as the patch instead of single pixels: the scatter
-of a strip contains the correlation of all pixels in it. Dark frames of like exposure are pairs,
-too: they tell the noise of reading, which of a decay only the faintest frames do.
+Two frames of the same patch differ by their noise, apart from their brightness: everything static
+cancels (the sample's structure, its edges, each pixel's own response). A pair therefore resolves
+what a single frame (`labrig.reduce.noise`) cannot: noise that the pixels of a row share, and the
+noise of a patch too small to be estimated from its surroundings. It is the photon transfer from
+pairs of Janesick (2007) and EMVA 1288, on strips as wide as the patch instead of single pixels:
+the scatter of a strip contains the correlation of all pixels in it. Dark frames of similar
+exposure are pairs, too: they determine the read noise, which of a decay only the faintest frames
+do.
 
-What one channel's strips deviate by, another's may, too: rows that are read together, charge that
-strays into the neighbour of another colour. The same differences tell that correlation.
+Deviations of the strips may be correlated between channels: rows that are read together, charge
+that strays into the neighbour of another colour. The same differences determine that correlation.
 """
 
 from collections.abc import Mapping, Sequence
@@ -26,19 +27,18 @@ from labrig.reduce.photon_transfer import NoiseModel, variance_terms
 from labrig.reduce.raw import RawFrame
 from labrig.region import Region, region_pixels
 
-#: Strips of a patch, if it has that many rows of each colour.
+#: Number of strips of a patch, if it has that many rows of each colour.
 STRIPS = 16
-#: Degrees of freedom from which the pairs go before what each frame says: they then know σ to 10 %.
+#: Degrees of freedom from which pairs replace each frame's own estimate: σ is then known to 10 %.
 FEWEST_DOF = 50
-#: Brightness in σ of the mean from which the frames of a pair are brought to the same; what does
-#: not stand out of the noise has no structure that does.
+#: Brightness in σ of the mean from which the frames of a pair are scaled to each other; below it
+#: their structure is within the noise.
 SCALED_SIGMAS = 5.0
-#: Least fraction of the σ that a frame by itself says: frames without noise are no measurement of
-#: it.
+#: Least fraction of the σ by a frame alone: frames without noise are no measurement of it.
 LEAST_FRACTION = 0.1
-#: Rounds in which the weights follow the noise found.
+#: Iterations of the weights by the fitted noise.
 REWEIGHTINGS = 4
-#: Keeps a correlation from being 1 to the last digit.
+#: Regularisation that keeps a correlation below 1.
 LEAST_PRODUCT = 1e-6
 
 
@@ -49,9 +49,9 @@ class PatchNoise:
     Attributes
     ----------
     sigma
-        Shape (n, C), DN.
+        Standard uncertainty of each frame's means in DN, shape (n, C).
     correlation
-        Shape (C, C): of the channels of one frame; what they share as flicker is not in it.
+        Correlation of the channels of one frame, shape (C, C); common-mode flicker is not in it.
     """
 
     sigma: Floats
@@ -65,13 +65,13 @@ class PatchFrames:
     Attributes
     ----------
     exposure_s
-        Shape (n,).
+        Exposure times in seconds, shape (n,).
     deviations
-        Shape (n, C, strips), of `strip_deviations`, DN.
+        Deviations of the strips by `strip_deviations` in DN, shape (n, C, strips).
     light
-        Shape (n, C): means in DN above those of no exposure, dark current included.
+        Means in DN above those of zero exposure, dark current included, shape (n, C).
     sigma
-        Shape (n, C): what each frame by itself says, DN.
+        Standard uncertainty of the means by each frame alone in DN, shape (n, C).
     """
 
     exposure_s: Floats
@@ -80,13 +80,13 @@ class PatchFrames:
     sigma: Floats
 
     def take(self, rows: npt.NDArray[np.intp]) -> "PatchFrames":
-        """Some of the frames."""
+        """Return the given frames."""
         return PatchFrames(
             self.exposure_s[rows], self.deviations[rows], self.light[rows], self.sigma[rows]
         )
 
     def and_then(self, others: "PatchFrames") -> "PatchFrames":
-        """These frames, then the others."""
+        """Return these frames followed by `others`."""
         return PatchFrames(
             np.append(self.exposure_s, others.exposure_s),
             np.concatenate([self.deviations, others.deviations]),
@@ -95,26 +95,26 @@ class PatchFrames:
         )
 
     def pairs_of_like_exposure(self) -> list[tuple[int, int]]:
-        """Frames that differ by nothing but noise, however much dark current leaves its pattern."""
+        """Return pairs of frames that differ by noise only, whatever the dark current's pattern."""
         rising = np.argsort(self.exposure_s, kind="stable").tolist()
         return [
-            (one, other)
-            for one, other in pairwise(rising)
-            if same_exposure(self.exposure_s[one], self.exposure_s[other])
+            (first, second)
+            for first, second in pairwise(rising)
+            if same_exposure(self.exposure_s[first], self.exposure_s[second])
         ]
 
 
 def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Floats:
-    """Means of strips over the width of a region, less the region's mean; shape (C, strips), DN.
+    """Return the means of strips across a region minus the region's mean in DN, shape (C, strips).
 
     Parameters
     ----------
     raw
-        The frame.
+        The RAW frame.
     region
-        Where.
+        Region of the patch in fractions of the frame.
     hot
-        Shape (height, width): pixels to leave out.
+        Hot pixels to leave out, shape (height, width).
     """
     x, y, width, height = region_pixels(region, raw.width, raw.height)
     side = raw.cfa_side
@@ -122,14 +122,14 @@ def strip_deviations(raw: RawFrame, region: Region, hot: PixelMask | None) -> Fl
     total, count = np.zeros((2, len(raw.channels), strips))
     for position, letter in enumerate(raw.cfa):
         row, column = divmod(position, side)
-        here = (
+        slices = (
             slice(y + (row - y) % side, y + height, side),
             slice(x + (column - x) % side, x + width, side),
         )
-        plane = raw.mosaic[here]
+        plane = raw.mosaic[slices]
         if len(plane) < strips:
             continue
-        kept = np.ones(plane.shape, bool) if hot is None else ~hot[here]
+        kept = np.ones(plane.shape, bool) if hot is None else ~hot[slices]
         pixels = kept.sum(axis=1)
         light = plane.sum(axis=1, dtype=np.int64, where=kept) - raw.black[position] * pixels
         starts = np.arange(strips) * len(plane) // strips
@@ -147,47 +147,52 @@ def paired_noise(
     usable: npt.NDArray[np.bool_],
     darks: Mapping[str, PatchFrames],
 ) -> PatchNoise:
-    """Noise of the means of a patch, σ unit by unit.
+    """Estimate the noise of the means of a patch, σ unit by unit.
 
-    What each frame says by itself is kept where pairs are too few, channels then independent.
+    Where there are too few pairs, σ of each frame alone is kept, the channels then independent.
 
     Parameters
     ----------
     frames
         The patch in n frames.
-    t_s, unit, usable
-        Shape (n,) each: when, in which unit, and whether the frame can be in a pair.
+    t_s
+        Begin of each exposure in seconds, shape (n,).
+    unit
+        Unit of each frame.
+    usable
+        Whether the frame can be in a pair, shape (n,).
     darks
         Dark frames at the ISO of each unit, where there are any.
     """
-    found = frames.sigma.copy()
-    channels = found.shape[1]
+    sigma = frames.sigma.copy()
+    channels = sigma.shape[1]
     products = LEAST_PRODUCT * np.eye(channels)
-    for one in dict.fromkeys(unit):
-        rows = np.array([row for row, name in enumerate(unit) if name == one])
+    for name in dict.fromkeys(unit):
+        rows = np.array([row for row, row_unit in enumerate(unit) if row_unit == name])
         paired = np.flatnonzero(usable[rows])
         paired = paired[np.argsort(t_s[rows[paired]], kind="stable")]
         pairs = list(pairwise(paired.tolist()))
         if len(pairs) * (frames.deviations.shape[2] - 1) < FEWEST_DOF:
             continue
         part = frames.take(rows)
-        if one in darks:
-            dark_pairs = darks[one].pairs_of_like_exposure()
+        if name in darks:
+            dark_pairs = darks[name].pairs_of_like_exposure()
             pairs += [(len(rows) + first, len(rows) + second) for first, second in dark_pairs]
-            part = part.and_then(darks[one])
+            part = part.and_then(darks[name])
         first, second = np.array(pairs).T
         for channel in range(channels):
-            found[rows, channel] = _sigma_of_means(part, channel, first, second)[: len(rows)]
+            sigma[rows, channel] = _sigma_of_means(part, channel, first, second)[: len(rows)]
         light = second < len(rows)
-        products += _cross_products(frames.take(rows), found[rows], first[light], second[light])
+        products += _cross_products(frames.take(rows), sigma[rows], first[light], second[light])
     length = np.sqrt(np.diag(products))
-    return PatchNoise(found, products / np.outer(length, length))
+    return PatchNoise(sigma, products / np.outer(length, length))
 
 
 def paired_dark_sigma(darks: PatchFrames) -> Floats:
-    """Standard uncertainty in DN of the means of a patch in dark frames, shape (n, C).
+    """Return the standard uncertainty of the means of a patch in dark frames in DN, shape (n, C).
 
-    From pairs of like exposure; what each frame says by itself where these are too few.
+    It is estimated from pairs of similar exposure, or from each frame alone where these are too
+    few.
     """
     pairs = darks.pairs_of_like_exposure()
     if len(pairs) * (darks.deviations.shape[2] - 1) < FEWEST_DOF:
@@ -198,47 +203,48 @@ def paired_dark_sigma(darks: PatchFrames) -> Floats:
 
 
 def _cross_products(
-    frames: PatchFrames, sigma: Floats, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
+    frames: PatchFrames, sigma: Floats, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
 ) -> Floats:
-    """Of the channels' differences between paired frames, in σ, shape (C, C)."""
-    scales, differences = _differences(frames, sigma, one, other)
-    expected = np.square(sigma[other]) + np.square(scales * sigma[one])
+    """Sum products of the channels' normalised differences over paired frames, shape (C, C)."""
+    scales, differences = _differences(frames, sigma, first, second)
+    expected = np.square(sigma[second]) + np.square(scales * sigma[first])
     normal = differences / np.sqrt(expected)[..., np.newaxis]
     products: Floats = np.einsum("pcs,pds->cd", normal, normal)
     return products
 
 
 def _differences(
-    frames: PatchFrames, sigma: Floats, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
+    frames: PatchFrames, sigma: Floats, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
 ) -> tuple[Floats, Floats]:
-    """By what `one` frame is scaled to the `other`, (p, C); strips of their difference, (p, C, s).
+    """Return scales and differences of p pairs of frames.
 
-    A frame that is nothing but noise is not scaled.
+    The scale of the first frame to the second has shape (p, C), the difference of their s strips
+    (p, C, s). A frame that is nothing but noise is not scaled.
     """
     light = np.maximum(frames.light, 0)
-    bright = light[one] > SCALED_SIGMAS * sigma[one]
-    scales = np.where(bright, light[other] / np.where(bright, light[one], 1.0), 1.0)
-    return scales, frames.deviations[other] - scales[..., np.newaxis] * frames.deviations[one]
+    is_bright = light[first] > SCALED_SIGMAS * sigma[first]
+    scales = np.where(is_bright, light[second] / np.where(is_bright, light[first], 1.0), 1.0)
+    return scales, frames.deviations[second] - scales[..., np.newaxis] * frames.deviations[first]
 
 
 def _sigma_of_means(
-    frames: PatchFrames, channel: int, one: npt.NDArray[np.intp], other: npt.NDArray[np.intp]
+    frames: PatchFrames, channel: int, first: npt.NDArray[np.intp], second: npt.NDArray[np.intp]
 ) -> Floats:
-    """σ of the means of one channel, shape (n,), from pairs of `one` frame and an `other`.
+    """Return σ of the means of one channel in DN, shape (n,), from pairs of frames.
 
-    Uneven is what is proportional to the light but not common to the patch.
+    The uneven part is proportional to the light but not common to the patch.
     """
-    scales, differences = _differences(frames, frames.sigma, one, other)
+    scales, differences = _differences(frames, frames.sigma, first, second)
     scale, difference, sigma = scales[:, channel], differences[:, channel], frames.sigma[:, channel]
     strips = difference.shape[1]
     light = frames.light[:, channel]
     scatter = np.square(difference).sum(axis=1) / (strips - 1) / strips
     terms = variance_terms(light)
-    of_pair = terms[other] + np.square(scale)[:, np.newaxis] * terms[one]
+    pair_terms = terms[second] + np.square(scale)[:, np.newaxis] * terms[first]
     variance = np.square(sigma)
     least = LEAST_FRACTION**2 * variance
     for _ in range(REWEIGHTINGS):
-        expected = variance[other] + np.square(scale) * variance[one]
-        noise = NoiseModel.fit(of_pair, scatter, sigma_dn2=expected)
+        expected = variance[second] + np.square(scale) * variance[first]
+        noise = NoiseModel.fit(pair_terms, scatter, sigma_dn2=expected)
         variance = np.maximum(noise.variance_dn2(light), least)
     return np.sqrt(variance)

@@ -29,11 +29,22 @@ from labrig.results import Series, add_flag, is_usable
 def calibrated(
     series: Series, camera: CameraModel, region: Region, width: int, height: int
 ) -> Series:
-    """`series` of a region of frames of `width` × `height` pixels, in DN/s of its first row's
-    settings in the middle of the lens.
+    """Correct the series of a region by the camera's calibration.
 
-    How well the factors are known is not in `sigma`: such errors are common to all frames of a
-    setting, and cancel where there is but one.
+    The values are in DN/s of the first row's settings on the axis of the lens. Uncertainties of the
+    calibration factors are not in `sigma`: such errors are common to all frames of a setting, and
+    cancel where there is only one.
+
+    Parameters
+    ----------
+    series
+        Series of the region in DN/s.
+    camera
+        Calibration of the camera.
+    region
+        The region in fractions of the frame.
+    width, height
+        Size of the frame in pixels.
 
     Raises
     ------
@@ -49,18 +60,22 @@ def calibrated(
         (float(iso), None if np.isnan(f_number) else float(f_number))
         for iso, f_number in zip(series.iso, series.f_number, strict=True)
     ]
-    first, _ = camera.scale(*settings[0])
+    reference_gain, _ = camera.scale(*settings[0])
     gain = {
-        one: camera.flat(one[1], region, width, height) * camera.scale(*one)[0] / first
-        for one in set(settings)
+        setting: camera.flat(setting[1], region, width, height)
+        * camera.scale(*setting)[0]
+        / reference_gain
+        for setting in set(settings)
     }
-    true_s = np.array([camera.exposure_s(told_s)[0] for told_s in series.exposure_s])
-    per_row = (true_s / series.exposure_s)[:, None] * np.array([gain[one] for one in settings])
+    actual_s = np.array([camera.exposure_s(nominal_s)[0] for nominal_s in series.exposure_s])
+    per_row = (actual_s / series.exposure_s)[:, None] * np.array(
+        [gain[setting] for setting in settings]
+    )
     # As the offset acts on a fit, most where weights are highest.
     weights = 1 / np.square(series.sigma)
     return replace(
         series,
-        exposure_s=true_s,
+        exposure_s=actual_s,
         values=series.values / per_row,
         sigma=series.sigma / per_row,
         dark_sigma=series.dark_sigma / np.average(per_row, axis=0, weights=weights),
@@ -71,15 +86,25 @@ def calibrated(
 #: frames: silicon doubles it every 6 °C or so. Dark frames are taken once, an hour or two before
 #: the decay, and 20 min of warming up leave a camera a degree or two to go.
 TWO_DEGREES = 2 ** (2 / 6) - 1
-#: Correlation that errors of different channels have at most.
+#: Largest correlation of the errors of different channels.
 MOST_COMMON = 0.99
-#: Dark frames held in memory at once, to look for hot pixels.
+#: Dark frames held in memory at once, to find hot pixels.
 _DARKS_FOR_HOT = 5
 
 
 @dataclass(frozen=True, eq=False)
-class _Dark:
-    """A patch in the dark frames of one ISO, of one `kind` of frame."""
+class _PatchDark:
+    """Dark level of a patch at one ISO.
+
+    Attributes
+    ----------
+    kind
+        Width, height and channels of the dark frames.
+    model
+        Dark level over exposure time.
+    frames
+        The patch in the dark frames.
+    """
 
     kind: tuple[int, int, tuple[str, ...]]
     model: DarkModel
@@ -93,7 +118,50 @@ def reduce_series(
     background: Region | None = None,
     name: str = "",
 ) -> Series:
-    """The series of one patch, called `name`; see `reduce_patches`."""
+    """Reduce frames to the time series of one patch.
+
+    Parameters
+    ----------
+    frames
+        Light frames; those of one unit have one ISO and one f-number.
+    region
+        Region of the patch as (x, y, width, height) in fractions of the frame.
+    darks
+        Dark frames at the same ISO, as for `reduce_patches`.
+    background
+        Dark region of the light frames, whose level is subtracted instead of the dark frames'.
+    name
+        Name of the patch in the series.
+
+    Returns
+    -------
+    Series
+        Signal in DN/s with its standard uncertainty, one row for each frame in the given order.
+
+    Raises
+    ------
+    DataError
+        ISO or f-number differ within a unit, an exposure time is not above 0 s, or no dark frames
+        match.
+    FrameError, UsageError
+        A frame cannot be read, or the region leaves it.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.reduce import SeriesFrame, reduce_series
+    >>> run = labrig.read_run("runs/decay")
+    >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
+    >>> glow = run.frames("decay")[:3]
+    >>> frames = [
+    ...     SeriesFrame(frame.path, frame.start_time - glow[0].start_time, frame.exposure_s)
+    ...     for frame in glow
+    ... ]
+    >>> series = reduce_series(frames, (0.25, 0.25, 0.5, 0.5), darks, name="paint")
+    >>> green = series.channels.index("G")
+    >>> [f"{value:.0f} DN/s" for value in series.values[:, green]]
+    ['8894 DN/s', '4806 DN/s', '3319 DN/s']
+    """
     return reduce_patches(frames, {name: region}, darks, background)[name]
 
 
@@ -104,53 +172,74 @@ def reduce_patches(
     background: Region | None = None,
     camera: CameraModel | None = None,
 ) -> dict[str, Series]:
-    """The series of each patch, in DN/s, with a row for every frame in the given order.
+    """Reduce frames to the time series of each patch.
+
+    Frames in which a patch is clipped (`is_clipped`) are flagged, not dropped. The standard
+    uncertainty comes from pairs of successive frames of a unit, and of dark frames of one exposure
+    time; where there are too few pairs, from each frame alone.
 
     Parameters
     ----------
     frames
         Light frames; those of one unit have one ISO and one f-number.
     patches
-        Where each patch lies, by its name.
+        Region of each patch by its name, as (x, y, width, height) in fractions of the frame.
     darks
-        Dark frames at the same ISO, best at the shortest and the longest exposure and two or
-        more of the longest, whose hot pixels are then left out. Their level is subtracted.
+        Dark frames at the same ISO, best at the shortest and the longest exposure and two or more
+        of the longest, whose hot pixels are then left out. Their level is subtracted.
     background
-        A dark region of the frames themselves, whose level is subtracted instead.
+        Dark region of the light frames, whose level is subtracted instead of the dark frames'.
     camera
-        Calibration by which true shutter times, fall-off and settings are put right.
+        Calibration by which actual exposure times, vignetting and gains of the settings are
+        corrected; None leaves the values as they are.
 
-    Frames in which a patch is clipped (`is_clipped`) are flagged so, not dropped. Sigma comes from
-    pairs of successive frames of a unit, and of dark frames of one exposure, if there are enough of
-    a unit, else from each frame alone.
+    Returns
+    -------
+    dict of str to Series
+        Signal of each patch in DN/s with its standard uncertainty, one row for each frame in the
+        given order.
 
     Raises
     ------
     DataError
-        Frames of different ISO or f-number in one unit, no exposure, no dark frames that match, or
-        a calibration of another camera or aperture.
+        ISO or f-number differ within a unit, an exposure time is not above 0 s, no dark frames
+        match, or the calibration is of another camera or aperture.
     FrameError, UsageError
-        As `read_raw` and `measure`.
+        A frame cannot be read, or a region leaves it.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.reduce import SeriesFrame, reduce_patches
+    >>> run = labrig.read_run("runs/decay")
+    >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
+    >>> first = run.frames("decay")[0]
+    >>> frames = [SeriesFrame(first.path, 1.06, first.exposure_s)]
+    >>> halves = {"left": (0.25, 0.25, 0.25, 0.5), "right": (0.5, 0.25, 0.25, 0.5)}
+    >>> for name, series in reduce_patches(frames, halves, darks).items():
+    ...     print(name, [f"{value:.2g}" for value in series.values[0]], series.flag)
+    left ['1.1e+03', '8.9e+03', '5.1e+03'] ('',)
+    right ['1.1e+03', '8.9e+03', '5.1e+03'] ('',)
     """
     if not frames or not patches:
         raise DataError(f"expected frames and patches, got {len(frames)} and {len(patches)}")
     longest = _read_longest(darks)
     hot = hot_pixels(list(longest.values())) if longest else None
-    dark = {} if background else _measured_darks(darks, patches, hot, longest)
-    longest.clear()  # five frames of 42 MB that nobody needs any more
+    dark = {} if background else _patch_darks(darks, patches, hot, longest)
+    longest.clear()  # five frames of 42 MB that are not needed any more
     shots = measure_frames(frames, patches, background, hot, {})
     _check_settings(shots)
     series = {name: _patch_series(name, shots, dark) for name in patches}
     if camera is None:
         return series
     return {
-        name: calibrated(one, camera, patches[name], *_size(shots[0]))
-        for name, one in series.items()
+        name: calibrated(patch_series, camera, patches[name], *_frame_size(shots[0]))
+        for name, patch_series in series.items()
     }
 
 
 def _read_longest(darks: Sequence[SeriesFrame]) -> dict[Path, RawFrame]:
-    """Some of the longest darks; none if they are too few to tell hot pixels."""
+    """Read some of the longest dark frames; none if they are too few to find hot pixels."""
     longest_s = max((dark.exposure_s for dark in darks), default=0.0)
     longest = [dark for dark in darks if dark.exposure_s >= longest_s * (1 - SAME_EXPOSURE)]
     if len(longest) < HOT_FRAMES:
@@ -158,34 +247,34 @@ def _read_longest(darks: Sequence[SeriesFrame]) -> dict[Path, RawFrame]:
     return {dark.path: read_raw(dark.path) for dark in longest[:_DARKS_FOR_HOT]}
 
 
-def _measured_darks(
+def _patch_darks(
     darks: Sequence[SeriesFrame],
     patches: Mapping[str, Region],
     hot: PixelMask | None,
     read: Mapping[Path, RawFrame],
-) -> dict[tuple[str, float], _Dark]:
-    """The dark by patch and ISO."""
+) -> dict[tuple[str, float], _PatchDark]:
+    """Return the dark level by patch and ISO."""
     by_iso: dict[float, list[MeasuredFrame]] = defaultdict(list)
     for shot in measure_frames(darks, patches, None, hot, read):
-        by_iso[_key(shot.iso)].append(shot)
+        by_iso[_setting_key(shot.iso)].append(shot)
     return {
-        (name, iso): _dark([shot.frame.exposure_s for shot in shots], _views(name, shots))
+        (name, iso): _patch_dark([shot.frame.exposure_s for shot in shots], _views(name, shots))
         for iso, shots in by_iso.items()
         for name in patches
     }
 
 
-def _dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]) -> _Dark:
+def _patch_dark(exposures_s: Sequence[float], views: Sequence[RegionMeasurement]) -> _PatchDark:
     exposure_s = np.array(exposures_s)
     level, sigma = levels(views)
     light = level - fit_dark(exposure_s, level, sigma).base
     frames = PatchFrames(exposure_s, strips(views), light, sigma)
     frames = replace(frames, sigma=paired_dark_sigma(frames))
-    return _Dark(views[0].kind, fit_dark(exposure_s, level, frames.sigma), frames)
+    return _PatchDark(views[0].kind, fit_dark(exposure_s, level, frames.sigma), frames)
 
 
 def _patch_series(
-    name: str, shots: Sequence[MeasuredFrame], darks: Mapping[tuple[str, float], _Dark]
+    name: str, shots: Sequence[MeasuredFrame], darks: Mapping[tuple[str, float], _PatchDark]
 ) -> Series:
     exposure_s = np.array([shot.frame.exposure_s for shot in shots])
     t_s = np.array([shot.frame.t_s for shot in shots])
@@ -210,19 +299,19 @@ def _patch_series(
         dark_sigma = np.zeros_like(level)
     elif darks:
         for row, (shot, view) in enumerate(zip(shots, views, strict=True)):
-            found = darks.get((name, _key(shot.iso)))
-            if found is None or found.kind != view.kind:
+            patch_dark = darks.get((name, _setting_key(shot.iso)))
+            if patch_dark is None or patch_dark.kind != view.kind:
                 raise DataError(
                     f"{shot.frame.path}: expected dark frames at ISO {shot.iso:g} as this frame, "
                     "of the same sensor, got none; take some, or name a background region"
                 )
-            dark[row], of_model = found.model.dark_level(shot.frame.exposure_s)
-            unexposed[row] = found.model.base
-            drift[row] = TWO_DEGREES * np.abs(found.model.current(shot.frame.exposure_s))
-            dark_sigma[row] = np.hypot(of_model, drift[row])
-            dark_of_unit[shot.frame.unit] = found.frames
-    own = noise(views, level - (dark if backgrounds else unexposed), sigma)
-    sigma = np.hypot(own.sigma, dark_noise) if backgrounds else own.sigma
+            dark[row], model_sigma = patch_dark.model.dark_level(shot.frame.exposure_s)
+            unexposed[row] = patch_dark.model.base
+            drift[row] = TWO_DEGREES * np.abs(patch_dark.model.current(shot.frame.exposure_s))
+            dark_sigma[row] = np.hypot(model_sigma, drift[row])
+            dark_of_unit[shot.frame.unit] = patch_dark.frames
+    patch_noise = noise(views, level - (dark if backgrounds else unexposed), sigma)
+    sigma = np.hypot(patch_noise.sigma, dark_noise) if backgrounds else patch_noise.sigma
     per_second = exposure_s[:, np.newaxis]
     sigma = sigma / per_second
     # As the offset acts on a fit, most where weights are highest.
@@ -242,24 +331,30 @@ def _patch_series(
         unit=unit,
         flag=flags,
         region=name,
-        correlation=own.correlation,
-        dark_correlation=_dark_correlation(dark_sigma, drift_sigma, own.correlation),
+        correlation=patch_noise.correlation,
+        dark_correlation=_dark_correlation(dark_sigma, drift_sigma, patch_noise.correlation),
     )
 
 
 def _dark_correlation(sigma: Floats, drift: Floats, noise: Floats) -> Floats | None:
-    """Of a dark level's errors (C,): warming is common to all channels, noise as it correlates."""
+    """Return the correlation (C, C) of the dark level's errors.
+
+    Errors by the sensor's warming are common to all channels; those by noise correlate as the
+    noise.
+    """
     if not (sigma > 0).all():
         return None
-    of_model = np.sqrt(np.maximum(np.square(sigma) - np.square(drift), 0.0)) / sigma
-    common = drift / sigma
-    correlation = noise * np.outer(of_model, of_model) + np.outer(common, common)
+    model_fraction = np.sqrt(np.maximum(np.square(sigma) - np.square(drift), 0.0)) / sigma
+    drift_fraction = drift / sigma
+    correlation = noise * np.outer(model_fraction, model_fraction) + np.outer(
+        drift_fraction, drift_fraction
+    )
     # A dark level known without noise would make the errors all one.
     return np.where(np.eye(len(sigma), dtype=np.bool_), 1.0, MOST_COMMON * correlation)
 
 
-def _size(shot: MeasuredFrame) -> tuple[int, int]:
-    """Width and height of a frame in pixels."""
+def _frame_size(shot: MeasuredFrame) -> tuple[int, int]:
+    """Return width and height of a frame in pixels."""
     width, height, _ = next(iter(shot.patches.values())).kind
     return width, height
 
@@ -275,19 +370,22 @@ def _flag(shot: MeasuredFrame, name: str) -> str:
 
 
 def _check_settings(shots: Sequence[MeasuredFrame]) -> None:
-    """DN/s compare only at one gain and one aperture."""
+    """Refuse frames of several gains or apertures in one unit: their DN/s are not comparable."""
     for unit in {shot.frame.unit for shot in shots}:
-        for what, found in (
-            ("ISO", {_key(shot.iso) for shot in shots if shot.frame.unit == unit}),
-            ("f-number", {_key(shot.f_number) for shot in shots if shot.frame.unit == unit}),
+        for setting, values in (
+            ("ISO", {_setting_key(shot.iso) for shot in shots if shot.frame.unit == unit}),
+            (
+                "f-number",
+                {_setting_key(shot.f_number) for shot in shots if shot.frame.unit == unit},
+            ),
         ):
-            if len(found) > 1:
+            if len(values) > 1:
                 raise DataError(
-                    f"expected one {what} in unit '{unit}', got {sorted(found)}; DN/s of different "
-                    "settings do not compare: reduce them apart"
+                    f"expected one {setting} in unit '{unit}', got {sorted(values)}; DN/s of "
+                    "different settings do not compare: reduce them apart"
                 )
 
 
-def _key(number: float) -> float:
-    """`number`, or −1 for NaN, which as a key would not equal itself."""
+def _setting_key(number: float) -> float:
+    """Return `number`, or −1 for NaN, which as a key would not equal itself."""
     return -1.0 if np.isnan(number) else number

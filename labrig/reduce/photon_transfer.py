@@ -1,8 +1,8 @@
-"""The photon-transfer model: how much a pixel scatters at which level, and its fit.
+"""The photon-transfer model: variance of a pixel by its level, and its fit.
 
-Reading adds the same variance at all levels, photons one in proportion to the level, and light that
-is uneven or flickers unevenly one in proportion to its square (J. R. Janesick, *Photon Transfer*,
-2007; EMVA Standard 1288).
+Read noise adds the same variance at all levels, photons one in proportion to the level, and light
+that is uneven or flickers unevenly one in proportion to its square (J. R. Janesick, *Photon
+Transfer*, 2007; EMVA Standard 1288).
 """
 
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from labrig.nonnegative import nonnegative_least_squares
 
 FloatArray = NDArray[np.float64]
 
-#: Variance of rounding to whole numbers (uniform distribution), the least an integer can have.
+#: Variance of rounding to integers in DN² (uniform distribution), the least of a digital value.
 ROUNDING_VARIANCE = 1 / 12
 
 
@@ -25,12 +25,12 @@ class NoiseModel:
     Attributes
     ----------
     read_dn2
-        At no light.
+        Variance without light in DN², by read noise.
     photon_dn
-        Per DN of light: one over the gain in electrons per DN. A fit leaves it 0 where the levels
-        do not tell.
+        Photon noise in DN² per DN of light: the reciprocal of the gain in electrons per DN. A fit
+        leaves it 0 where the levels do not determine it.
     uneven
-        Per DN² of light.
+        Variance per DN² of light, by uneven light.
     """
 
     read_dn2: float
@@ -45,35 +45,64 @@ class NoiseModel:
         sigma_dn2: FloatArray,
         read_dn2: float | None = None,
     ) -> "NoiseModel":
-        """The model, all parts ≥ 0, through measured variances by weighted least squares.
+        """Fit the model, all parts ≥ 0, to measured variances by weighted least squares.
 
         Parameters
         ----------
         terms
-            (n, 2) or (n, 3): what `variance_terms` says of the levels; of a difference of frames,
-            the sum of what it says of both. With two, there is no uneven part.
-        variance_dn2, sigma_dn2
-            (n,) measured, and their standard uncertainties, known up to a common factor. Whoever
-            has nothing better takes what is expected of a variance for its uncertainty.
+            Terms of the model by `variance_terms`, shape (n, 2) or (n, 3); of a difference of
+            frames, the sum of both frames' terms. With two terms there is no uneven part.
+        variance_dn2
+            Measured variances in DN², shape (n,).
+        sigma_dn2
+            Their standard uncertainties in DN², known up to a common factor, shape (n,). Without
+            better knowledge, the expected variance serves as its uncertainty.
         read_dn2
-            What is measured without light, then held; None: it is fitted.
+            Variance measured without light in DN², which is then held; None fits it.
         """
-        held = 0.0 if read_dn2 is None else read_dn2
-        free = terms if read_dn2 is None else terms[:, 1:]
-        target = variance_dn2 - held * terms[:, 0]
-        found = nonnegative_least_squares(free / sigma_dn2[:, np.newaxis], target / sigma_dn2)
-        return cls(*([] if read_dn2 is None else [read_dn2]), *found.tolist())
+        fixed_read_dn2 = 0.0 if read_dn2 is None else read_dn2
+        free_terms = terms if read_dn2 is None else terms[:, 1:]
+        target = variance_dn2 - fixed_read_dn2 * terms[:, 0]
+        parts = nonnegative_least_squares(free_terms / sigma_dn2[:, np.newaxis], target / sigma_dn2)
+        return cls(*([] if read_dn2 is None else [read_dn2]), *parts.tolist())
 
     def parts_dn2(self, level_dn: FloatArray) -> FloatArray:
-        """The parts of the variance at levels (…,), shape (…, 3): reading, photons, uneven."""
+        """Return the parts of the variance in DN² at levels (…,), shape (…, 3).
+
+        The parts are those of reading, photons and uneven light.
+        """
         return variance_terms(level_dn) * [self.read_dn2, self.photon_dn, self.uneven]
 
     def variance_dn2(self, level_dn: FloatArray) -> FloatArray:
-        """The variance at levels (…,); below black as at black."""
+        """Return the variance at levels (…,) in DN²; below black it is that at black."""
         return np.asarray(self.parts_dn2(level_dn).sum(axis=-1))
 
 
 def variance_terms(level_dn: FloatArray) -> FloatArray:
-    """(…, 3) 1, L and L² of levels (…,) in DN above black, none below 0."""
+    """Return the terms 1, L and L² of the photon-transfer model at levels L.
+
+    Parameters
+    ----------
+    level_dn
+        Levels in DN above black, of any shape; levels below 0 count as 0.
+
+    Returns
+    -------
+    ndarray
+        The three terms along a new last axis, in units of 1, DN and DN², shape (…, 3).
+
+    References
+    ----------
+    J. R. Janesick, *Photon Transfer*, SPIE Press, 2007. EMVA Standard 1288.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.reduce import NoiseModel, variance_terms
+    >>> variance_terms(np.array([0.0, 100.0])).tolist()
+    [[1.0, 0.0, 0.0], [1.0, 100.0, 10000.0]]
+    >>> NoiseModel(read_dn2=4.0, photon_dn=0.5).variance_dn2(np.array([0.0, 100.0])).tolist()
+    [4.0, 54.0]
+    """
     level = np.maximum(level_dn, 0.0)
     return np.stack([np.ones_like(level), level, level**2], axis=-1)

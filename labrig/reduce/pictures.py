@@ -12,18 +12,83 @@ JPEG_QUALITY = 88
 
 
 def is_grey(raw: RawFrame) -> bool:
-    """Whether the sensor knows no colours."""
+    """Return whether the sensor is monochrome.
+
+    Parameters
+    ----------
+    raw
+        The RAW frame.
+
+    Returns
+    -------
+    bool
+        True if the sensor has no colour filters.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.reduce import is_grey
+    >>> raw = labrig.read_raw(Path("frame.dng"))
+    >>> raw.cfa, is_grey(raw)
+    ('RGGB', False)
+    """
     return len(raw.channels) == 1
 
 
 def binned(raw: RawFrame) -> Picture:
-    """R, G, B of every cell above black, 1 = saturated; (height / 2, width / 2, 3) of Bayer."""
+    """Bin a RAW frame to one RGB value for each cell of the colour filter.
+
+    Parameters
+    ----------
+    raw
+        The RAW frame.
+
+    Returns
+    -------
+    ndarray of float32
+        R, G and B above black as fractions of the saturation level; (height / 2, width / 2, 3) of a
+        Bayer sensor. A monochrome sensor has three equal values.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.reduce import binned
+    >>> picture = binned(labrig.read_raw(Path("frame.dng")))
+    >>> picture.shape
+    (32, 48, 3)
+    >>> [f"{fraction:.0%}" for fraction in picture[16, 24]]
+    ['1%', '4%', '2%']
+    """
     picture = cell_means_dn(raw) / np.float32(raw.white - max(raw.black))
     return np.repeat(picture, 3, axis=-1) if is_grey(raw) else picture
 
 
 def small(picture: Picture, width: int) -> Picture:
-    """Averaged down to `width` or a little less; never enlarged."""
+    """Average a picture down to a width.
+
+    Parameters
+    ----------
+    picture
+        Picture of any unit, shape (height, width, 3).
+    width
+        Width of the smaller picture in pixels; a picture of this width or less stays as it is.
+
+    Returns
+    -------
+    ndarray of float32
+        The picture at the same aspect ratio, `width` pixels wide at most.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.reduce import binned, small
+    >>> picture = binned(labrig.read_raw(Path("frame.dng")))
+    >>> picture.shape, small(picture, width=24).shape
+    ((32, 48, 3), (16, 24, 3))
+    """
     import cv2  # takes a tenth of a second to load
 
     height_in, width_in = picture.shape[:2]
@@ -34,7 +99,34 @@ def small(picture: Picture, width: int) -> Picture:
 
 
 def jpeg(rgb: NDArray[np.uint8]) -> bytes:
-    """A JPEG file of (height, width, 3)."""
+    """Encode a picture as JPEG.
+
+    Parameters
+    ----------
+    rgb
+        Picture with 8 bits a channel, shape (height, width, 3).
+
+    Returns
+    -------
+    bytes
+        The content of a JPEG file.
+
+    Raises
+    ------
+    RuntimeError
+        OpenCV cannot encode the picture.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import numpy as np
+    >>> import labrig
+    >>> from labrig.reduce import binned, jpeg
+    >>> picture = binned(labrig.read_raw(Path("frame.dng")))
+    >>> content = jpeg(np.uint8(255 * np.clip(picture, 0, 1)))
+    >>> content[6:10]
+    b'JFIF'
+    """
     import cv2
 
     good, data = cv2.imencode(".jpg", rgb[..., ::-1], [cv2.IMWRITE_JPEG_QUALITY, JPEG_QUALITY])

@@ -1,4 +1,4 @@
-"""A RAW file as the numbers the sensor counted, with what the camera says about them."""
+"""The mosaic of a RAW file in DN, with the camera's metadata."""
 
 import io
 import logging
@@ -29,7 +29,7 @@ from labrig.reduce.noise import Floats, Mosaic
 from labrig.reduce.saturation import clip_level
 
 _STDERR = 2
-#: How LibRaw's lines begin (it names the file, which a buffer has not), and those of its libjpeg.
+#: First bytes of LibRaw's lines (a buffer has no file name), and of those of its libjpeg.
 _PREFIXES = (b"unknown file:", b"Corrupt JPEG data:", b"Premature end of JPEG file")
 #: The process has one stderr: two redirections at once would restore each other's.
 _lock = threading.Lock()
@@ -37,24 +37,24 @@ _lock = threading.Lock()
 
 @contextmanager
 def quiet_stderr() -> Iterator[None]:
-    """While open, LibRaw's lines on the process's stderr are dropped.
+    """Drop LibRaw's lines on the process's stderr.
 
     Lines that other threads write meanwhile are passed on at the end.
     """
-    with _lock, tempfile.TemporaryFile() as caught:
+    with _lock, tempfile.TemporaryFile() as captured:
         try:
-            kept = os.dup(_STDERR)
+            original = os.dup(_STDERR)
         except OSError:  # a process without stderr has nothing to keep quiet
             yield
             return
-        os.dup2(caught.fileno(), _STDERR)
+        os.dup2(captured.fileno(), _STDERR)
         try:
             yield
         finally:
-            os.dup2(kept, _STDERR)
-            os.close(kept)
-            caught.seek(0)
-            for line in caught:
+            os.dup2(original, _STDERR)
+            os.close(original)
+            captured.seek(0)
+            for line in captured:
                 if not line.startswith(_PREFIXES):
                     os.write(_STDERR, line)
 
@@ -63,8 +63,18 @@ def quiet_stderr() -> Iterator[None]:
 class Exif:
     """EXIF of one frame; None where absent, unreadable or a placeholder such as 0.
 
-    `lens` is its name and focal length, as far as the camera tells. `dng`: the file says that it is
-    a DNG.
+    Attributes
+    ----------
+    exposure_s
+        Nominal exposure time in seconds.
+    iso, f_number
+        ISO and f-number.
+    make, model
+        Manufacturer and model of the camera.
+    lens
+        Name and focal length of the lens, as far as the camera records them.
+    dng
+        Whether the file declares itself a DNG.
     """
 
     exposure_s: float | None = None
@@ -76,9 +86,9 @@ class Exif:
     dng: bool = False
 
 
-#: The value by which EXIF 2.3 says "more than 65534, look elsewhere".
+#: Value of EXIF 2.3 for an ISO above 65534, which is in another tag.
 _ISO_OVERFLOW = 65535
-#: What exifread calls the tag that only DNG files have: by its number, as long as it has no name.
+#: Names that exifread gives the tag of DNG files: by its number, or by its name.
 _DNG_VERSION = ("Image Tag 0xC612", "Image DNGVersion")
 
 
@@ -87,9 +97,27 @@ logging.getLogger("exifread").setLevel(logging.CRITICAL)
 
 
 def read_exif(content: bytes) -> Exif:
-    """EXIF in the bytes of a RAW file.
+    """Read the EXIF of a RAW file.
 
-    Damaged EXIF is as good as none: the picture can be reduced without it.
+    Damaged EXIF counts as missing: the picture can be reduced without it.
+
+    Parameters
+    ----------
+    content
+        The bytes of the RAW file.
+
+    Returns
+    -------
+    Exif
+        Settings of the exposure, camera and lens; None where absent or unreadable.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.reduce import read_exif
+    >>> exif = read_exif(Path("frame.dng").read_bytes())
+    >>> exif.exposure_s, exif.iso, exif.f_number
+    (0.5, 400.0, 4.0)
     """
     import exifread  # with its maker-note tables, only when a RAW file is read
 
@@ -110,7 +138,7 @@ def read_exif(content: bytes) -> Exif:
 
 
 def _positive(tags: dict[str, Any], name: str) -> float | None:
-    """First value of a tag, in the EXIF directory or, as TIFF/EP has it, beside the image."""
+    """Return the first value of a tag in the EXIF directory or, as TIFF/EP has it, the image's."""
     for directory in ("EXIF", "Image"):
         values = getattr(tags.get(f"{directory} {name}"), "values", None)
         try:
@@ -123,14 +151,14 @@ def _positive(tags: dict[str, Any], name: str) -> float | None:
 
 
 def _lens(tags: dict[str, Any]) -> str | None:
-    """`EF50mm f/1.4 USM, 50 mm`."""
+    """Return the lens as in `EF50mm f/1.4 USM, 50 mm`."""
     focal_mm = _positive(tags, "FocalLength")
-    said = (_text(tags, "EXIF LensModel"), None if focal_mm is None else f"{focal_mm:g} mm")
-    return ", ".join(filter(None, said)) or None
+    parts = (_text(tags, "EXIF LensModel"), None if focal_mm is None else f"{focal_mm:g} mm")
+    return ", ".join(filter(None, parts)) or None
 
 
 def _text(tags: dict[str, Any], name: str) -> str | None:
-    """A tag's text without the padding cameras write, None if nothing legible is left."""
+    """Return a tag's text without the padding of cameras; None if no legible text remains."""
     words = str(tags.get(name, "")).split()
     text = " ".join(words)
     return text if text.isprintable() and text else None
@@ -145,14 +173,15 @@ _X_TRANS = 6
 
 
 def sensor_pattern(raw: Any, dng: bytes | None) -> tuple[str, tuple[float, ...]]:
-    """`cfa` and `black` of a `RawFrame`.
+    """Return `cfa` and `black` of a `RawFrame`.
 
     Parameters
     ----------
     raw
         An open rawpy file.
     dng
-        Its bytes if it is a DNG, whose own tags then go before what LibRaw makes of them.
+        The bytes of the file if it is a DNG, whose own tags then have priority over LibRaw's; else
+        None.
 
     Raises
     ------
@@ -160,26 +189,26 @@ def sensor_pattern(raw: Any, dng: bytes | None) -> tuple[str, tuple[float, ...]]
         The sensor has other colours, or no pattern that is known for certain.
     """
     if dng is not None:
-        found = read_dng(dng, raw.sizes.raw_height, raw.sizes.raw_width)
-        if found is not None:
-            return smallest_square(*_from_first_pixel(raw, found))
-    return smallest_square(*_by_libraw(raw))
+        pattern = read_dng(dng, raw.sizes.raw_height, raw.sizes.raw_width)
+        if pattern is not None:
+            return smallest_square(*_visible_pattern(raw, pattern))
+    return smallest_square(*_libraw_pattern(raw))
 
 
-def _from_first_pixel(raw: Any, found: DngPattern) -> tuple[Letters, Floats]:
-    """Both repeats of a DNG, shifted to where LibRaw's visible part begins."""
-    shift = (found.corner[0] - raw.sizes.top_margin, found.corner[1] - raw.sizes.left_margin)
-    colours = np.roll(found.colours, shift, axis=(0, 1))
-    if found.black is not None:
-        return colours, np.roll(found.black, shift, axis=(0, 1))
+def _visible_pattern(raw: Any, pattern: DngPattern) -> tuple[Letters, Floats]:
+    """Return colours and black levels of a DNG, shifted to the first pixel visible to LibRaw."""
+    shift = (pattern.corner[0] - raw.sizes.top_margin, pattern.corner[1] - raw.sizes.left_margin)
+    colours = np.roll(pattern.colours, shift, axis=(0, 1))
+    if pattern.black is not None:
+        return colours, np.roll(pattern.black, shift, axis=(0, 1))
     # LibRaw then has measured it in the masked borders, or knows the camera.
     by_number = raw.black_level_per_channel
     numbers = [_BLACK_NUMBER.get(str(letter), 0) for letter in colours.flat]
     return colours, np.array([float(by_number[i]) for i in numbers]).reshape(colours.shape)
 
 
-def _by_libraw(raw: Any) -> tuple[Letters, Floats]:
-    """Colours and black levels as LibRaw says; its patterns begin at the first visible pixel."""
+def _libraw_pattern(raw: Any) -> tuple[Letters, Floats]:
+    """Return colours and black levels by LibRaw, from the first visible pixel on."""
     pattern, levels = raw.raw_pattern, raw.black_level_per_channel
     if pattern is None or pattern.shape == (1, 1):
         return np.array([[MONOCHROME]]), np.array([[float(levels[0])]])
@@ -200,18 +229,18 @@ def _by_libraw(raw: Any) -> tuple[Letters, Floats]:
     return colours, np.asarray(levels, dtype=np.float64)[pattern]
 
 
-#: No camera's file is larger.
+#: Largest size of a RAW file in bytes.
 MOST_BYTES = 1_000_000_000
-#: Rows and columns of one position of the CFA, the least from which noise can be told.
+#: Fewest rows and columns of one position of the CFA from which noise can be estimated.
 _LEAST_PIXELS = 3
 _EXPECTED = "expected a RAW file with one colour in every pixel"
-#: How files begin that hold what a sensor counted: TIFF (most, NEF, ARW and DNG among them) and its
-#: kin of Olympus, Panasonic and Phase One; CIFF; Fujifilm; Minolta; Sigma.
+#: First bytes of RAW files: TIFF (most, NEF, ARW and DNG among them) and its variants of Olympus,
+#: Panasonic and Phase One; CIFF; Fujifilm; Minolta; Sigma.
 _CONTAINERS = (
     b"II*\0", b"MM\0*", b"IIRO", b"IIRS", b"MMOR", b"IIU\0", b"IIII", b"MMMM",
     b"II\x1a\0\0\0HEAPCCDR", b"FUJIFILMCCD-RAW", b"\0MRM", b"FOVb",
 )  # fmt: skip
-#: Canon's CR3, a kind of MPEG-4, says so here.
+#: File type of Canon's CR3, a kind of MPEG-4, and its place in the file.
 _CR3, _CR3_AT = b"ftypcrx", 4
 
 
@@ -222,16 +251,18 @@ class RawFrame:
     Parameters
     ----------
     mosaic
-        Shape (height, width), uint16, DN with the black level in it.
+        Pixels in DN with the black level in them, uint16, shape (height, width).
     cfa
-        Colours of the smallest square that repeats, from the top-left pixel in reading order:
-        four letters such as `RGGB`, 36 of an X-Trans sensor, `L` of a monochrome one.
+        Colours of the smallest square that repeats, from the top-left pixel in reading order: four
+        letters such as `RGGB`, 36 of an X-Trans sensor, `L` of a monochrome one.
     black
-        Black level in DN of those pixels, in the same order.
+        Black levels of those pixels in DN, in the same order.
     white
         Level in DN from which a pixel is saturated.
-    exposure_s, iso, f_number, make, model
-        From EXIF; None where absent or a placeholder.
+    exposure_s
+        Nominal exposure time in seconds by EXIF; None where absent or a placeholder.
+    iso, f_number, make, model
+        Settings and camera by EXIF; None where absent or a placeholder.
     """
 
     mosaic: Mosaic
@@ -270,27 +301,39 @@ class RawFrame:
 
     @property
     def width(self) -> int:
-        """Columns of the visible mosaic."""
+        """Number of columns of the visible mosaic."""
         return int(self.mosaic.shape[1])
 
     @property
     def height(self) -> int:
-        """Rows of the visible mosaic."""
+        """Number of rows of the visible mosaic."""
         return int(self.mosaic.shape[0])
 
     @property
     def cfa_side(self) -> int:
-        """Pixels after which `cfa` repeats, down and across."""
+        """Period of `cfa` in pixels, down and across."""
         return side_of(self.cfa)
 
     @property
     def channels(self) -> tuple[str, ...]:
-        """R, G and B, or L."""
+        """Names of the channels: R, G and B, or L."""
         return channels_of(self.cfa)
 
 
 def read_raw(source: Path | bytes, name: str = "the frame") -> RawFrame:
-    """The RAW file `source`, a path or the bytes of one (then `name` names it in messages).
+    """Read the mosaic of a RAW file, undemosaiced, with its black and saturation levels.
+
+    Parameters
+    ----------
+    source
+        Path of the RAW file, or the bytes of one.
+    name
+        Name of the frame in messages, if `source` is bytes.
+
+    Returns
+    -------
+    RawFrame
+        The visible mosaic in DN, shape (height, width), and the settings of the exposure.
 
     Raises
     ------
@@ -299,7 +342,17 @@ def read_raw(source: Path | bytes, name: str = "the frame") -> RawFrame:
     DiskError
         The disk does not give it back.
     FrameError
-        Not a RAW file, cut off or damaged, or from a sensor of another kind.
+        The file is no RAW file, is cut off or damaged, or is from a sensor of another kind.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> raw = labrig.read_raw(Path("frame.dng"))
+    >>> raw.mosaic.shape, raw.cfa, raw.black[0], raw.white
+    ((64, 96), 'RGGB', 1024.0, 15600.0)
+    >>> raw.exposure_s, raw.iso, raw.f_number
+    (0.5, 400.0, 4.0)
     """
     if isinstance(source, Path):
         name = str(source)
@@ -339,15 +392,15 @@ def _decode(content: bytes) -> RawFrame:
             ) from None
         # A damaged file can fail anywhere in rawpy, with any exception: all mean the same.
         except Exception as error:
-            said = error.args[0] if error.args else type(error).__name__
-            text = said.decode(errors="replace") if isinstance(said, bytes) else str(said)
+            reason = error.args[0] if error.args else type(error).__name__
+            text = reason.decode(errors="replace") if isinstance(reason, bytes) else str(reason)
             raise FrameError(
                 f"{_EXPECTED}, got a damaged one ({' '.join(text.split())}); transfer it again"
             ) from None
 
 
 def _frame(raw: Any, flat: Any, content: bytes, exif: Exif) -> RawFrame:
-    """`raw`, an open rawpy file, if it is undemosaiced."""
+    """Return the frame of `raw`, an open rawpy file, if it is undemosaiced."""
     if raw.raw_type != flat:
         raise FrameError(
             f"{_EXPECTED}, got an image with all colours in every pixel (linear DNG, sRAW or "

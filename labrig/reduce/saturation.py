@@ -1,9 +1,9 @@
-"""The level from which pixels are saturated, and how many of them clip a region.
+"""The level from which pixels are saturated, and the number of them that clips a region.
 
-The level is told from the frame where the file's white level is not reached.
-Some sensors, and most at their lowest ISO, are full below the white level of their file. Then all
+Some sensors, and most at their lowest ISO, saturate below the white level of their file. Then all
 pixels that would be brighter pile up at one level, the brightest of the frame. Pixels that are not
-saturated do not: photon noise alone spreads them over tens of levels up there.
+saturated do not: photon noise alone spreads them over tens of levels there. The saturation level is
+therefore determined from the frame where the file's white level is not reached.
 """
 
 import numpy as np
@@ -18,7 +18,7 @@ _MOST_PIXELS = 2**24
 
 
 def histogram(plane: Mosaic) -> npt.NDArray[np.int64]:
-    """Number of pixels at each level, shape (65536,)."""
+    """Return the number of pixels at each level, shape (65536,)."""
     import cv2  # counts ten times as fast as NumPy
 
     counts = np.zeros(65536, np.int64)
@@ -31,7 +31,20 @@ def histogram(plane: Mosaic) -> npt.NDArray[np.int64]:
 def counted(
     plane: Mosaic, left_out: npt.NDArray[np.bool_] | None
 ) -> tuple[npt.NDArray[np.int64], npt.NDArray[np.int64]]:
-    """Levels that occur, rising, and in how many pixels but those `left_out` (as `plane`)."""
+    """Count the pixels at each level that occurs.
+
+    Parameters
+    ----------
+    plane
+        Pixels in DN.
+    left_out
+        Pixels to leave out, in the shape of `plane`; None leaves out none.
+
+    Returns
+    -------
+    tuple of ndarray
+        Levels that occur, rising, and the number of pixels at each.
+    """
     if plane.size < _FEW_PIXELS:
         kept = plane if left_out is None else plane[~left_out]
         levels, pixels = np.unique(kept, return_counts=True)
@@ -46,44 +59,57 @@ def counted(
 #: Fraction of a region's pixels, of one colour, that may be saturated; see `is_clipped`.
 CLIPPED_FRACTION = 0.001
 
-#: Fraction of the range above black below which no sensor is full, whatever piles up there.
+#: Fraction of the range above black below which a plateau is not saturation.
 _LEAST_FULL = 0.5
-#: A plateau holds this fraction of the frame's pixels, and so many of them, …
+#: Fraction of the frame's pixels, and number of pixels, that a plateau holds at least.
 _LEAST_FRACTION = 1e-4
 _LEAST_PIXELS = 50
-#: … that many times as many as any of the levels next below it,
+#: Pixels of a plateau over those of any of the levels next below it.
 _STANDS_OUT = 10
-#: counted over so many levels that occur (compressed files leave levels out). A frame with fewer
-#: of them has no noise and is no photograph: nothing can be told.
+#: Number of these levels, of those that occur (compressed files leave levels out). A frame with
+#: fewer levels has no noise and is no photograph: its saturation level remains the file's.
 _LEVELS_BELOW = 16
 
 
 def is_clipped(saturated: npt.ArrayLike, pixels: npt.ArrayLike) -> npt.NDArray[np.bool_]:
-    """Whether the mean of a region is too small because pixels of it are full.
+    """Return whether saturated pixels make the mean of a region too small.
 
-    It is if more than 0.1 % of them are. Fewer say nothing about the light: a sensor's hot pixels
-    are up to that many, and in a long exposure they are full whatever is seen. And fewer do no
-    harm: noise whose tail beyond white holds 0.1 % of the pixels lacks 3e-4 of a pixel's standard
-    deviation in the mean, and highlights twice as bright as white lack 0.1 % of white, a seventh
-    of what a shutter flickers by.
+    A region is clipped if more than 0.1 % of its pixels are saturated. Fewer say nothing about the
+    light: a sensor's hot pixels are up to that many, and in a long exposure they are full at any
+    light. Nor do fewer bias the mean: noise whose tail beyond white holds 0.1 % of the pixels lacks
+    3e-4 of a pixel's standard deviation in the mean, and highlights twice as bright as white lack
+    0.1 % of white, a seventh of a shutter's flicker.
 
     Parameters
     ----------
-    saturated, pixels
-        How many pixels of one colour are at white or above, of how many.
+    saturated
+        Number of pixels of one colour at white or above, of any shape.
+    pixels
+        Number of pixels of that colour, of the same shape.
+
+    Returns
+    -------
+    ndarray of bool
+        True where the region is clipped, of the shape of `saturated`.
+
+    Examples
+    --------
+    >>> from labrig.reduce import is_clipped
+    >>> is_clipped([0, 1, 5], [1000, 1000, 1000]).tolist()
+    [False, False, True]
     """
     return np.asarray(np.asarray(saturated) > CLIPPED_FRACTION * np.asarray(pixels))
 
 
 def clip_level(mosaic: Mosaic, black: float, white: float) -> float:
-    """`white`, or the level below it at which the frame's pixels are clipped.
+    """Return the saturation level: `white`, or the level below it at which the frame's pixels clip.
 
     Parameters
     ----------
     mosaic
-        The whole visible frame, DN.
+        The whole visible frame in DN.
     black, white
-        As the file says, DN.
+        Black and white level of the file in DN.
     """
     highest = int(mosaic.max())
     lowest = black + _LEAST_FULL * (white - black)

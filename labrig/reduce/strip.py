@@ -1,4 +1,4 @@
-"""The strip of a linear variable filter in frames: where it is lit, and what is read along it."""
+"""The strip of a linear variable filter in frames: finding it, and measuring the light along it."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -15,46 +15,45 @@ from labrig.reduce.measured_frames import SeriesFrame
 from labrig.reduce.patches import reduce_patches
 from labrig.results import FloatArray, SliceValues, StripProfile
 
-#: Lit is what is brighter than so many times the noise of the dark surroundings,
+#: Least brightness of a lit pixel in units of the noise of the dark surroundings,
 SEEN_SIGMA = 6.0
-#: than this fraction of the brightest light near by,
+#: as a fraction of the brightest light near by,
 EDGE = 0.4
-#: and than this fraction of the brightest of all: less is stray light.
+#: and as a fraction of the brightest of all: less is stray light.
 FAINTEST = 3e-4
-#: How near, as a fraction of the frame's width. Along the strip the light may double within it.
+#: Neighbourhood as a fraction of the frame's width, within which the strip's light may double.
 NEAR = 0.01
-#: Regions read upright along a strip that is tilted more would be of too many wavelengths.
+#: Largest tilt: upright regions along the strip would mix too many wavelengths beyond it.
 MOST_TILT_DEGREES = 5.0
-#: A strip is so many times as long as it is high, and fills this fraction of the frame at the
-#: least.
+#: Least ratio of a strip's length to its height, and least fraction of the frame that it fills.
 LEAST_ELONGATION = 2.0
 LEAST_FRACTION = 0.005
-#: How much of the rectangle is lit; more than all is rounding.
+#: Range of the lit fraction of the rectangle; more than 1 is rounding.
 FULL = (0.9, 1.1)
-#: Left out at each long side and at each end, as fractions of the strip's height and length.
+#: Margins at each long side and at each end, as fractions of the strip's height and length.
 LONG_MARGIN, END_MARGIN = 0.12, 0.01
-#: A slice is two pixels wide at the least: a cell of the colour filter.
+#: Least width of a slice in pixels: a cell of the colour filter.
 _LEAST_SLICE = 2
-#: Lamp, shutter and aperture from one scene to the next, relative; all colours and places alike.
+#: Relative change of lamp, shutter and aperture between scenes, common to colours and places.
 FLICKER = 0.005
-#: Relative errors that no two frames share: the sensor's pattern, dust.
+#: Relative independent error of a place: the sensor's pattern, dust.
 PATTERN = 0.002
 
 
 @dataclass(frozen=True)
 class FoundStrip:
-    """A lit rectangle.
+    """A lit rectangle in a frame.
 
     Attributes
     ----------
     corners
-        (x, y) in pixels, clockwise from the upper left.
+        Corners (x, y) in pixels, clockwise from the upper left.
     tilt_degrees
-        Of its long side; > 0 falls to the right.
+        Tilt of the long side in degrees; > 0 falls to the right.
     length, height
-        In pixels.
+        Size of the rectangle in pixels.
     width_of_frame, height_of_frame
-        In pixels.
+        Size of the frame in pixels.
     """
 
     corners: tuple[tuple[float, float], ...]
@@ -65,7 +64,7 @@ class FoundStrip:
     height_of_frame: int
 
     def strip(self, rising: bool) -> Strip:
-        """Its inner part in fractions of the frame."""
+        """Return the inner part of the rectangle in fractions of the frame."""
         upper_left, upper_right, lower_right, lower_left = np.array(self.corners)
         left, right = (upper_left + lower_left) / 2, (upper_right + lower_right) / 2
         inwards = END_MARGIN * (right - left)
@@ -78,27 +77,46 @@ class FoundStrip:
         )
 
     def __str__(self) -> str:
-        """Its size and tilt."""
+        """Return size and tilt of the rectangle."""
         return f"{self.length:.0f} x {self.height:.0f} pixels, tilted by {self.tilt_degrees:+.1f}°"
 
 
 def find_strip(frame: HdrFrame) -> FoundStrip:
-    """The brightest elongated rectangle in an otherwise dark frame.
+    """Find the brightest elongated rectangle in an otherwise dark frame.
+
+    Parameters
+    ----------
+    frame
+        Frame of a lit strip of a linear variable filter, one exposure or several combined.
+
+    Returns
+    -------
+    FoundStrip
+        Corners, tilt and size of the lit rectangle in pixels.
 
     Raises
     ------
     DataError
-        There is none, it is tilted by more than 5°, or too short to be read.
+        No strip is lit, it is tilted by more than 5°, or it is too short to be read.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.reduce import HdrFrame, find_strip
+    >>> rate = np.zeros((120, 200), np.float32)
+    >>> rate[50:70, 20:180] = 1000.0  # DN/s
+    >>> print(find_strip(HdrFrame(rate, cfa="L", cfa_side=1, channels=("L",))))
+    161 x 21 pixels, tilted by +0.0°
     """
     light = frame.light()
     height, width = light.shape
-    lit = _lit(light)
-    if lit is None:
+    lit_mask = _largest_lit_patch(light)
+    if lit_mask is None:
         raise DataError(
             "no strip is lit in the picture: the lamp is out, the filter is not in its place, or "
             "the frames are too short"
         )
-    (middle_x, middle_y), across, down, angle = _rectangle(lit)
+    (middle_x, middle_y), across, down, angle = _rectangle(lit_mask)
     if across * down < LEAST_FRACTION * width * height or across < LEAST_ELONGATION * down:
         raise DataError(
             f"expected a long strip on a dark ground, found {across:.0f} x {down:.0f} pixels that "
@@ -114,7 +132,7 @@ def find_strip(frame: HdrFrame) -> FoundStrip:
             f"the strip is {across:.0f} pixels long, {_LEAST_SLICE * SLICES} or more are needed "
             f"for {SLICES} positions; move the camera nearer"
         )
-    if not FULL[0] < np.count_nonzero(lit) / (across * down) < FULL[1]:
+    if not FULL[0] < np.count_nonzero(lit_mask) / (across * down) < FULL[1]:
         raise DataError(
             "what is lit is no rectangle; keep other light away and the holder round the filter "
             "dark"
@@ -130,35 +148,53 @@ def find_strip(frame: HdrFrame) -> FoundStrip:
 
 
 def strip_profile(frame: HdrFrame, strip: Strip) -> StripProfile:
-    """Means across the strip, one for every cell of the colour filter along it.
+    """Average a frame across a strip, one value for every cell of the colour filter along it.
 
-    Each channel is read where its own pixels are, and drawn straight in between.
+    Each channel is read where its own pixels are, and interpolated linearly in between.
 
     Parameters
     ----------
     frame
-        Whole, from one exposure or several.
+        The whole frame, one exposure or several combined.
     strip
-        Where it lies; which way its wavelengths rise does not matter.
+        Place of the strip in the frame; the direction of its wavelengths does not matter.
+
+    Returns
+    -------
+    StripProfile
+        Mean signal in DN/s at n positions from the left end (0) to the right end (1), shape
+        (n, channels).
 
     Raises
     ------
     DataError
         Some part of the strip clips in all frames.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.optics import Strip
+    >>> from labrig.reduce import HdrFrame, strip_profile
+    >>> rate = np.tile(np.linspace(0.0, 1000.0, 200, dtype=np.float32), (120, 1))  # DN/s
+    >>> frame = HdrFrame(rate, cfa="L", cfa_side=1, channels=("L",))
+    >>> strip = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.2, rising=True)
+    >>> profile = strip_profile(frame, strip)
+    >>> profile.value_dn_per_s.shape, profile.value_dn_per_s[[0, -1], 0].round().tolist()
+    ((80, 1), [103.0, 897.0])
     """
     height, width = frame.rate.shape
-    along, inside = _along(strip, width, height)
+    along, inside = _strip_position(strip, width, height)
     rows, columns = np.nonzero(inside)
-    at, value = along[inside], frame.rate[inside].astype(np.float64)
+    place, value = along[inside], frame.rate[inside].astype(np.float64)
     side = frame.cfa_side
     colour = np.array(list(frame.cfa)).reshape(side, side)[rows % side, columns % side]
     cells = (strip.right[0] - strip.left[0]) * width / max(side, 2)
     edges = np.linspace(0.0, 1.0, int(cells) + 1)
     position = (edges[1:] + edges[:-1]) / 2
-    seen = np.isfinite(value)
+    is_finite = np.isfinite(value)
     columns_of_value = [
-        _read_at(at[own], value[own], edges, position)
-        for own in (seen & (colour == name) for name in frame.channels)
+        _interpolate_means(place[in_channel], value[in_channel], edges, position)
+        for in_channel in (is_finite & (colour == name) for name in frame.channels)
     ]
     return StripProfile(position, np.stack(columns_of_value, axis=1))
 
@@ -169,65 +205,93 @@ def slice_values(
     darks: Sequence[SeriesFrame],
     camera: CameraModel | None,
 ) -> Mapping[str, SliceValues]:
-    """Light in every slice of a strip, scene by scene.
+    """Measure the light in every slice of a strip, scene by scene.
 
     Parameters
     ----------
     frames
-        Those of one unit show one scene at several exposures.
+        Light frames; those of one unit show one scene at several exposures.
     strip
-        Where it lies in all of them.
+        Place of the strip, the same in all frames.
     darks
-        Dark frames at their exposures.
+        Dark frames at their exposure times.
     camera
-        Its calibration, where there is one.
+        Calibration of the camera; None uses the values as they are.
 
     Returns
     -------
-    dict
-        Unit → values in DN/s.
+    dict of str to SliceValues
+        Signal in DN/s and its standard uncertainty by unit, shape (slices, channels).
+
+    Raises
+    ------
+    DataError
+        ISO or f-number differ within a unit, no dark frames match, or the calibration is of another
+        camera or aperture.
+    FrameError, UsageError
+        A frame cannot be read, or the strip leaves it.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.optics import Strip
+    >>> from labrig.reduce import SeriesFrame, slice_values
+    >>> run = labrig.read_run("runs/decay")
+    >>> darks = [SeriesFrame(dark.path, 0.0, dark.exposure_s) for dark in run.frames("dark")]
+    >>> first = run.frames("decay")[0]
+    >>> frames = [SeriesFrame(first.path, 1.06, first.exposure_s, unit="lit")]
+    >>> strip = Strip(left=(0.1, 0.5), right=(0.9, 0.5), height=0.2, rising=True)
+    >>> values = slice_values(frames, strip, darks, camera=None)
+    >>> values["lit"].value.shape
+    (31, 3)
     """
     series = reduce_patches(frames, strip.slices(), darks, camera=camera)
     units = dict.fromkeys(frame.unit for frame in frames)
-    found = {}
+    values_by_unit = {}
     for unit in units:
         pairs = []
-        for one in series.values():
-            rows = np.array(one.unit) == unit
-            usable = rows & one.usable & np.isfinite(one.sigma).all(axis=1)
-            pairs.append(_weighted_mean(one.values[usable], one.sigma[usable], one.dark_sigma))
+        for slice_series in series.values():
+            rows = np.array(slice_series.unit) == unit
+            usable = rows & slice_series.usable & np.isfinite(slice_series.sigma).all(axis=1)
+            pairs.append(
+                _weighted_mean(
+                    slice_series.values[usable], slice_series.sigma[usable], slice_series.dark_sigma
+                )
+            )
         value, sigma = np.moveaxis(np.array(pairs), 1, 0)
-        found[unit] = SliceValues(value, sigma)
-    return found
+        values_by_unit[unit] = SliceValues(value, sigma)
+    return values_by_unit
 
 
-def _lit(light: Image) -> NDArray[np.uint8] | None:
-    """(height, width) 1 in the largest lit patch; None without light."""
+def _largest_lit_patch(light: Image) -> NDArray[np.uint8] | None:
+    """Mark the largest lit patch by 1, shape (height, width); None without light."""
     ground = float(np.median(light))
     noise = 1.4826 * float(np.median(np.abs(light - ground)))
     above = light - np.float32(ground)
     height, width = light.shape
-    near = np.ones((height // 2 * 2 + 1, int(NEAR * width) // 2 * 2 + 1), np.uint8)
-    local = cv2.dilate(above, near)
+    neighbourhood = np.ones((height // 2 * 2 + 1, int(NEAR * width) // 2 * 2 + 1), np.uint8)
+    local = cv2.dilate(above, neighbourhood)
     least = max(SEEN_SIGMA * noise, FAINTEST * float(above.max()))
-    lit = ((above > least) & (above > EDGE * local)).astype(np.uint8)
+    lit_mask = ((above > least) & (above > EDGE * local)).astype(np.uint8)
     cell = np.ones((3, 3), np.uint8)
-    whole = cv2.morphologyEx(cv2.morphologyEx(lit, cv2.MORPH_OPEN, cell), cv2.MORPH_CLOSE, cell)
-    count, labels, stats, _ = cv2.connectedComponentsWithStats(whole)
+    cleaned = cv2.morphologyEx(
+        cv2.morphologyEx(lit_mask, cv2.MORPH_OPEN, cell), cv2.MORPH_CLOSE, cell
+    )
+    count, labels, stats, _ = cv2.connectedComponentsWithStats(cleaned)
     if count < 2:
         return None
     largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
     return np.asarray(labels == largest, dtype=np.uint8)
 
 
-def _rectangle(lit: NDArray[np.uint8]) -> tuple[tuple[float, float], float, float, float]:
-    """Middle, length, height in pixels and tilt in degrees of the rectangle of equal moments.
+def _rectangle(lit_mask: NDArray[np.uint8]) -> tuple[tuple[float, float], float, float, float]:
+    """Return the rectangle of equal moments: centre, length, height in pixels, tilt in degrees.
 
-    Moments are of all pixels: they tell a tilt of a fraction of a pixel, which corners do not.
+    Moments involve all pixels: they resolve a tilt of a fraction of a pixel, which corners do not.
     """
-    m = cv2.moments(lit, binaryImage=True)
-    middle = m["m10"] / m["m00"] + 0.5, m["m01"] / m["m00"] + 0.5
-    xx, yy, xy = (m[name] / m["m00"] for name in ("mu20", "mu02", "mu11"))
+    moments = cv2.moments(lit_mask, binaryImage=True)
+    middle = moments["m10"] / moments["m00"] + 0.5, moments["m01"] / moments["m00"] + 0.5
+    xx, yy, xy = (moments[name] / moments["m00"] for name in ("mu20", "mu02", "mu11"))
     (short, long), axes = np.linalg.eigh(np.array([[xx, xy], [xy, yy]]))
     angle = math.degrees(math.atan2(axes[1, 1], axes[0, 1]))
     # n pixels side by side have the variance (n² − 1)/12.
@@ -239,8 +303,8 @@ def _point(xy: NDArray[np.float64]) -> tuple[float, float]:
     return float(xy[0]), float(xy[1])
 
 
-def _along(strip: Strip, width: int, height: int) -> tuple[FloatArray, NDArray[np.bool_]]:
-    """Position of every pixel along the strip, and whether it is inside; (height, width)."""
+def _strip_position(strip: Strip, width: int, height: int) -> tuple[FloatArray, NDArray[np.bool_]]:
+    """Return every pixel's position along the strip, and whether it is inside; (height, width)."""
     x, y = np.arange(width) + 0.5, np.arange(height)[:, np.newaxis] + 0.5
     left = np.array([strip.left[0] * width, strip.left[1] * height])
     right = np.array([strip.right[0] * width, strip.right[1] * height])
@@ -252,24 +316,24 @@ def _along(strip: Strip, width: int, height: int) -> tuple[FloatArray, NDArray[n
     return along, inside
 
 
-def _read_at(
-    at: FloatArray, value: FloatArray, edges: FloatArray, position: FloatArray
+def _interpolate_means(
+    place: FloatArray, value: FloatArray, edges: FloatArray, position: FloatArray
 ) -> FloatArray:
-    """Mean value and mean place of the pixels between `edges`, read at `position`."""
-    pixels, _ = np.histogram(at, edges)
+    """Interpolate the mean of the pixels between `edges`, at their mean place, to `position`."""
+    pixels, _ = np.histogram(place, edges)
     if (pixels == 0).any():
         raise DataError(
             "some of the strip clips in every frame; close the aperture, or lower the ISO"
         )
-    place = np.histogram(at, edges, weights=at)[0] / pixels
-    mean = np.histogram(at, edges, weights=value)[0] / pixels
-    return np.asarray(np.interp(position, place, mean), dtype=np.float64)
+    mean_place = np.histogram(place, edges, weights=place)[0] / pixels
+    mean_value = np.histogram(place, edges, weights=value)[0] / pixels
+    return np.asarray(np.interp(position, mean_place, mean_value), dtype=np.float64)
 
 
 def _weighted_mean(
     value: FloatArray, sigma: FloatArray, dark_sigma: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """(channels,) of the frames (n, channels) of one scene, weighted."""
+    """Return the weighted mean of frames (n, channels) of one scene and its σ, (channels,) each."""
     if not len(value):
         return np.full_like(dark_sigma, np.nan), np.full_like(dark_sigma, np.nan)
     weight = 1 / sigma**2

@@ -1,4 +1,4 @@
-"""What a blank shows: light after lamp-off that is no glow."""
+"""Result of a blank: light after lamp-off that is not the sample's glow."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,22 +12,23 @@ from labrig.results.run_result import RunResult
 
 @dataclass(frozen=True, eq=False)
 class StrayLight:
-    """Light in DN/s of n frames by their middles, C channels.
+    """Stray light in n frames of C channels.
 
     Attributes
     ----------
     start_s, t_s
-        (n,) begins and middles of the exposures after lamp-off, rising.
+        Begins and middles of the exposures in seconds after lamp-off, rising, shape (n,).
     rate, sigma
-        (n, C) above the constant level.
+        Stray light above the constant level and its standard uncertainty in DN/s, shape (n, C).
     constant, constant_sigma
-        (C,) what stays.
+        Constant level and its standard uncertainty in DN/s, shape (C,).
     fades
-        Whether the late frames still get darker.
+        Whether the signal still falls in the late frames.
     unclean
-        (n,) whether anything is seen above the constant level.
+        Whether stray light above the constant level is detected, shape (n,).
     first_clean_s
-        Begin of the first frame after which all are clean; None: there is none.
+        Begin of the first frame from which all are clean, in seconds after lamp-off; None if there
+        is none.
     """
 
     start_s: FloatArray
@@ -48,9 +49,9 @@ class BlankResult(RunResult):
     Attributes
     ----------
     calibration
-        For the decays of the same bench; the file `blank.yaml`.
+        Calibration for the decays of the same bench; the file `blank.yaml`.
     stray_light
-        All frames, also those after the first clean one.
+        Stray light of all frames, also of those after the first clean one.
 
     Examples
     --------
@@ -64,7 +65,7 @@ class BlankResult(RunResult):
     stray_light: StrayLight
 
     def provides(self) -> Mapping[str, Any]:
-        """The blank."""
+        """Return the calibration."""
         return {BLANK_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:

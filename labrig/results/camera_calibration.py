@@ -1,4 +1,4 @@
-"""What a body and a lens make of light."""
+"""Result of a camera calibration: noise, linearity, settings and flat fields."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,26 +11,26 @@ from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.series import Series
 
-#: Standard deviations from which neighbours evidently share noise.
+#: Significance in σ of correlated noise of neighbouring pixels.
 EVIDENT_SIGMAS = 4.0
 
 
 @dataclass(frozen=True)
 class PairScatter:
-    """What two frames of the same light differ by, all channels together.
+    """Scatter between two frames of the same light, all channels together.
 
     Attributes
     ----------
     level_dn
-        Mean of the two above dark.
+        Mean of the two frames above dark in DN.
     variance_dn2
-        Of a pixel in one frame, without what its row shares.
+        Variance of a pixel in one frame without the common-mode noise of its row, in DN².
     neighbours_dn2
-        Sum of its covariances with the eight next pixels.
+        Sum of the covariances of a pixel with its eight neighbours in DN².
     row_variance_dn2
-        Of what a row shares.
+        Variance of the common-mode noise of a row in DN².
     pixels
-        That were compared.
+        Number of pixels that were compared.
     """
 
     level_dn: float
@@ -41,24 +41,24 @@ class PairScatter:
 
     @property
     def light_variance_dn2(self) -> float:
-        """Of a pixel's own light, DN²: what it loses to its neighbours is put back."""
+        """Variance of a pixel's own light in DN², the part shared with neighbours put back."""
         return self.variance_dn2 + self.neighbours_dn2
 
 
 @dataclass(frozen=True)
 class PhotonTransfer:
-    """The noise at one ISO, and what it was found from.
+    """Photon transfer at one ISO.
 
     Attributes
     ----------
     noise
-        As in the camera file.
+        Gain and read noise, as in the camera file.
     points
-        Of the lit frames.
+        Scatter of the pairs of lit frames.
     shared, shared_sigma
-        What neighbours share, over the variance of a pixel.
+        Covariance with the neighbours relative to the variance of a pixel, and its σ.
     reduced_chi2
-        Of the straight line; more than a few: it is none.
+        Reduced χ² of the photon-transfer line; more than a few if the variance is not linear.
     """
 
     noise: Noise
@@ -69,22 +69,24 @@ class PhotonTransfer:
 
     @property
     def neighbours_share_noise(self) -> bool:
-        """Whether neighbours evidently share noise."""
+        """Whether the noise of neighbouring pixels is significantly correlated."""
         return self.shared > EVIDENT_SIGMAS * self.shared_sigma
 
 
 @dataclass(frozen=True, eq=False)
 class FittedFlat:
-    """A flat field, and means of blocks of the card: ρ², and light over the fit in the middle.
+    """A flat field, and the block means of the card that it was fitted to.
 
     Attributes
     ----------
     flat
-        As in the camera file.
+        Flat field, as in the camera file.
     rho2
-        (channels, blocks) squared distance from the middle over half the diagonal.
+        Squared distance of each block from the centre in units of half the diagonal, shape
+        (channels, blocks).
     light
-        (channels, blocks), the gradient divided out.
+        Light of each block relative to the fit in the centre, the gradient divided out, shape
+        (channels, blocks).
     """
 
     flat: Flat
@@ -99,16 +101,17 @@ class CameraCalibrationResult(RunResult):
     Attributes
     ----------
     calibration
-        For all later runs with this body and lens; the file `camera.yaml`. Its `flicker` is that
-        of brackets.
+        Calibration for all later runs with this body and lens; the file `camera.yaml`. Its
+        `flicker` is that of brackets.
     card
-        The card's region in all lit frames, dark subtracted, nothing else put right.
+        Signal of the card's region in all lit frames in DN/s, dark subtracted, otherwise
+        uncorrected.
     photon_transfers
-        By ISO, in the order of `calibration.noise`.
+        Photon transfer by ISO, in the order of `calibration.noise`.
     repeat_flicker
         Relative scatter of frames of one exposure.
     flats
-        By f-number, in the order of `calibration.flats`.
+        Flat fields by f-number, in the order of `calibration.flats`.
 
     Examples
     --------
@@ -126,7 +129,7 @@ class CameraCalibrationResult(RunResult):
     flats: tuple[FittedFlat, ...]
 
     def provides(self) -> Mapping[str, Any]:
-        """The camera."""
+        """Return the calibration."""
         return {CAMERA_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:

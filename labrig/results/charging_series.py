@@ -1,4 +1,4 @@
-"""What is measured of an excitation: charges of a sample, and photographs of its glow after each.
+"""Measurement of an excitation: charges of a sample, and photographs of its glow after each.
 
 One photograph shows many sites at once: places under the linear variable filter that were charged
 by different wavelengths, or samples under the lamp itself.
@@ -14,21 +14,21 @@ from numpy.typing import ArrayLike
 from labrig.errors import FitError
 from labrig.results.measured import BoolArray, FloatArray
 
-#: Charges that are first looked at so many times later than most (those of a metering, by the next
-#: look at what is left) do not go with the others.
+#: Delay of the first photograph, in multiples of the median, beyond which a charge is left out
+#: (metering charges are photographed only before the next charge).
 LATER = 3.0
 
 
 @dataclass(frozen=True, eq=False)
 class Transient:
-    """How the lamp comes on or goes dark, band by band.
+    """Turn-on or turn-off transient of the lamp in B bands.
 
     Attributes
     ----------
     duration_s
-        (m,) of steps from the switch on.
+        Durations of m steps from the switch on, in seconds, shape (m,).
     fraction
-        (m, B) mean irradiance during each over the steady lamp's.
+        Mean irradiance during each step relative to the steady lamp's, shape (m, B).
     """
 
     duration_s: FloatArray
@@ -36,12 +36,19 @@ class Transient:
 
     @classmethod
     def sampled(cls, t_s: ArrayLike, fraction: ArrayLike) -> Self:
-        """From samples: (m + 1,) rising times from the switch, 0 first, and (m + 1, B) values.
+        """Construct a transient from samples.
+
+        Parameters
+        ----------
+        t_s
+            Times in seconds after the switch, rising from 0, shape (m + 1,).
+        fraction
+            Irradiance at these times relative to the steady lamp's, shape (m + 1, B).
 
         Raises
         ------
         FitError
-            Times that do not rise from 0, or shapes that do not go together.
+            The times do not rise from 0, or the shapes do not agree.
         """
         times, values = np.asarray(t_s, dtype=np.float64), np.asarray(fraction, dtype=np.float64)
         rising = times.ndim == 1 and len(times) > 1 and times[0] == 0 and (np.diff(times) > 0).all()
@@ -54,33 +61,34 @@ class Transient:
 
     @classmethod
     def none(cls, bands: int) -> Self:
-        """A lamp that switches at once."""
+        """Construct the transient of a lamp that switches instantly."""
         return cls(np.zeros(0), np.zeros((0, bands)))
 
     @property
     def total_s(self) -> float:
-        """From the switch until nothing changes any more."""
+        """Duration of the transient in seconds."""
         return float(self.duration_s.sum())
 
 
 @dataclass(frozen=True, eq=False)
 class Charge:
-    """One charge and the photographs after it, before the next one; times on one clock.
+    """One charge and the n photographs between it and the next one; times on one clock.
 
     Attributes
     ----------
     on_s, off_s
-        When the lamp was switched.
+        Times in seconds at which the lamp was switched on and off.
     start_s, exposure_s
-        (n,) of the photographs.
+        Begins and exposure times of the photographs in seconds, shape (n,).
     brightness
-        The lamp's, over the one that `irradiance` belongs to.
+        Brightness of the lamp relative to the one that `irradiance` belongs to.
     cold
-        Part of what a cold lamp lacks that it lacked in this charge on average, 0 to 1.
+        Mean warm-up deficit during this charge as a fraction of a cold lamp's, 0 to 1.
     fresh
-        Whether the sample was exchanged for one that has never seen light.
+        Whether the sample was exchanged for one that has never been exposed to light.
     saturated
-        Take all states for fully charged at lamp-off, r = 1, as Nalbach et al. do after 90 minutes.
+        Whether all states count as fully charged at lamp-off, r = 1, as Nalbach et al. assume after
+        90 minutes.
     """
 
     on_s: float
@@ -100,22 +108,24 @@ class ChargingSeries:
     Attributes
     ----------
     name
-        In messages and results.
+        Name of the series in messages and results.
     charges
-        By rising time; the first finds the sample dark.
+        Charges by rising time; the first finds the sample dark.
     rise, fade
-        The lamp's, after it was switched on and off.
+        Turn-on and turn-off transients of the lamp.
     irradiance
-        (P, B) E of every site in every band of the steady lamp, relative to the stated norm.
+        Irradiance E of every site in every band of the steady lamp, relative to the stated norm,
+        shape (P, B).
     values, sigma
-        (n, P, C) mean signal per second of exposure, and independent standard uncertainty; NaN
-        where nothing was measured.
+        Mean signal per second of exposure and its independent standard uncertainty, shape (n, P,
+        C); NaN where nothing was measured.
     site_modes
-        (M, P, B) ln of the sites' irradiance in every band may be off by Σ_m z_m site_modes[m], the
-        z_m independent and of unit variance, the same at every charge; None: exact.
+        Error modes of the sites' irradiance, shape (M, P, B): its logarithm in every band may be
+        off by Σ_m z_m site_modes[m], the z_m independent and of unit variance, the same at every
+        charge. None: it is exact.
     across
-        (Q, P, B) irradiance at Q places within every site that stand for it, over the site's: where
-        light is uneven, a mean level is not the level of the mean light. None: it is even.
+        Irradiance at Q places within every site relative to the site's, shape (Q, P, B): in uneven
+        light, the mean level is not the level of the mean light. None: the light is even.
     """
 
     name: str
@@ -129,19 +139,21 @@ class ChargingSeries:
     across: FloatArray | None = None
 
     def spread(self) -> Self:
-        """The same with every place within the sites a site of its own, place by place."""
+        """Return the series with every place within the sites as a site, place by place."""
         if self.across is None:
             return self
         irradiance = (self.across * self.irradiance).reshape(-1, self.irradiance.shape[1])
         return replace(self, irradiance=irradiance, across=None)
 
     def first_frames(self, usable: BoolArray) -> dict[int, int]:
-        """Row of its first usable photograph, for each charge photographed as soon as most.
+        """Return the row of its first usable photograph for each charge.
+
+        Charges first photographed more than three times later than most are left out.
 
         Parameters
         ----------
         usable
-            (n,) photographs that may be taken.
+            Whether each photograph may be used, shape (n,).
         """
         ends = np.cumsum([0, *(len(charge.start_s) for charge in self.charges)])
         first = {
@@ -156,12 +168,12 @@ class ChargingSeries:
         return {number: row for number, row in first.items() if begins_s[row] <= LATER * usual_s}
 
     def checked(self) -> Self:
-        """Itself, if nothing is wrong with it.
+        """Return the series itself if it is consistent.
 
         Raises
         ------
         FitError
-            Charges or photographs that overlap, or shapes that do not go together.
+            Charges or photographs overlap, or shapes do not agree.
         """
         shots = sum(len(charge.start_s) for charge in self.charges)
         sites, bands = self.irradiance.shape

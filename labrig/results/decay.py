@@ -1,4 +1,4 @@
-"""What a decay run found: of every patch its values over time and the fit to them."""
+"""Result of a decay run: the time series of every patch and the fit to it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -22,14 +22,14 @@ class NoiseBudget:
     Attributes
     ----------
     t_s
-        (n,) middle of the exposures of the first decay, rising.
+        Middles of the exposures of the first decay in seconds after lamp-off, rising, shape (n,).
     photons, reading, uneven
-        (n,) what grows as the root of the light, what is there without light, and what is
-        proportional to it but differs over the patch. Their sum in quadrature is the series' σ.
+        Photon noise, read noise, and the part that is proportional to the light but uneven over the
+        patch, shape (n,). Their sum in quadrature is the series' σ.
     flicker
-        (n,) common to the channels of a frame, as fitted.
+        Fitted scatter common to the channels of a frame, shape (n,).
     dark_level
-        (n,) of the level that was subtracted, common to all frames; 0 if not known.
+        Uncertainty of the subtracted dark level, common to all frames, shape (n,); 0 if unknown.
     """
 
     t_s: FloatArray
@@ -41,32 +41,32 @@ class NoiseBudget:
 
     @property
     def together(self) -> FloatArray:
-        """Of one value, (n,)."""
+        """Total relative standard uncertainty of one value, shape (n,)."""
         parts = (self.photons, self.reading, self.uneven, self.flicker, self.dark_level)
         return np.asarray(np.sqrt(np.square(parts).sum(axis=0)))
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class DecayPatch:
-    """One patch of the sample.
+    """Decay of one patch of the sample.
 
     Attributes
     ----------
     region
-        Where it lies in the photographs; None if that is not known.
+        Region of the patch in the photographs; None if unknown.
     series
-        What was measured there, DN/s.
+        Time series of the patch in DN/s.
     fit
-        None where nothing could be fitted.
+        Fitted decay; None where the fit failed.
     failure
-        Why there is no fit; empty if there is one.
+        Reason for the missing fit; empty if there is one.
     normalised_residuals
-        (m, C) value − model of the m usable frames, whitened: independent and of unit variance if
-        the noise is as assumed. None without a fit.
+        Value − model of the m usable frames, whitened: independent and of unit variance if the
+        noise is as assumed, shape (m, C). None without a fit.
     noise
-        Where σ comes from; None where the fitted frames do not tell.
+        Noise budget; None where the fitted frames do not determine it.
     material
-        What the decay alone says of it, rates and amplitudes; None without a fit.
+        Material by this decay alone, with rates and amplitudes; None without a fit.
     """
 
     region: Region | None
@@ -94,15 +94,15 @@ class DecayResult(RunResult):
     Attributes
     ----------
     patches
-        By name.
+        Decay of each patch by its name.
     background
-        The region whose level was subtracted from each frame; None if dark frames served for that.
+        Region whose level was subtracted from each frame; None if dark frames served for that.
     states_asked
-        The number of states that was asked for; None if the data decided.
+        Number of states that was requested; None if the data decided.
     charges_s
-        How long the lamp shone before each decay, as measured.
+        Measured duration of the charge before each decay in seconds.
     temperature_c
-        Mean over the photographs of the glow; None where it is not known.
+        Mean temperature over the photographs of the glow in °C; None if unknown.
 
     Examples
     --------
@@ -121,18 +121,18 @@ class DecayResult(RunResult):
 
     @property
     def fits(self) -> dict[str, FittedDecay]:
-        """Of the patches that could be fitted, by name."""
-        return {name: one.fit for name, one in self.patches.items() if one.fit is not None}
+        """Fits of the patches that could be fitted, by name."""
+        return {name: patch.fit for name, patch in self.patches.items() if patch.fit is not None}
 
     def provides(self) -> dict[str, dict[str, FittedDecay]]:
-        """The fits, by patch."""
+        """Return the fits by patch."""
         return {"decays": self.fits}
 
     def failures(self) -> tuple[str, ...]:
-        """Why no patch at all could be fitted."""
-        return () if self.fits else tuple(one.failure for one in self.patches.values())
+        """Return the reasons why no patch at all could be fitted."""
+        return () if self.fits else tuple(patch.failure for patch in self.patches.values())
 
     def write_files(self, folder: Path) -> None:
-        """Write what belongs to each patch; of several, each into a folder of its name."""
+        """Write the files of each patch; of several patches, each into a folder of its name."""
         for name, patch in self.patches.items():
             patch.write_files(folder / name if len(self.patches) > 1 else folder)

@@ -18,31 +18,32 @@ from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.yaml_file import read_model, write_yaml
 
-#: The grid of the paper's section 4.7.
+#: Grid of wavelengths in nm, from section 4.7 of the paper (Nalbach et al.).
 WAVELENGTH_NM: FloatArray = np.arange(400.0, 701.0, 10.0)
-#: Probability that the truth of a wavelength lies between `low` and `high`.
+#: Probability of the credible band between `low` and `high` at a wavelength.
 CREDIBLE = 0.6827
 
 
 class EmissionSpectrum(BaseModel):
-    """Λ* on a grid, its largest value 1.
+    """Emission spectrum Λ* on a grid, normalised to a maximum of 1.
 
     Attributes
     ----------
     sample
-        Its name.
+        Name of the sample.
     wavelength_nm
-        (n,) every value is the mean about its wavelength, half-way to its neighbours.
+        Wavelengths of the grid in nm, shape (n,). Each value is the mean about its wavelength,
+        half-way to its neighbours.
     value, sigma
-        (n,) and one standard deviation; a common factor is left open and not in it.
+        Spectrum and its standard uncertainty, shape (n,); a common factor is not in it.
     low, high
-        (n,) ends of the 68 % credible interval.
+        Ends of the 68 % credible band, shape (n,).
     covariance
-        (n, n) of the values.
+        Covariance of the values, shape (n, n).
     lamp
-        That charged the sample.
+        Name of the lamp that charged the sample.
     run
-        Where it was measured.
+        Name of the run in which it was measured.
     """
 
     model_config = ConfigDict(frozen=True, extra="forbid")
@@ -79,18 +80,21 @@ class EmissionSpectrum(BaseModel):
         lamp: str,
         run: str,
     ) -> Self:
-        """The spectrum on the grid of `WAVELENGTH_NM`, from a fit on its own knots.
+        """Average a spectrum fitted on its own knots to the grid of `WAVELENGTH_NM`.
 
-        The draws are brought to one integral: what is common to all wavelengths is no shape.
+        The draws are normalised to one integral: a factor common to all wavelengths is not part of
+        the shape.
 
         Parameters
         ----------
-        knots_nm, value
-            (k,) of the fitted spectrum, in any unit: straight lines between the knots.
+        knots_nm
+            Wavelengths of the fitted spectrum in nm, linear between them, shape (k,).
+        value
+            Fitted spectrum in any unit, shape (k,).
         draws
-            (s, k) spectra that the measured values leave possible.
+            Posterior draws of the spectrum, shape (s, k).
         sample, lamp, run
-            As the attributes.
+            Names of sample, lamp and run, as the attributes.
         """
         edges = edges_from_centres(WAVELENGTH_NM)
         means = band_means(knots_nm, value, edges)
@@ -112,7 +116,7 @@ class EmissionSpectrum(BaseModel):
 
     @property
     def peak_nm(self) -> float:
-        """Wavelength of the largest value."""
+        """Wavelength of the largest value in nm."""
         return self.wavelength_nm[int(np.argmax(self.value))]
 
     @property
@@ -125,21 +129,26 @@ class EmissionSpectrum(BaseModel):
         return Measured(centroid, sigma, "nm")
 
     def in_bands(self, edges_nm: ArrayLike) -> tuple[FloatArray, FloatArray]:
-        """Means over neighbouring bands (b,), and their covariance (b, b).
+        """Return the means over neighbouring bands, shape (b,), and their covariance, shape (b, b).
 
-        Values are means: a cubic spline through their running sum takes them apart where an edge
-        of a band lies within one; straight lines between them would fill valleys.
+        A cubic spline through the running sum of the values divides them where an edge of a band
+        lies between grid points; linear interpolation would fill valleys.
         """
-        ends = edges_from_centres(np.array(self.wavelength_nm))
-        sums = np.vstack([np.zeros(len(ends) - 1), np.tril(np.ones((len(ends) - 1,) * 2))])
-        sums[1:] *= np.diff(ends)
+        grid_edges = edges_from_centres(np.array(self.wavelength_nm))
+        sums = np.vstack(
+            [np.zeros(len(grid_edges) - 1), np.tril(np.ones((len(grid_edges) - 1,) * 2))]
+        )
+        sums[1:] *= np.diff(grid_edges)
         edges = np.asarray(edges_nm, dtype=np.float64)
-        inside = np.clip(edges, ends[0], ends[-1])
-        means = np.diff(CubicSpline(ends, sums)(inside), axis=0) / np.diff(edges)[:, np.newaxis]
+        clipped_edges = np.clip(edges, grid_edges[0], grid_edges[-1])
+        means = (
+            np.diff(CubicSpline(grid_edges, sums)(clipped_edges), axis=0)
+            / np.diff(edges)[:, np.newaxis]
+        )
         return means @ np.array(self.value), means @ np.array(self.covariance) @ means.T
 
     def for_material(self) -> Spectrum:
-        """As a material's file has it."""
+        """Return the spectrum in the form of a material file."""
         return Spectrum(wavelength_nm=self.wavelength_nm, value=self.value, sigma=self.sigma)
 
     def write_csv(self, path: Path) -> None:
@@ -153,34 +162,36 @@ class EmissionSpectrum(BaseModel):
 
 
 def read_emission_spectrum(path: Path) -> EmissionSpectrum:
-    """The spectrum in the file at `path`.
+    """Read an emission spectrum.
 
     Raises
     ------
     UsageError
-        No such file, or it is malformed.
+        The file does not exist, or is malformed.
     """
     return read_model(path, EmissionSpectrum)
 
 
 def write_emission_spectrum(path: Path, spectrum: EmissionSpectrum) -> None:
-    """Write `spectrum` so that `read_emission_spectrum` gives it back."""
+    """Write an emission spectrum; `read_emission_spectrum` reads it back."""
     write_yaml(path, spectrum)
 
 
 @dataclass(frozen=True, eq=False)
 class FilterFrames:
-    """Frames of one scene through the filter: its brightness may change, its colours may not.
+    """f frames of one scene through the filter, of constant colours but variable brightness.
 
     Attributes
     ----------
     t_s
-        (f,) middle of each exposure after lamp-off.
-    value_dn_per_s, sigma_dn_per_s
-        (f, m) of every position and channel, NaN where it clips; one standard deviation of what
-        is independent.
+        Middles of the exposures in seconds after lamp-off, shape (f,).
+    value_dn_per_s
+        Signal of every position and channel in DN/s, shape (f, m); NaN where it clips.
+    sigma_dn_per_s
+        Independent standard uncertainty of the signal in DN/s, shape (f, m).
     dark_sigma_dn_per_s
-        (f, m) of what a dark level that is off adds to all values of a frame together.
+        Common-mode standard uncertainty of a frame's values by the dark level in DN/s, shape (f,
+        m).
     """
 
     t_s: FloatArray
@@ -192,35 +203,36 @@ class FilterFrames:
         return len(self.t_s)
 
     def take(self, rows: Sequence[int]) -> "FilterFrames":
-        """Some of the frames."""
-        some = list(rows)
+        """Return the given frames."""
+        indices = list(rows)
         return FilterFrames(
-            self.t_s[some],
-            self.value_dn_per_s[some],
-            self.sigma_dn_per_s[some],
-            self.dark_sigma_dn_per_s[some],
+            self.t_s[indices],
+            self.value_dn_per_s[indices],
+            self.sigma_dn_per_s[indices],
+            self.dark_sigma_dn_per_s[indices],
         )
 
 
 @dataclass(frozen=True)
 class SpectralComparison:
-    """Whether one scene through the filter differs from another in more than its brightness.
+    """Test whether two scenes through the filter differ in more than their brightness.
 
     Attributes
     ----------
     what
-        Which scene against which, for people.
+        Names of the two scenes, for people.
     brightness
-        Of the one relative to the other.
+        Brightness of the first scene relative to the second.
     chi2, dof
-        Of the difference, the brightness and an offset of the dark level fitted.
+        χ² of the difference, brightness and an offset of the dark level fitted, and its degrees of
+        freedom.
     p_value
-        Chance of such a difference by noise alone.
+        Probability of such a χ² by noise alone.
     beyond_noise
-        Relative root mean square difference that noise does not explain, bright places counting
-        most; 0 if it explains all.
+        Relative root mean square difference in excess of noise, weighted towards bright places; 0
+        if noise explains all.
     shift_nm, shift_sigma_nm
-        How far the centroid of light along the filter is moved.
+        Shift of the centroid of light along the filter and its standard uncertainty in nm.
     """
 
     what: str
@@ -240,11 +252,11 @@ class ChargeSpectrum:
     Attributes
     ----------
     lamp
-        That charged the sample.
+        Name of the lamp that charged the sample.
     frames
-        In which there is light.
+        Frames in which light is detected.
     spectrum
-        Of all frames together; its credible band is of few draws.
+        Spectrum of all frames together, its credible band from few draws.
     """
 
     lamp: str
@@ -259,24 +271,25 @@ class PatchSpectrum:
     Attributes
     ----------
     spectrum
-        After the first charge, all times together; the file `emission.yaml`.
+        Spectrum after the first charge, all times together; the file `emission.yaml`.
     channels
-        Of the camera.
+        Channels of the camera.
     centre_nm
-        (m,) centre of the filter's band for every value of a frame: position by position, the
-        channels of one after the other.
+        Centre of the filter's band in nm for every value of a frame, position by position and
+        within it channel by channel, shape (m,).
     white_reference
-        Whether a grey card under the known lamp told what the camera's curves are off by.
+        Whether the camera's curves were corrected by a grey card under the known lamp.
     charges
-        One a lamp that lit, in order of time.
+        Glow after the charge by each lamp that lit, in order of time.
     times
-        Every frame after the first charge against all others together; empty if it is alone.
+        Comparisons of every frame after the first charge with all others together; empty if it is
+        the only one.
     at_times
-        The spectrum of each of these frames, of few draws.
+        Spectrum of each of these frames, from few draws.
     lamps
-        Every later charge against the first.
+        Comparisons of every later charge with the first.
     changes_with_time, depends_on_lamp
-        Whether any of `times`, of `lamps` differs by more than chance.
+        Whether any of `times`, of `lamps` is significant.
     """
 
     spectrum: EmissionSpectrum
@@ -298,7 +311,7 @@ class EmissionSpectrumResult(RunResult):
     Attributes
     ----------
     patches
-        By the patch's name; under "" of the only one.
+        Emission spectrum of each patch by its name; that of the only one under "".
 
     Examples
     --------
@@ -312,7 +325,7 @@ class EmissionSpectrumResult(RunResult):
     patches: Mapping[str, PatchSpectrum]
 
     def provides(self) -> Mapping[str, Any]:
-        """The spectrum of every patch."""
+        """Return the spectrum of every patch."""
         return {"spectra": {name: patch.spectrum for name, patch in self.patches.items()}}
 
     def write_files(self, folder: Path) -> None:

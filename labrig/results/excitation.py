@@ -1,4 +1,4 @@
-"""How fast light of each band charges a sample, and the material that follows."""
+"""Result of an excitation run: excitation rates by band, and the material from them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -17,30 +17,49 @@ from labrig.results.run_result import RunResult
 from labrig.results.series import Series
 from labrig.results.text_files import finite, write_json
 
-#: Charges whose longest is so many times the shortest go along a logarithmic axis.
+#: Ratio of the longest to the shortest charge from which an axis is logarithmic.
 MANY_TIMES = 20.0
 
 
 def spans_decades(charge_s: FloatArray) -> bool:
-    """Whether charges are so different that they go along a logarithmic axis."""
+    """Return whether charge durations differ so much that a logarithmic axis suits them.
+
+    Parameters
+    ----------
+    charge_s
+        Duration of each charge in seconds, shape (n,).
+
+    Returns
+    -------
+    bool
+        True if the shortest is above 0 s and the longest is more than 20 times as long.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.results import spans_decades
+    >>> spans_decades(np.array([1.0, 10.0, 100.0])), spans_decades(np.array([10.0, 20.0]))
+    (True, False)
+    """
     low = float(charge_s.min())
     return low > 0 and float(charge_s.max()) > MANY_TIMES * low
 
 
 @dataclass(frozen=True, eq=False)
 class Closure:
-    """Levels after n charges in DN/s, measured against predicted; nothing is fitted to them.
+    """Measured against predicted levels after n charges; nothing is fitted to them.
 
     Attributes
     ----------
     charge_s
-        (n,) how long the lamp shone; its fade counts as so much longer at full light.
+        Duration of each charge in seconds, corrected for the lamp's transients, shape (n,).
     measured, predicted
-        (n,) levels.
+        Levels in DN/s, shape (n,).
     sigma
-        (n,) by how much the two may differ.
+        Standard uncertainty of their difference in DN/s, shape (n,).
     curve_charge_s, curve
-        (m,) charges from the shortest to the longest, and the levels predicted after them.
+        Durations in seconds from the shortest to the longest charge, and predicted levels in DN/s
+        after them, shape (m,).
     """
 
     charge_s: FloatArray
@@ -58,7 +77,7 @@ class Closure:
 
     @property
     def rms_sigma(self) -> float:
-        """RMS deviation in σ: about 1 if noise and what the prediction may be off by explain it."""
+        """RMS deviation in σ: about 1 if noise and the uncertainty of the prediction explain it."""
         return _rms((self.measured - self.predicted) / self.sigma)
 
 
@@ -68,17 +87,17 @@ def _rms(values: FloatArray) -> float:
 
 @dataclass(frozen=True, eq=False)
 class PatchCharging:
-    """What was measured of a patch at P places along the filter.
+    """Charging of a patch at P places along the filter.
 
     Attributes
     ----------
     through, direct
-        Charges through the filter and by the lamp itself, at the same places; values are even:
-        what lens and sample do from place to place is divided out.
+        Charges through the filter and by the lamp itself, at the same places. Their values are
+        divided by `evenness`.
     evenness
-        (P,) by which they were divided, 1 on average.
+        Relative signal of each place in even light, by lens and sample, 1 on average, shape (P,).
     whole
-        The whole strip after the last charge by the lamp itself.
+        Series of the whole strip after the last charge by the lamp itself.
     """
 
     through: ChargingSeries
@@ -89,19 +108,19 @@ class PatchCharging:
 
 @dataclass(frozen=True, eq=False)
 class PatchExcitation:
-    """What was found of a patch.
+    """Excitation of a patch.
 
     Attributes
     ----------
     charging
         Light, charges, and photographs after each.
     decay
-        Of the whole strip after the last charge; where the fit of the charges started.
+        Decay of the whole strip after the last charge; where the fit of the charges started.
     fit
-        Of all charges together; its residuals are those of `charging.through`, then of
+        Fit of all charges together; its residuals are those of `charging.through`, then of
         `charging.direct`.
     material
-        As these rates say; with re-radiance where the emission spectrum is known.
+        Material by these rates, with re-radiance where the emission spectrum is known.
     closure
         Charging by the lamp itself, as predicted from charges through the filter; None if there
         were too few charges to test it.
@@ -121,9 +140,9 @@ class ExcitationResult(RunResult):
     Attributes
     ----------
     irradiance
-        The lamp's light on the sample, as it was known.
+        Irradiance calibration that the analysis used.
     patches
-        By name; under "" the only one.
+        Excitation of each patch by its name; that of the only one under "".
 
     Examples
     --------
@@ -140,15 +159,17 @@ class ExcitationResult(RunResult):
 
     @property
     def position_nm(self) -> FloatArray:
-        """(P,) mean wavelength of the light at every place behind the filter."""
-        edges, through = np.array(self.irradiance.bands_nm), np.array(self.irradiance.through)
+        """Mean wavelength of the light at every place behind the filter in nm, shape (P,)."""
+        edges, transmitted = np.array(self.irradiance.bands_nm), np.array(self.irradiance.through)
         middles = (edges[1:] + edges[:-1]) / 2
         # Squared, so that what leaks all over does not pull.
-        found: FloatArray = through**2 @ middles / np.maximum((through**2).sum(axis=1), 1e-300)
-        return found
+        position_nm: FloatArray = (
+            transmitted**2 @ middles / np.maximum((transmitted**2).sum(axis=1), 1e-300)
+        )
+        return position_nm
 
     def provides(self) -> Mapping[str, Any]:
-        """The materials."""
+        """Return the materials by patch."""
         return {"materials": {name: patch.material for name, patch in self.patches.items()}}
 
     def write_files(self, folder: Path) -> None:
@@ -160,7 +181,7 @@ class ExcitationResult(RunResult):
             write_json(place / "excitation.json", finite(self._fit_content(patch.fit)))
 
     def _fit_content(self, fit: FittedExcitation) -> dict[str, Any]:
-        off = fit.at_off[-1]
+        level_at_off = fit.at_off[-1]
         return {
             "schema_version": self.schema_version,
             "bands_nm": self.irradiance.bands_nm,
@@ -174,8 +195,8 @@ class ExcitationResult(RunResult):
                     "k_e_per_s": state.k_e_per_s.tolist(),
                     "k_e_sigma_per_s": state.k_e_sigma_per_s.tolist(),
                     "k_e_upper_per_s": state.k_e_upper_per_s.tolist(),
-                    "r0": float(off.r0[number]),
-                    "r0_sigma": float(off.r0_sigma[number]),
+                    "r0": float(level_at_off.r0[number]),
+                    "r0_sigma": float(level_at_off.r0_sigma[number]),
                 }
                 for number, state in enumerate(fit.states)
             ],

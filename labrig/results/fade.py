@@ -1,4 +1,4 @@
-"""How the lamp goes dark after switching off, comes on, and warms."""
+"""Result of a fade run: turn-off, turn-on and warm-up transients of the lamp."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -12,18 +12,19 @@ from labrig.results.run_result import RunResult
 
 @dataclass(frozen=True, eq=False)
 class SwitchedFrames:
-    """n frames after a switch of the lamp, seen in S places or colours.
+    """n frames after a switch of the lamp in S places or colours.
 
     Attributes
     ----------
     start_s, exposure_s
-        (n,) begins after the switch as recorded, and shutter times.
+        Recorded begins in seconds after the switch, and exposure times in seconds, shape (n,).
     light_s, light_sigma_s
-        (n, S) ∫ of the fraction of the steady lamp over the exposure, in s; NaN where it clips.
+        Integral over the exposure of the light relative to the steady lamp, and its standard
+        uncertainty, in seconds, shape (n, S); NaN where it clips.
     steady_dn_per_s
-        (S,) signal of the steady lamp.
+        Signal of the steady lamp in DN/s, shape (S,).
     clipped
-        How many frames clip somewhere; those that clip everywhere are not among the n.
+        Number of frames that clip somewhere; those that clip everywhere are not among the n.
     """
 
     start_s: FloatArray
@@ -36,20 +37,21 @@ class SwitchedFrames:
 
 @dataclass(frozen=True, eq=False)
 class FittedShape:
-    """One course of u(t) in ln fraction = −u(t) (550 nm/λ)^p that may explain the frames.
+    """One shape of u(t) in ln fraction = −u(t) (550 nm/λ)^p, fitted to the frames.
 
     Attributes
     ----------
     name
-        `filament`, or `polynomial of degree 3` and the like.
+        Name of the shape, such as `filament` or `polynomial of degree 3`.
     parameters, covariance
-        (k,) and (k, k); the last two parameters are p and the lag of the shutter in s.
+        Fitted parameters and their covariance, shapes (k,) and (k, k); the last two parameters are
+        p and the lag of the shutter in seconds.
     jitter_s
-        Scatter of the frames' begins.
+        Scatter of the frames' begins in seconds.
     chi2, dof
-        Of the frames, and its degrees of freedom.
+        χ² of the frames and its degrees of freedom.
     weight
-        How likely the shape is among those fitted; they sum to 1.
+        Probability of the shape among those fitted; they sum to 1.
     """
 
     name: str
@@ -68,18 +70,18 @@ class FittedShape:
 
 @dataclass(frozen=True, eq=False)
 class LampChange:
-    """The lamp's fade or rise; what it is band by band is in the file's table.
+    """Turn-off or turn-on transient of the lamp; the file has its table by band.
 
     Attributes
     ----------
     frames
-        What it was found from.
+        Frames that it was fitted to.
     shapes
-        Those that explain it.
+        Shapes that are compatible with the frames.
     exponent
-        p, over all shapes; 1 of a glowing body.
+        Exponent p over all shapes; 1 of a black-body emitter.
     lag
-        By how much shutters opened later than recorded, over all shapes.
+        Delay in seconds of the actual against the recorded opening of the shutter, over all shapes.
     """
 
     frames: SwitchedFrames
@@ -89,18 +91,20 @@ class LampChange:
 
     @property
     def best(self) -> FittedShape:
-        """The likeliest shape."""
+        """Most probable shape."""
         return max(self.shapes, key=lambda shape: shape.weight)
 
 
 @dataclass(frozen=True, eq=False)
 class WarmingLight:
-    """Light while the lamp's housing warms.
+    """Light during the warm-up of the lamp's housing.
 
     Attributes
     ----------
-    t_s, light
-        (n,) begins of the frames after switching on, and light over that of the warm lamp.
+    t_s
+        Begins of the frames in seconds after switching on, shape (n,).
+    light
+        Light relative to that of the warm lamp, shape (n,).
     """
 
     t_s: FloatArray
@@ -109,16 +113,16 @@ class WarmingLight:
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class FadeResult(RunResult):
-    """The lamp after its switch.
+    """Transients of the lamp after it was switched.
 
     Attributes
     ----------
     calibration
-        For charges on the same bench; the file `fade.yaml`.
+        Calibration for charges on the same bench; the file `fade.yaml`.
     fade, rise
-        After switching off and on; None: not measured.
+        Turn-off and turn-on transient; None if not measured.
     warming
-        The light with which `calibration.warming` was found; None: not measured.
+        Light from which `calibration.warming` was fitted; None if not measured.
 
     Examples
     --------
@@ -134,7 +138,7 @@ class FadeResult(RunResult):
     warming: WarmingLight | None = None
 
     def provides(self) -> Mapping[str, Any]:
-        """The fade."""
+        """Return the calibration."""
         return {FADE_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""What a decay told: rates, amplitudes and how well they are known; the file `fit.json`."""
+"""Fit of a decay: rates and amplitudes with their uncertainties; the file `fit.json`."""
 
 import json
 import math
@@ -16,7 +16,7 @@ from labrig.results.measured import FloatArray, Measured, with_uncertainty
 from labrig.results.text_files import finite, json_text, write_json
 
 FILE = "fit.json"
-#: Of that file: another number says that keys were renamed or mean something else.
+#: Version of that file: another number means renamed keys or other meanings.
 SCHEMA_VERSION = 1
 
 
@@ -27,9 +27,9 @@ class DecayState:
     Attributes
     ----------
     k_r_per_s, k_r_sigma_per_s
-        Rate; σ 0 if it was held.
+        Rate k in 1/s; σ is 0 if it was held.
     amplitude, amplitude_sigma
-        At lamp off, in the brightest channel, in the values' units.
+        Amplitude a at lamp off in the brightest channel, in the unit of the values.
     """
 
     k_r_per_s: float
@@ -40,18 +40,18 @@ class DecayState:
 
 @dataclass(frozen=True)
 class Candidate:
-    """What n states achieved, all candidates at the same weights.
+    """Quality of the fit with n states, all candidates at the same weights.
 
     Attributes
     ----------
     n_states
-        States tried.
+        Number of states.
     reduced_chi2
         χ² per degree of freedom; NaN if there are none.
     bic
-        χ² + parameters · log(independent data).
+        Bayesian information criterion: χ² + parameters · log(independent data).
     f_p_value
-        Chance of such a gain over one state fewer if that were enough; None for the first tried.
+        p-value of the F-test against one state fewer; None for the first candidate.
     """
 
     n_states: int
@@ -62,14 +62,18 @@ class Candidate:
 
 @dataclass(frozen=True)
 class AlternativeModel:
-    """A alternative model fitted, in the brightest channel, in the values' units.
+    """An alternative decay model fitted, in the brightest channel.
 
     Attributes
     ----------
     name, formula
-        Which, and how it reads.
-    amplitude, tau_s, exponent, exponent_sigma
-        A at lamp off, τ, p or β and its σ.
+        Name and formula of the model.
+    amplitude
+        Amplitude A at lamp off in the unit of the values.
+    tau_s
+        Time constant τ in seconds.
+    exponent, exponent_sigma
+        Exponent p or β and its standard uncertainty.
     bic
         Bayesian information criterion, comparable with the candidates'.
     """
@@ -85,35 +89,37 @@ class AlternativeModel:
 
 @dataclass(frozen=True)
 class FittedDecay:
-    """Σ_i a_i e^(−k_i t) times one weight per channel, plus its offset; with uncertainties.
+    """Decay model Σ_i a_i e^(−k_i t), times a weight and plus an offset for each channel.
 
     Attributes
     ----------
     states
-        By falling rate.
-    channels, channel_weights, channel_weights_sigma
-        Names, weights (maximum 1, which is held), their σ.
+        Exponentials by falling rate.
+    channels
+        Names of the C channels.
+    channel_weights, channel_weights_sigma
+        Weights of the channels, whose maximum is held at 1, and their σ.
     offsets, offsets_sigma
-        Of the channels, in the values' units; σ 0 if held at 0.
+        Offsets of the channels in the unit of the values; σ is 0 if held at 0.
     repeats, levels
-        Names of the charges, and how bright the decay after each was over their mean.
+        Names of the charges, and brightness of the decay after each relative to their mean.
     flicker, flicker_sigma
-        Relative noise common to the channels of a frame; σ 0 if given.
+        Relative noise common to the channels of a frame; σ is 0 if it was given.
     chi2, dof
-        Sum of squared residuals in units of the noise, and its degrees of freedom.
+        Sum of squared normalised residuals and its degrees of freedom.
     bic
-        χ² + parameters · log(independent data).
+        Bayesian information criterion: χ² + parameters · log(independent data).
     covariance
-        Of the `covariance_parameters`; channel weights and the other channels' offsets
+        Covariance of the `covariance_parameters`; channel weights and the other channels' offsets
         marginalised.
     warnings
-        What to distrust, and what to do about it.
+        Limits of the fit and remedies, a line each.
     candidates
-        The numbers of states tried.
+        Fits with each number of states that was tried.
     alternative_models
         Power law and stretched exponential, fitted to the same series.
     better_model
-        The one of them that does clearly better than exponentials, if one does.
+        Alternative model that is clearly better than exponentials; None if none is.
     """
 
     states: tuple[DecayState, ...]
@@ -138,12 +144,12 @@ class FittedDecay:
     @property
     def covariance_parameters(self) -> tuple[str, ...]:
         """Names of the rows of `covariance`: rate and amplitude of each state, then the offset."""
-        of_states = [
+        state_parameters = [
             name
             for number in range(1, self.n_states + 1)
             for name in (f"k_r_per_s {number}", f"amplitude {number}")
         ]
-        return (*of_states, "offset")
+        return (*state_parameters, "offset")
 
     @property
     def rates(self) -> tuple[Measured, ...]:
@@ -156,7 +162,7 @@ class FittedDecay:
         return self.channels[self.brightest]
 
     def amplitudes_in(self, channel: str) -> tuple[Measured, ...]:
-        """Amplitude of every state in the DN/s of a channel.
+        """Return the amplitude of every state in the DN/s of a channel.
 
         Raises
         ------
@@ -168,8 +174,8 @@ class FittedDecay:
                 f"expected the same channels in both runs, got {channel} in one of them and "
                 f"{', '.join(self.channels)} in the other"
             )
-        at = self.channels.index(channel)
-        weight = Measured(self.channel_weights[at], self.channel_weights_sigma[at])
+        index = self.channels.index(channel)
+        weight = Measured(self.channel_weights[index], self.channel_weights_sigma[index])
         return tuple(
             Measured(s.amplitude, s.amplitude_sigma, "DN/s").times(weight) for s in self.states
         )
@@ -181,17 +187,17 @@ class FittedDecay:
 
     @property
     def brightest(self) -> int:
-        """The channel of weight 1, in whose units the amplitudes are."""
+        """Index of the channel of weight 1, in whose unit the amplitudes are."""
         return int(np.argmax(self.channel_weights))
 
     @property
     def offset(self) -> float:
-        """Of the brightest channel."""
+        """Offset of the brightest channel in the unit of the values."""
         return self.offsets[self.brightest]
 
     @property
     def offset_sigma(self) -> float:
-        """Of the brightest channel."""
+        """Standard uncertainty of the brightest channel's offset."""
         return self.offsets_sigma[self.brightest]
 
     @property
@@ -200,19 +206,19 @@ class FittedDecay:
         return self.chi2 / self.dof if self.dof > 0 else math.nan
 
     def predict(self, t_s: ArrayLike, exposure_s: ArrayLike = 0.0) -> FloatArray:
-        """Mean signal during exposures, (n, C), offsets included.
+        """Return the mean signal during exposures, offsets included, shape (n, C).
 
         Parameters
         ----------
         t_s
-            (n,) start of the exposures after lamp off, ≥ 0.
+            Begin of each exposure in seconds after lamp off, ≥ 0, shape (n,).
         exposure_s
-            Their length ≥ 0, one for all or (n,).
+            Exposure time in seconds, ≥ 0, one for all or shape (n,).
 
         Raises
         ------
         FitError
-            Shapes that do not agree.
+            The shapes do not agree.
         """
         t = np.atleast_1d(np.asarray(t_s, dtype=np.float64))
         exposure = np.asarray(exposure_s, dtype=np.float64)
@@ -228,7 +234,7 @@ class FittedDecay:
         return predicted
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of `fit.json`; None for what is not finite."""
+        """Return the content of `fit.json`; values that are not finite are None."""
         fields: dict[str, Any] = {
             "schema_version": SCHEMA_VERSION,
             "n_states": self.n_states,
@@ -257,11 +263,11 @@ class FittedDecay:
         return content
 
     def to_json(self) -> str:
-        """The text of `fit.json`."""
+        """Return the text of `fit.json`."""
         return json_text(self.to_dict())
 
     def __str__(self) -> str:
-        """A table for people; digits in brackets are σ in units of the last places."""
+        """Return a table for people; digits in brackets are σ in units of the last places."""
         rows = [
             [
                 str(number),
@@ -272,9 +278,11 @@ class FittedDecay:
             for number, state in enumerate(self.states, start=1)
         ]
         lines = _table([["state", "k / s⁻¹", "1/k / s", "amplitude"], *rows])
-        lines.append(f"weights  {self._written(self.channel_weights, self.channel_weights_sigma)}")
+        lines.append(
+            f"weights  {self._values_text(self.channel_weights, self.channel_weights_sigma)}"
+        )
         if any(self.offsets_sigma):
-            lines.append(f"offsets  {self._written(self.offsets, self.offsets_sigma)}")
+            lines.append(f"offsets  {self._values_text(self.offsets, self.offsets_sigma)}")
         if len(self.repeats) > 1:
             pairs = zip(self.repeats, self.levels, strict=True)
             lines.append(f"levels   {', '.join(f'{name} {level:.4f}' for name, level in pairs)}")
@@ -288,7 +296,7 @@ class FittedDecay:
     def _by_channel(self, values: tuple[float, ...]) -> dict[str, float]:
         return dict(zip(self.channels, values, strict=True))
 
-    def _written(self, values: tuple[float, ...], sigmas: tuple[float, ...]) -> str:
+    def _values_text(self, values: tuple[float, ...], sigmas: tuple[float, ...]) -> str:
         return ", ".join(
             f"{name} {with_uncertainty(value, sigma)}"
             for name, value, sigma in zip(self.channels, values, sigmas, strict=True)
@@ -296,23 +304,58 @@ class FittedDecay:
 
 
 def write_fitted_decay(path: Path, result: FittedDecay) -> None:
-    """Write `fit.json`.
+    """Write the fit of a decay to a JSON file.
+
+    Parameters
+    ----------
+    path
+        Path of the file, `fit.json` in a result folder.
+    result
+        The fitted decay.
 
     Raises
     ------
     DiskError
-        It cannot be written.
+        The file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.results import read_fitted_decay, write_fitted_decay
+    >>> result = labrig.read_result("runs/decay")
+    >>> write_fitted_decay(Path("fit.json"), result.patches["sample"].fit)
+    >>> read_fitted_decay(Path("fit.json")).n_states
+    2
     """
     write_json(path, result.to_dict())
 
 
 def read_fitted_decay(path: Path) -> FittedDecay:
-    """Read `fit.json`.
+    """Read the fit of a decay from a JSON file.
+
+    Parameters
+    ----------
+    path
+        Path of a `fit.json`, as `write_fitted_decay` writes it.
+
+    Returns
+    -------
+    FittedDecay
+        Rates, amplitudes and offsets with their standard uncertainties and covariance.
 
     Raises
     ------
     DataError
-        It is missing, damaged, or of another version.
+        The file is missing, damaged, or of another version.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.results import read_fitted_decay
+    >>> fit = read_fitted_decay(Path("runs/decay/result/fit.json"))
+    >>> [f"{rate.value:.2g} {rate.unit}" for rate in fit.rates]
+    ['0.2 1/s', '0.01 1/s']
     """
     try:
         return _from_dict(json.loads(path.read_text(encoding="utf-8")))
@@ -324,9 +367,26 @@ def read_fitted_decay(path: Path) -> FittedDecay:
 
 
 def find_fitted_decays(folder: Path) -> dict[str, Path]:
-    """The `fit.json` of every patch in a result folder, by the name of the patch's folder.
+    """Find the fit of every patch in a result folder.
 
-    A run with one patch has its fit in the result folder itself, under the name "".
+    Parameters
+    ----------
+    folder
+        A result folder.
+
+    Returns
+    -------
+    dict of str to Path
+        Path of each `fit.json` by the name of the patch's folder. A run with one patch has its fit
+        in the result folder itself, under the name "".
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.results import find_fitted_decays
+    >>> for name, path in find_fitted_decays(Path("runs/decay/result")).items():
+    ...     print(repr(name), path.as_posix())
+    '' runs/decay/result/fit.json
     """
     return {
         path.parent.name if path.parent != folder else "": path
@@ -335,12 +395,30 @@ def find_fitted_decays(folder: Path) -> dict[str, Path]:
 
 
 def read_fitted_decays(folder: Path) -> dict[str, FittedDecay]:
-    """What was fitted to every patch, by name as in `find_fitted_decays`; none if nothing was.
+    """Read the fit of every patch in a result folder.
+
+    Parameters
+    ----------
+    folder
+        A result folder.
+
+    Returns
+    -------
+    dict of str to FittedDecay
+        The fits by name of the patch, as in `find_fitted_decays`; empty if nothing was fitted.
 
     Raises
     ------
     DataError
         A file is damaged.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.results import read_fitted_decays
+    >>> for name, fit in read_fitted_decays(Path("runs/decay/result")).items():
+    ...     print(repr(name), fit.n_states, fit.brightest_channel)
+    '' 2 G
     """
     return {name: read_fitted_decay(path) for name, path in find_fitted_decays(folder).items()}
 
@@ -350,51 +428,56 @@ def _from_dict(content: Any) -> FittedDecay:
         raise ValueError(f"schema_version {content['schema_version']}, not {SCHEMA_VERSION}")
     weights: Mapping[str, float] = content["channel_weights"]
     alternative_models = tuple(
-        AlternativeModel(**one | {"exponent_sigma": _known(one["exponent_sigma"])})
-        for one in content["alternative_models"]
+        AlternativeModel(**model | {"exponent_sigma": _number_or(model["exponent_sigma"])})
+        for model in content["alternative_models"]
     )
     better = content["better_model"]
     return FittedDecay(
         states=tuple(
             DecayState(
-                k_r_per_s=float(one["k_r_per_s"]),
-                k_r_sigma_per_s=_known(one["k_r_sigma_per_s"]),
-                amplitude=float(one["amplitude"]),
-                amplitude_sigma=_known(one["amplitude_sigma"]),
+                k_r_per_s=float(state["k_r_per_s"]),
+                k_r_sigma_per_s=_number_or(state["k_r_sigma_per_s"]),
+                amplitude=float(state["amplitude"]),
+                amplitude_sigma=_number_or(state["amplitude_sigma"]),
             )
-            for one in content["states"]
+            for state in content["states"]
         ),
         channels=tuple(weights),
         channel_weights=tuple(map(float, weights.values())),
-        channel_weights_sigma=_in_order(weights, content["channel_weights_sigma"]),
+        channel_weights_sigma=_by_channel_order(weights, content["channel_weights_sigma"]),
         offsets=tuple(float(content["offsets"][name]) for name in weights),
-        offsets_sigma=_in_order(weights, content["offsets_sigma"]),
+        offsets_sigma=_by_channel_order(weights, content["offsets_sigma"]),
         repeats=tuple(content["levels"]),
         levels=tuple(map(float, content["levels"].values())),
         flicker=float(content["flicker"]),
-        flicker_sigma=_known(content["flicker_sigma"]),
+        flicker_sigma=_number_or(content["flicker_sigma"]),
         chi2=float(content["chi2"]),
         dof=int(content["dof"]),
         bic=float(content["bic"]),
         covariance=np.array(
-            [[_known(value) for value in row] for row in content["covariance"]], dtype=np.float64
+            [[_number_or(value) for value in row] for row in content["covariance"]],
+            dtype=np.float64,
         ),
         warnings=tuple(content["warnings"]),
         candidates=tuple(
-            Candidate(**one | {"reduced_chi2": _known(one["reduced_chi2"], math.nan)})
-            for one in content["candidates"]
+            Candidate(
+                **candidate | {"reduced_chi2": _number_or(candidate["reduced_chi2"], math.nan)}
+            )
+            for candidate in content["candidates"]
         ),
         alternative_models=alternative_models,
-        better_model=next((one for one in alternative_models if one.name == better), None),
+        better_model=next((model for model in alternative_models if model.name == better), None),
     )
 
 
-def _in_order(channels: Mapping[str, Any], sigma: Mapping[str, float | None]) -> tuple[float, ...]:
-    return tuple(_known(sigma[name]) for name in channels)
+def _by_channel_order(
+    channels: Mapping[str, Any], sigma: Mapping[str, float | None]
+) -> tuple[float, ...]:
+    return tuple(_number_or(sigma[name]) for name in channels)
 
 
-def _known(value: float | None, unknown: float = math.inf) -> float:
-    """JSON has no infinity: what nothing is known of is null there."""
+def _number_or(value: float | None, unknown: float = math.inf) -> float:
+    """Return the number of a JSON value, whose null stands for infinity or another `unknown`."""
     return unknown if value is None else float(value)
 
 

@@ -1,4 +1,4 @@
-"""Excitation rates of all states and bands, and how well they are known."""
+"""Fit of an excitation: rates of all states and bands with their uncertainties."""
 
 from dataclasses import dataclass
 
@@ -6,24 +6,24 @@ import numpy as np
 
 from labrig.results.measured import BoolArray, FloatArray
 
-#: One-sided 95 %.
+#: Standard deviations of a one-sided 95 % limit.
 UPPER_SIGMAS = 1.645
-#: An excitation rate of fewer σ than this is an upper limit.
+#: Significance in σ below which an excitation rate is an upper limit.
 SEEN_SIGMAS = 2.0
 
 
 @dataclass(frozen=True, eq=False)
 class ExcitedState:
-    """One state; σ are standard uncertainties.
+    """Rates of one state; σ are standard uncertainties.
 
     Attributes
     ----------
     k_r_per_s, k_r_sigma_per_s
-        Re-radiation rate.
+        Re-radiation rate in 1/s.
     amplitude, amplitude_sigma
-        Λ* k_r: the glow of a fully charged sample, in the brightest channel and the values' unit.
+        Glow Λ* k_r of a fully charged sample in the brightest channel, in the unit of the values.
     k_e_per_s, k_e_sigma_per_s
-        (B,) per unit of the irradiance that the first series states.
+        Excitation rates in 1/s per unit of the first series' irradiance, shape (B,).
     """
 
     k_r_per_s: float
@@ -35,27 +35,28 @@ class ExcitedState:
 
     @property
     def seen(self) -> BoolArray:
-        """(B,) bool: the band excites; where not, only `k_e_upper_per_s` is known."""
+        """Whether excitation by each band is detected, shape (B,); else k_e is an upper limit."""
         return self.k_e_per_s > SEEN_SIGMAS * self.k_e_sigma_per_s
 
     @property
     def k_e_upper_per_s(self) -> FloatArray:
-        """(B,) what k_e stays below with 95 % probability."""
+        """Upper limit of k_e in 1/s with 95 % probability, shape (B,)."""
         return self.k_e_per_s + UPPER_SIGMAS * self.k_e_sigma_per_s
 
 
 @dataclass(frozen=True, eq=False)
 class LevelAtOff:
-    """How charged the states were at a lamp-off, traced back in the dark.
+    """Charge of the N states at a lamp-off, extrapolated back in the dark.
 
     Attributes
     ----------
     series, charge, site
-        Where: name and numbers from 0.
+        Name of the series, and numbers of charge and site from 0.
     r0, r0_sigma
-        (N,) concentrations.
+        Concentrations, shape (N,).
     amplitude, amplitude_sigma
-        (N,) a = Λ* k_r r(0), what the decay from there shows, known better than its factors.
+        Amplitudes a = Λ* k_r r(0) of the decay from there, which are better determined than their
+        factors, shape (N,).
     """
 
     series: str
@@ -74,19 +75,19 @@ class FittedExcitation:
     Attributes
     ----------
     states
-        By falling rate.
+        States by falling rate.
     channel_weights, channel_weights_sigma
-        (C,) the brightest is 1.
+        Weights of the channels, 1 of the brightest, shape (C,).
     at_off
-        Of every series the charge and site that glow most.
+        Charge at lamp-off of every series, at the charge and site of the brightest glow.
     chi2, dof
-        Sum of squared whitened residuals, degrees of freedom.
+        Sum of squared whitened residuals, and its degrees of freedom.
     covariance
-        Of the `covariance_parameters`.
+        Covariance of the `covariance_parameters`.
     warnings
-        What to distrust, and what to do about it.
+        Limits of the fit and remedies, a line each.
     residuals
-        Of every series (n, P, C) in σ, flicker not taken out.
+        Residuals of every series in σ without flicker, shape (n, P, C) each.
     """
 
     states: tuple[ExcitedState, ...]
@@ -101,7 +102,7 @@ class FittedExcitation:
 
     @property
     def reduced_chi2(self) -> float:
-        """χ² per degree of freedom."""
+        """χ² per degree of freedom; NaN if there are none."""
         return self.chi2 / self.dof if self.dof > 0 else float("nan")
 
     @property
@@ -116,5 +117,5 @@ class FittedExcitation:
         )
 
     def k_e(self) -> FloatArray:
-        """(N, B) of all states."""
+        """Return the excitation rates of all states in 1/s, shape (N, B)."""
         return np.array([state.k_e_per_s for state in self.states])

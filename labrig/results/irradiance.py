@@ -1,4 +1,4 @@
-"""What the lamp does to the sample, by itself and through the variable filter that lies on it."""
+"""Result of an irradiance run: the lamp's light on the sample, directly and through the filter."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -14,19 +14,19 @@ from labrig.results.run_result import RunResult
 
 @dataclass(frozen=True, eq=False)
 class CardRatio:
-    """Light of a grey card through the filter over that of the lamp by itself.
+    """Signal of a grey card through the filter relative to that under the lamp itself.
 
     Attributes
     ----------
     value, sigma
-        (p, channels) mean over the rounds at p positions; NaN where it was not measured. σ is
-        without what is common to all.
+        Mean ratio over the rounds and its independent standard uncertainty at p positions, shape
+        (p, channels); NaN where it was not measured.
     common_sigma
-        Relative standard uncertainty that is common to all ratios.
+        Relative standard uncertainty common to all ratios.
     drift
         Relative scatter of the rounds about their mean, all positions and channels together.
     rounds
-        How many rounds there are.
+        Number of rounds.
     """
 
     value: FloatArray
@@ -38,17 +38,17 @@ class CardRatio:
 
 @dataclass(frozen=True, eq=False)
 class StripScale:
-    """What the filter leaves at p positions, over what its calibration lets expect.
+    """Light through the filter at p positions relative to the expectation by its calibration.
 
     Attributes
     ----------
     value
-        (p,) factors.
+        Factors, shape (p,).
     covariance
-        (p, p) of their logarithms.
+        Covariance of the factors' logarithms, shape (p, p).
     measured, measured_sigma
-        (p,) each position by itself, before neighbours had their say; σ relative, with the
-        camera's curves.
+        Factor of each position alone, before smoothing, and its relative standard uncertainty with
+        that of the camera's curves, shape (p,).
     """
 
     value: FloatArray
@@ -58,7 +58,7 @@ class StripScale:
 
     @property
     def relative_sigma(self) -> FloatArray:
-        """(p,) standard uncertainties of the factors' logarithms."""
+        """Standard uncertainties of the factors' logarithms, shape (p,)."""
         sigma: FloatArray = np.sqrt(np.diag(self.covariance))
         return sigma
 
@@ -70,13 +70,13 @@ class IrradianceResult(RunResult):
     Attributes
     ----------
     calibration
-        For excitation on the same bench; the file `irradiance.yaml`.
+        Calibration for excitation on the same bench; the file `irradiance.yaml`.
     centre_nm
-        (p,) middle of the band that each position lets through.
+        Centre of the band that each position transmits in nm, shape (p,).
     card_ratio
-        What the photographs of the grey card show.
+        Ratios measured on the grey card.
     scale
-        The same over what the filter's calibration lets expect.
+        Ratios relative to the expectation by the filter's calibration.
 
     Examples
     --------
@@ -92,7 +92,7 @@ class IrradianceResult(RunResult):
     scale: StripScale
 
     def provides(self) -> Mapping[str, Any]:
-        """The irradiance."""
+        """Return the calibration."""
         return {IRRADIANCE_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:

@@ -1,4 +1,4 @@
-"""Whether a sample glows alike in all directions."""
+"""Result of an isotropy run: the glow of a sample by its angle."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,29 +11,50 @@ from labrig.results.measured import FloatArray, IntArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 
-#: What the paper found its samples to fluctuate by at most (section 4).
+#: Largest fluctuation of the paper's samples (section 4).
 PAPER_REACH = 0.05
-#: A deviation is believed when it is so many σ beyond that.
+#: Significance in σ of a deviation beyond that.
 SIGMAS = 2.0
 
 
 def is_within_paper(ratio: Measured) -> bool:
-    """Whether a ratio of two views may be as near to 1 as the paper's samples are."""
+    """Return whether a ratio of two views deviates from 1 by no more than the paper's samples do.
+
+    The paper's samples fluctuate by 5 % at most (section 4); a deviation beyond that counts if it
+    is significant by 2 σ.
+
+    Parameters
+    ----------
+    ratio
+        Radiance of a view relative to the straight view, with its standard uncertainty.
+
+    Returns
+    -------
+    bool
+        True if the deviation is within 5 % and 2 σ.
+
+    Examples
+    --------
+    >>> from labrig.results import Measured, is_within_paper
+    >>> is_within_paper(Measured(0.93, 0.02)), is_within_paper(Measured(0.93, 0.005))
+    (True, False)
+    """
     return abs(ratio.value - 1) < PAPER_REACH + SIGMAS * ratio.sigma
 
 
 @dataclass(frozen=True, eq=False)
 class AngularGlow:
-    """The glow of a patch at n angles, over the glow seen straight at the same time.
+    """Glow of a patch at n angles relative to the straight view at the same time.
 
     Attributes
     ----------
     angle_deg
-        (n,) against the camera's axis, rising.
+        Angles against the camera's axis in degrees, rising, shape (n,).
     ratio, ratio_sigma
-        (n,) radiance over that of the straight view, 1 if the emission is isotropic.
+        Radiance relative to that of the straight view and its standard uncertainty, shape (n,); 1
+        if the emission is isotropic.
     drift
-        The straight view after all others over the one before; it is divided out of `ratio`.
+        Ratio of the straight views after and before all others; it is divided out of `ratio`.
     """
 
     angle_deg: IntArray
@@ -43,16 +64,18 @@ class AngularGlow:
 
     @property
     def worst(self) -> Measured:
-        """The ratio that is furthest from 1."""
-        return Measured(float(self.ratio[self._worst]), float(self.ratio_sigma[self._worst]))
+        """Ratio with the largest deviation from 1."""
+        return Measured(
+            float(self.ratio[self._worst_index]), float(self.ratio_sigma[self._worst_index])
+        )
 
     @property
     def worst_angle_deg(self) -> int:
-        """Where that is."""
-        return int(self.angle_deg[self._worst])
+        """Angle of the largest deviation in degrees."""
+        return int(self.angle_deg[self._worst_index])
 
     @property
-    def _worst(self) -> int:
+    def _worst_index(self) -> int:
         return int(np.argmax(np.abs(self.ratio - 1)))
 
 
@@ -63,7 +86,7 @@ class IsotropyResult(RunResult):
     Attributes
     ----------
     patches
-        By name.
+        Angular glow of each patch by its name.
     around
         Whether the patches enclose the whole sample, so that its intensity was divided by the
         cosine of the angle; else they lie inside of it and show its radiance.

@@ -1,4 +1,4 @@
-"""What the calibration of a linear variable filter gives."""
+"""Result of the calibration of a linear variable filter."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -20,9 +20,9 @@ class StripProfile:
     Attributes
     ----------
     position
-        (n,) rising from 0 at the strip's left end to 1 at its right end.
+        Positions rising from 0 at the strip's left end to 1 at its right end, shape (n,).
     value_dn_per_s
-        (n, channels) mean across the strip.
+        Mean signal across the strip in DN/s, shape (n, channels).
     """
 
     position: FloatArray
@@ -36,8 +36,9 @@ class SliceValues:
     Attributes
     ----------
     value, sigma
-        (positions, channels) in DN/s; NaN where all frames clip. σ is without what lamp, shutter
-        and aperture change from one scene to the next: that is common to all places and channels.
+        Signal and its standard uncertainty in DN/s, shape (positions, channels); NaN where all
+        frames clip. σ does not include changes of lamp, shutter and aperture between scenes, which
+        are common to all places and channels.
     """
 
     value: FloatArray
@@ -46,20 +47,21 @@ class SliceValues:
 
 @dataclass(frozen=True, eq=False)
 class LocatedLines:
-    """Lines of a lamp found along a strip.
+    """Lines of a lamp located along a strip.
 
     Attributes
     ----------
     wavelength_nm
-        (l,) rising; of a blend, of its first line.
+        Wavelengths of l lines in nm, rising, shape (l,); of a blend that of its first line.
     position, sigma
-        (l,) where they are, and one standard deviation, in the unit of the profile's positions.
+        Positions of the lines and their standard uncertainties in the unit of the profile's
+        positions, shape (l,).
     fwhm
-        Width of a single line in that unit, in the middle of the lines.
+        Full width at half maximum of a single line in that unit, in the middle of the lines.
     rising
-        Whether the wavelength grows with the position, from left to right.
+        Whether the wavelength rises with the position, from left to right.
     explained
-        Fraction of the profile's variance that the lines and a straight background explain.
+        Fraction of the profile's variance that the lines and a linear background explain.
     """
 
     wavelength_nm: FloatArray
@@ -70,9 +72,9 @@ class LocatedLines:
     explained: float
 
     def __str__(self) -> str:
-        """Which lines, and which way round."""
-        way = "rising" if self.rising else "falling"
-        return f"{', '.join(f'{nm:.0f}' for nm in self.wavelength_nm)} nm, {way} to the right"
+        """Return the lines and the direction of rising wavelength."""
+        direction = "rising" if self.rising else "falling"
+        return f"{', '.join(f'{nm:.0f}' for nm in self.wavelength_nm)} nm, {direction} to the right"
 
 
 @dataclass(frozen=True, eq=False)
@@ -82,11 +84,11 @@ class StripLines:
     Attributes
     ----------
     strip
-        With its wavelengths rising as they were found.
+        Place of the strip, with the direction of its wavelengths by the lines.
     profile
-        From its left end to its right end.
+        Light from its left end to its right end.
     lines
-        At positions from the blue end, 0, to the red end, 1.
+        Lines at positions from the blue end, 0, to the red end, 1.
     """
 
     strip: Strip
@@ -96,16 +98,16 @@ class StripLines:
 
 @dataclass(frozen=True, eq=False)
 class PlacedStrip:
-    """The strip on the sample by its mercury lines.
+    """The strip on the sample, located by its mercury lines.
 
     Attributes
     ----------
     strip
-        Such that the map known from before the camera holds along it.
+        Place along which the wavelength map from before the camera holds.
     residual_nm
-        (l,) wavelength of the map there minus that of the line.
+        Wavelength of the map minus that of each line in nm, shape (l,).
     sigma_nm
-        Standard uncertainty of the strip's place, in the middle of the lines.
+        Standard uncertainty of the strip's place in nm, in the middle of the lines.
     """
 
     strip: Strip
@@ -115,14 +117,14 @@ class PlacedStrip:
 
 @dataclass(frozen=True)
 class Stripes:
-    """How far the glow is from where the card was lit.
+    """Displacement of the glow from the place where the card was lit.
 
     Attributes
     ----------
     strip
-        On the sample as the camera sees it.
+        Place of the strip on the sample as the camera sees it.
     shift_nm, sigma_nm
-        Along the strip, towards the red end.
+        Shift along the strip towards the red end, and its standard uncertainty, in nm.
     """
 
     strip: Strip
@@ -132,16 +134,16 @@ class Stripes:
 
 @dataclass(frozen=True)
 class FilterMisfit:
-    """How far the frames of a colour filter are from the transmittances, rms along the strip.
+    """Deviation of a colour filter's frames from transmittances, RMS along the strip.
 
     Attributes
     ----------
     name
-        Of the filter that should have been in.
+        Name of the filter that should have been in place.
     own, best
-        Of its own transmittance, and of the best one.
+        Deviation from its own transmittance, and from the best one.
     like
-        Whose that is.
+        Name of the filter with the best transmittance.
     left_out
         Whether another filter, none or something else was in its place.
     """
@@ -155,7 +157,15 @@ class FilterMisfit:
 
 @dataclass(frozen=True, eq=False)
 class CameraCurves:
-    """Relative sensitivity (n, channels) of a camera's channels at (n,) wavelengths."""
+    """Spectral sensitivity of a camera's channels.
+
+    Attributes
+    ----------
+    wavelength_nm
+        Wavelengths in nm, shape (n,).
+    sensitivity
+        Relative sensitivity, shape (n, channels).
+    """
 
     wavelength_nm: FloatArray
     sensitivity: FloatArray
@@ -168,32 +178,35 @@ class LvfCalibrationResult(RunResult):
     Attributes
     ----------
     calibration
-        The file `lvf.yaml`: bands at p positions, map of wavelengths, places of the strip.
+        Bands at p positions, wavelength map and places of the strip; the file `lvf.yaml`.
     before_camera, on_sample
-        The strip under the mercury lamp, looked through and on the sample.
-    map_residual_nm, map_order
-        (l,) wavelength of the map minus that of each line before the camera; 1 or 2: straight or
-        bent.
+        The strip under the mercury lamp, before the camera and on the sample.
+    map_residual_nm
+        Wavelength of the map minus that of each line before the camera in nm, shape (l,).
+    map_order
+        Degree of the map: 1 is straight, 2 bent.
     placed
         The strip on the sample by its lines.
     stripes, why_no_stripes
-        The strip on the sample by what glows; None: there are no stripes, for that reason.
+        The strip on the sample by its glow; None if there are no stripes, and the reason for it.
     card
-        The grey card in the slices of the strip, without the strip.
+        Signal of the grey card in the slices of the strip, without the strip.
     through_filters
-        The card through the strip and each colour filter that was photographed, by its name;
+        Signal of the card through the strip and each photographed colour filter, by its name;
         `none` is without one.
     filter_misfits
-        Of every colour filter that was photographed.
+        Misfit of every photographed colour filter.
     filters
-        Names of the f colour filters that took part.
+        Names of the f colour filters that were used.
     transmittance_residual
-        (f, p) transmittance measured minus what the calibrated strip lets expect, mean of the
-        channels by their light; NaN where it says nothing.
+        Measured transmittance minus that of the calibrated strip, mean of the channels weighted by
+        their light, shape (f, p); NaN where it is undetermined.
     band_misfit
-        (p,) root mean square of what the fit leaves, in σ; where it is above 1, σ was raised by it.
+        Root mean square residual of the fit in σ, shape (p,); where it is above 1, σ was raised by
+        it.
     camera_before
-        The camera's curves as they were known; `calibration` has them as the filters tell them.
+        The camera's curves before the calibration; `calibration` has those corrected by the
+        filters.
 
     Examples
     --------
@@ -221,17 +234,17 @@ class LvfCalibrationResult(RunResult):
 
     @property
     def camera_curves(self) -> CameraResponse:
-        """The camera's curves as the filters tell them."""
+        """The camera's curves, corrected by the filters."""
         assert self.calibration.camera is not None, "a calibration has them"
         return self.calibration.camera.response()
 
     @property
     def map_rms_nm(self) -> float:
-        """Root of the mean squared residual of the map."""
+        """Root mean square residual of the wavelength map in nm."""
         return float(np.sqrt(np.mean(self.map_residual_nm**2)))
 
     def provides(self) -> Mapping[str, Any]:
-        """The calibrated filter."""
+        """Return the calibrated filter."""
         return {LVF_KIND.name: self.calibration}
 
     def write_files(self, folder: Path) -> None:

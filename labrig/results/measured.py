@@ -12,8 +12,8 @@ from pydantic import BaseModel, PlainSerializer, PlainValidator
 from labrig.results.run_result import RunResult
 
 
-def _listed(array: NDArray[Any]) -> Any:
-    """Nested lists; JSON has no infinity and no NaN, which become texts."""
+def _to_lists(array: NDArray[Any]) -> Any:
+    """Return nested lists, in which infinity and NaN, unknown to JSON, are texts."""
     if array.dtype.kind != "f" or np.isfinite(array).all():
         return array.tolist()
     texts = array.astype(object)
@@ -23,23 +23,23 @@ def _listed(array: NDArray[Any]) -> Any:
     return texts.tolist()
 
 
-_LISTED = PlainSerializer(_listed)
+_AS_LISTS = PlainSerializer(_to_lists)
 
 #: Real numbers of any shape.
 FloatArray = Annotated[
-    NDArray[np.float64], PlainValidator(lambda values: np.asarray(values, np.float64)), _LISTED
+    NDArray[np.float64], PlainValidator(lambda values: np.asarray(values, np.float64)), _AS_LISTS
 ]
 #: Truth values of any shape.
 BoolArray = Annotated[
-    NDArray[np.bool_], PlainValidator(lambda values: np.asarray(values, np.bool_)), _LISTED
+    NDArray[np.bool_], PlainValidator(lambda values: np.asarray(values, np.bool_)), _AS_LISTS
 ]
 #: Whole numbers of any shape.
 IntArray = Annotated[
-    NDArray[np.intp], PlainValidator(lambda values: np.asarray(values, np.intp)), _LISTED
+    NDArray[np.intp], PlainValidator(lambda values: np.asarray(values, np.intp)), _AS_LISTS
 ]
 
 
-#: A σ of more digits than this before its point is written with a power of ten.
+#: Fewest decimals of a rounded value; a larger σ is written with a power of ten.
 MOST_ROUNDED = -2
 
 
@@ -54,7 +54,7 @@ class Measured:
     sigma
         Its standard uncertainty ≥ 0; infinite where nothing is known of the value.
     unit
-        Such as `1/s` or `DN/s`; empty for a pure number.
+        Unit such as `1/s` or `DN/s`; empty for a pure number.
 
     Examples
     --------
@@ -67,13 +67,13 @@ class Measured:
     unit: str = ""
 
     def times(self, other: "Measured") -> "Measured":
-        """The product with a quantity that was measured independently."""
+        """Return the product with an independently measured quantity."""
         sigma = math.hypot(self.sigma * other.value, self.value * other.sigma)
         unit = " ".join(filter(None, (self.unit, other.unit)))
         return Measured(self.value * other.value, sigma, unit)
 
     def over(self, other: "Measured") -> "Measured":
-        """The ratio to a quantity of the same unit that was measured independently.
+        """Return the ratio to an independently measured quantity of the same unit.
 
         Raises
         ------
@@ -87,20 +87,40 @@ class Measured:
         return ratio
 
     def sigmas_from(self, other: "Measured") -> float:
-        """The difference `self` − `other` in its own σ, both measured independently.
+        """Return the difference `self` − `other` in its own σ, both measured independently.
 
-        NaN where nothing is known of that σ.
+        It is NaN where that σ is 0 or infinite.
         """
         sigma = math.hypot(self.sigma, other.sigma)
         return (self.value - other.value) / sigma if 0 < sigma < math.inf else math.nan
 
     def __str__(self) -> str:
-        """The value to two digits of its σ, and the unit."""
+        """Return the value to two digits of its σ, and the unit."""
         return " ".join(filter(None, (with_uncertainty(self.value, self.sigma), self.unit)))
 
 
 def with_uncertainty(value: float, sigma: float) -> str:
-    """`0.0802(13)`: the value to two digits of its σ; `0.08` if σ is 0, `0.08(?)` if unknown."""
+    """Write a value to two digits of its standard uncertainty, as in `0.0802(13)`.
+
+    Parameters
+    ----------
+    value
+        The value.
+    sigma
+        Its standard uncertainty in the same unit; 0 of an exact value, infinite if unknown.
+
+    Returns
+    -------
+    str
+        The value and, in brackets, σ in units of its last digits: `0.08` if σ is 0, `0.08(?)` if it
+        is unknown. A σ of 1 or more has its decimal point, as in `12.5(1.3)`.
+
+    Examples
+    --------
+    >>> from labrig.results import with_uncertainty
+    >>> with_uncertainty(0.0802, 0.0013), with_uncertainty(12.47, 1.3), with_uncertainty(0.08, 0.0)
+    ('0.0802(13)', '12.5(1.3)', '0.08')
+    """
     if sigma == 0:
         return f"{value:.6g}"
     if not math.isfinite(sigma):
@@ -135,53 +155,85 @@ _UNITS = {
     "_c": "degC",
     "_s": "s",
 }
-#: What stands for the only one of things that have no name.
+#: Name of the only entry of a mapping, whose key is empty.
 ONLY = "only"
 
 Path = tuple[str, ...]
 
 
 def leaves(value: Any, path: Path = ()) -> Iterator[tuple[Path, Any]]:
-    """Every plain value in a result and where it is: names of fields, keys, or numbers from 1.
+    """Iterate over every plain value in a result and its path.
 
-    A plain value is a number, a text, an array, a `Measured` or a sequence of such. Results within
+    A plain value is a number, a text, an array, a `Measured` or a sequence of these. Results within
     a result, such as the parts of a chain, are left out.
+
+    Parameters
+    ----------
+    value
+        A result, or a dataclass, mapping or sequence in one.
+    path
+        Path of `value` itself, before those of the plain values in it.
+
+    Yields
+    ------
+    path : tuple of str
+        Names of fields, keys of mappings, or positions in a sequence from 1.
+    value : object
+        The plain value.
 
     Examples
     --------
-    >>> from dataclasses import dataclass
-    >>> @dataclass(frozen=True)
-    ... class Peak:
-    ...     wavelength_nm: float
-    ...     height: Measured
-    >>> [path for path, _ in leaves({"first": Peak(450.0, Measured(1.0, 0.1))})]
-    [('first', 'wavelength_nm'), ('first', 'height')]
+    >>> import labrig
+    >>> from labrig.results import leaves
+    >>> fit = labrig.read_result("runs/decay").patches["sample"].fit
+    >>> for path, value in leaves(fit):
+    ...     if path[-1] == "k_r_per_s":
+    ...         print("/".join(path), f"{value:.2g}")
+    states/1/k_r_per_s 0.2
+    states/2/k_r_per_s 0.01
     """
-    inner = _inner(value)
+    inner = _members(value)
     if inner is None:
         yield path, value
         return
-    for name, one in inner:
-        if not isinstance(one, RunResult):
-            yield from leaves(one, (*path, name))
+    for name, item in inner:
+        if not isinstance(item, RunResult):
+            yield from leaves(item, (*path, name))
 
 
 def unit_of(name: str) -> str:
-    """The unit that the name of a field ends with, that of a σ being its value's; empty if none."""
+    """Return the unit that the name of a field ends with.
+
+    Parameters
+    ----------
+    name
+        Name of a field of a result; that of a standard uncertainty has the unit of its value.
+
+    Returns
+    -------
+    str
+        The unit; empty if the name has none.
+
+    Examples
+    --------
+    >>> from labrig.results import unit_of
+    >>> unit_of("k_r_sigma_per_s"), unit_of("centre_nm"), unit_of("chi2")
+    ('1/s', 'nm', '')
+    """
     base = name.removesuffix("_sigma").replace("_sigma_", "_")
     return next((unit for end, unit in _UNITS.items() if base.endswith(end)), "")
 
 
-def _inner(value: Any) -> list[tuple[str, Any]] | None:
-    """What is in a value; None for a plain one."""
+def _members(value: Any) -> list[tuple[str, Any]] | None:
+    """Return the named values in a value; None for a plain one."""
     if isinstance(value, Measured):
         return None
     if isinstance(value, BaseModel):
         return [(name, getattr(value, name)) for name in type(value).model_fields]
     if is_dataclass(value) and not isinstance(value, type):
-        return [(one.name, getattr(value, one.name)) for one in fields(value)]
+        return [(member.name, getattr(value, member.name)) for member in fields(value)]
     if isinstance(value, Mapping):
-        return [(str(key) or ONLY, one) for key, one in value.items()]
-    if isinstance(value, tuple | list) and any(_inner(one) is not None for one in value):
-        return [(str(number), one) for number, one in enumerate(value, start=1)]
+        return [(str(key) or ONLY, item) for key, item in value.items()]
+    if isinstance(value, tuple | list) and any(_members(item) is not None for item in value):
+        return [(str(number), item) for number, item in enumerate(value, start=1)]
     return None

@@ -1,4 +1,4 @@
-"""What a chain of protocols found: the results of its parts, and the materials they make."""
+"""Result of a chain of protocols: the results of its parts, and the materials from them."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -11,16 +11,17 @@ from labrig.results.run_result import AnyResult, RunResult
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class PhosphorResult(RunResult):
-    """A phosphor: what every part of the run found, and the materials from all of them.
+    """A phosphor: the result of every part of the run, and the materials from all of them.
 
     Attributes
     ----------
     parts
-        By name, in the order of the run; those that could not be analysed are missing.
+        Result of each part by its name, in the order of the run; those that could not be analysed
+        are missing.
     failed
-        Why a part could not be analysed, by its name.
+        Reason why a part could not be analysed, by its name.
     materials
-        By patch; under "" the only one.
+        Material of each patch by its name; that of the only one under "".
 
     Examples
     --------
@@ -36,7 +37,7 @@ class PhosphorResult(RunResult):
     materials: Mapping[str, Material]
 
     def provides(self) -> dict[str, Any]:
-        """What all parts provide; where two provide the same, what the later one does."""
+        """Return the values that all parts provide; the later part has priority."""
         provided: dict[str, Any] = {}
         for part in self.parts.values():
             for name, value in part.provides().items():

@@ -1,4 +1,4 @@
-"""What the analysis of a run gives: a frozen type for each protocol, and its file `result.json`."""
+"""Result of a run's analysis: a frozen type for each protocol, and its file `result.json`."""
 
 import json
 import math
@@ -18,21 +18,21 @@ FILE = "result.json"
 
 @dataclass(frozen=True, eq=False, kw_only=True)
 class RunResult:
-    """What one protocol's analysis found.
+    """Result of one protocol's analysis.
 
     A result holds numbers, with units in the names of its fields or in a `Measured`; arrays are
-    `FloatArray`, `BoolArray` or `IntArray`. All that a report shows, an export writes or a
-    notebook computes with is in it. A protocol's own type is a frozen dataclass on top of this,
-    registered by an entry point in `labrig.results` under the protocol's name.
+    `FloatArray`, `BoolArray` or `IntArray`. It contains everything that a report shows, an export
+    writes or a notebook computes with. A protocol's own type is a frozen dataclass derived from
+    this one, registered by an entry point in `labrig.results` under the protocol's name.
 
     Attributes
     ----------
     kind
         Name of the protocol, as it is registered.
     schema_version
-        Of the type's fields: another number says that fields were renamed or mean something else.
+        Version of the type's fields: another number means renamed fields or other meanings.
     warnings
-        What to distrust, and what to do about it, a line each.
+        Limits of the result and remedies, a line each.
     """
 
     kind: ClassVar[str]
@@ -44,15 +44,15 @@ class RunResult:
     warnings: tuple[str, ...] = ()
 
     def provides(self) -> Mapping[str, Any]:
-        """What later parts of a chain may use, by the name of a field of their `Inputs`."""
+        """Return values for later parts of a chain, by the name of a field of their `Inputs`."""
         return {}
 
     def failures(self) -> tuple[str, ...]:
-        """Why there is no result at all, a line each; none if there is one."""
+        """Return the reasons why there is no result at all, a line each; none if there is one."""
         return ()
 
     def write_files(self, folder: Path) -> None:
-        """Write what later runs and other programs read into a folder, such as a material file.
+        """Write the files for later runs and other programs into a folder, such as a material file.
 
         Raises
         ------
@@ -61,15 +61,15 @@ class RunResult:
         """
 
     def to_dict(self) -> dict[str, Any]:
-        """The content of `result.json`; what is not finite is the text `Infinity` or `NaN`."""
+        """Return the content of `result.json`, in which infinity and NaN are texts."""
         fields = TypeAdapter(type(self)).dump_python(self, mode="json")
         content: dict[str, Any] = finite(
-            {"kind": self.kind, "schema_version": self.schema_version} | fields, _spelled
+            {"kind": self.kind, "schema_version": self.schema_version} | fields, _nonfinite_text
         )
         return content
 
     def to_json(self) -> str:
-        """The text of `result.json`, a field of the result a line."""
+        """Return the text of `result.json`, one field of the result a line."""
         lines = [
             f"{json.dumps(key)}: {json.dumps(value, ensure_ascii=False, allow_nan=False)}"
             for key, value in self.to_dict().items()
@@ -78,12 +78,12 @@ class RunResult:
 
     @classmethod
     def from_dict(cls, content: Mapping[str, Any]) -> Self:
-        """The result whose `to_dict` is `content`.
+        """Construct the result whose `to_dict` is `content`.
 
         Raises
         ------
         ValueError
-            It is another protocol's, of another version, or no result at all.
+            The content is that of another protocol or version, or of no result at all.
         """
         fields = dict(content)
         kind, version = fields.pop("kind", None), fields.pop("schema_version", None)
@@ -95,8 +95,8 @@ class RunResult:
         return TypeAdapter(cls).validate_python(fields)
 
 
-def _of_its_kind(content: Any) -> RunResult:
-    """A result as its protocol's own type; one that is already is left as it is."""
+def _to_own_type(content: Any) -> RunResult:
+    """Convert the content of a result to its protocol's own type; a result stays as it is."""
     if isinstance(content, RunResult):
         return content
     if not isinstance(content, Mapping) or not isinstance(content.get("kind"), str):
@@ -107,29 +107,52 @@ def _of_its_kind(content: Any) -> RunResult:
 
 #: A field that holds the result of any protocol.
 AnyResult = Annotated[
-    RunResult, PlainValidator(_of_its_kind), PlainSerializer(lambda result: result.to_dict())
+    RunResult, PlainValidator(_to_own_type), PlainSerializer(lambda result: result.to_dict())
 ]
 
 
 def write_result(folder: Path, result: RunResult) -> None:
     """Write `result.json` and the other files of a result into a folder.
 
+    Parameters
+    ----------
+    folder
+        Folder for the files, which exists.
+    result
+        The result of a run's analysis.
+
     Raises
     ------
     DiskError
-        One cannot be written.
+        A file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.results import write_result
+    >>> folder = Path("copied-result")
+    >>> folder.mkdir(exist_ok=True)
+    >>> write_result(folder, labrig.read_result("runs/decay"))
+    >>> sorted(path.name for path in folder.iterdir())
+    ['fit.json', 'material.yaml', 'result.json', 'series.csv']
     """
     write_text(folder / FILE, result.to_json())
     result.write_files(folder)
 
 
 def read_result(run: Path | str) -> RunResult:
-    """What the latest analysis of a run found, of the type that belongs to its protocol.
+    """Read the result of a run's latest analysis.
 
     Parameters
     ----------
     run
         A run folder, or a result folder in one.
+
+    Returns
+    -------
+    RunResult
+        The result, of the type that belongs to the run's protocol.
 
     Raises
     ------
@@ -140,9 +163,14 @@ def read_result(run: Path | str) -> RunResult:
 
     Examples
     --------
-    >>> result = labrig.read_result("runs/2026-01-01T00-00-00_decay_blue-paint")  # doctest: +SKIP
-    >>> result.patches["paint"].fit.rates[0]  # doctest: +SKIP
-    Measured(value=0.0802, sigma=0.0013, unit='1/s')
+    >>> import labrig
+    >>> result = labrig.read_result("runs/decay")
+    >>> result.kind, list(result.patches)
+    ('decay', ['sample'])
+    >>> for rate in result.patches["sample"].fit.rates:
+    ...     print(f"{rate.value:.2g} {rate.unit}")
+    0.2 1/s
+    0.01 1/s
     """
     place = Path(run)
     path = place / "result" / FILE if (place / "result").is_dir() else place / FILE
@@ -151,21 +179,21 @@ def read_result(run: Path | str) -> RunResult:
             f"{place}: expected a run with a result; make it with: labrig process {place}"
         )
     try:
-        return _of_its_kind(json.loads(path.read_text(encoding="utf-8")))
+        return _to_own_type(json.loads(path.read_text(encoding="utf-8")))
     except (OSError, ValueError, KeyError, TypeError, AttributeError, RecursionError) as error:
         raise DataError(
             f"{path}: expected a result as this labrig writes it, got something else "
-            f"({_first(error)}); make it again: labrig process {place}"
+            f"({_first_error(error)}); make it again: labrig process {place}"
         ) from None
 
 
-def _first(error: Exception) -> str:
+def _first_error(error: Exception) -> str:
     if isinstance(error, ValidationError):
         first = error.errors()[0]
         return f"{'.'.join(map(str, first['loc']))}: {first['msg']}"
     return " ".join(str(error).split())
 
 
-def _spelled(number: float) -> str:
-    """As pydantic spells what JSON has no number for."""
+def _nonfinite_text(number: float) -> str:
+    """Return the text for a number that is not finite, in pydantic's spelling."""
     return "NaN" if math.isnan(number) else "Infinity" if number > 0 else "-Infinity"

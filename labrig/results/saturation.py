@@ -1,4 +1,4 @@
-"""Whether charging saturated a sample, and whether its rates depend on the charge."""
+"""Result of a saturation run: whether charging saturates, and whether rates depend on it."""
 
 from collections.abc import Mapping
 from dataclasses import dataclass
@@ -13,29 +13,37 @@ from labrig.results.measured import FloatArray, Measured
 from labrig.results.run_result import RunResult
 from labrig.results.text_files import write_csv
 
-#: Lights of a saturation run, as its units are called.
+#: Names of the lights of a saturation run, as in its units.
 LIGHTS = FULL_LIGHT, WEAKER = "full", "weaker"
-#: r(0) = 1 may be believed from here on, and not below.
+#: Level r(0) from which a state counts as fully charged.
 NEARLY_ONE = 0.95
-#: Where a longer charge brightens the glow by less, the plateau is reached.
+#: Relative growth of the glow by a longer charge below which the plateau is reached.
 PLATEAU = 0.02
 SIGMAS = 2.0
-#: Chance at which rates that are the same are said to differ.
+#: Significance level of the test for different rates.
 LEVEL = 1e-3
-#: Chance at which decays that are exponentials are said to be none.
+#: Significance level of the test for decays that are not exponential.
 MISFIT_LEVEL = 5e-4
 
 
 @dataclass(frozen=True)
 class ChargeLevel:
-    """r of a state at lamp off after the longest charge under the full light, and its σ."""
+    """Level of a state at lamp off after the longest charge under the full light.
+
+    Attributes
+    ----------
+    r
+        Level, 1 if fully charged.
+    sigma
+        Its standard uncertainty.
+    """
 
     r: float
     sigma: float
 
     @property
     def assessment(self) -> Literal["yes", "no", "not decided"]:
-        """Whether r(0) = 1 may be believed."""
+        """Whether r(0) = 1 is compatible with the level."""
         if self.r + SIGMAS * self.sigma < NEARLY_ONE:
             return "no"
         return "yes" if self.r - SIGMAS * self.sigma > NEARLY_ONE else "not decided"
@@ -43,16 +51,18 @@ class ChargeLevel:
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """One decay, its channels as one.
+    """One decay, its channels combined.
 
     Attributes
     ----------
     t_s, exposure_s
-        (n,) begins of the exposures after lamp off, and their lengths.
+        Begins of the exposures in seconds after lamp off, and exposure times in seconds, shape
+        (n,).
     value, sigma
-        (n,) DN/s of the brightest channel, flicker in σ.
+        Signal of the brightest channel and its standard uncertainty with flicker in DN/s, shape
+        (n,).
     offset_sigma
-        σ of a constant that may be in all values.
+        Standard uncertainty of a constant offset common to all values in DN/s.
     """
 
     t_s: FloatArray
@@ -64,24 +74,26 @@ class Curve:
 
 @dataclass(frozen=True, eq=False)
 class RatesTest:
-    """What sharing the rates of s states costs d decays.
+    """Test whether d decays of s states share their rates.
 
     Attributes
     ----------
     shared_per_s
-        (s,) by falling rate.
+        Shared rates in 1/s, falling, shape (s,).
     own_per_s, own_sigma_per_s
-        (d, s) of every decay by itself.
+        Rates of every decay alone and their standard uncertainties in 1/s, shape (d, s).
     amplitude, amplitude_sigma
-        (d, s) of every decay at lamp off, the rates shared.
+        Amplitudes of every decay at lamp off with shared rates in DN/s, shape (d, s).
     residuals
-        Of every decay (n,), value − model in σ, the rates shared.
-    chi2_shared, chi2_own, dof_own
-        Sums of all decays.
+        Value − model of every decay in σ with shared rates, shape (n,) each.
+    chi2_shared, chi2_own
+        χ² of all decays with shared and with own rates.
+    dof_own
+        Degrees of freedom with own rates.
     noise_dof
         Degrees of freedom from which the noise itself was estimated; infinite if it is known.
     p_value
-        Of an F-test: chance that rates which are the same come out so different.
+        p-value of the F-test: probability of such different rates if the true ones are equal.
     """
 
     shared_per_s: FloatArray
@@ -103,7 +115,7 @@ class RatesTest:
 
     @property
     def misfit(self) -> bool:
-        """Whether not even rates of their own describe the decays."""
+        """Whether not even individual rates describe the decays."""
         if np.isinf(self.noise_dof):
             return float(chdtrc(self.dof_own, self.chi2_own)) < MISFIT_LEVEL
         excess = self.chi2_own / self.dof_own
@@ -112,23 +124,24 @@ class RatesTest:
 
 @dataclass(frozen=True, eq=False)
 class PatchSaturation:
-    """What the decays of a patch say.
+    """Saturation of a patch.
 
     Attributes
     ----------
     fit
-        Of the decay after the longest charge under the full light.
+        Fit of the decay after the longest charge under the full light.
     light, charge_s
-        Of every decay, in the order of `curves`: `full` or `weaker`, and how long the lamp shone.
+        Light of every decay, `full` or `weaker`, and duration of its charge in seconds, in the
+        order of `curves`.
     curves
         All decays by their unit.
     rates
-        What sharing the rates costs them.
+        Test of shared rates.
     growth_at_begin, growth_at_end
-        Of the glow between the last two charges under the full light, as a fraction, at the begin
-        and at the end of their decays, where slow states show.
+        Relative growth of the glow between the last two charges under the full light, at the begin
+        and at the end of their decays, where slow states dominate.
     levels
-        Of every state by falling rate; none without a weaker light.
+        Level of every state by falling rate; empty without a weaker light.
     """
 
     fit: FittedDecay
@@ -144,15 +157,15 @@ class PatchSaturation:
     def in_time(self) -> Literal["saturated in time", "not saturated", "not decided"]:
         """Whether a longer charge still brightens the glow."""
         growths = self.growth_at_begin, self.growth_at_end
-        if any(one.value - SIGMAS * one.sigma > PLATEAU for one in growths):
+        if any(growth.value - SIGMAS * growth.sigma > PLATEAU for growth in growths):
             return "not saturated"
-        if all(one.value + SIGMAS * one.sigma < 2 * PLATEAU for one in growths):
+        if all(growth.value + SIGMAS * growth.sigma < 2 * PLATEAU for growth in growths):
             return "saturated in time"
         return "not decided"
 
     def rows(self, light: str) -> list[int]:
-        """Numbers of the decays under that light, by their charge."""
-        return [row for row, one in enumerate(self.light) if one == light]
+        """Return the numbers of the decays under a light, in the order of `curves`."""
+        return [row for row, decay_light in enumerate(self.light) if decay_light == light]
 
 
 @dataclass(frozen=True, eq=False, kw_only=True)
@@ -162,9 +175,9 @@ class SaturationResult(RunResult):
     Attributes
     ----------
     patches
-        By name.
+        Saturation of each patch by its name.
     weaker_light
-        Over the full one; None if there was none.
+        Weaker light relative to the full one; None if there was none.
 
     Examples
     --------
@@ -186,13 +199,13 @@ class SaturationResult(RunResult):
             rates = patch.rates
             for light in LIGHTS:
                 for row in patch.rows(light):
-                    of_states = zip(
+                    state_values = zip(
                         rates.shared_per_s,
                         rates.amplitude[row],
                         rates.amplitude_sigma[row],
                         strict=True,
                     )
-                    for numbers in of_states:
+                    for numbers in state_values:
                         texts = (f"{number:.6g}" for number in (patch.charge_s[row], *numbers))
                         rows.append((name, light, *texts))
         write_csv(folder / "saturation.csv", head, rows)

@@ -1,4 +1,4 @@
-"""A time series: what one patch of the sample gave, frame by frame."""
+"""Time series of one patch of the sample, frame by frame."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -14,7 +14,7 @@ from labrig.results.text_files import write_csv
 #: Columns of series.csv that are not channels.
 TIME, EXPOSURE, SIGMA_SUFFIX = "t_s", "exposure_s", "_sigma"
 RESERVED = ("iso", "f_number", "frame", "unit", "region", "flag")
-#: Flags of rows that a fit must leave out, and what joins the flags of one row.
+#: Flags of rows that a fit must leave out, and the sign that joins the flags of one row.
 EXCLUDING = frozenset({"clipped", "excluded", "afterglow"})
 FLAG_JOINER = "+"
 
@@ -25,33 +25,38 @@ class Series:
 
     Parameters
     ----------
-    t_s, exposure_s
-        Shape (n,): start of each exposure (after lamp off) and its length; 0 if not known.
+    t_s
+        Begin of each exposure in seconds after lamp off, shape (n,).
+    exposure_s
+        Exposure times in seconds, shape (n,); 0 if unknown.
     values
-        Shape (n, C), DN/s: black and dark subtracted, exposure divided out. Read from somebody's
-        table: in the table's unit.
+        Signal in DN/s, black and dark subtracted and divided by the exposure time, shape (n, C).
+        Read from another program's table, it is in the table's unit.
     sigma
-        Shape (n, C), in the unit of `values`: photon, read and dark noise of that very frame, NaN
-        where not known. Flicker of lamp, shutter and aperture is not in it: it moves all channels
-        of a frame together, and the fit measures it.
+        Standard uncertainty in the unit of `values` by photon, read and dark noise of each frame,
+        shape (n, C); NaN where unknown. Flicker of lamp, shutter and aperture is not in it: it is
+        common to all channels of a frame, and the fit measures it.
     dark_sigma
-        Shape (C,), DN/s: uncertainty of the dark level that was subtracted, common to all frames:
+        Standard uncertainty in DN/s of the subtracted dark level, common to all frames, shape (C,):
         the prior of a fit's offset. 0 if a background region was subtracted in each frame, NaN if
-        nothing is known. Not a column of series.csv.
+        unknown. Not a column of series.csv.
     channels
-        C names, such as `("R", "G", "B")`.
+        Names of the C channels, such as `("R", "G", "B")`.
     iso, f_number
-        Shape (n,), NaN where not known.
-    frame, unit, flag
-        n texts: file name, unit of the run, and `""` or flags such as `clipped`, `late`,
-        `excluded`, joined by `+`.
+        ISO and f-number of each frame, shape (n,); NaN where unknown.
+    frame, unit
+        File name and unit of the run of each frame.
+    flag
+        Flags of each frame such as `clipped`, `late` or `excluded`, joined by `+`; empty without
+        any.
     region
         Name of the patch.
     correlation
-        Shape (C, C), of the channels' noise in one frame; None if not known. Not a column of
-        series.csv.
+        Correlation of the channels' noise in one frame, shape (C, C); None if unknown. Not a column
+        of series.csv.
     dark_correlation
-        Shape (C, C), of what `dark_sigma` is the σ of; None if not known. No column, either.
+        Correlation of the channels' dark levels, whose σ is `dark_sigma`, shape (C, C); None if
+        unknown. Not a column of series.csv.
     """
 
     t_s: FloatArray
@@ -76,11 +81,11 @@ class Series:
 
     @property
     def usable(self) -> npt.NDArray[np.bool_]:
-        """Shape (n,): rows that no flag excludes."""
+        """Whether no flag excludes a row, shape (n,)."""
         return np.array([is_usable(flag) for flag in self.flag])
 
     def take(self, rows: npt.NDArray[np.intp], region: str | None = None) -> "Series":
-        """The given rows, in that order, as of `region` if that is given."""
+        """Return the given rows in that order, renamed to `region` if that is given."""
         return Series(
             t_s=self.t_s[rows],
             exposure_s=self.exposure_s[rows],
@@ -99,17 +104,24 @@ class Series:
         )
 
     def by_unit(self) -> list["Series"]:
-        """One series per unit, in order of appearance."""
+        """Return one series per unit, in order of appearance."""
         units = np.array(self.unit)
         return [self.take(np.flatnonzero(units == unit)) for unit in dict.fromkeys(self.unit)]
 
     def write_csv(self, path: Path) -> None:
-        """Write series.csv; `read_series` gives the same numbers back."""
+        """Write series.csv; `read_series` reads the same numbers back."""
         write_series(path, [self])
 
 
 def write_series(path: Path, series: Sequence[Series]) -> None:
-    """Write several patches into one series.csv, one below the other.
+    """Write the series of several patches into one CSV file, one below the other.
+
+    Parameters
+    ----------
+    path
+        Path of the file.
+    series
+        Series of patches with the same channels.
 
     Raises
     ------
@@ -117,6 +129,18 @@ def write_series(path: Path, series: Sequence[Series]) -> None:
         The patches have different channels.
     DiskError
         The file cannot be written.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.results import write_series
+    >>> left = labrig.read_series("series.csv")[0]
+    >>> right = replace(left, region="right", values=1.1 * left.values)
+    >>> write_series(Path("two-patches.csv"), [left, right])
+    >>> [series.region for series in labrig.read_series("two-patches.csv")]
+    ['sample', 'right']
     """
     channels = {part.channels for part in series}
     if len(channels) != 1:
@@ -143,7 +167,7 @@ def _rows(series: Series) -> Iterator[list[str]]:
 
 
 def _number(value: np.float64) -> str:
-    """The shortest text that reads back as the same number; nothing for NaN."""
+    """Return the shortest text that reads back as the same number; empty for NaN."""
     return "" if np.isnan(value) else repr(float(value))
 
 
@@ -180,11 +204,11 @@ def _check_numbers(series: Series) -> None:
 
 
 def _check_texts(series: Series) -> None:
-    taken = {TIME, EXPOSURE, *RESERVED}
+    reserved = {TIME, EXPOSURE, *RESERVED}
     for name in series.channels:
-        if not name or name in taken or name.endswith(SIGMA_SUFFIX) or not _is_plain(name):
+        if not name or name in reserved or name.endswith(SIGMA_SUFFIX) or not _is_plain(name):
             raise DataError(f"{name!r} cannot name a channel; rename it")
-        taken.add(name)
+        reserved.add(name)
     for text in {*series.frame, *series.unit, *series.flag, series.region}:
         if not _is_plain(text):
             raise DataError(f"expected a text on one line without outer spaces, got {text!r}")
@@ -195,11 +219,47 @@ def _is_plain(text: str) -> bool:
 
 
 def is_usable(flag: str) -> bool:
-    """Whether no word in `flag` excludes its row."""
+    """Return whether no flag excludes its row from a fit.
+
+    Parameters
+    ----------
+    flag
+        Flags of a row, joined by `+`; empty if there are none.
+
+    Returns
+    -------
+    bool
+        False if `clipped`, `excluded` or `afterglow` is among the flags.
+
+    Examples
+    --------
+    >>> from labrig.results import is_usable
+    >>> is_usable(""), is_usable("late"), is_usable("late+clipped")
+    (True, True, False)
+    """
     return EXCLUDING.isdisjoint(flag.split(FLAG_JOINER))
 
 
 def add_flag(flag: str, word: str) -> str:
-    """`flag` with `word` in it, once."""
-    words = [known for known in flag.split(FLAG_JOINER) if known]
+    """Add a flag to those of a row, once.
+
+    Parameters
+    ----------
+    flag
+        Flags of the row, joined by `+`; empty if there are none.
+    word
+        The flag to add.
+
+    Returns
+    -------
+    str
+        The flags with `word` among them.
+
+    Examples
+    --------
+    >>> from labrig.results import add_flag
+    >>> add_flag("late", "clipped"), add_flag("late+clipped", "clipped")
+    ('late+clipped', 'late+clipped')
+    """
+    words = [part for part in flag.split(FLAG_JOINER) if part]
     return FLAG_JOINER.join(dict.fromkeys([*words, word]))

@@ -1,4 +1,7 @@
-"""Reads series.csv, and anybody's table of a decay: comma, tab, semicolon or blanks."""
+"""Reader of series.csv and of other programs' tables of a decay.
+
+The delimiter is a comma, a tab, a semicolon or blanks.
+"""
 
 import csv
 import math
@@ -16,7 +19,30 @@ from labrig.results.series import EXPOSURE, RESERVED, SIGMA_SUFFIX, TIME, Series
 
 
 def joined(parts: Sequence[Series]) -> Series:
-    """One below the other; what they have in common is taken from the first."""
+    """Join series one below the other.
+
+    Parameters
+    ----------
+    parts
+        Series of the same channels; name of the patch, dark level and correlations are taken from
+        the first.
+
+    Returns
+    -------
+    Series
+        All rows in the given order.
+
+    Examples
+    --------
+    >>> from dataclasses import replace
+    >>> import labrig
+    >>> from labrig.results import joined
+    >>> first = labrig.read_series("series.csv")[0]
+    >>> second = replace(first, unit=("decay-2",) * len(first.unit))
+    >>> both = joined([first, second])
+    >>> len(first.t_s), len(both.t_s), sorted(set(both.unit))
+    (18, 36, ['decay-1', 'decay-2'])
+    """
     return replace(
         parts[0],
         t_s=np.concatenate([part.t_s for part in parts]),
@@ -41,7 +67,17 @@ _EXPECTED = "expected a table with a column t_s (or t, time_s) and one or more o
 
 @dataclass(frozen=True)
 class _Table:
-    """Cells of a table, as many in each row as in the header; `lines` are their line numbers."""
+    """Cells of a table.
+
+    Attributes
+    ----------
+    header
+        Names of the columns.
+    rows
+        Cells of each row, as many as in the header.
+    lines
+        Line number of each row.
+    """
 
     header: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -49,24 +85,77 @@ class _Table:
 
 
 def read_series(path: str | os.PathLike[str]) -> list[Series]:
-    """The series in a table, one for each region and unit in it, in order of appearance.
+    """Read the series in a table, one for each region and unit in it.
 
-    The header may be missing: then the columns are time, value and perhaps sigma. `#` begins a
-    comment. Every column that is not reserved (`RESERVED`) is a channel, except one that only
-    the first row fills: some programs put the settings of a measurement there.
+    The delimiter is a comma, a tab, a semicolon or blanks. The header may be missing: then the
+    columns are time, value and perhaps sigma. `#` begins a comment. Every column that is not
+    reserved (region, unit, flag and the like) is a channel, except one that only the first row
+    fills: some programs put the settings of a measurement there.
+
+    Parameters
+    ----------
+    path
+        Path of the table, labrig's series.csv or that of another program.
+
+    Returns
+    -------
+    list of Series
+        The series in order of appearance.
 
     Raises
     ------
     UsageError
-        No such file, or not such a table.
+        The file does not exist, or is not such a table.
     DataError
-        A number that is not finite, a missing value, or no rows.
+        A number is not finite, a value is missing, or there are no rows.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> series = labrig.read_series("series.csv")[0]
+    >>> series.region, series.channels, series.values.shape
+    ('sample', ('R', 'G', 'B'), (18, 3))
+    >>> for start_s, value in zip(series.t_s[:2], series.values[:2, 1]):
+    ...     print(f"{start_s:.2f} s: {value:.0f} DN/s")
+    1.06 s: 8894 DN/s
+    6.06 s: 4806 DN/s
     """
     return parse_series(read_text(Path(path)), str(path))
 
 
 def parse_series(text: str, source: str) -> list[Series]:
-    """As `read_series`, from text; `source` names it in messages."""
+    """Parse the series in the text of a table, one for each region and unit in it.
+
+    Parameters
+    ----------
+    text
+        Content of a table, in the form that `read_series` reads.
+    source
+        Name of the table in messages.
+
+    Returns
+    -------
+    list of Series
+        The series in order of appearance.
+
+    Raises
+    ------
+    UsageError
+        The text is not such a table.
+    DataError
+        A number is not finite, a value is missing, or there are no rows.
+
+    Examples
+    --------
+    >>> from labrig.results import parse_series
+    >>> table = '''time_s,value,sigma
+    ... 1,100,2
+    ... 2,61,1.6
+    ... 4,22,1'''
+    >>> series = parse_series(table, "clipboard")[0]
+    >>> series.t_s.tolist(), series.values[:, 0].tolist(), series.sigma[:, 0].tolist()
+    ([1.0, 2.0, 4.0], [100.0, 61.0, 22.0], [2.0, 1.6, 1.0])
+    """
     try:
         return _series(_table(text))
     except LabrigError as error:
@@ -97,7 +186,7 @@ def _table(text: str) -> _Table:
     if not cells:
         raise DataError(f"{_EXPECTED}, got a header without rows")
     numbers = tuple(number for number, _ in content)
-    rows = [_fitted(row, len(header), line) for row, line in zip(cells, numbers, strict=True)]
+    rows = [_padded(row, len(header), line) for row, line in zip(cells, numbers, strict=True)]
     return _Table(header, tuple(rows), numbers)
 
 
@@ -110,8 +199,8 @@ def _cells(line: str, delimiter: str | None, number: int) -> list[str]:
         raise UsageError(f"line {number}: not a row of a table ({error})") from None
 
 
-def _fitted(row: list[str], columns: int, line: int) -> tuple[str, ...]:
-    """`row` with as many cells as the header: empty ones at its end may be left out or too many."""
+def _padded(row: list[str], columns: int, line: int) -> tuple[str, ...]:
+    """Return `row` with as many cells as the header, empty ones at its end added or removed."""
     if any(cell.strip() for cell in row[columns:]):
         raise UsageError(
             f"line {line}: expected {columns} columns as in the first line, got {len(row)}"
@@ -122,15 +211,15 @@ def _fitted(row: list[str], columns: int, line: int) -> tuple[str, ...]:
 def _series(table: _Table) -> list[Series]:
     columns = _columns(table)
     names = list(columns)
-    time = _only(names, _TIME_NAMES)
+    time = _only_match(names, _TIME_NAMES)
     if time is None:
         raise UsageError(f"{_EXPECTED}, got {', '.join(names)}")
-    exposure = _only(names, _EXPOSURE_NAMES)
-    others = [name for name in names if name not in (time, exposure, *RESERVED)]
-    channels = [name for name in others if not _is_sigma(name, others)]
+    exposure = _only_match(names, _EXPOSURE_NAMES)
+    value_columns = [name for name in names if name not in (time, exposure, *RESERVED)]
+    channels = [name for name in value_columns if not _is_sigma(name, value_columns)]
     if not channels:
         raise UsageError(f"{_EXPECTED}, got {', '.join(names)}; a column of values is missing")
-    sigmas = [_sigma_name(channel, channels, others) for channel in channels]
+    sigmas = [_sigma_name(channel, channels, value_columns) for channel in channels]
 
     def numbers(name: str | None, empty: float | None) -> FloatArray:
         if name is None:
@@ -140,7 +229,7 @@ def _series(table: _Table) -> list[Series]:
     def texts(name: str) -> tuple[str, ...]:
         return tuple(columns.get(name, [""] * len(table.rows)))
 
-    whole = Series(
+    table_series = Series(
         t_s=numbers(time, None),
         exposure_s=numbers(exposure, 0.0),
         values=np.stack([numbers(channel, None) for channel in channels], axis=1),
@@ -154,13 +243,13 @@ def _series(table: _Table) -> list[Series]:
         flag=texts("flag"),
     )
     groups: dict[tuple[str, str], list[int]] = {}
-    for row, key in enumerate(zip(texts("region"), whole.unit, strict=True)):
+    for row, key in enumerate(zip(texts("region"), table_series.unit, strict=True)):
         groups.setdefault(key, []).append(row)
-    return [whole.take(np.array(rows), region) for (region, _), rows in groups.items()]
+    return [table_series.take(np.array(rows), region) for (region, _), rows in groups.items()]
 
 
 def _columns(table: _Table) -> dict[str, list[str]]:
-    """Cells by column name, without the columns that hold no series."""
+    """Return the cells by column name, without the columns that hold no series."""
     columns: dict[str, list[str]] = {}
     for position, name in enumerate(table.header):
         cells = [row[position] for row in table.rows]
@@ -177,22 +266,22 @@ def _columns(table: _Table) -> dict[str, list[str]]:
     return columns
 
 
-def _only(names: Sequence[str], wanted: frozenset[str]) -> str | None:
-    """The one of `names` that is among the `wanted`."""
-    found = [name for name in names if name.lower() in wanted]
-    if len(found) > 1:
-        raise UsageError(f"expected one of the columns {', '.join(found)}, got several; keep one")
-    return found[0] if found else None
+def _only_match(names: Sequence[str], accepted: frozenset[str]) -> str | None:
+    """Return the one of `names` that is among the `accepted`; None if none is."""
+    matches = [name for name in names if name.lower() in accepted]
+    if len(matches) > 1:
+        raise UsageError(f"expected one of the columns {', '.join(matches)}, got several; keep one")
+    return matches[0] if matches else None
 
 
-def _is_sigma(name: str, others: Sequence[str]) -> bool:
-    return name == _LONE_SIGMA or name.removesuffix(SIGMA_SUFFIX) in set(others) - {name}
+def _is_sigma(name: str, columns: Sequence[str]) -> bool:
+    return name == _LONE_SIGMA or name.removesuffix(SIGMA_SUFFIX) in set(columns) - {name}
 
 
-def _sigma_name(channel: str, channels: Sequence[str], others: Sequence[str]) -> str | None:
-    if channel + SIGMA_SUFFIX in others:
+def _sigma_name(channel: str, channels: Sequence[str], columns: Sequence[str]) -> str | None:
+    if channel + SIGMA_SUFFIX in columns:
         return channel + SIGMA_SUFFIX
-    if _LONE_SIGMA not in others:
+    if _LONE_SIGMA not in columns:
         return None
     if len(channels) > 1:
         raise UsageError(
@@ -205,7 +294,7 @@ def _sigma_name(channel: str, channels: Sequence[str], others: Sequence[str]) ->
 def _numbers(
     name: str, cells: Sequence[str], lines: Sequence[int], empty: float | None
 ) -> FloatArray:
-    """The cells of a column as numbers, blank ones as `empty` (None: there may be none)."""
+    """Return the cells of a column as numbers, blank ones as `empty` (None forbids them)."""
     values = np.empty(len(cells))
     for row, (cell, line) in enumerate(zip(cells, lines, strict=True)):
         if not cell.strip():

@@ -1,4 +1,4 @@
-"""Results as text files."""
+"""Writers of results as text files."""
 
 import csv
 import io
@@ -12,7 +12,7 @@ from labrig.errors import DiskError
 
 
 def write_text(path: Path, text: str) -> None:
-    """Write a text, its lines ended alike on every computer.
+    """Write a text with the same line ends on every computer.
 
     Raises
     ------
@@ -41,7 +41,7 @@ def write_csv(path: Path, head: Sequence[str], rows: Iterable[Sequence[Any]]) ->
 
 
 def write_json(path: Path, content: Mapping[str, Any]) -> None:
-    """Write an object, a key a line, all its numbers `finite`.
+    """Write a JSON object, one key a line; all its numbers must be finite.
 
     Raises
     ------
@@ -52,12 +52,12 @@ def write_json(path: Path, content: Mapping[str, Any]) -> None:
 
 
 def json_text(content: Mapping[str, Any]) -> str:
-    """The text of such a file."""
+    """Return the text of a JSON object, one key a line."""
     return json.dumps(content, indent=2, ensure_ascii=False, allow_nan=False)
 
 
 def finite(item: Any, spelled: Callable[[float], str | None] = lambda number: None) -> Any:
-    """`item` as JSON knows it: numbers that are not finite are None, or as they are `spelled`."""
+    """Return `item` with numbers that are not finite as None, or as the text by `spelled`."""
     if isinstance(item, Mapping):
         return {key: finite(value, spelled) for key, value in item.items()}
     if isinstance(item, list | tuple):

@@ -1,4 +1,4 @@
-"""From the frames of a camera calibration to what body and lens make of light."""
+"""From the frames of a camera calibration to noise, linearity, settings and flat fields."""
 
 from labrig.analyse.camera_calibration.analysis import analyse
 

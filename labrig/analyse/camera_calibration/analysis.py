@@ -1,4 +1,4 @@
-"""A camera calibration, from its frames to its result."""
+"""Analysis of a camera calibration, from its frames to its result."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass, replace
@@ -28,23 +28,23 @@ from labrig.results import (
 from labrig.written_numbers import exposure_text, plus_minus
 
 LIT = tuple(CardFrames)
-#: Where a sensor is further from a straight line, its frames tell nothing of a shutter.
+#: Deviation from linearity beyond which frames are not used for settings.
 MOST_BENT = 0.02
-#: χ² per degree of freedom beyond which the photon-transfer line is none.
+#: χ² per degree of freedom beyond which the photon transfer is not linear.
 STRAIGHT_CHI2 = 6.0
-#: Deviations from linear, shutter times and gradients of light that are worth a warning.
+#: Deviations from linearity and of exposure times, and gradients of light, that cause a warning.
 BENT, OFF, UNEVEN = 0.01, 0.05, 0.2
-#: Numbers of σ from which a difference is one.
+#: Significance of a difference in σ.
 CLEAR_SIGMAS = 4.0
 
 
 def analyse(part: Part) -> CameraCalibrationResult:
-    """Find noise, linearity, factors of settings and flat fields.
+    """Measure noise, linearity, factors of settings and flat fields.
 
     Raises
     ------
     DataError
-        Some unit is missing, or its frames are of no use.
+        Some unit is missing, or its frames are unusable.
     """
     protocol, run = part.protocol, part.run
     region, iso = part_region(part, protocol.card), protocol.camera.iso
@@ -52,32 +52,34 @@ def analyse(part: Part) -> CameraCalibrationResult:
     lit = part_frames(part, *LIT)
     card = card_levels(lit, darks, region)
     photon = [frame for frame in lit if frame.role == CardFrames.PHOTON]
-    transfers = tuple(_transfer(one, photon, darks, region) for one in protocol.isos)
+    transfers = tuple(
+        _fit_transfer(noise_iso, photon, darks, region) for noise_iso in protocol.isos
+    )
     bracket = [frame for frame in lit if frame.unit == LINEARITY]
     if not bracket:
         raise DataError("expected the brackets of 'linearity', got none; resume the run")
-    range_dn, full_dn = _saturation(max(bracket, key=lambda frame: frame.exposure_s), region)
+    range_dn, full_dn = _saturation_levels(max(bracket, key=lambda frame: frame.exposure_s), region)
     linearity = card.linearity(iso, range_dn, full_dn)
     factors = fit_factors(
         card.card_frames((CardFrames.REPEAT, CardFrames.BRACKET), linearity),
         iso,
         protocol.camera.f_number,
     )
-    flats = _flats(part, lit, darks)
+    flats = _fit_flats(part, lit, darks)
     file = CameraFile(
         camera=camera_identity(run),
         lens=lens_of(lit),
         iso=iso,
         f_number=protocol.camera.f_number,
         channels=card.series.channels,
-        noise=tuple(one.noise for one in transfers),
+        noise=tuple(transfer.noise for transfer in transfers),
         linearity=linearity,
         flicker=factors.flicker.value,
         flicker_sigma=factors.flicker.sigma,
         shutter=factors.shutter,
         iso_gain=factors.iso_gain,
         aperture=factors.aperture,
-        flats=tuple(one.flat for one in flats),
+        flats=tuple(fitted.flat for fitted in flats),
         source="measured with labrig, camera_calibration",
         run=run.folder.resolve().name,
     )
@@ -93,44 +95,52 @@ def analyse(part: Part) -> CameraCalibrationResult:
 
 @dataclass(frozen=True, eq=False)
 class CardLevels:
-    """The card in n frames of C channels, row by row the frames of `series`."""
+    """Signal of the card in n frames of C channels.
+
+    Attributes
+    ----------
+    frames
+        Records of the frames.
+    series
+        Signal of each frame in DN/s, row by row.
+    """
 
     frames: tuple[FrameRecord, ...]
     series: Series
 
     @property
     def level_dn(self) -> FloatArray:
-        """(n, C) above dark."""
+        """Signal above dark in DN, shape (n, C)."""
         return self.series.values * self.series.exposure_s[:, np.newaxis]
 
     @property
     def sigma_dn(self) -> FloatArray:
-        """(n, C) of `level_dn`."""
+        """Standard uncertainty of `level_dn` in DN, shape (n, C)."""
         return self.series.sigma * self.series.exposure_s[:, np.newaxis]
 
     @property
     def clipped(self) -> int:
-        """How many frames clip that are not meant to."""
+        """Number of frames that clip, except brackets, which are meant to."""
         rows = zip(self.frames, self.series.usable, strict=True)
         return sum(frame.role != CardFrames.BRACKET and not usable for frame, usable in rows)
 
     def linearity(
         self, iso: float, range_dn: float, saturation_dn: float | None
     ) -> Linearity | None:
-        """From the frames at one ISO."""
+        """Fit the deviation from linearity to the frames at one ISO."""
         rows = self.series.usable & np.array([frame.iso == iso for frame in self.frames])
         stops = [frame.f_number for frame in self.frames]
-        known = list(dict.fromkeys(stops))
-        group = np.array([known.index(stop) for stop in stops], dtype=np.intp)
+        stop_values = list(dict.fromkeys(stops))
+        group = np.array([stop_values.index(stop) for stop in stops], dtype=np.intp)
         level = np.where(rows[:, np.newaxis], self.level_dn, np.nan)
         return fit_linearity(level, self.sigma_dn, group, range_dn, saturation_dn)
 
     def card_frames(self, roles: Sequence[str], linearity: Linearity | None) -> list[CardFrame]:
-        """What brackets and repeats show, put right for what is not linear."""
-        bent = deviation(linearity, self.level_dn)
-        straight = self.level_dn * np.exp(-bent)
-        used = self.series.usable & (np.abs(bent).max(axis=1) < MOST_BENT)
-        light, noise = straight.sum(axis=1), np.sqrt(np.square(self.sigma_dn).sum(axis=1))
+        """Return the light of the card in frames of the roles, corrected for non-linearity."""
+        nonlinearity = deviation(linearity, self.level_dn)
+        linear_level = self.level_dn * np.exp(-nonlinearity)
+        used = self.series.usable & (np.abs(nonlinearity).max(axis=1) < MOST_BENT)
+        light, noise = linear_level.sum(axis=1), np.sqrt(np.square(self.sigma_dn).sum(axis=1))
         return [
             CardFrame(
                 frame.unit, frame.role, frame.start_time, frame.exposure_s, frame.iso,
@@ -149,7 +159,7 @@ def card_levels(
     Raises
     ------
     DataError
-        There are none, or no dark frames at their ISO.
+        There are no lit frames, or no dark frames at their ISO.
     """
     if not lit:
         raise DataError("expected frames of the lit card, got none; resume the run")
@@ -164,65 +174,72 @@ def card_levels(
     return CardLevels(tuple(lit), reduce_patches(frames, {"card": card}, dark)["card"])
 
 
-def _transfer(
+def _fit_transfer(
     iso: float, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord], card: Region
 ) -> PhotonTransfer:
-    """Photon transfer at one ISO.
+    """Fit the photon transfer at one ISO.
 
     Raises
     ------
     DataError
-        Too few frames.
+        There are too few frames.
     """
     shortest_s = min((frame.exposure_s for frame in darks if frame.iso == iso), default=0.0)
     dark = [frame for frame in darks if frame.iso == iso and frame.exposure_s == shortest_s]
     dark_dn = float(np.mean(_dark_levels(dark, card))) if dark else 0.0
-    own = [frame for frame in lit if frame.iso == iso]
+    iso_frames = [frame for frame in lit if frame.iso == iso]
     return photon_transfer(
-        iso, _scatters(pairs_of(own), card, dark_dn), _scatters(pairs_of(dark), card, dark_dn)
+        iso,
+        _measure_scatters(pairs_of(iso_frames), card, dark_dn),
+        _measure_scatters(pairs_of(dark), card, dark_dn),
     )
 
 
 def _dark_levels(darks: Sequence[FrameRecord], card: Region) -> FloatArray:
-    """Mean of each channel above black, (channels,)."""
+    """Return the mean of each channel above black in DN, shape (channels,)."""
     measured = [measure(read_raw(frame.path), card) for frame in darks]
-    levels = [[channel.mean for channel in one.channels.values()] for one in measured]
+    levels = [
+        [channel.mean for channel in frame_stats.channels.values()] for frame_stats in measured
+    ]
     mean: FloatArray = np.mean(levels, axis=0)
     return mean
 
 
-def _saturation(brightest: FrameRecord, card: Region) -> tuple[float, float | None]:
-    """From black to white, and the level above black at which most of the card clips; or None."""
-    seen = measure(read_raw(brightest.path), card)
-    clips = any(channel.saturated > channel.n / 2 for channel in seen.channels.values())
-    return seen.range_dn, seen.range_dn if clips else None
+def _saturation_levels(brightest: FrameRecord, card: Region) -> tuple[float, float | None]:
+    """Return the range from black to white and the saturation level above black, in DN.
+
+    The saturation level is None if less than half of the card clips.
+    """
+    measured = measure(read_raw(brightest.path), card)
+    clips = any(channel.saturated > channel.n / 2 for channel in measured.channels.values())
+    return measured.range_dn, measured.range_dn if clips else None
 
 
-def _scatters(
+def _measure_scatters(
     pairs: Sequence[tuple[FrameRecord, FrameRecord]], card: Region, dark_dn: float
 ) -> list[PairScatter]:
-    found = []
-    for one, other in pairs:
-        first, second = read_raw(one.path), read_raw(other.path)
+    scatters = []
+    for first_record, second_record in pairs:
+        first, second = read_raw(first_record.path), read_raw(second_record.path)
         if not measure(first, card).clipped:
-            found.append(scatter(first, second, card, dark_dn))
-    return found
+            scatters.append(scatter(first, second, card, dark_dn))
+    return scatters
 
 
-def _flats(
+def _fit_flats(
     part: Part, lit: Sequence[FrameRecord], darks: Sequence[FrameRecord]
 ) -> tuple[FittedFlat, ...]:
     card, reference = part_region(part, part.protocol.card), part.protocol.camera.iso
     dark_dn = _dark_levels([frame for frame in darks if frame.iso == reference], card)
-    of_flats = [frame for frame in lit if frame.role == CardFrames.FLAT]
+    flat_frames = [frame for frame in lit if frame.role == CardFrames.FLAT]
     return tuple(
         fit_flat(
-            [read_raw(frame.path) for frame in of_flats if frame.f_number == f_number],
+            [read_raw(frame.path) for frame in flat_frames if frame.f_number == f_number],
             card,
             dark_dn,
             f_number,
         )
-        for f_number in dict.fromkeys(frame.f_number for frame in of_flats)
+        for f_number in dict.fromkeys(frame.f_number for frame in flat_frames)
     )
 
 
@@ -232,19 +249,19 @@ def _warnings(
     factors: Factors,
     card: CardLevels,
 ) -> Iterator[str]:
-    for one in transfers:
-        if one.reduced_chi2 > STRAIGHT_CHI2:
+    for transfer in transfers:
+        if transfer.reduced_chi2 > STRAIGHT_CHI2:
             yield (
-                f"the noise at ISO {one.noise.iso:g} does not rise evenly with the light (χ² "
-                f"{one.reduced_chi2:.1f} a degree of freedom): does the camera filter its RAW "
+                f"the noise at ISO {transfer.noise.iso:g} does not rise evenly with the light (χ² "
+                f"{transfer.reduced_chi2:.1f} a degree of freedom): does the camera filter its RAW "
                 "frames, or did something move?"
             )
-    evident = [one for one in transfers if one.neighbours_share_noise]
+    evident = [transfer for transfer in transfers if transfer.neighbours_share_noise]
     if evident:
-        most = max(evident, key=lambda one: one.shared)
+        largest = max(evident, key=lambda transfer: transfer.shared)
         yield (
-            f"neighbouring pixels share noise ({100 * most.shared:.0f} % of a pixel's variance): "
-            "the gain takes it into account"
+            f"neighbouring pixels share noise ({100 * largest.shared:.0f} % of a pixel's variance)"
+            ": the gain takes it into account"
         )
     flicker, repeated = factors.flicker.value, factors.repeated.value
     if flicker - repeated > CLEAR_SIGMAS * factors.repeated.sigma:
@@ -256,18 +273,23 @@ def _warnings(
         curve = zip(
             file.linearity.level_dn, file.linearity.deviation, file.linearity.sigma, strict=True
         )
-        bent = [level for level, d, s in curve if abs(d) > max(BENT, CLEAR_SIGMAS * s)]
-        if bent:
+        bent_levels = [level for level, d, s in curve if abs(d) > max(BENT, CLEAR_SIGMAS * s)]
+        if bent_levels:
             yield (
-                f"the sensor is off a straight line by more than 1 % at {bent[0]:.0f} DN above "
-                "dark: keep the brightest level of a measurement well below"
+                f"the sensor is off a straight line by more than 1 % at {bent_levels[0]:.0f} DN "
+                "above dark: keep the brightest level of a measurement well below"
             )
         if file.linearity.saturation_dn is None:
             yield "no frame saturated; the level at which the sensor is full is not known"
-    off = [o for o in file.shutter if abs(o.factor - 1) > max(OFF, CLEAR_SIGMAS * o.sigma)][:3]
-    if off:
+    shutter_errors = [
+        factor
+        for factor in file.shutter
+        if abs(factor.factor - 1) > max(OFF, CLEAR_SIGMAS * factor.sigma)
+    ][:3]
+    if shutter_errors:
         named = ", ".join(
-            f"{exposure_text(one.setting)}, × {plus_minus(one.factor, one.sigma)}" for one in off
+            f"{exposure_text(factor.setting)}, × {plus_minus(factor.factor, factor.sigma)}"
+            for factor in shutter_errors
         )
         yield f"shutter times are off by more than 5 % ({named}): longer ones are more exact"
     if any(max(map(abs, row)) > UNEVEN for flat in file.flats for row in flat.gradient):

@@ -1,8 +1,8 @@
-"""What shutter, ISO and aperture do over what their labels say, and how much light flickers.
+"""Actual factors of shutter, ISO and aperture relative to their nominal ones, and the flicker.
 
-Brackets of a steady card: ln(light of a frame) is a lamp that drifts evenly within a unit, plus
-the labels, plus one number for every setting. All units are solved together; the reference exposure
-that stands between the others keeps lamp and settings apart.
+The data are brackets of a steady card: ln(light of a frame) is a linear drift of the lamp within a
+unit, plus the nominal settings, plus one parameter for every setting. All units are solved
+together; the reference exposure between the others separates lamp and settings.
 """
 
 from collections.abc import Sequence
@@ -18,9 +18,9 @@ from labrig.results import FloatArray, Measured
 
 Setting = float | None
 
-#: How much of a factor the frames must determine by themselves.
+#: Least squared projection of a determined factor on the frames' row space.
 DETERMINED = 1 - 1e-6
-#: Rounds in which the frames' weights follow their flicker.
+#: Iterations of the frames' weights by their flicker.
 ROUNDS = 4
 
 
@@ -31,11 +31,13 @@ class CardFrame:
     Attributes
     ----------
     unit, role
-        Of the run.
+        Unit and role in the run.
     time_s
-        On any clock.
+        Begin of the frame in seconds, on any clock.
+    exposure_s, iso, f_number
+        Nominal exposure time in seconds, ISO and f-number.
     light, sigma
-        ln of its signal over all channels, and what noise makes of that.
+        Logarithm of the signal over all channels, and its standard uncertainty by noise.
     """
 
     unit: str
@@ -50,7 +52,17 @@ class CardFrame:
 
 @dataclass(frozen=True)
 class Factors:
-    """By rising setting; relative `flicker` of all frames, `repeated` of equal ones."""
+    """Factors by rising setting.
+
+    Attributes
+    ----------
+    shutter, iso_gain, aperture
+        Actual over nominal light of each setting.
+    flicker
+        Relative scatter of all frames.
+    repeated
+        Relative scatter of frames with equal settings.
+    """
 
     shutter: tuple[Factor, ...]
     iso_gain: tuple[Factor, ...]
@@ -60,17 +72,19 @@ class Factors:
 
 
 def fit_factors(frames: Sequence[CardFrame], iso: float, f_number: Setting) -> Factors:
-    """The factors to frames of brackets and repeats.
+    """Fit the factors of settings to frames of brackets and repeats.
 
     Parameters
     ----------
+    frames
+        Frames of the card.
     iso, f_number
-        Settings at which factors are 1; the shutter's is 1 at the longest time of all.
+        Settings at which factors are 1; the shutter's is 1 at the longest exposure time.
 
     Raises
     ------
     DataError
-        Too few frames.
+        There are too few frames.
     """
     repeats = [frame for frame in frames if frame.role == CardFrames.REPEAT]
     if len(repeats) < 4 or len(frames) < 8:
@@ -83,43 +97,49 @@ def fit_factors(frames: Sequence[CardFrame], iso: float, f_number: Setting) -> F
     stops = sorted({frame.f_number for frame in frames if frame.f_number is not None})
     columns: list[tuple[str, Setting]] = [
         *(("shutter", time_s) for time_s in times[:-1]),
-        *(("iso", one) for one in isos if one != iso),
+        *(("iso", iso_setting) for iso_setting in isos if iso_setting != iso),
         *(("aperture", stop) for stop in stops if stop != f_number),
     ]
-    design = np.hstack([_settings(frames, columns), _lamp(frames)])
-    target = np.array([frame.light - _labelled(frame, iso, f_number) for frame in frames])
+    design = np.hstack([_settings_design(frames, columns), _lamp_design(frames)])
+    target = np.array([frame.light - _nominal_light(frame, iso, f_number) for frame in frames])
     noise = np.array([frame.sigma for frame in frames])
     values, sigma, determined, flicker = _solve(design, target, noise)
 
     def of(kind: str, fixed: Setting) -> tuple[Factor, ...]:
-        found = [] if fixed is None else [Factor(setting=fixed, factor=1.0, sigma=0.0)]
+        factors = [] if fixed is None else [Factor(setting=fixed, factor=1.0, sigma=0.0)]
         for number, (name, setting) in enumerate(columns):
             if name == kind and determined[number] and setting is not None:
                 factor = float(np.exp(values[number]))
-                found.append(
+                factors.append(
                     Factor(setting=setting, factor=factor, sigma=factor * float(sigma[number]))
                 )
-        return tuple(sorted(found, key=lambda one: one.setting))
+        return tuple(sorted(factors, key=lambda factor: factor.setting))
 
     return Factors(
         shutter=of("shutter", times[-1]),
         iso_gain=of("iso", iso),
         aperture=of("aperture", f_number),
         flicker=flicker,
-        repeated=_scatter(repeats),
+        repeated=_repeat_flicker(repeats),
     )
 
 
-def _settings(frames: Sequence[CardFrame], columns: Sequence[tuple[str, Setting]]) -> FloatArray:
+def _settings_design(
+    frames: Sequence[CardFrame], columns: Sequence[tuple[str, Setting]]
+) -> FloatArray:
     design = np.zeros((len(frames), len(columns)))
     for row, frame in enumerate(frames):
-        own = {("shutter", frame.exposure_s), ("iso", frame.iso), ("aperture", frame.f_number)}
-        design[row] = [column in own for column in columns]
+        frame_settings = {
+            ("shutter", frame.exposure_s),
+            ("iso", frame.iso),
+            ("aperture", frame.f_number),
+        }
+        design[row] = [column in frame_settings for column in columns]
     return design
 
 
-def _lamp(frames: Sequence[CardFrame]) -> FloatArray:
-    """A level and an even drift for every unit."""
+def _lamp_design(frames: Sequence[CardFrame]) -> FloatArray:
+    """Return the design of a level and a linear drift of the lamp for every unit."""
     units = list(dict.fromkeys(frame.unit for frame in frames))
     design = np.zeros((len(frames), 2 * len(units)))
     for number, unit in enumerate(units):
@@ -131,8 +151,8 @@ def _lamp(frames: Sequence[CardFrame]) -> FloatArray:
     return design
 
 
-def _labelled(frame: CardFrame, iso: float, f_number: Setting) -> float:
-    """Logarithm of what the labels alone would make of the reference's light."""
+def _nominal_light(frame: CardFrame, iso: float, f_number: Setting) -> float:
+    """Return the logarithm of the nominal light relative to the reference's."""
     labelled = np.log(frame.exposure_s * frame.iso / iso)
     if frame.f_number is not None and f_number is not None:
         labelled += 2 * np.log(f_number / frame.f_number)
@@ -142,7 +162,7 @@ def _labelled(frame: CardFrame, iso: float, f_number: Setting) -> float:
 def _solve(
     design: FloatArray, target: FloatArray, noise: FloatArray
 ) -> tuple[FloatArray, FloatArray, NDArray[np.bool_], Measured]:
-    """Values, σ, whether they are determined, and the flicker."""
+    """Return parameters, their σ, whether they are determined, and the flicker."""
     flicker = 0.01
     for _ in range(ROUNDS):
         weight = 1 / np.hypot(noise, flicker)
@@ -150,28 +170,28 @@ def _solve(
         kept = s > 1e-9 * s[0]
         inverse = v[kept].T / s[kept]
         values = inverse @ (u[:, kept].T @ (target * weight))
-        freedom = len(target) - int(kept.sum())
-        if freedom < 1:
+        dof = len(target) - int(kept.sum())
+        if dof < 1:
             raise DataError("expected more frames than settings; raise 'cycles'")
-        squares = np.square(target - design @ values) * len(target) / freedom
+        squares = np.square(target - design @ values) * len(target) / dof
         flicker = _common_scatter(squares, noise)
     sigma = np.sqrt(np.square(inverse).sum(axis=1))
     determined = np.square(v[kept]).sum(axis=0) > DETERMINED
-    return values, sigma, determined, Measured(flicker, float(flicker / np.sqrt(2 * freedom)))
+    return values, sigma, determined, Measured(flicker, float(flicker / np.sqrt(2 * dof)))
 
 
-def _scatter(frames: Sequence[CardFrame]) -> Measured:
-    """Flicker of equal frames about a straight line."""
-    light, design = np.array([frame.light for frame in frames]), _lamp(frames)
-    found, *_ = np.linalg.lstsq(design, light)
-    freedom = max(len(light) - design.shape[1], 1)
-    squares = np.square(light - design @ found) * len(light) / freedom
+def _repeat_flicker(frames: Sequence[CardFrame]) -> Measured:
+    """Return the flicker of frames with equal settings about a straight line."""
+    light, design = np.array([frame.light for frame in frames]), _lamp_design(frames)
+    coefficients, *_ = np.linalg.lstsq(design, light)
+    dof = max(len(light) - design.shape[1], 1)
+    squares = np.square(light - design @ coefficients) * len(light) / dof
     flicker = _common_scatter(squares, np.array([frame.sigma for frame in frames]))
-    return Measured(flicker, float(np.sqrt(squares.mean() / (2 * freedom))))
+    return Measured(flicker, float(np.sqrt(squares.mean() / (2 * dof))))
 
 
 def _common_scatter(squares: FloatArray, noise: FloatArray) -> float:
-    """ρ at which squares are ρ² + noise² in the mean, each weighted as it tells ρ."""
+    """Return ρ such that the squares average to ρ² + noise², weighted by their information on ρ."""
     variance = float(squares.mean())
     for _ in range(20):
         weight = 1 / np.square(variance + np.square(noise))

@@ -1,4 +1,4 @@
-"""The flat field of a lens at one aperture, from frames of an evenly lit card."""
+"""Vignetting of a lens at one aperture, from frames of an evenly lit card."""
 
 from collections.abc import Sequence
 from itertools import pairwise
@@ -15,30 +15,38 @@ from labrig.results import FittedFlat, FloatArray
 
 #: Blocks across and down the card whose means are fitted.
 BLOCKS = (16, 12)
-#: ρ⁴ takes part if it is so many σ from nothing.
+#: Significance in σ from which the ρ⁴ term is kept.
 EVIDENT_SIGMAS = 4.0
 
 
 def fit_flat(
     frames: Sequence[RawFrame], card: Region, dark_dn: FloatArray, f_number: float | None
 ) -> FittedFlat:
-    """Least squares of A (1 + g·x + c₁ρ² + c₂ρ⁴) to blocks of the card, channel by channel.
+    """Fit A (1 + g·x + c₁ρ² + c₂ρ⁴) to blocks of the card by least squares, channel by channel.
 
     Parameters
     ----------
+    frames
+        Frames of the card.
+    card
+        Region of the card in fractions of the frame.
     dark_dn
-        (channels,) level of the dark above black.
+        Dark level above black in DN, shape (channels,).
+    f_number
+        F-number of the frames; None if the lens has none.
 
     Raises
     ------
     DataError
-        No frames, or the card is not lit.
+        There are no frames, or the card is not lit.
     """
     if not frames:
         raise DataError("expected frames of the lit card, got none")
     first = frames[0]
-    x, y, light = _blocks(frames, card, dark_dn)
-    fits = [_fit(x, y, own, first.width, first.height) for own in light.T]
+    x, y, light = _block_light(frames, card, dark_dn)
+    fits = [
+        _fit_channel(x, y, channel_light, first.width, first.height) for channel_light in light.T
+    ]
     powers = max(fit.powers for fit in fits)
     flat = Flat(
         f_number=f_number,
@@ -49,8 +57,8 @@ def fit_flat(
     return FittedFlat(flat, np.array([f.rho2 for f in fits]), np.array([f.light for f in fits]))
 
 
-class _Fit(NamedTuple):
-    """Of one channel; `light` of the blocks is over the middle's, the gradient taken off."""
+class _ChannelFit(NamedTuple):
+    """Fit of one channel; `light` is that of the blocks over the centre's, without the gradient."""
 
     falloff: FloatArray
     powers: int
@@ -60,32 +68,41 @@ class _Fit(NamedTuple):
     light: FloatArray
 
 
-def _blocks(
+def _block_light(
     frames: Sequence[RawFrame], card: Region, dark_dn: FloatArray
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
-    """Middles in pixels of blocks of the card, (blocks,) each; their light, (blocks, channels)."""
+    """Return the light of blocks of the card.
+
+    Returns
+    -------
+    tuple of ndarray
+        Centres x and y of the blocks in pixels, shape (blocks,), and their light in DN, shape
+        (blocks, channels).
+    """
     left, top, width, height = region_pixels(card, frames[0].width, frames[0].height)
     side = frames[0].cfa_side
-    across = _edges(left, width, BLOCKS[0], side)
-    down = _edges(top, height, BLOCKS[1], side)
+    across = _block_edges(left, width, BLOCKS[0], side)
+    down = _block_edges(top, height, BLOCKS[1], side)
     areas = [
         (near, low, far - near, high - low)
         for low, high in pairwise(down.tolist())
         for near, far in pairwise(across.tolist())
     ]
     linear = [LinearFrame(frame, dark_dn) for frame in frames]
-    light = np.mean([[one.sums(area).mean_dn for area in areas] for one in linear], axis=0)
+    light = np.mean([[frame.sums(area).mean_dn for area in areas] for frame in linear], axis=0)
     x, y = np.meshgrid((across[1:] + across[:-1]) / 2, (down[1:] + down[:-1]) / 2)
     return x.ravel(), y.ravel(), light
 
 
-def _edges(start: int, length: int, blocks: int, side: int) -> NDArray[np.intp]:
-    """Of blocks that are whole cells of the colour filter, one cell wide at the least."""
+def _block_edges(start: int, length: int, blocks: int, side: int) -> NDArray[np.intp]:
+    """Return the edges of blocks of whole cells of the colour filter, one cell wide at least."""
     cells = length // side
     return start + side * np.linspace(0, cells, min(blocks, cells) + 1).round().astype(np.intp)
 
 
-def _fit(x: FloatArray, y: FloatArray, light: FloatArray, width: int, height: int) -> _Fit:
+def _fit_channel(
+    x: FloatArray, y: FloatArray, light: FloatArray, width: int, height: int
+) -> _ChannelFit:
     if not light.mean() > 0:
         raise DataError("expected a lit card, got a dark one; is 'card:' its region?")
     rho2 = rho_squared(x, y, width, height)
@@ -94,14 +111,16 @@ def _fit(x: FloatArray, y: FloatArray, light: FloatArray, width: int, height: in
     for powers in (2, 1):
         even = rho2[:, np.newaxis] ** np.arange(1, powers + 1)
         design = np.hstack([np.ones((len(x), 1)), odd, even])
-        found, *_ = np.linalg.lstsq(design, light)
-        residual = light - design @ found
-        variance = float(residual @ residual) / max(len(light) - len(found), 1)
+        coefficients, *_ = np.linalg.lstsq(design, light)
+        residual = light - design @ coefficients
+        variance = float(residual @ residual) / max(len(light) - len(coefficients), 1)
         sigma = float(np.sqrt(np.linalg.inv(design.T @ design)[-1, -1] * variance))
-        if abs(found[-1]) > EVIDENT_SIGMAS * sigma:
+        if abs(coefficients[-1]) > EVIDENT_SIGMAS * sigma:
             break
-    middle, gradient = float(found[0]), found[1:3] / found[0]
+    middle, gradient = float(coefficients[0]), coefficients[1:3] / coefficients[0]
     falloff = np.zeros(2)
-    falloff[:powers] = found[3:] / middle
-    plain = light / middle - odd @ gradient
-    return _Fit(falloff, powers, gradient, float(np.sqrt(variance)) / middle, rho2, plain)
+    falloff[:powers] = coefficients[3:] / middle
+    flat_light = light / middle - odd @ gradient
+    return _ChannelFit(
+        falloff, powers, gradient, float(np.sqrt(variance)) / middle, rho2, flat_light
+    )

@@ -1,14 +1,14 @@
-"""How far a sensor is from linear, from the colours of one grey card.
+"""Deviation of a sensor from linearity, from the colours of one grey card.
 
 A grey card has one colour. If the sensor were linear the channels of all its photographs would have
 the same ratios, whatever shutter, aperture and lamp did in that frame: all of that is common to the
-channels. The channels stand at different levels, so that a deviation D(level) shows in their
-ratios, free of flicker and drift:
+channels. The channels are at different levels, so that a deviation D(level) changes their ratios,
+free of flicker and drift:
 
     ln s_fc = λ_f + κ_c + δ_c / s_fc + D(s_fc),   D piecewise linear, D(0) = 0,
 
-δ the little by which the dark level that was subtracted is wrong. A deviation that is the same
-power at all levels cannot be seen in this way.
+with δ the error of the subtracted dark level. A deviation that is the same power at all levels is
+not observable in this way.
 """
 
 import numpy as np
@@ -20,7 +20,7 @@ from labrig.results import FloatArray
 
 #: Knots of D, as fractions of the range up to saturation.
 KNOTS = (0.15, 0.35, 0.55, 0.75, 0.95)
-#: Below this fraction noise of reading is most of a value.
+#: Fraction of the range below which read noise dominates.
 LEAST_FRACTION = 0.005
 
 
@@ -31,25 +31,27 @@ def fit_linearity(
     range_dn: float,
     saturation_dn: float | None,
 ) -> Linearity | None:
-    """D at a few levels; None where the frames cannot tell.
+    """Fit the deviation D at a few levels; None where the frames do not determine it.
 
     Parameters
     ----------
     level_dn, sigma_dn
-        (frames, channels) above dark; NaN where a value is not to be used.
+        Levels above dark and their standard uncertainties in DN, shape (frames, channels); NaN
+        where a value is not to be used.
     group
-        (frames,) what the lens does to the card's colour is the same within a group.
+        Group of each frame, shape (frames,), within which the lens has the same effect on the
+        card's colour.
     range_dn
-        From black to white.
+        Range from black to white in DN.
     saturation_dn
-        To be noted.
+        Saturation level in DN, which is passed on to the result.
     """
-    used = np.isfinite(level_dn) & (level_dn > LEAST_FRACTION * range_dn)
-    used &= (used.sum(axis=1) > 1)[:, np.newaxis]
-    if not used.any():
+    is_used = np.isfinite(level_dn) & (level_dn > LEAST_FRACTION * range_dn)
+    is_used &= (is_used.sum(axis=1) > 1)[:, np.newaxis]
+    if not is_used.any():
         return None
-    frame, channel = np.nonzero(used)
-    level, relative = level_dn[used], sigma_dn[used] / level_dn[used]
+    frame, channel = np.nonzero(is_used)
+    level, relative = level_dn[is_used], sigma_dn[is_used] / level_dn[is_used]
     highest = float(level.max())
     between = [fraction * range_dn for fraction in KNOTS if fraction * range_dn < highest]
     knots = np.array([0.0, *between, highest])
@@ -63,27 +65,30 @@ def fit_linearity(
     dark = np.equal.outer(channel, np.arange(channels)) / level[:, np.newaxis]
     nuisance = np.hstack([light, colour, dark * level.min()]) * weight[:, np.newaxis]
     # What light, colour and dark level explain is taken out; D is what is left.
-    left, weights, _ = np.linalg.svd(nuisance, full_matrices=False)
-    own = left[:, weights > 1e-10 * weights.max()]
+    left_vectors, singular_values, _ = np.linalg.svd(nuisance, full_matrices=False)
+    nuisance_basis = left_vectors[:, singular_values > 1e-10 * singular_values.max()]
     target, design = np.log(level) * weight, bends * weight[:, np.newaxis]
-    target, design = target - own @ (own.T @ target), design - own @ (own.T @ design)
+    target, design = (
+        target - nuisance_basis @ (nuisance_basis.T @ target),
+        design - nuisance_basis @ (nuisance_basis.T @ design),
+    )
     singular = np.linalg.svd(design, compute_uv=False)
     if singular[-1] < 1e-6 * singular[0]:
         return None
-    found, *_ = np.linalg.lstsq(design, target)
-    freedom = len(level) - own.shape[1] - len(found)
-    misfit = np.square(target - design @ found).sum() / max(freedom, 1)
+    coefficients, *_ = np.linalg.lstsq(design, target)
+    dof = len(level) - nuisance_basis.shape[1] - len(coefficients)
+    misfit = np.square(target - design @ coefficients).sum() / max(dof, 1)
     covariance = np.linalg.inv(design.T @ design) * max(misfit, 1.0)
     return Linearity(
         level_dn=tuple(knots[1:].tolist()),
-        deviation=tuple(found.tolist()),
+        deviation=tuple(coefficients.tolist()),
         sigma=tuple(np.sqrt(np.diag(covariance)).tolist()),
         saturation_dn=saturation_dn,
     )
 
 
 def deviation(linearity: Linearity | None, level_dn: FloatArray) -> FloatArray:
-    """D at some levels."""
+    """Return the deviation D at levels in DN; zero without a fit."""
     if linearity is None:
         return np.zeros_like(level_dn)
     return np.interp(level_dn, [0.0, *linearity.level_dn], [0.0, *linearity.deviation])

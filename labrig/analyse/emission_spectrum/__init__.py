@@ -1,4 +1,4 @@
-"""From frames through the LVF to Λ*, constant in time and for every lamp or not."""
+"""From frames through the LVF to the emission spectrum Λ*, and its dependence on time and lamp."""
 
 from labrig.analyse.emission_spectrum.analysis import analyse
 

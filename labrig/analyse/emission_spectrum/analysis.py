@@ -1,4 +1,4 @@
-"""An emission spectrum, from its frames to Λ* of each patch, and whether it is one at all."""
+"""Analysis of an emission spectrum, from its frames to Λ* of each patch."""
 
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -42,15 +42,15 @@ from labrig.results import (
     is_usable,
 )
 
-#: Draws of the spectrum, and of those that are only shown.
+#: Number of draws of the spectrum, and of those that are only shown.
 SAMPLES, FEW_SAMPLES = 400, 60
-#: After another lamp the glow must be so much brighter than what was left of the one before.
+#: Least brightness after another lamp relative to the glow left of the previous charge.
 CHARGED_ANEW = 1.05
 
 
 @dataclass(frozen=True, eq=False)
 class _Charge:
-    """The glow after one charge: its frames, and all of them as one."""
+    """The glow after one charge: its frames, and all of them combined."""
 
     lamp: str
     frames: FilterFrames
@@ -58,17 +58,17 @@ class _Charge:
 
 
 def analyse(part: Part) -> EmissionSpectrumResult:
-    """Find Λ* of every patch, whether it is constant, and whether it depends on the lamp.
+    """Measure Λ* of every patch, and test whether it depends on time and on the lamp.
 
     Raises
     ------
     UsageError
-        No calibrated LVF, no camera curves.
+        There is no calibrated LVF, or there are no camera curves.
     DataError
         No spectrum is complete, frames are damaged, nothing glows in them, or no patch lies below
         the filter.
     FitError
-        Too much clips.
+        Too many values clip.
     """
     intact = intact_frames(part.run, part.overrides, SpectrumFrames.GLOW)
     frames, stray = without_stray_light(intact, part.inputs.blank)
@@ -84,7 +84,7 @@ def analyse(part: Part) -> EmissionSpectrumResult:
     )
     patches, warnings = for_each_patch(
         list(models),
-        lambda patch: _of_patch(
+        lambda patch: _patch_spectrum(
             part, patch, models[patch], reductions[patch], frames.decay, white=bool(white)
         ),
     )
@@ -94,7 +94,7 @@ def analyse(part: Part) -> EmissionSpectrumResult:
     )
 
 
-def _of_patch(
+def _patch_spectrum(
     part: Part,
     patch: StripPatch,
     model: ForwardModel,
@@ -103,7 +103,7 @@ def _of_patch(
     *,
     white: bool,
 ) -> tuple[PatchSpectrum, list[str]]:
-    """The patch's spectrum, and warnings."""
+    """Return the patch's spectrum, and warnings."""
     model, warnings = with_white_reference(
         model, part, reduction.of_unit("white") if white else None
     )
@@ -119,17 +119,21 @@ def _of_patch(
     first = charges[0]
     times = over_time(first.frames, model.centre_nm) if len(first.frames) > 1 else []
     lamps = [
-        compared(f"{one.lamp} against {first.lamp}", one.frames, first.combined, model.centre_nm)
-        for one in charges[1:]
+        compared(
+            f"{charge.lamp} against {first.lamp}", charge.frames, first.combined, model.centre_nm
+        )
+        for charge in charges[1:]
     ]
-    found = PatchSpectrum(
+    spectrum = PatchSpectrum(
         spectrum=spectrum_of(first.combined, first.lamp, SAMPLES),
         channels=model.camera.channels,
         centre_nm=model.centre_nm,
         white_reference=model.white_reference,
         charges=tuple(
-            ChargeSpectrum(one.lamp, one.frames, spectrum_of(one.combined, one.lamp, FEW_SAMPLES))
-            for one in charges
+            ChargeSpectrum(
+                charge.lamp, charge.frames, spectrum_of(charge.combined, charge.lamp, FEW_SAMPLES)
+            )
+            for charge in charges
         ),
         times=tuple(times),
         at_times=tuple(
@@ -140,12 +144,12 @@ def _of_patch(
         changes_with_time=differ(times),
         depends_on_lamp=differ(lamps),
     )
-    return found, [
+    return spectrum, [
         *warnings,
-        *_clipping(first.frames),
-        *_faint(len(first.frames), frames),
-        *_differences(found),
-        *_not_charged(charges),
+        *_clipping_warnings(first.frames),
+        *_faint_warnings(len(first.frames), frames),
+        *_difference_warnings(spectrum),
+        *_uncharged_warnings(charges),
         *dead,
     ]
 
@@ -153,7 +157,7 @@ def _of_patch(
 def _charges(
     reduction: PatchReduction, frames: Sequence[SeriesFrame]
 ) -> tuple[list[_Charge], list[str]]:
-    """Those after which something glows, and a warning for each of the others.
+    """Return the charges after which something glows, and a warning for each of the others.
 
     Raises
     ------
@@ -165,59 +169,59 @@ def _charges(
     for unit in dict.fromkeys(frame.unit for frame in frames):
         lamp = lamp_of(unit)
         try:
-            seen = visible(reduction.of_unit(unit))
+            visible_frames = visible(reduction.of_unit(unit))
         except DataError:
             if not charges:
                 raise
             dead.append(f"after charging with the {lamp} lamp nothing glows: it did not light")
             continue
-        charges.append(_Charge(lamp, seen, combined(seen)))
+        charges.append(_Charge(lamp, visible_frames, combined(visible_frames)))
     return charges, dead
 
 
-def _differences(found: PatchSpectrum) -> Iterator[str]:
-    if found.changes_with_time:
-        worst = max(found.times, key=lambda one: one.beyond_noise)
+def _difference_warnings(spectrum: PatchSpectrum) -> Iterator[str]:
+    if spectrum.changes_with_time:
+        worst = max(spectrum.times, key=lambda comparison: comparison.beyond_noise)
         yield (
             f"the spectrum changes with time: at {worst.what} it differs by "
             f"{worst.beyond_noise:.1%} (rms, beyond noise) from the other times; states emit in "
             "different colours, or another light comes in, so that one Λ* does not describe them"
         )
-    if found.depends_on_lamp:
-        worst = max(found.lamps, key=lambda one: one.beyond_noise)
+    if spectrum.depends_on_lamp:
+        worst = max(spectrum.lamps, key=lambda comparison: comparison.beyond_noise)
         yield (
             f"the spectrum depends on the lamp: {worst.what} it differs by "
             f"{worst.beyond_noise:.1%} (rms, beyond noise); is it the same sample, in its place?"
         )
 
 
-def _not_charged(charges: Sequence[_Charge]) -> Iterator[str]:
-    """Lamps after which the glow went on fading as if they had not been lit."""
+def _uncharged_warnings(charges: Sequence[_Charge]) -> Iterator[str]:
+    """Warn of lamps after which the glow continued to fade as if they had not been lit."""
     for before, after in pairwise(charges):
-        seen = np.isfinite(before.combined.value) & np.isfinite(after.combined.value)
-        left = before.combined.value[seen] * before.combined.brightness[-1]
-        anew = after.combined.value[seen]
-        if float(anew @ left) < CHARGED_ANEW * float(left @ left):
+        is_finite = np.isfinite(before.combined.value) & np.isfinite(after.combined.value)
+        remaining_glow = before.combined.value[is_finite] * before.combined.brightness[-1]
+        new_glow = after.combined.value[is_finite]
+        if float(new_glow @ remaining_glow) < CHARGED_ANEW * float(remaining_glow @ remaining_glow):
             yield (
                 f"after charging with the {after.lamp} lamp the glow is no brighter than what was "
                 f"left before: the {after.lamp} lamp did not light, or hardly excites this sample"
             )
 
 
-def _faint(count: int, frames: Sequence[SeriesFrame]) -> Iterator[str]:
-    taken = sum(one.unit == frames[0].unit and is_usable(one.flag) for one in frames)
-    if count != taken:
+def _faint_warnings(count: int, frames: Sequence[SeriesFrame]) -> Iterator[str]:
+    usable = sum(frame.unit == frames[0].unit and is_usable(frame.flag) for frame in frames)
+    if count != usable:
         yield (
-            f"{taken - count} of {taken} frames show no light above the noise and are left out; "
+            f"{usable - count} of {usable} frames show no light above the noise and are left out; "
             "photograph earlier (times:), or charge for longer"
         )
 
 
-def _clipping(frames: FilterFrames) -> Iterator[str]:
+def _clipping_warnings(frames: FilterFrames) -> Iterator[str]:
     clipped = np.isnan(frames.value_dn_per_s)
     if clipped.any():
-        lost = int(clipped.all(axis=0).sum())
+        clipped_everywhere = int(clipped.all(axis=0).sum())
         yield (
-            f"{clipped.mean():.0%} of the values clip and are left out, {lost} of "
+            f"{clipped.mean():.0%} of the values clip and are left out, {clipped_everywhere} of "
             f"{clipped.shape[1]} in every frame; expose for less or lower the ISO"
         )

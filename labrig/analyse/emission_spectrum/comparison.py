@@ -1,7 +1,7 @@
-"""Frames through the LVF put together, and whether they differ in more than their brightness.
+"""Combination of frames through the LVF, and tests for differences beyond their brightness.
 
-They are compared as they are, position by position: camera curves and filter, which are known to
-some per cent, are the same in both and drop out.
+They are compared as measured, position by position: camera curves and filter, which are known to
+some per cent, are common to both and cancel.
 """
 
 from collections.abc import Sequence
@@ -13,26 +13,29 @@ from scipy.special import chdtrc
 from labrig.errors import DataError
 from labrig.results import FilterFrames, FloatArray, SpectralComparison
 
-#: Rounds in which brightness and mean follow each other; each gains a digit or more.
+#: Iterations of brightness and mean; each gains a digit or more.
 COMBINING_ROUNDS = 20
-#: All of the light together is so many σ at least.
+#: Least significance in σ of the sum of all light.
 SEEN_SIGMA = 5.0
-#: Chance, over all comparisons of a kind, at which spectra that do not differ are said to.
+#: Significance level, over all comparisons of a kind, of a difference of spectra.
 LEVEL = 1e-3
-#: Fraction of the highest value above which a place tells the centroid: elsewhere is noise.
+#: Fraction of the highest value above which a place counts in the centroid.
 BRIGHT = 0.02
-#: Rounds in which the noise of the reference follows the brightness.
+#: Iterations of the reference's noise by the brightness.
 COMPARING_ROUNDS = 5
 
 
 @dataclass(frozen=True, eq=False)
 class CombinedFrame:
-    """Several frames as one: (m,) values as bright as the first of them, and σ.
+    """Several frames combined into one.
 
     Attributes
     ----------
+    value, sigma
+        Combined values at the brightness of the first frame, and their standard uncertainties,
+        shape (m,).
     brightness
-        (f,) of every frame relative to the first.
+        Brightness of every frame relative to the first, shape (f,).
     """
 
     value: FloatArray
@@ -41,12 +44,12 @@ class CombinedFrame:
 
     @property
     def shows_light(self) -> bool:
-        """Whether all of it together stands out of the noise."""
+        """Whether the sum of all values is significant."""
         return bool(np.nansum(self.value) > SEEN_SIGMA * np.sqrt(np.nansum(self.sigma**2)))
 
 
 def combined(frames: FilterFrames) -> CombinedFrame:
-    """What is behind some frames, each as bright as it is."""
+    """Combine frames of different brightness."""
     weight = np.nan_to_num(1 / (frames.sigma_dn_per_s**2 + frames.dark_sigma_dn_per_s**2))
     value = np.nan_to_num(frames.value_dn_per_s)
     brightness = np.ones(len(frames))
@@ -54,8 +57,8 @@ def combined(frames: FilterFrames) -> CombinedFrame:
         total = (weight * brightness[:, np.newaxis] ** 2).sum(axis=0)
         with np.errstate(invalid="ignore", divide="ignore"):
             mean = (weight * value * brightness[:, np.newaxis]).sum(axis=0) / total
-        known = np.nan_to_num(mean)
-        brightness = (weight * value) @ known / (weight @ known**2)
+        finite_mean = np.nan_to_num(mean)
+        brightness = (weight * value) @ finite_mean / (weight @ finite_mean**2)
         brightness = brightness / (brightness[0] or 1.0)
     with np.errstate(divide="ignore"):
         sigma = np.where(total > 0, 1 / np.sqrt(total), np.nan)
@@ -63,12 +66,12 @@ def combined(frames: FilterFrames) -> CombinedFrame:
 
 
 def visible(frames: FilterFrames) -> FilterFrames:
-    """Those of the frames in which there is light.
+    """Return the frames in which light is detected.
 
     Raises
     ------
     DataError
-        There is none in any of them.
+        No frame shows light.
     """
     rows = [row for row in range(len(frames)) if combined(frames.take([row])).shows_light]
     if not rows:
@@ -80,63 +83,79 @@ def visible(frames: FilterFrames) -> FilterFrames:
 
 
 def differ(comparisons: Sequence[SpectralComparison]) -> bool:
-    """Whether any of several comparisons is more than chance."""
-    return any(one.p_value < LEVEL / len(comparisons) for one in comparisons)
+    """Return whether any of several comparisons is significant."""
+    return any(comparison.p_value < LEVEL / len(comparisons) for comparison in comparisons)
 
 
 def over_time(frames: FilterFrames, centre_nm: FloatArray) -> list[SpectralComparison]:
-    """Every frame against all others together.
+    """Compare every frame with all others together.
 
     Parameters
     ----------
+    frames
+        Frames after one charge.
     centre_nm
-        (m,) of the filter where every value was read.
+        Centre of the filter's band of every value in nm, shape (m,).
     """
-    found = []
+    comparisons = []
     for row in range(len(frames)):
         others = combined(frames.take([other for other in range(len(frames)) if other != row]))
-        found.append(compared(f"{frames.t_s[row]:.3g} s", frames.take([row]), others, centre_nm))
-    return found
+        comparisons.append(
+            compared(f"{frames.t_s[row]:.3g} s", frames.take([row]), others, centre_nm)
+        )
+    return comparisons
 
 
 def compared(
     what: str, frames: FilterFrames, reference: CombinedFrame, centre_nm: FloatArray
 ) -> SpectralComparison:
-    """Some frames against others put together."""
+    """Compare frames with others that are combined."""
     mean = combined(frames)
-    known = np.isfinite(mean.value) & np.isfinite(reference.value)
-    y, m = mean.value[known], reference.value[known]
-    gain, chi2 = float(y @ m / (m @ m)), 0.0
+    is_finite = np.isfinite(mean.value) & np.isfinite(reference.value)
+    value, reference_value = mean.value[is_finite], reference.value[is_finite]
+    gain, chi2 = float(value @ reference_value / (reference_value @ reference_value)), 0.0
     for _ in range(COMPARING_ROUNDS):
-        variance = mean.sigma[known] ** 2 + gain**2 * reference.sigma[known] ** 2
-        inverse = _inverse(variance)
-        gain = float(m @ inverse @ y / (m @ inverse @ m))
-        residual = y - gain * m
+        variance = mean.sigma[is_finite] ** 2 + gain**2 * reference.sigma[is_finite] ** 2
+        inverse = _inverse_covariance(variance)
+        gain = float(
+            reference_value @ inverse @ value / (reference_value @ inverse @ reference_value)
+        )
+        residual = value - gain * reference_value
         chi2 = float(residual @ inverse @ residual)
-    dof = len(y) - 2
-    excess = max(chi2 - dof, 0.0) / float(gain**2 * (m @ inverse @ m))
-    shift, sigma = _shift(y, m, gain, variance, centre_nm[known])
+    dof = len(value) - 2
+    excess = max(chi2 - dof, 0.0) / float(gain**2 * (reference_value @ inverse @ reference_value))
+    shift, sigma = _centroid_shift(value, reference_value, gain, variance, centre_nm[is_finite])
     return SpectralComparison(
         what, gain, chi2, dof, float(chdtrc(dof, chi2)), float(np.sqrt(excess)), shift, sigma
     )
 
 
-def _inverse(variance: FloatArray) -> FloatArray:
-    """Of the covariance where all values may be off by one and the same amount: a sensor that has
-    warmed since its dark frames is brighter all over.
+def _inverse_covariance(variance: FloatArray) -> FloatArray:
+    """Return the inverse covariance of values with a free common offset.
+
+    A sensor that has warmed since its dark frames is brighter everywhere by the same amount.
     """
     weight = 1 / variance
     inverse: FloatArray = np.diag(weight) - np.outer(weight, weight) / weight.sum()
     return inverse
 
 
-def _shift(
-    y: FloatArray, m: FloatArray, gain: float, variance: FloatArray, centre_nm: FloatArray
+def _centroid_shift(
+    value: FloatArray,
+    reference: FloatArray,
+    gain: float,
+    variance: FloatArray,
+    centre_nm: FloatArray,
 ) -> tuple[float, float]:
-    """Difference of the centroids in nm where m has its light, and its σ."""
-    bright = m > BRIGHT * m.max()
-    y, m, variance, centre_nm = y[bright], m[bright], variance[bright], centre_nm[bright]
-    light = float(m.sum())
-    middle = float(centre_nm @ m) / light
-    lever = (centre_nm - middle) / (gain * light)
-    return float(lever @ (y - gain * m)), float(np.sqrt(lever**2 @ variance))
+    """Return the difference of the centroids in nm where the reference has its light, and its σ."""
+    is_bright = reference > BRIGHT * reference.max()
+    value, reference, variance, centre_nm = (
+        value[is_bright],
+        reference[is_bright],
+        variance[is_bright],
+        centre_nm[is_bright],
+    )
+    light = float(reference.sum())
+    centroid_nm = float(centre_nm @ reference) / light
+    lever = (centre_nm - centroid_nm) / (gain * light)
+    return float(lever @ (value - gain * reference)), float(np.sqrt(lever**2 @ variance))

@@ -1,8 +1,8 @@
-"""What a spectrum comes to in a frame through the LVF: filter, camera curves, white reference.
+"""Forward model of a frame through the LVF: filter, camera curves, white reference.
 
-A camera's curves from another laboratory are off by some per cent, and so is every spectrum found
-with them. A grey card under a known lamp, seen through the same filter, shows by how much in every
-position and channel: the errors that the model may have are known ones from then on.
+Camera curves from another laboratory are off by some per cent, and so is every spectrum obtained
+with them. A grey card under a known lamp, seen through the same filter, measures the deviation in
+every position and channel, and constrains the model's errors.
 """
 
 from collections.abc import Mapping, Sequence
@@ -30,33 +30,33 @@ from labrig.reduce import LinearFrame, RawFrame, SeriesFrame, read_raw
 from labrig.region import Region
 from labrig.results import FilterFrames, FloatArray
 
-#: From where to where the holder is read, in heights of the strip from its middle; the filter's own
+#: Range in which the holder is read, in heights of the strip from its middle; the filter's own
 #: blurred edges end at 0.7.
 HOLDER = (0.8, 1.1)
-#: Of the spectrum fitted: finer than the filter's 25 nm, and beyond the grid that is told.
+#: Knots of the fitted spectrum: finer than the filter's 25 nm, and beyond the grid of results.
 KNOTS_NM: FloatArray = np.arange(380.0, 721.0, 5.0)
-#: What is not known of a lamp's spectrum whose file says nothing, relative.
+#: Relative uncertainty of a lamp's spectrum whose file has none.
 LAMP_SIGMA = 0.01
-#: How bright the picture is may be anything.
+#: Prior σ of the frame's relative brightness, uninformative.
 ANY_BRIGHTNESS = 1e3
 
 
 @dataclass(frozen=True, eq=False)
 class ForwardModel:
-    """From the spectrum of one patch to the values of a frame.
+    """Model of a frame's values by the spectrum of one patch.
 
     Attributes
     ----------
     slices, holder
-        Where in the frame the filter is read, and where its opaque holder is seen beside it.
+        Regions in which the filter is read, and those of its opaque holder beside it.
     lvfs
         The filter at the middle of each slice's own pixels, for every channel.
     camera
-        Its curves.
+        Curves of the camera.
     system
-        From a spectrum to the values read, and how that may be wrong.
+        Linear model of the values by a spectrum, and its error modes.
     white_reference
-        Whether a grey card under the known lamp told what the curves are off by.
+        Whether the curves were corrected by a grey card under the known lamp.
     """
 
     slices: Mapping[str, Region]
@@ -68,14 +68,14 @@ class ForwardModel:
 
     @property
     def centre_nm(self) -> FloatArray:
-        """(positions · channels,) of the band in which each value is read."""
+        """Centre of the band in which each value is read in nm, shape (positions · channels,)."""
         return np.stack([lvf.bands.centre_nm for lvf in self.lvfs], axis=1).ravel()
 
     def expected_of(self, light: Spectrum) -> FloatArray:
-        """(positions · channels,) what a light comes to."""
+        """Return the values of a light by the model, shape (positions · channels,)."""
         columns = [
-            signal_through(lvf, one, light)[:, 0]
-            for lvf, one in zip(self.lvfs, _channels(self.camera), strict=True)
+            signal_through(lvf, channel, light)[:, 0]
+            for lvf, channel in zip(self.lvfs, _channel_cameras(self.camera), strict=True)
         ]
         return np.stack(columns, axis=1).ravel()
 
@@ -83,35 +83,37 @@ class ForwardModel:
 def forward_models(
     part: Part, frame: SeriesFrame
 ) -> tuple[dict[StripPatch, ForwardModel], tuple[str, ...]]:
-    """The model of every patch of a part; and why a patch has none, a line each.
+    """Return the model of every patch of a part, and the reasons for patches without one.
 
     Parameters
     ----------
+    part
+        Part of a run.
     frame
-        One of the part's: tells the camera's pixels and channels.
+        Any of the part's frames, for the camera's pixels and channels.
 
     Raises
     ------
     UsageError
-        No LVF calibrated for this place, or no camera curves.
+        There is no LVF calibrated for this place, or there are no camera curves.
     DataError
         No patch lies below the filter.
     """
-    known = part.inputs.lvf
-    if known is None or known.before_camera is None:
+    calibration = part.inputs.lvf
+    if calibration is None or calibration.before_camera is None:
         raise UsageError(
             "a spectrum needs the LVF calibrated before the camera: run the protocol "
             "lvf_calibration, and name its run in the rig file (optics: {lvf: …}) or to labrig "
             "process --optics"
         )
-    raw, strip, lvf = read_raw(frame.path), known.before_camera, known.lvf
-    camera, holder = _camera(part, raw.channels), _holder(strip)
+    raw, strip, lvf = read_raw(frame.path), calibration.before_camera, calibration.lvf
+    camera, holder = _camera_curves(part, raw.channels), _holder_regions(strip)
     patches, refused = slice_strip(strip_patches(part), strip, raw)
     models = {}
     for patch, slices in patches.items():
         # At either end pixels reach a little beyond the places that were calibrated.
         places = np.clip(_positions(raw, strip, slices), lvf.position[0], lvf.position[-1])
-        lvfs = tuple(lvf.at(own) for own in places)
+        lvfs = tuple(lvf.at(channel_positions) for channel_positions in places)
         models[patch] = ForwardModel(slices, holder, lvfs, camera, _system(lvfs, camera))
     return models, refused
 
@@ -119,12 +121,12 @@ def forward_models(
 def with_white_reference(
     model: ForwardModel, part: Part, white: FilterFrames | None
 ) -> tuple[ForwardModel, tuple[str, ...]]:
-    """The model after frames of the grey card, if there are any; and warnings.
+    """Condition the model on frames of the grey card, if there are any; return it with warnings.
 
     Raises
     ------
     UsageError
-        The files of lamp or grey card are no good.
+        The files of lamp or grey card are malformed.
     """
     if white is None:
         return model, ()
@@ -134,12 +136,12 @@ def with_white_reference(
             "the white picture says nothing, since the spectra of lamp and grey card are not "
             "known: name them in the rig file (optics: {lamp: …, grey_card: …})",
         )
-    light = _light(lamp_spectrum(part.rig), card_reflectance(part.rig))
-    seen = combined(white)
-    if not seen.shows_light:
+    light = _card_light(lamp_spectrum(part.rig), card_reflectance(part.rig))
+    white_frame = combined(white)
+    if not white_frame.shows_light:
         return model, ("the white picture is dark or clips throughout; the spectrum does without",)
     system = conditioned_on_white(
-        model.system, seen.value, seen.sigma, light, model.expected_of(light)
+        model.system, white_frame.value, white_frame.sigma, light, model.expected_of(light)
     )
     return replace(model, system=system, white_reference=True), ()
 
@@ -151,29 +153,34 @@ def conditioned_on_white(
     light: Spectrum,
     expected: FloatArray,
 ) -> SpectralSystem:
-    """The system after a picture of a known light.
+    """Condition the system on a frame of a known light.
 
     With value = g (expected + Σ_k z_k modes_k · light) + noise, z and g normal, this is the mean
-    and covariance of z given the picture.
+    and covariance of z given the frame.
 
     Parameters
     ----------
+    system
+        Linear model with error modes.
     value, sigma
-        (m,) of the picture, in any unit; NaN where it clips.
+        Values of the frame in any unit and their standard uncertainties, shape (m,); NaN where it
+        clips.
     light
-        What was photographed.
+        Spectrum of the light that was photographed.
     expected
-        (m,) what the system's own curves make of it, wavelengths beyond its knots included.
+        Values by the system's own curves, wavelengths beyond its knots included, shape (m,).
     """
-    known = np.isfinite(value) & np.isfinite(sigma)
-    gain = float(expected[known] @ value[known] / (expected[known] @ expected[known]))
-    y, s = value[known] / gain, sigma[known] / gain
-    seen = system.modes[:, known] @ light.at(system.knots_nm)
-    levers = np.vstack([seen, ANY_BRIGHTNESS * expected[known]])
-    noise = np.hypot(s, LAMP_SIGMA * expected[known])
+    is_finite = np.isfinite(value) & np.isfinite(sigma)
+    gain = float(
+        expected[is_finite] @ value[is_finite] / (expected[is_finite] @ expected[is_finite])
+    )
+    y, s = value[is_finite] / gain, sigma[is_finite] / gain
+    mode_values = system.modes[:, is_finite] @ light.at(system.knots_nm)
+    levers = np.vstack([mode_values, ANY_BRIGHTNESS * expected[is_finite]])
+    noise = np.hypot(s, LAMP_SIGMA * expected[is_finite])
     whitened = levers / noise
     precision = np.eye(len(levers)) + whitened @ whitened.T
-    mean = np.linalg.solve(precision, whitened @ ((y - expected[known]) / noise))
+    mean = np.linalg.solve(precision, whitened @ ((y - expected[is_finite]) / noise))
     # Rows of the root of the covariance: independent again, each of unit variance.
     root = np.linalg.inv(np.linalg.cholesky(precision))[:, :-1]
     design = system.design + np.tensordot(mean[:-1], system.modes, axes=1)
@@ -182,8 +189,8 @@ def conditioned_on_white(
     )
 
 
-def _holder(strip: Strip) -> dict[str, Region]:
-    """Dark stripes above and below the strip, as far as the frame reaches."""
+def _holder_regions(strip: Strip) -> dict[str, Region]:
+    """Return dark stripes above and below the strip, as far as they lie in the frame."""
     (left, left_y), (right, right_y) = strip.left, strip.right
     upper, lower = min(left_y, right_y), max(left_y, right_y)
     near, far = (fraction * strip.height for fraction in HOLDER)
@@ -196,7 +203,7 @@ def _holder(strip: Strip) -> dict[str, Region]:
 
 
 def _positions(raw: RawFrame, strip: Strip, slices: Slices) -> FloatArray:
-    """Middle of each channel's own pixels in every slice, (channels, positions).
+    """Return the middle of each channel's own pixels in every slice, shape (channels, positions).
 
     Pixels of one colour are two apart: where slices are few pixels wide, that is some nanometres.
     """
@@ -208,27 +215,27 @@ def _positions(raw: RawFrame, strip: Strip, slices: Slices) -> FloatArray:
 
 
 def _system(lvfs: Sequence[Lvf], camera: CameraResponse) -> SpectralSystem:
-    """The system whose channels each see the filter in a place of their own.
+    """Return the system whose channels each see the filter in a place of their own.
 
     An error of the filter is common to the channels of a slice, one of a curve is the channel's.
     """
     error = CurveError()
     parts = [
-        system_through_lvf(lvf, one, KNOTS_NM, error)
-        for lvf, one in zip(lvfs, _channels(camera), strict=True)
+        system_through_lvf(lvf, channel, KNOTS_NM, error)
+        for lvf, channel in zip(lvfs, _channel_cameras(camera), strict=True)
     ]
-    of_filter = sum(
-        int(np.count_nonzero(getattr(lvfs[0].sigma, one.name))) for one in fields(Bands)
+    filter_modes = sum(
+        int(np.count_nonzero(getattr(lvfs[0].sigma, parameter.name))) for parameter in fields(Bands)
     )
-    curves = len(parts[0].modes) - of_filter
+    curves = len(parts[0].modes) - filter_modes
     count, knots = len(parts), len(KNOTS_NM)
     shape = (len(parts[0].design), count, knots)
     design = np.stack([part.design for part in parts], axis=1)
     modes = []
     for number, part in enumerate(parts):
-        own = np.zeros((curves, *shape))
-        own[:, :, number] = part.modes[:curves]
-        modes.append(own)
+        channel_modes = np.zeros((curves, *shape))
+        channel_modes[:, :, number] = part.modes[:curves]
+        modes.append(channel_modes)
     modes.append(np.stack([part.modes[curves:] for part in parts], axis=2))
     rows = shape[0] * count
     return SpectralSystem(
@@ -236,16 +243,16 @@ def _system(lvfs: Sequence[Lvf], camera: CameraResponse) -> SpectralSystem:
     )
 
 
-def _channels(camera: CameraResponse) -> list[CameraResponse]:
-    """Each channel as a camera of its own."""
+def _channel_cameras(camera: CameraResponse) -> list[CameraResponse]:
+    """Return each channel as a camera of its own."""
     return [
         CameraResponse(camera.name, camera.wavelength_nm, column[:, np.newaxis], (name,))
         for column, name in zip(camera.sensitivity.T, camera.channels, strict=True)
     ]
 
 
-def _light(lamp: Spectrum, card: Transmittance) -> Spectrum:
-    """The lamp's light as the card throws it back."""
+def _card_light(lamp: Spectrum, card: Transmittance) -> Spectrum:
+    """Return the spectrum of the lamp's light that the card reflects."""
     inside = (card.wavelength_nm > lamp.wavelength_nm[0]) & (
         card.wavelength_nm < lamp.wavelength_nm[-1]
     )
@@ -253,8 +260,8 @@ def _light(lamp: Spectrum, card: Transmittance) -> Spectrum:
     return Spectrum(lamp.name, fine, lamp.at(fine) * card.at(fine))
 
 
-def _camera(part: Part, channels: tuple[str, ...]) -> CameraResponse:
-    """Its curves, in the order of a frame's channels."""
+def _camera_curves(part: Part, channels: tuple[str, ...]) -> CameraResponse:
+    """Return the curves of the camera, in the order of a frame's channels."""
     if len(channels) == 1:
         name = part.overrides.camera or part.rig.optics.camera
         if name is not None:

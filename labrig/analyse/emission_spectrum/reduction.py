@@ -1,8 +1,8 @@
-"""From frames through the LVF to DN/s at its places: noise, dark and fall-off.
+"""Reduction of frames through the LVF to DN/s at its places: noise, dark and vignetting.
 
-A place on a small sensor is a few pixels wide, too few to tell their noise, and its surroundings
+A place on a small sensor is a few pixels wide, too few to measure their noise, and its surroundings
 are brighter or darker. But all pixels of a channel are alike, so one photon transfer holds for all.
-Pairs of successive frames, one scaled to the other, tell it: what stands still cancels.
+It is measured on pairs of successive frames, one scaled to the other: everything static cancels.
 """
 
 from collections.abc import Hashable, Iterator, Mapping, Sequence
@@ -34,31 +34,38 @@ from labrig.results import FilterFrames, FloatArray, is_usable
 
 Patch = TypeVar("Patch", bound=Hashable)
 
-#: Rounds in which the weights follow the line.
+#: Iterations of the weights by the line.
 ROUNDS = 8
-#: A scatter so many times what it should be is none of noise.
+#: Scatter relative to the expected one from which it is not noise.
 OUTLIER = 10.0
-#: Strips from which a place tells its noise.
+#: Fewest strips that determine the noise of a place.
 FEWEST_STRIPS = 2
 
 
 def sigma_dn(noise: Sequence[NoiseModel], level_dn: FloatArray, pixels: FloatArray) -> FloatArray:
-    """σ of means (…, C) over so many pixels (…, C) by the noise of each channel's pixels."""
-    variance = [one.variance_dn2(level_dn[..., number]) for number, one in enumerate(noise)]
+    """Return σ of means (…, C) over so many pixels (…, C) by the noise of each channel's pixels."""
+    variance = [model.variance_dn2(level_dn[..., number]) for number, model in enumerate(noise)]
     least = np.maximum(np.stack(variance, axis=-1), ROUNDING_VARIANCE)
     return np.asarray(np.sqrt(least / pixels))
 
 
 @dataclass(frozen=True, eq=False)
 class MeasuredPlaces:
-    """One frame of `width` × `height` pixels in all places.
+    """Measurement of one frame in p places.
 
     Attributes
     ----------
-    level_dn, pixels
-        (p, C) means above black, NaN where a place clips; over so many pixels.
+    frame
+        The frame.
+    width, height
+        Size of the frame in pixels.
+    level_dn
+        Means above black in DN, shape (p, C); NaN where a place clips.
+    pixels
+        Number of pixels of each mean, shape (p, C).
     strips
-        (p, C, s) means of strips over the width of a place, less its own; NaN where it has fewer.
+        Deviations of strips across a place from its mean in DN, shape (p, C, s); NaN where it has
+        fewer strips.
     """
 
     frame: SeriesFrame
@@ -69,10 +76,13 @@ class MeasuredPlaces:
     strips: FloatArray
 
     def take(self, places: Sequence[int]) -> "MeasuredPlaces":
-        """Some of the places."""
-        some = list(places)
+        """Return the measurement of the given places."""
+        indices = list(places)
         return replace(
-            self, level_dn=self.level_dn[some], pixels=self.pixels[some], strips=self.strips[some]
+            self,
+            level_dn=self.level_dn[indices],
+            pixels=self.pixels[indices],
+            strips=self.strips[indices],
         )
 
 
@@ -83,17 +93,17 @@ class PatchReduction:
     Attributes
     ----------
     frames
-        As measured.
+        Measurement of each frame.
     slices
-        The places.
+        Regions of the places.
     holder
-        Dark parts of the frame beside the filter, measured after the places.
+        Dark regions of the frame beside the filter, measured after the places.
     camera
-        Its calibration, where there is one.
+        Calibration of the camera; None if there is none.
     noise
-        Of its pixels.
+        Noise of the pixels of each channel.
     dark
-        Level of each place in the dark.
+        Dark level of each place.
     """
 
     frames: Sequence[MeasuredPlaces]
@@ -104,42 +114,49 @@ class PatchReduction:
     dark: Sequence[DarkModel]
 
     def of_unit(self, unit: str) -> FilterFrames:
-        """The frames of a unit, those a person excludes left out."""
-        rows = [one for one in self.frames if one.frame.unit == unit and is_usable(one.frame.flag)]
+        """Return the frames of a unit, without those the user excludes."""
+        rows = [
+            measured
+            for measured in self.frames
+            if measured.frame.unit == unit and is_usable(measured.frame.flag)
+        ]
         if not rows:
             raise DataError(f"expected frames of {unit}, got none that are not excluded")
-        columns = [self._reduced(one) for one in rows]
+        columns = [self._reduce(measured) for measured in rows]
         value, sigma, dark_sigma = (np.stack(column) for column in zip(*columns, strict=True))
-        middles_s = [one.frame.t_s + one.frame.exposure_s / 2 for one in rows]
+        middles_s = [measured.frame.t_s + measured.frame.exposure_s / 2 for measured in rows]
         return FilterFrames(np.array(middles_s), value, sigma, dark_sigma)
 
-    def _reduced(self, one: MeasuredPlaces) -> tuple[FloatArray, FloatArray, FloatArray]:
-        """Value, σ and the σ of what all have in common, each (places · channels,) in DN/s."""
-        frame, camera, exposure_s = one.frame, self.camera, one.frame.exposure_s
+    def _reduce(self, measured: MeasuredPlaces) -> tuple[FloatArray, FloatArray, FloatArray]:
+        """Return signal, σ and common-mode σ of a frame in DN/s, (places · channels,) each."""
+        frame, camera, exposure_s = measured.frame, self.camera, measured.frame.exposure_s
         levels = [model.dark_level(exposure_s) for model in self.dark]
-        level, known = (np.array(column) for column in zip(*levels, strict=True))
-        light, sigma = one.level_dn - level, sigma_dn(self.noise, one.level_dn, one.pixels)
+        level, level_sigma = (np.array(column) for column in zip(*levels, strict=True))
+        light, sigma = (
+            measured.level_dn - level,
+            sigma_dn(self.noise, measured.level_dn, measured.pixels),
+        )
         # A sensor that has warmed since the dark frames is off in all places together.
-        common = TWO_DEGREES * np.abs(np.array([m.current(exposure_s) for m in self.dark]))
+        common_sigma = TWO_DEGREES * np.abs(np.array([m.current(exposure_s) for m in self.dark]))
         count = len(self.slices)
         if self.holder:
-            fraction = one.pixels[count:] / one.pixels[count:].sum(axis=0)
+            fraction = measured.pixels[count:] / measured.pixels[count:].sum(axis=0)
             light = light - np.sum(fraction * light[count:], axis=0)
-            common = np.broadcast_to(
+            common_sigma = np.broadcast_to(
                 np.sqrt(np.sum((fraction * sigma[count:]) ** 2, axis=0)), light.shape
             )
-        sigma = np.where(np.isnan(light), np.nan, np.hypot(sigma, known))
+        sigma = np.where(np.isnan(light), np.nan, np.hypot(sigma, level_sigma))
         per_dn = np.full(
             light.shape, exposure_s if camera is None else camera.exposure_s(exposure_s)[0]
         )
         if camera is not None:
             per_dn[:count] *= [
-                camera.flat(frame.f_number, region, one.width, one.height)
+                camera.flat(frame.f_number, region, measured.width, measured.height)
                 for region in self.slices.values()
             ]
-        columns = (light, sigma, common)
-        value, sigma, common = ((column / per_dn)[:count].ravel() for column in columns)
-        return value, sigma, common
+        columns = (light, sigma, common_sigma)
+        value, sigma, common_sigma = ((column / per_dn)[:count].ravel() for column in columns)
+        return value, sigma, common_sigma
 
 
 def reduce_places(
@@ -149,13 +166,14 @@ def reduce_places(
     camera: CameraFile | None,
     holder: Mapping[str, Region] | None = None,
 ) -> dict[Patch, PatchReduction]:
-    """Read every frame once, in every place of each patch, and in the holder, whose light is
-    subtracted.
+    """Read every frame once, in every place of each patch.
+
+    The light of the holder is subtracted.
 
     Raises
     ------
     DataError
-        No dark frames, or some at another ISO.
+        There are no dark frames, or some are at another ISO.
     """
     isos = {frame.iso for frame in (*frames, *darks)}
     if not darks or len(isos) > 1:
@@ -163,33 +181,48 @@ def reduce_places(
             f"expected dark frames at the one ISO of all frames, got {len(darks)} and ISO "
             f"{', '.join(f'{iso:g}' for iso in sorted(filter(None, isos)))}"
         )
-    beside = dict(holder or {})
+    holder_regions = dict(holder or {})
     regions = [region for slices in patches.values() for region in slices.values()]
     lit, dark = (
-        _measured_frames(some, [*regions, *beside.values()], darks) for some in (frames, darks)
+        _measure_frames(selected, [*regions, *holder_regions.values()], darks)
+        for selected in (frames, darks)
     )
-    rising = sorted(dark, key=lambda one: one.frame.exposure_s)
-    groups = [[o for o in lit if o.frame.unit == u] for u in {o.frame.unit: None for o in lit}]
+    rising = sorted(dark, key=lambda measured: measured.frame.exposure_s)
+    groups = [
+        [measured for measured in lit if measured.frame.unit == unit]
+        for unit in {measured.frame.unit: None for measured in lit}
+    ]
     places, first = {}, 0
     for patch, slices in patches.items():
         after = first + len(slices)
         # The holder's places come last.
-        places[patch] = [*range(first, after), *range(len(regions), len(regions) + len(beside))]
+        places[patch] = [
+            *range(first, after),
+            *range(len(regions), len(regions) + len(holder_regions)),
+        ]
         first = after
     # Patches fade differently: the frames of a pair are brought to the same brightness in each.
     noise = pixel_noise(
-        [[one.take(own) for one in group] for own in places.values() for group in (*groups, rising)]
+        [
+            [measured.take(place_numbers) for measured in group]
+            for place_numbers in places.values()
+            for group in (*groups, rising)
+        ]
     )
     return {
-        patch: _reduction(
-            [one.take(own) for one in lit], [one.take(own) for one in dark], patches[patch],
-            beside, camera, noise,
+        patch: _patch_reduction(
+            [measured.take(place_numbers) for measured in lit],
+            [measured.take(place_numbers) for measured in dark],
+            patches[patch],
+            holder_regions,
+            camera,
+            noise,
         )
-        for patch, own in places.items()
-    }  # fmt: skip
+        for patch, place_numbers in places.items()
+    }
 
 
-def _reduction(
+def _patch_reduction(
     lit: Sequence[MeasuredPlaces],
     dark: Sequence[MeasuredPlaces],
     slices: Mapping[str, Region],
@@ -197,9 +230,9 @@ def _reduction(
     camera: CameraFile | None,
     noise: Sequence[NoiseModel],
 ) -> PatchReduction:
-    exposure_s = np.array([one.frame.exposure_s for one in dark])
-    level = np.stack([np.nan_to_num(one.level_dn) for one in dark])
-    sigma = np.stack([sigma_dn(noise, one.level_dn, one.pixels) for one in dark])
+    exposure_s = np.array([measured.frame.exposure_s for measured in dark])
+    level = np.stack([np.nan_to_num(measured.level_dn) for measured in dark])
+    sigma = np.stack([sigma_dn(noise, measured.level_dn, measured.pixels) for measured in dark])
     models = [
         fit_dark(exposure_s, level[:, place], np.nan_to_num(sigma[:, place], nan=np.inf))
         for place in range(level.shape[1])
@@ -207,63 +240,78 @@ def _reduction(
     return PatchReduction(lit, slices, holder, camera, noise, models)
 
 
-def _measured_frames(
+def _measure_frames(
     frames: Sequence[SeriesFrame], places: Sequence[Region], darks: Sequence[SeriesFrame]
 ) -> list[MeasuredPlaces]:
-    """Every frame in every place, hot pixels left out."""
+    """Measure every frame in every place, without hot pixels."""
     hot = hot_pixels_of(darks)
-    return [_measured(frame, read_raw(frame.path), places, hot) for frame in frames]
+    return [_measure(frame, read_raw(frame.path), places, hot) for frame in frames]
 
 
 def pixel_noise(groups: Sequence[Sequence[MeasuredPlaces]]) -> list[NoiseModel]:
-    """Each channel's, from groups of frames that show the same, brighter or darker, by time."""
-    levels, scatters = zip(*(pair for group in groups for pair in _pairs(group)), strict=True)
+    """Fit the noise of each channel's pixels.
+
+    Parameters
+    ----------
+    groups
+        Groups of frames by time that show one scene at different brightness.
+    """
+    levels, scatters = zip(
+        *(pair for group in groups for pair in _pair_scatters(group)), strict=True
+    )
     level, scatter = np.concatenate(levels), np.concatenate(scatters)
-    known = np.isfinite(scatter)
-    return [_line(level[known[:, c], c], scatter[known[:, c], c]) for c in range(level.shape[1])]
+    is_finite = np.isfinite(scatter)
+    return [
+        _fit_line(level[is_finite[:, c], c], scatter[is_finite[:, c], c])
+        for c in range(level.shape[1])
+    ]
 
 
-def _measured(
+def _measure(
     frame: SeriesFrame, raw: RawFrame, regions: Sequence[Region], hot: PixelMask | None
 ) -> MeasuredPlaces:
     linear = LinearFrame(raw, hot=hot)
     sums = [linear.of_region(region) for region in regions]
     deviations = np.full((len(regions), len(raw.channels), STRIPS), np.nan)
-    for own, one in zip(deviations, sums, strict=True):
-        means = one.strip_means_dn(min(STRIPS, len(one.pixels) // raw.cfa_side))
-        own[:, : len(means)] = (means - means.mean(axis=0)).T
-    level = np.array([np.where(one.is_clipped, np.nan, one.mean_dn) for one in sums])
-    pixels = np.array([np.maximum(one.pixels.sum(axis=0), 1.0) for one in sums])
+    for region_deviations, region_sums in zip(deviations, sums, strict=True):
+        means = region_sums.strip_means_dn(min(STRIPS, len(region_sums.pixels) // raw.cfa_side))
+        region_deviations[:, : len(means)] = (means - means.mean(axis=0)).T
+    level = np.array(
+        [np.where(region_sums.is_clipped, np.nan, region_sums.mean_dn) for region_sums in sums]
+    )
+    pixels = np.array([np.maximum(region_sums.pixels.sum(axis=0), 1.0) for region_sums in sums])
     return MeasuredPlaces(frame, raw.width, raw.height, level, pixels, deviations)
 
 
-def _pairs(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray, FloatArray]]:
-    """Level that a pair's noise belongs to and its variance per pixel, each (p, C)."""
-    for one, other in pairwise(group):
+def _pair_scatters(group: Sequence[MeasuredPlaces]) -> Iterator[tuple[FloatArray, FloatArray]]:
+    """Iterate over a pair's level in DN and the variance per pixel at it in DN², (p, C) each."""
+    for first, second in pairwise(group):
         # Brought to the same brightness all over, as nearly as the noisiest place allows.
-        a, b = np.nan_to_num(one.level_dn), np.nan_to_num(other.level_dn)
-        both = np.isfinite(one.level_dn) & np.isfinite(other.level_dn)
-        scale = np.sum(a * b, where=both, axis=0) / np.maximum(np.sum(a * a, where=both, axis=0), 1)
+        first_level, second_level = np.nan_to_num(first.level_dn), np.nan_to_num(second.level_dn)
+        in_both = np.isfinite(first.level_dn) & np.isfinite(second.level_dn)
+        scale = np.sum(first_level * second_level, where=in_both, axis=0) / np.maximum(
+            np.sum(first_level * first_level, where=in_both, axis=0), 1
+        )
         scale = np.clip(scale, 0.0, 1e3)
-        difference = other.strips - scale[:, np.newaxis] * one.strips
+        difference = second.strips - scale[:, np.newaxis] * first.strips
         strips = np.isfinite(difference).sum(axis=2)
         few = strips < FEWEST_STRIPS
         scatter = np.nansum(np.square(difference), axis=2) / np.maximum((strips - 1) * strips, 1)
-        scatter = np.where(few, np.nan, scatter * one.pixels)
+        scatter = np.where(few, np.nan, scatter * first.pixels)
         # a + b L of the one times scale², of the other times 1.
         fraction = 1 + scale**2
-        level = (b + scale**2 * a) / fraction
-        yield np.where(both, level, np.nan), np.where(both, scatter / fraction, np.nan)
+        level = (second_level + scale**2 * first_level) / fraction
+        yield np.where(in_both, level, np.nan), np.where(in_both, scatter / fraction, np.nan)
 
 
-def _line(level: FloatArray, scatter: FloatArray) -> NoiseModel:
-    """Reading and photons through scatters, each as uncertain as it is large."""
+def _fit_line(level: FloatArray, scatter: FloatArray) -> NoiseModel:
+    """Fit read and photon noise to scatters whose uncertainty is proportional to their size."""
     level = np.maximum(level, 0.0)
     terms = variance_terms(level)[:, :2]
     # Medians begin, so that a hot pixel or a cosmic ray cannot.
-    dark = level <= np.median(level)
-    at_black = float(np.median(scatter[dark]))
-    rise = (scatter[~dark] - at_black) / np.maximum(level[~dark], 1.0)
+    is_dark = level <= np.median(level)
+    at_black = float(np.median(scatter[is_dark]))
+    rise = (scatter[~is_dark] - at_black) / np.maximum(level[~is_dark], 1.0)
     noise = NoiseModel(at_black, max(float(np.median(rise)) if rise.size else 0.0, 0.0))
     for _ in range(ROUNDS):
         expected = np.maximum(noise.variance_dn2(level), ROUNDING_VARIANCE)

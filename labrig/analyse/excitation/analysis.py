@@ -1,4 +1,4 @@
-"""An excitation run, from its frames to rates and a material of every patch."""
+"""Analysis of an excitation run, from its frames to rates and a material of every patch."""
 
 from collections.abc import Sequence
 
@@ -26,11 +26,11 @@ from labrig.results import (
     PatchExcitation,
 )
 
-#: Of a lamp's brightness from charge to charge.
+#: Relative scatter of a lamp's brightness from charge to charge.
 LAMP = 0.01
-#: What a lamp lacks that was just switched on, where nobody has measured it.
+#: Typical warm-up of a lamp where it was not measured.
 USUAL = Warming(deficit=0.02, deficit_sigma=0.02, time_constant_s=150.0)
-#: No dark level is known better, in DN/s.
+#: Least standard uncertainty of a dark level in DN/s.
 LEAST_DARK = 1e-3
 
 
@@ -40,9 +40,9 @@ def analyse(part: Part) -> ExcitationResult:
     Raises
     ------
     DataError
-        Nothing is known of the light on the sample, or charges are missing.
+        The light on the sample is unknown, or charges are missing.
     FitError
-        Nothing glows, or what glows cannot be fitted.
+        Nothing glows, or the glow cannot be fitted.
     """
     irradiance, fade, blank = part.inputs.irradiance, part.inputs.fade, part.inputs.blank
     if irradiance is None:
@@ -55,7 +55,7 @@ def analyse(part: Part) -> ExcitationResult:
     chargings, left_out = patch_chargings(part, irradiance, warming)
     patches, warnings = for_each_patch(
         list(chargings),
-        lambda patch: _of_patch(part, patch, chargings[patch], irradiance, warming),
+        lambda patch: _patch_excitation(part, patch, chargings[patch], irradiance, warming),
     )
     unmeasured = () if fade else ("the lamp's fade was not measured: a usual one was taken",)
     leaks = blank.leaks() if blank else ()
@@ -66,29 +66,32 @@ def analyse(part: Part) -> ExcitationResult:
     )
 
 
-def _of_patch(
+def _patch_excitation(
     part: Part,
     patch: StripPatch,
     charging: PatchCharging,
     irradiance: IrradianceFile,
     warming: Warming,
 ) -> tuple[PatchExcitation, Sequence[str]]:
-    """The patch's excitation, and warnings."""
+    """Return the patch's excitation, and warnings."""
     decay = fit_series(charging.whole, _states(part, patch))
     dark = tuple(np.maximum(np.nan_to_num(charging.whole.dark_sigma), LEAST_DARK).tolist())
-    uncertain = RelativeSigmas(
+    relative_sigmas = RelativeSigmas(
         flicker=_flicker(part, decay),
         lamp=LAMP,
         cold_deficit=warming.deficit_sigma,
         offset=dark,
-        # The sensor warms and cools over hours of long exposures, more than dark frames tell.
+        # The sensor warms and cools over hours of long exposures, more than dark frames show.
         common_mode=dark,
         scale=scale_sigma(irradiance),
         irradiance=band_sigma(irradiance),
     )
-    fit = _fit(charging, decay, uncertain)
+    fit = _fit(charging, decay, relative_sigmas)
     closure = predicted_charging(
-        charging, irradiance, uncertain, lambda without: _fit(without, decay, uncertain, fit)
+        charging,
+        irradiance,
+        relative_sigmas,
+        lambda reduced: _fit(reduced, decay, relative_sigmas, fit),
     )
     run, spectra = part.run, part.inputs.spectra
     spectrum = patch.own(spectra)
@@ -109,24 +112,26 @@ def _of_patch(
 
 
 def _states(part: Part, patch: StripPatch) -> int | None:
-    """As many as are asked for, or as a decay of this patch had; None chooses."""
-    asked = part.protocol.states
-    states = part.overrides.states or (None if asked == "auto" else asked)
-    if states is None and (known := patch.own(part.inputs.decays)) is not None:
-        return known.n_states
+    """Return the requested number of states, or that of an earlier decay of this patch; or None."""
+    protocol_states = part.protocol.states
+    states = part.overrides.states or (None if protocol_states == "auto" else protocol_states)
+    if states is None and (decay := patch.own(part.inputs.decays)) is not None:
+        return decay.n_states
     return states
 
 
 def _fit(
     charging: PatchCharging,
     decay: FittedDecay,
-    uncertain: RelativeSigmas,
+    relative_sigmas: RelativeSigmas,
     near: FittedExcitation | None = None,
 ) -> FittedExcitation:
     rates = [state.k_r_per_s for state in decay.states]
     amplitudes = np.array([state.amplitude for state in decay.states])
     fractions = np.maximum(amplitudes / amplitudes.sum(), 1e-3)
-    return fit_excitation([charging.through, charging.direct], rates, fractions, uncertain, near)
+    return fit_excitation(
+        [charging.through, charging.direct], rates, fractions, relative_sigmas, near
+    )
 
 
 def _flicker(part: Part, decay: FittedDecay) -> float:

@@ -1,4 +1,4 @@
-"""When the lamp shone on the sample, and which charge every photograph of the glow belongs to."""
+"""Intervals in which the lamp charged the sample, and the charge before every photograph."""
 
 import math
 from collections.abc import Mapping, Sequence
@@ -11,22 +11,22 @@ from labrig.errors import DataError
 from labrig.protocols.excitation import ExcitationFrames, UnitKind
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord
 
-#: Frames that show the glow after a charge; those of a metering are exposed too long or too short.
+#: Roles of frames of the glow after a charge; metering frames are exposed too long or too short.
 GLOWING = (*ExcitationFrames, FrameRole.REST)
 
 
 @dataclass(frozen=True)
 class ChargeInterval:
-    """When a unit charged, in seconds since 1970.
+    """Interval in which a unit charged, in seconds since 1970.
 
     Attributes
     ----------
     unit
-        Its name.
+        Name of the unit.
     on_s, off_s
-        When the lamp was switched.
+        Times at which the lamp was switched on and off.
     cold
-        Part of what a cold lamp lacks that it lacked in this charge on average, 0 to 1.
+        Mean warm-up deficit during this charge as a fraction of a cold lamp's, 0 to 1.
     """
 
     unit: str
@@ -36,22 +36,22 @@ class ChargeInterval:
 
     @property
     def is_direct(self) -> bool:
-        """Whether it charged by the lamp itself."""
+        """Whether the lamp charged directly, without the filter."""
         return UnitKind.DIRECT.has(self.unit)
 
 
 @dataclass(frozen=True)
 class ChargeFrames:
-    """The charges, by time, and the photographs after them.
+    """Charges by time, and the photographs after them.
 
     Attributes
     ----------
     intervals
         The charges.
     charge_of
-        Photographs by time, each with the charge that it belongs to.
+        Charge before each photograph, by time.
     left_out
-        What to say of photographs that begin before the bench is dark.
+        Warnings about photographs that begin before the bench is dark.
     """
 
     intervals: Sequence[ChargeInterval]
@@ -60,43 +60,51 @@ class ChargeFrames:
 
     @property
     def zero_s(self) -> float:
-        """When the first charge began; from there times count."""
+        """Begin of the first charge in seconds since 1970, from which times count."""
         return self.intervals[0].on_s
 
-    def after(self, one: ChargeInterval) -> list[FrameRecord]:
-        """The photographs of one charge."""
-        return [frame for frame, charge in self.charge_of.items() if charge is one]
+    def after(self, interval: ChargeInterval) -> list[FrameRecord]:
+        """Return the photographs after one charge."""
+        return [frame for frame, charge in self.charge_of.items() if charge is interval]
 
 
 def charge_frames(
     run: RunRecord, overrides: Overrides, time_constant_s: float, blank: BlankFile | None = None
 ) -> ChargeFrames:
-    """What a run says; photographs that begin before the bench is dark, by its blank, left out.
+    """Return a run's charges and photographs, without those before its blank is clean.
 
     Parameters
     ----------
+    run
+        A recorded run.
+    overrides
+        The user's settings.
     time_constant_s
-        Time constant with which the lamp's housing warms and cools.
+        Time constant in seconds with which the lamp's housing warms and cools.
+    blank
+        Stray light of the bench; None if it was not measured.
 
     Raises
     ------
     DataError
-        There are no charges through the filter, or none without it, or no photographs; or the
-        blank never became clean.
+        There are no charges through the filter, or none without it, or no photographs; or the blank
+        never became clean.
     """
     units = (_interval(attempt) for attempt in run.completed().values())
-    lit = sorted((one for one in units if one is not None), key=lambda one: one.on_s)
-    intervals = with_warmth(lit, time_constant_s)
+    charges = sorted(
+        (interval for interval in units if interval is not None), key=lambda interval: interval.on_s
+    )
+    intervals = with_warmth(charges, time_constant_s)
     frames = [
         frame for role in GLOWING for frame in run.frames(role) if not overrides.excludes(frame)
     ]
     frames.sort(key=lambda frame: frame.start_time)
-    of_frames = {frame: _interval_before(intervals, frame) for frame in frames}
-    charge_of = {frame: one for frame, one in of_frames.items() if one is not None}
+    interval_of = {frame: _interval_before(intervals, frame) for frame in frames}
+    charge_of = {frame: interval for frame, interval in interval_of.items() if interval is not None}
     left_out: tuple[str, ...] = ()
     if blank is not None and charge_of:
-        charge_of, left_out = _cleaned(charge_of, blank)
-    if not charge_of or len({one.is_direct for one in intervals}) < 2:
+        charge_of, left_out = _without_stray_light(charge_of, blank)
+    if not charge_of or len({interval.is_direct for interval in intervals}) < 2:
         raise DataError(
             f"{run.folder}: expected complete charges through the filter and without it; go on "
             f"with: labrig resume {run.folder}"
@@ -104,10 +112,10 @@ def charge_frames(
     return ChargeFrames(intervals, charge_of, left_out)
 
 
-def _cleaned(
+def _without_stray_light(
     charge: Mapping[FrameRecord, ChargeInterval], blank: BlankFile
 ) -> tuple[dict[FrameRecord, ChargeInterval], tuple[str, ...]]:
-    after_s = {frame: frame.start_time - one.off_s for frame, one in charge.items()}
+    after_s = {frame: frame.start_time - interval.off_s for frame, interval in charge.items()}
     left_out = left_out_lines(list(after_s.values()), blank)
     return {frame: charge[frame] for frame, t in after_s.items() if blank.is_clean(t)}, left_out
 
@@ -115,17 +123,20 @@ def _cleaned(
 def with_warmth(
     intervals: Sequence[ChargeInterval], time_constant_s: float
 ) -> list[ChargeInterval]:
-    """By Newton's law: cold before the first charge, warmer in each one, cooler after it."""
-    found: list[ChargeInterval] = []
-    lacking, since_s = 1.0, 0.0
-    for one in intervals:
-        if found:
-            lacking = 1 - (1 - lacking) * math.exp(-(one.on_s - since_s) / time_constant_s)
-        charge_s = one.off_s - one.on_s
-        mean = -math.expm1(-charge_s / time_constant_s) * time_constant_s / charge_s
-        found.append(replace(one, cold_deficit=lacking * mean))
-        lacking, since_s = lacking * math.exp(-charge_s / time_constant_s), one.off_s
-    return found
+    """Set the warm-up deficit of each charge by Newton's law.
+
+    The lamp is cold before the first charge, warms in each one and cools after it.
+    """
+    warmed: list[ChargeInterval] = []
+    deficit, since_s = 1.0, 0.0
+    for interval in intervals:
+        if warmed:
+            deficit = 1 - (1 - deficit) * math.exp(-(interval.on_s - since_s) / time_constant_s)
+        charge_s = interval.off_s - interval.on_s
+        mean_fraction = -math.expm1(-charge_s / time_constant_s) * time_constant_s / charge_s
+        warmed.append(replace(interval, cold_deficit=deficit * mean_fraction))
+        deficit, since_s = deficit * math.exp(-charge_s / time_constant_s), interval.off_s
+    return warmed
 
 
 def _interval(attempt: Attempt) -> ChargeInterval | None:
@@ -140,8 +151,11 @@ def _interval(attempt: Attempt) -> ChargeInterval | None:
 def _interval_before(
     intervals: Sequence[ChargeInterval], frame: FrameRecord
 ) -> ChargeInterval | None:
-    """The last one; None if there was none in the same arrangement of filter and lamp."""
-    before = [one for one in intervals if one.off_s < frame.start_time]
-    if not before or before[-1].is_direct is not UnitKind.DIRECT.has(frame.unit):
+    """Return the last charge before a frame.
+
+    It is None if there was none, or none in the same arrangement of filter and lamp.
+    """
+    earlier = [interval for interval in intervals if interval.off_s < frame.start_time]
+    if not earlier or earlier[-1].is_direct is not UnitKind.DIRECT.has(frame.unit):
         return None
-    return before[-1]
+    return earlier[-1]

@@ -17,70 +17,73 @@ from labrig.reduce import LinearFrame, RawFrame, read_raw, reduce_patches
 from labrig.region import Region
 from labrig.results import BoolArray, Charge, ChargingSeries, FloatArray, PatchCharging, Series
 
-#: All of the strip, from which the rates to start with are taken.
+#: Name of the region around all sites, from which the initial rates are taken.
 WHOLE = "whole strip"
-#: Of a series whose values are still to come.
+#: Placeholder for the values of a series.
 NOTHING: FloatArray = np.empty((0, 0, 0))
 
 
 def patch_chargings(
     part: Part, irradiance: IrradianceFile, warming: Warming
 ) -> tuple[dict[StripPatch, PatchCharging], tuple[str, ...]]:
-    """Read and reduce all frames of the run: what each patch shows, and what to say of the rest.
+    """Read and reduce all frames of the run to the charging of each patch, and warnings.
 
     Parameters
     ----------
+    part
+        Part of a run.
     irradiance
-        On the sample.
+        Irradiance on the sample.
     warming
-        What the lamp lacks while its housing is cold.
+        Warm-up deficit of the lamp.
 
     Raises
     ------
     DataError
-        Charges or frames are missing, no patch lies below the filter, or the camera was not this
-        one.
+        Charges or frames are missing, no patch lies below the filter, or the camera is not the
+        calibrated one.
     """
-    known, overrides, protocol = part.inputs, part.overrides, part.protocol
-    frames = charge_frames(part.run, overrides, warming.time_constant_s, known.blank)
-    require_calibrated_camera(known.camera, part.run, list(frames.charge_of))
+    inputs, overrides, protocol = part.inputs, part.overrides, part.protocol
+    frames = charge_frames(part.run, overrides, warming.time_constant_s, inputs.blank)
+    require_calibrated_camera(inputs.camera, part.run, list(frames.charge_of))
     raw = read_raw(next(iter(frames.charge_of)).path)
-    sites, refused = slice_strip(
+    sites, reasons = slice_strip(
         strip_patches(part), irradiance.strip, raw, len(irradiance.position)
     )
     series = reduce_patches(
         [
-            replace(timed(frame, frames.zero_s), unit=one.unit)
-            for frame, one in frames.charge_of.items()
+            replace(timed(frame, frames.zero_s), unit=interval.unit)
+            for frame, interval in frames.charge_of.items()
         ],
         {
-            _key(patch, name): region
+            _place_name(patch, name): region
             for patch, slices in sites.items()
-            for name, region in {**slices, WHOLE: _around(slices)}.items()
+            for name, region in {**slices, WHOLE: _bounding_region(slices)}.items()
         },
         [
             untimed(frame)
             for frame in part.run.frames(FrameRole.DARK)
             if not overrides.excludes(frame)
         ],
-        camera=known.camera,
+        camera=inputs.camera,
     )
-    rise, fade = lamp_transients(known.fade, np.array(irradiance.bands_nm))
+    rise, fade = lamp_transients(inputs.fade, np.array(irradiance.bands_nm))
     longest = max(
-        (one for one in frames.intervals if one.is_direct), key=lambda one: one.off_s - one.on_s
+        (interval for interval in frames.intervals if interval.is_direct),
+        key=lambda interval: interval.off_s - interval.on_s,
     )
 
     def charges(direct: bool) -> tuple[Charge, ...]:
         return tuple(
             _charge(
-                one,
+                interval,
                 frames,
                 warming.deficit,
                 fresh=protocol.samples > 1,
-                saturated=protocol.saturated and one is longest,
+                saturated=protocol.saturated and interval is longest,
             )
-            for one in frames.intervals
-            if one.is_direct is direct
+            for interval in frames.intervals
+            if interval.is_direct is direct
         )
 
     through = ChargingSeries(
@@ -91,97 +94,111 @@ def patch_chargings(
     direct = ChargingSeries(
         "by the lamp itself", charges(True), rise, fade, everywhere, NOTHING, NOTHING
     )  # fmt: skip
-    found = {}
+    chargings = {}
     for patch, slices in sites.items():
-        own = [series[_key(patch, name)] for name in slices]
-        values = np.stack([_blanked(one, one.values) for one in own], axis=1)
-        sigma = np.stack([_blanked(one, one.sigma) for one in own], axis=1)
-        values = _centred(values, slices, np.array(irradiance.position), irradiance.strip, raw)
-        whole = series[_key(patch, WHOLE)]
-        found[patch] = _evened(values, sigma, through, direct, whole, frames)
-    return found, (*frames.left_out, *refused)
+        patch_series = [series[_place_name(patch, name)] for name in slices]
+        values = np.stack(
+            [_with_unusable_nan(site_series, site_series.values) for site_series in patch_series],
+            axis=1,
+        )
+        sigma = np.stack(
+            [_with_unusable_nan(site_series, site_series.sigma) for site_series in patch_series],
+            axis=1,
+        )
+        values = _interpolate_to_positions(
+            values, slices, np.array(irradiance.position), irradiance.strip, raw
+        )
+        strip_series = series[_place_name(patch, WHOLE)]
+        chargings[patch] = _divide_by_evenness(values, sigma, through, direct, strip_series, frames)
+    return chargings, (*frames.left_out, *reasons)
 
 
-def _centred(
+def _interpolate_to_positions(
     values: FloatArray,
     slices: Slices,
     position: FloatArray,
     strip: Strip,
     raw: RawFrame,
 ) -> FloatArray:
-    """Values (n, P, C) at the positions (P,) along the strip, by the slope to the neighbours.
+    """Interpolate values (n, P, C) to the positions (P,) along the strip, by the neighbours' slope.
 
-    A slice consists of whole pixels, and of a Bayer cell's colours some lie left of others: what a
-    channel shows of a slice belongs to a place up to a pixel away from the slice's middle. Along
+    A slice consists of whole pixels, and some of a Bayer cell's colours lie left of others: a
+    channel's value of a slice belongs to a place up to a pixel away from the slice's middle. Along
     the filter the glow is steep, so that a pixel matters where slices are a few pixels wide.
 
     Parameters
     ----------
+    values
+        Values of the slices.
     slices
-        Where the values were measured.
+        Regions in which the values were measured.
+    position
+        Positions along the strip, 0 at the blue end to 1 at the red end.
+    strip
+        Place of the strip.
     raw
-        Any frame: its size and colours.
+        Any frame, for its size and colours.
     """
     along = position if strip.rising else 1 - position
     left, right = strip.left[0] * raw.width, strip.right[0] * raw.width
-    wanted = left + (along - tilt_offset(strip, slices, raw)) * (right - left)
-    moved = values.copy()
+    centre_column = left + (along - tilt_offset(strip, slices, raw)) * (right - left)
+    interpolated = values.copy()
     middles = np.array([LinearFrame(raw).middle_columns(region) for region in slices.values()])
     for number, x in enumerate(middles.T):
         slope = np.nan_to_num(np.gradient(values[..., number], x, axis=1))
-        moved[..., number] += slope * (wanted - x)
-    return moved
+        interpolated[..., number] += slope * (centre_column - x)
+    return interpolated
 
 
-def _evened(
+def _divide_by_evenness(
     values: FloatArray,
     sigma: FloatArray,
     through: ChargingSeries,
     direct: ChargingSeries,
-    whole: Series,
+    strip_series: Series,
     frames: ChargeFrames,
 ) -> PatchCharging:
-    """One patch: (n, P, C) of all photographs, brought into the two series."""
-    is_direct = np.array([one.is_direct for one in frames.charge_of.values()])
+    """Divide one patch's values (n, P, C) of all photographs by the evenness, into two series."""
+    is_direct = np.array([interval.is_direct for interval in frames.charge_of.values()])
     evenness = _evenness(values[is_direct], sigma[is_direct])
     values, sigma = values / evenness[:, None], sigma / evenness[:, None]
-    last = np.array([one is frames.intervals[-1] for one in frames.charge_of.values()])
+    is_last = np.array([interval is frames.intervals[-1] for interval in frames.charge_of.values()])
     return PatchCharging(
         replace(through, values=values[~is_direct], sigma=sigma[~is_direct]),
         replace(direct, values=values[is_direct], sigma=sigma[is_direct]),
         evenness,
-        _after_off(whole, last, frames),
+        _final_decay(strip_series, is_last, frames),
     )
 
 
 def _charge(
-    one: ChargeInterval, frames: ChargeFrames, deficit: float, *, fresh: bool, saturated: bool
+    interval: ChargeInterval, frames: ChargeFrames, deficit: float, *, fresh: bool, saturated: bool
 ) -> Charge:
-    after = frames.after(one)
+    after = frames.after(interval)
     return Charge(
-        on_s=one.on_s - frames.zero_s,
-        off_s=one.off_s - frames.zero_s,
+        on_s=interval.on_s - frames.zero_s,
+        off_s=interval.off_s - frames.zero_s,
         start_s=np.array([frame.start_time - frames.zero_s for frame in after]),
         exposure_s=np.array([frame.exposure_s for frame in after]),
-        brightness=1 - deficit * one.cold_deficit,
-        cold_deficit=one.cold_deficit,
+        brightness=1 - deficit * interval.cold_deficit,
+        cold_deficit=interval.cold_deficit,
         fresh=fresh,
         saturated=saturated,
     )
 
 
-def _key(patch: StripPatch, name: str) -> str:
-    """Of a place among those of all patches."""
+def _place_name(patch: StripPatch, name: str) -> str:
+    """Return the name of a place among those of all patches."""
     return f"{patch.folder} {name}".strip()
 
 
-def _blanked(series: Series, numbers: FloatArray) -> FloatArray:
-    """NaN where a row must not be used."""
+def _with_unusable_nan(series: Series, numbers: FloatArray) -> FloatArray:
+    """Replace numbers by NaN in rows that must not be used."""
     return np.where(series.usable[:, None], numbers, np.nan)
 
 
-def _around(sites: Slices) -> Region:
-    """The upright rectangle around all sites."""
+def _bounding_region(sites: Slices) -> Region:
+    """Return the upright rectangle around all sites."""
     left, top = (min(region[k] for region in sites.values()) for k in (0, 1))
     right = max(region[0] + region[2] for region in sites.values())
     bottom = max(region[1] + region[3] for region in sites.values())
@@ -189,21 +206,23 @@ def _around(sites: Slices) -> Region:
 
 
 def _evenness(values: FloatArray, sigma: FloatArray) -> FloatArray:
-    """(P,) how bright every place is after the same light, 1 on average; all frames together."""
+    """Return the brightness of every place after the same light, 1 on average, shape (P,)."""
     weight = np.where(np.isfinite(values) & (sigma > 0), 1 / np.square(sigma), 0.0)
-    known = weight.min(axis=1, keepdims=True) > 0
-    frame = np.where(known, np.nanmean(np.where(known, values, 0.0), axis=1, keepdims=True), 0.0)
-    weight = np.where(known, weight, 0.0)
-    total = (weight * frame**2).sum(axis=(0, 2))
+    is_known = weight.min(axis=1, keepdims=True) > 0
+    frame_mean = np.where(
+        is_known, np.nanmean(np.where(is_known, values, 0.0), axis=1, keepdims=True), 0.0
+    )
+    weight = np.where(is_known, weight, 0.0)
+    total = (weight * frame_mean**2).sum(axis=(0, 2))
     if not (total > 0).all():
         raise DataError(
             "expected a glow all along the filter's place after charges by the lamp itself, got "
             "none somewhere, or it is clipped; check where the sample and the filter lie"
         )
-    found = (weight * frame * np.nan_to_num(values)).sum(axis=(0, 2)) / total
-    return np.asarray(found / found.mean())
+    signal = (weight * frame_mean * np.nan_to_num(values)).sum(axis=(0, 2)) / total
+    return np.asarray(signal / signal.mean())
 
 
-def _after_off(whole: Series, rows: BoolArray, frames: ChargeFrames) -> Series:
-    part = whole.take(np.flatnonzero(rows))
-    return replace(part, t_s=part.t_s - (frames.intervals[-1].off_s - frames.zero_s))
+def _final_decay(strip_series: Series, rows: BoolArray, frames: ChargeFrames) -> Series:
+    final = strip_series.take(np.flatnonzero(rows))
+    return replace(final, t_s=final.t_s - (frames.intervals[-1].off_s - frames.zero_s))

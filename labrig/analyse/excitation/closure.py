@@ -1,4 +1,4 @@
-"""Whether what charges through the filter tell predicts charging by the lamp itself."""
+"""Closure: charging by the lamp itself, predicted from charges through the filter."""
 
 from collections.abc import Callable
 from dataclasses import replace
@@ -9,60 +9,70 @@ from labrig.calibration import IrradianceFile
 from labrig.fit.excitation import Charging, RelativeSigmas, closure, levels_at_off
 from labrig.results import ChargingSeries, Closure, FittedExcitation, FloatArray, PatchCharging
 
-#: Of σ, for derivatives.
+#: Step of the derivatives as a fraction of σ.
 STEP = 0.01
 
 
 def predicted_charging(
     charging: PatchCharging,
     irradiance: IrradianceFile,
-    uncertain: RelativeSigmas,
+    relative_sigmas: RelativeSigmas,
     fit_of: Callable[[PatchCharging], FittedExcitation],
 ) -> Closure | None:
-    """Charging by the lamp itself as predicted from charges through the filter.
+    """Predict charging by the lamp itself from charges through the filter.
 
-    The longest charge by the lamp itself stays in the fit, since it tells how far the sample is
-    charged; the shorter ones are predicted. With fewer than two of those there is no test.
+    The longest charge by the lamp itself stays in the fit, since it determines the level of charge;
+    the shorter ones are predicted. With fewer than two of those there is no test.
 
     Parameters
     ----------
+    charging
+        Charging of a patch.
+    irradiance
+        Irradiance on the sample.
+    relative_sigmas
+        Relative uncertainties of the measurement.
     fit_of
-        Fits what is left without the charges that are predicted.
+        Function that fits the charging without the charges that are predicted.
     """
     direct = charging.direct
     lengths = np.array([charge.off_s - charge.on_s for charge in direct.charges])
     longest = int(np.argmax(lengths))
-    of_charge = np.repeat(np.arange(len(lengths)), [len(one.start_s) for one in direct.charges])
-    kept = of_charge == longest
-    alone = replace(
+    charge_number = np.repeat(
+        np.arange(len(lengths)), [len(charge.start_s) for charge in direct.charges]
+    )
+    is_longest = charge_number == longest
+    longest_only = replace(
         charging,
-        direct=replace(direct, values=np.where(kept[:, None, None], direct.values, np.nan)),
+        direct=replace(direct, values=np.where(is_longest[:, None, None], direct.values, np.nan)),
     )
     channel = int(np.argmax(np.nanmean(direct.values, axis=(0, 1))))
     usable = np.asarray(np.isfinite(direct.values[..., channel]).all(axis=1))
     first = direct.first_frames(usable)
     if len(first) < 3:
         return None
-    fit = fit_of(alone)
+    fit = fit_of(longest_only)
     rows = np.array(list(first.values()))
     charges = [direct.charges[number] for number in first]
     values, sigma = direct.values[rows, :, channel], direct.sigma[rows, :, channel]
     level = values.mean(axis=1)
-    noise = np.hypot(np.sqrt((sigma**2).sum(axis=1)) / sigma.shape[1], uncertain.flicker * level)
-    charge_s = _at_full_light(direct, fit, np.array(irradiance.direct))[list(first)]
+    noise = np.hypot(
+        np.sqrt((sigma**2).sum(axis=1)) / sigma.shape[1], relative_sigmas.flicker * level
+    )
+    charge_s = _equivalent_charge_s(direct, fit, np.array(irradiance.direct))[list(first)]
     starts, exposures = (
-        np.concatenate([getattr(one, name) for one in direct.charges])[rows]
+        np.concatenate([getattr(charge, name) for charge in direct.charges])[rows]
         for name in ("start_s", "exposure_s")
     )
     dark_s = starts - np.array([charge.off_s for charge in charges])
-    left = _left(direct, fit)[list(first)]
+    initial = _initial_concentrations(direct, fit)[list(first)]
 
     def predicted(theta: FloatArray) -> FloatArray:
-        """By k_r, amplitudes, k_e and ln of the light."""
+        """Return the levels by k_r, amplitudes, k_e and ln of the light."""
         n = len(fit.states)
         light = np.array(irradiance.direct) * np.exp(theta[-1])
         sample = Charging(theta[2 * n : -1].reshape(n, -1), theta[:n], theta[n : 2 * n], light)
-        return sample.level(charge_s, left, dark_s, exposures)
+        return sample.level(charge_s, initial, dark_s, exposures)
 
     theta = np.array(
         [
@@ -72,54 +82,63 @@ def predicted_charging(
             0.0,
         ]
     )
-    unsure = np.sqrt(np.append(np.diag(fit.covariance), max(uncertain.scale, 1e-6) ** 2))
-    slopes = _slopes(predicted, theta, unsure)
+    theta_sigma = np.sqrt(np.append(np.diag(fit.covariance), max(relative_sigmas.scale, 1e-6) ** 2))
+    slopes = _slopes(predicted, theta, theta_sigma)
     cold_deficit = np.array([charge.cold_deficit for charge in charges])
-    of_charges = slopes[-1] ** 2 * (
-        uncertain.scale**2 + uncertain.lamp**2 + (uncertain.cold_deficit * cold_deficit) ** 2
+    charge_variance = slopes[-1] ** 2 * (
+        relative_sigmas.scale**2
+        + relative_sigmas.lamp**2
+        + (relative_sigmas.cold_deficit * cold_deficit) ** 2
     )
-    of_rates = np.einsum("ic,ij,jc->c", slopes[:-1], fit.covariance, slopes[:-1])
+    rate_variance = np.einsum("ic,ij,jc->c", slopes[:-1], fit.covariance, slopes[:-1])
     return closure(
         charge_s,
         level,
-        np.sqrt(noise**2 + np.maximum(of_rates, 0.0) + of_charges),
+        np.sqrt(noise**2 + np.maximum(rate_variance, 0.0) + charge_variance),
         irradiance=irradiance.direct,
         k_e_per_s=fit.k_e(),
         k_r_per_s=[state.k_r_per_s for state in fit.states],
         full_level=[state.amplitude for state in fit.states],
-        r0=left,
+        r0=initial,
         dark_s=dark_s,
         exposure_s=exposures,
     )
 
 
-def _at_full_light(direct: ChargingSeries, fit: FittedExcitation, steady: FloatArray) -> FloatArray:
-    """(K,) s: how long the charges would have lasted by the steady lamp, for what they charge."""
+def _equivalent_charge_s(
+    direct: ChargingSeries, fit: FittedExcitation, steady: FloatArray
+) -> FloatArray:
+    """Return the durations of the K charges in seconds, corrected for the lamp's transients."""
     weight = fit.k_e().sum(axis=0) * steady
     weight /= weight.sum()
     lost_s = direct.rise.duration_s @ (1 - direct.rise.fraction @ weight)
     gained_s = direct.fade.duration_s @ (direct.fade.fraction @ weight)
     return np.array(
-        [one.brightness * (one.off_s - one.on_s - lost_s + gained_s) for one in direct.charges]
+        [
+            charge.brightness * (charge.off_s - charge.on_s - lost_s + gained_s)
+            for charge in direct.charges
+        ]
     )
 
 
-def _left(direct: ChargingSeries, fit: FittedExcitation) -> FloatArray:
-    """(K, N) concentrations that each charge finds, of the one before it."""
+def _initial_concentrations(direct: ChargingSeries, fit: FittedExcitation) -> FloatArray:
+    """Return the concentrations left of the previous charge at the begin of each charge, (K, N)."""
     k_r = np.array([state.k_r_per_s for state in fit.states])
     ended = levels_at_off(direct, k_r, fit.k_e()).value.mean(axis=1)
     on_s, off_s = (
-        np.array([getattr(one, name) for one in direct.charges]) for name in ("on_s", "off_s")
+        np.array([getattr(charge, name) for charge in direct.charges]) for name in ("on_s", "off_s")
     )
     waited_s = on_s[1:] - off_s[:-1]
-    fresh = np.array([one.fresh for one in direct.charges[1:]])
-    left = np.where(fresh[:, None], 0.0, ended[:-1] * np.exp(-np.outer(waited_s, k_r)))
-    return np.vstack([np.zeros_like(k_r), left])
+    fresh = np.array([charge.fresh for charge in direct.charges[1:]])
+    remaining = np.where(fresh[:, None], 0.0, ended[:-1] * np.exp(-np.outer(waited_s, k_r)))
+    return np.vstack([np.zeros_like(k_r), remaining])
 
 
 def _slopes(
-    of: Callable[[FloatArray], FloatArray], theta: FloatArray, unsure: FloatArray
+    function: Callable[[FloatArray], FloatArray], theta: FloatArray, sigma: FloatArray
 ) -> FloatArray:
-    """(θ, n), by differences of a part of each one's σ."""
-    steps = np.diag(STEP * np.maximum(unsure, 1e-12))
-    return np.array([(of(theta + step) - of(theta - step)) / (2 * step.sum()) for step in steps])
+    """Return the slopes (θ, n), by differences of a fraction of each parameter's σ."""
+    steps = np.diag(STEP * np.maximum(sigma, 1e-12))
+    return np.array(
+        [(function(theta + step) - function(theta - step)) / (2 * step.sum()) for step in steps]
+    )

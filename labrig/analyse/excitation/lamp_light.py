@@ -1,7 +1,7 @@
-"""The lamp's light on the sample: how it may be off, how it runs across a place, how it changes.
+"""The lamp's light on the sample: its errors, its course across a place, its transients.
 
-Every place behind the filter has a light of its own. The lamp comes on and goes dark in every band
-as it was measured, or as halogen lamps usually do.
+Every place behind the filter has an irradiance of its own. The lamp's transients in every band are
+the measured ones, or those of typical halogen lamps.
 """
 
 import numpy as np
@@ -10,19 +10,19 @@ from scipy.interpolate import PchipInterpolator
 from labrig.calibration import Change, FadeFile, IrradianceFile
 from labrig.results import FloatArray, Transient
 
-#: Of the light on a place alone, whatever its file says: bands are calibrated place by place, and
-#: their flanks are rough by so much. Smooth errors alone would have to bend for it.
+#: Least relative σ of the light on a single place: bands are calibrated place by place, and their
+#: flanks scatter by so much. Smooth errors alone cannot describe it.
 LEAST_SITE_SIGMA = 0.03
-#: Of a filter's wavelengths.
+#: Standard uncertainty of a filter's wavelengths in nm.
 WAVELENGTH_SIGMA_NM = 1.0
-#: Errors of places so many parts of the filter apart have nothing in common: some 40 nm.
+#: Number of smooth modes along the filter: errors are uncorrelated over some 40 nm.
 SMOOTH_MODES = 9
-#: Light of which less is known than this is taken for known so well: logarithms are to be linear.
+#: Largest relative σ of the light, within which its logarithm is linear.
 WORST = 1.0
-#: Less light than this fraction of the most has no logarithm worth the name.
+#: Least light as a fraction of the most, for its logarithm.
 LEAST_LIGHT = 1e-6
-#: A halogen lamp falls to 1/e in so long at these wavelengths (measured by others),
-#: and is dark after `DARK_S` (Nalbach et al., section 4.6).
+#: Wavelengths in nm and times in seconds in which a halogen lamp falls to 1/e (from literature),
+#: and time after which it is dark (Nalbach et al., section 4.6).
 USUAL_NM = (419.0, 650.0)
 USUAL_1_E_S = (0.031, 0.051)
 DARK_S = 0.32
@@ -30,11 +30,16 @@ STEPS = 64
 
 
 def site_modes(irradiance: IrradianceFile) -> FloatArray:
-    """(M, P, B): what is said of each place's light, alike for neighbours, and a little of its own.
+    """Return the error modes of each place's irradiance, smooth along the filter or independent.
 
-    Camera curves, the filter's wavelengths, its widths and what it leaks are wrong smoothly along
-    the filter. The first are the same in all bands, the second move light from band to band, the
-    others change it at a band's edges and far from it.
+    Camera curves, the filter's wavelengths, its widths and leakage have errors that are smooth
+    along the filter. The first are the same in all bands, the second move light from band to band,
+    the others change it at a band's edges and far from it.
+
+    Returns
+    -------
+    ndarray
+        Modes of the logarithm, shape (M, P, B).
     """
     through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
     light_sigma = _relative_sigma(irradiance)[:, None]
@@ -43,82 +48,86 @@ def site_modes(irradiance: IrradianceFile) -> FloatArray:
     fraction = np.clip(1 - np.abs(position - knots[:, None]) / (knots[1] - knots[0]), 0.0, None)
     smooth = np.sin(np.pi / 2 * fraction)[..., None]
     nm = np.ptp(irradiance.bands_nm) * (position - position[0]) / np.ptp(position)
-    by_nm = np.gradient(np.log(_some(through)), nm, axis=0)
-    beyond = np.sqrt(np.clip((sigma / _some(through)) ** 2 - light_sigma**2, 0.0, WORST**2))
+    slope_per_nm = np.gradient(np.log(_positive_light(through)), nm, axis=0)
+    shape_sigma = np.sqrt(
+        np.clip((sigma / _positive_light(through)) ** 2 - light_sigma**2, 0.0, WORST**2)
+    )
     bands = np.ones(through.shape[1])
-    alone = LEAST_SITE_SIGMA * np.eye(len(position))[..., None]
+    independent = LEAST_SITE_SIGMA * np.eye(len(position))[..., None]
     return np.concatenate(
         [
             smooth * light_sigma * bands,
-            smooth * WAVELENGTH_SIGMA_NM * by_nm,
-            smooth * beyond,
-            alone * bands,
+            smooth * WAVELENGTH_SIGMA_NM * slope_per_nm,
+            smooth * shape_sigma,
+            independent * bands,
         ]
     )
 
 
 def across_sites(irradiance: IrradianceFile) -> FloatArray:
-    """(2, P, B) light at two places within each one, over its mean, by its run along the filter.
+    """Return the irradiance at two places within each site relative to its mean, shape (2, P, B).
 
-    The two are Gauss's: with them a mean over a place is right up to third order.
+    The two places are Gauss's: with them a mean over a site is exact up to third order.
     """
-    position, through = np.array(irradiance.position), _some(np.array(irradiance.through))
+    position, through = np.array(irradiance.position), _positive_light(np.array(irradiance.through))
     course = PchipInterpolator(position, np.log(through), axis=0)
-    off = np.gradient(position)[:, None] / 2 / np.sqrt(3)
-    here, slope = course(position), course(position, 1)
+    offset = np.gradient(position)[:, None] / 2 / np.sqrt(3)
+    log_light, slope = course(position), course(position, 1)
     # At the ends there is nothing to look up beyond the last place's middle.
-    pair: FloatArray = np.exp(np.stack([here - slope * off, here + slope * off]))
+    pair: FloatArray = np.exp(np.stack([log_light - slope * offset, log_light + slope * offset]))
     mean: FloatArray = pair.mean(axis=0)
     return pair / mean
 
 
 def band_sigma(irradiance: IrradianceFile) -> tuple[float, ...]:
-    """Relative, of the lamp's own light in each band: wrong there, it is wrong at all places.
+    """Return the relative σ of the lamp's own light in each band, which is common to all places.
 
-    What else is not known of the light on a place is said by `site_modes`.
+    The other errors of the irradiance are those of `site_modes`.
     """
     direct = np.array(irradiance.direct_sigma) / np.maximum(np.array(irradiance.direct), 1e-300)
     return tuple(direct.tolist())
 
 
 def scale_sigma(irradiance: IrradianceFile) -> float:
-    """Relative, of the light on all places together over that of the lamp by itself.
+    """Return the relative σ of the light on all places over that of the lamp by itself.
 
-    What is not known even of the place that is known best, all places have in common: how bright
-    the camera sees a narrow band against the lamp's whole light.
+    It includes the uncertainty of the best-known place, which all places have in common: the
+    camera's response to a narrow band relative to the lamp's whole light.
     """
     return float(np.hypot(irradiance.scale_sigma, _relative_sigma(irradiance).min()))
 
 
 def lamp_transients(fade: FadeFile | None, bands_nm: FloatArray) -> tuple[Transient, Transient]:
-    """Rise and fade; without a file, what halogen lamps usually do.
+    """Return turn-on and turn-off transient; without a file, those of typical halogen lamps.
 
-    A rise that was not measured is taken for the fade upside down: a filament heats about as fast
-    as it cools.
+    A rise that was not measured is taken as the inverted fade: a filament heats about as fast as it
+    cools.
     """
     if fade is None:
-        dark = _usual(bands_nm)
-        return _upside_down(dark), dark
-    found = _transient(fade, fade.fade, bands_nm, end=0.0)
+        usual_fade = _typical_fade(bands_nm)
+        return _inverted(usual_fade), usual_fade
+    measured_fade = _measured_transient(fade, fade.fade, bands_nm, end=0.0)
     if fade.rise is None:
-        return _upside_down(found), found
-    return _transient(fade, fade.rise, bands_nm, end=1.0), found
+        return _inverted(measured_fade), measured_fade
+    return _measured_transient(fade, fade.rise, bands_nm, end=1.0), measured_fade
 
 
 def _relative_sigma(irradiance: IrradianceFile) -> FloatArray:
-    """(P,) relative σ of all light on each place."""
+    """Return the relative σ of all light on each place, shape (P,)."""
     through, sigma = np.array(irradiance.through), np.array(irradiance.through_sigma)
     relative: FloatArray = np.sqrt((sigma**2).sum(axis=1)) / np.maximum(through.sum(axis=1), 1e-300)
     return relative
 
 
-def _some(light: FloatArray) -> FloatArray:
-    some: FloatArray = np.maximum(light, LEAST_LIGHT * light.max())
-    return some
+def _positive_light(light: FloatArray) -> FloatArray:
+    positive: FloatArray = np.maximum(light, LEAST_LIGHT * light.max())
+    return positive
 
 
-def _transient(file: FadeFile, change: Change, bands_nm: FloatArray, end: float) -> Transient:
-    """In steps short enough, until the lamp has arrived."""
+def _measured_transient(
+    file: FadeFile, change: Change, bands_nm: FloatArray, end: float
+) -> Transient:
+    """Return the transient in steps short enough, until the lamp has reached its `end`."""
     times_s, fraction = file.in_bands(change, bands_nm)
     fine_s = np.linspace(0.0, times_s[-1], STEPS + 1)
     fine = np.column_stack([np.interp(fine_s, times_s, column) for column in fraction.T])
@@ -126,7 +135,7 @@ def _transient(file: FadeFile, change: Change, bands_nm: FloatArray, end: float)
     return Transient.sampled(fine_s, fine)
 
 
-def _usual(bands_nm: FloatArray) -> Transient:
+def _typical_fade(bands_nm: FloatArray) -> Transient:
     middles_nm = (bands_nm[1:] + bands_nm[:-1]) / 2
     tau_s = np.interp(middles_nm, USUAL_NM, USUAL_1_E_S)
     times_s = np.linspace(0.0, DARK_S, STEPS + 1)
@@ -135,5 +144,5 @@ def _usual(bands_nm: FloatArray) -> Transient:
     return Transient.sampled(times_s, fraction)
 
 
-def _upside_down(fade: Transient) -> Transient:
+def _inverted(fade: Transient) -> Transient:
     return Transient(fade.duration_s, 1 - fade.fraction)

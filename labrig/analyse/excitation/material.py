@@ -1,4 +1,4 @@
-"""The material that an excitation, with the emission spectrum, says there is."""
+"""Material from a fitted excitation and the emission spectrum."""
 
 from importlib.metadata import version
 
@@ -23,7 +23,7 @@ def excited_material(
     run: str,
     frames: tuple[str, ...],
 ) -> Material:
-    """Everything the fit knows; Λ only with a spectrum."""
+    """Return the material of a fitted excitation, with Λ if there is a spectrum."""
     at_off = fit.at_off[-1]
     bands = np.array(irradiance.bands_nm)
     return Material(
@@ -57,14 +57,14 @@ def _reradiation(
     spectrum: EmissionSpectrum | None,
     bands_nm: FloatArray,
 ) -> dict[str, tuple[float, ...]]:
-    """Λ of every band: A_i / k_r,i times the spectrum's mean there, errors of all three."""
+    """Return Λ and its σ by band: A_i / k_r,i times the spectrum's mean, with all their errors."""
     if spectrum is None:
         return {}
     states = len(fit.states)
     level = state.amplitude / state.k_r_per_s
-    both = [number, states + number]
+    indices = [number, states + number]
     slope = np.array([-1 / state.k_r_per_s, 1 / max(state.amplitude, 1e-300)])
-    relative = float(slope @ fit.covariance[np.ix_(both, both)] @ slope)
+    relative = float(slope @ fit.covariance[np.ix_(indices, indices)] @ slope)
     shape, covariance = spectrum.in_bands(bands_nm)
     shape_sigma = np.sqrt(np.diag(covariance))
     value = level * shape

@@ -1,4 +1,4 @@
-"""From photographs of a lamp that fades and rises to how it does so, band by band."""
+"""From photographs of a switched lamp to its turn-off and turn-on transients by band."""
 
 from labrig.analyse.fade.analysis import analyse
 

@@ -1,4 +1,4 @@
-"""A fade, from its frames to its result."""
+"""Analysis of a fade run, from its frames to its result."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -26,27 +26,28 @@ from labrig.region import Region
 from labrig.results import FadeResult, FloatArray, LampChange, WarmingLight
 from labrig.written_numbers import plus_minus
 
-#: Of a photograph's light where no camera file says.
+#: Relative flicker of a photograph without a camera file.
 TYPICAL_FLICKER = 0.007
-#: Wavelengths on which curves are integrated, nm.
+#: Step in nm of the wavelengths on which curves are integrated.
 STEP_NM = 10.0
-#: Times of the table, denser at first; until the slowest band is so near to its end.
+#: Number of times of the table, exponent by which they are denser at first, fraction of the light
+#: at which the slowest band has reached its end, and longest time in seconds.
 TIMES, DENSER = 81, 1.5
 GONE = 1e-4
 LONGEST_S = 5.0
-#: By which a relay may close sooner or later than it opens.
+#: Standard deviation in seconds between the delays of a relay's closing and opening.
 RELAY_S = 1e-3
-#: χ² per degree of freedom beyond which the lamp is no glowing body.
+#: χ² per degree of freedom beyond which the lamp is no black-body emitter.
 BAD_CHI2 = 3.0
 
 
 def analyse(part: Part) -> FadeResult:
-    """Find how the lamp goes dark, comes on and warms.
+    """Measure the lamp's turn-off, turn-on and warm-up transients.
 
     Raises
     ------
     DataError, FitError
-        The photographs show no lamp that is switched.
+        The photographs show no switched lamp.
     UsageError
         The rig file does not name the curves of lamp and camera.
     """
@@ -66,17 +67,17 @@ def analyse(part: Part) -> FadeResult:
     lag = ANY_LAG
     for role in SWITCHED if protocol.rise else SWITCHED[:1]:
         switched = frames_after_switch(part.run, frames, darks, places, camera, role)
-        seen = weights
+        channel_weights = weights
         if protocol.through_lvf:
             # All channels of a place see the same band: one of them is enough.
             columns = brightest_channels(switched, len(curves.channels))
-            switched, seen = take_columns(switched, columns), weights[columns]
+            switched, channel_weights = take_columns(switched, columns), weights[columns]
         rises = role == LampFrames.RISE
-        change = fit_change(switched, seen, nm, flicker, rises=rises, lag=lag)
+        change = fit_change(switched, channel_weights, nm, flicker, rises=rises, lag=lag)
         lag = replace(change.lag, sigma=float(np.hypot(change.lag.sigma, RELAY_S)))
         changes[role] = change.result(switched)
         tables[role] = _table(change, bands, nm)
-    warm, warming_light = _warming(part, darks, flicker)
+    warm, warming_light = _fit_warming(part, darks, flicker)
     file = FadeFile(
         lamp=lamp.name,
         bands_nm=protocol.bands,
@@ -95,7 +96,7 @@ def analyse(part: Part) -> FadeResult:
     )
 
 
-def _warming(
+def _fit_warming(
     part: Part, darks: Sequence[FrameRecord], flicker: float
 ) -> tuple[Warming, WarmingLight] | tuple[None, None]:
     frames = part_frames(part, LampFrames.WARMING)
@@ -112,10 +113,10 @@ def _places(
     lamp: Spectrum,
     nm: FloatArray,
 ) -> tuple[Mapping[str, Region], FloatArray]:
-    """Regions, and what each channel of each of them sees of the steady lamp at `nm`."""
-    seen = (lamp.at(nm)[:, np.newaxis] * curves.at(nm)).T
+    """Return regions, and the weights of the steady lamp at `nm` in each of their channels."""
+    channel_light = (lamp.at(nm)[:, np.newaxis] * curves.at(nm)).T
     if not part.protocol.through_lvf:
-        return {"card": part_region(part, part.protocol.card)}, _normalised(seen)
+        return {"card": part_region(part, part.protocol.card)}, _normalise(channel_light)
     lvf = part.inputs.lvf
     if lvf is None or lvf.before_camera is None:
         raise DataError(
@@ -124,50 +125,50 @@ def _places(
         )
     strip, frame = lvf.before_camera, read_raw(frames[0].path)
     transmission = lvf.lvf.at(strip.positions(frame.width, frame.height)).transmission(nm)
-    through = transmission[:, np.newaxis, :] * seen
-    return strip.slices(), _normalised(through.reshape(-1, len(nm)))
+    through = transmission[:, np.newaxis, :] * channel_light
+    return strip.slices(), _normalise(through.reshape(-1, len(nm)))
 
 
-def _normalised(weights: FloatArray) -> FloatArray:
+def _normalise(weights: FloatArray) -> FloatArray:
     result: FloatArray = weights / weights.sum(axis=1, keepdims=True)
     return result
 
 
 def _band_weights(edges_nm: FloatArray, lamp: Spectrum, nm: FloatArray) -> FloatArray:
-    """(bands, wavelengths) the lamp's light in each band; evenly where it has none."""
+    """Return the lamp's light in each band, (bands, wavelengths); uniform where it has none."""
     middles = (edges_nm[1:] + edges_nm[:-1]) / 2
     inside = (nm >= edges_nm[:-1, np.newaxis]) & (nm <= edges_nm[1:, np.newaxis])
     for row, middle in enumerate(middles):
         if not inside[row].any():
             inside[row, np.argmin(np.abs(nm - middle))] = True
-    even = inside.astype(np.float64)
-    lit = even * np.maximum(lamp.at(nm), 0.0)
-    return _normalised(np.where(lit.sum(axis=1, keepdims=True) > 0, lit, even))
+    uniform = inside.astype(np.float64)
+    lamp_light = uniform * np.maximum(lamp.at(nm), 0.0)
+    return _normalise(np.where(lamp_light.sum(axis=1, keepdims=True) > 0, lamp_light, uniform))
 
 
 def _table(change: FittedChange, bands: FloatArray, nm: FloatArray) -> Change:
-    last_s = _over_at(change, bands, nm)
+    last_s = _end_s(change, bands, nm)
     t_s = last_s * np.linspace(0, 1, TIMES) ** DENSER
     fraction, sigma = change.in_bands(bands, nm, t_s)
     first = 0.0 if change.rises else 1.0
     fraction[0], sigma[0] = first, 0.0
     return Change(
-        t_s=tuple(_short(value) for value in t_s),
-        fraction=tuple(tuple(_short(value) for value in row) for row in fraction),
-        sigma=tuple(tuple(_short(value) for value in row) for row in sigma),
+        t_s=tuple(_rounded(value) for value in t_s),
+        fraction=tuple(tuple(_rounded(value) for value in row) for row in fraction),
+        sigma=tuple(tuple(_rounded(value) for value in row) for row in sigma),
     )
 
 
-def _over_at(change: FittedChange, bands: FloatArray, nm: FloatArray) -> float:
-    """When all bands are as good as at their end."""
+def _end_s(change: FittedChange, bands: FloatArray, nm: FloatArray) -> float:
+    """Return the time in seconds at which all bands have reached their end."""
     t_s = np.linspace(0, LONGEST_S, 2001)
     fraction, _ = change.in_bands(bands, nm, t_s)
-    left = 1 - fraction if change.rises else fraction
-    over = np.flatnonzero((left < GONE).all(axis=1))
-    return float(t_s[over[0]]) if len(over) else LONGEST_S
+    remaining = 1 - fraction if change.rises else fraction
+    ended = np.flatnonzero((remaining < GONE).all(axis=1))
+    return float(t_s[ended[0]]) if len(ended) else LONGEST_S
 
 
-def _short(value: float) -> float:
+def _rounded(value: float) -> float:
     return float(f"{value:.5g}")
 
 

@@ -1,4 +1,4 @@
-"""How a lamp may go dark or come on: the fraction of its steady light, in a few numbers.
+"""Models of the lamp's transients: the fraction of its steady light, in a few parameters.
 
 By Wien's law a body at the temperature T(t) has, of its light at T₀, the fraction
 
@@ -14,53 +14,59 @@ import numpy as np
 
 from labrig.results import FittedShape, FloatArray, LampChange, Measured, SwitchedFrames
 
-#: Wavelength at which u is minus the logarithm of the fraction.
+#: Wavelength in nm at which u is minus the logarithm of the fraction.
 REFERENCE_NM = 550.0
-#: Unit of time of the polynomials.
+#: Unit of time of the polynomials in seconds.
 SCALE_S = 0.3
-#: Of −ln what counts as nothing.
+#: Value of −ln fraction that counts as dark.
 DARK = 60.0
-#: hc/(k · 550 nm · T₀) of a lamp of 3000 K, and how much others differ from it (2700 K to 3400 K).
+#: ln of hc/(k · 550 nm · T₀) of a lamp of 3000 K, and its σ over lamps of 2700 K to 3400 K.
 LN_KAPPA, LN_KAPPA_SIGMA = float(np.log(8.72)), 0.1
-#: Ratio of radiation to conduction, ln r/(1 − r): as good as anything is possible.
+#: Prior σ of the ratio of radiation to conduction, ln r/(1 − r), nearly uninformative.
 LOGIT_SIGMA = 1.5
-#: Of σ, for derivatives.
+#: Step of the derivatives as a fraction of σ.
 STEP = 0.01
 
 
 class Shape(Protocol):
-    """A change of the lamp."""
+    """Model u(t) of a turn-off or turn-on transient of the lamp."""
 
     @property
     def name(self) -> str:
-        """For people."""
+        """Name of the model for people."""
 
     @property
     def rises(self) -> bool:
-        """Whether it comes on."""
+        """Whether the lamp is turned on."""
 
     @property
     def free(self) -> int:
-        """Parameters besides p and the lag."""
+        """Number of parameters besides p and the lag."""
 
     def start(self, level: float, slope: float) -> FloatArray:
-        """(free,) parameters to begin with: of a rise ln u = level + slope t / `SCALE_S`; of a fade
-        u = −slope t / `SCALE_S`.
+        """Return initial parameters, shape (free,).
+
+        They are those of ln u = level + slope t / `SCALE_S` of a rise, of u = −slope t / `SCALE_S`
+        of a fade.
         """
 
     def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
-        """At (m,) times ≥ 0 after the switch."""
+        """Return u at times ≥ 0 in seconds after the switch, shape (m,)."""
 
     def expected(self) -> tuple[FloatArray, FloatArray]:
-        """(free,) what parameters are known to be beforehand, and σ; infinite: anything."""
+        """Return prior values of the parameters and their σ, shape (free,) each.
+
+        The σ of a parameter without prior is infinite.
+        """
 
 
 @dataclass(frozen=True)
 class Cooling:
     """A filament that loses heat by radiation and conduction, dT/dt ∝ −T (r T⁴ + 1 − r), T₀ = 1.
 
-    Its radiation goes with T⁵, as tungsten's emissivity grows with T. An equation of Bernoulli's:
-    1/T = [(e^(q t) − r) / (1 − r)]^(1/4), u = κ (1/T − 1). Parameters: ln κ, ln q, ln r/(1 − r).
+    Its radiation is proportional to T⁵, as tungsten's emissivity grows with T. The equation is one
+    of Bernoulli's: 1/T = [(e^(q t) − r) / (1 − r)]^(1/4), u = κ (1/T − 1). Parameters: ln κ, ln q,
+    ln r/(1 − r).
     """
 
     rises: bool = False
@@ -68,12 +74,12 @@ class Cooling:
     name: str = "filament"
 
     def start(self, level: float, slope: float) -> FloatArray:
-        """Half radiation, half conduction."""
+        """Return initial parameters of equal radiation and conduction."""
         per_s = -slope / SCALE_S
         return np.array([LN_KAPPA, np.log(2 * max(per_s, 0.1) / np.exp(LN_KAPPA)), 0.0])
 
     def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
-        """See the class."""
+        """Return u at times in seconds after the switch, shape (m,)."""
         kappa, rate = np.exp(parameters[:2])
         conducted = 1 / (1 + np.exp(parameters[2]))
         grown = np.expm1(np.minimum(rate * t_s, 300.0)) / conducted
@@ -81,22 +87,22 @@ class Cooling:
         return u
 
     def expected(self) -> tuple[FloatArray, FloatArray]:
-        """Of halogen lamps."""
+        """Return prior values of the parameters of halogen lamps, and their σ."""
         return np.array([LN_KAPPA, 0.0, 0.0]), np.array([LN_KAPPA_SIGMA, np.inf, LOGIT_SIGMA])
 
 
 @dataclass(frozen=True)
 class Smooth:
-    """Nothing but smooth: u(t) a polynomial from 0 on, ln u(t) one where the lamp comes on.
+    """Polynomial u(t) without a constant term, of a rise a polynomial ln u(t).
 
     Attributes
     ----------
     rises
-        Whether it comes on.
+        Whether the lamp is turned on.
     degree
-        Of the polynomial.
+        Degree of the polynomial.
     last_s
-        Begin of the last photograph: from there on it goes on straight.
+        Begin of the last photograph in seconds after the switch; beyond it u is linear.
     """
 
     rises: bool
@@ -105,16 +111,16 @@ class Smooth:
 
     @property
     def free(self) -> int:
-        """Coefficients."""
+        """Number of coefficients."""
         return self.degree + (1 if self.rises else 0)
 
     @property
     def name(self) -> str:
-        """With its degree."""
+        """Name of the model with its degree."""
         return f"polynomial of degree {self.degree}"
 
     def start(self, level: float, slope: float) -> FloatArray:
-        """A straight line."""
+        """Return initial parameters of a straight line."""
         theta = np.zeros(self.free)
         if self.rises:
             theta[:2] = level, min(slope, -0.1)
@@ -123,7 +129,7 @@ class Smooth:
         return theta
 
     def u(self, parameters: FloatArray, t_s: FloatArray) -> FloatArray:
-        """See the class."""
+        """Return u at times in seconds after the switch, shape (m,)."""
         powers = np.arange(self.free) + (0 if self.rises else 1)
         end, x = self.last_s / SCALE_S, t_s / SCALE_S
         inner = np.minimum(x, end)[:, np.newaxis] ** powers @ parameters
@@ -134,12 +140,15 @@ class Smooth:
         return np.clip(np.maximum.accumulate(value), 0.0, DARK)
 
     def expected(self) -> tuple[FloatArray, FloatArray]:
-        """Nothing is known."""
+        """Return zeros and infinite σ: the coefficients have no prior."""
         return np.zeros(self.free), np.full(self.free, np.inf)
 
 
 def fraction_of(shape: Shape, theta: FloatArray, nm: FloatArray, t_s: FloatArray) -> FloatArray:
-    """Fraction of the steady lamp's light at (m,) times after the switch, (m, wavelengths)."""
+    """Return the light at m times after the switch relative to the steady lamp's.
+
+    The shape is (m, wavelengths).
+    """
     u = shape.u(theta[:-2], np.maximum(t_s, 0.0))
     fraction: FloatArray = np.exp(-np.outer(u, (REFERENCE_NM / nm) ** theta[-2]))
     return fraction
@@ -147,16 +156,18 @@ def fraction_of(shape: Shape, theta: FloatArray, nm: FloatArray, t_s: FloatArray
 
 @dataclass(frozen=True, eq=False)
 class Fit:
-    """One shape's.
+    """Fit of one shape to the photographs.
 
     Attributes
     ----------
     shape, parameters, covariance
-        See `Shape`.
+        Model, its parameters with p and the lag, and their covariance.
     jitter_s
-        Of the photographs' begins.
-    chi2, dof, log_determinant
-        Of the photographs, degrees of freedom, and of their covariance.
+        Scatter of the photographs' begins in seconds.
+    chi2, dof
+        χ² of the photographs and its degrees of freedom.
+    log_determinant
+        Logarithm of the determinant of the photographs' covariance.
     """
 
     shape: Shape
@@ -175,7 +186,7 @@ class Fit:
     def in_bands(
         self, weights: FloatArray, nm: FloatArray, t_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """As `FittedChange.in_bands`, of this shape alone."""
+        """Return fraction and σ in bands by this shape alone, as `FittedChange.in_bands`."""
         fraction = fraction_of(self.shape, self.parameters, nm, t_s) @ weights.T
         slopes = []
         for number, step in enumerate(STEP * np.sqrt(np.diag(self.covariance))):
@@ -189,13 +200,15 @@ class Fit:
 
 @dataclass(frozen=True, eq=False)
 class FittedChange:
-    """A change of the lamp.
+    """Fitted transient of the lamp.
 
     Attributes
     ----------
-    fits, likely
-        Shapes that explain it, and how likely each is (Burnham and Anderson, *Model selection and
-        multimodel inference*, 2002); sums to 1.
+    fits
+        Fits of the shapes that are compatible with the photographs.
+    likely
+        Probability of each shape (Burnham and Anderson, *Model selection and multimodel inference*,
+        2002); sums to 1.
     """
 
     fits: tuple[Fit, ...]
@@ -203,16 +216,16 @@ class FittedChange:
 
     @property
     def rises(self) -> bool:
-        """Whether the lamp comes on."""
+        """Whether the lamp is turned on."""
         return self.fits[0].shape.rises
 
     @property
     def lag(self) -> Measured:
-        """By which shutters open later than recorded."""
+        """Delay of the actual against the recorded opening of the shutter in seconds."""
         return self._mean(-1, "s")
 
     def result(self, frames: SwitchedFrames) -> LampChange:
-        """As it is kept, with the frames that it was found from."""
+        """Return the transient as part of a result, with the frames that it was fitted to."""
         shapes = tuple(
             FittedShape(
                 fit.shape.name, fit.parameters, fit.covariance, fit.jitter_s, fit.chi2, fit.dof,
@@ -225,24 +238,28 @@ class FittedChange:
     def in_bands(
         self, weights: FloatArray, nm: FloatArray, t_s: FloatArray
     ) -> tuple[FloatArray, FloatArray]:
-        """Fraction of the steady lamp's light after the switch, and σ, each (times, bands).
+        """Return the light relative to the steady lamp's and its σ, shape (times, bands) each.
 
         Parameters
         ----------
         weights
-            (bands, wavelengths) of the light at `nm` in every band; sums to 1.
+            Weights of the light at `nm` in every band, which sum to 1, shape (bands, wavelengths).
+        nm
+            Wavelengths in nm.
+        t_s
+            Times after the switch in seconds.
         """
         fractions, sigmas = zip(*(fit.in_bands(weights, nm, t_s) for fit in self.fits), strict=True)
-        return self._averaged(np.array(fractions), np.array(sigmas))
+        return self._average(np.array(fractions), np.array(sigmas))
 
     def _mean(self, parameter: int, unit: str = "") -> Measured:
         values = np.array([fit.parameters[parameter] for fit in self.fits])
         sigmas = [np.sqrt(fit.covariance[parameter, parameter]) for fit in self.fits]
-        mean, sigma = self._averaged(values, np.array(sigmas))
+        mean, sigma = self._average(values, np.array(sigmas))
         return Measured(float(mean), float(sigma), unit)
 
-    def _averaged(self, values: FloatArray, sigmas: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Over the fits, first axis; σ holds what they disagree by."""
+    def _average(self, values: FloatArray, sigmas: FloatArray) -> tuple[FloatArray, FloatArray]:
+        """Average over the fits, the first axis; σ includes their scatter."""
         mean = np.tensordot(self.likely, values, axes=1)
         variance = np.square(sigmas) + np.square(values - mean)
         return mean, np.sqrt(np.tensordot(self.likely, variance, axes=1))

@@ -1,7 +1,7 @@
-"""Finds the lamp's change that explains photographs of it.
+"""Fit of the lamp's transients to photographs.
 
-A photograph begins at a time after the switch that is known but for a constant lag and some jitter,
-which all its places and colours share, as they share its flicker.
+The begin of a photograph after the switch is known up to a constant lag and some jitter, which all
+its places and colours share, as they share its flicker.
 """
 
 import numpy as np
@@ -20,18 +20,18 @@ from labrig.errors import FitError
 from labrig.fit import least_squares
 from labrig.results import FloatArray, Measured, SwitchedFrames
 
-#: On which fractions are integrated.
+#: Step in seconds of the grid on which fractions are integrated.
 STEP_S = 2e-3
 DEGREES = (2, 3, 4)
-#: What is known of p beforehand, and of the lag if nothing else is; one standard deviation.
+#: Prior standard deviation of p, and prior of the lag without any measurement.
 EXPONENT_SIGMA = 0.2
 ANY_LAG = Measured(0.0, 6e-3, "s")
-#: Jitters that are tried, the first one first.
+#: Jitters in seconds that are compared, and the initial one.
 JITTERS_S = np.geomspace(3e-4, 2e-2, 31)
 FIRST_JITTER_S = 3e-3
-#: Rounds in which covariances follow the model; steps of a fit, and when it is good enough.
+#: Iterations of the covariances by the model; most steps of a fit, and its tolerance.
 ROUNDS, MOST_STEPS, TOLERANCE = 3, 100, 1e-6
-#: A lamp is a filament unless something else is likelier by so much in −2 ln L.
+#: Difference in −2 ln L from which another shape replaces the filament.
 CLEARLY = 10.0
 
 
@@ -44,23 +44,28 @@ def fit_change(
     rises: bool,
     lag: Measured = ANY_LAG,
 ) -> FittedChange:
-    """The change that explains the photographs.
+    """Fit the transient of the lamp to photographs.
 
     Parameters
     ----------
+    frames
+        Photographs after the switch.
     weights
-        (S, wavelengths) what each place or colour sees of the steady lamp at `nm`; sums to 1.
+        Weights of the steady lamp's light at `nm` in each place or colour, which sum to 1, shape
+        (S, wavelengths).
+    nm
+        Wavelengths in nm.
     flicker
-        Of a photograph's light.
+        Relative scatter common to the values of a photograph.
     rises
-        Whether the lamp comes on.
+        Whether the lamp is turned on.
     lag
-        By which shutters are thought to open late.
+        Prior of the delay of the shutter in seconds.
 
     Raises
     ------
     FitError
-        The photographs show no such change.
+        The photographs show no such transient.
     """
     last_s = float(frames.start_s.max())
     smooth = [Smooth(rises, degree, last_s) for degree in DEGREES]
@@ -95,19 +100,19 @@ def _fit(
     theta, jitter_s = problem.start(), FIRST_JITTER_S
     for _ in range(ROUNDS):
         problem.whiten(theta, jitter_s)
-        found = least_squares(
+        result = least_squares(
             problem.residuals, theta, max_iterations=MOST_STEPS, tolerance=TOLERANCE
         )
-        theta = found.parameters
+        theta = result.parameters
         jitter_s = problem.likeliest_jitter(theta)
     problem.whiten(theta, jitter_s)
     chi2, dof = problem.chi2(theta), max(problem.values - len(theta), 1)
-    covariance = found.covariance * max(chi2 / dof, 1.0)
+    covariance = result.covariance * max(chi2 / dof, 1.0)
     return Fit(shape, theta, covariance, jitter_s, chi2, dof, problem.log_determinant)
 
 
 class _Problem:
-    """Residuals of all photographs, whitened by what the values of each share."""
+    """Residuals of all photographs, whitened by the common-mode noise of each."""
 
     def __init__(
         self,
@@ -127,13 +132,13 @@ class _Problem:
         self._grid_s = np.arange(0.0, last_s + STEP_S, STEP_S)
         self._used = np.isfinite(frames.light_s) & np.isfinite(frames.light_sigma_s)
         self.values = int(self._used.sum())
-        known = np.where(self._used, frames.light_sigma_s, 1.0)
-        self._inverse_sigma = np.where(self._used, 1 / known, 0.0)
+        sigma_s = np.where(self._used, frames.light_sigma_s, 1.0)
+        self._inverse_sigma = np.where(self._used, 1 / sigma_s, 0.0)
         self._along, self._common = np.empty((0, 0, 2)), np.empty((0, 2))
         self.log_determinant = 0.0
 
     def start(self) -> FloatArray:
-        """A first guess from the photographs' brightest colour."""
+        """Return initial parameters by the photographs' brightest colour."""
         frames = self._frames
         column = int(np.argmax(frames.steady_dn_per_s))
         value, start_s = frames.light_s[:, column], frames.start_s
@@ -158,80 +163,93 @@ class _Problem:
         return np.array([*first, 1.0, self._expected[-1]])
 
     def model(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """∫ fraction dt of every photograph, and its slope by its begin; (n, S) each."""
+        """Return ∫ fraction dt of every photograph, and its slope by the begin; (n, S) each."""
         fraction = fraction_of(self._shape, theta, self._nm, self._grid_s) @ self._weights.T
         steps = STEP_S * (fraction[1:] + fraction[:-1]) / 2
         integral = np.vstack([np.zeros(fraction.shape[1]), np.cumsum(steps, axis=0)])
         begin_s = self._frames.start_s + theta[-1]
-        first, before = _until(begin_s, integral, fraction)
-        last, after = _until(begin_s + self._frames.exposure_s, integral, fraction)
+        first, before = _integral_until(begin_s, integral, fraction)
+        last, after = _integral_until(begin_s + self._frames.exposure_s, integral, fraction)
         return last - first, after - before
 
     def whiten(self, theta: FloatArray, jitter_s: float) -> None:
-        """Take covariances from the model there."""
+        """Set the covariances to those of the model at these parameters."""
         value, slope = self.model(theta)
-        self._along, self._common = self._shared(value, slope, jitter_s)
-        own = np.log(np.square(self._frames.light_sigma_s[self._used]))
-        self.log_determinant = float(own.sum() + np.log1p(self._common).sum())
+        self._along, self._common = self._common_mode(value, slope, jitter_s)
+        log_variance = np.log(np.square(self._frames.light_sigma_s[self._used]))
+        self.log_determinant = float(log_variance.sum() + np.log1p(self._common).sum())
 
     def likeliest_jitter(self, theta: FloatArray) -> float:
-        """Of `JITTERS_S`, given what is left of the photographs."""
+        """Return the most probable of `JITTERS_S` by the residuals of the photographs."""
         value, slope = self.model(theta)
-        rest = self._scaled(value)
+        residual = self._scaled_residuals(value)
 
-        def unlikely(jitter_s: float) -> float:
-            along, common = self._shared(value, slope, jitter_s)
-            explained = np.square(np.einsum("nsk,ns->nk", along, rest)) * common / (1 + common)
+        def negative_log_likelihood(jitter_s: float) -> float:
+            along, common = self._common_mode(value, slope, jitter_s)
+            explained = np.square(np.einsum("nsk,ns->nk", along, residual)) * common / (1 + common)
             return float(np.log1p(common).sum() - explained.sum())
 
-        return float(JITTERS_S[np.argmin([unlikely(tried) for tried in JITTERS_S])])
+        return float(
+            JITTERS_S[np.argmin([negative_log_likelihood(jitter_s) for jitter_s in JITTERS_S])]
+        )
 
-    def _scaled(self, value: FloatArray) -> FloatArray:
-        """What a model leaves, in σ; 0 of values that are not used."""
+    def _scaled_residuals(self, value: FloatArray) -> FloatArray:
+        """Return the residuals of a model in σ; 0 of values that are not used."""
         return np.where(self._used, (self._frames.light_s - value) * self._inverse_sigma, 0.0)
 
-    def _shared(
+    def _common_mode(
         self, value: FloatArray, slope: FloatArray, jitter_s: float
     ) -> tuple[FloatArray, FloatArray]:
-        """What values of a photograph share, in σ: unit vectors (n, S, 2) and variances (n, 2)."""
-        both = np.stack([self._flicker * value, jitter_s * slope], axis=2)
-        both *= self._inverse_sigma[..., np.newaxis]
-        variance, turned = np.linalg.eigh(np.einsum("nsk,nsl->nkl", both, both))
+        """Return the common-mode noise of each photograph's values in σ.
+
+        It consists of unit vectors, shape (n, S, 2), and variances, shape (n, 2).
+        """
+        modes = np.stack([self._flicker * value, jitter_s * slope], axis=2)
+        modes *= self._inverse_sigma[..., np.newaxis]
+        variance, rotation = np.linalg.eigh(np.einsum("nsk,nsl->nkl", modes, modes))
         variance = np.maximum(variance, np.finfo(np.float64).tiny)
-        along: FloatArray = both @ turned / np.sqrt(variance)[:, np.newaxis, :]
+        along: FloatArray = modes @ rotation / np.sqrt(variance)[:, np.newaxis, :]
         return along, variance
 
-    def _whitened(self, theta: FloatArray) -> FloatArray:
-        """Times (1 + Σ v e eᵀ)^(−1/2), e the unit vectors and v the variances."""
-        rest = self._scaled(self.model(theta)[0])
-        shared = np.einsum("nsk,ns->nk", self._along, rest) * (1 - 1 / np.sqrt(1 + self._common))
-        result: FloatArray = (rest - np.einsum("nsk,nk->ns", self._along, shared)).ravel()
+    def _whitened_residuals(self, theta: FloatArray) -> FloatArray:
+        """Multiply the residuals by (1 + Σ v e eᵀ)^(−1/2), with unit vectors e and variances v."""
+        residual = self._scaled_residuals(self.model(theta)[0])
+        common_part = np.einsum("nsk,ns->nk", self._along, residual) * (
+            1 - 1 / np.sqrt(1 + self._common)
+        )
+        result: FloatArray = (residual - np.einsum("nsk,nk->ns", self._along, common_part)).ravel()
         return result
 
     def chi2(self, theta: FloatArray) -> float:
-        """Of the photographs alone."""
-        return float(np.square(self._whitened(theta)).sum())
+        """Return χ² of the photographs alone."""
+        return float(np.square(self._whitened_residuals(theta)).sum())
 
     def residuals(self, theta: FloatArray) -> tuple[FloatArray, FloatArray]:
-        """Whitened, then what is known beforehand; and their slopes."""
+        """Return the whitened residuals, then those of the prior, and the slopes of all."""
 
-        def all_of(at: FloatArray) -> FloatArray:
-            return np.append(self._whitened(at), (at - self._expected) / self._sigma)
+        def whitened_residuals(parameters: FloatArray) -> FloatArray:
+            return np.append(
+                self._whitened_residuals(parameters), (parameters - self._expected) / self._sigma
+            )
 
-        here = all_of(theta)
-        jacobian = np.empty((len(here), len(theta)))
+        residual = whitened_residuals(theta)
+        jacobian = np.empty((len(residual), len(theta)))
         for number in range(len(theta)):
             step = np.zeros_like(theta)
             step[number] = 1e-6
-            jacobian[:, number] = (all_of(theta + step) - all_of(theta - step)) / (2 * step[number])
-        return here, jacobian
+            jacobian[:, number] = (
+                whitened_residuals(theta + step) - whitened_residuals(theta - step)
+            ) / (2 * step[number])
+        return residual, jacobian
 
 
-def _until(
+def _integral_until(
     at_s: FloatArray, integral: FloatArray, fraction: FloatArray
 ) -> tuple[FloatArray, FloatArray]:
-    """Integral and value of a fraction that is straight between the times of the grid."""
-    left = np.clip((at_s / STEP_S).astype(np.intp), 0, len(fraction) - 2)
-    x = (at_s - left * STEP_S)[:, np.newaxis]
-    slope = (fraction[left + 1] - fraction[left]) / STEP_S
-    return integral[left] + (fraction[left] + slope * x / 2) * x, fraction[left] + slope * x
+    """Return integral and value of a fraction that is linear between the times of the grid."""
+    index = np.clip((at_s / STEP_S).astype(np.intp), 0, len(fraction) - 2)
+    offset_s = (at_s - index * STEP_S)[:, np.newaxis]
+    slope = (fraction[index + 1] - fraction[index]) / STEP_S
+    return integral[index] + (fraction[index] + slope * offset_s / 2) * offset_s, fraction[
+        index
+    ] + slope * offset_s

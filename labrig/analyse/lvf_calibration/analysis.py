@@ -1,4 +1,4 @@
-"""The calibration of a variable filter, from its frames to its result."""
+"""Analysis of the calibration of a variable filter, from its frames to its result."""
 
 from collections.abc import Iterator
 from dataclasses import replace
@@ -42,21 +42,22 @@ from labrig.results import (
     Stripes,
 )
 
-#: Misfit of the filters beyond which the curves are worth a look.
+#: Misfit of the filters in σ beyond which a warning is given.
 BAD_MISFIT = 3.0
-#: Shift of the sample that is worth a word.
+#: Shift of the sample in nm beyond which a warning is given.
 SHIFTED_NM = 2.0
 
 
 def analyse(part: Part) -> LvfCalibrationResult:
-    """Find the strip and its lines, then fit what the colour filters say.
+    """Locate the strip and its lines, then fit its bands to the frames of the colour filters.
 
     Raises
     ------
     DataError
         Frames are missing or damaged, or show no strip, or one that is tilted.
     FitError
-        No mercury lines, the filter the wrong way round, or too few filters.
+        There are no mercury lines, the filter is the wrong way round, or there are too few colour
+        filters.
     """
     protocol, frames = part.protocol, StripFrames(part)
     strip = find_strip(frames.hdr(LvfFrames.FILTER, filter_unit(None))).strip(rising=True)
@@ -70,23 +71,23 @@ def analyse(part: Part) -> LvfCalibrationResult:
         card_reflectance(part.rig),
         camera_curves(part.rig, part.overrides.camera),
     )
-    every = _scenes(part, frames, before_camera.strip)
-    of_filters = tuple(misfits(every, bench, fit.map))
-    scenes = every.without({one.name for one in of_filters if one.left_out})
-    found = calibrated(scenes, bench, fit.map)
-    stripes, why_no_stripes = _stripes(part, frames, placed.strip, found, fit.map)
-    filters = tuple(one.name for one in scenes.filters[1:])
-    assert found.lvf.sigma is not None, "a calibration tells its σ"
+    all_scenes = _scenes(part, frames, before_camera.strip)
+    filter_misfits = tuple(misfits(all_scenes, bench, fit.map))
+    scenes = all_scenes.without({misfit.name for misfit in filter_misfits if misfit.left_out})
+    lvf_fit = calibrated(scenes, bench, fit.map)
+    stripes, why_no_stripes = _stripes(part, frames, placed.strip, lvf_fit, fit.map)
+    filters = tuple(transmittance.name for transmittance in scenes.filters[1:])
+    assert lvf_fit.lvf.sigma is not None, "a calibration tells its σ"
     file = LvfFile(
-        position=tuple(found.lvf.position.tolist()),
-        bands=BandColumns.of(found.lvf.bands),
-        sigma=BandColumns.of(found.lvf.sigma),
-        remainder_nm=tuple(found.lvf.remainder_nm.tolist()),
-        remainder=tuple(tuple(row) for row in found.lvf.remainder.tolist()),
+        position=tuple(lvf_fit.lvf.position.tolist()),
+        bands=BandColumns.of(lvf_fit.lvf.bands),
+        sigma=BandColumns.of(lvf_fit.lvf.sigma),
+        remainder_nm=tuple(lvf_fit.lvf.remainder_nm.tolist()),
+        remainder=tuple(tuple(row) for row in lvf_fit.lvf.remainder.tolist()),
         wavelengths=WavelengthColumns.of(fit.map),
         before_camera=before_camera.strip,
         on_sample=stripes.strip if stripes else placed.strip,
-        camera=CurveColumns.of(found.camera),
+        camera=CurveColumns.of(lvf_fit.camera),
         source=f"{len(filters)} colour filters and mercury lines, measured with labrig",
         run=part.run.folder.resolve().name,
     )
@@ -99,16 +100,19 @@ def analyse(part: Part) -> LvfCalibrationResult:
         placed=placed,
         stripes=stripes,
         why_no_stripes=why_no_stripes,
-        card=every.card,
+        card=all_scenes.card,
         through_filters={
-            one.name: values for one, values in zip(every.filters, every.values, strict=True)
+            transmittance.name: values
+            for transmittance, values in zip(all_scenes.filters, all_scenes.values, strict=True)
         },
-        filter_misfits=of_filters,
+        filter_misfits=filter_misfits,
         filters=filters,
-        transmittance_residual=residuals(scenes, replace(bench, camera=found.camera), file.lvf)[1:],
-        band_misfit=found.misfit,
+        transmittance_residual=residuals(scenes, replace(bench, camera=lvf_fit.camera), file.lvf)[
+            1:
+        ],
+        band_misfit=lvf_fit.misfit,
         camera_before=CameraCurves(bench.camera.wavelength_nm, bench.camera.sensitivity),
-        warnings=tuple(_warnings(of_filters, found.misfit, stripes)),
+        warnings=tuple(_warnings(filter_misfits, lvf_fit.misfit, stripes)),
     )
 
 
@@ -129,28 +133,30 @@ def _stripes(
     part: Part,
     frames: StripFrames,
     strip: Strip,
-    found: LvfCalibration,
+    lvf_fit: LvfCalibration,
     wavelengths: WavelengthMap,
 ) -> tuple[Stripes | None, str]:
-    """The stripes that glow, or why there are none."""
+    """Locate the stripes that glow, or return the reason why there are none."""
     if part.protocol.stripes == "none":
         return None, "no stripes were asked for"
     nm = wavelengths.wavelength_nm([0.0, 1.0])
-    why = "no stripes were photographed"
+    reason = "no stripes were photographed"
     # A glow fades while it is photographed: one frame, the fullest that does not clip.
     for frame in sorted(frames.of(LvfFrames.STRIPES), key=lambda frame: -frame.exposure_s):
         try:
             hdr = read_hdr_frame([frame], frames.hot)
-            return shifted_by_stripes(hdr, strip, found.lvf, float(abs(nm[1] - nm[0]))), ""
+            return shifted_by_stripes(hdr, strip, lvf_fit.lvf, float(abs(nm[1] - nm[0]))), ""
         except DataError as error:  # it clips, or nothing is seen
-            why = str(error)
-    return None, why
+            reason = str(error)
+    return None, reason
 
 
 def _warnings(
-    of_filters: tuple[FilterMisfit, ...], misfit: FloatArray, stripes: Stripes | None
+    filter_misfits: tuple[FilterMisfit, ...], misfit: FloatArray, stripes: Stripes | None
 ) -> Iterator[str]:
-    yield from (left_out_text(one) for one in of_filters if one.left_out)
+    yield from (
+        left_out_text(filter_misfit) for filter_misfit in filter_misfits if filter_misfit.left_out
+    )
     if np.median(misfit) > BAD_MISFIT:
         yield (
             f"the filters contradict one another (misfit {np.median(misfit):.1f}, 1 is "

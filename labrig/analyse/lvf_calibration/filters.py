@@ -1,4 +1,4 @@
-"""Colour filters over a grey card: whether each was in its place, and what they say together."""
+"""Colour filters over a grey card: test that each was in its place, and joint calibration."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -19,21 +19,21 @@ from labrig.optics import (
 from labrig.reduce import FLICKER
 from labrig.results import FilterMisfit, FloatArray, SliceValues
 
-#: Root mean square by which transmittances along a strip may be off: the map, bands of another
-#: shape, a filter that is not quite as its table.
+#: Root mean square error expected of transmittances along a strip: by the map, bands of another
+#: shape, a filter that differs from its table.
 EXPECTED = 0.05
-#: A picture is of another filter if that one explains it so many times better.
+#: Factor by which another filter must explain a frame better to be taken for the one in place.
 BETTER = 3.0
-#: Beyond this it is of none that is known.
+#: Root mean square error beyond which no known filter is in place.
 FAR_OFF = 0.15
-#: Places say what filter is in if they see this fraction of what the brightest one sees.
+#: Light of the places that identify a filter, as a fraction of the brightest one's.
 BRIGHT = 0.25
-#: What a gel differs from its table by, and a table of few points from the curve, relative.
+#: Relative deviation of a gel from its table, and of a table of few points from the curve.
 TABLE = 0.02
-#: Curves of cameras are worst at the ends of the spectrum and where a channel is nearly blind;
-#: neighbouring bands tell of it, but only if so much is allowed for.
+#: Error model of the camera's curves, which are worst at the ends of the spectrum and where a
+#: channel is nearly blind; neighbouring bands constrain these errors if they are allowed for.
 CURVES = CurveError(added=0.03)
-#: A place says something of a filter if its value without one is this many of its σ.
+#: Significance in σ of a place's value without a filter from which its transmittance is defined.
 CLEAR = 30.0
 
 NO_FILTER = Transmittance("none", np.array([300.0, 900.0]), np.ones(2))
@@ -41,18 +41,18 @@ NO_FILTER = Transmittance("none", np.array([300.0, 900.0]), np.ones(2))
 
 @dataclass(frozen=True, eq=False)
 class FilterScenes:
-    """Pictures through the strip, with each filter.
+    """Frames through the strip with each filter.
 
     Attributes
     ----------
     position
-        (p,) rising.
+        Positions along the strip, rising, shape (p,).
     filters
-        (f,) the first is `NO_FILTER`.
+        Transmittances of the f filters; the first is `NO_FILTER`.
     values
-        (f,) in the same order.
+        Slice values with each filter, in the same order.
     card
-        The card at the same places without the strip.
+        Slice values of the card at the same places without the strip.
     """
 
     position: FloatArray
@@ -61,8 +61,12 @@ class FilterScenes:
     card: SliceValues
 
     def without(self, names: set[str]) -> "FilterScenes":
-        """Leave some filters out."""
-        kept = [number for number, one in enumerate(self.filters) if one.name not in names]
+        """Return the scenes without the filters of these names."""
+        kept = [
+            number
+            for number, transmittance in enumerate(self.filters)
+            if transmittance.name not in names
+        ]
         return replace(
             self,
             filters=[self.filters[number] for number in kept],
@@ -72,26 +76,40 @@ class FilterScenes:
 
 @dataclass(frozen=True)
 class Bench:
-    """What is known of the light's way: lamp, card, camera."""
+    """Known spectra on the light's path.
+
+    Attributes
+    ----------
+    lamp
+        Spectrum of the lamp.
+    card
+        Reflectance of the card.
+    camera
+        Curves of the camera.
+    """
 
     lamp: Spectrum
     card: Transmittance
     camera: CameraResponse
 
     def card_values(self) -> FloatArray:
-        """(channels,) ∫ L R S_c dλ: the card by itself."""
+        """Return ∫ L R S_c dλ, the signal of the card itself, shape (channels,)."""
         nodes, light = self._light()
         values: FloatArray = light @ self.camera.at(nodes)
         return values
 
     def relative(self, lvf: Lvf, filters: Sequence[Transmittance]) -> FloatArray:
-        """(filters, p, channels) values over those without a filter."""
-        nodes, light = self._light(*(one.wavelength_nm for one in filters))
-        seen = lvf.transmission(nodes) * light
+        """Return values relative to those without a filter, shape (filters, p, channels)."""
+        nodes, light = self._light(*(transmittance.wavelength_nm for transmittance in filters))
+        through_strip = lvf.transmission(nodes) * light
         sensitivity = self.camera.at(nodes)
-        bare = seen @ sensitivity
-        passed = [(seen * one.at(nodes)) @ sensitivity for one in filters]
-        relative: FloatArray = np.stack(passed) / np.maximum(bare, 1e-12 * bare.max())
+        unfiltered = through_strip @ sensitivity
+        transmitted = [
+            (through_strip * transmittance.at(nodes)) @ sensitivity for transmittance in filters
+        ]
+        relative: FloatArray = np.stack(transmitted) / np.maximum(
+            unfiltered, 1e-12 * unfiltered.max()
+        )
         return relative
 
     def _light(self, *knots: FloatArray) -> tuple[FloatArray, FloatArray]:
@@ -102,56 +120,63 @@ class Bench:
 
 
 def misfits(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> list[FilterMisfit]:
-    """Of every filter but the first.
+    """Return the misfit of every filter but the first.
 
-    The bands that the maker states will do: what counts is where along the strip a filter bites,
-    and the camera's curves cancel in the ratio to the picture without it.
+    The nominal bands of the maker suffice: the test is where along the strip a filter absorbs, and
+    the camera's curves cancel in the ratio to the frame without it.
     """
     lvf = nominal_lvf(wavelengths, wavelengths.wavelength_nm(scenes.position))
     expected = bench.relative(lvf, scenes.filters)
-    bare = scenes.values[0].value
+    unfiltered = scenes.values[0].value
     # In its brightest colour a place sees its band, in the others and at dim ends what leaks.
-    fraction = np.nan_to_num(bare / scenes.card.value)
-    own = np.argmax(fraction, axis=1)
+    fraction = np.nan_to_num(unfiltered / scenes.card.value)
+    brightest = np.argmax(fraction, axis=1)
     bright = fraction.max(axis=1) > BRIGHT * fraction.max()
-    at = np.flatnonzero(bright), own[bright]
-    found = []
-    for number, seen in enumerate(scenes.values[1:], start=1):
-        ratio = seen.value[at] / bare[at]
-        off = np.sqrt(np.nanmean((expected[:, *at] - ratio) ** 2, axis=1))
-        best = int(np.argmin(off))
+    places = np.flatnonzero(bright), brightest[bright]
+    filter_misfits = []
+    for number, scene in enumerate(scenes.values[1:], start=1):
+        ratio = scene.value[places] / unfiltered[places]
+        deviation = np.sqrt(np.nanmean((expected[:, *places] - ratio) ** 2, axis=1))
+        best = int(np.argmin(deviation))
         name = scenes.filters[number].name
-        like = scenes.filters[best].name
-        another = like != name and off[number] > BETTER * off[best]
-        wrong = off[number] > FAR_OFF or (off[number] > EXPECTED and another)
-        found.append(FilterMisfit(name, float(off[number]), float(off[best]), like, bool(wrong)))
-    return found
+        best_name = scenes.filters[best].name
+        is_other_filter = best_name != name and deviation[number] > BETTER * deviation[best]
+        is_left_out = deviation[number] > FAR_OFF or (
+            deviation[number] > EXPECTED and is_other_filter
+        )
+        filter_misfits.append(
+            FilterMisfit(
+                name, float(deviation[number]), float(deviation[best]), best_name, bool(is_left_out)
+            )
+        )
+    return filter_misfits
 
 
 def left_out_text(misfit: FilterMisfit) -> str:
-    """A warning about a filter that was not in its place."""
-    looks = "it looks like none of the others"
+    """Return a warning about a filter that was not in its place."""
+    likeness = "it looks like none of the others"
     if misfit.like != misfit.name and misfit.own > BETTER * misfit.best:
-        like = "no filter" if misfit.like == NO_FILTER.name else misfit.like
-        looks = f"it looks like {like} ({misfit.best:.3f})"
+        best_name = "no filter" if misfit.like == NO_FILTER.name else misfit.like
+        likeness = f"it looks like {best_name} ({misfit.best:.3f})"
     return (
         f"colour filter {misfit.name}: its picture is off its transmittance by {misfit.own:.3f} "
-        f"(rms along the strip), {looks}; it was not in its place, and is left out (put it in "
+        f"(rms along the strip), {likeness}; it was not in its place, and is left out (put it in "
         "and take its unit again, or correct its file)"
     )
 
 
 def calibrated(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -> LvfCalibration:
-    """T_p(λ) at every position, in units of the card seen without the strip.
+    """Fit T_p(λ) at every position, in units of the card seen without the strip.
 
-    What lens, lamp and card do to a place is divided out by the picture of the card itself; so is
-    how high the camera's channels stand to one another under this lamp.
+    The effect of lens, lamp and card on a place is divided out by the frame of the card itself, and
+    so is the ratio of the camera's channels under this lamp.
     """
     reference = bench.card_values() / scenes.card.value
-    value = np.stack([one.value * reference for one in scenes.values], axis=1)
+    value = np.stack([scene.value * reference for scene in scenes.values], axis=1)
     sigma = [
-        np.hypot(seen.sigma, (FLICKER if one is NO_FILTER else TABLE) * seen.value) * reference
-        for one, seen in zip(scenes.filters, scenes.values, strict=True)
+        np.hypot(scene.sigma, (FLICKER if transmittance is NO_FILTER else TABLE) * scene.value)
+        * reference
+        for transmittance, scene in zip(scenes.filters, scenes.values, strict=True)
     ]
     return calibrate_lvf(
         scenes.position,
@@ -167,17 +192,20 @@ def calibrated(scenes: FilterScenes, bench: Bench, wavelengths: WavelengthMap) -
 
 
 def residuals(scenes: FilterScenes, bench: Bench, lvf: Lvf) -> FloatArray:
-    """(filters, p) transmittance measured minus what the calibrated strip lets expect, mean of the
-    channels by their light; NaN where it says nothing.
+    """Return measured transmittance minus that of the calibrated strip, shape (filters, p).
+
+    It is the mean of the channels weighted by their light; NaN where it is undetermined.
     """
     expected = bench.relative(lvf, scenes.filters)
-    bare = scenes.values[0]
-    clear = bare.value > CLEAR * bare.sigma
-    weight = np.where(clear, bare.value, 0.0)
+    unfiltered = scenes.values[0]
+    is_clear = unfiltered.value > CLEAR * unfiltered.sigma
+    weight = np.where(is_clear, unfiltered.value, 0.0)
     total = weight.sum(axis=1)
     rows = []
-    for one, want in zip(scenes.values, expected, strict=True):
-        off = np.where(clear, one.value / np.where(clear, bare.value, 1.0) - want, 0.0)
-        mean = (weight * np.nan_to_num(off)).sum(axis=1) / np.where(total > 0, total, 1.0)
+    for scene, expected_ratio in zip(scenes.values, expected, strict=True):
+        residual = np.where(
+            is_clear, scene.value / np.where(is_clear, unfiltered.value, 1.0) - expected_ratio, 0.0
+        )
+        mean = (weight * np.nan_to_num(residual)).sum(axis=1) / np.where(total > 0, total, 1.0)
         rows.append(np.where(total > 0, mean, np.nan))
     return np.array(rows)

@@ -12,13 +12,13 @@ from labrig.optics import Lvf, Strip, WavelengthMap
 from labrig.reduce import HdrFrame, strip_profile
 from labrig.results import PlacedStrip, Stripes, StripLines
 
-#: From blue end to red end.
+#: Range of positions, from the blue end to the red end.
 WHOLE = (0.0, 1.0)
-#: Lines that excite phosphors, in nm; those of longer wavelength seldom do.
+#: Mercury lines in nm that excite phosphors; those of longer wavelength seldom do.
 EXCITING_NM = (365.02, 404.6565, 407.7837, 435.8335, 546.0750)
-#: Doors let the sample shift by no more, as a fraction of the strip's length.
+#: Largest shift of the sample by the door, as a fraction of the strip's length.
 MOST_SHIFT = 0.08
-#: Stripes are seen if they explain this fraction of what varies along the strip.
+#: Fraction of the variance along the strip that detected stripes explain at least.
 LEAST_EXPLAINED = 0.7
 
 
@@ -27,15 +27,17 @@ def strip_lines(frame: HdrFrame, strip: Strip, rising: bool | None) -> StripLine
 
     Parameters
     ----------
+    frame
+        Frame of the strip under the mercury lamp.
     strip
-        Which way its wavelengths rise is not asked.
+        Place of the strip; the direction of its wavelengths does not matter.
     rising
-        Which way they are expected to rise from left to right; None: as they do.
+        Whether wavelengths are expected to rise from left to right; None accepts both directions.
 
     Raises
     ------
     FitError
-        There are none, or the strip is the wrong way round.
+        There are no lines, or the strip is the wrong way round.
     """
     profile = strip_profile(frame, strip)
     lines = locate_lines(profile.position, profile.value_dn_per_s, rising=rising)
@@ -47,15 +49,15 @@ def strip_lines(frame: HdrFrame, strip: Strip, rising: bool | None) -> StripLine
     )
 
 
-def wavelengths_along(found: StripLines) -> WavelengthFit:
-    """Position → wavelength from the blue end to the red end."""
-    return fit_wavelengths(found.lines, WHOLE)
+def wavelengths_along(lamp_strip: StripLines) -> WavelengthFit:
+    """Fit the wavelength by the position from the blue end to the red end."""
+    return fit_wavelengths(lamp_strip.lines, WHOLE)
 
 
-def place_on_sample(found: StripLines, wavelengths: WavelengthMap) -> PlacedStrip:
-    """Move the ends of a strip until its lines are where the filter has them.
+def place_on_sample(lamp_strip: StripLines, wavelengths: WavelengthMap) -> PlacedStrip:
+    """Move the ends of a strip until its lines agree with the filter's map.
 
-    The lamp comes in obliquely and the camera sees the strip from another distance: it is shifted
+    The lamp's light is oblique and the camera sees the strip from another distance: it is shifted
     and stretched, but the filter is the same.
 
     Raises
@@ -63,25 +65,25 @@ def place_on_sample(found: StripLines, wavelengths: WavelengthMap) -> PlacedStri
     DataError
         The strip would leave the frame.
     """
-    lines = found.lines
+    lines = lamp_strip.lines
     slope = np.abs(np.gradient(wavelengths.wavelength_nm(np.linspace(*WHOLE, 201)), 0.005)).mean()
     sigma = np.hypot(lines.sigma, 0.1 / slope)
-    wanted = wavelengths.position(lines.wavelength_nm)
+    map_position = wavelengths.position(lines.wavelength_nm)
     (stretch, shift), covariance = np.polyfit(
-        wanted, lines.position, 1, w=1 / sigma, cov="unscaled"
+        map_position, lines.position, 1, w=1 / sigma, cov="unscaled"
     )
-    strip = _moved(found.strip, float(shift), float(shift + stretch))
-    there = (lines.position - shift) / stretch
-    at = np.array([wanted.mean(), 1.0])
+    strip = _move_ends(lamp_strip.strip, float(shift), float(shift + stretch))
+    position = (lines.position - shift) / stretch
+    terms = np.array([map_position.mean(), 1.0])
     return PlacedStrip(
         strip,
-        wavelengths.wavelength_nm(there) - lines.wavelength_nm,
-        float(slope * np.sqrt(at @ covariance @ at)),
+        wavelengths.wavelength_nm(position) - lines.wavelength_nm,
+        float(slope * np.sqrt(terms @ covariance @ terms)),
     )
 
 
-def _moved(strip: Strip, blue: float, red: float) -> Strip:
-    """The strip whose blue and red ends are at these positions along the old one."""
+def _move_ends(strip: Strip, blue: float, red: float) -> Strip:
+    """Return the strip whose blue and red ends are at these positions along the old one."""
     start, end = (blue, red) if strip.rising else (1 - red, 1 - blue)
     left, right = np.array(strip.left), np.array(strip.right)
     ends = [left + fraction * (right - left) for fraction in (start, end)]
@@ -97,37 +99,39 @@ def _moved(strip: Strip, blue: float, red: float) -> Strip:
 
 
 def shifted_by_stripes(frame: HdrFrame, strip: Strip, lvf: Lvf, nm_per_strip: float) -> Stripes:
-    """Shift the strip until the stripes of glow are where the filter lets mercury lines through.
+    """Shift the strip until the stripes of glow lie where the filter transmits mercury lines.
 
-    Heights of the lines are free: how strongly each of them excites is not known yet.
+    Heights of the lines are free: how strongly each of them excites is unknown here.
 
     Raises
     ------
     FitError
-        No stripes are seen.
+        No stripes are detected.
     """
     profile = strip_profile(frame, strip)
     position = profile.position if strip.rising else 1 - profile.position
     glow = profile.value_dn_per_s.sum(axis=1)
     shapes = lvf.transmission(np.array(EXCITING_NM)).T
-    varies = float(((glow - glow.mean()) ** 2).sum())
+    variation = float(((glow - glow.mean()) ** 2).sum())
 
-    def left(shift: float) -> float:
-        at = np.clip(position - shift, lvf.position[0], lvf.position[-1])
-        columns = [np.interp(at, lvf.position, shape) for shape in shapes]
-        design = np.column_stack([*columns, np.ones_like(at)])
-        rest = glow - design @ nonnegative_least_squares(design, glow)
-        return float(rest @ rest)
+    def residual_square(shift: float) -> float:
+        unshifted = np.clip(position - shift, lvf.position[0], lvf.position[-1])
+        columns = [np.interp(unshifted, lvf.position, shape) for shape in shapes]
+        design = np.column_stack([*columns, np.ones_like(unshifted)])
+        residual = glow - design @ nonnegative_least_squares(design, glow)
+        return float(residual @ residual)
 
     coarse = np.linspace(-MOST_SHIFT, MOST_SHIFT, 33)
-    best = coarse[np.argmin([left(shift) for shift in coarse])]
+    best = coarse[np.argmin([residual_square(shift) for shift in coarse])]
     step = coarse[1] - coarse[0]
     # Least squares, but of curves with a kink at every position of the filter: without slopes.
-    found = minimize_scalar(left, bounds=(best - step, best + step), method="bounded")
-    if not varies or found.fun > (1 - LEAST_EXPLAINED) * varies:
+    result = minimize_scalar(residual_square, bounds=(best - step, best + step), method="bounded")
+    if not variation or result.fun > (1 - LEAST_EXPLAINED) * variation:
         raise FitError("no stripes of mercury lines are seen on the sample")
-    shift = float(found.x)
-    curvature = (left(shift + step) + left(shift - step) - 2 * found.fun) / step**2
-    noise = found.fun / max(len(glow) - len(EXCITING_NM) - 2, 1)
+    shift = float(result.x)
+    curvature = (
+        residual_square(shift + step) + residual_square(shift - step) - 2 * result.fun
+    ) / step**2
+    noise = result.fun / max(len(glow) - len(EXCITING_NM) - 2, 1)
     sigma = float(np.sqrt(2 * noise / curvature)) if curvature > 0 else MOST_SHIFT
-    return Stripes(_moved(strip, shift, 1 + shift), shift * nm_per_strip, sigma * nm_per_strip)
+    return Stripes(_move_ends(strip, shift, 1 + shift), shift * nm_per_strip, sigma * nm_per_strip)
