@@ -25,7 +25,7 @@ from labrig.quantity import duration_text
 MAY_BE_ON, ALL_OFF = b"+", b"-"
 #: Message of the guard when it is ready.
 READY = "ready"
-HEARTBEAT_DURATION_S = 1.0
+HEARTBEAT_INTERVAL_S = 1.0
 #: Silence after which labrig counts as hung, longer than any call that holds the interpreter.
 HANG_TIMEOUT_S = 30
 #: Duration of the attempts to switch a light off: its board may have to be plugged in again.
@@ -110,7 +110,7 @@ class Guard:
                 self._process.wait()
 
     def _beat(self) -> None:
-        while not self._closed.wait(HEARTBEAT_DURATION_S):
+        while not self._closed.wait(HEARTBEAT_INTERVAL_S):
             with self._lock, suppress(DeviceError):  # tried again with the next beat
                 self._send()
 

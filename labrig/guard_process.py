@@ -24,7 +24,7 @@ from labrig.errors import LabrigError
 from labrig.guard import (
     ALL_OFF,
     HANG_TIMEOUT_S,
-    HEARTBEAT_DURATION_S,
+    HEARTBEAT_INTERVAL_S,
     MAY_BE_ON,
     READY,
     TRIES_FOR_S,
@@ -63,10 +63,10 @@ def labrig_is_gone(source: BinaryIO, pid: int) -> bool:
     state, silent_s = ALL_OFF, 0.0
     while True:
         try:
-            message = messages.get(timeout=HEARTBEAT_DURATION_S)
+            message = messages.get(timeout=HEARTBEAT_INTERVAL_S)
         except queue.Empty:
             # Counted, not looked up on a clock: a PC that slept has not been silent.
-            silent_s += HEARTBEAT_DURATION_S
+            silent_s += HEARTBEAT_INTERVAL_S
             if state == MAY_BE_ON and silent_s >= HANG_TIMEOUT_S:
                 _kill(pid)
                 return True

@@ -90,8 +90,8 @@ def test_silence_ends_what_hangs_but_only_while_a_light_may_be_on(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     killed: list[int] = []
-    monkeypatch.setattr(guard_process, "BEAT_S", 0.01)
-    monkeypatch.setattr(guard_process, "HANGS_S", 0.1)
+    monkeypatch.setattr(guard_process, "HEARTBEAT_INTERVAL_S", 0.01)
+    monkeypatch.setattr(guard_process, "HANG_TIMEOUT_S", 0.1)
     monkeypatch.setattr(guard_process, "_kill", killed.append)
     hears, says = os.pipe()
     with os.fdopen(hears, "rb", buffering=0) as source, os.fdopen(says, "wb", buffering=0) as pipe:
@@ -143,7 +143,7 @@ def stand_ins(monkeypatch: pytest.MonkeyPatch) -> list["subprocess.Popen[bytes]"
         return started[-1]
 
     monkeypatch.setattr(guard_module, "_started", start)
-    monkeypatch.setattr(guard_module, "BEAT_S", 0.01)
+    monkeypatch.setattr(guard_module, "HEARTBEAT_INTERVAL_S", 0.01)
     return started
 
 

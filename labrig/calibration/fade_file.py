@@ -139,7 +139,7 @@ def read_fade_file(path: Path) -> FadeFile:
     >>> t_s, fraction = lamp.in_bands(lamp.fade, [400, 500, 600, 700])
     >>> fraction.shape == (len(t_s), 3)
     True
-    >>> lamp.fade.missing_s()[:2].round(3).tolist()
+    >>> lamp.fade.equivalent_s()[:2].round(3).tolist()
     [0.029, 0.031]
     """
     return read_model(path, FadeFile)

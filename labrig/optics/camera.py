@@ -169,8 +169,8 @@ def read_checked_curves(
 
     Examples
     --------
-    >>> from labrig.optics import read_sound_curves
-    >>> file = read_sound_curves("canon_eos_5d_mark_ii", ["G"])
+    >>> from labrig.optics import read_checked_curves
+    >>> file = read_checked_curves("canon_eos_5d_mark_ii", ["G"])
     >>> list(file.curves), len(file.curves["G"].wavelength_nm)
     (['G'], 81)
     """

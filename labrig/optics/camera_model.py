@@ -224,10 +224,10 @@ def f_number_text(f_number: float | None) -> str:
 
     Examples
     --------
-    >>> from labrig.optics import stop_text
-    >>> stop_text(5.6)
+    >>> from labrig.optics import f_number_text
+    >>> f_number_text(5.6)
     'f/5.6'
-    >>> stop_text(None)
+    >>> f_number_text(None)
     'an unknown aperture'
     """
     return "an unknown aperture" if f_number is None else f"f/{f_number:g}"

@@ -329,11 +329,11 @@ def signal_through(lvf: Lvf, camera: CameraResponse, light: Spectrum) -> FloatAr
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.optics import Spectrum, WavelengthMap, nominal_lvf, read_camera, seen_through
+    >>> from labrig.optics import Spectrum, WavelengthMap, nominal_lvf, read_camera, signal_through
     >>> wavelengths = WavelengthMap(np.array([550.0, 200.0]), span=(0.0, 1.0))
     >>> lvf = nominal_lvf(wavelengths, [450.0, 530.0, 610.0])
     >>> white = Spectrum("equal energy", np.array([380.0, 780.0]), np.ones(2))
-    >>> seen_through(lvf, read_camera("canon_eos_5d_mark_ii"), white).round(1).tolist()
+    >>> signal_through(lvf, read_camera("canon_eos_5d_mark_ii"), white).round(1).tolist()
     [[0.2, 2.9, 22.3], [3.8, 25.9, 3.5], [12.5, 4.4, 0.2]]
     """
     low, high = camera.wavelength_nm[0], camera.wavelength_nm[-1]

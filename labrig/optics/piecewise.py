@@ -105,8 +105,8 @@ def edges_from_centres(centre_nm: ArrayLike) -> FloatArray:
 
     Examples
     --------
-    >>> from labrig.optics import edges_about
-    >>> edges_about([400, 420, 460]).tolist()
+    >>> from labrig.optics import edges_from_centres
+    >>> edges_from_centres([400, 420, 460]).tolist()
     [390.0, 410.0, 440.0, 480.0]
     """
     centre = np.asarray(centre_nm, dtype=np.float64)
@@ -173,8 +173,8 @@ def hat_functions(knots_nm: FloatArray, wavelength_nm: FloatArray) -> FloatArray
     Examples
     --------
     >>> import numpy as np
-    >>> from labrig.optics import hats
-    >>> hats(np.array([400.0, 500.0, 600.0]), np.array([425.0, 500.0, 650.0])).tolist()
+    >>> from labrig.optics import hat_functions
+    >>> hat_functions(np.array([400.0, 500.0, 600.0]), np.array([425.0, 500.0, 650.0])).tolist()
     [[0.75, 0.25, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 0.0]]
     """
     cell = np.clip(np.searchsorted(knots_nm, wavelength_nm, side="right") - 1, 0, len(knots_nm) - 2)

@@ -117,9 +117,9 @@ def frames_in_roles(run: RunRecord, roles: Collection[str]) -> list[FrameRecord]
     Examples
     --------
     >>> import labrig
-    >>> from labrig.record import FrameRole, in_roles
+    >>> from labrig.record import FrameRole, frames_in_roles
     >>> run = labrig.read_run("runs/decay")
-    >>> frames = in_roles(run, [FrameRole.DARK, FrameRole.DECAY])
+    >>> frames = frames_in_roles(run, [FrameRole.DARK, FrameRole.DECAY])
     >>> len(frames), frames[-1].path.name, frames[-1].exposure_s
     (30, '000037.dng', 0.5)
     """
@@ -275,8 +275,8 @@ def time_text(seconds: float) -> str:
 
     Examples
     --------
-    >>> from labrig.record import written_time
-    >>> written_time(1_767_225_600.0)
+    >>> from labrig.record import time_text
+    >>> time_text(1_767_225_600.0)
     '2026-01-01 00:00:00 UTC'
     """
     return datetime.fromtimestamp(seconds, UTC).strftime("%Y-%m-%d %H:%M:%S UTC")

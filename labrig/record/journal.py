@@ -261,7 +261,7 @@ def add_note(run: Path, text: str, time_text: float) -> Path:
         Run folder.
     text
         Note in Markdown; its lines are kept as they are.
-    written_time
+    time_text
         Time of the note in seconds since 1970.
 
     Returns

@@ -14,7 +14,7 @@ README = Path(__file__).parents[2] / "README.md"
 def test_the_notebook_of_the_readme_runs(
     finished: Finished, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
 ) -> None:
-    section = README.read_text(encoding="utf-8").partition("## From a notebook\n")[2]
+    section = README.read_text(encoding="utf-8").partition("In a notebook:\n")[2]
     shown = re.search(r"    import labrig\n(?:(?:    .*)?\n)+", section)
     assert shown is not None
     code = textwrap.dedent(shown[0])

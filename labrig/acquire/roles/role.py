@@ -178,7 +178,7 @@ class ExerciseContext:
     ----------
     clock
         Clock of the rig.
-    eyes
+    frame_reader
         Reader of frames and live pictures.
     """
 

@@ -25,7 +25,7 @@ class ChargeInterval:
         Name of the unit.
     on_s, off_s
         Times at which the lamp was switched on and off.
-    cold
+    cold_deficit
         Mean warm-up deficit during this charge as a fraction of a cold lamp's, 0 to 1.
     """
 

@@ -55,7 +55,7 @@ class RelativeSigmas:
         Relative flicker ρ common to all values of an exposure.
     lamp
         Relative scatter of the lamp's brightness from charge to charge.
-    cold
+    cold_deficit
         Relative σ of the deficit of a lamp that was just switched on; 0 is expected.
     scale
         Relative σ of the irradiance of every series but the first over that of the first.

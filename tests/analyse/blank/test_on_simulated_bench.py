@@ -98,7 +98,7 @@ def test_a_lamp_that_glows_on_is_never_clean(tmp_path: Path) -> None:
     found = decay_analysis.analyse(part_of(decayed, Inputs(blank=ends)))
     (patch,) = found.patches.values()
     assert list(patch.series.usable[:4]) == [False, False, True, True]
-    assert any("2 frames begin before the bench is dark" in said for said in found.warnings)
+    assert any("before the bench is dark are left out, 2 of" in said for said in found.warnings)
     rate = np.array(blank.rate_dn_per_s)[:, 1]
     assert rate[1] > rate[-1]
 
