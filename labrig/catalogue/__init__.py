@@ -3,11 +3,11 @@
 from labrig.catalogue.compare import Comparison, Difference, PatchComparison, compare_runs
 from labrig.catalogue.listing import (
     RunFilter,
-    RunState,
+    RunStatus,
     RunSummary,
     find_run,
     list_runs,
-    state_of,
+    status_of,
     summarise,
 )
 
@@ -16,11 +16,11 @@ __all__ = [
     "Difference",
     "PatchComparison",
     "RunFilter",
-    "RunState",
+    "RunStatus",
     "RunSummary",
     "compare_runs",
     "find_run",
     "list_runs",
-    "state_of",
+    "status_of",
     "summarise",
 ]

@@ -17,8 +17,8 @@ from labrig.yaml_file import did_you_mean, read_yaml
 
 #: `running`: a process writes to the run; `unfinished`: units are missing; `recorded`: all units
 #: are complete, without a result; `processed`: with a result; `damaged`: the journal is unreadable.
-RunState = Literal["running", "unfinished", "recorded", "processed", "damaged"]
-STATES: tuple[RunState, ...] = get_args(RunState)
+RunStatus = Literal["running", "unfinished", "recorded", "processed", "damaged"]
+STATUSES: tuple[RunStatus, ...] = get_args(RunStatus)
 
 
 @dataclass(frozen=True)
@@ -51,7 +51,7 @@ class RunSummary:
     sample: str
     protocol: str
     began: datetime | None
-    state: RunState
+    status: RunStatus
     done: int
     units: int | None
     frames: int
@@ -76,11 +76,11 @@ class RunFilter:
     protocol: str = "*"
     since: date = date.min
     until: date = date.max
-    state: str | None = None
+    status: str | None = None
 
     def __post_init__(self) -> None:
-        if self.state is not None and self.state not in STATES:
-            raise UsageError(f"--state {self.state}: {did_you_mean(self.state, STATES)}")
+        if self.status is not None and self.status not in STATUSES:
+            raise UsageError(f"--status {self.status}: {did_you_mean(self.status, STATUSES)}")
 
     def admits(self, run: RunSummary) -> bool:
         """Whether the filter admits `run`; a run without attempts passes no limits on the day."""
@@ -90,7 +90,7 @@ class RunFilter:
             fnmatchcase(run.sample.casefold(), self.sample.casefold())
             and fnmatchcase(run.protocol.casefold(), self.protocol.casefold())
             and (unbounded if day is None else self.since <= day <= self.until)
-            and self.state in (None, run.state)
+            and self.status in (None, run.status)
         )
 
 
@@ -119,7 +119,7 @@ def list_runs(runs: Path, run_filter: RunFilter) -> list[RunSummary]:
     >>> from pathlib import Path
     >>> from labrig.catalogue import RunFilter, list_runs
     >>> runs = list_runs(Path("runs"), RunFilter(protocol="decay"))
-    >>> [(run.folder.name, run.state) for run in runs]
+    >>> [(run.folder.name, run.status) for run in runs]
     [('decay', 'processed')]
     """
     if not runs.is_dir():
@@ -190,7 +190,7 @@ def summarise(folder: Path) -> RunSummary:
     >>> from pathlib import Path
     >>> from labrig.catalogue import summarise
     >>> summary = summarise(Path("runs/decay"))
-    >>> summary.sample, summary.state, summary.frames
+    >>> summary.sample, summary.status, summary.frames
     ('sample', 'processed', 37)
     """
     sample, protocol, units = _protocol_summary(folder)
@@ -198,8 +198,8 @@ def summarise(folder: Path) -> RunSummary:
         record, results = read_run(folder), read_fitted_decays(folder / "result")
     except (DataError, DiskError):
         has_journal = (folder / "journal.jsonl").exists()
-        state: RunState = "damaged" if has_journal else "unfinished"
-        return RunSummary(folder, sample, protocol, None, state, 0, units, 0, {})
+        status: RunStatus = "damaged" if has_journal else "unfinished"
+        return RunSummary(folder, sample, protocol, None, status, 0, units, 0, {})
     completed = record.completed()
     return RunSummary(
         folder=folder,
@@ -210,7 +210,7 @@ def summarise(folder: Path) -> RunSummary:
             if record.attempts
             else None
         ),
-        state=state_of(folder, units is not None and len(completed) == units),
+        status=status_of(folder, units is not None and len(completed) == units),
         done=len(completed),
         units=units,
         frames=sum(len(attempt.frames) for attempt in completed.values()),
@@ -237,7 +237,7 @@ def _protocol_summary(folder: Path) -> tuple[str, str, int | None]:
     return str(name), str(content.get("protocol", "?")), units
 
 
-def state_of(folder: Path, is_complete: bool) -> RunState:
+def status_of(folder: Path, is_complete: bool) -> RunStatus:
     """Return the state of a run.
 
     Parameters
@@ -255,8 +255,8 @@ def state_of(folder: Path, is_complete: bool) -> RunState:
     Examples
     --------
     >>> from pathlib import Path
-    >>> from labrig.catalogue import state_of
-    >>> state_of(Path("runs/decay"), is_complete=True)
+    >>> from labrig.catalogue import status_of
+    >>> status_of(Path("runs/decay"), is_complete=True)
     'processed'
     """
     if _is_being_written(folder):

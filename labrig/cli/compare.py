@@ -20,8 +20,8 @@ def compare(
         list[str] | None,
         typer.Option(
             metavar="[PATCH=]MATERIAL",
-            help="Lay this beside what was measured: a shipped material such as blue-paint, or a "
-            "file. Repeatable.",
+            help="Material to compare with the measured one: a shipped one such as blue-paint, "
+            "or a file. Repeatable.",
         ),
     ] = None,
     white: Annotated[
@@ -34,13 +34,13 @@ def compare(
         ),
     ] = "all",
     camera: Annotated[
-        str | None, typer.Option("--camera", help="Other camera curves than the rig file names.")
+        str | None, typer.Option("--camera", help="Camera curves to use instead of the rig file's.")
     ] = None,
     figures: Annotated[
         Path | None,
         typer.Option(help="Folder for the figures; default: comparison in the run folder."),
     ] = None,
-    runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
+    runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     json: Annotated[bool, typer.Option("--json", help="Print as JSON, draw nothing.")] = False,
 ) -> None:
     """Predicted against photographed glow, more states against one, a material beside another.

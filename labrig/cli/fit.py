@@ -17,11 +17,11 @@ def fits() -> None:
 def decay(
     series: Annotated[
         Path,
-        typer.Argument(help="series.csv of a run, or a table of time, value and maybe sigma."),
+        typer.Argument(help="series.csv of a run, or a table of time, value and optionally sigma."),
     ],
     states: Annotated[
         int | None,
-        typer.Option("--states", min=1, max=3, help="Number of states; default: chosen."),
+        typer.Option("--states", min=1, max=3, help="Number of states; chosen by default."),
     ] = None,
     offset: Annotated[
         str, typer.Option("--offset", help="'zero', 'free', or the σ of a constant background.")

@@ -15,7 +15,7 @@ def show(
         list[str] | None, typer.Option("--curve", help="Name of a curve; may be given again.")
     ] = None,
     picture: Annotated[
-        Path | None, typer.Option("--picture", help="Draw into this file (.png, .svg, .pdf).")
+        Path | None, typer.Option("--picture", help="File for a figure (.png, .svg, .pdf).")
     ] = None,
 ) -> None:
     """What is in a file of measured curves, and how they look."""

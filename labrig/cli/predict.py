@@ -136,7 +136,7 @@ def _doubts(prediction: "Prediction", patch: str) -> list[str]:
         cheapest = min(sufficient, key=lambda remedy: remedy.extra_time_s, default=None)
         would = f"'{cheapest.change.says}' would" if cheapest else "nothing below is enough"
         doubts.append(
-            f"the fit will not tell these {len(predicted.k_r_per_s)} states apart for sure: it "
+            f"the fit will not resolve these {len(predicted.k_r_per_s)} states apart for sure: it "
             f"sees all of them with a chance of {100 * predicted.chance_of_all_states:.0f} %, and "
             f"their rates {predicted.least_apart:.1f} σ from each other; {would}"
         )

@@ -19,17 +19,18 @@ def process(
     ] = None,
     exclude: Annotated[
         list[str] | None,
-        typer.Option("--exclude", help="A frame to leave out, by number or name. Repeatable."),
+        typer.Option("--exclude", help="Frame to leave out, by number or name. Repeatable."),
     ] = None,
     states: Annotated[
         int | None, typer.Option("--states", min=1, max=3, help="Number of states to fit.")
     ] = None,
     rate: Annotated[
         list[float] | None,
-        typer.Option("--rate", help="A rate in 1/s that is known and held. Repeatable."),
+        typer.Option("--rate", help="Rate in 1/s that is held fixed. Repeatable."),
     ] = None,
     camera: Annotated[
-        str | None, typer.Option("--camera", help="Other camera curves, for the report's colours.")
+        str | None,
+        typer.Option("--camera", help="Camera curves to use instead, for the report's colours."),
     ] = None,
     optics: Annotated[
         list[str] | None,
@@ -39,7 +40,7 @@ def process(
             "run, such as lvf=PATH. Repeatable.",
         ),
     ] = None,
-    runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
+    runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     json: Annotated[bool, typer.Option("--json", help="Print the result as JSON.")] = False,
 ) -> None:
     """Reduce, fit and report a run again, and say what changed.

@@ -1,5 +1,6 @@
 """`labrig protocol`: shipped protocols, and copies of them to be edited."""
 
+from itertools import takewhile
 from pathlib import Path
 from typing import Annotated
 
@@ -10,24 +11,37 @@ app = typer.Typer(help="The protocols that can be run.")
 
 @app.command("list")
 def list_protocols() -> None:
-    """Shipped protocol files and what each of them does."""
+    """List the shipped protocol files and what each of them measures."""
+    from rich.console import Console
+    from rich.table import Table
+
     from labrig import resources
     from labrig.acquire import read_protocol
 
+    table = Table(box=None, pad_edge=False)
+    for title in ("file", "protocol", "measures"):
+        table.add_column(title, no_wrap=title != "measures")
     for path in resources.names("protocols").values():
         model = read_protocol(path)
-        summary = path.read_text(encoding="utf-8").splitlines()[0].removeprefix("#").strip()
-        typer.echo(f"{path.stem:16} ({model.protocol})  {summary}")
+        table.add_row(path.stem, model.protocol, _summary(path.read_text(encoding="utf-8")))
+    Console().print(table)
+
+
+def _summary(text: str) -> str:
+    """Return the first sentence of the comment that a protocol file begins with."""
+    comment = takewhile(lambda line: line.startswith("#"), text.splitlines())
+    whole = " ".join(line.removeprefix("#").strip() for line in comment)
+    return whole.partition(". ")[0].removesuffix(".") + "."
 
 
 @app.command("new")
 def new_protocol(
     name: Annotated[str, typer.Argument(help="A shipped protocol, see 'labrig protocol list'.")],
     file: Annotated[
-        Path | None, typer.Argument(help="Where to put it.", show_default="./my-NAME.yaml")
+        Path | None, typer.Argument(help="Path of the new file.", show_default="./my-NAME.yaml")
     ] = None,
 ) -> None:
-    """Put a commented protocol file in place, to be changed; nothing is overwritten."""
+    """Create a commented protocol file to change; nothing is overwritten."""
     from labrig import resources
     from labrig.errors import DiskError, UsageError
 

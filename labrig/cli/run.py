@@ -19,14 +19,14 @@ Protocol = Annotated[
 RigOption = Annotated[
     str, typer.Option("--rig", help="A shipped rig, such as 'sim', or a path to a YAML file.")
 ]
-Runs = Annotated[Path, typer.Option("--runs", help="Where run folders are made.")]
+Runs = Annotated[Path, typer.Option("--runs", help="Folder in which run folders are created.")]
 NoProcess = Annotated[
     bool, typer.Option("--no-process", help="Stop after recording; reduce and fit later.")
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print the result as JSON.")]
 Yes = Annotated[
     bool,
-    typer.Option("--yes", help="Ask nobody: the rig's 'changer' do what is to be done by hand."),
+    typer.Option("--yes", help="Non-interactive: the rig's 'changer' does the manual steps."),
 ]
 
 
@@ -81,7 +81,7 @@ def resume(
     run: Annotated[
         Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
     ],
-    runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
+    runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     yes: Yes = False,
     no_process: NoProcess = False,
     on_finish: Annotated[

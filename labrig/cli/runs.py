@@ -27,7 +27,7 @@ app = typer.Typer(
     cls=_ListsByDefault,
 )
 
-Runs = Annotated[Path, typer.Option("--runs", help="Where the run folders are.")]
+Runs = Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")]
 Run = Annotated[Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")]
 Sample = Annotated[str, typer.Option(help="Only samples of this name; * stands for anything.")]
 Protocol = Annotated[str, typer.Option(help="Only runs of this protocol.")]
@@ -38,8 +38,11 @@ Since = Annotated[
 Until = Annotated[
     datetime | None, typer.Option(formats=["%Y-%m-%d"], help="Only runs of this day or earlier.")
 ]
-State = Annotated[
-    str | None, typer.Option(help="running, unfinished, recorded, processed or damaged.")
+Status = Annotated[
+    str | None,
+    typer.Option(
+        help="Only runs with this status: running, unfinished, recorded, processed or damaged."
+    ),
 ]
 Json = Annotated[bool, typer.Option("--json", help="Print as JSON.")]
 
@@ -53,7 +56,7 @@ def list_them(
     protocol: Protocol = "*",
     since: Since = None,
     until: Until = None,
-    state: State = None,
+    status: Status = None,
     json: Json = False,
 ) -> None:
     """One line a run: when, which sample, how far it came, which rates."""
@@ -66,7 +69,7 @@ def list_them(
         protocol,
         since.date() if since else date.min,
         until.date() if until else date.max,
-        state,
+        status,
     )
     summaries = list_runs(runs, run_filter)
     if json:
@@ -89,7 +92,7 @@ def show(run: Run, runs: Runs = Path("runs"), json: Json = False) -> None:
         _print_json({**_summary_json(summary), "notes": notes})
         return
     typer.echo(f"{folder}")
-    typer.echo(f"  {summary.protocol} of {summary.sample}, {_when(summary)} UTC, {summary.state}")
+    typer.echo(f"  {summary.protocol} of {summary.sample}, {_when(summary)} UTC, {summary.status}")
     typer.echo(f"  {_progress(summary)} units, {summary.frames} frames")
     _print_results(folder)
     report = folder / "result" / "report.html"
@@ -144,14 +147,14 @@ def _print_runs(summaries: list["RunSummary"]) -> None:
     from rich.text import Text
 
     table = Table(box=None, pad_edge=False)
-    for title in ("began (UTC)", "sample", "protocol", "state", "k_r in 1/s"):
+    for title in ("began (UTC)", "sample", "protocol", "status", "k_r in 1/s"):
         table.add_column(title, overflow="fold")
     for run in summaries:
         table.add_row(
             _when(run),
             run.sample,
             run.protocol,
-            Text(_state(run), style=_STYLES.get(run.state, "")),
+            Text(_status(run), style=_STYLES.get(run.status, "")),
             "\n".join(_short_rates(*patch) for patch in run.results.items()),
         )
     Console().print(table)
@@ -234,8 +237,8 @@ def _when(run: "RunSummary") -> str:
     return "–" if run.began is None else f"{run.began:%Y-%m-%d %H:%M}"
 
 
-def _state(run: "RunSummary") -> str:
-    return run.state if run.done == run.units else f"{run.state}, {_progress(run)}"
+def _status(run: "RunSummary") -> str:
+    return run.status if run.done == run.units else f"{run.status}, {_progress(run)}"
 
 
 def _progress(run: "RunSummary") -> str:

@@ -10,7 +10,7 @@ def watch(
     run: Annotated[
         Path, typer.Argument(help="A run folder, the beginning of its name, or 'last'.")
     ] = Path("last"),
-    runs: Annotated[Path, typer.Option("--runs", help="Where the run folders are.")] = Path("runs"),
+    runs: Annotated[Path, typer.Option("--runs", help="Folder of the run folders.")] = Path("runs"),
     port: Annotated[
         int, typer.Option("--port", help="On 127.0.0.1; 0 for any free one.", min=0, max=65535)
     ] = 0,

@@ -8,7 +8,7 @@ from pathlib import Path
 from typing import Any
 
 from labrig.acquire import ProtocolModel, plan, read_protocol, read_rig_file
-from labrig.catalogue import RunState, state_of
+from labrig.catalogue import RunStatus, status_of
 from labrig.errors import DataError, LabrigError, UsageError
 from labrig.record import Attempt, FrameRecord, FrameRole, RunRecord, read_run
 from labrig.reduce import jpeg
@@ -62,7 +62,7 @@ class RunFollower:
         }
         self._last_look: tuple[object, ...] = ()
         self._record = RunRecord(run, [], False, 0.0)
-        self._state: RunState = "unfinished"
+        self._status: RunStatus = "unfinished"
         self._points: dict[str, list[dict[str, Any]]] = {}
         self._newest_frame: dict[str, Any] = {}
         self._unreadable: set[str] = set()
@@ -81,9 +81,9 @@ class RunFollower:
         if sizes[0] and sizes != self._last_look[:2]:
             self._record = read_run(self.run)
         is_complete = len(self._record.completed()) == len(self._units)
-        self._state = state_of(self.run, is_complete)
-        is_new = (*sizes, self._state) != self._last_look
-        self._last_look = (*sizes, self._state)
+        self._status = status_of(self.run, is_complete)
+        is_new = (*sizes, self._status) != self._last_look
+        self._last_look = (*sizes, self._status)
         return self._read_frames() or is_new
 
     def state(self) -> State:
@@ -97,7 +97,7 @@ class RunFollower:
             "run": {
                 "name": self.run.name,
                 "sample": self._protocol.sample.name,
-                "state": self._state,
+                "status": self._status,
                 "simulated": self._is_simulated,
                 "last_time": self._record.last_time,
                 "frames": len(frames),
@@ -119,7 +119,7 @@ class RunFollower:
 
     def _current(self) -> Attempt | None:
         """Return the attempt under way; one that a crash left open is not under way."""
-        last = self._record.attempts[-1:] if self._state == "running" else []
+        last = self._record.attempts[-1:] if self._status == "running" else []
         return next((attempt for attempt in last if attempt.exit_status is None), None)
 
     def _counted_attempts(self) -> list[Attempt]:

@@ -30,7 +30,7 @@ function take(news) {
 /** Time in the room, in seconds since 1970: a simulated one only moves with its journal. */
 function now() {
   const { simulated, last_time } = state.run;
-  return simulated || state.run.state !== "running" ? last_time : Date.now() / 1000;
+  return simulated || state.run.status !== "running" ? last_time : Date.now() / 1000;
 }
 
 /** Where the unit under way is in its plan; no further than what the journal has to tell next. */
@@ -115,7 +115,7 @@ function showSteps() {
   const standing = state.run.now;
   $("unit").textContent = standing ? state.units[standing.unit].name : "";
   if (!standing) {
-    $("steps").replaceChildren(tag("li", NOTHING_NEXT[state.run.state], "alone"));
+    $("steps").replaceChildren(tag("li", NOTHING_NEXT[state.run.status], "alone"));
     return;
   }
   const at = position();
@@ -136,7 +136,7 @@ function showProgress() {
   showSteps();
   showUnits($("units"), units, at);
   const left = units.reduce((sum, unit) => sum + leftS(unit, at), 0);
-  $("left-s").textContent = left > 0 && run.state === "running" ? `${duration(left)} left, as planned` : "";
+  $("left-s").textContent = left > 0 && run.status === "running" ? `${duration(left)} left, as planned` : "";
   const not = run.discarded_frames ? `; ${run.discarded_frames} more do not count` : "";
   $("frames").textContent = `${run.frames} of at most ${run.planned_frames} frames${not}`;
   $("disk").textContent = `${(run.disk_free_bytes / 1e9).toFixed(1)} GB free on the disk`;
@@ -175,8 +175,8 @@ function show() {
   document.title = `${run.sample} – labrig`;
   $("sample").textContent = run.sample;
   $("run").textContent = `${run.name}${run.simulated ? " (simulated)" : ""}`;
-  $("state").textContent = isConnected ? run.state : "connection lost, trying again";
-  $("state").className = `state ${isConnected ? run.state : "lost"}`;
+  $("state").textContent = isConnected ? run.status : "connection lost, trying again";
+  $("state").className = `state ${isConnected ? run.status : "lost"}`;
   $("page").hidden = false;
   showTroubles();
   showProgress();

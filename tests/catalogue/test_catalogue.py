@@ -64,7 +64,7 @@ def week(tmp_path_factory: pytest.TempPathFactory) -> Path:
         (["--sample", "green-paint"], [4, 5]),
         (["--since", "2026-01-03"], [3, 4]),
         (["--since", "2026-01-03", "--until", "2026-01-03"], [3]),
-        (["--state", "unfinished"], [5]),
+        (["--status", "unfinished"], [5]),
         (["--protocol", "emission"], []),
     ],
 )
@@ -84,19 +84,19 @@ def test_a_person_reads_one_line_a_run(week: Path, labrig: Labrig) -> None:
     assert "processed" in paint
     assert re.search(r"0\.03\d+\(\d+\)", paint)
     assert labrig("runs", "--runs", week).out == said
-    assert "unfinished, 0 of 2" in labrig("runs", "--state=unfinished", "--runs", week).out
+    assert "unfinished, 0 of 2" in labrig("runs", "--status=unfinished", "--runs", week).out
 
 
 def test_a_run_that_is_being_written_or_damaged_says_so(week: Path, tmp_path: Path) -> None:
     (folder, *_) = (run.folder for run in list_runs(week, RunFilter(sample="blue-paint")))
     with FileLock(folder / ".lock"):
-        assert summarise(folder).state == "running"
-    assert summarise(folder).state == "processed"
+        assert summarise(folder).status == "running"
+    assert summarise(folder).status == "processed"
     damaged = tmp_path / "damaged"
     damaged.mkdir()
     (damaged / "protocol.yaml").write_text((folder / "protocol.yaml").read_text())
     (damaged / "journal.jsonl").write_text("{]\n{}\n")
-    assert summarise(damaged).state == "damaged"
+    assert summarise(damaged).status == "damaged"
 
 
 def test_runs_are_called_by_the_beginning_of_their_name(week: Path, labrig: Labrig) -> None:

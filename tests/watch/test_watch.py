@@ -107,14 +107,14 @@ def unit_states(state: State) -> list[str]:
 
 def test_what_is_done_and_what_comes(growing: Growing) -> None:
     following = RunFollower(growing.path)
-    assert settled(following)["run"]["state"] == "unfinished"
+    assert settled(following)["run"]["status"] == "unfinished"
     growing.grow_until(b'"unit": "decay-1"')
     growing.grow_until(b'"role": "decay"')
     with FileLock(growing.path / ".lock"):
         assert following.look()
         state = settled(following)
         assert not following.look()
-    assert state["run"]["state"] == "running"
+    assert state["run"]["status"] == "running"
     assert unit_states(state) == ["done", "now"]
     now = state["run"]["now"]
     assert [step["what"].split(",")[0] for step in now["done"]] == ["lamp off", "decay frame"]
@@ -132,7 +132,7 @@ def test_what_is_done_and_what_comes(growing: Growing) -> None:
 def test_the_points_are_the_decay(growing: Growing) -> None:
     growing.finish()
     state = settled(RunFollower(growing.path))
-    assert state["run"]["state"] == "processed"
+    assert state["run"]["status"] == "processed"
     assert sorted(state["results"]) == ["left", "right"]
     frames = read_run(growing.path).frames("decay")
     left = [
@@ -203,7 +203,7 @@ def test_what_was_cut_off_counts_no_more_until_it_is_done_again(
     with FileLock(run / ".lock"):
         assert len(settled(following)["points"]) == 3
     state = settled(following)
-    assert (state["run"]["state"], state["run"]["now"]) == ("unfinished", None)
+    assert (state["run"]["status"], state["run"]["now"]) == ("unfinished", None)
     assert unit_states(state) == ["done", "again"]
     assert state["points"] == {}
     assert state["run"]["discarded_frames"] == 3
@@ -211,7 +211,7 @@ def test_what_was_cut_off_counts_no_more_until_it_is_done_again(
     assert trouble == {"unit": "decay-1", "reason": "labrig was cut off", "mended": False}
     resume_run(run, quietly)
     state = settled(following)
-    assert (state["run"]["state"], unit_states(state)) == ("recorded", ["done", "done"])
+    assert (state["run"]["status"], unit_states(state)) == ("recorded", ["done", "done"])
     assert state["units"]["1"]["tries"] == 2
     assert [trouble["mended"] for trouble in state["troubles"].values()] == [True]
     assert state["run"]["discarded_frames"] == 3
