@@ -47,7 +47,7 @@ def load_driver(key: str, name: str, source: str) -> Any:
     return driver
 
 
-def read_protocol(path: Path) -> ProtocolModel:
+def read_protocol(path: str | Path) -> ProtocolModel:
     """Read a protocol file and validate it with the model that its key `protocol` names.
 
     Parameters
@@ -67,14 +67,14 @@ def read_protocol(path: Path) -> ProtocolModel:
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> import labrig
-    >>> protocol = labrig.read_protocol(Path("runs/decay/protocol.yaml"))
+    >>> protocol = labrig.read_protocol("runs/decay/protocol.yaml")
     >>> protocol.protocol, protocol.charge, protocol.camera.iso
     ('decay', 600.0, 400)
     >>> [unit.name for unit in protocol.units()]
     ['dark', 'meter', 'decay-1']
     """
+    path = Path(path)
     content = read_yaml(path)
     kind = content.get("protocol")
     if not isinstance(kind, str):

@@ -158,7 +158,7 @@ class RigFile(BaseModel):
     )
 
 
-def read_rig_file(path: Path) -> RigFile:
+def read_rig_file(path: str | Path) -> RigFile:
     """Read and validate a rig file, except the keys that belong to its drivers.
 
     Files that it names relative to its own folder have absolute paths in the result, so that the
@@ -181,15 +181,16 @@ def read_rig_file(path: Path) -> RigFile:
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> import labrig
-    >>> rig = labrig.read_rig_file(Path("runs/decay/rig.yaml"))
+    >>> rig = labrig.read_rig_file("runs/decay/rig.yaml")
     >>> rig.name
     'simulated dark room with LVF'
     >>> rig.devices["lamp"].driver, rig.optics.camera
     ('numato_relay', 'canon_eos_5d_mark_ii')
     """
-    rig = validate(_with_absolute_paths(read_yaml(path), path.resolve().parent), RigFile, str(path))
+    path = Path(path)
+    content = _with_absolute_paths(read_yaml(path), path.resolve().parent)
+    rig = validate(content, RigFile, str(path))
     for key in rig.devices:
         if key not in ROLES:
             raise UsageError(

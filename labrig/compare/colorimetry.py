@@ -6,6 +6,7 @@ from typing import Literal, get_args
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig import colour_science
 from labrig.errors import UsageError
 from labrig.optics import CameraResponse
 from labrig.report import camera_to_xyz
@@ -44,8 +45,7 @@ class Observer:
 
 def observer(name: str) -> Observer:
     """Return a standard observer of colour-science by name."""
-    import colour  # takes seconds to load
-
+    colour = colour_science.load()
     table = colour.MSDS_CMFS[name]
     return Observer(name, np.asarray(table.wavelengths), np.asarray(table.values))
 
@@ -58,8 +58,7 @@ def white_xyz(name: str, standard_observer: Observer) -> FloatArray:
     UsageError
         If there is no such illuminant.
     """
-    import colour
-
+    colour = colour_science.load()
     names = {key: key for key in colour.SDS_ILLUMINANTS if "_" not in key}
     if name not in names:
         raise UsageError(
@@ -76,8 +75,7 @@ def white_xyz(name: str, standard_observer: Observer) -> FloatArray:
 
 def lab(xyz: FloatArray, white: FloatArray) -> FloatArray:
     """Return CIELAB of X, Y, Z, shape (…, 3), both on the scale on which `white` has Y = 1."""
-    import colour
-
+    colour = colour_science.load()
     return np.asarray(colour.XYZ_to_Lab(xyz, colour.XYZ_to_xy(white)))
 
 
@@ -88,8 +86,7 @@ def delta_e(first: FloatArray, second: FloatArray) -> FloatArray:
     ----------
     Sharma, Wu, Dalal, "The CIEDE2000 color-difference formula" (2005).
     """
-    import colour
-
+    colour = colour_science.load()
     return np.asarray(colour.difference.delta_E_CIE2000(first, second))
 
 
@@ -136,8 +133,7 @@ def viewing(
     UsageError
         If there is no such white or normalisation.
     """
-    import colour
-
+    colour = colour_science.load()
     if normalisation not in get_args(Normalisation):
         raise UsageError(f"--normalise: expected 'all' or 'each', got '{normalisation}'")
     each = normalisation == "each"

@@ -8,6 +8,7 @@ from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 from numpy.typing import NDArray
 
+from labrig import colour_science
 from labrig.compare.colorimetry import FloatArray
 from labrig.compare.glow import GlowComparison
 from labrig.report import (
@@ -67,8 +68,7 @@ def screen_colours(glow: GlowComparison) -> dict[str, FloatArray]:
 
     The brightest photograph has a channel of 1. Photographs that are nothing but noise are black.
     """
-    import colour
-
+    colour = colour_science.load()
     matrix = np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB)
     photographed = into_gamut(glow.photographed @ matrix.T) * glow.seen[:, np.newaxis]
     full = max(float(photographed.max()), 1e-12)

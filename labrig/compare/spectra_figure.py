@@ -8,6 +8,7 @@ import numpy as np
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
 
+from labrig import colour_science
 from labrig.compare.colorimetry import FloatArray
 from labrig.compare.three_channels import ThreeChannels
 from labrig.report import (
@@ -95,7 +96,6 @@ def spectra_figure(results: Sequence[ThreeChannels]) -> Figure:
 
 def _on_screen(xyz: FloatArray) -> FloatArray:
     """Return linear sRGB of X, Y, Z with a maximum of 1, shape (3,)."""
-    import colour
-
+    colour = colour_science.load()
     linear = into_gamut(np.asarray(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB) @ xyz)
     return linear / max(float(linear.max()), 1e-12)

@@ -418,7 +418,7 @@ def measure(
     --------
     >>> from pathlib import Path
     >>> import labrig
-    >>> raw = labrig.read_raw(Path("frame.dng"))
+    >>> raw = labrig.read_raw("frame.dng")
     >>> measured = labrig.measure(raw, region=(0.25, 0.25, 0.5, 0.5))
     >>> for name, stats in measured.channels.items():
     ...     print(f"{name} {stats.mean:.0f} DN, sigma {stats.sigma:.1f} DN, {stats.n} pixels")

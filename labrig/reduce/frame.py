@@ -232,7 +232,7 @@ def saturated_cells(raw: RawFrame) -> PixelMask:
     >>> from pathlib import Path
     >>> import labrig
     >>> from labrig.reduce import saturated_cells
-    >>> saturated = saturated_cells(labrig.read_raw(Path("frame.dng")))
+    >>> saturated = saturated_cells(labrig.read_raw("frame.dng"))
     >>> saturated.shape, bool(saturated.any())
     ((32, 48), False)
     """

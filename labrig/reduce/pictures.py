@@ -29,7 +29,7 @@ def is_grey(raw: RawFrame) -> bool:
     >>> from pathlib import Path
     >>> import labrig
     >>> from labrig.reduce import is_grey
-    >>> raw = labrig.read_raw(Path("frame.dng"))
+    >>> raw = labrig.read_raw("frame.dng")
     >>> raw.cfa, is_grey(raw)
     ('RGGB', False)
     """
@@ -55,7 +55,7 @@ def binned(raw: RawFrame) -> Picture:
     >>> from pathlib import Path
     >>> import labrig
     >>> from labrig.reduce import binned
-    >>> picture = binned(labrig.read_raw(Path("frame.dng")))
+    >>> picture = binned(labrig.read_raw("frame.dng"))
     >>> picture.shape
     (32, 48, 3)
     >>> [f"{fraction:.0%}" for fraction in picture[16, 24]]
@@ -85,7 +85,7 @@ def small(picture: Picture, width: int) -> Picture:
     >>> from pathlib import Path
     >>> import labrig
     >>> from labrig.reduce import binned, small
-    >>> picture = binned(labrig.read_raw(Path("frame.dng")))
+    >>> picture = binned(labrig.read_raw("frame.dng"))
     >>> picture.shape, small(picture, width=24).shape
     ((32, 48, 3), (16, 24, 3))
     """
@@ -122,7 +122,7 @@ def jpeg(rgb: NDArray[np.uint8]) -> bytes:
     >>> import numpy as np
     >>> import labrig
     >>> from labrig.reduce import binned, jpeg
-    >>> picture = binned(labrig.read_raw(Path("frame.dng")))
+    >>> picture = binned(labrig.read_raw("frame.dng"))
     >>> content = jpeg(np.uint8(255 * np.clip(picture, 0, 1)))
     >>> content[6:10]
     b'JFIF'

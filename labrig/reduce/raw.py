@@ -320,7 +320,7 @@ class RawFrame:
         return channels_of(self.cfa)
 
 
-def read_raw(source: Path | bytes, name: str = "the frame") -> RawFrame:
+def read_raw(source: str | Path | bytes, name: str = "the frame") -> RawFrame:
     """Read the mosaic of a RAW file, undemosaiced, with its black and saturation levels.
 
     Parameters
@@ -346,19 +346,18 @@ def read_raw(source: Path | bytes, name: str = "the frame") -> RawFrame:
 
     Examples
     --------
-    >>> from pathlib import Path
     >>> import labrig
-    >>> raw = labrig.read_raw(Path("frame.dng"))
+    >>> raw = labrig.read_raw("frame.dng")
     >>> raw.mosaic.shape, raw.cfa, raw.black[0], raw.white
     ((64, 96), 'RGGB', 1024.0, 15600.0)
     >>> raw.exposure_s, raw.iso, raw.f_number
     (0.5, 400.0, 4.0)
     """
-    if isinstance(source, Path):
-        name = str(source)
-        content = read_bytes(source, MOST_BYTES)
-    else:
+    if isinstance(source, bytes):
         content = source
+    else:
+        name = str(source)
+        content = read_bytes(Path(source), MOST_BYTES)
     try:
         return _decode(content)
     except FrameError as error:

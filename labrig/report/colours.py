@@ -5,6 +5,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from labrig import colour_science
 from labrig.optics import CameraResponse
 from labrig.results import Series
 from labrig.written_numbers import rounded
@@ -40,8 +41,7 @@ def screen_for(camera: CameraResponse | None) -> Screen:
     """The way to the screen for a camera."""
     if camera is None:
         return Screen(np.eye(3), np.eye(3), known=False)
-    import colour  # takes seconds to load
-
+    colour = colour_science.load()
     glow = colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB @ camera_to_xyz(camera)
     halogen = np.asarray(colour.colorimetry.planck_law(camera.wavelength_nm * 1e-9, HALOGEN_K))
     under_lamp = camera.response(halogen)
@@ -78,8 +78,7 @@ def camera_to_xyz(camera: CameraResponse) -> FloatArray:
 
 def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
     """x̄, ȳ, z̄ of the CIE 1931 2° observer at each wavelength, shape (n, 3); 0 outside its table."""
-    import colour
-
+    colour = colour_science.load()
     observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     columns = [
         np.interp(wavelength_nm, observer.wavelengths, column, left=0.0, right=0.0)
@@ -90,8 +89,7 @@ def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
 
 def spectrum_colour(wavelength_nm: FloatArray, value: FloatArray) -> str:
     """The colour of a spectrum (n,) at full brightness, as `#rrggbb`; cut off at sRGB's edge."""
-    import colour
-
+    colour = colour_science.load()
     xyz = colour_matching(wavelength_nm).T @ (value * np.gradient(wavelength_nm))
     linear = into_gamut(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB @ xyz)
     return css_colour(linear / max(float(linear.max()), 1e-12))
@@ -108,8 +106,7 @@ def into_gamut(linear: FloatArray) -> FloatArray:
 
 def encoded(linear: FloatArray) -> Bytes:
     """Linear sRGB as bytes with sRGB's transfer curve; more than 1 is cut off."""
-    import colour
-
+    colour = colour_science.load()
     curve = colour.cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB")
     return np.asarray(np.rint(255 * np.asarray(curve)), dtype=np.uint8)
 

@@ -1,5 +1,7 @@
 """From raw values to the screen."""
 
+import subprocess
+import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -152,3 +154,14 @@ def test_the_misfit_is_what_the_docstring_says() -> None:
     scale = target.sum(axis=0)[1] / fitted.sum(axis=0)[1]
     rms = np.sqrt(np.mean((fitted * scale - target) ** 2, axis=0))
     np.testing.assert_allclose(rms, [0.09, 0.09, 0.16], atol=0.01)
+
+
+def test_numpy_prints_as_before() -> None:
+    code = (
+        "import numpy as np; from labrig import colour_science; colour_science.load(); "
+        "print(repr(np.array([1.0, 2.0])))"
+    )
+    printed = subprocess.run(
+        [sys.executable, "-c", code], capture_output=True, text=True, check=True
+    )
+    assert printed.stdout == "array([1., 2.])\n"
