@@ -1,13 +1,12 @@
 """colour-science, loaded when it is first needed: it takes seconds."""
 
-from types import ModuleType
+from typing import Any
 
 import numpy as np
 
 
-def load() -> ModuleType:
+def load() -> Any:
     """Return the package `colour`; how NumPy prints stays as it is, which `colour` would change."""
     with np.printoptions():
         import colour
-    assert isinstance(colour, ModuleType)
     return colour
