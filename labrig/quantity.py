@@ -76,7 +76,12 @@ def _validator(units: dict[str, float], bare: bool) -> BeforeValidator:
 
 
 def _serializer(unit: str) -> PlainSerializer:
-    return PlainSerializer(lambda value: f"{value!r} {unit}", return_type=str)
+    return PlainSerializer(lambda value: _written(value, unit), return_type=str)
+
+
+def _written(value: float, unit: str) -> str:
+    """Return a text that is read as the same number, such as `300 s`."""
+    return f"{repr(value).removesuffix('.0')} {unit}"
 
 
 def _schema(units: dict[str, float], bare: bool) -> WithJsonSchema:
@@ -104,7 +109,7 @@ class WordOrDuration:
             self._validate,
             handler(source),
             serialization=core_schema.plain_serializer_function_ser_schema(
-                lambda value: value if isinstance(value, str) else f"{value!r} s"
+                lambda value: value if isinstance(value, str) else _written(value, "s")
             ),
         )
 

@@ -35,11 +35,20 @@ def _document(whole: dict[str, Any]) -> Iterator[str]:
     blocks = dict(whole.get("$defs", {}))
     if "properties" in whole:
         yield from _block("The file", whole, blocks)
-    for name, block in blocks.items():
+    # Protocols and drivers first, then the blocks that they have in common.
+    for name, block in sorted(blocks.items(), key=lambda item: _kind(item[1]) is None):
         branches = [block, *block.get("anyOf", [])]
         table = next((branch for branch in branches if branch.get("properties")), None)
         if table is not None:
             yield from _block(name, {**table, "description": _summary(block, table)}, blocks)
+
+
+def _kind(block: dict[str, Any]) -> str | None:
+    """Return the key that chooses a block with its value, such as `protocol: decay`."""
+    for key in ("protocol", "driver"):
+        if "const" in (value := block.get("properties", {}).get(key, {})):
+            return f"`{key}: {value['const']}`"
+    return None
 
 
 def _summary(block: dict[str, Any], table: dict[str, Any]) -> str:
@@ -49,7 +58,7 @@ def _summary(block: dict[str, Any], table: dict[str, Any]) -> str:
 
 def _block(name: str, block: dict[str, Any], blocks: dict[str, Any]) -> Iterator[str]:
     yield f"({_anchor(name)})="
-    yield f"## {name}\n"
+    yield f"## {_kind(block) or name}\n"
     yield f"{block.get('description', '')}\n"
     yield "| key | value | default | meaning |"
     yield "|---|---|---|---|"
