@@ -53,17 +53,41 @@ def screen_for(camera: CameraResponse | None) -> Screen:
 
 
 def camera_to_xyz(camera: CameraResponse) -> FloatArray:
-    """M, shape (3, 3): CIE 1931 XYZ ≈ M · (R, G, B) of raw linear camera values.
+    """Return the matrix M with CIE 1931 XYZ ≈ M · (R, G, B) of raw linear camera values.
 
-    Least squares of the colour-matching functions by the sensitivities over all wavelengths
-    (spectra of any shape being equally likely), under the condition that equal energy comes out
-    exactly (Finlayson and Drew, *Color constancy and white-point preserving least squares*,
-    J. Imaging Sci. Technol. 41, 1997). Scaled so that the equal-energy spectrum that gives the
-    camera's highest channel 1 gives Y = 1.
+    The colour-matching functions are fitted by the sensitivities in least squares over all
+    wavelengths (spectra of any shape are equally likely), under the condition that equal energy is
+    reproduced exactly (white-point preserving least squares). The scale is such that the
+    equal-energy spectrum that gives the camera's highest channel 1 gives Y = 1.
 
+    Parameters
+    ----------
+    camera
+        Spectral responses of the camera, in the channels R, G, B.
+
+    Returns
+    -------
+    numpy.ndarray
+        Matrix M, shape (3, 3).
+
+    Notes
+    -----
     No camera is an observer, so narrow-band light is displaced: for the EOS 5D Mark II the residual
-    is 9, 9 and 16 % RMS of x̄, ȳ, z̄; emissions 50-100 nm wide come out within a median ΔE*ab of 18,
-    daylight within 1 %. Good for showing a glow, not for measuring its colour.
+    is 9, 9 and 16 % RMS of x̄, ȳ, z̄; emissions 50-100 nm wide are reproduced within a median ΔE*ab
+    of 18, daylight within 1 %. The matrix is good for showing a glow, not for measuring its colour.
+
+    References
+    ----------
+    Finlayson and Drew, *Color constancy and white-point preserving least squares*,
+    J. Imaging Sci. Technol. 41, 1997.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.report import camera_to_xyz
+    >>> xyz = camera_to_xyz(labrig.read_camera("canon_eos_5d_mark_ii")) @ [0.10, 0.80, 0.50]
+    >>> [f"{value:.2f}" for value in xyz]
+    ['0.25', '0.58', '0.62']
     """
     step_nm = np.gradient(camera.wavelength_nm)
     target = colour_matching(camera.wavelength_nm)
@@ -98,10 +122,28 @@ def spectrum_colour(wavelength_nm: FloatArray, value: FloatArray) -> str:
 
 
 def into_gamut(linear: FloatArray) -> FloatArray:
-    """Linear sRGB, shape (…, 3), as near as a screen can show it: what is negative becomes 0.
+    """Return linear sRGB within the gamut of a screen, with negative values set to 0.
 
     Mixing with grey of the same luminance would keep the hue of narrow-band light better, but the
     luminance of deep blue is so small, and so uncertain from a camera, that it would turn black.
+
+    Parameters
+    ----------
+    linear
+        Colours in linear sRGB, shape (…, 3).
+
+    Returns
+    -------
+    numpy.ndarray
+        Colours without negative values, shape (…, 3); values above 1 are kept.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.report import into_gamut
+    >>> laser_532_nm = np.array([-0.4, 1.0, -0.1])  # greener than a screen can show
+    >>> into_gamut(laser_532_nm).tolist()
+    [0.0, 1.0, 0.0]
     """
     return np.maximum(linear, 0.0)
 
@@ -115,7 +157,25 @@ def encoded(linear: FloatArray) -> Bytes:
 
 
 def css_colour(linear: FloatArray) -> str:
-    """One linear sRGB colour as `#rrggbb`."""
+    """Return a linear sRGB colour as CSS writes it.
+
+    Parameters
+    ----------
+    linear
+        Colour in linear sRGB, shape (3,); values outside of 0 to 1 are clipped.
+
+    Returns
+    -------
+    str
+        Colour with the transfer curve of sRGB, as `#rrggbb`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.report import css_colour
+    >>> css_colour(np.array([0.0, 0.5, 1.0]))  # half the light is more than half the byte
+    '#00bcff'
+    """
     return "#" + bytes(encoded(linear)).hex()
 
 

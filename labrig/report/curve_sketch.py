@@ -21,7 +21,28 @@ _COLOURS = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 
 
 def describe_curves(file: CurveFile) -> str:
-    """Title, and of every curve its grid, its range, its peak and its shape."""
+    """Describe the curves of a file in lines of text.
+
+    Parameters
+    ----------
+    file
+        Measured curves over wavelength, such as those of a camera or a filter.
+
+    Returns
+    -------
+    str
+        Title, number of curves and path of the file; then the grid, range and peak of each of the
+        first 12 curves, and a line of bars with its shape.
+
+    Examples
+    --------
+    >>> from labrig.optics import read_sound_curves
+    >>> from labrig.report import describe_curves
+    >>> print(describe_curves(read_sound_curves("canon_eos_5d_mark_ii", ["G"])))
+    Canon EOS 5D Mark II: one curve (...canon_eos_5d_mark_ii.json)
+      G  380-780 nm, step 5; 0.000163 to 1, highest at 520 nm
+         |      ▁▁▁▁▂▃▅▆▇█████▇▇▆▅▄▃▂▁▁                   |
+    """
     curves = list(file.curves.items())
     what = "one curve" if len(curves) == 1 else f"{len(curves)} curves"
     lines = [f"{file.title}: {what} ({file.path})"]
@@ -47,12 +68,30 @@ def _described(name: str, curve: Curve) -> str:
 
 
 def draw_curves(file: CurveFile, path: Path) -> None:
-    """All curves of a file over wavelength.
+    """Draw all curves of a file over wavelength, with bands of ± 1 σ where σ is known.
+
+    Parameters
+    ----------
+    file
+        Measured curves over wavelength, such as those of a camera or a filter.
+    path
+        Path of the picture, which ends in `.png`, `.svg` or `.pdf`.
 
     Raises
     ------
     UsageError
-        A file name that is no picture, or cannot be written.
+        If the file name is not that of a picture, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_sound_curves
+    >>> from labrig.report import draw_curves
+    >>> camera = read_sound_curves("canon_eos_5d_mark_ii")
+    >>> draw_curves(camera, Path("camera.svg"))
+    >>> draw_curves(camera, Path("camera.bmp"))
+    Traceback (most recent call last):
+    labrig.errors.UsageError: camera.bmp: expected a file name that ends in .png, .svg, .pdf
     """
     from matplotlib.figure import Figure  # slow to load
 

@@ -72,7 +72,26 @@ class Curve:
 
 
 def middles_s(series: Series) -> FloatArray:
-    """Middle of each exposure after lamp off, where its value is drawn."""
+    """Return the middle of each exposure, where figures draw its value.
+
+    Parameters
+    ----------
+    series
+        Signals of n frames with the begin and the length of their exposures.
+
+    Returns
+    -------
+    numpy.ndarray
+        Middles of the exposures in seconds after lamp off, shape (n,).
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.report import middles_s
+    >>> (series,) = labrig.read_series("series.csv")
+    >>> [f"{t_s:.2f}" for t_s in middles_s(series)[:4]]
+    ['1.31', '6.31', '11.31', '16.31']
+    """
     return series.t_s + series.exposure_s / 2
 
 

@@ -65,7 +65,21 @@ _SETTINGS = {
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """While open, figures come out alike whatever the user's own matplotlib settings are."""
+    """Set the style of all figures, whatever the user's own matplotlib settings are.
+
+    Returns
+    -------
+    contextlib.AbstractContextManager
+        Context within which figures are made and saved.
+
+    Examples
+    --------
+    >>> import matplotlib
+    >>> from labrig.report import figure_style
+    >>> with figure_style():
+    ...     matplotlib.rcParams["font.size"]
+    10.5
+    """
     with matplotlib.style.context(["default", _SETTINGS]):
         yield
 
@@ -76,7 +90,29 @@ def channel_colour(name: str, number: int) -> str:
 
 
 def new_figure(height_pt: float, width_pt: float = WIDTH_PT) -> Figure:
-    """An empty, transparent figure."""
+    """Return an empty, transparent figure.
+
+    Parameters
+    ----------
+    height_pt
+        Height in points.
+    width_pt
+        Width in points.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure without axes, of 72 dots per inch: a pixel is a point.
+
+    Examples
+    --------
+    >>> from labrig.report import figure_style, new_figure, place
+    >>> with figure_style():
+    ...     figure = new_figure(200)
+    ...     axes = place(figure, left=62, bottom=38, right=12, top=30)
+    >>> [round(72 * inches) for inches in figure.get_size_inches()]
+    [420, 200]
+    """
     figure = Figure(figsize=(width_pt / 72, height_pt / 72), dpi=72)
     figure.patch.set_visible(False)
     return figure
@@ -90,9 +126,33 @@ def place(
     top: float,
     share_x: Axes | None = None,
 ) -> Axes:
-    """Axes with margins in points from the figure's left, bottom, right and top edge.
+    """Add axes whose margins to the edges of the figure are given in points.
 
     Labels stand at the figure's edge, so that those of several axes are in line.
+
+    Parameters
+    ----------
+    figure
+        Figure that gets the axes.
+    left, bottom, right, top
+        Distances of the axes from the edges of the figure in points.
+    share_x
+        Axes with the same horizontal axis; None for a horizontal axis of its own.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Axes with grid and the colours of the report.
+
+    Examples
+    --------
+    >>> from labrig.report import figure_style, new_figure, place
+    >>> with figure_style():
+    ...     figure = new_figure(268)
+    ...     signal = place(figure, left=62, bottom=136, right=12, top=30)
+    ...     residuals = place(figure, left=62, bottom=38, right=12, top=150, share_x=signal)
+    >>> round(residuals.get_window_extent().height)
+    80
     """
     width, height = figure.get_size_inches() * 72
     axes = figure.add_axes(
@@ -156,7 +216,26 @@ BAND_OPACITY = 0.3
 
 
 def legend_above(figure: Figure, entries: Sequence[Artist], columns: int) -> None:
-    """`entries`, each with its label, at the top of `figure`."""
+    """Add a legend at the top of a figure.
+
+    Parameters
+    ----------
+    figure
+        Figure that gets the legend, with a free margin above its axes.
+    entries
+        Entries of the legend, each with its label.
+    columns
+        Largest number of columns.
+
+    Examples
+    --------
+    >>> from labrig.report import DASHED, figure_style, legend_above, lined, new_figure
+    >>> with figure_style():
+    ...     figure = new_figure(200)
+    ...     legend_above(figure, [lined("fit", "black"), lined("state", "black", DASHED)], 2)
+    >>> [text.get_text() for text in figure.legends[0].get_texts()]
+    ['fit', 'state']
+    """
     figure.legend(
         handles=list(entries),
         loc="upper left",
@@ -190,7 +269,34 @@ def marked(label: str, marker: str, colour: str, face: str | None = None) -> Lin
 def lined(
     label: str, colour: str, style: LineStyle = "-", width: float = 1.2, opacity: float = 1.0
 ) -> Line2D:
-    """An entry for a curve."""
+    """Return the legend entry of a curve.
+
+    Parameters
+    ----------
+    label
+        Text of the entry.
+    colour
+        Colour of the curve, as matplotlib takes it.
+    style
+        Line style of the curve, as matplotlib takes it.
+    width
+        Line width in points.
+    opacity
+        Opacity of the curve, from 0 to 1.
+
+    Returns
+    -------
+    matplotlib.lines.Line2D
+        Line without points, for the handles of a legend.
+
+    Examples
+    --------
+    >>> from labrig.report import INK, lined, legend_above, new_figure
+    >>> entry = lined("predicted", INK)
+    >>> legend_above(new_figure(200), [entry], columns=1)
+    >>> entry.get_label()
+    'predicted'
+    """
     return Line2D([], [], color=colour, ls=style, linewidth=width, alpha=opacity, label=label)
 
 

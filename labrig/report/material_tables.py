@@ -27,7 +27,31 @@ def measured_table(material: Material) -> Table:
 
 
 def comparison_table(comparison: MaterialComparison) -> Table:
-    """One material beside another, as the report and the terminal show it."""
+    """Return the table of the comparison of two materials, for the report and the terminal.
+
+    Parameters
+    ----------
+    comparison
+        Pairs of a measured and a reference value, from `compare_materials`.
+
+    Returns
+    -------
+    Table
+        Measured and reference value of every quantity and their difference in per cent and in σ;
+        its caption has the factors that rescale k_e and Λ, and the notes.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.material import compare_materials
+    >>> from labrig.report import comparison_table
+    >>> measured = labrig.read_material("material.yaml")
+    >>> reference = labrig.read_material("white-paint")
+    >>> for row in comparison_table(compare_materials(measured, reference)).rows:
+    ...     print("; ".join(row))
+    k_r 1 / s⁻¹; 0.2048 ± 0.0028; 0.047; +335.7; +56.1
+    k_r 2 / s⁻¹; 0.01009 ± 0.00010; –; –; –
+    """
     return Table(
         head=("", _measured_head(comparison), "reference", "apart / %", "apart / σ"),
         rows=tuple(

@@ -301,14 +301,36 @@ class Report:
 
 
 def write_report(path: Path, report: Report) -> None:
-    """Write `report` to `path`, its figures for print into a folder `figures` beside it.
+    """Write a report as one HTML file, and its figures for print into a folder beside it.
 
-    The same report gives the same bytes.
+    The figures are written into `figures` beside `path`, each as SVG file and all as one PDF. The
+    same report gives the same bytes.
+
+    Parameters
+    ----------
+    path
+        Path of the HTML file.
+    report
+        Report of one processed run.
 
     Raises
     ------
     DiskError
-        `path` cannot be written.
+        If `path` cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import RunDescription
+    >>> from labrig.report import Report, Section, write_report
+    >>> about = RunDescription(
+    ...     title="strontium aluminate", protocol="decay", run="2026-03-01_decay",
+    ...     started="10:00", ended="10:30", rig="darkroom", simulated=False, labrig_version="0.1.0"
+    ... )
+    >>> section = Section("Remarks", text=("The sample was at 20 °C for an hour before.",))
+    >>> write_report(Path("report.html"), Report(about, sections=(section,)))
+    >>> "<h1>strontium aluminate</h1>" in Path("report.html").read_text(encoding="utf-8")
+    True
     """
     with figure_style(), FigureFiles(f"{report.about.title}, {report.about.run}") as figure_files:
         shown = draw((*report.sections, *report.methods), figure_files)

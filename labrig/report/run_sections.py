@@ -59,7 +59,31 @@ def temperature_figure(
 
 
 def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
-    """Whether something else switched the lamp, and whether lamp, shield and door moved on time."""
+    """Return the section on the lamp's relay and on the timing of lamp, shield and door.
+
+    The section says whether anything but labrig switched the lamp, and how much later than planned
+    lamp, shield and door moved.
+
+    Parameters
+    ----------
+    run
+        Journal of the run.
+
+    Returns
+    -------
+    tuple of Section
+        One section, or none if there is nothing to report.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.report import lamp_sections
+    >>> (section,) = lamp_sections(labrig.read_run(Path("runs/decay")))
+    >>> print(section.text[0])
+    Begun after its planned time: lamp off at most 0 ms, shield cover at most 5.2 ms (decay-1), door
+    open at most 0 ms.
+    """
     attempts = list(run.completed().values())
     text = []
     used = [
@@ -83,7 +107,29 @@ def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
 
 
 def temperature_sections(run: RunRecord, roles: Collection[str]) -> tuple[Section, ...]:
-    """Picture and words; nothing without a thermometer. Rates rest on frames of these roles."""
+    """Return the section on the temperature during a run.
+
+    Parameters
+    ----------
+    run
+        Journal of the run.
+    roles
+        Roles of the frames from which rates are fitted; their times are shaded in the figure.
+
+    Returns
+    -------
+    tuple of Section
+        One section with a figure of the readings, or none without a thermometer.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.report import temperature_sections
+    >>> (section,) = temperature_sections(labrig.read_run(Path("runs/decay")), {"decay"})
+    >>> section.text[0].split(" (")[0]
+    '20.7 °C to 20.8 °C over the run'
+    """
     if not run.temperatures():
         return ()
     course, photographs = TemperatureHistory(run), in_roles(run, roles)
