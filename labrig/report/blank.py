@@ -1,4 +1,4 @@
-"""A blank in a report."""
+"""Report of a blank: background and stray light."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -30,11 +30,12 @@ HEIGHT_PT = 250.0
 
 
 def render(result: BlankResult, source: Source) -> Rendered:
-    """Show stray light over time, and what stays."""
+    """Render the stray light over time and the constant background of each channel."""
     return Rendered((_section(result),), tuple(_lines(result.calibration)))
 
 
 def _section(result: BlankResult) -> Section:
+    """Return the section with the figure of the light and the table of its levels."""
     file, channels = result.calibration, result.calibration.channels
     rows = tuple(
         (
@@ -71,6 +72,7 @@ def _section(result: BlankResult) -> Section:
 
 
 def _figure(result: BlankResult) -> Figure:
+    """Draw the signal above background of each frame of the blank, in DN/s."""
     file, found, channels = result.calibration, result.stray_light, result.calibration.channels
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
@@ -94,6 +96,7 @@ def _figure(result: BlankResult) -> Figure:
 
 
 def _lines(file: BlankFile) -> Iterator[str]:
+    """Yield the lines for the terminal."""
     clean = file.first_clean_s
     yield (
         "never free of the turn-off transient"

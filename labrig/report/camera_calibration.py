@@ -1,4 +1,4 @@
-"""A camera calibration in a report."""
+"""Report of a camera calibration."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -38,7 +38,7 @@ HEIGHT_PT = 230.0
 
 
 def render(result: CameraCalibrationResult, source: Source) -> Rendered:
-    """Show noise, linearity, settings, flat field."""
+    """Render noise, linearity, factors of the settings, and flat field."""
     file = result.calibration
     sections = [_noise(file, result.photon_transfers)]
     if file.linearity is not None:
@@ -48,6 +48,7 @@ def render(result: CameraCalibrationResult, source: Source) -> Rendered:
 
 
 def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
+    """Return the section with gain and read noise at each ISO speed."""
     rows = tuple(
         (
             f"{one.iso:g}",
@@ -73,6 +74,7 @@ def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
 
 
 def _transfer_figure(transfers: Sequence[PhotonTransfer]) -> Figure:
+    """Draw the photon transfer curve of each ISO speed."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
     _logarithmic(axes)
@@ -93,7 +95,7 @@ def _transfer_figure(transfers: Sequence[PhotonTransfer]) -> Figure:
 
 
 def _logarithmic(axes: Axes) -> None:
-    """The horizontal axis, with plain numbers."""
+    """Make the horizontal axis logarithmic, with plain numbers as labels."""
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
@@ -101,6 +103,7 @@ def _logarithmic(axes: Axes) -> None:
 
 
 def _linearity(found: Linearity) -> Section:
+    """Return the section on the deviation from linearity."""
     full = "is not known" if found.saturation_dn is None else f"is {found.saturation_dn:.0f} DN"
     return Section(
         "Linearity",
@@ -119,6 +122,7 @@ def _linearity(found: Linearity) -> Section:
 
 
 def _linearity_figure(found: Linearity) -> Figure:
+    """Draw the deviation from linearity in per cent over the level in DN."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     axes.axhline(0, color=MUTED, linewidth=0.8)
@@ -134,6 +138,7 @@ def _linearity_figure(found: Linearity) -> Figure:
 
 
 def _settings(file: CameraFile, repeat_flicker: Measured) -> Section:
+    """Return the section with the factors of exposure times, ISO speeds and f-numbers."""
     flicker = plus_minus(100 * file.flicker, 100 * file.flicker_sigma)
     repeated = plus_minus(100 * repeat_flicker.value, 100 * repeat_flicker.sigma)
     tables = (
@@ -161,6 +166,7 @@ def _settings(file: CameraFile, repeat_flicker: Measured) -> Section:
 
 
 def _shutter_figure(file: CameraFile) -> Figure:
+    """Draw actual over nominal exposure time."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     _logarithmic(axes)
@@ -175,6 +181,7 @@ def _shutter_figure(file: CameraFile) -> Figure:
 
 
 def _table(name: str, factors: Sequence[Factor], form: str, caption: str) -> Table:
+    """Return the table of the factor of each setting, whose name is formatted by `form`."""
     rows = tuple(
         (form.format(one.setting), plus_minus(one.factor, one.sigma) if one.sigma else "1")
         for one in factors
@@ -183,6 +190,7 @@ def _table(name: str, factors: Sequence[Factor], form: str, caption: str) -> Tab
 
 
 def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
+    """Return the section with the vignetting at each f-number; the first flat is drawn."""
     shown = flats[0]
     rows = tuple(
         (
@@ -214,6 +222,7 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
 
 
 def _flat_figure(shown: FittedFlat, channels: Sequence[str]) -> Figure:
+    """Draw the relative illumination over the distance from the middle of the frame."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
     rho = np.linspace(0, 1, 101)
@@ -231,6 +240,7 @@ def _flat_figure(shown: FittedFlat, channels: Sequence[str]) -> Figure:
 
 
 def _lines(file: CameraFile) -> Iterator[str]:
+    """Yield the lines for the terminal."""
     for noise in file.noise:
         yield (
             f"ISO {noise.iso:g}: gain {plus_minus(noise.gain_e_per_dn, noise.gain_e_per_dn_sigma)} "

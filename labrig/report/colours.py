@@ -1,4 +1,4 @@
-"""From a camera's raw values to colours on a screen."""
+"""Conversion of a camera's raw values to colours on a screen."""
 
 from dataclasses import dataclass
 
@@ -12,21 +12,22 @@ from labrig.written_numbers import rounded
 FloatArray = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
-#: Colour temperature of a tungsten halogen lamp, the usual one for charging.
+#: Colour temperature in K of a tungsten halogen lamp, the usual lamp for charging.
 HALOGEN_K = 3200.0
 
 
 @dataclass(frozen=True, eq=False)
 class Screen:
-    """How raw linear (R, G, B) of one camera become linear sRGB.
+    """Matrices from raw linear (R, G, B) of one camera to linear sRGB.
 
-    Parameters
+    Attributes
     ----------
     glow
-        Shape (3, 3), for what shines by itself: no white balance, daylight would be white.
+        Matrix for light that the sample emits, shape (3, 3); it has no white balance, so that
+        daylight would be white.
     lamp_lit
-        Shape (3, 3), for what a halogen lamp shines on, white balanced: a white surface whose
-        highest raw value is 1 comes out as (1, 1, 1).
+        Matrix for surfaces lit by a halogen lamp, shape (3, 3); it is white balanced: a white
+        surface whose highest raw value is 1 becomes (1, 1, 1).
     known
         Whether the camera's sensitivity is known; if not, raw values are shown as they are.
     """
@@ -37,7 +38,7 @@ class Screen:
 
 
 def screen_for(camera: CameraResponse | None) -> Screen:
-    """The way to the screen for a camera."""
+    """Return the matrices for a camera; unit matrices if its responses are not known."""
     if camera is None:
         return Screen(np.eye(3), np.eye(3), known=False)
     import colour  # takes seconds to load
@@ -101,7 +102,7 @@ def camera_to_xyz(camera: CameraResponse) -> FloatArray:
 
 
 def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
-    """x̄, ȳ, z̄ of the CIE 1931 2° observer at each wavelength, shape (n, 3); 0 outside its table."""
+    """Return x̄, ȳ, z̄ of the CIE 1931 2° observer, shape (n, 3); 0 outside of its table."""
     import colour
 
     observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
@@ -113,7 +114,7 @@ def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
 
 
 def spectrum_colour(wavelength_nm: FloatArray, value: FloatArray) -> str:
-    """The colour of a spectrum (n,) at full brightness, as `#rrggbb`; cut off at sRGB's edge."""
+    """Return the colour of a spectrum (n,) at full brightness, as `#rrggbb` clipped to sRGB."""
     import colour
 
     xyz = colour_matching(wavelength_nm).T @ (value * np.gradient(wavelength_nm))
@@ -149,7 +150,7 @@ def into_gamut(linear: FloatArray) -> FloatArray:
 
 
 def encoded(linear: FloatArray) -> Bytes:
-    """Linear sRGB as bytes with sRGB's transfer curve; more than 1 is cut off."""
+    """Return linear sRGB as bytes with the transfer curve of sRGB; values above 1 are clipped."""
     import colour
 
     curve = colour.cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB")
@@ -179,29 +180,29 @@ def css_colour(linear: FloatArray) -> str:
     return "#" + bytes(encoded(linear)).hex()
 
 
-#: As many as stand side by side on a desktop with a legible time below each.
+#: Number of swatches that fit side by side on a desktop with a legible time below each.
 MOST_SWATCHES = 18
-#: Signal-to-noise ratio below which a hue says nothing.
+#: Signal-to-noise ratio below which no hue is shown.
 LEAST_FOR_HUE = 5.0
 _RGB = ("R", "G", "B")
 
 
 @dataclass(frozen=True)
 class Swatch:
-    """The colour at one time.
+    """Colour of the glow at one time.
 
-    Parameters
+    Attributes
     ----------
     time
-        Seconds after lamp off, written.
+        Begin of the exposure in seconds after lamp off, as text.
     glow
-        CSS colour, all times on one exposure; black where there is nothing but noise.
+        CSS colour on the scale of all times; black where there is nothing but noise.
     hue
         CSS colour at full brightness; empty where noise hides it.
     measured
-        What was measured: `R 170, G 4200, B 7700 DN/s`.
+        Measured signals as text, such as `R 170, G 4200, B 7700 DN/s`.
     fills
-        Whether this is the one that just fills the display.
+        Whether this is the brightest swatch, which just fills the display.
     """
 
     time: str
@@ -212,7 +213,10 @@ class Swatch:
 
 
 def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
-    """Of the first unit's usable frames, evenly chosen; empty for other channels than R, G, B."""
+    """Return swatches of evenly chosen usable frames of the first unit.
+
+    There are none for channels other than R, G, B.
+    """
     rows = np.flatnonzero(series.usable & (np.array(series.unit) == series.unit[0]))
     if series.channels != _RGB or not len(rows):
         return ()
@@ -240,5 +244,6 @@ def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
 
 
 def _written(values: FloatArray) -> str:
+    """Return the signals R, G, B in DN/s as text."""
     pairs = zip(_RGB, values, strict=True)
     return ", ".join(f"{name} {rounded(float(value), 3)}" for name, value in pairs) + " DN/s"

@@ -1,4 +1,4 @@
-"""Curves to look at: a line of text each, or a picture."""
+"""Sketches of measured curves, as lines of text or as a picture."""
 
 from pathlib import Path
 
@@ -11,10 +11,10 @@ from labrig.optics import (
     band_means,
 )
 
-#: Eighths of a line of text.
+#: Bars of 0 to 8 eighths of the height of a line of text.
 BARS = " ▁▂▃▄▅▆▇█"
 COLUMNS = 48
-#: Curves described; a catalogue has hundreds.
+#: Largest number of curves that are described; a catalogue has hundreds.
 MOST_CURVES = 12
 PICTURES = (".png", ".svg", ".pdf")
 _COLOURS = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
@@ -54,6 +54,7 @@ def describe_curves(file: CurveFile) -> str:
 
 
 def _described(name: str, curve: Curve) -> str:
+    """Return the line of text with grid, range and peak of a curve, and the line of its shape."""
     nm, value = curve.wavelength_nm, curve.value
     steps = np.diff(nm)
     grid = f"step {steps[0]:g}" if np.ptp(steps) < 1e-6 else f"{len(nm)} points"

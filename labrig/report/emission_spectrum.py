@@ -1,4 +1,4 @@
-"""An emission spectrum in a report: Λ*, whether it is one at all times, and after every lamp."""
+"""Report of an emission spectrum: Λ*, its constancy in time, its independence of the lamp."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -42,7 +42,7 @@ COLUMNS = 4
 
 
 def render(result: EmissionSpectrumResult, source: Source) -> Rendered:
-    """Show the spectrum of every patch, its constancy and its independence of the lamp."""
+    """Render the spectrum of every patch, its constancy and its independence of the lamp."""
     sections: list[Section] = []
     lines: list[str] = []
     for name, patch in result.patches.items():
@@ -53,7 +53,7 @@ def render(result: EmissionSpectrumResult, source: Source) -> Rendered:
 
 
 def _lines(patch: PatchSpectrum) -> Iterator[str]:
-    """Where the spectrum is, one line for the times, one for each further lamp."""
+    """Yield a line on the spectrum, one on its constancy, and one for each further lamp."""
     spectrum, centroid = patch.spectrum, patch.spectrum.centroid
     yield (
         f"emission: highest at {spectrum.peak_nm:.0f} nm, centroid "
@@ -76,10 +76,12 @@ def _lines(patch: PatchSpectrum) -> Iterator[str]:
 
 
 def _shift(comparison: SpectralComparison) -> str:
+    """Return the shift of the centroid with its σ in nm, as text."""
     return plus_minus(comparison.shift_nm, comparison.shift_sigma_nm)
 
 
 def _sections(patch: PatchSpectrum) -> Iterator[Section]:
+    """Yield the sections on the spectrum, its constancy and its independence of the lamp."""
     frames = patch.charges[0].frames
     white = (
         "A grey card under the known lamp, seen through the same filter, corrects the camera's "
@@ -153,6 +155,7 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
 
 
 def _constancy_text(patch: PatchSpectrum) -> str:
+    """Return the statement on the constancy of the spectrum in time."""
     least = min(patch.times, key=lambda one: one.p_value)
     if patch.changes_with_time:
         worst = max(patch.times, key=lambda one: one.beyond_noise)
@@ -169,6 +172,7 @@ def _constancy_text(patch: PatchSpectrum) -> str:
 
 
 def _lamp_text(patch: PatchSpectrum) -> str:
+    """Return the statement on the independence of the spectrum of the exciting lamp."""
     outcome = "differs" if patch.depends_on_lamp else "is the same within noise"
     worst = max(patch.lamps, key=lambda one: one.beyond_noise)
     return (
@@ -178,6 +182,7 @@ def _lamp_text(patch: PatchSpectrum) -> str:
 
 
 def _table(what: str, comparisons: Sequence[SpectralComparison]) -> Table:
+    """Return the table of comparisons; `what` is the head of its first column."""
     return Table(
         (what, "χ²", "degrees of freedom", "p", "rms beyond noise / %", "centroid shift / nm"),
         tuple(
@@ -200,16 +205,18 @@ def spectrum_figure(
     band: tuple[FloatArray, FloatArray] | None,
     names: tuple[str, str],
 ) -> Figure:
-    """An emission spectrum, largest value 1.
+    """Draw an emission spectrum.
 
     Parameters
     ----------
-    nm, value
-        (n,) wavelengths and the spectrum.
+    nm
+        Wavelengths in nm, shape (n,).
+    value
+        Spectrum with largest value 1, shape (n,).
     band
-        (n,) its lower and upper limits, if they are known.
+        Lower and upper limit of the spectrum, each of shape (n,); None if they are not known.
     names
-        Of the spectrum and of the band.
+        Names of the spectrum and of the band in the legend.
     """
     figure, axes = _axes(f"{names[0]} (largest value 1)")
     entries: list[Artist] = [lined(names[0], INK)]
@@ -223,7 +230,7 @@ def spectrum_figure(
 
 
 def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
-    """Several spectra, each of its own integral, so that only their shapes differ."""
+    """Draw several spectra, each normalised to its integral."""
     figure, axes = _axes("Fraction of the emission per 10 nm / %")
     entries = []
     for number, (name, spectrum) in enumerate(spectra.items()):
@@ -245,7 +252,15 @@ def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
 
 
 def _shift_figure(comparisons: Sequence[SpectralComparison], t_s: FloatArray) -> Figure:
-    """How far the centroid of every frame's light lies off that of the others."""
+    """Draw the shift of the centroid of every frame relative to the other frames, in nm.
+
+    Parameters
+    ----------
+    comparisons
+        Comparison of each of n frames with the others.
+    t_s
+        Times of the frames in seconds after lamp off, shape (n,).
+    """
     figure = new_figure(180.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     axes.axhline(0.0, color=MUTED, linewidth=0.9)
@@ -264,6 +279,7 @@ def _shift_figure(comparisons: Sequence[SpectralComparison], t_s: FloatArray) ->
 
 
 def _axes(label: str) -> tuple[Figure, Axes]:
+    """Return a figure with axes over wavelength; `label` is that of the vertical axis."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     axes.set_xlabel(WAVELENGTH_LABEL)
@@ -273,5 +289,6 @@ def _axes(label: str) -> tuple[Figure, Axes]:
 
 
 def _colour_and_marker(number: int) -> tuple[str, str]:
+    """Return colour and marker of the spectrum with index `number`."""
     colours = (INK, *OTHER_CHANNELS)
     return colours[number % len(colours)], MARKERS[number % len(MARKERS)]

@@ -1,4 +1,4 @@
-"""Excitation in a report: rates by band, how places charge, what the fit leaves, and closure."""
+"""Report of an excitation: rates by band, charging curves, residuals, and closure."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -36,7 +36,7 @@ from labrig.results import (
 from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 270.0
-#: Places along the strip whose charging is shown.
+#: Number of positions along the filter whose charging is drawn.
 SHOWN = 5
 MEASURED = (
     "r(0) and a = Λ* k_r r(0) after the brightest charge by the lamp itself. r(0) is "
@@ -46,7 +46,7 @@ ASSUMED = "r(0) = 1 is assumed after the longest charge, as Nalbach et al. do."
 
 
 def render(result: ExcitationResult, source: Source) -> Rendered:
-    """Show every patch: its rates, how its places charge, and whether the rates predict that."""
+    """Render the excitation rates, charging curves, residuals and closure of every patch."""
     sections, lines = [], []
     for name, patch in result.patches.items():
         sections.append(_section(f"Excitation: {name}" if name else "Excitation", result, patch))
@@ -55,6 +55,7 @@ def render(result: ExcitationResult, source: Source) -> Rendered:
 
 
 def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
+    """Yield the lines for the terminal: states, rates by band, χ² and closure."""
     fit, off = patch.fit, patch.fit.at_off[-1]
     for number, state in enumerate(fit.states):
         yield (
@@ -69,6 +70,7 @@ def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
 
 
 def _closure_line(closure: Closure | None) -> str:
+    """Return the statement on closure."""
     if closure is None:
         return "not tested; give three charges or more in 'direct'"
     return (
@@ -78,6 +80,7 @@ def _closure_line(closure: Closure | None) -> str:
 
 
 def _rates(fit: FittedExcitation, number: int) -> list[str]:
+    """Return k_e of a state in each band in 1/s as text, or its upper limit."""
     state = fit.states[number]
     return [
         plus_minus(float(value), float(sigma)) if seen else f"< {rounded(float(upper), 2)}"
@@ -88,6 +91,7 @@ def _rates(fit: FittedExcitation, number: int) -> list[str]:
 
 
 def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Section:
+    """Return the section of a patch."""
     fit, through, direct = patch.fit, patch.charging.through, patch.charging.direct
     position_nm, irradiance = result.position_nm, result.irradiance
     fitted = through.values - fit.residuals[0] * through.sigma
@@ -133,6 +137,7 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
 
 
 def _levels_table(fit: FittedExcitation, caption: str) -> Table:
+    """Return the table of k_r, r(0) and amplitudes of the states."""
     off = fit.at_off[-1]
     return Table(
         ("State", "k_r / s⁻¹", "Amplitude at r = 1 / (DN/s)", "r(0)", "Amplitude a / (DN/s)"),
@@ -151,6 +156,7 @@ def _levels_table(fit: FittedExcitation, caption: str) -> Table:
 
 
 def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
+    """Return the table of k_e by band and state."""
     states = range(len(fit.states))
     columns = [_rates(fit, number) for number in states]
     return Table(
@@ -164,7 +170,7 @@ def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
 
 
 def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
-    """k_e of every band and state, limits as arrows."""
+    """Draw k_e of every band and state, upper limits as carets."""
     edges = np.array(bands_nm)
     middles, widths = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
     figure = new_figure(HEIGHT_PT)
@@ -191,14 +197,16 @@ def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
 
 
 def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: FloatArray) -> Figure:
-    """Glow in the first usable photograph after every charge, over the charge, at some places.
+    """Draw the first usable signal after every charge over its length, at some positions.
 
     Parameters
     ----------
+    series
+        Signals of n frames at P positions in C channels, after charges through the filter.
     fitted
-        (n, P, C) what the fit says.
+        Fitted signals in DN/s, shape (n, P, C).
     position_nm
-        (P,) wavelength that charges each place.
+        Wavelength that excites each position in nm, shape (P,).
     """
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=48)
@@ -230,7 +238,15 @@ def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: Fl
 
 
 def _residual_figure(residuals: FloatArray, position_nm: FloatArray) -> Figure:
-    """(n, P, C) in σ, rms over channels and photographs, along the filter and over time."""
+    """Draw the rms of the residuals over frames and channels at each position.
+
+    Parameters
+    ----------
+    residuals
+        Residuals of n frames at P positions in C channels, in σ, shape (n, P, C).
+    position_nm
+        Wavelength that excites each position in nm, shape (P,).
+    """
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     of_site = np.sqrt(np.nanmean(residuals**2, axis=(0, 2)))
@@ -243,7 +259,7 @@ def _residual_figure(residuals: FloatArray, position_nm: FloatArray) -> Figure:
 
 
 def closure_picture(closure: Closure) -> Picture:
-    """The figure with what it says about the prediction."""
+    """Return the figure of closure with its caption."""
     caption = (
         "Charging under the whole lamp: the curve is predicted from the rates measured band by "
         "band, without any fit; points are measured, with ± 1 σ of both. RMS deviation "
@@ -253,7 +269,7 @@ def closure_picture(closure: Closure) -> Picture:
 
 
 def closure_figure(closure: Closure) -> Figure:
-    """Levels over the charge, measured and predicted, and by how much they deviate."""
+    """Draw measured and predicted levels over the length of the charge, and their deviation."""
     charge_s, measured, predicted = closure.charge_s, closure.measured, closure.predicted
     figure = new_figure(300.0)
     upper = place(figure, left=LEFT_PT, bottom=128, right=12, top=30)

@@ -1,4 +1,4 @@
-"""How figures look."""
+"""Style of all figures of a report: sizes, colours, axes, legends."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -20,14 +20,14 @@ from labrig.written_numbers import power_of_ten
 
 FloatArray = NDArray[np.float64]
 
-#: Figures are this wide in points, so that 10 pt is legible at half a desktop's or a phone's width.
+#: Width of figures in points, so that 10 pt is legible at half a desktop's or a phone's width.
 WIDTH_PT = 420.0
 FONT_PT = 10.5
 SMALL_PT = 9.5
-#: Left margin of axes, so that figures below one another are in line.
+#: Left margin of axes in points, the same in all figures so that their axes are in line.
 LEFT_PT = 62.0
 
-#: Left between a label and the figure's edge.
+#: Distance between a label and the edge of the figure in points.
 EDGE_PT = 3.0
 
 LineStyle: TypeAlias = str | tuple[float, tuple[float, ...]]
@@ -37,7 +37,7 @@ DOTTED: LineStyle = (0, (1, 2))
 DASH_DOTTED: LineStyle = (0, (5, 2, 1, 2))
 
 INK, MUTED, RULE, PAPER, SHADE = "#1d2329", "#5f6b76", "#dde2e6", "#fefefe", "#e9eff4"
-#: Colours of the channels of a camera, and of other channels in turn.
+#: Colours of the channels R, G, B of a camera, and of other channels in turn.
 CHANNEL = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 OTHER_CHANNELS = ("#7a4fb5", "#b06a00", "#0f7f8a", "#a8326e", "#4f5b66")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
@@ -85,7 +85,7 @@ def figure_style() -> Iterator[None]:
 
 
 def channel_colour(name: str, number: int) -> str:
-    """Colour of the channel called `name`, the `number`-th of its series."""
+    """Return the colour of the channel `name`, whose index in its series is `number`."""
     return CHANNEL.get(name, OTHER_CHANNELS[number % len(OTHER_CHANNELS)])
 
 
@@ -185,7 +185,7 @@ def points(
     face: str,
     size: float = 3.8,
 ) -> None:
-    """Measured values; hollow where `face` is the paper's colour."""
+    """Draw measured values as points, which are hollow if `face` is the colour of the paper."""
     axes.plot(
         x,
         y,
@@ -200,7 +200,7 @@ def points(
 
 
 def error_bars(axes: Axes, x: FloatArray, y: FloatArray, sigma: FloatArray, colour: str) -> None:
-    """Bars of ± 1 σ, all in one path: as single ones they would be half of the file."""
+    """Draw bars of ± 1 σ, all in one path; as single paths they would be half of the file."""
     gap = np.full_like(y, np.nan)
     axes.plot(
         np.repeat(x, 3),
@@ -211,7 +211,7 @@ def error_bars(axes: Axes, x: FloatArray, y: FloatArray, sigma: FloatArray, colo
     )
 
 
-#: How strongly bands of uncertainty are coloured.
+#: Opacity of bands of uncertainty.
 BAND_OPACITY = 0.3
 
 
@@ -253,7 +253,7 @@ def legend_above(figure: Figure, entries: Sequence[Artist], columns: int) -> Non
 
 
 def marked(label: str, marker: str, colour: str, face: str | None = None) -> Line2D:
-    """An entry for points."""
+    """Return the legend entry of points."""
     return Line2D(
         [],
         [],
@@ -301,19 +301,21 @@ def lined(
 
 
 def shaded(label: str, colour: str) -> Patch:
-    """An entry for a band."""
+    """Return the legend entry of a band."""
     return Patch(color=colour, alpha=BAND_OPACITY, linewidth=0, label=label)
 
 
-#: An axis of fewer decades than this has labels between them, too.
+#: Number of decades of an axis below which ticks between decades are labelled, too.
 FEW_DECADES = 2.0
-#: With fewer of them, evenly spaced ticks are labelled instead.
+#: Number of labels below which evenly spaced ticks are labelled instead.
 FEWEST_LABELS = 2
 
 
 def mark_decades(axes: Axes, most: int = 8) -> None:
-    """Ticks of the vertical axis, its limits set: `most` of them at decades or between, labelled,
-    and short ones at the whole numbers between decades, if every decade is labelled.
+    """Set the ticks of a logarithmic vertical axis whose limits are set.
+
+    Labelled ticks stand at `most` decades or between them; if every decade is labelled, short ticks
+    stand at its multiples from 2 to 9.
     """
     low, high = axes.get_ylim()
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
@@ -347,7 +349,7 @@ def mark_decades(axes: Axes, most: int = 8) -> None:
 
 
 def decade_text(value: float, _: int | None) -> str:
-    """A tick: `0.01` to `10000`, beyond that with a power of ten."""
+    """Return the label of a tick: `0.001` to `10000`, beyond that with a power of ten."""
     exponent = math.floor(math.log10(value) + 1e-9)
     if -3 <= exponent <= 4:
         return f"{value:g}"

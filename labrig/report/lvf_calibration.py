@@ -1,4 +1,4 @@
-"""The calibration of a linear variable filter in a report."""
+"""Report of the calibration of a linear variable filter."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -26,19 +26,21 @@ from labrig.results import CameraCurves, FloatArray, LocatedLines, LvfCalibratio
 from labrig.written_numbers import plus_minus, rounded
 
 _WAVELENGTH = "Wavelength / nm"
-#: Rows of the table of positions; the file has them all.
+#: Number of positions in the table; the file has all positions.
 _ROWS = 11
 
 
 def render(result: LvfCalibrationResult, source: Source) -> Rendered:
-    """Show the map along the strip, and what the strip lets through."""
+    """Render the wavelengths along the strip, and its transmission."""
     return Rendered((_map_section(result), _band_section(result)), tuple(_lines(result)))
 
 
 def _lines(result: LvfCalibrationResult) -> Iterator[str]:
+    """Yield the lines for the terminal: mercury lines, bands, and place on the sample."""
     bands, sigma = result.calibration.bands, result.calibration.sigma
 
     def centre(number: int) -> str:
+        """Return the centre of a band with its σ in nm, as text."""
         return plus_minus(bands.centre_nm[number], sigma.centre_nm[number])
 
     yield (
@@ -57,6 +59,7 @@ def _lines(result: LvfCalibrationResult) -> Iterator[str]:
 
 
 def _stripes_text(result: LvfCalibrationResult) -> str:
+    """Return the statement on the shift of the strip between card and glow."""
     if result.stripes is None:
         sigma = rounded(result.placed.sigma_nm, 2)
         return f"its place as on the card ± {sigma} nm ({result.why_no_stripes})"
@@ -65,6 +68,7 @@ def _stripes_text(result: LvfCalibrationResult) -> str:
 
 
 def _map_section(result: LvfCalibrationResult) -> Section:
+    """Return the section on the wavelength of each position."""
     before, on = result.before_camera, result.on_sample
     wavelengths = result.calibration.wavelengths.map()
     residuals = {
@@ -99,6 +103,7 @@ def _map_section(result: LvfCalibrationResult) -> Section:
 
 
 def _band_section(result: LvfCalibrationResult) -> Section:
+    """Return the section on the transmission of each position."""
     file, count = result.calibration, len(result.filters)
     median, worst = np.median(result.band_misfit), result.band_misfit.max()
     return Section(
@@ -146,6 +151,7 @@ def _band_section(result: LvfCalibrationResult) -> Section:
 
 
 def _table(file: LvfFile) -> Table:
+    """Return the table of the bands at some positions."""
     bands, sigma = file.bands, file.sigma
     count = len(file.position)
     chosen = sorted({round(row) for row in np.linspace(0, count - 1, _ROWS)})
@@ -164,7 +170,7 @@ def _table(file: LvfFile) -> Table:
 
 
 def _profile_figure(found: StripLines, wavelengths: WavelengthMap) -> Figure:
-    """The strip under mercury, and which line is where."""
+    """Draw the profile of the strip under the mercury lamp, and the located lines."""
     figure = new_figure(220)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     position = found.profile.position if found.strip.rising else 1 - found.profile.position
@@ -184,7 +190,7 @@ def _profile_figure(found: StripLines, wavelengths: WavelengthMap) -> Figure:
 
 
 def _line_residual_figure(residuals: dict[str, tuple[LocatedLines, FloatArray]]) -> Figure:
-    """What the map leaves of every line in nm, by the place of the strip."""
+    """Draw the residuals of the map at the lines in nm, for each place of the strip."""
     figure = new_figure(180)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     axes.axhline(0, color=MUTED, linewidth=0.8)
@@ -202,7 +208,7 @@ def _line_residual_figure(residuals: dict[str, tuple[LocatedLines, FloatArray]])
 
 
 def _transmission_figure(file: LvfFile) -> Figure:
-    """T_p(λ) of all positions."""
+    """Draw the transmission T_p(λ) of all positions p."""
     figure = new_figure(240)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
     nm = np.arange(380.0, 780.5, 1.0)
@@ -217,7 +223,7 @@ def _transmission_figure(file: LvfFile) -> Figure:
 
 
 def _along_figure(file: LvfFile) -> Figure:
-    """Centre, less a straight line, and width, with 1 σ."""
+    """Draw centre minus a straight line, and width of the bands, with 1 σ."""
     figure = new_figure(268)
     upper = place(figure, left=LEFT_PT, bottom=148, right=12, top=12)
     lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=134, share_x=upper)
@@ -245,7 +251,7 @@ def _along_figure(file: LvfFile) -> Figure:
 
 
 def _camera_figure(before: CameraCurves, found: CameraResponse) -> Figure:
-    """Curves of every channel, as they were known and as the filters tell them."""
+    """Draw the camera's curves as in their file and as fitted with the colour filters."""
     figure = new_figure(200)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     entries = []
@@ -265,7 +271,17 @@ def _camera_figure(before: CameraCurves, found: CameraResponse) -> Figure:
 def _filter_residual_figure(
     left: FloatArray, names: tuple[str, ...], centre_nm: FloatArray
 ) -> Figure:
-    """Transmittance measured minus expected, for every filter (row) and position (column)."""
+    """Draw measured minus expected transmittance for every filter (row) and position (column).
+
+    Parameters
+    ----------
+    left
+        Residuals of F filters at P positions, shape (F, P).
+    names
+        Names of the filters, shape (F,).
+    centre_nm
+        Centre of the band at each position in nm, shape (P,).
+    """
     height = max(160.0, 9.0 * len(names) + 70)
     figure = new_figure(height)
     axes = place(figure, left=LEFT_PT + 44, bottom=38, right=60, top=12)
@@ -294,4 +310,5 @@ def _filter_residual_figure(
 
 
 def _colour_of(centre_nm: float) -> str:
+    """Return the channel whose colour a band is drawn in."""
     return "B" if centre_nm < 490 else "G" if centre_nm < 590 else "R"

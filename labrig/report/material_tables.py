@@ -1,4 +1,4 @@
-"""Materials in tables: one as measured, and one beside another."""
+"""Tables of a material as measured, and of its comparison with another."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ UNKNOWN = "–"
 
 
 def measured_table(material: Material) -> Table:
-    """Every number of a material as it was measured, with its uncertainty; a column a state."""
+    """Return the table of all values of a material with their σ, in one column a state."""
     states = sorted(material.states, key=lambda state: -state.k_r_per_s)
     head = ("",) if len(states) == 1 else ("", *(f"state {n + 1}" for n in range(len(states))))
     rows = tuple(_rows(states, material.bands_nm or ()))
@@ -81,11 +81,13 @@ def comparison_table(comparison: MaterialComparison) -> Table:
 
 
 def _measured_head(comparison: MaterialComparison) -> str:
+    """Return the head of the column of measured values."""
     factors = (comparison.k_e_factor, comparison.reradiation_factor)
     return "measured" if factors == (1.0, 1.0) else "measured, rescaled"
 
 
 def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[str, ...]]:
+    """Yield the rows of k_r, r(0), and k_e and Λ by band."""
     for quantity, name in (("k_r / s⁻¹", "k_r_per_s"), ("r(0)", "r0")):
         if any(getattr(state, name) is not None for state in states):
             yield (quantity, *(_of(state, name) for state in states))
@@ -97,6 +99,7 @@ def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[
 
 
 def _of(state: State, name: str, band: int | None = None) -> str:
+    """Return a quantity of a state, in a band if there are bands, with its σ as text."""
     value, sigma = getattr(state, name), getattr(state, f"{name}_sigma")
     if value is None:
         return UNKNOWN
@@ -106,12 +109,14 @@ def _of(state: State, name: str, band: int | None = None) -> str:
 
 
 def _written(value: float, sigma: float) -> str:
+    """Return a value with its σ as text; NaN stands for an unknown value or σ."""
     if math.isnan(value):
         return UNKNOWN
     return rounded(value) if math.isnan(sigma) else plus_minus(value, sigma)
 
 
 def _signed(number: float) -> str:
+    """Return a number as text with its sign."""
     if not math.isfinite(number):
         return UNKNOWN
     text = f"{number:+.1f}"

@@ -1,4 +1,4 @@
-"""What a paper would say of how this was measured: only what is true of the run."""
+"""Methods section of a paper on a run, with statements that hold for this run only."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from labrig.report.timing import ON_TIME_S, Lateness
 from labrig.results import FittedDecay
 from labrig.written_numbers import exposure_text, rounded
 
-#: Durations and exposures that differ by less are said as one.
+#: Relative difference below which durations and exposures are given as one value.
 ALIKE = 0.02
 
 
 def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -> Iterator[str]:
-    """From the charge to the values, a sentence each."""
+    """Yield the sentences on the measurement, from the charge to the values."""
     how = "simulated" if report.about.simulated else "measured"
     yield f"The decay of the phosphorescence of {report.about.title} was {how} with labrig."
     decays = [frame for frame in report.frames if frame.role == FrameRole.DECAY]
@@ -36,6 +36,7 @@ def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None)
 
 
 def _charge(report: DecayReport, decays: Sequence[FrameRecord]) -> Iterator[str]:
+    """Yield the sentence on the charge."""
     if not report.charges_s:
         return
     repeats = len({frame.unit for frame in decays})
@@ -47,6 +48,7 @@ def _charge(report: DecayReport, decays: Sequence[FrameRecord]) -> Iterator[str]
 def _frames(
     report: DecayReport, sensor: Sensor | None, decays: Sequence[FrameRecord]
 ) -> Iterator[str]:
+    """Yield the sentence on the camera, its settings and its exposures."""
     name = sensor.camera if sensor and sensor.camera else "camera"
     camera = f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
     units = list(dict.fromkeys(frame.unit for frame in decays))
@@ -62,6 +64,7 @@ def _frames(
 
 
 def _punctuality(late: Lateness) -> str:
+    """Return the sentence on the lateness of the exposures."""
     if abs(late.worst_s) < ON_TIME_S:
         return f"Every exposure began within {_ms(ON_TIME_S)} of its planned time."
     return (
@@ -71,17 +74,19 @@ def _punctuality(late: Lateness) -> str:
 
 
 def _settings(frames: Sequence[FrameRecord]) -> list[str]:
+    """Return the f-numbers and ISO speeds of the frames as text."""
     apertures = sorted({frame.f_number for frame in frames if frame.f_number is not None})
     speeds = sorted({frame.iso for frame in frames})
     return [*(f"f/{rounded(one, 3)}" for one in apertures), *(f"ISO {one}" for one in speeds)]
 
 
 def _exposures(frames: Sequence[FrameRecord]) -> str:
+    """Return the range of the exposure times as text."""
     return _range([frame.exposure_s for frame in frames], exposure_text)
 
 
 def _interval(decays: Sequence[FrameRecord]) -> str:
-    """From begin to begin as planned: as measured, less the lateness."""
+    """Return the planned interval between exposures as text: the measured one less lateness."""
     gaps_s = [
         (after.start_time - after.late_s) - (before.start_time - before.late_s)
         for before, after in pairwise(decays)
@@ -91,6 +96,7 @@ def _interval(decays: Sequence[FrameRecord]) -> str:
 
 
 def _mean(report: DecayReport, sensor: Sensor | None) -> str:
+    """Return the sentence on the mean over a region."""
     channels = report.patches[0].series.channels
     place = "regions" if len(report.patches) > 1 else "a region"
     size = _sizes(report, sensor)
@@ -103,6 +109,7 @@ def _mean(report: DecayReport, sensor: Sensor | None) -> str:
 
 
 def _sizes(report: DecayReport, sensor: Sensor | None) -> str:
+    """Return the sizes of the regions in pixels as text; empty if they are not known."""
     sizes = set()
     for patch in report.patches:
         if sensor is None or patch.region is None:
@@ -117,6 +124,7 @@ def _sizes(report: DecayReport, sensor: Sensor | None) -> str:
 
 
 def _dark(report: DecayReport) -> Iterator[str]:
+    """Yield the sentence on the level that was subtracted."""
     darks = [frame for frame in report.frames if frame.role == FrameRole.DARK]
     decays = [frame for frame in report.frames if frame.role == FrameRole.DECAY]
     if report.background is not None:
@@ -131,6 +139,7 @@ def _dark(report: DecayReport) -> Iterator[str]:
 
 
 def _left_out(report: DecayReport) -> Iterator[str]:
+    """Yield the sentence on excluded frames."""
     all_of = "frames" if len(report.patches) == 1 else "values of all patches"
     flags = [flag for patch in report.patches for flag in patch.series.flag]
     out = len(flags) - sum(int(patch.series.usable.sum()) for patch in report.patches)
@@ -142,11 +151,12 @@ def _left_out(report: DecayReport) -> Iterator[str]:
 
 
 def listed(words: Sequence[str]) -> str:
-    """`R, G and B`."""
+    """Return words as a list in text, such as `R, G and B`."""
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
 def _range(numbers: Sequence[float], written: Callable[[float], str]) -> str:
+    """Return the range of numbers as text, or their median if they are nearly equal."""
     low, high = min(numbers), max(numbers)
     if high <= low * (1 + ALIKE):
         return written(float(np.median(numbers)))
@@ -154,6 +164,7 @@ def _range(numbers: Sequence[float], written: Callable[[float], str]) -> str:
 
 
 def _ms(seconds: float) -> str:
+    """Return a time in ms as text."""
     return f"{rounded(1e3 * seconds, 2)} ms"
 
 
@@ -168,19 +179,29 @@ REFERENCES = (
     "P. Virtanen et al.: SciPy 1.0: fundamental algorithms for scientific computing in Python. "
     "Nature Methods 17, 261–272, 2020. doi:10.1038/s41592-019-0686-2",
 )
-#: What a paper should say and labrig cannot know.
+#: Properties that a paper should state and that labrig cannot know.
 UNKNOWN = (
     "the lamp's type, power and distance",
     "the lens and the camera's distance",
     "the sample's temperature",
 )
-#: As they are called in papers, and with their reference.
+#: Names of the libraries in papers, with their references.
 _SOFTWARE = {"numpy": "NumPy {} [2]", "scipy": "SciPy {} [3]", "libraw": "LibRaw {}"}
 
 
 @dataclass(frozen=True)
 class Methods:
-    """Paragraphs of plain text; the equation stands after `model`, which is empty without a fit."""
+    """Paragraphs of a methods section in plain text.
+
+    Attributes
+    ----------
+    recording
+        Paragraph on the measurement.
+    model
+        Paragraph on the decay model, which the equation follows; empty without a fit.
+    analysis
+        Paragraph on the fit and the software.
+    """
 
     recording: str
     model: str
@@ -188,7 +209,7 @@ class Methods:
 
     @property
     def plain(self) -> str:
-        """All of it, to be pasted; the equation as LaTeX."""
+        """All paragraphs and references as plain text, with the equation in LaTeX."""
         references = [f"[{number}] {text}" for number, text in enumerate(REFERENCES, start=1)]
         equation = f"\\begin{{equation}}\n  {EQUATION_LATEX}\n\\end{{equation}}"
         fitted = [self.model, equation] if self.model else []
@@ -196,7 +217,17 @@ class Methods:
 
 
 def methods(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -> Methods:
-    """Of the run in `report`, with its camera and the lateness of its frames where known."""
+    """Return the methods section of a run.
+
+    Parameters
+    ----------
+    report
+        Decay as measured and fitted.
+    sensor
+        Camera that took the frames; None if it is not known.
+    late
+        Lateness of the frames; None if it is not known.
+    """
     fits = [patch.fit for patch in report.patches if isinstance(patch.fit, FittedDecay)]
     software = list(_software(report))
     return Methods(
@@ -207,6 +238,7 @@ def methods(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -
 
 
 def _model(report: DecayReport) -> str:
+    """Return the sentence on the decay model."""
     channel = "" if len(report.patches[0].series.channels) == 1 else " in channel c"
     return (
         f"The signal{channel} of an exposure from t to t + T after lamp off was modelled, after "
@@ -215,6 +247,7 @@ def _model(report: DecayReport) -> str:
 
 
 def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
+    """Yield the sentences on the fit."""
     offset = (
         "an offset b_c, constrained by the uncertainty of the dark level"
         if any(any(fit.offsets_sigma) for fit in fits)
@@ -245,7 +278,7 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
 
 
 def _flicker(fits: list[FittedDecay]) -> str:
-    """Patches of a frame share their flicker, so that the one which knows it best tells it."""
+    """Return the statement on flicker, which patches share; the value of smallest σ is given."""
     measured = [fit for fit in fits if fit.flicker_sigma > 0]
     best = min(measured, key=lambda fit: fit.flicker_sigma, default=fits[0])
     if best.flicker == 0:
@@ -256,6 +289,7 @@ def _flicker(fits: list[FittedDecay]) -> str:
 
 
 def _software(report: DecayReport) -> Iterator[str]:
+    """Yield the sentence on the software and its versions."""
     versions = dict(report.about.libraries)
     used = [text.format(versions[name]) for name, text in _SOFTWARE.items() if name in versions]
     with_them = f" with {listed(used)}" if used else ""

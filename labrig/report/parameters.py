@@ -1,4 +1,4 @@
-"""What a fit found, in rows and sentences."""
+"""Results of a fitted decay as rows of tables and sentences."""
 
 import math
 from dataclasses import dataclass
@@ -8,13 +8,23 @@ from markupsafe import Markup
 from labrig.results import FittedDecay
 from labrig.written_numbers import plus_minus, rounded
 
-#: Relative σ of a rate from which its reciprocal is given without one.
+#: Relative σ of a rate from which its reciprocal is given without σ.
 WORST_FOR_LIFETIME = 0.5
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a table: what (text or markup), its unit, and the values, one a column."""
+    """Row of a table.
+
+    Attributes
+    ----------
+    quantity
+        Name of the quantity, as text or markup.
+    unit
+        Unit of the values; empty without one.
+    values
+        Values with σ as text, one a column.
+    """
 
     quantity: str
     unit: str
@@ -23,7 +33,21 @@ class Row:
 
 @dataclass(frozen=True)
 class CandidateRow:
-    """A model that was tried: its name, reduced χ², BIC above the best one's, F-test's p."""
+    """Row of the table of decay models that were fitted.
+
+    Attributes
+    ----------
+    model
+        Name of the decay model.
+    reduced_chi2
+        Reduced χ².
+    bic_above_best
+        BIC less that of the best model.
+    p_value
+        p-value of the F-test against one state fewer.
+    chosen
+        Whether this model was chosen.
+    """
 
     model: str
     reduced_chi2: str
@@ -33,7 +57,7 @@ class CandidateRow:
 
 
 def state_rows(fit: FittedDecay) -> list[Row]:
-    """Rates, times and amplitudes, one column a state."""
+    """Return rows of rates, lifetimes, half-lives and amplitudes, with one column a state."""
     rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in fit.states]
     lifetimes = [_lifetime(rate, sigma) for rate, sigma in rates]
     half_lives = [(math.log(2) * value, math.log(2) * sigma) for value, sigma in lifetimes]
@@ -47,7 +71,7 @@ def state_rows(fit: FittedDecay) -> list[Row]:
 
 
 def quality_rows(fit: FittedDecay) -> list[Row]:
-    """What the states share."""
+    """Return rows of the parameters that the states share: weights, offsets, flicker and χ²."""
     rows = []
     several = len(fit.channels) > 1
     if several:
@@ -72,7 +96,7 @@ def quality_rows(fit: FittedDecay) -> list[Row]:
 
 
 def paper_rows(fit: FittedDecay) -> list[Row]:
-    """Λᵢ = aᵢ/kᵢ in each channel, as if every state had been full: rᵢ(0) = 1."""
+    """Return rows of Λᵢ = aᵢ/kᵢ in each channel, assuming that every state was full: rᵢ(0) = 1."""
     rows = []
     for name, weight, weight_sigma in zip(
         fit.channels, fit.channel_weights, fit.channel_weights_sigma, strict=True
@@ -94,7 +118,7 @@ def paper_rows(fit: FittedDecay) -> list[Row]:
 
 
 def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
-    """The numbers of states tried, and the alternative models."""
+    """Return rows of the fits with each number of states, and of the alternative models."""
     bics = [candidate.bic for candidate in fit.candidates] + [
         alternative.bic for alternative in fit.alternative_models
     ]
@@ -117,7 +141,7 @@ def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
 
 
 def why_so_many_states(fit: FittedDecay) -> str:
-    """In a sentence or two."""
+    """Return the reason for the number of states in a sentence or two."""
     tried = {candidate.n_states: candidate for candidate in fit.candidates}
     here = tried.get(fit.n_states)
     fewer, more = tried.get(fit.n_states - 1), tried.get(fit.n_states + 1)
@@ -146,22 +170,26 @@ def why_so_many_states(fit: FittedDecay) -> str:
 
 
 def _lifetime(rate_per_s: float, sigma_per_s: float) -> tuple[float, float]:
-    """1/k and its σ in s; unknown where k is so uncertain that 1/k has no symmetric error."""
+    """Return 1/k and its σ in s; σ is infinite if 1/k has no symmetric error."""
     known = sigma_per_s < WORST_FOR_LIFETIME * rate_per_s
     return 1 / rate_per_s, sigma_per_s / rate_per_s**2 if known else math.inf
 
 
 def _written(pairs: list[tuple[float, float]]) -> tuple[str, ...]:
+    """Return values with their σ as text."""
     return tuple(plus_minus(value, sigma) for value, sigma in pairs)
 
 
 def _states(number: int) -> str:
+    """Return a number of states as text."""
     return "1 state" if number == 1 else f"{number} states"
 
 
 def _above(bic: float, best: float) -> str:
+    """Return the difference of a BIC to the best one as text."""
     return "best" if bic == best else f"+{rounded(bic - best, 3)}"
 
 
 def _p_value(p: float) -> str:
+    """Return a p-value as text."""
     return "< 10⁻⁶" if p < 1e-6 else rounded(p, 2)

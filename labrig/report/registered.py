@@ -1,4 +1,4 @@
-"""From a result of any protocol to its part of a report."""
+"""Rendering of a result by the renderer that its protocol registers."""
 
 from labrig.plugins import REPORTS, load, names
 from labrig.report import any_result

@@ -1,4 +1,4 @@
-"""What a report says of a run whatever it measured: lamp, shield and door; the temperature."""
+"""Sections of a report that do not depend on the protocol: lamp, shield, door, temperature."""
 
 from collections.abc import Collection
 from functools import partial
@@ -25,23 +25,28 @@ from labrig.report.timing import moves_text
 FloatArray = NDArray[np.float64]
 
 HEIGHT_PT = 180.0
-#: Longer runs are shown in hours.
+#: Longest run in s whose time axis is in minutes; that of longer runs is in hours.
 LONGEST_IN_MINUTES_S = 3 * 3600.0
-#: No axis is shorter, in degrees: the noise of a steady room is to look like it.
+#: Smallest span of the temperature axis in °C, so that the noise of a steady room looks small.
 LEAST_SPAN_C = 2.0
 
 
 def temperature_figure(
     time_s: FloatArray, celsius: FloatArray, smooth: FloatArray, glow_s: FloatArray
 ) -> Figure:
-    """Readings and their smoothed course; where the glow was photographed is shaded.
+    """Draw readings of the temperature and their smoothed course.
 
     Parameters
     ----------
-    time_s, celsius, smooth
-        (N,) of the readings, rising, after the beginning of the run.
+    time_s
+        Rising times of the readings in seconds after the begin of the run, shape (n,).
+    celsius
+        Readings in °C, shape (n,).
+    smooth
+        Smoothed readings in °C, shape (n,).
     glow_s
-        (M, 2) beginning and end of what is to be shaded.
+        Begin and end of each shaded time of the glow in seconds after the begin of the run, shape
+        (m, 2).
     """
     unit_s, unit = (60.0, "min") if time_s[-1] <= LONGEST_IN_MINUTES_S else (3600.0, "h")
     figure = new_figure(HEIGHT_PT)

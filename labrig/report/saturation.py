@@ -1,4 +1,4 @@
-"""Plateaus of the glow, levels of charge and rates after several charges in a report."""
+"""Report of saturation: plateaus of the glow, levels of charge, and rates after each charge."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -37,7 +37,7 @@ from labrig.written_numbers import plus_minus, rounded
 
 
 def render(result: SaturationResult, source: Source) -> Rendered:
-    """Show every patch: how its glow saturates, in time and in level, and its rates."""
+    """Render the saturation of every patch in time and in level, and its rates."""
     several = len(result.patches) > 1
     lines = (
         f"{name}: {line}" if several else line
@@ -49,7 +49,7 @@ def render(result: SaturationResult, source: Source) -> Rendered:
 
 
 def _lines(patch: PatchSaturation) -> Iterator[str]:
-    """Saturation in time, in level, and the rates."""
+    """Yield the lines on saturation in time, saturation in level, and rates."""
     begin, end = (
         f"{_percent(growth.value)} ± {_percent(growth.sigma)}"
         for growth in (patch.growth_at_begin, patch.growth_at_end)
@@ -72,6 +72,7 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
 
 
 def _rates_text(patch: PatchSaturation) -> str:
+    """Return the outcome of the test whether all decays have the same rates."""
     test = patch.rates
     if test.misfit and not test.differ:
         return (
@@ -87,6 +88,7 @@ def _rates_text(patch: PatchSaturation) -> str:
 
 
 def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Section:
+    """Return the section of a patch; `weaker` is the weaker light as fraction of the full one."""
     text = [*_lines(patch)]
     if weaker is not None:
         text.append(
@@ -119,10 +121,12 @@ def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Sect
 
 
 def _percent(fraction: float) -> str:
+    """Return a fraction in per cent as text."""
     return f"{fraction:.1%}".replace("-", "−")
 
 
 def _rates_table(test: RatesTest, units: tuple[str, ...]) -> Table:
+    """Return the table of the rates of each decay and of the shared rates."""
     states = range(len(test.shared_per_s))
     rows = (
         (
@@ -137,7 +141,7 @@ def _rates_table(test: RatesTest, units: tuple[str, ...]) -> Table:
 
 
 def _plateau_figure(patch: PatchSaturation) -> Figure:
-    """Amplitude of every state after each charge, by light."""
+    """Draw the amplitude of every state over the length of the charge, by light."""
     figure = new_figure(256.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     entries = []
@@ -167,7 +171,7 @@ def _plateau_figure(patch: PatchSaturation) -> Figure:
 
 
 def _decays_figure(patch: PatchSaturation) -> Figure:
-    """Decays over what shared rates make of their begin, and what is left of each."""
+    """Draw the decays, normalised to the fit with shared rates at lamp off, and their residuals."""
     figure = new_figure(320.0)
     top = place(figure, left=LEFT_PT, bottom=150, right=12, top=46)
     below = place(figure, left=LEFT_PT, bottom=38, right=12, top=190, share_x=top)
@@ -194,5 +198,6 @@ def _decays_figure(patch: PatchSaturation) -> Figure:
 
 
 def _look(number: int) -> tuple[str, str]:
+    """Return colour and marker of the series with index `number`."""
     colours = (INK, *OTHER_CHANNELS)
     return colours[number % len(colours)], MARKERS[number % len(MARKERS)]
