@@ -227,23 +227,23 @@ def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
     linear = into_gamut(values @ screen.glow.T)
     signal_to_noise = np.sqrt(np.sum((values / sigma) ** 2, axis=1))
     # Without a known σ there is no reason to doubt.
-    seen = ~(signal_to_noise < LEAST_FOR_HUE) & (linear.max(axis=1) > 0)
-    linear[~seen] = 0.0
+    visible = ~(signal_to_noise < LEAST_FOR_HUE) & (linear.max(axis=1) > 0)
+    linear[~visible] = 0.0
     brightest = linear.max(axis=1)
-    full = max(float(brightest.max()), 1e-12)
+    full_scale = max(float(brightest.max()), 1e-12)
     return tuple(
         Swatch(
             time=rounded(float(series.t_s[row]), 3),
-            glow=css_colour(colour / full),
-            hue=css_colour(colour / peak) if visible else "",
-            measured=_written(series.values[row]),
-            fills=peak == full,
+            glow=css_colour(colour / full_scale),
+            hue=css_colour(colour / peak) if is_visible else "",
+            measured=_signals_text(series.values[row]),
+            fills=peak == full_scale,
         )
-        for row, colour, peak, visible in zip(rows, linear, brightest, seen, strict=True)
+        for row, colour, peak, is_visible in zip(rows, linear, brightest, visible, strict=True)
     )
 
 
-def _written(values: FloatArray) -> str:
+def _signals_text(values: FloatArray) -> str:
     """Return the signals R, G, B in DN/s as text."""
     pairs = zip(_RGB, values, strict=True)
     return ", ".join(f"{name} {rounded(float(value), 3)}" for name, value in pairs) + " DN/s"

@@ -44,16 +44,16 @@ def describe_curves(file: CurveFile) -> str:
          |      ▁▁▁▁▂▃▅▆▇█████▇▇▆▅▄▃▂▁▁                   |
     """
     curves = list(file.curves.items())
-    what = "one curve" if len(curves) == 1 else f"{len(curves)} curves"
-    lines = [f"{file.title}: {what} ({file.path})"]
+    count = "one curve" if len(curves) == 1 else f"{len(curves)} curves"
+    lines = [f"{file.title}: {count} ({file.path})"]
     widest = max(len(name) for name, _ in curves[:MOST_CURVES])
-    lines += [_described(name.ljust(widest), curve) for name, curve in curves[:MOST_CURVES]]
+    lines += [_describe_curve(name.ljust(widest), curve) for name, curve in curves[:MOST_CURVES]]
     if len(curves) > MOST_CURVES:
         lines.append(f"and {len(curves) - MOST_CURVES} more; choose with --curve NAME")
     return "\n".join(lines)
 
 
-def _described(name: str, curve: Curve) -> str:
+def _describe_curve(name: str, curve: Curve) -> str:
     """Return the line of text with grid, range and peak of a curve, and the line of its shape."""
     nm, value = curve.wavelength_nm, curve.value
     steps = np.diff(nm)

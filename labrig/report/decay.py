@@ -63,15 +63,15 @@ def repeats(series: Series, fit: FittedDecay) -> tuple[Repeat, ...]:
     The factor of a unit to the common fit is 1 plus the mean common-mode deviation of its frames,
     weighted by the noise of a frame and its flicker.
     """
-    left = residuals(series, fit)
-    weight = 1 / (np.square(left.common_sigma) + fit.flicker**2)
-    known = series.usable & np.isfinite(left.common) & np.isfinite(weight)
+    deviations = residuals(series, fit)
+    weight = 1 / (np.square(deviations.common_sigma) + fit.flicker**2)
+    usable = series.usable & np.isfinite(deviations.common) & np.isfinite(weight)
     factors = []
     for unit in dict.fromkeys(series.unit):
-        rows = known & (np.array(series.unit) == unit)
+        rows = usable & (np.array(series.unit) == unit)
         if rows.any():
             information = float(weight[rows].sum())
-            mean = 1 + float(weight[rows] @ left.common[rows]) / information
+            mean = 1 + float(weight[rows] @ deviations.common[rows]) / information
             factors.append((unit, mean, 1 / np.sqrt(information)))
     if not factors:
         return ()
@@ -118,16 +118,16 @@ def steady(series: Series) -> SteadySource | None:
     brightest = int(values.mean(axis=0).argmax())
     value, t_s = values[:, brightest], series.t_s[series.usable]
     level, span_s = float(value.mean()), float(np.ptp(t_s))
-    away_s = t_s - t_s.mean()
+    centred_s = t_s - t_s.mean()
     if not span_s:
         return None
-    slope = float(away_s @ value / (away_s @ away_s))
-    rest = value - level - slope * away_s
-    scatter = float(np.sqrt(rest @ rest / (len(value) - 2)))
+    slope = float(centred_s @ value / (centred_s @ centred_s))
+    residual = value - level - slope * centred_s
+    scatter = float(np.sqrt(residual @ residual / (len(value) - 2)))
     level_sigma = scatter / np.sqrt(len(value))
     if not level > SEEN_SIGMA * level_sigma:
         return None
-    slope_sigma = scatter / np.sqrt(away_s @ away_s)
+    slope_sigma = scatter / np.sqrt(centred_s @ centred_s)
     return SteadySource(
         channel=series.channels[brightest],
         level=level,
@@ -225,7 +225,7 @@ def render(result: DecayResult, source: Source) -> Rendered:
     first = next(iter(result.patches.values())).series
     report = DecayReport(
         about=source.about,
-        patches=tuple(_reported(name, one) for name, one in result.patches.items()),
+        patches=tuple(_patch_report(name, patch) for name, patch in result.patches.items()),
         frames=tuple(frames),
         daylight=tuple(frame for frame in frames if frame.role == FrameRole.DAYLIGHT),
         glow=_glow(frames, first),
@@ -235,8 +235,8 @@ def render(result: DecayResult, source: Source) -> Rendered:
         states=result.states_asked,
     )
     lines = tuple(f"{name}\n{fit}" for name, fit in result.fits.items())
-    found, methods = decay_sections(report, source.anchor)
-    return Rendered(found, lines, methods)
+    results, method_sections = decay_sections(report, source.anchor)
+    return Rendered(results, lines, method_sections)
 
 
 def decay_sections(
@@ -259,22 +259,22 @@ def decay_sections(
     late = lateness(timings)
     content = _Content(report, patches, screen.known, late)
     sensor = sensor_of([photograph.frame for photograph in report.glow])
-    found = (
+    results = (
         _results(content, anchor),
         _sample(content, screen, anchor),
         *(
             Section(
-                f"Patch {one.patch.name}",
-                figures=one.figures,
-                anchor=one.anchor,
+                f"Patch {patch.patch.name}",
+                figures=patch.figures,
+                anchor=patch.anchor,
                 template="patch.html.j2",
-                content=_Content(report, patches, screen.known, late, one),
+                content=_Content(report, patches, screen.known, late, patch),
             )
-            for one in patches
+            for patch in patches
         ),
         *_timing(content, timings, anchor),
     )
-    how = Section(
+    methods_section = Section(
         "Methods",
         anchor=f"{anchor}methods",
         template="methods.html.j2",
@@ -284,10 +284,10 @@ def decay_sections(
             "unknown": UNKNOWN,
         },
     )
-    return found, (how, Section("Assumptions", points=DECAY_ASSUMPTIONS))
+    return results, (methods_section, Section("Assumptions", points=DECAY_ASSUMPTIONS))
 
 
-def _reported(name: str, patch: DecayPatch) -> PatchReport:
+def _patch_report(name: str, patch: DecayPatch) -> PatchReport:
     """Return a patch of the result as a patch of the report."""
     return PatchReport(name, patch.region, patch.series, patch.fit or patch.failure, patch.noise)
 
@@ -306,8 +306,8 @@ def _results(content: _Content, anchor: str) -> Section:
     figures: tuple[Picture, ...] = ()
     if len(content.patches) > 1:
         figures = tuple(
-            Picture(f"overview-{one.number}-{one.patch.name}", draw)
-            for one, draw in zip(
+            Picture(f"overview-{patch.number}-{patch.patch.name}", draw)
+            for patch, draw in zip(
                 content.patches, overview_figures(content.report.patches), strict=True
             )
         )
@@ -339,9 +339,11 @@ def _sample(content: _Content, screen: Screen, anchor: str) -> Section:
 
 def _timing(content: _Content, timings: Sequence[FrameTiming], anchor: str) -> tuple[Section, ...]:
     """Return the section on lateness, repeats and steady patches, or none without any of them."""
-    repeated = list(dict.fromkeys(one.unit for item in content.patches for one in item.repeats))
-    shining = [item for item in content.patches if item.steady]
-    if not (content.late or repeated or shining):
+    repeat_units = list(
+        dict.fromkeys(repeat.unit for patch in content.patches for repeat in patch.repeats)
+    )
+    steady_patches = [patch for patch in content.patches if patch.steady]
+    if not (content.late or repeat_units or steady_patches):
         return ()
     figures = (Picture("timing", partial(timing_figure, timings)),) if timings else ()
     return (
@@ -355,7 +357,7 @@ def _timing(content: _Content, timings: Sequence[FrameTiming], anchor: str) -> t
                 content.patches,
                 content.colours_known,
                 content.late,
-                extra={"repeated": repeated, "steady": shining},
+                extra={"repeated": repeat_units, "steady": steady_patches},
             ),
         ),
     )

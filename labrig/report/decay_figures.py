@@ -99,9 +99,9 @@ def middles_s(series: Series) -> FloatArray:
 def fitted_curve(series: Series, fit: FittedDecay) -> Curve:
     """Evaluate a fit over the times of a series, with exposures interpolated between its frames."""
     order = np.argsort(series.t_s, kind="stable")
-    known_t, known_exposure = series.t_s[order], series.exposure_s[order]
-    t_s = np.linspace(known_t[0], known_t[-1], POINTS)
-    exposure_s = np.interp(t_s, known_t, known_exposure)
+    frame_t_s, frame_exposure_s = series.t_s[order], series.exposure_s[order]
+    t_s = np.linspace(frame_t_s[0], frame_t_s[-1], POINTS)
+    exposure_s = np.interp(t_s, frame_t_s, frame_exposure_s)
     middle_s = t_s + exposure_s / 2
     states = [state.amplitude * np.exp(-state.k_r_per_s * middle_s) for state in fit.states]
     return Curve(
@@ -144,7 +144,7 @@ def linear_decay(series: Series, fit: FittedDecay | None) -> Figure:
     """Draw the signal over time."""
     figure, axes = _axes()
     _draw(axes, series, fit)
-    highest, lowest = max(_highest(series), 0.0), min(float(_used(series).min()), 0.0)
+    highest, lowest = max(_highest(series), 0.0), min(float(_usable_values(series).min()), 0.0)
     room = 0.06 * (highest - lowest) or 1.0
     axes.set_ylim(lowest - (room if lowest < 0 else 0.0), highest + room)
     exponent = _common_exponent(highest)
@@ -215,15 +215,19 @@ def _common_exponent(highest: float) -> int:
     return 3 * math.floor(math.log10(highest) / 3)
 
 
-def _used(series: Series) -> FloatArray:
+def _usable_values(series: Series) -> FloatArray:
     """Return the values of usable frames, shape (m, C); all values if no frame is usable."""
     return series.values[series.usable] if series.usable.any() else series.values
 
 
 def _highest(series: Series) -> float:
     """Return the highest value on an axis; values excluded from the fit raise it within limits."""
-    used = float(_used(series).max())
-    return min(float(series.values.max()), LEFT_OUT_SHOWN * used) if used > 0 else used
+    highest_usable = float(_usable_values(series).max())
+    return (
+        min(float(series.values.max()), LEFT_OUT_SHOWN * highest_usable)
+        if highest_usable > 0
+        else highest_usable
+    )
 
 
 def _draw(axes: Axes, series: Series, fit: FittedDecay | None) -> None:
@@ -327,7 +331,7 @@ def residuals(series: Series, fit: FittedDecay) -> Residuals:
 
 def residual_figure(series: Series, fit: FittedDecay) -> Figure:
     """Draw the normalised residuals and, with several channels, the common-mode deviations."""
-    left = residuals(series, fit)
+    deviations = residuals(series, fit)
     several = len(series.channels) > 1
     figure = new_figure(RESIDUALS_HEIGHT_PT if several else LOW_HEIGHT_PT)
     upper = place(figure, left=LEFT_PT, bottom=136 if several else 38, right=12, top=30)
@@ -335,14 +339,14 @@ def residual_figure(series: Series, fit: FittedDecay) -> Figure:
     last = float(t_s.max())
     upper.axhspan(-BAND, BAND, color=SHADE, linewidth=0)
     upper.axhline(0, color=MUTED, linewidth=0.8)
-    cut = np.clip(left.normalised, -FARTHEST, FARTHEST)
+    clipped = np.clip(deviations.normalised, -FARTHEST, FARTHEST)
     for number, name in enumerate(series.channels):
         marker = MARKERS[number % len(MARKERS)]
         colour = channel_colour(name, number)
         for rows, face in ((usable, colour), (~usable, PAPER)):
-            points(upper, t_s[rows], cut[rows, number], marker, colour, face, size=3.6)
+            points(upper, t_s[rows], clipped[rows, number], marker, colour, face, size=3.6)
     _residual_legend(figure, series)
-    reach = float(np.abs(cut[usable]).max()) if usable.any() else BAND
+    reach = float(np.abs(clipped[usable]).max()) if usable.any() else BAND
     upper.set_ylim(-max(reach * 1.1, 3.2), max(reach * 1.1, 3.2))
     upper.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
     upper.set_ylabel("Residual / σ")
@@ -353,13 +357,14 @@ def residual_figure(series: Series, fit: FittedDecay) -> Figure:
     lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=150, share_x=upper)
     lower.axhspan(-200 * fit.flicker, 200 * fit.flicker, color=SHADE, linewidth=0)
     lower.axhline(0, color=MUTED, linewidth=0.8)
-    known = left.common_sigma <= max(COMMON_SIGMA, 3 * np.nanmin(left.common_sigma))
-    shown = known & usable if (known & usable).any() else known
-    common, common_sigma = 100 * left.common[shown], 100 * left.common_sigma[shown]
-    error_bars(lower, t_s[shown], common, common_sigma, INK)
-    points(lower, t_s[shown], common, "o", INK, INK, size=2.6)
+    precise = deviations.common_sigma <= max(COMMON_SIGMA, 3 * np.nanmin(deviations.common_sigma))
+    drawn = precise & usable if (precise & usable).any() else precise
+    common, common_sigma = 100 * deviations.common[drawn], 100 * deviations.common_sigma[drawn]
+    error_bars(lower, t_s[drawn], common, common_sigma, INK)
+    points(lower, t_s[drawn], common, "o", INK, INK, size=2.6)
     reach = max(
-        float(np.max(np.abs(left.common[shown]) + left.common_sigma[shown])), 2.4 * fit.flicker
+        float(np.max(np.abs(deviations.common[drawn]) + deviations.common_sigma[drawn])),
+        2.4 * fit.flicker,
     )
     lower.set_ylim(-110 * reach, 110 * reach)
     lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
@@ -407,27 +412,27 @@ def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
         "flicker": budget.flicker,
         "dark level": budget.dark_level,
     }
-    worth = LEAST_FRACTION * budget.together
-    return {name: part for name, part in parts.items() if (part > worth).any()}
+    threshold = LEAST_FRACTION * budget.together
+    return {name: part for name, part in parts.items() if (part > threshold).any()}
 
 
 def noise_figure(budget: NoiseBudget) -> Figure:
     """Draw the relative standard uncertainty of the brightest channel, and its components."""
     figure = new_figure(NOISE_HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
-    together = 100 * budget.together
+    total = 100 * budget.together
     axes.set_yscale("log")
     # Broad and pale, since the largest part is nearly as large.
     entries: list[Artist] = [lined("together", INK, width=4.5, opacity=BAND_OPACITY)]
-    shown = [together]
-    axes.plot(budget.t_s, together, color=INK, linewidth=4.5, alpha=BAND_OPACITY)
+    drawn_parts = [total]
+    axes.plot(budget.t_s, total, color=INK, linewidth=4.5, alpha=BAND_OPACITY)
     for name, part in visible_parts(budget).items():
         percent, (colour, style) = 100 * part, _LINES[name]
         axes.plot(budget.t_s, percent, color=colour, linewidth=1.2, linestyle=style)
         entries.append(lined(name, colour, style))
-        shown.append(percent[percent > LEAST_FRACTION * together])
-    low, high = min(part.min() for part in shown), max(part.max() for part in shown)
-    axes.set_ylim(0.8 * low, 1.3 * max(min(high, MOST_PERCENT), together.min()))
+        drawn_parts.append(percent[percent > LEAST_FRACTION * total])
+    low, high = min(part.min() for part in drawn_parts), max(part.max() for part in drawn_parts)
+    axes.set_ylim(0.8 * low, 1.3 * max(min(high, MOST_PERCENT), total.min()))
     mark_decades(axes)
     last = float(budget.t_s.max())
     axes.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
@@ -489,13 +494,13 @@ def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
     axes.axhline(0, color=MUTED, linewidth=0.8)
     entries = []
     for number, unit in enumerate(units):
-        of_unit = [timing for timing in timings if timing.unit == unit]
+        unit_timings = [timing for timing in timings if timing.unit == unit]
         marker = MARKERS[number % len(MARKERS)]
         colour = INK if number == 0 else OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
         entries.append(marked(unit, marker, colour))
         axes.plot(
-            [timing.t_s for timing in of_unit],
-            [1e3 * timing.late_s for timing in of_unit],
+            [timing.t_s for timing in unit_timings],
+            [1e3 * timing.late_s for timing in unit_timings],
             linestyle="none",
             marker=marker,
             markersize=3.6,

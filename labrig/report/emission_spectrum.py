@@ -46,8 +46,10 @@ def render(result: EmissionSpectrumResult, source: Source) -> Rendered:
     sections: list[Section] = []
     lines: list[str] = []
     for name, patch in result.patches.items():
-        of_patch, prefix = (f": {name}", f"{name}: ") if name else ("", "")
-        sections += (replace(one, title=one.title + of_patch) for one in _sections(patch))
+        title_suffix, prefix = (f": {name}", f"{name}: ") if name else ("", "")
+        sections += (
+            replace(section, title=section.title + title_suffix) for section in _sections(patch)
+        )
         lines += (prefix + line for line in _lines(patch))
     return Rendered(tuple(sections), tuple(lines))
 
@@ -61,17 +63,17 @@ def _lines(patch: PatchSpectrum) -> Iterator[str]:
         f"σ of Λ* {100 * float(np.median(spectrum.sigma)):.1f} % of its peak (median)"
     )
     if patch.times:
-        least = min(patch.times, key=lambda one: one.p_value)
+        least = min(patch.times, key=lambda comparison: comparison.p_value)
         outcome = "changes" if patch.changes_with_time else "the same"
         yield (
             f"over time: {outcome} (least p = {least.p_value:.2g} of {len(patch.times)}, at "
             f"{least.what}; centroid {_shift(least)} nm off the others)"
         )
     outcome = "differs" if patch.depends_on_lamp else "the same"
-    for one in patch.lamps:
+    for comparison in patch.lamps:
         yield (
-            f"{one.what}: {outcome} (p = {one.p_value:.2g}; centroid {_shift(one)} nm off, "
-            f"{one.brightness:.3g} times as bright)"
+            f"{comparison.what}: {outcome} (p = {comparison.p_value:.2g}; "
+            f"centroid {_shift(comparison)} nm off, {comparison.brightness:.3g} times as bright)"
         )
 
 
@@ -156,9 +158,9 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
 
 def _constancy_text(patch: PatchSpectrum) -> str:
     """Return the statement on the constancy of the spectrum in time."""
-    least = min(patch.times, key=lambda one: one.p_value)
+    least = min(patch.times, key=lambda comparison: comparison.p_value)
     if patch.changes_with_time:
-        worst = max(patch.times, key=lambda one: one.beyond_noise)
+        worst = max(patch.times, key=lambda comparison: comparison.beyond_noise)
         return (
             "The relative spectrum changes with time: the frame at "
             f"{worst.what} differs from those at the other times by {worst.beyond_noise:.2%} "
@@ -174,27 +176,27 @@ def _constancy_text(patch: PatchSpectrum) -> str:
 def _lamp_text(patch: PatchSpectrum) -> str:
     """Return the statement on the independence of the spectrum of the exciting lamp."""
     outcome = "differs" if patch.depends_on_lamp else "is the same within noise"
-    worst = max(patch.lamps, key=lambda one: one.beyond_noise)
+    worst = max(patch.lamps, key=lambda comparison: comparison.beyond_noise)
     return (
         f"The relative spectrum {outcome} whichever lamp charged the sample: "
         f"p = {worst.p_value:.2g}, {worst.beyond_noise:.2%} rms beyond noise."
     )
 
 
-def _table(what: str, comparisons: Sequence[SpectralComparison]) -> Table:
+def _table(head: str, comparisons: Sequence[SpectralComparison]) -> Table:
     """Return the table of comparisons; `what` is the head of its first column."""
     return Table(
-        (what, "χ²", "degrees of freedom", "p", "rms beyond noise / %", "centroid shift / nm"),
+        (head, "χ²", "degrees of freedom", "p", "rms beyond noise / %", "centroid shift / nm"),
         tuple(
             (
-                one.what,
-                rounded(one.chi2),
-                str(one.dof),
-                f"{one.p_value:.2g}",
-                rounded(100 * one.beyond_noise, 2),
-                _shift(one),
+                comparison.what,
+                rounded(comparison.chi2),
+                str(comparison.dof),
+                f"{comparison.p_value:.2g}",
+                rounded(100 * comparison.beyond_noise, 2),
+                _shift(comparison),
             )
-            for one in comparisons
+            for comparison in comparisons
         ),
     )
 
@@ -241,10 +243,10 @@ def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
             for column in (spectrum.value, spectrum.sigma)
         )
         # Side by side, so that error bars do not cover each other.
-        beside = nm + 1.2 * (number - (len(spectra) - 1) / 2)
+        shifted_nm = nm + 1.2 * (number - (len(spectra) - 1) / 2)
         axes.plot(nm, value, color=colour, linewidth=0.9)
-        error_bars(axes, beside, value, sigma, colour)
-        points(axes, beside, value, marker, colour, colour, size=3.0)
+        error_bars(axes, shifted_nm, value, sigma, colour)
+        points(axes, shifted_nm, value, marker, colour, colour, size=3.0)
         entries.append(marked(name, marker, colour))
     axes.set_ylim(0, None)
     legend_above(figure, entries, COLUMNS)
@@ -264,8 +266,8 @@ def _shift_figure(comparisons: Sequence[SpectralComparison], t_s: FloatArray) ->
     figure = new_figure(180.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     axes.axhline(0.0, color=MUTED, linewidth=0.9)
-    shift = np.array([one.shift_nm for one in comparisons])
-    sigma = np.array([one.shift_sigma_nm for one in comparisons])
+    shift = np.array([comparison.shift_nm for comparison in comparisons])
+    sigma = np.array([comparison.shift_sigma_nm for comparison in comparisons])
     error_bars(axes, t_s, shift, sigma, INK)
     points(axes, t_s, shift, "o", INK, INK)
     axes.set_xscale("log")

@@ -82,9 +82,11 @@ def _fractions(file: FadeFile, table: Change) -> Figure:
     fraction, sigma = np.array(table.fraction), np.array(table.sigma)
     time_ms = 1e3 * np.array(table.t_s)
     bands = fraction.shape[1]
-    shown = sorted(set(np.linspace(0, bands - 1, min(bands, len(COLOURS))).round().astype(int)))
+    drawn_bands = sorted(
+        set(np.linspace(0, bands - 1, min(bands, len(COLOURS))).round().astype(int))
+    )
     entries = []
-    for band, colour in zip(shown, COLOURS, strict=False):
+    for band, colour in zip(drawn_bands, COLOURS, strict=False):
         low, high = file.bands_nm[band], file.bands_nm[band + 1]
         axes.fill_between(
             time_ms, fraction[:, band] - sigma[:, band], fraction[:, band] + sigma[:, band],
@@ -98,29 +100,31 @@ def _fractions(file: FadeFile, table: Change) -> Figure:
     return figure
 
 
-def _warming(warm: Warming, seen: WarmingLight) -> Section:
+def _warming(warming: Warming, measured: WarmingLight) -> Section:
     """Return the section on the warm-up transient."""
-    deficit = plus_minus(100 * warm.deficit, 100 * warm.deficit_sigma)
+    deficit = plus_minus(100 * warming.deficit, 100 * warming.deficit_sigma)
     text = (
         f"After ten minutes in the dark the lamp has {deficit} % less light than when warm. The "
-        f"deficit decays with a time constant of {warm.time_constant_s:.0f} s as the housing "
+        f"deficit decays with a time constant of {warming.time_constant_s:.0f} s as the housing "
         "warms, and weakens short charges."
     )
     caption = "Light on the card in each photograph; line: 1 − d e^(−t/τ)."
     return Section(
         "Warm-up transient of the lamp",
         (text,),
-        (Picture("warming", partial(_warming_figure, warm, seen), caption),),
+        (Picture("warming", partial(_warming_figure, warming, measured), caption),),
     )
 
 
-def _warming_figure(warm: Warming, seen: WarmingLight) -> Figure:
+def _warming_figure(warming: Warming, measured: WarmingLight) -> Figure:
     """Draw the light after switching on in per cent of that of the warm lamp."""
     figure = new_figure(180)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
-    grid = np.linspace(0, float(seen.t_s.max()), 201)
-    axes.plot(grid, 100 * (1 - warm.deficit * np.exp(-grid / warm.time_constant_s)), color=INK)
-    points(axes, seen.t_s, 100 * seen.light, "o", INK, INK, size=3.0)
+    grid = np.linspace(0, float(measured.t_s.max()), 201)
+    axes.plot(
+        grid, 100 * (1 - warming.deficit * np.exp(-grid / warming.time_constant_s)), color=INK
+    )
+    points(axes, measured.t_s, 100 * measured.light, "o", INK, INK, size=3.0)
     axes.set_xlabel("Time after switching on / s")
     axes.set_ylabel("Light / % of warm")
     return figure
@@ -142,9 +146,10 @@ def _lines(changes: list[tuple[str, Change, LampChange]]) -> Iterator[str]:
         )
 
 
-def _warming_line(warm: Warming) -> str:
+def _warming_line(warming: Warming) -> str:
     """Return the line for the terminal on the warm-up transient."""
     return (
-        f"a cold lamp has {plus_minus(100 * warm.deficit, 100 * warm.deficit_sigma)} % less light; "
-        f"the deficit decays with a time constant of {warm.time_constant_s:.0f} s"
+        f"a cold lamp has {plus_minus(100 * warming.deficit, 100 * warming.deficit_sigma)} % "
+        "less light; "
+        f"the deficit decays with a time constant of {warming.time_constant_s:.0f} s"
     )

@@ -321,23 +321,23 @@ def mark_decades(axes: Axes, most: int = 8) -> None:
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     inside = [decade for decade in decades if low <= 10.0**decade <= high]
     step = max(1, math.ceil(len(inside) / most))
-    every = decades[::step]
-    labelled = [10.0**decade for decade in every]
+    labelled_decades = decades[::step]
+    labelled = [10.0**decade for decade in labelled_decades]
     if high < low * 10**FEW_DECADES:
-        labelled = [digit * 10.0**decade for decade in every for digit in (1, 2, 5)]
-    labelled = [at for at in labelled if low <= at <= high]
+        labelled = [digit * 10.0**decade for decade in labelled_decades for digit in (1, 2, 5)]
+    labelled = [tick for tick in labelled if low <= tick <= high]
     if len(labelled) < FEWEST_LABELS:
-        labelled = [at for at in MaxNLocator(5).tick_values(low, high) if low <= at <= high]
+        labelled = [tick for tick in MaxNLocator(5).tick_values(low, high) if low <= tick <= high]
     axes.yaxis.set_major_locator(FixedLocator(labelled))
     axes.yaxis.set_major_formatter(FuncFormatter(decade_text))
     # Matplotlib's own minor ticks would be half of the work of drawing the figure.
     axes.yaxis.set_minor_locator(NullLocator())
     if step == 1:
-        between = [digit * 10.0**decade for decade in decades for digit in range(2, 10)]
-        shown = [at for at in between if low <= at <= high]
+        multiples = [digit * 10.0**decade for decade in decades for digit in range(2, 10)]
+        minor_ticks = [tick for tick in multiples if low <= tick <= high]
         axes.plot(
-            np.zeros(len(shown)),
-            shown,
+            np.zeros(len(minor_ticks)),
+            minor_ticks,
             transform=axes.get_yaxis_transform(),
             linestyle="none",
             marker=TICKLEFT,

@@ -77,9 +77,9 @@ def _irradiance_figure(file: IrradianceFile) -> Figure:
     entries = []
     for band, (low, high) in enumerate(zip(file.bands_nm[:-1], file.bands_nm[1:], strict=True)):
         colour = OTHER_CHANNELS[band % len(OTHER_CHANNELS)]
-        seen = through[:, band] > 0.02 * through[:, band].max()
-        error_bars(axes, position[seen], through[seen, band], sigma[seen, band], colour)
-        axes.plot(position[seen], through[seen, band], color=colour, linewidth=1.0)
+        drawn = through[:, band] > 0.02 * through[:, band].max()
+        error_bars(axes, position[drawn], through[drawn, band], sigma[drawn, band], colour)
+        axes.plot(position[drawn], through[drawn, band], color=colour, linewidth=1.0)
         entries.append(lined(f"{low:.0f}–{high:.0f} nm", colour))
     axes.set_ylim(0, None)
     axes.set_xlabel("Position from blue end to red end")
@@ -97,8 +97,8 @@ def _scale_figure(result: IrradianceResult) -> Figure:
     low, high = scale.value * np.exp(-sigma), scale.value * np.exp(sigma)
     axes.fill_between(centre_nm, low, high, color=SHADE, linewidth=0)
     axes.plot(centre_nm, scale.value, color=MUTED, linewidth=1.2)
-    unsure = scale.measured * scale.measured_sigma
-    error_bars(axes, centre_nm, scale.measured, unsure, INK)
+    measured_sigma = scale.measured * scale.measured_sigma
+    error_bars(axes, centre_nm, scale.measured, measured_sigma, INK)
     points(axes, centre_nm, scale.measured, "o", INK, INK, size=3.0)
     # Single positions in the violet may be far off: their bars may leave the figure.
     axes.set_ylim(0, 2 * float(np.median(scale.value)))

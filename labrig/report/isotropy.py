@@ -54,7 +54,7 @@ def _line(glow: AngularGlow) -> str:
 def _section(result: IsotropyResult) -> Section:
     """Return the section with the figure and the table of all patches."""
     patches = result.patches
-    what = (
+    geometry = (
         "The patches enclose the whole sample: what they show is its intensity, here divided by "
         "the cosine of the angle."
         if result.around
@@ -79,7 +79,7 @@ def _section(result: IsotropyResult) -> Section:
     return Section(
         "Isotropy",
         (
-            f"Every view follows a charge seen straight. {what}",
+            f"Every view follows a charge seen straight. {geometry}",
             f"The straight view after all others over the one before: {drift}; that drift is "
             "divided out.",
             *(_statement(name, glow) for name, glow in patches.items()),

@@ -57,10 +57,10 @@ def comparison_table(comparison: MaterialComparison) -> Table:
         rows=tuple(
             (
                 f"{pair.quantity} / {pair.unit}" if pair.unit else pair.quantity,
-                _written(pair.measured, pair.sigma),
-                _written(pair.reference, pair.reference_sigma),
-                _signed(pair.percent),
-                _signed(pair.in_sigma),
+                _value_text(pair.measured, pair.sigma),
+                _value_text(pair.reference, pair.reference_sigma),
+                _signed_text(pair.percent),
+                _signed_text(pair.in_sigma),
             )
             for pair in comparison.pairs
         ),
@@ -90,32 +90,32 @@ def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[
     """Yield the rows of k_r, r(0), and k_e and Λ by band."""
     for quantity, name in (("k_r / s⁻¹", "k_r_per_s"), ("r(0)", "r0")):
         if any(getattr(state, name) is not None for state in states):
-            yield (quantity, *(_of(state, name) for state in states))
+            yield (quantity, *(_quantity_text(state, name) for state in states))
     for symbol, unit, name in (("k_e", " / s⁻¹", "k_e_per_s"), ("Λ", "", "reradiation")):
         if any(getattr(state, name) is not None for state in states):
             for band, (low, high) in enumerate(pairwise(bands_nm)):
                 quantity = f"{symbol} {low:g}–{high:g} nm{unit}"
-                yield (quantity, *(_of(state, name, band) for state in states))
+                yield (quantity, *(_quantity_text(state, name, band) for state in states))
 
 
-def _of(state: State, name: str, band: int | None = None) -> str:
+def _quantity_text(state: State, name: str, band: int | None = None) -> str:
     """Return a quantity of a state, in a band if there are bands, with its σ as text."""
     value, sigma = getattr(state, name), getattr(state, f"{name}_sigma")
     if value is None:
         return UNKNOWN
     if band is not None:
         value, sigma = value[band], None if sigma is None else sigma[band]
-    return _written(value, math.nan if sigma is None else sigma)
+    return _value_text(value, math.nan if sigma is None else sigma)
 
 
-def _written(value: float, sigma: float) -> str:
+def _value_text(value: float, sigma: float) -> str:
     """Return a value with its σ as text; NaN stands for an unknown value or σ."""
     if math.isnan(value):
         return UNKNOWN
     return rounded(value) if math.isnan(sigma) else plus_minus(value, sigma)
 
 
-def _signed(number: float) -> str:
+def _signed_text(number: float) -> str:
     """Return a number as text with its sign."""
     if not math.isfinite(number):
         return UNKNOWN

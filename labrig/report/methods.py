@@ -32,7 +32,7 @@ def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None)
         yield _punctuality(late)
     yield _mean(report, sensor)
     yield from _dark(report)
-    yield from _left_out(report)
+    yield from _exclusions(report)
 
 
 def _charge(report: DecayReport, decays: Sequence[FrameRecord]) -> Iterator[str]:
@@ -53,7 +53,7 @@ def _frames(
     camera = f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
     units = list(dict.fromkeys(frame.unit for frame in decays))
     counts = [sum(frame.unit == unit for frame in decays) for unit in units]
-    count = " to ".join(str(one) for one in dict.fromkeys((min(counts), max(counts))))
+    count = " to ".join(str(number) for number in dict.fromkeys((min(counts), max(counts))))
     series = report.patches[0].series
     yield (
         f"After the lamp had been switched off, {camera} at {', '.join(_settings(decays))} took "
@@ -77,7 +77,10 @@ def _settings(frames: Sequence[FrameRecord]) -> list[str]:
     """Return the f-numbers and ISO speeds of the frames as text."""
     apertures = sorted({frame.f_number for frame in frames if frame.f_number is not None})
     speeds = sorted({frame.iso for frame in frames})
-    return [*(f"f/{rounded(one, 3)}" for one in apertures), *(f"ISO {one}" for one in speeds)]
+    return [
+        *(f"f/{rounded(setting, 3)}" for setting in apertures),
+        *(f"ISO {setting}" for setting in speeds),
+    ]
 
 
 def _exposures(frames: Sequence[FrameRecord]) -> str:
@@ -100,11 +103,11 @@ def _mean(report: DecayReport, sensor: Sensor | None) -> str:
     channels = report.patches[0].series.channels
     place = "regions" if len(report.patches) > 1 else "a region"
     size = _sizes(report, sensor)
-    each = f", for each of the channels {listed(channels)}" if len(channels) > 1 else ""
+    per_channel = f", for each of the channels {listed(channels)}" if len(channels) > 1 else ""
     return (
         "The linear RAW values above the black level, neither demosaiced nor white balanced, were "
-        f"averaged over {place} of the frame{f' of {size}' if size else ''}{each} and divided by "
-        "the exposure time."
+        f"averaged over {place} of the frame{f' of {size}' if size else ''}{per_channel} "
+        "and divided by the exposure time."
     )
 
 
@@ -130,24 +133,28 @@ def _dark(report: DecayReport) -> Iterator[str]:
     if report.background is not None:
         yield "The level of a dark region of the same frame was subtracted from each."
     elif darks and decays:
-        began = min(frame.start_time for frame in decays)
-        before = ", taken before the decay" if max(d.start_time for d in darks) < began else ""
+        first_decay = min(frame.start_time for frame in decays)
+        before = (
+            ", taken before the decay"
+            if max(dark.start_time for dark in darks) < first_decay
+            else ""
+        )
         yield (
             f"The dark level ({len(darks)} dark frames of {_exposures(darks)}{before}) was "
             "subtracted."
         )
 
 
-def _left_out(report: DecayReport) -> Iterator[str]:
+def _exclusions(report: DecayReport) -> Iterator[str]:
     """Yield the sentence on excluded frames."""
-    all_of = "frames" if len(report.patches) == 1 else "values of all patches"
+    items = "frames" if len(report.patches) == 1 else "values of all patches"
     flags = [flag for patch in report.patches for flag in patch.series.flag]
-    out = len(flags) - sum(int(patch.series.usable.sum()) for patch in report.patches)
-    clipped = sum("clipped" in flag for flag in flags)
-    if out:
-        fraction = "" if clipped == out else f", {clipped} of them"
-        why = f"{fraction} because pixels were saturated" if clipped else ""
-        yield f"{out} of {len(flags)} {all_of} were left out{why}."
+    n_excluded = len(flags) - sum(int(patch.series.usable.sum()) for patch in report.patches)
+    n_clipped = sum("clipped" in flag for flag in flags)
+    if n_excluded:
+        fraction = "" if n_clipped == n_excluded else f", {n_clipped} of them"
+        reason = f"{fraction} because pixels were saturated" if n_clipped else ""
+        yield f"{n_excluded} of {len(flags)} {items} were left out{reason}."
 
 
 def listed(words: Sequence[str]) -> str:
@@ -155,12 +162,12 @@ def listed(words: Sequence[str]) -> str:
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
-def _range(numbers: Sequence[float], written: Callable[[float], str]) -> str:
+def _range(numbers: Sequence[float], format_number: Callable[[float], str]) -> str:
     """Return the range of numbers as text, or their median if they are nearly equal."""
     low, high = min(numbers), max(numbers)
     if high <= low * (1 + ALIKE):
-        return written(float(np.median(numbers)))
-    return f"{written(low)} to {written(high)}"
+        return format_number(float(np.median(numbers)))
+    return f"{format_number(low)} to {format_number(high)}"
 
 
 def _ms(seconds: float) -> str:
@@ -262,7 +269,7 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
         yield f"Here k_i are the rates and a_i the amplitudes; there are w_c = 1 and {offset}."
     yield "All parameters were fitted together by weighted nonlinear least squares."
     yield f"The weights follow the photon and read noise found in the frames{_flicker(fits)}."
-    states = [str(one) for one in sorted({fit.n_states for fit in fits})]
+    states = [str(number) for number in sorted({fit.n_states for fit in fits})]
     number = f"n = {states[0]}" if len(states) == 1 else f"n = {' or '.join(states)} by patch"
     if report.states is not None:
         yield f"The number of states was set to {report.states}."
@@ -291,6 +298,9 @@ def _flicker(fits: list[FittedDecay]) -> str:
 def _software(report: DecayReport) -> Iterator[str]:
     """Yield the sentence on the software and its versions."""
     versions = dict(report.about.libraries)
-    used = [text.format(versions[name]) for name, text in _SOFTWARE.items() if name in versions]
-    with_them = f" with {listed(used)}" if used else ""
-    yield f"Recording and analysis were done by labrig {report.about.labrig_version}{with_them}."
+    libraries = [
+        text.format(versions[name]) for name, text in _SOFTWARE.items() if name in versions
+    ]
+    with_libraries = f" with {listed(libraries)}" if libraries else ""
+    version = report.about.labrig_version
+    yield f"Recording and analysis were done by labrig {version}{with_libraries}."

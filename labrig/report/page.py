@@ -76,8 +76,8 @@ class FigureFiles:
         self._files: dict[str, str] = {}
         self._buffer = BytesIO()
         # Without dates and versions the same figures give the same bytes.
-        about = {"Title": title, "Creator": "labrig", "Producer": None, "CreationDate": None}
-        self._pdf = PdfPages(self._buffer, metadata=about)
+        metadata = {"Title": title, "Creator": "labrig", "Producer": None, "CreationDate": None}
+        self._pdf = PdfPages(self._buffer, metadata=metadata)
 
     def __enter__(self) -> Self:
         return self
@@ -103,12 +103,12 @@ class FigureFiles:
             Description for screen readers.
         """
         name = _slug(name)
-        drawn = _svg(figure)
-        self._files[f"{name}.svg"] = _file(drawn)
+        svg = _svg(figure)
+        self._files[f"{name}.svg"] = _file(svg)
         figure.patch.set(visible=True, facecolor="white")
         self._pdf.savefig(figure)  # type: ignore[no-untyped-call]
         return FigureFile(
-            element=Markup(_element(drawn, figure, name, described)),
+            element=Markup(_element(svg, figure, name, described)),
             svg_link=f"{FOLDER}/{name}.svg",
             pdf_link=f"{FOLDER}/{PDF}#page={len(self._files)}",
         )
@@ -121,11 +121,11 @@ class FigureFiles:
         OSError
             If the files cannot be written.
         """
-        place = folder / FOLDER
-        place.mkdir(exist_ok=True)
+        figures_folder = folder / FOLDER
+        figures_folder.mkdir(exist_ok=True)
         for name, text in self._files.items():
-            (place / name).write_text(text, encoding="utf-8", newline="\n")
-        (place / PDF).write_bytes(self._buffer.getvalue())
+            (figures_folder / name).write_text(text, encoding="utf-8", newline="\n")
+        (figures_folder / PDF).write_bytes(self._buffer.getvalue())
 
 
 def _slug(name: str) -> str:
@@ -136,31 +136,31 @@ def _slug(name: str) -> str:
 def _svg(figure: Figure) -> str:
     """Return the figure as SVG, from its root element on."""
     buffer = BytesIO()
-    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    figure.savefig(buffer, format="svg", metadata=nothing)
+    no_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.savefig(buffer, format="svg", metadata=no_metadata)
     text = buffer.getvalue().decode("utf-8")
     text = text[text.index("<svg") :].strip()
     text = _TAG.sub(lambda tag: _TOO_FINE.sub("", tag[0]), text)
-    return _MARKERS.sub(_styled_once, re.sub(r">\s+<", "><", text))
+    return _MARKERS.sub(_share_style, re.sub(r">\s+<", "><", text))
 
 
-def _styled_once(markers: re.Match[str]) -> str:
+def _share_style(markers: re.Match[str]) -> str:
     """Return a group of markers with their common style at the group."""
     own, uses, style = markers.groups()
     bare = uses.replace(f' style="{style}"', "")
     return f'<g{own or ""} style="{style}">{bare}</g>'
 
 
-def _file(drawn: str) -> str:
+def _file(svg: str) -> str:
     """Return the text of an SVG file with a white background."""
-    root, body = drawn.split(">", 1)
+    root, body = svg.split(">", 1)
     body = re.sub(r"font-family: [^;\"]*", f"font-family: {_FONTS}", body)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{root}>{_GROUND}{body}\n'
 
 
-def _element(drawn: str, figure: Figure, name: str, described: str) -> str:
+def _element(svg: str, figure: Figure, name: str, description: str) -> str:
     """Return the SVG element for the page, with its own ids and the page's colours and font."""
-    body = drawn.split(">", 1)[1]
+    body = svg.split(">", 1)[1]
     width, height = figure.get_size_inches() * 72
     # Its style sheet would hold for the whole page, which has one of its own.
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", body, flags=re.DOTALL)
@@ -170,7 +170,7 @@ def _element(drawn: str, figure: Figure, name: str, described: str) -> str:
     body = body.replace("url(#", f"url(#{name}-").replace('xlink:href="#', f'href="#{name}-')
     for colour, variable in VARIABLES.items():
         body = body.replace(colour, f"var(--{variable}, {colour})")
-    label = html.escape(described)
+    label = html.escape(description)
     return f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{label}">{body}'
 
 
@@ -181,14 +181,14 @@ _SYMBOL = re.compile(r"\b([a-z])_([a-z])\b")
 @cache
 def environment() -> Environment:
     """Return the environment of the templates in this folder, with the functions that they use."""
-    made = Environment(
+    templates = Environment(
         loader=FileSystemLoader(_FOLDER),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.globals.update(
+    templates.globals.update(
         duration_text=duration_text,
         plus_minus=plus_minus,
         rounded=rounded,
@@ -199,10 +199,10 @@ def environment() -> Environment:
         candidate_rows=parameters.candidate_rows,
         why_so_many_states=parameters.why_so_many_states,
     )
-    made.filters["quoted"] = shlex.quote
-    made.filters["indexed"] = _indexed
-    made.filters["titled"] = _titled
-    return made
+    templates.filters["quoted"] = shlex.quote
+    templates.filters["indexed"] = _indexed
+    templates.filters["titled"] = _titled
+    return templates
 
 
 def style() -> str:
@@ -218,8 +218,8 @@ def script() -> str:
 def dated_notes(text: str) -> list[tuple[str, str]]:
     """Return heading and text of every note; text before the first heading has an empty one."""
     before, *entries = re.split(r"^## +", text, flags=re.MULTILINE)
-    split = (entry.partition("\n") for entry in entries)
-    return [("", before.strip()), *((heading.strip(), rest.strip()) for heading, _, rest in split)]
+    parts = (entry.partition("\n") for entry in entries)
+    return [("", before.strip()), *((heading.strip(), rest.strip()) for heading, _, rest in parts)]
 
 
 def _indexed(text: str) -> Markup:
@@ -260,19 +260,23 @@ class RenderedSection:
 
 def draw(sections: Sequence[Section], figure_files: FigureFiles) -> list[RenderedSection]:
     """Draw the figures of all sections and add them to `figure_files`."""
-    return [_drawn(number, section, figure_files) for number, section in enumerate(sections, 1)]
+    return [
+        _draw_section(number, section, figure_files) for number, section in enumerate(sections, 1)
+    ]
 
 
-def _drawn(number: int, section: Section, figure_files: FigureFiles) -> RenderedSection:
+def _draw_section(number: int, section: Section, figure_files: FigureFiles) -> RenderedSection:
     """Draw the figures of the `number`-th section."""
     by_name = {
-        one.name: figure_files.add(
-            one.draw(), f"{number}-{one.name}", f"{section.title}: {one.name}"
+        picture.name: figure_files.add(
+            picture.draw(), f"{number}-{picture.name}", f"{section.title}: {picture.name}"
         )
-        for one in section.figures
+        for picture in section.figures
     }
     return RenderedSection(
-        section, tuple((by_name[one.name], one.caption) for one in section.figures), by_name
+        section,
+        tuple((by_name[picture.name], picture.caption) for picture in section.figures),
+        by_name,
     )
 
 
@@ -340,15 +344,15 @@ def write_report(path: Path, report: Report) -> None:
     True
     """
     with figure_style(), FigureFiles(f"{report.about.title}, {report.about.run}") as figure_files:
-        shown = draw((*report.sections, *report.methods), figure_files)
+        rendered = draw((*report.sections, *report.methods), figure_files)
     text = (
         environment()
         .get_template(TEMPLATE)
         .render(
             report=report,
             about=report.about,
-            found=shown[: len(report.sections)],
-            methods=shown[len(report.sections) :],
+            sections=rendered[: len(report.sections)],
+            methods=rendered[len(report.sections) :],
             notes=dated_notes(report.about.notes),
             # Style sheet and script are labrig's own; escaping them would break them.
             style=Markup(style()),

@@ -63,10 +63,10 @@ def state_rows(fit: FittedDecay) -> list[Row]:
     half_lives = [(math.log(2) * value, math.log(2) * sigma) for value, sigma in lifetimes]
     amplitudes = [(state.amplitude, state.amplitude_sigma) for state in fit.states]
     return [
-        Row(Markup("Rate k<sub>r</sub>"), "s⁻¹", _written(rates)),
-        Row(Markup("Lifetime 1/k<sub>r</sub>"), "s", _written(lifetimes)),
-        Row("Half-life", "s", _written(half_lives)),
-        Row("Amplitude a", "DN/s", _written(amplitudes)),
+        Row(Markup("Rate k<sub>r</sub>"), "s⁻¹", _value_texts(rates)),
+        Row(Markup("Lifetime 1/k<sub>r</sub>"), "s", _value_texts(lifetimes)),
+        Row("Half-life", "s", _value_texts(half_lives)),
+        Row("Amplitude a", "DN/s", _value_texts(amplitudes)),
     ]
 
 
@@ -104,16 +104,18 @@ def paper_rows(fit: FittedDecay) -> list[Row]:
         values = []
         for number, state in enumerate(fit.states):
             rate, amplitude = state.k_r_per_s, state.amplitude
-            shared = 2 * float(fit.covariance[2 * number, 2 * number + 1]) / (rate * amplitude)
+            relative_covariance = (
+                2 * float(fit.covariance[2 * number, 2 * number + 1]) / (rate * amplitude)
+            )
             relative2 = (
                 (state.k_r_sigma_per_s / rate) ** 2
                 + (state.amplitude_sigma / amplitude) ** 2
-                - (shared if math.isfinite(shared) else 0.0)
+                - (relative_covariance if math.isfinite(relative_covariance) else 0.0)
                 + ((weight_sigma / weight) ** 2 if weight > 0 else 0.0)
             )
             value = weight * amplitude / rate
             values.append((value, value * math.sqrt(max(relative2, 0.0))))
-        rows.append(Row(f"Λ in {name}", "DN", _written(values)))
+        rows.append(Row(f"Λ in {name}", "DN", _value_texts(values)))
     return rows
 
 
@@ -125,16 +127,16 @@ def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
     best = min(bics, default=math.inf)
     rows = [
         CandidateRow(
-            model=_states(candidate.n_states),
+            model=_states_text(candidate.n_states),
             reduced_chi2=rounded(candidate.reduced_chi2, 3),
-            bic_above_best=_above(candidate.bic, best),
+            bic_above_best=_bic_difference(candidate.bic, best),
             p_value="–" if candidate.f_p_value is None else _p_value(candidate.f_p_value),
             chosen=candidate.n_states == fit.n_states,
         )
         for candidate in fit.candidates
     ]
     rows += [
-        CandidateRow(alternative.name, "–", _above(alternative.bic, best), "–", False)
+        CandidateRow(alternative.name, "–", _bic_difference(alternative.bic, best), "–", False)
         for alternative in fit.alternative_models
     ]
     return rows
@@ -142,50 +144,52 @@ def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
 
 def why_so_many_states(fit: FittedDecay) -> str:
     """Return the reason for the number of states in a sentence or two."""
-    tried = {candidate.n_states: candidate for candidate in fit.candidates}
-    here = tried.get(fit.n_states)
-    fewer, more = tried.get(fit.n_states - 1), tried.get(fit.n_states + 1)
-    said = []
-    if here is not None and fewer is not None:
-        gain = rounded(fewer.bic - here.bic, 3)
-        said.append(f"BIC is lower by {gain} than with {_states(fewer.n_states)}.")
-    if here is not None and more is not None:
-        change = more.bic - here.bic
-        word = "raises" if change >= 0 else "lowers"
-        said.append(f"One more state {word} BIC by {rounded(abs(change), 3)}.")
+    candidates = {candidate.n_states: candidate for candidate in fit.candidates}
+    chosen = candidates.get(fit.n_states)
+    fewer, more = candidates.get(fit.n_states - 1), candidates.get(fit.n_states + 1)
+    sentences = []
+    if chosen is not None and fewer is not None:
+        gain = rounded(fewer.bic - chosen.bic, 3)
+        sentences.append(f"BIC is lower by {gain} than with {_states_text(fewer.n_states)}.")
+    if chosen is not None and more is not None:
+        change = more.bic - chosen.bic
+        verb = "raises" if change >= 0 else "lowers"
+        sentences.append(f"One more state {verb} BIC by {rounded(abs(change), 3)}.")
         if more.f_p_value is not None:
-            said.append(f"Chance alone gains as much in χ² with p = {_p_value(more.f_p_value)}.")
-    if not said:
-        said.append("No other number of states was tried or supported by the data.")
+            sentences.append(
+                f"Chance alone gains as much in χ² with p = {_p_value(more.f_p_value)}."
+            )
+    if not sentences:
+        sentences.append("No other number of states was tried or supported by the data.")
     elif more is None:
-        said.append("More were not asked for, or the data do not support them.")
+        sentences.append("More were not asked for, or the data do not support them.")
     if fit.better_model is not None:
         alternative = fit.better_model
         exponent = plus_minus(alternative.exponent, alternative.exponent_sigma)
-        said.append(
+        sentences.append(
             f"A {alternative.name}, {alternative.formula}, describes the data clearly better "
             f"(exponent {exponent})."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def _lifetime(rate_per_s: float, sigma_per_s: float) -> tuple[float, float]:
     """Return 1/k and its σ in s; σ is infinite if 1/k has no symmetric error."""
-    known = sigma_per_s < WORST_FOR_LIFETIME * rate_per_s
-    return 1 / rate_per_s, sigma_per_s / rate_per_s**2 if known else math.inf
+    determined = sigma_per_s < WORST_FOR_LIFETIME * rate_per_s
+    return 1 / rate_per_s, sigma_per_s / rate_per_s**2 if determined else math.inf
 
 
-def _written(pairs: list[tuple[float, float]]) -> tuple[str, ...]:
+def _value_texts(pairs: list[tuple[float, float]]) -> tuple[str, ...]:
     """Return values with their σ as text."""
     return tuple(plus_minus(value, sigma) for value, sigma in pairs)
 
 
-def _states(number: int) -> str:
+def _states_text(number: int) -> str:
     """Return a number of states as text."""
     return "1 state" if number == 1 else f"{number} states"
 
 
-def _above(bic: float, best: float) -> str:
+def _bic_difference(bic: float, best: float) -> str:
     """Return the difference of a BIC to the best one as text."""
     return "best" if bic == best else f"+{rounded(bic - best, 3)}"
 

@@ -54,14 +54,18 @@ def render(result: PhosphorResult, source: Source) -> Rendered:
         name: render_result(result.parts[name], part) for name, part in _parts(result, source)
     }
     sections = [_summary(result, source)]
-    for name, one in rendered.items():
-        sections += [replace(section, part=name) for section in one.sections]
+    for name, rendered_part in rendered.items():
+        sections += [replace(section, part=name) for section in rendered_part.sections]
     for patch, material in result.materials.items():
         sections += _comparison(patch, material)
     return Rendered(
         tuple(sections),
-        tuple(f"{name}: {line}" for name, one in rendered.items() for line in one.lines),
-        tuple(section for one in rendered.values() for section in one.methods),
+        tuple(
+            f"{name}: {line}"
+            for name, rendered_part in rendered.items()
+            for line in rendered_part.lines
+        ),
+        tuple(section for rendered_part in rendered.values() for section in rendered_part.methods),
     )
 
 
@@ -84,7 +88,7 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
             Picture(
                 f"glow-{name}",
                 partial(logarithmic_decay, patch.series, patch.fit),
-                f"The glow{_of(name, result)} over time, with ± 1 σ; lines are the fit.",
+                f"The glow{_patch_suffix(name, result)} over time, with ± 1 σ; lines are the fit.",
             )
         )
     for name, material in result.materials.items():
@@ -95,13 +99,13 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
                 Picture(
                     f"spectrum-{name}",
                     partial(spectrum_figure, nm, value, _band(material.spectrum), NAMES),
-                    f"Emission spectrum{_of(name, result)}, largest value 1.",
+                    f"Emission spectrum{_patch_suffix(name, result)}, largest value 1.",
                 )
             )
     frames = [frame for attempt in source.run.completed().values() for frame in attempt.frames]
     screen = screen_for(source.camera)
     daylight = daylight_picture(
-        [one for one in frames if one.role == FrameRole.DAYLIGHT], (), screen
+        [frame for frame in frames if frame.role == FrameRole.DAYLIGHT], (), screen
     )
     return Section(
         "The material as measured",
@@ -144,7 +148,7 @@ def _decays(result: PhosphorResult) -> dict[str, DecayPatch]:
     return {name: patch for name, patch in patches.items() if patch.fit is not None}
 
 
-def _of(patch: str, result: PhosphorResult) -> str:
+def _patch_suffix(patch: str, result: PhosphorResult) -> str:
     """Return the patch as part of a caption, empty if there is only one."""
     return f" of {patch}" if patch and len(result.materials) > 1 else ""
 
@@ -159,10 +163,10 @@ def _band(spectrum: Spectrum) -> tuple[FloatArray, FloatArray] | None:
 
 def _comparison(patch: str, material: Material) -> tuple[Section, ...]:
     """Return the section that compares the material with the shipped one of its name, if any."""
-    known = resources.names("config/materials")
-    if material.name not in known:
+    references = resources.names("config/materials")
+    if material.name not in references:
         return ()
-    reference = read_material(known[material.name])
+    reference = read_material(references[material.name])
     source = reference.provenance.source if reference.provenance else "labrig"
     text = (
         f"Beside {material.name} of {source}. k_e and Λ are rescaled here, since their scales are "

@@ -149,14 +149,14 @@ def daylight_picture(
         raw = _read(frame.path)
         if raw is None:
             continue
-        blown = float(LinearFrame(raw).is_saturated().mean())
-        if best is not None and blown > CLIPPED_FRACTION:
+        saturated_fraction = float(LinearFrame(raw).is_saturated().mean())
+        if best is not None and saturated_fraction > CLIPPED_FRACTION:
             break
         best = frame, raw
     if best is None:
         return None
     frame, raw = best
-    linear = into_gamut(_on_screen(raw, small(binned(raw), DAYLIGHT_WIDTH), screen.lamp_lit))
+    linear = into_gamut(_to_screen(raw, small(binned(raw), DAYLIGHT_WIDTH), screen.lamp_lit))
     # How well it was exposed does not matter here: what is bright should look bright.
     linear *= DAYLIGHT_BRIGHT / max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
     height, width = linear.shape[:2]
@@ -174,28 +174,30 @@ def daylight_picture(
 
 def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tuple[GlowPicture, ...]:
     """Return photographs of one decay on a common scale of DN/s, and each brightened."""
-    shown = []
+    prepared = []
     for photograph in photographs:
         raw = _read(photograph.frame.path)
         if raw is not None:
             picture = small(binned(raw), GLOW_WIDTH)
             saturated = small(saturated_cells(raw).astype(np.float32), GLOW_WIDTH)
             blown = (saturated > BLOWN_LOOKS)[..., np.newaxis]
-            gathered = _light_gathered(photograph.frame)
-            linear = into_gamut(_on_screen(raw, picture / gathered, screen.glow))
-            shown.append((photograph, linear, blown))
-    if not shown:
+            exposure_factor = _exposure_factor(photograph.frame)
+            linear = into_gamut(_to_screen(raw, picture / exposure_factor, screen.glow))
+            prepared.append((photograph, linear, blown))
+    if not prepared:
         return ()
-    levels = [float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear, _ in shown]
-    full = max(*levels, 1e-9)
+    levels = [float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear, _ in prepared]
+    full_scale = max(*levels, 1e-9)
     pictures = []
-    for (photograph, linear, blown), level in zip(shown, levels, strict=True):
-        factor = float(f"{min(full / max(level, 1e-9), MOST_BRIGHTENED):.1e}")
+    for (photograph, linear, blown), level in zip(prepared, levels, strict=True):
+        factor = float(f"{min(full_scale / max(level, 1e-9), MOST_BRIGHTENED):.1e}")
         pictures.append(
             GlowPicture(
                 t_s=photograph.t_s,
-                source=_data_uri(encoded(np.where(blown, 1.0, linear / full))),
-                brightened_source=_data_uri(encoded(np.where(blown, 1.0, linear * factor / full))),
+                source=_data_uri(encoded(np.where(blown, 1.0, linear / full_scale))),
+                brightened_source=_data_uri(
+                    encoded(np.where(blown, 1.0, linear * factor / full_scale))
+                ),
                 brightened=rounded(factor, 2),
                 blown=bool(blown.any()),
             )
@@ -211,12 +213,12 @@ def _read(path: Path) -> RawFrame | None:
         return None
 
 
-def _light_gathered(frame: FrameRecord) -> float:
+def _exposure_factor(frame: FrameRecord) -> float:
     """Return the factor t · ISO / N² of a frame, to which its values are proportional."""
     return frame.exposure_s * frame.iso / (frame.f_number or 1.0) ** 2
 
 
-def _on_screen(raw: RawFrame, picture: Picture, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+def _to_screen(raw: RawFrame, picture: Picture, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
     """Return a picture in linear sRGB by a colour matrix; a grey one is returned unchanged."""
     return np.asarray(picture @ (np.eye(3) if is_grey(raw) else matrix).T)
 
@@ -236,9 +238,9 @@ def _marks(
         if patch.region is None:
             continue
         try:
-            x, y, wide, high = region_pixels(patch.region, raw.width, raw.height)
+            x, y, region_width, region_height = region_pixels(patch.region, raw.width, raw.height)
         except UsageError:
             continue  # photographs of another size than the measured frames
-        place = (x * across, y * down, wide * across, high * down)
-        marks.append(RegionMark(number, patch.name, *(round(value, 1) for value in place)))
+        rectangle = (x * across, y * down, region_width * across, region_height * down)
+        marks.append(RegionMark(number, patch.name, *(round(value, 1) for value in rectangle)))
     return tuple(marks)

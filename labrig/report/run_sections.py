@@ -91,17 +91,17 @@ def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
     """
     attempts = list(run.completed().values())
     text = []
-    used = [
+    reads_back = [
         attempt.start.get("lamp_reads_back")
         for attempt in attempts
         if any(action.device == "lamp" for action in attempt.actions)
     ]
-    if False in used:
+    if False in reads_back:
         text.append(
             "The lamp's relay board does not report its state: only the photographs can show "
             "whether something else switched the lamp while it charged."
         )
-    elif True in used:
+    elif True in reads_back:
         text.append(
             "The lamp's relay was read back about once a minute, and each time before it was "
             "switched: nothing else had switched it."
@@ -137,19 +137,21 @@ def temperature_sections(run: RunRecord, roles: Collection[str]) -> tuple[Sectio
     """
     if not run.temperatures():
         return ()
-    course, photographs = TemperatureHistory(run), in_roles(run, roles)
+    history, photographs = TemperatureHistory(run), in_roles(run, roles)
     units = [list(group) for _, group in groupby(photographs, key=lambda frame: frame.unit)]
-    began = run.attempts[0].start["time"]
-    spans = [(one[0].start_time, one[-1].end_time) for one in units]
-    glow_s = np.array(spans).reshape(-1, 2) - began
+    run_start = run.attempts[0].start["time"]
+    spans = [(unit[0].start_time, unit[-1].end_time) for unit in units]
+    glow_s = np.array(spans).reshape(-1, 2) - run_start
     shaded = " Shaded: the glow from which rates are fitted." if len(glow_s) else ""
     picture = Picture(
         "temperature",
-        partial(temperature_figure, course.time - began, course.celsius, course.smooth, glow_s),
+        partial(
+            temperature_figure, history.time - run_start, history.celsius, history.smooth, glow_s
+        ),
         f"Readings, and their means over five minutes (line).{shaded}",
     )
     text = (
-        f"{degrees_text(course.smooth)} over the run ({len(course.time)} readings, smoothed over "
+        f"{degrees_text(history.smooth)} over the run ({len(history.time)} readings, smoothed over "
         f"{duration_text(SMOOTHED_S)})."
     )
     mean = glow_temperature_c(run, roles)

@@ -44,7 +44,9 @@ def render(result: SaturationResult, source: Source) -> Rendered:
         for name, patch in result.patches.items()
         for line in _lines(patch)
     )
-    sections = (_section(name, one, result.weaker_light) for name, one in result.patches.items())
+    sections = (
+        _section(name, patch, result.weaker_light) for name, patch in result.patches.items()
+    )
     return Rendered(tuple(sections), tuple(lines))
 
 
@@ -60,8 +62,8 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
         f"from {shorter} to {longer} of charge the glow changes by {begin} at lamp off, {end} at "
         f"the end of the decay: {patch.in_time}"
     )
-    of_states = zip(patch.levels, patch.rates.shared_per_s, strict=False)
-    for number, (level, k_per_s) in enumerate(of_states, start=1):
+    states = zip(patch.levels, patch.rates.shared_per_s, strict=False)
+    for number, (level, k_per_s) in enumerate(states, start=1):
         yield (
             f"state {number} (k = {rounded(float(k_per_s), 3)} s⁻¹): r(0) = "
             f"{plus_minus(level.r, level.sigma)}; assumption r(0) = 1: {level.assessment}"
@@ -149,18 +151,18 @@ def _plateau_figure(patch: PatchSaturation) -> Figure:
     for style, light in zip(("-", DASHED), lights, strict=False):
         rows = patch.rows(light)
         minutes = patch.charge_s[rows] / 60
-        full = light == FULL_LIGHT
+        is_full = light == FULL_LIGHT
         entries.append(lined(f"{light} light", MUTED, style))
         for state in range(patch.rates.amplitude.shape[1]):
-            colour, marker = _look(state)
+            colour, marker = _colour_and_marker(state)
             y, sigma = (
-                of_all[rows, state]
-                for of_all in (patch.rates.amplitude, patch.rates.amplitude_sigma)
+                column[rows, state]
+                for column in (patch.rates.amplitude, patch.rates.amplitude_sigma)
             )
             axes.plot(minutes, y, color=colour, linestyle=style, linewidth=1.0)
             error_bars(axes, minutes, y, sigma, colour)
-            points(axes, minutes, y, marker, colour, colour if full else PAPER)
-            if full:
+            points(axes, minutes, y, marker, colour, colour if is_full else PAPER)
+            if is_full:
                 entries.append(marked(f"state {state + 1}", marker, colour))
     axes.set_xlim(0, None)
     axes.set_ylim(0, None)
@@ -173,31 +175,31 @@ def _plateau_figure(patch: PatchSaturation) -> Figure:
 def _decays_figure(patch: PatchSaturation) -> Figure:
     """Draw the decays, normalised to the fit with shared rates at lamp off, and their residuals."""
     figure = new_figure(320.0)
-    top = place(figure, left=LEFT_PT, bottom=150, right=12, top=46)
-    below = place(figure, left=LEFT_PT, bottom=38, right=12, top=190, share_x=top)
-    top.set_yscale("log", nonpositive="clip")
+    upper = place(figure, left=LEFT_PT, bottom=150, right=12, top=46)
+    lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=190, share_x=upper)
+    upper.set_yscale("log", nonpositive="clip")
     entries, lowest = [], np.inf
-    for number, (name, one) in enumerate(patch.curves.items()):
-        colour, marker = _look(number)
-        start = float(patch.rates.amplitude[number].sum())
-        middle_s = one.t_s + one.exposure_s / 2
-        points(top, middle_s, one.value / start, marker, colour, colour, size=3.0)
-        points(below, middle_s, patch.rates.residuals[number], marker, colour, colour, size=3.0)
+    for number, (name, curve) in enumerate(patch.curves.items()):
+        colour, marker = _colour_and_marker(number)
+        begin_signal = float(patch.rates.amplitude[number].sum())
+        middle_s = curve.t_s + curve.exposure_s / 2
+        points(upper, middle_s, curve.value / begin_signal, marker, colour, colour, size=3.0)
+        points(lower, middle_s, patch.rates.residuals[number], marker, colour, colour, size=3.0)
         entries.append(marked(name, marker, colour))
-        least = float(np.min(one.value[one.value > 0], initial=np.inf))
-        lowest = min(lowest, least / start)
-    top.set_ylim(max(lowest / 1.5, 1e-5), 1.5)
-    mark_decades(top)
-    below.axhline(0, color=MUTED, linewidth=0.9)
-    top.set_ylabel("Over begin")
-    below.set_ylabel("Residual / σ")
-    below.set_xlabel("Time after lamp off / s")
-    top.tick_params(labelbottom=False)
+        smallest = float(np.min(curve.value[curve.value > 0], initial=np.inf))
+        lowest = min(lowest, smallest / begin_signal)
+    upper.set_ylim(max(lowest / 1.5, 1e-5), 1.5)
+    mark_decades(upper)
+    lower.axhline(0, color=MUTED, linewidth=0.9)
+    upper.set_ylabel("Over begin")
+    lower.set_ylabel("Residual / σ")
+    lower.set_xlabel("Time after lamp off / s")
+    upper.tick_params(labelbottom=False)
     legend_above(figure, entries, columns=3)
     return figure
 
 
-def _look(number: int) -> tuple[str, str]:
+def _colour_and_marker(number: int) -> tuple[str, str]:
     """Return colour and marker of the series with index `number`."""
     colours = (INK, *OTHER_CHANNELS)
     return colours[number % len(colours)], MARKERS[number % len(MARKERS)]

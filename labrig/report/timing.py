@@ -98,21 +98,23 @@ def moves_text(actions: Sequence[ActionRecord]) -> str:
 
     The text is empty if there is neither shield nor door and the lamp was switched off on time.
     """
-    moves = {move: [one for one in actions if (one.device, one.action) == move] for move in MOVES}
-    latest = [max(some, key=lambda one: one.late_s) for some in moves.values() if some]
-    if all(one.device == "lamp" and one.late_s < ON_TIME_S for one in latest):
-        return ""
-    said = [
-        f"{one.device} {one.action} at most {rounded(1e3 * one.late_s, 2)} ms"
-        + (f" ({one.unit})" if one.late_s >= ON_TIME_S else "")
-        for one in latest
+    moves = [
+        [action for action in actions if (action.device, action.action) == move] for move in MOVES
     ]
-    text = f"Begun after its planned time: {', '.join(said)}."
-    late_s = [one.late_s for some in moves.values() for one in some]
-    n_late = sum(one > LATE_MOVE_S for one in late_s)
+    latest = [max(group, key=lambda action: action.late_s) for group in moves if group]
+    if all(action.device == "lamp" and action.late_s < ON_TIME_S for action in latest):
+        return ""
+    statements = [
+        f"{action.device} {action.action} at most {rounded(1e3 * action.late_s, 2)} ms"
+        + (f" ({action.unit})" if action.late_s >= ON_TIME_S else "")
+        for action in latest
+    ]
+    text = f"Begun after its planned time: {', '.join(statements)}."
+    lateness_s = [action.late_s for group in moves for action in group]
+    n_late = sum(late_s > LATE_MOVE_S for late_s in lateness_s)
     if not n_late:
         return text
     return (
-        f"{text} {n_late} of {len(late_s)} began more than {1e3 * LATE_MOVE_S:g} ms late: the "
+        f"{text} {n_late} of {len(lateness_s)} began more than {1e3 * LATE_MOVE_S:g} ms late: the "
         "frames after may show a door that still moves, or the lamp's transient."
     )
