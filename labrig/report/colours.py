@@ -95,10 +95,10 @@ def camera_to_xyz(camera: CameraResponse) -> FloatArray:
     weighted = camera.sensitivity.T * step_nm
     gram = weighted @ camera.sensitivity
     fitted = np.linalg.solve(gram, weighted @ target).T
-    white, goal = weighted.sum(axis=1), step_nm @ target
+    white, target_white = weighted.sum(axis=1), step_nm @ target
     direction = np.linalg.solve(gram, white)
-    matrix = fitted + np.outer(goal - fitted @ white, direction / (white @ direction))
-    return np.asarray(matrix * white.max() / goal[1])
+    matrix = fitted + np.outer(target_white - fitted @ white, direction / (white @ direction))
+    return np.asarray(matrix * white.max() / target_white[1])
 
 
 def colour_matching(wavelength_nm: FloatArray) -> FloatArray:

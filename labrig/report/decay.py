@@ -204,7 +204,7 @@ class _Content:
         Whether the camera's sensitivity is known.
     late
         Lateness of the frames; None without frames.
-    item
+    patch
         Patch of a section about one patch; None in the others.
     extra
         Further data of single templates by name.
@@ -214,7 +214,7 @@ class _Content:
     patches: tuple[_Patch, ...]
     colours_known: bool
     late: Lateness | None = None
-    item: _Patch | None = None
+    patch: _Patch | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
 
@@ -357,7 +357,7 @@ def _timing(content: _Content, timings: Sequence[FrameTiming], anchor: str) -> t
                 content.patches,
                 content.colours_known,
                 content.late,
-                extra={"repeated": repeat_units, "steady": steady_patches},
+                extra={"repeat_units": repeat_units, "steady_patches": steady_patches},
             ),
         ),
     )

@@ -221,7 +221,7 @@ def _usable_values(series: Series) -> FloatArray:
 
 
 def _highest(series: Series) -> float:
-    """Return the highest value on an axis; values excluded from the fit raise it within limits."""
+    """Return the highest value on an axis; excluded values count up to 3 times the usable ones."""
     highest_usable = float(_usable_values(series).max())
     return (
         min(float(series.values.max()), LEFT_OUT_SHOWN * highest_usable)
