@@ -66,8 +66,8 @@ def _lines(patch: PatchSpectrum) -> Iterator[str]:
         most_significant = min(patch.times, key=lambda comparison: comparison.p_value)
         outcome = "changes" if patch.changes_with_time else "the same"
         yield (
-            f"over time: {outcome} (least p = {most_significant.p_value:.2g} of {len(patch.times)}, "
-            f"at {most_significant.what}; centroid {_shift(most_significant)} nm off the others)"
+            f"over time: {outcome} (least p = {most_significant.p_value:.2g} "
+            f"of {len(patch.times)}, at {most_significant.what}; centroid {_shift(most_significant)} nm off the others)"
         )
     outcome = "differs" if patch.depends_on_lamp else "the same"
     for comparison in patch.lamps:
