@@ -63,11 +63,11 @@ def _lines(patch: PatchSpectrum) -> Iterator[str]:
         f"σ of Λ* {100 * float(np.median(spectrum.sigma)):.1f} % of its peak (median)"
     )
     if patch.times:
-        most_significant = min(patch.times, key=lambda comparison: comparison.p_value)
+        least_p = min(patch.times, key=lambda comparison: comparison.p_value)
         outcome = "changes" if patch.changes_with_time else "the same"
         yield (
-            f"over time: {outcome} (least p = {most_significant.p_value:.2g} "
-            f"of {len(patch.times)}, at {most_significant.what}; centroid {_shift(most_significant)} nm off the others)"
+            f"over time: {outcome} (least p = {least_p.p_value:.2g} "
+            f"of {len(patch.times)}, at {least_p.what}; centroid {_shift(least_p)} nm off the others)"
         )
     outcome = "differs" if patch.depends_on_lamp else "the same"
     for comparison in patch.lamps:
@@ -158,17 +158,17 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
 
 def _constancy_text(patch: PatchSpectrum) -> str:
     """Return the statement on the constancy of the spectrum in time."""
-    most_significant = min(patch.times, key=lambda comparison: comparison.p_value)
+    least_p = min(patch.times, key=lambda comparison: comparison.p_value)
     if patch.changes_with_time:
         worst = max(patch.times, key=lambda comparison: comparison.beyond_noise)
         return (
             "The relative spectrum changes with time: the frame at "
             f"{worst.what} differs from those at the other times by {worst.beyond_noise:.2%} "
-            f"beyond noise (p = {most_significant.p_value:.2g})."
+            f"beyond noise (p = {least_p.p_value:.2g})."
         )
     return (
         "The relative spectrum is the same at all times within noise (paper, fig. 6): the least "
-        f"p-value of {len(patch.times)} is {most_significant.p_value:.2g}. Frames are compared "
+        f"p-value of {len(patch.times)} is {least_p.p_value:.2g}. Frames are compared "
         "position by position, so that camera curves and filter cancel."
     )
 
