@@ -66,8 +66,8 @@ def _lines(patch: PatchSpectrum) -> Iterator[str]:
         least_p = min(patch.times, key=lambda comparison: comparison.p_value)
         outcome = "changes" if patch.changes_with_time else "the same"
         yield (
-            f"over time: {outcome} (least p = {least_p.p_value:.2g} "
-            f"of {len(patch.times)}, at {least_p.what}; centroid {_shift(least_p)} nm off the others)"
+            f"over time: {outcome} (least p = {least_p.p_value:.2g} of {len(patch.times)}, "
+            f"at {least_p.what}; centroid {_shift(least_p)} nm off the others)"
         )
     outcome = "differs" if patch.depends_on_lamp else "the same"
     for comparison in patch.lamps:
