@@ -1,4 +1,4 @@
-"""The report of a run: what was measured, for people; figures and words, from results.
+"""HTML report of a run, with figures and text from its results.
 
 Names are listed in `__init__.pyi`, and loaded when first used.
 """

@@ -1,4 +1,4 @@
-"""Plain tables of any result, for protocols that register no report of their own."""
+"""Plain table of a result, for protocols that register no report of their own."""
 
 from typing import Any
 
@@ -7,14 +7,14 @@ import numpy as np
 from labrig.report.sections import Rendered, Section, Source, Table
 from labrig.results import RunResult, leaves
 
-#: Longer arrays are not shown, only how long they are.
+#: Largest number of values that are shown; of longer arrays only the shape is shown.
 MOST_SHOWN = 12
 
 
 def render(result: RunResult, source: Source) -> Rendered:
-    """Every field by its name, those of fields in fields with a dot between."""
+    """Return a table of all fields of the result; names of nested fields are joined by dots."""
     rows = tuple(
-        (".".join(path).replace("_", " "), _written(value))
+        (".".join(path).replace("_", " "), _value_text(value))
         for path, value in leaves(result)
         if path != ("warnings",)
     )
@@ -23,15 +23,16 @@ def render(result: RunResult, source: Source) -> Rendered:
     return Rendered((Section("Results", tables=(table,)),), lines)
 
 
-def _written(value: Any) -> str:
+def _value_text(value: Any) -> str:
+    """Return a value of a result as text."""
     if isinstance(value, np.ndarray):
         if value.size > MOST_SHOWN:
             return f"{' × '.join(map(str, value.shape))} numbers"
-        return ", ".join(f"{one:.6g}" for one in value.ravel())
+        return ", ".join(f"{number:.6g}" for number in value.ravel())
     if isinstance(value, tuple | list):
         if len(value) > MOST_SHOWN:
             return f"{len(value)} values"
-        return ", ".join(map(_written, value)) or "none"
+        return ", ".join(map(_value_text, value)) or "none"
     if isinstance(value, float):
         return f"{value:.6g}"
     return "none" if value is None else str(value)

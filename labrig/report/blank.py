@@ -1,4 +1,4 @@
-"""A blank in a report."""
+"""Report of a blank: background and stray light."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -30,11 +30,12 @@ HEIGHT_PT = 250.0
 
 
 def render(result: BlankResult, source: Source) -> Rendered:
-    """Show stray light over time, and what stays."""
+    """Render the stray light over time and the constant background of each channel."""
     return Rendered((_section(result),), tuple(_lines(result.calibration)))
 
 
 def _section(result: BlankResult) -> Section:
+    """Return the section with the figure of the light and the table of its levels."""
     file, channels = result.calibration, result.calibration.channels
     rows = tuple(
         (
@@ -45,7 +46,7 @@ def _section(result: BlankResult) -> Section:
         for number, name in enumerate(channels)
     )
     clean = file.first_clean_s
-    said = (
+    transient_text = (
         "No frame is free of fading light within the sequence."
         if clean is None
         else f"Frames that begin {rounded(clean, 3)} s or later after lamp off are free of the "
@@ -54,7 +55,7 @@ def _section(result: BlankResult) -> Section:
     return Section(
         "Background and stray light",
         (
-            said,
+            transient_text,
             "Background is constant light after lamp off that dark frames do not show. Stray light "
             "is in both, and dark frames subtract it as long as it is constant; its colour "
             "distinguishes it from dark current, so that its figure is a lower limit.",
@@ -71,18 +72,19 @@ def _section(result: BlankResult) -> Section:
 
 
 def _figure(result: BlankResult) -> Figure:
-    file, found, channels = result.calibration, result.stray_light, result.calibration.channels
+    """Draw the signal above background of each frame of the blank, in DN/s."""
+    file, stray, channels = result.calibration, result.stray_light, result.calibration.channels
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
     axes.set_xscale("log")
-    least = 4 * float(np.median(found.sigma))
-    axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(least)))
+    least_level = 4 * float(np.median(stray.sigma))
+    axes.set_yscale("symlog", linthresh=10.0 ** np.ceil(np.log10(least_level)))
     axes.axhline(0, color=MUTED, linewidth=0.8)
     entries = []
     for number, name in enumerate(channels):
         colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
-        error_bars(axes, found.start_s, found.rate[:, number], found.sigma[:, number], colour)
-        points(axes, found.start_s, found.rate[:, number], marker, colour, PAPER)
+        error_bars(axes, stray.start_s, stray.rate[:, number], stray.sigma[:, number], colour)
+        points(axes, stray.start_s, stray.rate[:, number], marker, colour, PAPER)
         entries.append(marked(name, marker, colour, PAPER))
     if file.first_clean_s is not None:
         axes.axvline(file.first_clean_s, color=MUTED, linewidth=1.0, linestyle=DASHED)
@@ -94,15 +96,16 @@ def _figure(result: BlankResult) -> Figure:
 
 
 def _lines(file: BlankFile) -> Iterator[str]:
+    """Yield the lines for the terminal."""
     clean = file.first_clean_s
     yield (
         "never free of the turn-off transient"
         if clean is None
         else f"free of the turn-off transient from {rounded(clean, 3)} s after lamp off"
     )
-    for what, level, sigma in (
+    for name, level, sigma in (
         ("background", file.constant_dn_per_s, file.constant_sigma_dn_per_s),
         ("stray light", file.ambient_dn_per_s, file.ambient_sigma_dn_per_s),
     ):
-        named = zip(file.channels, level, sigma, strict=True)
-        yield f"{what}: {', '.join(f'{n} {plus_minus(v, s)}' for n, v, s in named)} DN/s"
+        channel_levels = zip(file.channels, level, sigma, strict=True)
+        yield f"{name}: {', '.join(f'{n} {plus_minus(v, s)}' for n, v, s in channel_levels)} DN/s"

@@ -1,4 +1,4 @@
-"""A camera calibration in a report."""
+"""Report of a camera calibration."""
 
 from collections.abc import Iterator, Sequence
 from functools import partial
@@ -38,7 +38,7 @@ HEIGHT_PT = 230.0
 
 
 def render(result: CameraCalibrationResult, source: Source) -> Rendered:
-    """Show noise, linearity, settings, flat field."""
+    """Render noise, linearity, factors of the settings, and flat field."""
     file = result.calibration
     sections = [_noise(file, result.photon_transfers)]
     if file.linearity is not None:
@@ -48,14 +48,15 @@ def render(result: CameraCalibrationResult, source: Source) -> Rendered:
 
 
 def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
+    """Return the section with gain and read noise at each ISO speed."""
     rows = tuple(
         (
-            f"{one.iso:g}",
-            plus_minus(one.gain_e_per_dn, one.gain_e_per_dn_sigma),
-            plus_minus(one.read_noise_e, one.read_noise_e_sigma),
-            f"{one.row_noise_e:.2g}",
+            f"{noise.iso:g}",
+            plus_minus(noise.gain_e_per_dn, noise.gain_e_per_dn_sigma),
+            plus_minus(noise.read_noise_e, noise.read_noise_e_sigma),
+            f"{noise.row_noise_e:.2g}",
         )
-        for one in file.noise
+        for noise in file.noise
     )
     return Section(
         "Photon transfer curve",
@@ -73,19 +74,20 @@ def _noise(file: CameraFile, transfers: Sequence[PhotonTransfer]) -> Section:
 
 
 def _transfer_figure(transfers: Sequence[PhotonTransfer]) -> Figure:
+    """Draw the photon transfer curve of each ISO speed."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
     _logarithmic(axes)
     axes.set_yscale("log")
     entries = []
-    for number, one in enumerate(transfers):
+    for number, transfer in enumerate(transfers):
         colour, marker = OTHER_CHANNELS[number % len(OTHER_CHANNELS)], MARKERS[number % 8]
-        level = np.array([point.level_dn for point in one.points])
-        read = one.noise.read_noise_e / one.noise.gain_e_per_dn
-        variance = np.array([point.light_variance_dn2 for point in one.points]) - read**2
+        level = np.array([point.level_dn for point in transfer.points])
+        read = transfer.noise.read_noise_e / transfer.noise.gain_e_per_dn
+        variance = np.array([point.light_variance_dn2 for point in transfer.points]) - read**2
         points(axes, level, variance, marker, colour, PAPER)
-        axes.plot(level, level / one.noise.gain_e_per_dn, color=colour, linewidth=1.0)
-        entries.append(marked(f"ISO {one.noise.iso:g}", marker, colour, PAPER))
+        axes.plot(level, level / transfer.noise.gain_e_per_dn, color=colour, linewidth=1.0)
+        entries.append(marked(f"ISO {transfer.noise.iso:g}", marker, colour, PAPER))
     axes.set_xlabel("Level above dark / DN")
     axes.set_ylabel("Photon variance / DN²")
     legend_above(figure, entries, columns=6)
@@ -93,38 +95,44 @@ def _transfer_figure(transfers: Sequence[PhotonTransfer]) -> Figure:
 
 
 def _logarithmic(axes: Axes) -> None:
-    """The horizontal axis, with plain numbers."""
+    """Make the horizontal axis logarithmic, with plain numbers as labels."""
     axes.set_xscale("log")
     axes.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
     axes.xaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
     axes.xaxis.set_minor_locator(NullLocator())
 
 
-def _linearity(found: Linearity) -> Section:
-    full = "is not known" if found.saturation_dn is None else f"is {found.saturation_dn:.0f} DN"
+def _linearity(linearity: Linearity) -> Section:
+    """Return the section on the deviation from linearity."""
+    saturation = (
+        "is not known"
+        if linearity.saturation_dn is None
+        else f"is {linearity.saturation_dn:.0f} DN"
+    )
     return Section(
         "Linearity",
         (
             "From the ratios of the channels along a bracket of exposure times: errors of shutter "
-            f"and lamp are common-mode to the channels. The saturation level {full}.",
+            f"and lamp are common-mode to the channels. The saturation level {saturation}.",
         ),
         (
             Picture(
                 "linearity",
-                partial(_linearity_figure, found),
+                partial(_linearity_figure, linearity),
                 "Deviation from linearity; bars are ± 1 σ.",
             ),
         ),
     )
 
 
-def _linearity_figure(found: Linearity) -> Figure:
+def _linearity_figure(linearity: Linearity) -> Figure:
+    """Draw the deviation from linearity in per cent over the level in DN."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     axes.axhline(0, color=MUTED, linewidth=0.8)
-    level = np.array([0.0, *found.level_dn])
-    percent = 100 * np.array([0.0, *found.deviation])
-    sigma = 100 * np.array([0.0, *found.sigma])
+    level = np.array([0.0, *linearity.level_dn])
+    percent = 100 * np.array([0.0, *linearity.deviation])
+    sigma = 100 * np.array([0.0, *linearity.sigma])
     axes.plot(level, percent, color=INK, linewidth=1.0)
     error_bars(axes, level, percent, sigma, INK)
     points(axes, level, percent, "o", INK, PAPER)
@@ -134,6 +142,7 @@ def _linearity_figure(found: Linearity) -> Figure:
 
 
 def _settings(file: CameraFile, repeat_flicker: Measured) -> Section:
+    """Return the section with the factors of exposure times, ISO speeds and f-numbers."""
     flicker = plus_minus(100 * file.flicker, 100 * file.flicker_sigma)
     repeated = plus_minus(100 * repeat_flicker.value, 100 * repeat_flicker.sigma)
     tables = (
@@ -161,39 +170,45 @@ def _settings(file: CameraFile, repeat_flicker: Measured) -> Section:
 
 
 def _shutter_figure(file: CameraFile) -> Figure:
+    """Draw actual over nominal exposure time."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     _logarithmic(axes)
     axes.axhline(1, color=MUTED, linewidth=0.8)
-    times_s = np.array([one.setting for one in file.shutter])
-    factor = np.array([one.factor for one in file.shutter])
-    error_bars(axes, times_s, factor, np.array([one.sigma for one in file.shutter]), INK)
-    points(axes, times_s, factor, "o", INK, PAPER)
+    times_s = np.array([factor.setting for factor in file.shutter])
+    ratio = np.array([factor.factor for factor in file.shutter])
+    error_bars(axes, times_s, ratio, np.array([factor.sigma for factor in file.shutter]), INK)
+    points(axes, times_s, ratio, "o", INK, PAPER)
     axes.set_xlabel("Nominal exposure time / s")
     axes.set_ylabel("Actual / nominal")
     return figure
 
 
 def _table(name: str, factors: Sequence[Factor], form: str, caption: str) -> Table:
+    """Return the table of the factor of each setting, whose name is formatted by `form`."""
     rows = tuple(
-        (form.format(one.setting), plus_minus(one.factor, one.sigma) if one.sigma else "1")
-        for one in factors
+        (
+            form.format(factor.setting),
+            plus_minus(factor.factor, factor.sigma) if factor.sigma else "1",
+        )
+        for factor in factors
     )
     return Table((name, "factor"), rows, caption)
 
 
 def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
-    shown = flats[0]
+    """Return the section with the vignetting at each f-number; the first flat is drawn."""
+    first = flats[0]
     rows = tuple(
         (
             "–" if flat.f_number is None else f"f/{flat.f_number:g}",
-            *(f"{100 * left:.1f}" for left in flat.at(1.0)),
+            *(f"{100 * illumination:.1f}" for illumination in flat.at(1.0)),
             f"{100 * max(abs(g) for row in flat.gradient for g in row):.1f}",
         )
-        for flat in (one.flat for one in flats)
+        for flat in (fitted.flat for fitted in flats)
     )
     head = ("aperture", *(f"{name} in the corner / %" for name in file.channels), "gradient / %")
-    stop = shown.flat.f_number
+    stop = first.flat.f_number
     return Section(
         "Flat field and vignetting",
         (
@@ -203,7 +218,7 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
         (
             Picture(
                 "flat-field",
-                partial(_flat_figure, shown, file.channels),
+                partial(_flat_figure, first, file.channels),
                 "Blocks of the card"
                 + ("" if stop is None else f" at f/{stop:g}")
                 + ", the gradient divided out, and the fitted vignetting.",
@@ -213,16 +228,17 @@ def _flat_field(file: CameraFile, flats: Sequence[FittedFlat]) -> Section:
     )
 
 
-def _flat_figure(shown: FittedFlat, channels: Sequence[str]) -> Figure:
+def _flat_figure(fitted: FittedFlat, channels: Sequence[str]) -> Figure:
+    """Draw the relative illumination over the distance from the middle of the frame."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
     rho = np.linspace(0, 1, 101)
     entries = []
     for number, name in enumerate(channels):
         colour, marker = channel_colour(name, number), MARKERS[number % len(MARKERS)]
-        distance = np.sqrt(shown.rho2[number])
-        points(axes, distance, shown.light[number], marker, colour, PAPER, size=2.6)
-        axes.plot(rho, shown.flat.at(rho**2)[:, number], color=colour, linewidth=1.2)
+        distance = np.sqrt(fitted.rho2[number])
+        points(axes, distance, fitted.light[number], marker, colour, PAPER, size=2.6)
+        axes.plot(rho, fitted.flat.at(rho**2)[:, number], color=colour, linewidth=1.2)
         entries.append(marked(name, marker, colour, PAPER))
     axes.set_xlabel("Distance from the middle / half the diagonal")
     axes.set_ylabel("Relative illumination")
@@ -231,6 +247,7 @@ def _flat_figure(shown: FittedFlat, channels: Sequence[str]) -> Figure:
 
 
 def _lines(file: CameraFile) -> Iterator[str]:
+    """Yield the lines for the terminal."""
     for noise in file.noise:
         yield (
             f"ISO {noise.iso:g}: gain {plus_minus(noise.gain_e_per_dn, noise.gain_e_per_dn_sigma)} "
@@ -239,11 +256,15 @@ def _lines(file: CameraFile) -> Iterator[str]:
     yield f"flicker {plus_minus(100 * file.flicker, 100 * file.flicker_sigma)} %"
     for name, factors in (("shutter", file.shutter), ("aperture", file.aperture)):
         if len(factors) > 1:
-            most = max(factors, key=lambda one: abs(one.factor - 1))
-            setting = exposure_text(most.setting) if name == "shutter" else f"f/{most.setting:g}"
-            factor = plus_minus(most.factor, most.sigma)
+            largest = max(factors, key=lambda entry: abs(entry.factor - 1))
+            setting = (
+                exposure_text(largest.setting) if name == "shutter" else f"f/{largest.setting:g}"
+            )
+            factor = plus_minus(largest.factor, largest.sigma)
             yield f"{name}: largest deviation from nominal at {setting}, × {factor}"
     corners = [float(np.min(flat.at(1.0))) for flat in file.flats]
     stops = ["" if flat.f_number is None else f" at f/{flat.f_number:g}" for flat in file.flats]
-    falling = (f"{100 * left:.1f} %{at}" for left, at in zip(corners, stops, strict=True))
-    yield f"vignetting: corners at {', '.join(falling)}"
+    corner_texts = (
+        f"{100 * corner:.1f} %{stop}" for corner, stop in zip(corners, stops, strict=True)
+    )
+    yield f"vignetting: corners at {', '.join(corner_texts)}"

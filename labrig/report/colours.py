@@ -1,4 +1,4 @@
-"""From a camera's raw values to colours on a screen."""
+"""Conversion of a camera's raw values to colours on a screen."""
 
 from dataclasses import dataclass
 
@@ -13,21 +13,22 @@ from labrig.written_numbers import rounded
 FloatArray = NDArray[np.float64]
 Bytes = NDArray[np.uint8]
 
-#: Colour temperature of a tungsten halogen lamp, the usual one for charging.
+#: Colour temperature in K of a tungsten halogen lamp, the usual lamp for charging.
 HALOGEN_K = 3200.0
 
 
 @dataclass(frozen=True, eq=False)
 class Screen:
-    """How raw linear (R, G, B) of one camera become linear sRGB.
+    """Matrices from raw linear (R, G, B) of one camera to linear sRGB.
 
-    Parameters
+    Attributes
     ----------
     glow
-        Shape (3, 3), for what shines by itself: no white balance, daylight would be white.
+        Matrix for light that the sample emits, shape (3, 3); it has no white balance, so that
+        daylight would be white.
     lamp_lit
-        Shape (3, 3), for what a halogen lamp shines on, white balanced: a white surface whose
-        highest raw value is 1 comes out as (1, 1, 1).
+        Matrix for surfaces lit by a halogen lamp, shape (3, 3); it is white balanced: a white
+        surface whose highest raw value is 1 becomes (1, 1, 1).
     known
         Whether the camera's sensitivity is known; if not, raw values are shown as they are.
     """
@@ -38,7 +39,7 @@ class Screen:
 
 
 def screen_for(camera: CameraResponse | None) -> Screen:
-    """The way to the screen for a camera."""
+    """Return the matrices for a camera; unit matrices if its responses are not known."""
     if camera is None:
         return Screen(np.eye(3), np.eye(3), known=False)
     colour = colour_science.load()
@@ -53,31 +54,55 @@ def screen_for(camera: CameraResponse | None) -> Screen:
 
 
 def camera_to_xyz(camera: CameraResponse) -> FloatArray:
-    """M, shape (3, 3): CIE 1931 XYZ ≈ M · (R, G, B) of raw linear camera values.
+    """Return the matrix M with CIE 1931 XYZ ≈ M · (R, G, B) of raw linear camera values.
 
-    Least squares of the colour-matching functions by the sensitivities over all wavelengths
-    (spectra of any shape being equally likely), under the condition that equal energy comes out
-    exactly (Finlayson and Drew, *Color constancy and white-point preserving least squares*,
-    J. Imaging Sci. Technol. 41, 1997). Scaled so that the equal-energy spectrum that gives the
-    camera's highest channel 1 gives Y = 1.
+    The colour-matching functions are fitted by the sensitivities in least squares over all
+    wavelengths (spectra of any shape are equally likely), under the condition that equal energy is
+    reproduced exactly (white-point preserving least squares). The scale is such that the
+    equal-energy spectrum that gives the camera's highest channel 1 gives Y = 1.
 
+    Parameters
+    ----------
+    camera
+        Spectral responses of the camera, in the channels R, G, B.
+
+    Returns
+    -------
+    numpy.ndarray
+        Matrix M, shape (3, 3).
+
+    Notes
+    -----
     No camera is an observer, so narrow-band light is displaced: for the EOS 5D Mark II the residual
-    is 9, 9 and 16 % RMS of x̄, ȳ, z̄; emissions 50-100 nm wide come out within a median ΔE*ab of 18,
-    daylight within 1 %. Good for showing a glow, not for measuring its colour.
+    is 9, 9 and 16 % RMS of x̄, ȳ, z̄; emissions 50-100 nm wide are reproduced within a median ΔE*ab
+    of 18, daylight within 1 %. The matrix is good for showing a glow, not for measuring its colour.
+
+    References
+    ----------
+    Finlayson and Drew, *Color constancy and white-point preserving least squares*,
+    J. Imaging Sci. Technol. 41, 1997.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.report import camera_to_xyz
+    >>> xyz = camera_to_xyz(labrig.read_camera("canon_eos_5d_mark_ii")) @ [0.10, 0.80, 0.50]
+    >>> [f"{value:.2f}" for value in xyz]
+    ['0.25', '0.58', '0.62']
     """
     step_nm = np.gradient(camera.wavelength_nm)
     target = colour_matching(camera.wavelength_nm)
     weighted = camera.sensitivity.T * step_nm
     gram = weighted @ camera.sensitivity
     fitted = np.linalg.solve(gram, weighted @ target).T
-    white, goal = weighted.sum(axis=1), step_nm @ target
+    white, target_white = weighted.sum(axis=1), step_nm @ target
     direction = np.linalg.solve(gram, white)
-    matrix = fitted + np.outer(goal - fitted @ white, direction / (white @ direction))
-    return np.asarray(matrix * white.max() / goal[1])
+    matrix = fitted + np.outer(target_white - fitted @ white, direction / (white @ direction))
+    return np.asarray(matrix * white.max() / target_white[1])
 
 
 def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
-    """x̄, ȳ, z̄ of the CIE 1931 2° observer at each wavelength, shape (n, 3); 0 outside its table."""
+    """Return x̄, ȳ, z̄ of the CIE 1931 2° observer, shape (n, 3); 0 outside of its table."""
     colour = colour_science.load()
     observer = colour.MSDS_CMFS["CIE 1931 2 Degree Standard Observer"]
     columns = [
@@ -88,7 +113,7 @@ def colour_matching(wavelength_nm: FloatArray) -> FloatArray:
 
 
 def spectrum_colour(wavelength_nm: FloatArray, value: FloatArray) -> str:
-    """The colour of a spectrum (n,) at full brightness, as `#rrggbb`; cut off at sRGB's edge."""
+    """Return the colour of a spectrum (n,) at full brightness, as `#rrggbb` clipped to sRGB."""
     colour = colour_science.load()
     xyz = colour_matching(wavelength_nm).T @ (value * np.gradient(wavelength_nm))
     linear = into_gamut(colour.RGB_COLOURSPACES["sRGB"].matrix_XYZ_to_RGB @ xyz)
@@ -96,49 +121,85 @@ def spectrum_colour(wavelength_nm: FloatArray, value: FloatArray) -> str:
 
 
 def into_gamut(linear: FloatArray) -> FloatArray:
-    """Linear sRGB, shape (…, 3), as near as a screen can show it: what is negative becomes 0.
+    """Return linear sRGB within the gamut of a screen, with negative values set to 0.
 
     Mixing with grey of the same luminance would keep the hue of narrow-band light better, but the
     luminance of deep blue is so small, and so uncertain from a camera, that it would turn black.
+
+    Parameters
+    ----------
+    linear
+        Colours in linear sRGB, shape (…, 3).
+
+    Returns
+    -------
+    numpy.ndarray
+        Colours without negative values, shape (…, 3); values above 1 are kept.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.report import into_gamut
+    >>> laser_532_nm = np.array([-0.4, 1.0, -0.1])  # greener than a screen can show
+    >>> into_gamut(laser_532_nm).tolist()
+    [0.0, 1.0, 0.0]
     """
     return np.maximum(linear, 0.0)
 
 
 def encoded(linear: FloatArray) -> Bytes:
-    """Linear sRGB as bytes with sRGB's transfer curve; more than 1 is cut off."""
+    """Return linear sRGB as bytes with the transfer curve of sRGB; values above 1 are clipped."""
     colour = colour_science.load()
     curve = colour.cctf_encoding(np.clip(linear, 0.0, 1.0), function="sRGB")
     return np.asarray(np.rint(255 * np.asarray(curve)), dtype=np.uint8)
 
 
 def css_colour(linear: FloatArray) -> str:
-    """One linear sRGB colour as `#rrggbb`."""
+    """Return a linear sRGB colour as CSS writes it.
+
+    Parameters
+    ----------
+    linear
+        Colour in linear sRGB, shape (3,); values outside of 0 to 1 are clipped.
+
+    Returns
+    -------
+    str
+        Colour with the transfer curve of sRGB, as `#rrggbb`.
+
+    Examples
+    --------
+    >>> import numpy as np
+    >>> from labrig.report import css_colour
+    >>> css_colour(np.array([0.0, 0.5, 1.0]))  # half the light is more than half the byte
+    '#00bcff'
+    """
     return "#" + bytes(encoded(linear)).hex()
 
 
-#: As many as stand side by side on a desktop with a legible time below each.
+#: Number of swatches that fit side by side on a desktop with a legible time below each.
 MOST_SWATCHES = 18
-#: Signal-to-noise ratio below which a hue says nothing.
+#: Signal-to-noise ratio below which no hue is shown.
 LEAST_FOR_HUE = 5.0
 _RGB = ("R", "G", "B")
 
 
 @dataclass(frozen=True)
 class Swatch:
-    """The colour at one time.
+    """Colour of the glow at one time.
 
-    Parameters
+    Attributes
     ----------
     time
-        Seconds after lamp off, written.
+        Begin of the exposure in seconds after lamp off, as text.
     glow
-        CSS colour, all times on one exposure; black where there is nothing but noise.
+        CSS colour on the scale of all times; black where there is nothing but noise.
     hue
         CSS colour at full brightness; empty where noise hides it.
     measured
-        What was measured: `R 170, G 4200, B 7700 DN/s`.
+        Measured signals as text, such as `R 170, G 4200, B 7700 DN/s`.
     fills
-        Whether this is the one that just fills the display.
+        Whether this is the brightest swatch, which just fills the display.
     """
 
     time: str
@@ -149,7 +210,10 @@ class Swatch:
 
 
 def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
-    """Of the first unit's usable frames, evenly chosen; empty for other channels than R, G, B."""
+    """Return swatches of evenly chosen usable frames of the first unit.
+
+    There are none for channels other than R, G, B.
+    """
     rows = np.flatnonzero(series.usable & (np.array(series.unit) == series.unit[0]))
     if series.channels != _RGB or not len(rows):
         return ()
@@ -160,22 +224,23 @@ def swatches(series: Series, screen: Screen) -> tuple[Swatch, ...]:
     linear = into_gamut(values @ screen.glow.T)
     signal_to_noise = np.sqrt(np.sum((values / sigma) ** 2, axis=1))
     # Without a known σ there is no reason to doubt.
-    seen = ~(signal_to_noise < LEAST_FOR_HUE) & (linear.max(axis=1) > 0)
-    linear[~seen] = 0.0
+    visible = ~(signal_to_noise < LEAST_FOR_HUE) & (linear.max(axis=1) > 0)
+    linear[~visible] = 0.0
     brightest = linear.max(axis=1)
-    full = max(float(brightest.max()), 1e-12)
+    full_scale = max(float(brightest.max()), 1e-12)
     return tuple(
         Swatch(
             time=rounded(float(series.t_s[row]), 3),
-            glow=css_colour(colour / full),
-            hue=css_colour(colour / peak) if visible else "",
-            measured=_written(series.values[row]),
-            fills=peak == full,
+            glow=css_colour(colour / full_scale),
+            hue=css_colour(colour / peak) if is_visible else "",
+            measured=_signals_text(series.values[row]),
+            fills=peak == full_scale,
         )
-        for row, colour, peak, visible in zip(rows, linear, brightest, seen, strict=True)
+        for row, colour, peak, is_visible in zip(rows, linear, brightest, visible, strict=True)
     )
 
 
-def _written(values: FloatArray) -> str:
+def _signals_text(values: FloatArray) -> str:
+    """Return the signals R, G, B in DN/s as text."""
     pairs = zip(_RGB, values, strict=True)
     return ", ".join(f"{name} {rounded(float(value), 3)}" for name, value in pairs) + " DN/s"

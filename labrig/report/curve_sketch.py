@@ -1,4 +1,4 @@
-"""Curves to look at: a line of text each, or a picture."""
+"""Sketches of measured curves, as lines of text or as a picture."""
 
 from pathlib import Path
 
@@ -11,28 +11,50 @@ from labrig.optics import (
     band_means,
 )
 
-#: Eighths of a line of text.
+#: Bars of 0 to 8 eighths of the height of a line of text.
 BARS = " ▁▂▃▄▅▆▇█"
 COLUMNS = 48
-#: Curves described; a catalogue has hundreds.
+#: Largest number of curves that are described; a catalogue has hundreds.
 MOST_CURVES = 12
 PICTURES = (".png", ".svg", ".pdf")
 _COLOURS = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 
 
 def describe_curves(file: CurveFile) -> str:
-    """Title, and of every curve its grid, its range, its peak and its shape."""
+    """Describe the curves of a file in lines of text.
+
+    Parameters
+    ----------
+    file
+        Measured curves over wavelength, such as those of a camera or a filter.
+
+    Returns
+    -------
+    str
+        Title, number of curves and path of the file; then the grid, range and peak of each of the
+        first 12 curves, and a line of bars with its shape.
+
+    Examples
+    --------
+    >>> from labrig.optics import read_sound_curves
+    >>> from labrig.report import describe_curves
+    >>> print(describe_curves(read_sound_curves("canon_eos_5d_mark_ii", ["G"])))
+    Canon EOS 5D Mark II: one curve (...canon_eos_5d_mark_ii.json)
+      G  380-780 nm, step 5; 0.000163 to 1, highest at 520 nm
+         |      ▁▁▁▁▂▃▅▆▇█████▇▇▆▅▄▃▂▁▁                   |
+    """
     curves = list(file.curves.items())
-    what = "one curve" if len(curves) == 1 else f"{len(curves)} curves"
-    lines = [f"{file.title}: {what} ({file.path})"]
+    count = "one curve" if len(curves) == 1 else f"{len(curves)} curves"
+    lines = [f"{file.title}: {count} ({file.path})"]
     widest = max(len(name) for name, _ in curves[:MOST_CURVES])
-    lines += [_described(name.ljust(widest), curve) for name, curve in curves[:MOST_CURVES]]
+    lines += [_describe_curve(name.ljust(widest), curve) for name, curve in curves[:MOST_CURVES]]
     if len(curves) > MOST_CURVES:
         lines.append(f"and {len(curves) - MOST_CURVES} more; choose with --curve NAME")
     return "\n".join(lines)
 
 
-def _described(name: str, curve: Curve) -> str:
+def _describe_curve(name: str, curve: Curve) -> str:
+    """Return the line of text with grid, range and peak of a curve, and the line of its shape."""
     nm, value = curve.wavelength_nm, curve.value
     steps = np.diff(nm)
     grid = f"step {steps[0]:g}" if np.ptp(steps) < 1e-6 else f"{len(nm)} points"
@@ -47,12 +69,30 @@ def _described(name: str, curve: Curve) -> str:
 
 
 def draw_curves(file: CurveFile, path: Path) -> None:
-    """All curves of a file over wavelength.
+    """Draw all curves of a file over wavelength, with bands of ± 1 σ where σ is known.
+
+    Parameters
+    ----------
+    file
+        Measured curves over wavelength, such as those of a camera or a filter.
+    path
+        Path of the picture, which ends in `.png`, `.svg` or `.pdf`.
 
     Raises
     ------
     UsageError
-        A file name that is no picture, or cannot be written.
+        If the file name is not that of a picture, or the file cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.optics import read_sound_curves
+    >>> from labrig.report import draw_curves
+    >>> camera = read_sound_curves("canon_eos_5d_mark_ii")
+    >>> draw_curves(camera, Path("camera.svg"))
+    >>> draw_curves(camera, Path("camera.bmp"))
+    Traceback (most recent call last):
+    labrig.errors.UsageError: camera.bmp: expected a file name that ends in .png, .svg, .pdf
     """
     from matplotlib.figure import Figure  # slow to load
 

@@ -1,4 +1,4 @@
-"""A decay in a report: its numbers, the sample, every patch, timing, and how it was done."""
+"""Report of a decay: results, sample, every patch, timing, and methods."""
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -36,13 +36,21 @@ from labrig.report.timing import (
 )
 from labrig.results import DecayPatch, DecayResult, FittedDecay, Series
 
-#: What stands out of its own σ by less was dark.
+#: Signal-to-noise ratio of the mean signal below which a patch without a fit counts as dark.
 SEEN_SIGMA = 5.0
 
 
 @dataclass(frozen=True)
 class Repeat:
-    """One repeat's brightness relative to the first one's, with its standard uncertainty."""
+    """Brightness of a repeat relative to the first decay.
+
+    Attributes
+    ----------
+    unit
+        Name of the unit.
+    ratio, sigma
+        Ratio of the brightness and its standard uncertainty.
+    """
 
     unit: str
     ratio: float
@@ -50,20 +58,20 @@ class Repeat:
 
 
 def repeats(series: Series, fit: FittedDecay) -> tuple[Repeat, ...]:
-    """All units of `series` but the first; those without usable frames are left out.
+    """Return the brightness of each unit but the first; units without usable frames are omitted.
 
-    Each unit's factor to the common fit is the mean of what the channels of its frames have in
-    common, weighted by the noise of a frame and its flicker.
+    The factor of a unit to the common fit is 1 plus the mean common-mode deviation of its frames,
+    weighted by the noise of a frame and its flicker.
     """
-    left = residuals(series, fit)
-    weight = 1 / (np.square(left.common_sigma) + fit.flicker**2)
-    known = series.usable & np.isfinite(left.common) & np.isfinite(weight)
+    deviations = residuals(series, fit)
+    weight = 1 / (np.square(deviations.common_sigma) + fit.flicker**2)
+    usable = series.usable & np.isfinite(deviations.common) & np.isfinite(weight)
     factors = []
     for unit in dict.fromkeys(series.unit):
-        rows = known & (np.array(series.unit) == unit)
+        rows = usable & (np.array(series.unit) == unit)
         if rows.any():
             information = float(weight[rows].sum())
-            mean = 1 + float(weight[rows] @ left.common[rows]) / information
+            mean = 1 + float(weight[rows] @ deviations.common[rows]) / information
             factors.append((unit, mean, 1 / np.sqrt(information)))
     if not factors:
         return ()
@@ -78,17 +86,17 @@ def repeats(series: Series, fit: FittedDecay) -> tuple[Repeat, ...]:
 
 @dataclass(frozen=True)
 class SteadySource:
-    """A patch that shone steadily, such as a reference diode: what it says of lamp and camera.
+    """Stability of a patch that shone steadily, such as a reference diode.
 
-    Parameters
+    Attributes
     ----------
     channel
-        The brightest one.
+        Name of the brightest channel.
     level, level_sigma
-        Its mean over all frames, DN/s.
+        Mean of its signal over all frames and the σ of the mean, in DN/s.
     drift, drift_sigma
-        Change of a straight line through it, relative to its mean, from the first frame of a decay
-        to the last.
+        Change of a straight line through the signal from the first frame of a decay to the last,
+        relative to the mean, and its σ.
     """
 
     channel: str
@@ -99,9 +107,10 @@ class SteadySource:
 
 
 def steady(series: Series) -> SteadySource | None:
-    """For a patch without a fit; None if it is dark or has fewer than three usable frames.
+    """Return level and drift of a patch without a fit.
 
-    The scatter of the frames about the line tells σ, flicker included.
+    σ follows from the scatter of the frames about a straight line and so includes flicker. The
+    result is None if the patch is dark or has fewer than three usable frames.
     """
     values = series.values[series.usable]
     if len(values) < 3:
@@ -109,16 +118,16 @@ def steady(series: Series) -> SteadySource | None:
     brightest = int(values.mean(axis=0).argmax())
     value, t_s = values[:, brightest], series.t_s[series.usable]
     level, span_s = float(value.mean()), float(np.ptp(t_s))
-    away_s = t_s - t_s.mean()
+    centred_s = t_s - t_s.mean()
     if not span_s:
         return None
-    slope = float(away_s @ value / (away_s @ away_s))
-    rest = value - level - slope * away_s
-    scatter = float(np.sqrt(rest @ rest / (len(value) - 2)))
+    slope = float(centred_s @ value / (centred_s @ centred_s))
+    residual = value - level - slope * centred_s
+    scatter = float(np.sqrt(residual @ residual / (len(value) - 2)))
     level_sigma = scatter / np.sqrt(len(value))
     if not level > SEEN_SIGMA * level_sigma:
         return None
-    slope_sigma = scatter / np.sqrt(away_s @ away_s)
+    slope_sigma = scatter / np.sqrt(centred_s @ centred_s)
     return SteadySource(
         channel=series.channels[brightest],
         level=level,
@@ -128,15 +137,44 @@ def steady(series: Series) -> SteadySource | None:
     )
 
 
-#: With more patches than this, photographs show their numbers and not their names.
+#: Largest number of patches whose names are shown on photographs; of more, numbers are shown.
 NAMES_ON_PHOTOGRAPH = 3
-#: Photographs of the glow: dense where it changes most.
+#: Positions of the shown photographs of the glow, as fractions of the first decay's frames; dense
+#: where the signal changes most.
 GLOW_FRACTIONS = (0.0, 0.03, 0.09, 0.22, 0.5, 1.0)
 
 
 @dataclass(frozen=True)
 class _Patch:
-    """A patch as the templates need it."""
+    """Patch of the sample, as the templates need it.
+
+    Attributes
+    ----------
+    number
+        Number of the patch, counted from 1.
+    anchor
+        Target of links to the patch.
+    patch
+        Patch with its series.
+    fit
+        Fitted decay; None without one.
+    failure
+        Reason why there is no fit; empty with one.
+    n_usable
+        Number of usable frames.
+    swatches
+        Colours of the glow over time.
+    repeats
+        Brightness of the repeats relative to the first decay.
+    steady
+        Level and drift of a patch without a fit; None if it is dark.
+    figures
+        Figures of the patch.
+    noise_parts
+        Names of the parts of the noise that are drawn.
+    below_axis
+        Number of values below the logarithmic axis.
+    """
 
     number: int
     anchor: str
@@ -146,7 +184,6 @@ class _Patch:
     n_usable: int
     swatches: tuple[Swatch, ...]
     repeats: tuple[Repeat, ...]
-    #: Without a fit, if it shone.
     steady: SteadySource | None
     figures: tuple[Picture, ...] = ()
     noise_parts: tuple[str, ...] = ()
@@ -155,24 +192,40 @@ class _Patch:
 
 @dataclass(frozen=True)
 class _Content:
-    """What the templates of a decay's sections need, all of them or one patch."""
+    """Data for the templates of the sections of a decay.
+
+    Attributes
+    ----------
+    report
+        Decay as measured.
+    patches
+        All patches.
+    colours_known
+        Whether the camera's sensitivity is known.
+    late
+        Lateness of the frames; None without frames.
+    patch
+        Patch of a section about one patch; None in the others.
+    extra
+        Further data of single templates by name.
+    """
 
     report: DecayReport
     patches: tuple[_Patch, ...]
     colours_known: bool
     late: Lateness | None = None
-    item: _Patch | None = None
+    patch: _Patch | None = None
     extra: Mapping[str, object] = field(default_factory=dict)
 
 
 def render(result: DecayResult, source: Source) -> Rendered:
-    """Show a decay."""
+    """Render a decay: results, sample, patches, timing, and methods."""
     completed = source.run.completed().values()
     frames = [frame for attempt in completed for frame in attempt.frames]
     first = next(iter(result.patches.values())).series
     report = DecayReport(
         about=source.about,
-        patches=tuple(_reported(name, one) for name, one in result.patches.items()),
+        patches=tuple(_patch_report(name, patch) for name, patch in result.patches.items()),
         frames=tuple(frames),
         daylight=tuple(frame for frame in frames if frame.role == FrameRole.DAYLIGHT),
         glow=_glow(frames, first),
@@ -182,14 +235,22 @@ def render(result: DecayResult, source: Source) -> Rendered:
         states=result.states_asked,
     )
     lines = tuple(f"{name}\n{fit}" for name, fit in result.fits.items())
-    found, methods = decay_sections(report, source.anchor)
-    return Rendered(found, lines, methods)
+    results, method_sections = decay_sections(report, source.anchor)
+    return Rendered(results, lines, method_sections)
 
 
 def decay_sections(
     report: DecayReport, anchor: str = ""
 ) -> tuple[tuple[Section, ...], tuple[Section, ...]]:
-    """What was found, and how; `anchor` begins the names of places that links lead to."""
+    """Return the sections with the results and those with the methods.
+
+    Parameters
+    ----------
+    report
+        Decay as measured and fitted.
+    anchor
+        Beginning of the names of all link targets.
+    """
     screen = screen_for(report.camera)
     patches = tuple(
         _patch(number, patch, screen, anchor) for number, patch in enumerate(report.patches, 1)
@@ -198,22 +259,22 @@ def decay_sections(
     late = lateness(timings)
     content = _Content(report, patches, screen.known, late)
     sensor = sensor_of([photograph.frame for photograph in report.glow])
-    found = (
+    results = (
         _results(content, anchor),
         _sample(content, screen, anchor),
         *(
             Section(
-                f"Patch {one.patch.name}",
-                figures=one.figures,
-                anchor=one.anchor,
+                f"Patch {patch.patch.name}",
+                figures=patch.figures,
+                anchor=patch.anchor,
                 template="patch.html.j2",
-                content=_Content(report, patches, screen.known, late, one),
+                content=_Content(report, patches, screen.known, late, patch),
             )
-            for one in patches
+            for patch in patches
         ),
         *_timing(content, timings, anchor),
     )
-    how = Section(
+    methods_section = Section(
         "Methods",
         anchor=f"{anchor}methods",
         template="methods.html.j2",
@@ -223,15 +284,16 @@ def decay_sections(
             "unknown": UNKNOWN,
         },
     )
-    return found, (how, Section("Assumptions", points=DECAY_ASSUMPTIONS))
+    return results, (methods_section, Section("Assumptions", points=DECAY_ASSUMPTIONS))
 
 
-def _reported(name: str, patch: DecayPatch) -> PatchReport:
+def _patch_report(name: str, patch: DecayPatch) -> PatchReport:
+    """Return a patch of the result as a patch of the report."""
     return PatchReport(name, patch.region, patch.series, patch.fit or patch.failure, patch.noise)
 
 
 def _glow(frames: Sequence[FrameRecord], series: Series) -> tuple[GlowPhotograph, ...]:
-    """Some photographs of the first decay."""
+    """Return some photographs of the first decay, by rising time."""
     by_name = {frame.path.name: frame for frame in frames}
     first = series.by_unit()[0]
     last = len(first.frame) - 1
@@ -240,12 +302,12 @@ def _glow(frames: Sequence[FrameRecord], series: Series) -> tuple[GlowPhotograph
 
 
 def _results(content: _Content, anchor: str) -> Section:
-    """A table of all patches; of several a small figure each, too."""
+    """Return the section with the table of all patches, and a small figure each if several."""
     figures: tuple[Picture, ...] = ()
     if len(content.patches) > 1:
         figures = tuple(
-            Picture(f"overview-{one.number}-{one.patch.name}", draw)
-            for one, draw in zip(
+            Picture(f"overview-{patch.number}-{patch.patch.name}", draw)
+            for patch, draw in zip(
                 content.patches, overview_figures(content.report.patches), strict=True
             )
         )
@@ -259,6 +321,7 @@ def _results(content: _Content, anchor: str) -> Section:
 
 
 def _sample(content: _Content, screen: Screen, anchor: str) -> Section:
+    """Return the section with the photographs and properties of the sample."""
     report = content.report
     extra = {
         "daylight": daylight_picture(report.daylight, report.patches, screen),
@@ -275,9 +338,12 @@ def _sample(content: _Content, screen: Screen, anchor: str) -> Section:
 
 
 def _timing(content: _Content, timings: Sequence[FrameTiming], anchor: str) -> tuple[Section, ...]:
-    repeated = list(dict.fromkeys(one.unit for item in content.patches for one in item.repeats))
-    shining = [item for item in content.patches if item.steady]
-    if not (content.late or repeated or shining):
+    """Return the section on lateness, repeats and steady patches, or none without any of them."""
+    repeat_units = list(
+        dict.fromkeys(repeat.unit for patch in content.patches for repeat in patch.repeats)
+    )
+    steady_patches = [patch for patch in content.patches if patch.steady]
+    if not (content.late or repeat_units or steady_patches):
         return ()
     figures = (Picture("timing", partial(timing_figure, timings)),) if timings else ()
     return (
@@ -291,13 +357,14 @@ def _timing(content: _Content, timings: Sequence[FrameTiming], anchor: str) -> t
                 content.patches,
                 content.colours_known,
                 content.late,
-                extra={"repeated": repeated, "steady": shining},
+                extra={"repeat_units": repeat_units, "steady_patches": steady_patches},
             ),
         ),
     )
 
 
 def _patch(number: int, patch: PatchReport, screen: Screen, anchor: str) -> _Patch:
+    """Return a patch with its figures, swatches, repeats and drift."""
     fit = patch.fit if isinstance(patch.fit, FittedDecay) else None
     series = patch.series
     figures = [

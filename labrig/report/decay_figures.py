@@ -1,4 +1,4 @@
-"""A decay as measured and fitted, on a linear and on a logarithmic scale."""
+"""Figures of a decay: signals, residuals, noise and timing."""
 
 import math
 from collections.abc import Callable, Sequence
@@ -42,26 +42,27 @@ from labrig.report.timing import FrameTiming
 from labrig.results import FittedDecay, FloatArray, NoiseBudget, Series
 from labrig.written_numbers import power_of_ten, rounded
 
+#: Number of points of a fitted curve.
 POINTS = 160
 
 
 @dataclass(frozen=True, eq=False)
 class Curve:
-    """The fit as a line.
+    """Fitted decay at m times, for C channels and n states.
 
-    Parameters
+    Attributes
     ----------
     t_s
-        Shape (m,): middles of exposures.
+        Middles of exposures in seconds after lamp off, shape (m,).
     total
-        Shape (m, C), what frames there would measure.
+        Mean signal of the fit over these exposures in DN/s, shape (m, C).
     sigma
-        Shape (m,), the standard uncertainty of `total` in the brightest channel; the covariance of
-        a fit says nothing of the others. Infinite where a parameter is not known.
+        Standard uncertainty of `total` in the brightest channel in DN/s, shape (m,); the covariance
+        of a fit does not cover the other channels. Infinite where a parameter is not determined.
     states
-        Shape (m, n): each state in the brightest channel, offset left out.
+        Signal of each state in the brightest channel without the offset in DN/s, shape (m, n).
     brightest
-        That channel's number.
+        Index of the brightest channel.
     """
 
     t_s: FloatArray
@@ -72,16 +73,35 @@ class Curve:
 
 
 def middles_s(series: Series) -> FloatArray:
-    """Middle of each exposure after lamp off, where its value is drawn."""
+    """Return the middle of each exposure, where figures draw its value.
+
+    Parameters
+    ----------
+    series
+        Signals of n frames with the begin and the length of their exposures.
+
+    Returns
+    -------
+    numpy.ndarray
+        Middles of the exposures in seconds after lamp off, shape (n,).
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.report import middles_s
+    >>> (series,) = labrig.read_series("series.csv")
+    >>> [f"{t_s:.2f}" for t_s in middles_s(series)[:4]]
+    ['1.31', '6.31', '11.31', '16.31']
+    """
     return series.t_s + series.exposure_s / 2
 
 
 def fitted_curve(series: Series, fit: FittedDecay) -> Curve:
-    """`fit` along the times of `series`, for the exposures that frames had around them."""
+    """Evaluate a fit over the times of a series, with exposures interpolated between its frames."""
     order = np.argsort(series.t_s, kind="stable")
-    known_t, known_exposure = series.t_s[order], series.exposure_s[order]
-    t_s = np.linspace(known_t[0], known_t[-1], POINTS)
-    exposure_s = np.interp(t_s, known_t, known_exposure)
+    frame_t_s, frame_exposure_s = series.t_s[order], series.exposure_s[order]
+    t_s = np.linspace(frame_t_s[0], frame_t_s[-1], POINTS)
+    exposure_s = np.interp(t_s, frame_t_s, frame_exposure_s)
     middle_s = t_s + exposure_s / 2
     states = [state.amplitude * np.exp(-state.k_r_per_s * middle_s) for state in fit.states]
     return Curve(
@@ -94,7 +114,7 @@ def fitted_curve(series: Series, fit: FittedDecay) -> Curve:
 
 
 def _sigma(fit: FittedDecay, t_s: FloatArray, exposure_s: FloatArray) -> FloatArray:
-    """σ = √(J Cov Jᵀ), J the derivatives by k₁, a₁, k₂, a₂, …, offset."""
+    """Return σ = √(J Cov Jᵀ), shape (m,), with J the derivatives by k₁, a₁, k₂, a₂, …, offset."""
     if not np.isfinite(fit.covariance).all():
         return np.full_like(t_s, np.inf)
     rates = np.array([state.k_r_per_s for state in fit.states])
@@ -110,21 +130,21 @@ def _sigma(fit: FittedDecay, t_s: FloatArray, exposure_s: FloatArray) -> FloatAr
 TIME_LABEL = "Time after lamp off / s"
 SIGNAL_LABEL = "Signal / (DN/s)"
 HEIGHT_PT = 256.0
-#: A logarithmic axis begins at this fraction of the noise at the end of the decay, and spans no
-#: more than so many decades: below is nothing but the noise's chance zeros.
+#: Lower end of a logarithmic axis as a fraction of the noise at the end of the decay.
 FRACTION_OF_NOISE = 0.5
+#: Largest number of decades of a logarithmic axis.
 MOST_DECADES = 6.0
-#: Highest values from here to there are written without a power of ten.
+#: Range of the highest value within which an axis needs no power of ten, in DN/s.
 PLAIN_FROM, PLAIN_TO = 0.02, 1e5
-#: Values left out of the fit are shown up to this many times the highest fitted one.
+#: Values excluded from the fit are shown up to this many times the highest fitted value.
 LEFT_OUT_SHOWN = 3.0
 
 
 def linear_decay(series: Series, fit: FittedDecay | None) -> Figure:
-    """Signal over time."""
+    """Draw the signal over time."""
     figure, axes = _axes()
     _draw(axes, series, fit)
-    highest, lowest = max(_highest(series), 0.0), min(float(_used(series).min()), 0.0)
+    highest, lowest = max(_highest(series), 0.0), min(float(_usable_values(series).min()), 0.0)
     room = 0.06 * (highest - lowest) or 1.0
     axes.set_ylim(lowest - (room if lowest < 0 else 0.0), highest + room)
     exponent = _common_exponent(highest)
@@ -137,7 +157,7 @@ def linear_decay(series: Series, fit: FittedDecay | None) -> Figure:
 
 
 def logarithmic_decay(series: Series, fit: FittedDecay | None) -> Figure:
-    """Signal over time with a logarithmic axis; what is not positive stands at its foot."""
+    """Draw the signal over time on a logarithmic axis; values below it are marked at its foot."""
     figure, axes = _axes()
     axes.set_yscale("log", nonpositive="clip")
     _draw(axes, series, fit)
@@ -162,12 +182,12 @@ def logarithmic_decay(series: Series, fit: FittedDecay | None) -> Figure:
 
 
 def values_below_axis(series: Series) -> int:
-    """How many values a logarithmic axis cannot show."""
+    """Return the number of values below the logarithmic axis."""
     return int(np.count_nonzero(series.values < log_axis_ends(series)[0]))
 
 
 def log_axis_ends(series: Series) -> tuple[float, float]:
-    """Lower and upper end of a logarithmic axis."""
+    """Return the lower and upper end of the logarithmic axis of a series, in DN/s."""
     highest = _highest(series)
     if highest <= 0:
         return 0.1, 10.0
@@ -180,6 +200,7 @@ def log_axis_ends(series: Series) -> tuple[float, float]:
 
 
 def _axes() -> tuple[Figure, Axes]:
+    """Return a figure with axes of signal over time."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     axes.set_xlabel(TIME_LABEL)
@@ -188,24 +209,29 @@ def _axes() -> tuple[Figure, Axes]:
 
 
 def _common_exponent(highest: float) -> int:
-    """The power of ten in the unit of an axis, so that its ticks are short."""
+    """Return the power of ten in the unit of an axis, so that its tick labels are short."""
     if PLAIN_FROM <= highest < PLAIN_TO or highest <= 0:
         return 0
     return 3 * math.floor(math.log10(highest) / 3)
 
 
-def _used(series: Series) -> FloatArray:
-    """Values that are fitted, shape (m, C); all if none are."""
+def _usable_values(series: Series) -> FloatArray:
+    """Return the values of usable frames, shape (m, C); all values if no frame is usable."""
     return series.values[series.usable] if series.usable.any() else series.values
 
 
 def _highest(series: Series) -> float:
-    """The highest value worth an axis: those left out of the fit do not dwarf the fitted ones."""
-    used = float(_used(series).max())
-    return min(float(series.values.max()), LEFT_OUT_SHOWN * used) if used > 0 else used
+    """Return the highest value on an axis; excluded values count up to 3 times the usable ones."""
+    highest_usable = float(_usable_values(series).max())
+    return (
+        min(float(series.values.max()), LEFT_OUT_SHOWN * highest_usable)
+        if highest_usable > 0
+        else highest_usable
+    )
 
 
 def _draw(axes: Axes, series: Series, fit: FittedDecay | None) -> None:
+    """Draw the signals with ± 1 σ, and the fit with its band and its states."""
     t_s, usable = middles_s(series), series.usable
     for number, name in enumerate(series.channels):
         marker = MARKERS[number % len(MARKERS)]
@@ -237,10 +263,12 @@ def _draw(axes: Axes, series: Series, fit: FittedDecay | None) -> None:
 
 
 def _brightest_colour(fit: FittedDecay) -> str:
+    """Return the colour of the brightest channel of a fit."""
     return channel_colour(fit.channels[fit.brightest], fit.brightest)
 
 
 def _legend(figure: Figure, series: Series, fit: FittedDecay | None) -> None:
+    """Add the legend of channels, fit and states."""
     entries: list[Artist] = [
         marked(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
         for number, name in enumerate(series.channels)
@@ -257,25 +285,26 @@ def _legend(figure: Figure, series: Series, fit: FittedDecay | None) -> None:
 
 RESIDUALS_HEIGHT_PT = 268.0
 LOW_HEIGHT_PT = 200.0
+#: Half width of the shaded band of residuals in σ.
 BAND = 2.0
-#: Beyond this many σ a residual is drawn at the edge of the figure.
+#: Residuals beyond this many σ are drawn at the edge of the figure.
 FARTHEST = 8.0
-#: A frame's common deviation is shown if its own noise leaves it known to this, or to three times
-#: what the best frame has.
+#: The common-mode deviation of a frame is shown if its σ is at most this, or at most three times
+#: the smallest σ of all frames.
 COMMON_SIGMA = 0.02
 
 
 @dataclass(frozen=True, eq=False)
 class Residuals:
-    """Deviations of the values from the fit.
+    """Deviations of the values of n frames and C channels from the fit.
 
-    Parameters
+    Attributes
     ----------
     normalised
-        Shape (n, C): over the standard deviation expected of a value, flicker included.
+        Residuals over the expected standard deviation of a value, flicker included, shape (n, C).
     common, common_sigma
-        Shape (n,): relative deviation that fits all channels of a frame best, and what photon and
-        read noise leave it uncertain by.
+        Common-mode deviation: the relative deviation that fits all channels of a frame best, and
+        its σ from photon and read noise, shape (n,).
     """
 
     normalised: FloatArray
@@ -284,7 +313,7 @@ class Residuals:
 
 
 def residuals(series: Series, fit: FittedDecay) -> Residuals:
-    """Of all rows of `series`, those left out of the fit, too."""
+    """Return the residuals of all rows of a series, with those excluded from the fit."""
     model = fit.predict(series.t_s, series.exposure_s)
     signal = model - fit.offsets
     deviation = series.values - model
@@ -301,8 +330,8 @@ def residuals(series: Series, fit: FittedDecay) -> Residuals:
 
 
 def residual_figure(series: Series, fit: FittedDecay) -> Figure:
-    """Normalised residuals; with several channels below them what a frame's channels share."""
-    left = residuals(series, fit)
+    """Draw the normalised residuals and, with several channels, the common-mode deviations."""
+    deviations = residuals(series, fit)
     several = len(series.channels) > 1
     figure = new_figure(RESIDUALS_HEIGHT_PT if several else LOW_HEIGHT_PT)
     upper = place(figure, left=LEFT_PT, bottom=136 if several else 38, right=12, top=30)
@@ -310,14 +339,14 @@ def residual_figure(series: Series, fit: FittedDecay) -> Figure:
     last = float(t_s.max())
     upper.axhspan(-BAND, BAND, color=SHADE, linewidth=0)
     upper.axhline(0, color=MUTED, linewidth=0.8)
-    cut = np.clip(left.normalised, -FARTHEST, FARTHEST)
+    clipped = np.clip(deviations.normalised, -FARTHEST, FARTHEST)
     for number, name in enumerate(series.channels):
         marker = MARKERS[number % len(MARKERS)]
         colour = channel_colour(name, number)
         for rows, face in ((usable, colour), (~usable, PAPER)):
-            points(upper, t_s[rows], cut[rows, number], marker, colour, face, size=3.6)
+            points(upper, t_s[rows], clipped[rows, number], marker, colour, face, size=3.6)
     _residual_legend(figure, series)
-    reach = float(np.abs(cut[usable]).max()) if usable.any() else BAND
+    reach = float(np.abs(clipped[usable]).max()) if usable.any() else BAND
     upper.set_ylim(-max(reach * 1.1, 3.2), max(reach * 1.1, 3.2))
     upper.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
     upper.set_ylabel("Residual / σ")
@@ -328,13 +357,14 @@ def residual_figure(series: Series, fit: FittedDecay) -> Figure:
     lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=150, share_x=upper)
     lower.axhspan(-200 * fit.flicker, 200 * fit.flicker, color=SHADE, linewidth=0)
     lower.axhline(0, color=MUTED, linewidth=0.8)
-    known = left.common_sigma <= max(COMMON_SIGMA, 3 * np.nanmin(left.common_sigma))
-    shown = known & usable if (known & usable).any() else known
-    common, common_sigma = 100 * left.common[shown], 100 * left.common_sigma[shown]
-    error_bars(lower, t_s[shown], common, common_sigma, INK)
-    points(lower, t_s[shown], common, "o", INK, INK, size=2.6)
+    precise = deviations.common_sigma <= max(COMMON_SIGMA, 3 * np.nanmin(deviations.common_sigma))
+    drawn = precise & usable if (precise & usable).any() else precise
+    common, common_sigma = 100 * deviations.common[drawn], 100 * deviations.common_sigma[drawn]
+    error_bars(lower, t_s[drawn], common, common_sigma, INK)
+    points(lower, t_s[drawn], common, "o", INK, INK, size=2.6)
     reach = max(
-        float(np.max(np.abs(left.common[shown]) + left.common_sigma[shown])), 2.4 * fit.flicker
+        float(np.max(np.abs(deviations.common[drawn]) + deviations.common_sigma[drawn])),
+        2.4 * fit.flicker,
     )
     lower.set_ylim(-110 * reach, 110 * reach)
     lower.yaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
@@ -344,6 +374,7 @@ def residual_figure(series: Series, fit: FittedDecay) -> Figure:
 
 
 def _residual_legend(figure: Figure, series: Series) -> None:
+    """Add the legend of channels and common-mode deviations."""
     entries = [
         marked(name, MARKERS[number % len(MARKERS)], channel_colour(name, number))
         for number, name in enumerate(series.channels)
@@ -356,7 +387,7 @@ def _residual_legend(figure: Figure, series: Series) -> None:
 
 
 NOISE_HEIGHT_PT = 268.0
-#: Parts below this fraction of the whole are not worth their line.
+#: Parts of the noise that are nowhere above this fraction of the total σ are not drawn.
 LEAST_FRACTION = 0.03
 _LINES: dict[str, tuple[str, LineStyle]] = {
     "photon noise": (OTHER_CHANNELS[1], "-"),
@@ -365,12 +396,15 @@ _LINES: dict[str, tuple[str, LineStyle]] = {
     "flicker": (OTHER_CHANNELS[0], DOTTED),
     "dark level": (MUTED, LONG_DASHED),
 }
-#: Where nothing is seen any more, how little need not be shown.
+#: Upper end of the axis of relative σ in per cent.
 MOST_PERCENT = 300.0
 
 
 def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
-    """The parts that somewhere are worth a line, by their names."""
+    """Return the parts of the noise that contribute noticeably to the total σ, by name.
+
+    Each is a standard uncertainty relative to the fitted signal, shape (n,).
+    """
     parts = {
         "photon noise": budget.photons,
         "read noise": budget.reading,
@@ -378,27 +412,27 @@ def visible_parts(budget: NoiseBudget) -> dict[str, FloatArray]:
         "flicker": budget.flicker,
         "dark level": budget.dark_level,
     }
-    worth = LEAST_FRACTION * budget.together
-    return {name: part for name, part in parts.items() if (part > worth).any()}
+    threshold = LEAST_FRACTION * budget.together
+    return {name: part for name, part in parts.items() if (part > threshold).any()}
 
 
 def noise_figure(budget: NoiseBudget) -> Figure:
-    """Relative standard uncertainty of a value of the brightest channel, and what it is made of."""
+    """Draw the relative standard uncertainty of the brightest channel, and its components."""
     figure = new_figure(NOISE_HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
-    together = 100 * budget.together
+    total = 100 * budget.together
     axes.set_yscale("log")
     # Broad and pale, since the largest part is nearly as large.
     entries: list[Artist] = [lined("together", INK, width=4.5, opacity=BAND_OPACITY)]
-    shown = [together]
-    axes.plot(budget.t_s, together, color=INK, linewidth=4.5, alpha=BAND_OPACITY)
+    drawn_parts = [total]
+    axes.plot(budget.t_s, total, color=INK, linewidth=4.5, alpha=BAND_OPACITY)
     for name, part in visible_parts(budget).items():
         percent, (colour, style) = 100 * part, _LINES[name]
         axes.plot(budget.t_s, percent, color=colour, linewidth=1.2, linestyle=style)
         entries.append(lined(name, colour, style))
-        shown.append(percent[percent > LEAST_FRACTION * together])
-    low, high = min(part.min() for part in shown), max(part.max() for part in shown)
-    axes.set_ylim(0.8 * low, 1.3 * max(min(high, MOST_PERCENT), together.min()))
+        drawn_parts.append(percent[percent > LEAST_FRACTION * total])
+    low, high = min(part.min() for part in drawn_parts), max(part.max() for part in drawn_parts)
+    axes.set_ylim(0.8 * low, 1.3 * max(min(high, MOST_PERCENT), total.min()))
     mark_decades(axes)
     last = float(budget.t_s.max())
     axes.set_xlim(-0.02 * last if last else -1.0, 1.03 * last or 1.0)
@@ -414,7 +448,7 @@ TIMING_HEIGHT_PT = 200.0
 
 
 def overview_figures(patches: Sequence[PatchReport]) -> list[Callable[[], Figure]]:
-    """What draws a small logarithmic decay for each patch, all with the same axes."""
+    """Return functions that draw a small logarithmic decay of each patch, all on the same axes."""
     ends = [log_axis_ends(patch.series) for patch in patches]
     low, high = min(end[0] for end in ends), max(end[1] for end in ends)
     last_s = max(float(middles_s(patch.series).max()) for patch in patches) or 1.0
@@ -422,6 +456,7 @@ def overview_figures(patches: Sequence[PatchReport]) -> list[Callable[[], Figure
 
 
 def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> Figure:
+    """Draw a small logarithmic decay from `low` to `high` in DN/s and up to `last_s`."""
     figure = new_figure(SMALL_HEIGHT_PT, SMALL_WIDTH_PT)
     axes = place(figure, left=50, bottom=32, right=14, top=6)
     axes.set_yscale("log", nonpositive="clip")
@@ -451,7 +486,7 @@ def _small_decay(patch: PatchReport, low: float, high: float, last_s: float) -> 
 
 
 def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
-    """How much later than planned each exposure began, one mark a frame, one colour a unit."""
+    """Draw the lateness of each exposure in ms, in one colour a unit."""
     units = list(dict.fromkeys(timing.unit for timing in timings))
     several = 1 < len(units) <= len(MARKERS)
     figure = new_figure(TIMING_HEIGHT_PT)
@@ -459,13 +494,13 @@ def timing_figure(timings: Sequence[FrameTiming]) -> Figure:
     axes.axhline(0, color=MUTED, linewidth=0.8)
     entries = []
     for number, unit in enumerate(units):
-        of_unit = [timing for timing in timings if timing.unit == unit]
+        unit_timings = [timing for timing in timings if timing.unit == unit]
         marker = MARKERS[number % len(MARKERS)]
         colour = INK if number == 0 else OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
         entries.append(marked(unit, marker, colour))
         axes.plot(
-            [timing.t_s for timing in of_unit],
-            [1e3 * timing.late_s for timing in of_unit],
+            [timing.t_s for timing in unit_timings],
+            [1e3 * timing.late_s for timing in unit_timings],
             linestyle="none",
             marker=marker,
             markersize=3.6,

@@ -1,4 +1,4 @@
-"""An emission spectrum in a report: Λ*, whether it is one at all times, and after every lamp."""
+"""Report of an emission spectrum: Λ*, its constancy in time, its independence of the lamp."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace
@@ -42,18 +42,20 @@ COLUMNS = 4
 
 
 def render(result: EmissionSpectrumResult, source: Source) -> Rendered:
-    """Show the spectrum of every patch, its constancy and its independence of the lamp."""
+    """Render the spectrum of every patch, its constancy and its independence of the lamp."""
     sections: list[Section] = []
     lines: list[str] = []
     for name, patch in result.patches.items():
-        of_patch, prefix = (f": {name}", f"{name}: ") if name else ("", "")
-        sections += (replace(one, title=one.title + of_patch) for one in _sections(patch))
+        title_suffix, prefix = (f": {name}", f"{name}: ") if name else ("", "")
+        sections += (
+            replace(section, title=section.title + title_suffix) for section in _sections(patch)
+        )
         lines += (prefix + line for line in _lines(patch))
     return Rendered(tuple(sections), tuple(lines))
 
 
 def _lines(patch: PatchSpectrum) -> Iterator[str]:
-    """Where the spectrum is, one line for the times, one for each further lamp."""
+    """Yield a line on the spectrum, one on its constancy, and one for each further lamp."""
     spectrum, centroid = patch.spectrum, patch.spectrum.centroid
     yield (
         f"emission: highest at {spectrum.peak_nm:.0f} nm, centroid "
@@ -61,25 +63,27 @@ def _lines(patch: PatchSpectrum) -> Iterator[str]:
         f"σ of Λ* {100 * float(np.median(spectrum.sigma)):.1f} % of its peak (median)"
     )
     if patch.times:
-        least = min(patch.times, key=lambda one: one.p_value)
+        least_p = min(patch.times, key=lambda comparison: comparison.p_value)
         outcome = "changes" if patch.changes_with_time else "the same"
         yield (
-            f"over time: {outcome} (least p = {least.p_value:.2g} of {len(patch.times)}, at "
-            f"{least.what}; centroid {_shift(least)} nm off the others)"
+            f"over time: {outcome} (least p = {least_p.p_value:.2g} of {len(patch.times)}, "
+            f"at {least_p.what}; centroid {_shift(least_p)} nm off the others)"
         )
     outcome = "differs" if patch.depends_on_lamp else "the same"
-    for one in patch.lamps:
+    for comparison in patch.lamps:
         yield (
-            f"{one.what}: {outcome} (p = {one.p_value:.2g}; centroid {_shift(one)} nm off, "
-            f"{one.brightness:.3g} times as bright)"
+            f"{comparison.what}: {outcome} (p = {comparison.p_value:.2g}; "
+            f"centroid {_shift(comparison)} nm off, {comparison.brightness:.3g} times as bright)"
         )
 
 
 def _shift(comparison: SpectralComparison) -> str:
+    """Return the shift of the centroid with its σ in nm, as text."""
     return plus_minus(comparison.shift_nm, comparison.shift_sigma_nm)
 
 
 def _sections(patch: PatchSpectrum) -> Iterator[Section]:
+    """Yield the sections on the spectrum, its constancy and its independence of the lamp."""
     frames = patch.charges[0].frames
     white = (
         "A grey card under the known lamp, seen through the same filter, corrects the camera's "
@@ -153,43 +157,46 @@ def _sections(patch: PatchSpectrum) -> Iterator[Section]:
 
 
 def _constancy_text(patch: PatchSpectrum) -> str:
-    least = min(patch.times, key=lambda one: one.p_value)
+    """Return the statement on the constancy of the spectrum in time."""
+    least_p = min(patch.times, key=lambda comparison: comparison.p_value)
     if patch.changes_with_time:
-        worst = max(patch.times, key=lambda one: one.beyond_noise)
+        worst = max(patch.times, key=lambda comparison: comparison.beyond_noise)
         return (
             "The relative spectrum changes with time: the frame at "
             f"{worst.what} differs from those at the other times by {worst.beyond_noise:.2%} "
-            f"beyond noise (p = {least.p_value:.2g})."
+            f"beyond noise (p = {least_p.p_value:.2g})."
         )
     return (
         "The relative spectrum is the same at all times within noise (paper, fig. 6): the least "
-        f"p-value of {len(patch.times)} is {least.p_value:.2g}. Frames are compared "
+        f"p-value of {len(patch.times)} is {least_p.p_value:.2g}. Frames are compared "
         "position by position, so that camera curves and filter cancel."
     )
 
 
 def _lamp_text(patch: PatchSpectrum) -> str:
+    """Return the statement on the independence of the spectrum of the exciting lamp."""
     outcome = "differs" if patch.depends_on_lamp else "is the same within noise"
-    worst = max(patch.lamps, key=lambda one: one.beyond_noise)
+    worst = max(patch.lamps, key=lambda comparison: comparison.beyond_noise)
     return (
         f"The relative spectrum {outcome} whichever lamp charged the sample: "
         f"p = {worst.p_value:.2g}, {worst.beyond_noise:.2%} rms beyond noise."
     )
 
 
-def _table(what: str, comparisons: Sequence[SpectralComparison]) -> Table:
+def _table(head: str, comparisons: Sequence[SpectralComparison]) -> Table:
+    """Return the table of comparisons; `what` is the head of its first column."""
     return Table(
-        (what, "χ²", "degrees of freedom", "p", "rms beyond noise / %", "centroid shift / nm"),
+        (head, "χ²", "degrees of freedom", "p", "rms beyond noise / %", "centroid shift / nm"),
         tuple(
             (
-                one.what,
-                rounded(one.chi2),
-                str(one.dof),
-                f"{one.p_value:.2g}",
-                rounded(100 * one.beyond_noise, 2),
-                _shift(one),
+                comparison.what,
+                rounded(comparison.chi2),
+                str(comparison.dof),
+                f"{comparison.p_value:.2g}",
+                rounded(100 * comparison.beyond_noise, 2),
+                _shift(comparison),
             )
-            for one in comparisons
+            for comparison in comparisons
         ),
     )
 
@@ -200,16 +207,18 @@ def spectrum_figure(
     band: tuple[FloatArray, FloatArray] | None,
     names: tuple[str, str],
 ) -> Figure:
-    """An emission spectrum, largest value 1.
+    """Draw an emission spectrum.
 
     Parameters
     ----------
-    nm, value
-        (n,) wavelengths and the spectrum.
+    nm
+        Wavelengths in nm, shape (n,).
+    value
+        Spectrum with largest value 1, shape (n,).
     band
-        (n,) its lower and upper limits, if they are known.
+        Lower and upper limit of the spectrum, each of shape (n,); None if they are not known.
     names
-        Of the spectrum and of the band.
+        Names of the spectrum and of the band in the legend.
     """
     figure, axes = _axes(f"{names[0]} (largest value 1)")
     entries: list[Artist] = [lined(names[0], INK)]
@@ -223,7 +232,7 @@ def spectrum_figure(
 
 
 def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
-    """Several spectra, each of its own integral, so that only their shapes differ."""
+    """Draw several spectra, each normalised to its integral."""
     figure, axes = _axes("Fraction of the emission per 10 nm / %")
     entries = []
     for number, (name, spectrum) in enumerate(spectra.items()):
@@ -234,10 +243,10 @@ def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
             for column in (spectrum.value, spectrum.sigma)
         )
         # Side by side, so that error bars do not cover each other.
-        beside = nm + 1.2 * (number - (len(spectra) - 1) / 2)
+        shifted_nm = nm + 1.2 * (number - (len(spectra) - 1) / 2)
         axes.plot(nm, value, color=colour, linewidth=0.9)
-        error_bars(axes, beside, value, sigma, colour)
-        points(axes, beside, value, marker, colour, colour, size=3.0)
+        error_bars(axes, shifted_nm, value, sigma, colour)
+        points(axes, shifted_nm, value, marker, colour, colour, size=3.0)
         entries.append(marked(name, marker, colour))
     axes.set_ylim(0, None)
     legend_above(figure, entries, COLUMNS)
@@ -245,12 +254,20 @@ def _normalised_figure(spectra: Mapping[str, EmissionSpectrum]) -> Figure:
 
 
 def _shift_figure(comparisons: Sequence[SpectralComparison], t_s: FloatArray) -> Figure:
-    """How far the centroid of every frame's light lies off that of the others."""
+    """Draw the shift of the centroid of every frame relative to the other frames, in nm.
+
+    Parameters
+    ----------
+    comparisons
+        Comparison of each of n frames with the others.
+    t_s
+        Times of the frames in seconds after lamp off, shape (n,).
+    """
     figure = new_figure(180.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
     axes.axhline(0.0, color=MUTED, linewidth=0.9)
-    shift = np.array([one.shift_nm for one in comparisons])
-    sigma = np.array([one.shift_sigma_nm for one in comparisons])
+    shift = np.array([comparison.shift_nm for comparison in comparisons])
+    sigma = np.array([comparison.shift_sigma_nm for comparison in comparisons])
     error_bars(axes, t_s, shift, sigma, INK)
     points(axes, t_s, shift, "o", INK, INK)
     axes.set_xscale("log")
@@ -264,6 +281,7 @@ def _shift_figure(comparisons: Sequence[SpectralComparison], t_s: FloatArray) ->
 
 
 def _axes(label: str) -> tuple[Figure, Axes]:
+    """Return a figure with axes over wavelength; `label` is that of the vertical axis."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     axes.set_xlabel(WAVELENGTH_LABEL)
@@ -273,5 +291,6 @@ def _axes(label: str) -> tuple[Figure, Axes]:
 
 
 def _colour_and_marker(number: int) -> tuple[str, str]:
+    """Return colour and marker of the spectrum with index `number`."""
     colours = (INK, *OTHER_CHANNELS)
     return colours[number % len(colours)], MARKERS[number % len(MARKERS)]

@@ -1,4 +1,4 @@
-"""Excitation in a report: rates by band, how places charge, what the fit leaves, and closure."""
+"""Report of an excitation: rates by band, charging curves, residuals, and closure."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -36,7 +36,7 @@ from labrig.results import (
 from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 270.0
-#: Places along the strip whose charging is shown.
+#: Number of positions along the filter whose charging is drawn.
 SHOWN = 5
 MEASURED = (
     "r(0) and a = Λ* k_r r(0) after the brightest charge by the lamp itself. r(0) is "
@@ -46,7 +46,7 @@ ASSUMED = "r(0) = 1 is assumed after the longest charge, as Nalbach et al. do."
 
 
 def render(result: ExcitationResult, source: Source) -> Rendered:
-    """Show every patch: its rates, how its places charge, and whether the rates predict that."""
+    """Render the excitation rates, charging curves, residuals and closure of every patch."""
     sections, lines = [], []
     for name, patch in result.patches.items():
         sections.append(_section(f"Excitation: {name}" if name else "Excitation", result, patch))
@@ -55,6 +55,7 @@ def render(result: ExcitationResult, source: Source) -> Rendered:
 
 
 def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
+    """Yield the lines for the terminal: states, rates by band, χ² and closure."""
     fit, off = patch.fit, patch.fit.at_off[-1]
     for number, state in enumerate(fit.states):
         yield (
@@ -69,6 +70,7 @@ def _lines(result: ExcitationResult, patch: PatchExcitation) -> Iterator[str]:
 
 
 def _closure_line(closure: Closure | None) -> str:
+    """Return the statement on closure."""
     if closure is None:
         return "not tested; give three charges or more in 'direct'"
     return (
@@ -78,16 +80,18 @@ def _closure_line(closure: Closure | None) -> str:
 
 
 def _rates(fit: FittedExcitation, number: int) -> list[str]:
+    """Return k_e of a state in each band in 1/s as text, or its upper limit."""
     state = fit.states[number]
     return [
-        plus_minus(float(value), float(sigma)) if seen else f"< {rounded(float(upper), 2)}"
-        for value, sigma, seen, upper in zip(
+        plus_minus(float(value), float(sigma)) if detected else f"< {rounded(float(upper), 2)}"
+        for value, sigma, detected, upper in zip(
             state.k_e_per_s, state.k_e_sigma_per_s, state.seen, state.k_e_upper_per_s, strict=True
         )
     ]
 
 
 def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Section:
+    """Return the section of a patch."""
     fit, through, direct = patch.fit, patch.charging.through, patch.charging.direct
     position_nm, irradiance = result.position_nm, result.irradiance
     fitted = through.values - fit.residuals[0] * through.sigma
@@ -133,6 +137,7 @@ def _section(title: str, result: ExcitationResult, patch: PatchExcitation) -> Se
 
 
 def _levels_table(fit: FittedExcitation, caption: str) -> Table:
+    """Return the table of k_r, r(0) and amplitudes of the states."""
     off = fit.at_off[-1]
     return Table(
         ("State", "k_r / s⁻¹", "Amplitude at r = 1 / (DN/s)", "r(0)", "Amplitude a / (DN/s)"),
@@ -151,6 +156,7 @@ def _levels_table(fit: FittedExcitation, caption: str) -> Table:
 
 
 def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
+    """Return the table of k_e by band and state."""
     states = range(len(fit.states))
     columns = [_rates(fit, number) for number in states]
     return Table(
@@ -164,7 +170,7 @@ def _rates_table(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Table:
 
 
 def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
-    """k_e of every band and state, limits as arrows."""
+    """Draw k_e of every band and state, upper limits as carets."""
     edges = np.array(bands_nm)
     middles, widths = (edges[1:] + edges[:-1]) / 2, np.diff(edges)
     figure = new_figure(HEIGHT_PT)
@@ -174,13 +180,13 @@ def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
     for number, state in enumerate(fit.states):
         colour = INK if number == 0 else OTHER_CHANNELS[number - 1]
         shift = (number - (len(fit.states) - 1) / 2) * 0.16 * widths
-        marker, seen = MARKERS[number], state.seen
+        marker, detected = MARKERS[number], state.seen
         x, y = middles + shift, 1e3 * state.k_e_per_s
-        error_bars(axes, x[seen], y[seen], 1e3 * state.k_e_sigma_per_s[seen], colour)
-        points(axes, x[seen], y[seen], marker, colour, colour, 5.0)
-        limits = 1e3 * state.k_e_upper_per_s[~seen]
-        axes.plot(x[~seen], limits, linestyle="none", marker=7, markersize=6, color=colour)
-        for at_nm, limit in zip(x[~seen], limits, strict=True):
+        error_bars(axes, x[detected], y[detected], 1e3 * state.k_e_sigma_per_s[detected], colour)
+        points(axes, x[detected], y[detected], marker, colour, colour, 5.0)
+        limits = 1e3 * state.k_e_upper_per_s[~detected]
+        axes.plot(x[~detected], limits, linestyle="none", marker=7, markersize=6, color=colour)
+        for at_nm, limit in zip(x[~detected], limits, strict=True):
             axes.plot([at_nm, at_nm], [0, limit], color=colour, linewidth=0.9, alpha=0.5)
         entries.append(marked(f"state {number + 1}, k_r {state.k_r_per_s:.3g} s⁻¹", marker, colour))
     axes.set_ylim(0, None)
@@ -191,14 +197,16 @@ def _rates_figure(fit: FittedExcitation, bands_nm: tuple[float, ...]) -> Figure:
 
 
 def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: FloatArray) -> Figure:
-    """Glow in the first usable photograph after every charge, over the charge, at some places.
+    """Draw the first usable signal after every charge over its length, at some positions.
 
     Parameters
     ----------
+    series
+        Signals of n frames at P positions in C channels, after charges through the filter.
     fitted
-        (n, P, C) what the fit says.
+        Fitted signals in DN/s, shape (n, P, C).
     position_nm
-        (P,) wavelength that charges each place.
+        Wavelength that excites each position in nm, shape (P,).
     """
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=48)
@@ -207,18 +215,20 @@ def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: Fl
     charge_s = np.array([charge.off_s - charge.on_s for charge in series.charges])
     channel = int(np.argmax(np.nanmean(series.values, axis=(0, 1))))
     total = np.nansum(fitted[..., channel], axis=0)
-    reach = np.flatnonzero(total > 0.01 * total.max())
-    shown = reach[np.linspace(0, len(reach) - 1, min(SHOWN, len(reach))).round().astype(int)]
+    bright_sites = np.flatnonzero(total > 0.01 * total.max())
+    drawn_sites = bright_sites[
+        np.linspace(0, len(bright_sites) - 1, min(SHOWN, len(bright_sites))).round().astype(int)
+    ]
     entries = []
-    for number, site in enumerate(dict.fromkeys(shown.tolist())):
+    for number, site in enumerate(dict.fromkeys(drawn_sites.tolist())):
         colour = OTHER_CHANNELS[number % len(OTHER_CHANNELS)]
-        first = series.first_frames(np.isfinite(series.values[:, site, channel]))
-        order = sorted(first, key=lambda number: charge_s[number])
-        picked = [first[number] for number in order]
-        x, y = charge_s[order], series.values[picked, site, channel]
-        error_bars(axes, x, y, series.sigma[picked, site, channel], colour)
+        first_frames = series.first_frames(np.isfinite(series.values[:, site, channel]))
+        order = sorted(first_frames, key=lambda number: charge_s[number])
+        rows = [first_frames[number] for number in order]
+        x, y = charge_s[order], series.values[rows, site, channel]
+        error_bars(axes, x, y, series.sigma[rows, site, channel], colour)
         points(axes, x, y, MARKERS[number], colour, colour, 4.2)
-        axes.plot(x, fitted[picked, site, channel], color=colour, linewidth=1.0)
+        axes.plot(x, fitted[rows, site, channel], color=colour, linewidth=1.0)
         entries.append(marked(f"{position_nm[site]:.0f} nm", MARKERS[number], colour))
     times_s = sorted({float(f"{time:.2g}") for time in charge_s})
     axes.set_xticks(times_s, [rounded(time, 2) for time in times_s])
@@ -230,20 +240,28 @@ def _charging_figure(series: ChargingSeries, fitted: FloatArray, position_nm: Fl
 
 
 def _residual_figure(residuals: FloatArray, position_nm: FloatArray) -> Figure:
-    """(n, P, C) in σ, rms over channels and photographs, along the filter and over time."""
+    """Draw the rms of the residuals over frames and channels at each position.
+
+    Parameters
+    ----------
+    residuals
+        Residuals of n frames at P positions in C channels, in σ, shape (n, P, C).
+    position_nm
+        Wavelength that excites each position in nm, shape (P,).
+    """
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=14)
-    of_site = np.sqrt(np.nanmean(residuals**2, axis=(0, 2)))
+    site_rms = np.sqrt(np.nanmean(residuals**2, axis=(0, 2)))
     axes.axhline(1.0, color=RULE, linewidth=1.2)
-    points(axes, position_nm, of_site, "o", INK, INK, 4.2)
-    axes.set_ylim(0, max(1.5, 1.15 * float(np.nanmax(of_site))))
+    points(axes, position_nm, site_rms, "o", INK, INK, 4.2)
+    axes.set_ylim(0, max(1.5, 1.15 * float(np.nanmax(site_rms))))
     axes.set_xlabel("Excitation wavelength / nm")
     axes.set_ylabel("Residuals, rms / σ")
     return figure
 
 
 def closure_picture(closure: Closure) -> Picture:
-    """The figure with what it says about the prediction."""
+    """Return the figure of closure with its caption."""
     caption = (
         "Charging under the whole lamp: the curve is predicted from the rates measured band by "
         "band, without any fit; points are measured, with ± 1 σ of both. RMS deviation "
@@ -253,7 +271,7 @@ def closure_picture(closure: Closure) -> Picture:
 
 
 def closure_figure(closure: Closure) -> Figure:
-    """Levels over the charge, measured and predicted, and by how much they deviate."""
+    """Draw measured and predicted levels over the length of the charge, and their deviation."""
     charge_s, measured, predicted = closure.charge_s, closure.measured, closure.predicted
     figure = new_figure(300.0)
     upper = place(figure, left=LEFT_PT, bottom=128, right=12, top=30)
@@ -269,8 +287,11 @@ def closure_figure(closure: Closure) -> Figure:
         upper.xaxis.set_major_locator(LogLocator(subs=(1.0, 2.0, 5.0)))
         upper.xaxis.set_minor_locator(NullLocator())
     upper.xaxis.set_major_formatter(FuncFormatter(lambda value, _: rounded(value)))
-    full = float(np.sqrt(np.mean(predicted**2))) or 1.0
-    fraction, fraction_sigma = 100 * (measured - predicted) / full, 100 * closure.sigma / full
+    rms_level = float(np.sqrt(np.mean(predicted**2))) or 1.0
+    fraction, fraction_sigma = (
+        100 * (measured - predicted) / rms_level,
+        100 * closure.sigma / rms_level,
+    )
     lower.axhline(0, color=MUTED, linewidth=1.2)
     error_bars(lower, charge_s, fraction, fraction_sigma, INK)
     points(lower, charge_s, fraction, "o", INK, INK, size=3.0)

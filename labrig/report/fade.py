@@ -1,4 +1,4 @@
-"""A lamp's fade and rise in a report."""
+"""Report of a lamp's fade, rise and warming."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -23,12 +23,12 @@ from labrig.results import FadeResult, LampChange, WarmingLight
 from labrig.written_numbers import plus_minus, rounded
 
 HEIGHT_PT = 250.0
-#: Of the bands that are drawn, from blue to red.
+#: Colours of the bands that are drawn, from blue to red.
 COLOURS = (CHANNEL["B"], OTHER_CHANNELS[2], CHANNEL["G"], OTHER_CHANNELS[1], CHANNEL["R"])
 
 
 def render(result: FadeResult, source: Source) -> Rendered:
-    """Show the fractions over time, how they were fitted, and the light while the housing warms."""
+    """Render the light of the lamp during fade and rise, and while its housing warms."""
     file = result.calibration
     changes = [("fade", file.fade, result.fade)]
     if file.rise is not None and result.rise is not None:
@@ -41,6 +41,7 @@ def render(result: FadeResult, source: Source) -> Rendered:
 
 
 def _changes(file: FadeFile, changes: list[tuple[str, Change, LampChange]]) -> Section:
+    """Return the section on fade and rise, each given by name, table and fit."""
     figures = tuple(
         Picture(
             name,
@@ -75,14 +76,17 @@ def _changes(file: FadeFile, changes: list[tuple[str, Change, LampChange]]) -> S
 
 
 def _fractions(file: FadeFile, table: Change) -> Figure:
+    """Draw the light in some bands over that of the steady lamp."""
     figure = new_figure(HEIGHT_PT)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
     fraction, sigma = np.array(table.fraction), np.array(table.sigma)
     time_ms = 1e3 * np.array(table.t_s)
     bands = fraction.shape[1]
-    shown = sorted(set(np.linspace(0, bands - 1, min(bands, len(COLOURS))).round().astype(int)))
+    drawn_bands = sorted(
+        set(np.linspace(0, bands - 1, min(bands, len(COLOURS))).round().astype(int))
+    )
     entries = []
-    for band, colour in zip(shown, COLOURS, strict=False):
+    for band, colour in zip(drawn_bands, COLOURS, strict=False):
         low, high = file.bands_nm[band], file.bands_nm[band + 1]
         axes.fill_between(
             time_ms, fraction[:, band] - sigma[:, band], fraction[:, band] + sigma[:, band],
@@ -96,33 +100,38 @@ def _fractions(file: FadeFile, table: Change) -> Figure:
     return figure
 
 
-def _warming(warm: Warming, seen: WarmingLight) -> Section:
-    deficit = plus_minus(100 * warm.deficit, 100 * warm.deficit_sigma)
+def _warming(warming: Warming, measured: WarmingLight) -> Section:
+    """Return the section on the warm-up transient."""
+    deficit = plus_minus(100 * warming.deficit, 100 * warming.deficit_sigma)
     text = (
         f"After ten minutes in the dark the lamp has {deficit} % less light than when warm. The "
-        f"deficit decays with a time constant of {warm.time_constant_s:.0f} s as the housing "
+        f"deficit decays with a time constant of {warming.time_constant_s:.0f} s as the housing "
         "warms, and weakens short charges."
     )
     caption = "Light on the card in each photograph; line: 1 − d e^(−t/τ)."
     return Section(
         "Warm-up transient of the lamp",
         (text,),
-        (Picture("warming", partial(_warming_figure, warm, seen), caption),),
+        (Picture("warming", partial(_warming_figure, warming, measured), caption),),
     )
 
 
-def _warming_figure(warm: Warming, seen: WarmingLight) -> Figure:
+def _warming_figure(warming: Warming, measured: WarmingLight) -> Figure:
+    """Draw the light after switching on in per cent of that of the warm lamp."""
     figure = new_figure(180)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
-    grid = np.linspace(0, float(seen.t_s.max()), 201)
-    axes.plot(grid, 100 * (1 - warm.deficit * np.exp(-grid / warm.time_constant_s)), color=INK)
-    points(axes, seen.t_s, 100 * seen.light, "o", INK, INK, size=3.0)
+    grid = np.linspace(0, float(measured.t_s.max()), 201)
+    axes.plot(
+        grid, 100 * (1 - warming.deficit * np.exp(-grid / warming.time_constant_s)), color=INK
+    )
+    points(axes, measured.t_s, 100 * measured.light, "o", INK, INK, size=3.0)
     axes.set_xlabel("Time after switching on / s")
     axes.set_ylabel("Light / % of warm")
     return figure
 
 
 def _lines(changes: list[tuple[str, Change, LampChange]]) -> Iterator[str]:
+    """Yield a line for the terminal on each transient."""
     for name, table, change in changes:
         equivalent_s = table.equivalent_s()
         if name == "rise":
@@ -137,8 +146,10 @@ def _lines(changes: list[tuple[str, Change, LampChange]]) -> Iterator[str]:
         )
 
 
-def _warming_line(warm: Warming) -> str:
+def _warming_line(warming: Warming) -> str:
+    """Return the line for the terminal on the warm-up transient."""
     return (
-        f"a cold lamp has {plus_minus(100 * warm.deficit, 100 * warm.deficit_sigma)} % less light; "
-        f"the deficit decays with a time constant of {warm.time_constant_s:.0f} s"
+        f"a cold lamp has {plus_minus(100 * warming.deficit, 100 * warming.deficit_sigma)} % "
+        "less light; "
+        f"the deficit decays with a time constant of {warming.time_constant_s:.0f} s"
     )

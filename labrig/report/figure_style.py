@@ -1,4 +1,4 @@
-"""How figures look."""
+"""Style of all figures of a report: sizes, colours, axes, legends."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -20,14 +20,14 @@ from labrig.written_numbers import power_of_ten
 
 FloatArray = NDArray[np.float64]
 
-#: Figures are this wide in points, so that 10 pt is legible at half a desktop's or a phone's width.
+#: Width of figures in points, so that 10 pt is legible at half a desktop's or a phone's width.
 WIDTH_PT = 420.0
 FONT_PT = 10.5
 SMALL_PT = 9.5
-#: Left margin of axes, so that figures below one another are in line.
+#: Left margin of axes in points, the same in all figures so that their axes are in line.
 LEFT_PT = 62.0
 
-#: Left between a label and the figure's edge.
+#: Distance between a label and the edge of the figure in points.
 EDGE_PT = 3.0
 
 LineStyle: TypeAlias = str | tuple[float, tuple[float, ...]]
@@ -37,7 +37,7 @@ DOTTED: LineStyle = (0, (1, 2))
 DASH_DOTTED: LineStyle = (0, (5, 2, 1, 2))
 
 INK, MUTED, RULE, PAPER, SHADE = "#1d2329", "#5f6b76", "#dde2e6", "#fefefe", "#e9eff4"
-#: Colours of the channels of a camera, and of other channels in turn.
+#: Colours of the channels R, G, B of a camera, and of other channels in turn.
 CHANNEL = {"R": "#c4372c", "G": "#1b8450", "B": "#2b62c9"}
 OTHER_CHANNELS = ("#7a4fb5", "#b06a00", "#0f7f8a", "#a8326e", "#4f5b66")
 MARKERS = ("o", "s", "^", "D", "v", "P", "X", "*")
@@ -65,18 +65,54 @@ _SETTINGS = {
 
 @contextmanager
 def figure_style() -> Iterator[None]:
-    """While open, figures come out alike whatever the user's own matplotlib settings are."""
+    """Set the style of all figures, whatever the user's own matplotlib settings are.
+
+    Returns
+    -------
+    contextlib.AbstractContextManager
+        Context within which figures are made and saved.
+
+    Examples
+    --------
+    >>> import matplotlib
+    >>> from labrig.report import figure_style
+    >>> with figure_style():
+    ...     matplotlib.rcParams["font.size"]
+    10.5
+    """
     with matplotlib.style.context(["default", _SETTINGS]):
         yield
 
 
 def channel_colour(name: str, number: int) -> str:
-    """Colour of the channel called `name`, the `number`-th of its series."""
+    """Return the colour of the channel `name`, whose index in its series is `number`."""
     return CHANNEL.get(name, OTHER_CHANNELS[number % len(OTHER_CHANNELS)])
 
 
 def new_figure(height_pt: float, width_pt: float = WIDTH_PT) -> Figure:
-    """An empty, transparent figure."""
+    """Return an empty, transparent figure.
+
+    Parameters
+    ----------
+    height_pt
+        Height in points.
+    width_pt
+        Width in points.
+
+    Returns
+    -------
+    matplotlib.figure.Figure
+        Figure without axes, of 72 dots per inch: a pixel is a point.
+
+    Examples
+    --------
+    >>> from labrig.report import figure_style, new_figure, place
+    >>> with figure_style():
+    ...     figure = new_figure(200)
+    ...     axes = place(figure, left=62, bottom=38, right=12, top=30)
+    >>> [round(72 * inches) for inches in figure.get_size_inches()]
+    [420, 200]
+    """
     figure = Figure(figsize=(width_pt / 72, height_pt / 72), dpi=72)
     figure.patch.set_visible(False)
     return figure
@@ -90,9 +126,33 @@ def place(
     top: float,
     share_x: Axes | None = None,
 ) -> Axes:
-    """Axes with margins in points from the figure's left, bottom, right and top edge.
+    """Add axes whose margins to the edges of the figure are given in points.
 
     Labels stand at the figure's edge, so that those of several axes are in line.
+
+    Parameters
+    ----------
+    figure
+        Figure that gets the axes.
+    left, bottom, right, top
+        Distances of the axes from the edges of the figure in points.
+    share_x
+        Axes with the same horizontal axis; None for a horizontal axis of its own.
+
+    Returns
+    -------
+    matplotlib.axes.Axes
+        Axes with grid and the colours of the report.
+
+    Examples
+    --------
+    >>> from labrig.report import figure_style, new_figure, place
+    >>> with figure_style():
+    ...     figure = new_figure(268)
+    ...     signal = place(figure, left=62, bottom=136, right=12, top=30)
+    ...     residuals = place(figure, left=62, bottom=38, right=12, top=150, share_x=signal)
+    >>> round(residuals.get_window_extent().height)
+    80
     """
     width, height = figure.get_size_inches() * 72
     axes = figure.add_axes(
@@ -125,7 +185,7 @@ def points(
     face: str,
     size: float = 3.8,
 ) -> None:
-    """Measured values; hollow where `face` is the paper's colour."""
+    """Draw measured values as points, which are hollow if `face` is the colour of the paper."""
     axes.plot(
         x,
         y,
@@ -140,7 +200,7 @@ def points(
 
 
 def error_bars(axes: Axes, x: FloatArray, y: FloatArray, sigma: FloatArray, colour: str) -> None:
-    """Bars of ± 1 σ, all in one path: as single ones they would be half of the file."""
+    """Draw bars of ± 1 σ, all in one path; as single paths they would be half of the file."""
     gap = np.full_like(y, np.nan)
     axes.plot(
         np.repeat(x, 3),
@@ -151,12 +211,31 @@ def error_bars(axes: Axes, x: FloatArray, y: FloatArray, sigma: FloatArray, colo
     )
 
 
-#: How strongly bands of uncertainty are coloured.
+#: Opacity of bands of uncertainty.
 BAND_OPACITY = 0.3
 
 
 def legend_above(figure: Figure, entries: Sequence[Artist], columns: int) -> None:
-    """`entries`, each with its label, at the top of `figure`."""
+    """Add a legend at the top of a figure.
+
+    Parameters
+    ----------
+    figure
+        Figure that gets the legend, with a free margin above its axes.
+    entries
+        Entries of the legend, each with its label.
+    columns
+        Largest number of columns.
+
+    Examples
+    --------
+    >>> from labrig.report import DASHED, figure_style, legend_above, lined, new_figure
+    >>> with figure_style():
+    ...     figure = new_figure(200)
+    ...     legend_above(figure, [lined("fit", "black"), lined("state", "black", DASHED)], 2)
+    >>> [text.get_text() for text in figure.legends[0].get_texts()]
+    ['fit', 'state']
+    """
     figure.legend(
         handles=list(entries),
         loc="upper left",
@@ -174,7 +253,7 @@ def legend_above(figure: Figure, entries: Sequence[Artist], columns: int) -> Non
 
 
 def marked(label: str, marker: str, colour: str, face: str | None = None) -> Line2D:
-    """An entry for points."""
+    """Return the legend entry of points."""
     return Line2D(
         [],
         [],
@@ -190,46 +269,75 @@ def marked(label: str, marker: str, colour: str, face: str | None = None) -> Lin
 def lined(
     label: str, colour: str, style: LineStyle = "-", width: float = 1.2, opacity: float = 1.0
 ) -> Line2D:
-    """An entry for a curve."""
+    """Return the legend entry of a curve.
+
+    Parameters
+    ----------
+    label
+        Text of the entry.
+    colour
+        Colour of the curve, as matplotlib takes it.
+    style
+        Line style of the curve, as matplotlib takes it.
+    width
+        Line width in points.
+    opacity
+        Opacity of the curve, from 0 to 1.
+
+    Returns
+    -------
+    matplotlib.lines.Line2D
+        Line without points, for the handles of a legend.
+
+    Examples
+    --------
+    >>> from labrig.report import INK, lined, legend_above, new_figure
+    >>> entry = lined("predicted", INK)
+    >>> legend_above(new_figure(200), [entry], columns=1)
+    >>> entry.get_label()
+    'predicted'
+    """
     return Line2D([], [], color=colour, ls=style, linewidth=width, alpha=opacity, label=label)
 
 
 def shaded(label: str, colour: str) -> Patch:
-    """An entry for a band."""
+    """Return the legend entry of a band."""
     return Patch(color=colour, alpha=BAND_OPACITY, linewidth=0, label=label)
 
 
-#: An axis of fewer decades than this has labels between them, too.
+#: Number of decades of an axis below which ticks between decades are labelled, too.
 FEW_DECADES = 2.0
-#: With fewer of them, evenly spaced ticks are labelled instead.
+#: Number of labels below which evenly spaced ticks are labelled instead.
 FEWEST_LABELS = 2
 
 
 def mark_decades(axes: Axes, most: int = 8) -> None:
-    """Ticks of the vertical axis, its limits set: `most` of them at decades or between, labelled,
-    and short ones at the whole numbers between decades, if every decade is labelled.
+    """Set the ticks of a logarithmic vertical axis whose limits are set.
+
+    Labelled ticks stand at `most` decades or between them; if every decade is labelled, short ticks
+    stand at its multiples from 2 to 9.
     """
     low, high = axes.get_ylim()
     decades = range(math.floor(math.log10(low)), math.ceil(math.log10(high)) + 1)
     inside = [decade for decade in decades if low <= 10.0**decade <= high]
     step = max(1, math.ceil(len(inside) / most))
-    every = decades[::step]
-    labelled = [10.0**decade for decade in every]
+    labelled_decades = decades[::step]
+    labelled = [10.0**decade for decade in labelled_decades]
     if high < low * 10**FEW_DECADES:
-        labelled = [digit * 10.0**decade for decade in every for digit in (1, 2, 5)]
-    labelled = [at for at in labelled if low <= at <= high]
+        labelled = [digit * 10.0**decade for decade in labelled_decades for digit in (1, 2, 5)]
+    labelled = [tick for tick in labelled if low <= tick <= high]
     if len(labelled) < FEWEST_LABELS:
-        labelled = [at for at in MaxNLocator(5).tick_values(low, high) if low <= at <= high]
+        labelled = [tick for tick in MaxNLocator(5).tick_values(low, high) if low <= tick <= high]
     axes.yaxis.set_major_locator(FixedLocator(labelled))
     axes.yaxis.set_major_formatter(FuncFormatter(decade_text))
     # Matplotlib's own minor ticks would be half of the work of drawing the figure.
     axes.yaxis.set_minor_locator(NullLocator())
     if step == 1:
-        between = [digit * 10.0**decade for decade in decades for digit in range(2, 10)]
-        shown = [at for at in between if low <= at <= high]
+        multiples = [digit * 10.0**decade for decade in decades for digit in range(2, 10)]
+        minor_ticks = [tick for tick in multiples if low <= tick <= high]
         axes.plot(
-            np.zeros(len(shown)),
-            shown,
+            np.zeros(len(minor_ticks)),
+            minor_ticks,
             transform=axes.get_yaxis_transform(),
             linestyle="none",
             marker=TICKLEFT,
@@ -241,7 +349,7 @@ def mark_decades(axes: Axes, most: int = 8) -> None:
 
 
 def decade_text(value: float, _: int | None) -> str:
-    """A tick: `0.01` to `10000`, beyond that with a power of ten."""
+    """Return the label of a tick: `0.001` to `10000`, beyond that with a power of ten."""
     exponent = math.floor(math.log10(value) + 1e-9)
     if -3 <= exponent <= 4:
         return f"{value:g}"

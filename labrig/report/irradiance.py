@@ -1,4 +1,4 @@
-"""A measurement of irradiance in a report."""
+"""Report of a measurement of irradiance."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -26,11 +26,12 @@ from labrig.written_numbers import plus_minus, rounded
 
 
 def render(result: IrradianceResult, source: Source) -> Rendered:
-    """Show E of every band along the filter, and the scale that the grey card gives it."""
+    """Render the irradiance E of every band along the filter, and its scale from the grey card."""
     return Rendered((_section(result),), tuple(_lines(result.calibration)))
 
 
 def _section(result: IrradianceResult) -> Section:
+    """Return the section with the figures and the table of the irradiance."""
     file = result.calibration
     head = ("Band / nm", *(f"{low:g}" for low in file.bands_nm[:-1]))
     rows = (
@@ -68,7 +69,7 @@ def _section(result: IrradianceResult) -> Section:
 
 
 def _irradiance_figure(file: IrradianceFile) -> Figure:
-    """E of every band along the strip."""
+    """Draw the irradiance E of every band along the strip."""
     figure = new_figure(240)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=46)
     through, sigma = np.array(file.through), np.array(file.through_sigma)
@@ -76,9 +77,9 @@ def _irradiance_figure(file: IrradianceFile) -> Figure:
     entries = []
     for band, (low, high) in enumerate(zip(file.bands_nm[:-1], file.bands_nm[1:], strict=True)):
         colour = OTHER_CHANNELS[band % len(OTHER_CHANNELS)]
-        seen = through[:, band] > 0.02 * through[:, band].max()
-        error_bars(axes, position[seen], through[seen, band], sigma[seen, band], colour)
-        axes.plot(position[seen], through[seen, band], color=colour, linewidth=1.0)
+        drawn = through[:, band] > 0.02 * through[:, band].max()
+        error_bars(axes, position[drawn], through[drawn, band], sigma[drawn, band], colour)
+        axes.plot(position[drawn], through[drawn, band], color=colour, linewidth=1.0)
         entries.append(lined(f"{low:.0f}–{high:.0f} nm", colour))
     axes.set_ylim(0, None)
     axes.set_xlabel("Position from blue end to red end")
@@ -88,7 +89,7 @@ def _irradiance_figure(file: IrradianceFile) -> Figure:
 
 
 def _scale_figure(result: IrradianceResult) -> Figure:
-    """Measured over expected, by the wavelength of the position."""
+    """Draw measured over expected light of the card by the wavelength of the position."""
     scale, centre_nm = result.scale, result.centre_nm
     figure = new_figure(200)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
@@ -96,8 +97,8 @@ def _scale_figure(result: IrradianceResult) -> Figure:
     low, high = scale.value * np.exp(-sigma), scale.value * np.exp(sigma)
     axes.fill_between(centre_nm, low, high, color=SHADE, linewidth=0)
     axes.plot(centre_nm, scale.value, color=MUTED, linewidth=1.2)
-    unsure = scale.measured * scale.measured_sigma
-    error_bars(axes, centre_nm, scale.measured, unsure, INK)
+    measured_sigma = scale.measured * scale.measured_sigma
+    error_bars(axes, centre_nm, scale.measured, measured_sigma, INK)
     points(axes, centre_nm, scale.measured, "o", INK, INK, size=3.0)
     # Single positions in the violet may be far off: their bars may leave the figure.
     axes.set_ylim(0, 2 * float(np.median(scale.value)))
@@ -107,6 +108,7 @@ def _scale_figure(result: IrradianceResult) -> Figure:
 
 
 def _lines(file: IrradianceFile) -> Iterator[str]:
+    """Yield the lines for the terminal: E of the lamp, and at three positions."""
     direct = ", ".join(rounded(value, 3) for value in file.direct)
     yield f"the lamp by itself, E per band: {direct} (length {rounded(file.vector_length)})"
     for k in (0, len(file.position) // 2, len(file.position) - 1):

@@ -1,4 +1,4 @@
-"""The glow at several angles in a report."""
+"""Report of the glow at several angles."""
 
 from collections.abc import Mapping
 from functools import partial
@@ -26,12 +26,12 @@ from labrig.report.sections import Picture, Rendered, Section, Source, Table
 from labrig.results import PAPER_REACH, AngularGlow, IsotropyResult, is_within_paper
 from labrig.written_numbers import plus_minus
 
-#: By how much more than the paper's samples fluctuate the figure reaches at least.
+#: Least half height of the figure, as a multiple of the fluctuation of the paper's samples.
 LEAST_REACH = 1.5
 
 
 def render(result: IsotropyResult, source: Source) -> Rendered:
-    """Show the radiance over the angle, and what the largest deviation is."""
+    """Render the radiance over the angle, and its largest deviation."""
     several = len(result.patches) > 1
     lines = (
         f"{name}: {_line(glow)}" if several else _line(glow)
@@ -41,6 +41,7 @@ def render(result: IsotropyResult, source: Source) -> Rendered:
 
 
 def _line(glow: AngularGlow) -> str:
+    """Return the line for the terminal on the largest deviation of a patch."""
     worst = glow.worst
     return (
         f"isotropy: within {abs(worst.value - 1):.1%} of the straight view up to "
@@ -51,8 +52,9 @@ def _line(glow: AngularGlow) -> str:
 
 
 def _section(result: IsotropyResult) -> Section:
+    """Return the section with the figure and the table of all patches."""
     patches = result.patches
-    what = (
+    geometry = (
         "The patches enclose the whole sample: what they show is its intensity, here divided by "
         "the cosine of the angle."
         if result.around
@@ -77,7 +79,7 @@ def _section(result: IsotropyResult) -> Section:
     return Section(
         "Isotropy",
         (
-            f"Every view follows a charge seen straight. {what}",
+            f"Every view follows a charge seen straight. {geometry}",
             f"The straight view after all others over the one before: {drift}; that drift is "
             "divided out.",
             *(_statement(name, glow) for name, glow in patches.items()),
@@ -88,6 +90,7 @@ def _section(result: IsotropyResult) -> Section:
 
 
 def _statement(name: str, glow: AngularGlow) -> str:
+    """Return the sentence on the largest deviation of a patch."""
     worst = glow.worst
     return (
         f"{name}: the largest deviation is {worst.value - 1:+.1%} ± {worst.sigma:.1%} at "
@@ -97,6 +100,7 @@ def _statement(name: str, glow: AngularGlow) -> str:
 
 
 def _figure(patches: Mapping[str, AngularGlow]) -> Figure:
+    """Draw the glow over the angle, relative to the straight view."""
     figure = new_figure(220.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     axes.axhspan(1 - PAPER_REACH, 1 + PAPER_REACH, color=SHADE, zorder=0)

@@ -1,4 +1,4 @@
-"""The calibration of a linear variable filter in a report."""
+"""Report of the calibration of a linear variable filter."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -26,19 +26,21 @@ from labrig.results import CameraCurves, FloatArray, LocatedLines, LvfCalibratio
 from labrig.written_numbers import plus_minus, rounded
 
 _WAVELENGTH = "Wavelength / nm"
-#: Rows of the table of positions; the file has them all.
+#: Number of positions in the table; the file has all positions.
 _ROWS = 11
 
 
 def render(result: LvfCalibrationResult, source: Source) -> Rendered:
-    """Show the map along the strip, and what the strip lets through."""
+    """Render the wavelengths along the strip, and its transmission."""
     return Rendered((_map_section(result), _band_section(result)), tuple(_lines(result)))
 
 
 def _lines(result: LvfCalibrationResult) -> Iterator[str]:
+    """Yield the lines for the terminal: mercury lines, bands, and place on the sample."""
     bands, sigma = result.calibration.bands, result.calibration.sigma
 
     def centre(number: int) -> str:
+        """Return the centre of a band with its σ in nm, as text."""
         return plus_minus(bands.centre_nm[number], sigma.centre_nm[number])
 
     yield (
@@ -57,6 +59,7 @@ def _lines(result: LvfCalibrationResult) -> Iterator[str]:
 
 
 def _stripes_text(result: LvfCalibrationResult) -> str:
+    """Return the statement on the shift of the strip between card and glow."""
     if result.stripes is None:
         sigma = rounded(result.placed.sigma_nm, 2)
         return f"its place as on the card ± {sigma} nm ({result.why_no_stripes})"
@@ -65,28 +68,30 @@ def _stripes_text(result: LvfCalibrationResult) -> str:
 
 
 def _map_section(result: LvfCalibrationResult) -> Section:
-    before, on = result.before_camera, result.on_sample
+    """Return the section on the wavelength of each position."""
+    before_camera, on_sample = result.before_camera, result.on_sample
     wavelengths = result.calibration.wavelengths.map()
     residuals = {
-        "before the camera": (before.lines, result.map_residual_nm),
-        "on the sample": (on.lines, result.placed.residual_nm),
+        "before the camera": (before_camera.lines, result.map_residual_nm),
+        "on the sample": (on_sample.lines, result.placed.residual_nm),
     }
     return Section(
         "Wavelength along the strip",
         (
-            f"Lines found before the camera: {before.lines}; on the sample: {on.lines}. "
+            f"Lines found before the camera: {before_camera.lines}; "
+            f"on the sample: {on_sample.lines}. "
             f"{_stripes_text(result).capitalize()}.",
         ),
         (
             Picture(
                 "lines",
-                partial(_profile_figure, before, wavelengths),
+                partial(_profile_figure, before_camera, wavelengths),
                 "The strip under the mercury lamp, in transmission; dashed: the located lines. "
                 "Of a blend, its first line is marked.",
             ),
             Picture(
                 "lines-on-sample",
-                partial(_profile_figure, on, wavelengths),
+                partial(_profile_figure, on_sample, wavelengths),
                 "The strip on the sample under the mercury lamp, seen on the grey card.",
             ),
             Picture(
@@ -99,6 +104,7 @@ def _map_section(result: LvfCalibrationResult) -> Section:
 
 
 def _band_section(result: LvfCalibrationResult) -> Section:
+    """Return the section on the transmission of each position."""
     file, count = result.calibration, len(result.filters)
     median, worst = np.median(result.band_misfit), result.band_misfit.max()
     return Section(
@@ -146,6 +152,7 @@ def _band_section(result: LvfCalibrationResult) -> Section:
 
 
 def _table(file: LvfFile) -> Table:
+    """Return the table of the bands at some positions."""
     bands, sigma = file.bands, file.sigma
     count = len(file.position)
     chosen = sorted({round(row) for row in np.linspace(0, count - 1, _ROWS)})
@@ -163,17 +170,21 @@ def _table(file: LvfFile) -> Table:
     return Table(head, tuple(rows), f"Some of the positions; all are in {LVF_KIND.file_name}.")
 
 
-def _profile_figure(found: StripLines, wavelengths: WavelengthMap) -> Figure:
-    """The strip under mercury, and which line is where."""
+def _profile_figure(strip_lines: StripLines, wavelengths: WavelengthMap) -> Figure:
+    """Draw the profile of the strip under the mercury lamp, and the located lines."""
     figure = new_figure(220)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
-    position = found.profile.position if found.strip.rising else 1 - found.profile.position
+    position = (
+        strip_lines.profile.position
+        if strip_lines.strip.rising
+        else 1 - strip_lines.profile.position
+    )
     nm = wavelengths.wavelength_nm(position)
-    value = found.profile.value_dn_per_s / found.profile.value_dn_per_s.max()
+    value = strip_lines.profile.value_dn_per_s / strip_lines.profile.value_dn_per_s.max()
     names = ("R", "G", "B") if value.shape[1] == 3 else ("L",)
     for number, name in enumerate(names):
         axes.plot(nm, value[:, number], color=channel_colour(name, number), linewidth=1.2)
-    for line in found.lines.wavelength_nm:
+    for line in strip_lines.lines.wavelength_nm:
         axes.axvline(line, color=MUTED, linewidth=0.8, linestyle=DASHED)
     axes.set_xlim(float(nm.min()), float(nm.max()))
     axes.set_xlabel(_WAVELENGTH)
@@ -184,16 +195,16 @@ def _profile_figure(found: StripLines, wavelengths: WavelengthMap) -> Figure:
 
 
 def _line_residual_figure(residuals: dict[str, tuple[LocatedLines, FloatArray]]) -> Figure:
-    """What the map leaves of every line in nm, by the place of the strip."""
+    """Draw the residuals of the map at the lines in nm, for each place of the strip."""
     figure = new_figure(180)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     axes.axhline(0, color=MUTED, linewidth=0.8)
     colours = (INK, channel_colour("B", 2))
     entries = []
-    for (name, (lines, left_nm)), colour in zip(residuals.items(), colours, strict=True):
+    for (name, (lines, residual_nm)), colour in zip(residuals.items(), colours, strict=True):
         nm_per_position = abs(float(np.polyfit(lines.position, lines.wavelength_nm, 1)[0]))
-        error_bars(axes, lines.wavelength_nm, left_nm, lines.sigma * nm_per_position, colour)
-        points(axes, lines.wavelength_nm, left_nm, "o", colour, colour)
+        error_bars(axes, lines.wavelength_nm, residual_nm, lines.sigma * nm_per_position, colour)
+        points(axes, lines.wavelength_nm, residual_nm, "o", colour, colour)
         entries.append(lined(name, colour))
     axes.set_xlabel(_WAVELENGTH)
     axes.set_ylabel("Map − line / nm")
@@ -202,13 +213,13 @@ def _line_residual_figure(residuals: dict[str, tuple[LocatedLines, FloatArray]])
 
 
 def _transmission_figure(file: LvfFile) -> Figure:
-    """T_p(λ) of all positions."""
+    """Draw the transmission T_p(λ) of all positions p."""
     figure = new_figure(240)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=12)
     nm = np.arange(380.0, 780.5, 1.0)
     transmission = file.lvf.transmission(nm)
     for centre, row in zip(file.bands.centre_nm, transmission, strict=True):
-        axes.plot(nm, 100 * row, color=channel_colour(_colour_of(centre), 0), linewidth=0.9)
+        axes.plot(nm, 100 * row, color=channel_colour(_colour_channel(centre), 0), linewidth=0.9)
     axes.set_xlim(380, 740)
     axes.set_ylim(0, None)
     axes.set_xlabel(_WAVELENGTH)
@@ -217,18 +228,18 @@ def _transmission_figure(file: LvfFile) -> Figure:
 
 
 def _along_figure(file: LvfFile) -> Figure:
-    """Centre, less a straight line, and width, with 1 σ."""
+    """Draw centre minus a straight line, and width of the bands, with 1 σ."""
     figure = new_figure(268)
     upper = place(figure, left=LEFT_PT, bottom=148, right=12, top=12)
     lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=134, share_x=upper)
     position = np.array(file.position)
     bands, sigma = file.bands.bands(), file.sigma.bands()
     straight = np.polyval(np.polyfit(position, bands.centre_nm, 1), position)
-    for axes, value, unsure in (
+    for axes, value, value_sigma in (
         (upper, bands.centre_nm - straight, sigma.centre_nm),
         (lower, bands.fwhm_nm, sigma.fwhm_nm),
     ):
-        error_bars(axes, position, value, unsure, INK)
+        error_bars(axes, position, value, value_sigma, INK)
         points(axes, position, value, "o", INK, INK, size=3.0)
     grid = np.linspace(*file.wavelengths.span, 101)
     mapped = file.wavelengths.map()
@@ -244,16 +255,22 @@ def _along_figure(file: LvfFile) -> Figure:
     return figure
 
 
-def _camera_figure(before: CameraCurves, found: CameraResponse) -> Figure:
-    """Curves of every channel, as they were known and as the filters tell them."""
+def _camera_figure(original: CameraCurves, fitted: CameraResponse) -> Figure:
+    """Draw the camera's curves as in their file and as fitted with the colour filters."""
     figure = new_figure(200)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     entries = []
-    for number, name in enumerate(found.channels):
+    for number, name in enumerate(fitted.channels):
         colour = channel_colour(name, number)
-        known = before.sensitivity[:, number]
-        axes.plot(before.wavelength_nm, known, color=colour, linewidth=0.9, linestyle=DASHED)
-        axes.plot(found.wavelength_nm, found.sensitivity[:, number], color=colour, linewidth=1.2)
+        sensitivity = original.sensitivity[:, number]
+        axes.plot(
+            original.wavelength_nm,
+            sensitivity,
+            color=colour,
+            linewidth=0.9,
+            linestyle=DASHED,
+        )
+        axes.plot(fitted.wavelength_nm, fitted.sensitivity[:, number], color=colour, linewidth=1.2)
         entries.append(lined(name, colour))
     axes.set_ylim(0, None)
     axes.set_xlabel(_WAVELENGTH)
@@ -263,35 +280,46 @@ def _camera_figure(before: CameraCurves, found: CameraResponse) -> Figure:
 
 
 def _filter_residual_figure(
-    left: FloatArray, names: tuple[str, ...], centre_nm: FloatArray
+    residuals: FloatArray, names: tuple[str, ...], centre_nm: FloatArray
 ) -> Figure:
-    """Transmittance measured minus expected, for every filter (row) and position (column)."""
-    height = max(160.0, 9.0 * len(names) + 70)
-    figure = new_figure(height)
+    """Draw measured minus expected transmittance for every filter (row) and position (column).
+
+    Parameters
+    ----------
+    residuals
+        Residuals of F filters at P positions, shape (F, P).
+    names
+        Names of the filters, shape (F,).
+    centre_nm
+        Centre of the band at each position in nm, shape (P,).
+    """
+    height_pt = max(160.0, 9.0 * len(names) + 70)
+    figure = new_figure(height_pt)
     axes = place(figure, left=LEFT_PT + 44, bottom=38, right=60, top=12)
-    most = max(0.02, float(np.nanpercentile(np.abs(left), 98)))
-    step = (centre_nm[-1] - centre_nm[0]) / (len(centre_nm) - 1) / 2
+    limit = max(0.02, float(np.nanpercentile(np.abs(residuals), 98)))
+    half_step_nm = (centre_nm[-1] - centre_nm[0]) / (len(centre_nm) - 1) / 2
     picture = axes.imshow(
-        100 * left,
+        100 * residuals,
         aspect="auto",
         cmap="RdBu_r",
-        vmin=-100 * most,
-        vmax=100 * most,
-        extent=(centre_nm[0] - step, centre_nm[-1] + step, len(names) - 0.5, -0.5),
+        vmin=-100 * limit,
+        vmax=100 * limit,
+        extent=(centre_nm[0] - half_step_nm, centre_nm[-1] + half_step_nm, len(names) - 0.5, -0.5),
         interpolation="nearest",
     )
-    every = max(1, round(len(names) * 11 / (height - 50)))
-    axes.set_yticks(range(0, len(names), every), names[::every])
+    label_step = max(1, round(len(names) * 11 / (height_pt - 50)))
+    axes.set_yticks(range(0, len(names), label_step), names[::label_step])
     axes.tick_params(axis="y", labelsize=7)
     axes.grid(False)
     axes.set_xlabel(_WAVELENGTH)
-    width, tall = figure.get_size_inches() * 72
-    bar = figure.add_axes((1 - 50 / width, 38 / tall, 10 / width, 1 - 50 / tall))
+    width, height = figure.get_size_inches() * 72
+    bar = figure.add_axes((1 - 50 / width, 38 / height, 10 / width, 1 - 50 / height))
     figure.colorbar(picture, cax=bar)
     bar.tick_params(colors=MUTED, labelsize=8)
     bar.set_title("%", fontsize=8, color=MUTED)
     return figure
 
 
-def _colour_of(centre_nm: float) -> str:
+def _colour_channel(centre_nm: float) -> str:
+    """Return the channel whose colour a band is drawn in."""
     return "B" if centre_nm < 490 else "G" if centre_nm < 590 else "R"

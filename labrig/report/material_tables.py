@@ -1,4 +1,4 @@
-"""Materials in tables: one as measured, and one beside another."""
+"""Tables of a material as measured, and of its comparison with another."""
 
 import math
 from collections.abc import Iterator, Sequence
@@ -12,7 +12,7 @@ UNKNOWN = "–"
 
 
 def measured_table(material: Material) -> Table:
-    """Every number of a material as it was measured, with its uncertainty; a column a state."""
+    """Return the table of all values of a material with their σ, in one column a state."""
     states = sorted(material.states, key=lambda state: -state.k_r_per_s)
     head = ("",) if len(states) == 1 else ("", *(f"state {n + 1}" for n in range(len(states))))
     rows = tuple(_rows(states, material.bands_nm or ()))
@@ -27,16 +27,40 @@ def measured_table(material: Material) -> Table:
 
 
 def comparison_table(comparison: MaterialComparison) -> Table:
-    """One material beside another, as the report and the terminal show it."""
+    """Return the table of the comparison of two materials, for the report and the terminal.
+
+    Parameters
+    ----------
+    comparison
+        Pairs of a measured and a reference value, from `compare_materials`.
+
+    Returns
+    -------
+    Table
+        Measured and reference value of every quantity and their difference in per cent and in σ;
+        its caption has the factors that rescale k_e and Λ, and the notes.
+
+    Examples
+    --------
+    >>> import labrig
+    >>> from labrig.material import compare_materials
+    >>> from labrig.report import comparison_table
+    >>> measured = labrig.read_material("material.yaml")
+    >>> reference = labrig.read_material("white-paint")
+    >>> for row in comparison_table(compare_materials(measured, reference)).rows:
+    ...     print("; ".join(row))
+    k_r 1 / s⁻¹; 0.2048 ± 0.0028; 0.047; +335.7; +56.1
+    k_r 2 / s⁻¹; 0.01009 ± 0.00010; –; –; –
+    """
     return Table(
         head=("", _measured_head(comparison), "reference", "apart / %", "apart / σ"),
         rows=tuple(
             (
                 f"{pair.quantity} / {pair.unit}" if pair.unit else pair.quantity,
-                _written(pair.measured, pair.sigma),
-                _written(pair.reference, pair.reference_sigma),
-                _signed(pair.percent),
-                _signed(pair.in_sigma),
+                _value_text(pair.measured, pair.sigma),
+                _value_text(pair.reference, pair.reference_sigma),
+                _signed_text(pair.percent),
+                _signed_text(pair.in_sigma),
             )
             for pair in comparison.pairs
         ),
@@ -57,37 +81,42 @@ def comparison_table(comparison: MaterialComparison) -> Table:
 
 
 def _measured_head(comparison: MaterialComparison) -> str:
+    """Return the head of the column of measured values."""
     factors = (comparison.k_e_factor, comparison.reradiation_factor)
     return "measured" if factors == (1.0, 1.0) else "measured, rescaled"
 
 
 def _rows(states: Sequence[State], bands_nm: Sequence[float]) -> Iterator[tuple[str, ...]]:
+    """Yield the rows of k_r, r(0), and k_e and Λ by band."""
     for quantity, name in (("k_r / s⁻¹", "k_r_per_s"), ("r(0)", "r0")):
         if any(getattr(state, name) is not None for state in states):
-            yield (quantity, *(_of(state, name) for state in states))
+            yield (quantity, *(_quantity_text(state, name) for state in states))
     for symbol, unit, name in (("k_e", " / s⁻¹", "k_e_per_s"), ("Λ", "", "reradiation")):
         if any(getattr(state, name) is not None for state in states):
             for band, (low, high) in enumerate(pairwise(bands_nm)):
                 quantity = f"{symbol} {low:g}–{high:g} nm{unit}"
-                yield (quantity, *(_of(state, name, band) for state in states))
+                yield (quantity, *(_quantity_text(state, name, band) for state in states))
 
 
-def _of(state: State, name: str, band: int | None = None) -> str:
+def _quantity_text(state: State, name: str, band: int | None = None) -> str:
+    """Return a quantity of a state, in a band if there are bands, with its σ as text."""
     value, sigma = getattr(state, name), getattr(state, f"{name}_sigma")
     if value is None:
         return UNKNOWN
     if band is not None:
         value, sigma = value[band], None if sigma is None else sigma[band]
-    return _written(value, math.nan if sigma is None else sigma)
+    return _value_text(value, math.nan if sigma is None else sigma)
 
 
-def _written(value: float, sigma: float) -> str:
+def _value_text(value: float, sigma: float) -> str:
+    """Return a value with its σ as text; NaN stands for an unknown value or σ."""
     if math.isnan(value):
         return UNKNOWN
     return rounded(value) if math.isnan(sigma) else plus_minus(value, sigma)
 
 
-def _signed(number: float) -> str:
+def _signed_text(number: float) -> str:
+    """Return a number as text with its sign."""
     if not math.isfinite(number):
         return UNKNOWN
     text = f"{number:+.1f}"

@@ -1,4 +1,4 @@
-"""What a paper would say of how this was measured: only what is true of the run."""
+"""Methods section of a paper on a run, with statements that hold for this run only."""
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
@@ -16,12 +16,12 @@ from labrig.report.timing import ON_TIME_S, Lateness
 from labrig.results import FittedDecay
 from labrig.written_numbers import exposure_text, rounded
 
-#: Durations and exposures that differ by less are said as one.
+#: Relative difference below which durations and exposures are given as one value.
 ALIKE = 0.02
 
 
 def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -> Iterator[str]:
-    """From the charge to the values, a sentence each."""
+    """Yield the sentences on the measurement, from the charge to the values."""
     how = "simulated" if report.about.simulated else "measured"
     yield f"The decay of the phosphorescence of {report.about.title} was {how} with labrig."
     decays = [frame for frame in report.frames if frame.role == FrameRole.DECAY]
@@ -32,10 +32,11 @@ def recording(report: DecayReport, sensor: Sensor | None, late: Lateness | None)
         yield _punctuality(late)
     yield _mean(report, sensor)
     yield from _dark(report)
-    yield from _left_out(report)
+    yield from _exclusions(report)
 
 
 def _charge(report: DecayReport, decays: Sequence[FrameRecord]) -> Iterator[str]:
+    """Yield the sentence on the charge."""
     if not report.charges_s:
         return
     repeats = len({frame.unit for frame in decays})
@@ -47,11 +48,12 @@ def _charge(report: DecayReport, decays: Sequence[FrameRecord]) -> Iterator[str]
 def _frames(
     report: DecayReport, sensor: Sensor | None, decays: Sequence[FrameRecord]
 ) -> Iterator[str]:
+    """Yield the sentence on the camera, its settings and its exposures."""
     name = sensor.camera if sensor and sensor.camera else "camera"
     camera = f"{'an' if name[0] in 'AEIOU' else 'a'} {name}"
     units = list(dict.fromkeys(frame.unit for frame in decays))
     counts = [sum(frame.unit == unit for frame in decays) for unit in units]
-    count = " to ".join(str(one) for one in dict.fromkeys((min(counts), max(counts))))
+    count = " to ".join(str(number) for number in dict.fromkeys((min(counts), max(counts))))
     series = report.patches[0].series
     yield (
         f"After the lamp had been switched off, {camera} at {', '.join(_settings(decays))} took "
@@ -62,6 +64,7 @@ def _frames(
 
 
 def _punctuality(late: Lateness) -> str:
+    """Return the sentence on the lateness of the exposures."""
     if abs(late.worst_s) < ON_TIME_S:
         return f"Every exposure began within {_ms(ON_TIME_S)} of its planned time."
     return (
@@ -71,17 +74,22 @@ def _punctuality(late: Lateness) -> str:
 
 
 def _settings(frames: Sequence[FrameRecord]) -> list[str]:
+    """Return the f-numbers and ISO speeds of the frames as text."""
     apertures = sorted({frame.f_number for frame in frames if frame.f_number is not None})
     speeds = sorted({frame.iso for frame in frames})
-    return [*(f"f/{rounded(one, 3)}" for one in apertures), *(f"ISO {one}" for one in speeds)]
+    return [
+        *(f"f/{rounded(setting, 3)}" for setting in apertures),
+        *(f"ISO {setting}" for setting in speeds),
+    ]
 
 
 def _exposures(frames: Sequence[FrameRecord]) -> str:
+    """Return the range of the exposure times as text."""
     return _range([frame.exposure_s for frame in frames], exposure_text)
 
 
 def _interval(decays: Sequence[FrameRecord]) -> str:
-    """From begin to begin as planned: as measured, less the lateness."""
+    """Return the planned interval between exposures as text: the measured one less lateness."""
     gaps_s = [
         (after.start_time - after.late_s) - (before.start_time - before.late_s)
         for before, after in pairwise(decays)
@@ -91,18 +99,20 @@ def _interval(decays: Sequence[FrameRecord]) -> str:
 
 
 def _mean(report: DecayReport, sensor: Sensor | None) -> str:
+    """Return the sentence on the mean over a region."""
     channels = report.patches[0].series.channels
     place = "regions" if len(report.patches) > 1 else "a region"
     size = _sizes(report, sensor)
-    each = f", for each of the channels {listed(channels)}" if len(channels) > 1 else ""
+    per_channel = f", for each of the channels {listed(channels)}" if len(channels) > 1 else ""
     return (
         "The linear RAW values above the black level, neither demosaiced nor white balanced, were "
-        f"averaged over {place} of the frame{f' of {size}' if size else ''}{each} and divided by "
-        "the exposure time."
+        f"averaged over {place} of the frame{f' of {size}' if size else ''}{per_channel} "
+        "and divided by the exposure time."
     )
 
 
 def _sizes(report: DecayReport, sensor: Sensor | None) -> str:
+    """Return the sizes of the regions in pixels as text; empty if they are not known."""
     sizes = set()
     for patch in report.patches:
         if sensor is None or patch.region is None:
@@ -117,43 +127,51 @@ def _sizes(report: DecayReport, sensor: Sensor | None) -> str:
 
 
 def _dark(report: DecayReport) -> Iterator[str]:
+    """Yield the sentence on the level that was subtracted."""
     darks = [frame for frame in report.frames if frame.role == FrameRole.DARK]
     decays = [frame for frame in report.frames if frame.role == FrameRole.DECAY]
     if report.background is not None:
         yield "The level of a dark region of the same frame was subtracted from each."
     elif darks and decays:
-        began = min(frame.start_time for frame in decays)
-        before = ", taken before the decay" if max(d.start_time for d in darks) < began else ""
+        first_decay = min(frame.start_time for frame in decays)
+        before = (
+            ", taken before the decay"
+            if max(dark.start_time for dark in darks) < first_decay
+            else ""
+        )
         yield (
             f"The dark level ({len(darks)} dark frames of {_exposures(darks)}{before}) was "
             "subtracted."
         )
 
 
-def _left_out(report: DecayReport) -> Iterator[str]:
-    all_of = "frames" if len(report.patches) == 1 else "values of all patches"
+def _exclusions(report: DecayReport) -> Iterator[str]:
+    """Yield the sentence on excluded frames."""
+    items = "frames" if len(report.patches) == 1 else "values of all patches"
     flags = [flag for patch in report.patches for flag in patch.series.flag]
-    out = len(flags) - sum(int(patch.series.usable.sum()) for patch in report.patches)
-    clipped = sum("clipped" in flag for flag in flags)
-    if out:
-        fraction = "" if clipped == out else f", {clipped} of them"
-        why = f"{fraction} because pixels were saturated" if clipped else ""
-        yield f"{out} of {len(flags)} {all_of} were left out{why}."
+    n_excluded = len(flags) - sum(int(patch.series.usable.sum()) for patch in report.patches)
+    n_clipped = sum("clipped" in flag for flag in flags)
+    if n_excluded:
+        fraction = "" if n_clipped == n_excluded else f", {n_clipped} of them"
+        reason = f"{fraction} because pixels were saturated" if n_clipped else ""
+        yield f"{n_excluded} of {len(flags)} {items} were left out{reason}."
 
 
 def listed(words: Sequence[str]) -> str:
-    """`R, G and B`."""
+    """Return words as a list in text, such as `R, G and B`."""
     return " and ".join(filter(None, (", ".join(words[:-1]), words[-1])))
 
 
-def _range(numbers: Sequence[float], written: Callable[[float], str]) -> str:
+def _range(numbers: Sequence[float], format_number: Callable[[float], str]) -> str:
+    """Return the range of numbers as text, or their median if they are nearly equal."""
     low, high = min(numbers), max(numbers)
     if high <= low * (1 + ALIKE):
-        return written(float(np.median(numbers)))
-    return f"{written(low)} to {written(high)}"
+        return format_number(float(np.median(numbers)))
+    return f"{format_number(low)} to {format_number(high)}"
 
 
 def _ms(seconds: float) -> str:
+    """Return a time in ms as text."""
     return f"{rounded(1e3 * seconds, 2)} ms"
 
 
@@ -168,19 +186,29 @@ REFERENCES = (
     "P. Virtanen et al.: SciPy 1.0: fundamental algorithms for scientific computing in Python. "
     "Nature Methods 17, 261–272, 2020. doi:10.1038/s41592-019-0686-2",
 )
-#: What a paper should say and labrig cannot know.
+#: Properties that a paper should state and that labrig cannot know.
 UNKNOWN = (
     "the lamp's type, power and distance",
     "the lens and the camera's distance",
     "the sample's temperature",
 )
-#: As they are called in papers, and with their reference.
+#: Names of the libraries in papers, with their references.
 _SOFTWARE = {"numpy": "NumPy {} [2]", "scipy": "SciPy {} [3]", "libraw": "LibRaw {}"}
 
 
 @dataclass(frozen=True)
 class Methods:
-    """Paragraphs of plain text; the equation stands after `model`, which is empty without a fit."""
+    """Paragraphs of a methods section in plain text.
+
+    Attributes
+    ----------
+    recording
+        Paragraph on the measurement.
+    model
+        Paragraph on the decay model, which the equation follows; empty without a fit.
+    analysis
+        Paragraph on the fit and the software.
+    """
 
     recording: str
     model: str
@@ -188,7 +216,7 @@ class Methods:
 
     @property
     def plain(self) -> str:
-        """All of it, to be pasted; the equation as LaTeX."""
+        """All paragraphs and references as plain text, with the equation in LaTeX."""
         references = [f"[{number}] {text}" for number, text in enumerate(REFERENCES, start=1)]
         equation = f"\\begin{{equation}}\n  {EQUATION_LATEX}\n\\end{{equation}}"
         fitted = [self.model, equation] if self.model else []
@@ -196,7 +224,17 @@ class Methods:
 
 
 def methods(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -> Methods:
-    """Of the run in `report`, with its camera and the lateness of its frames where known."""
+    """Return the methods section of a run.
+
+    Parameters
+    ----------
+    report
+        Decay as measured and fitted.
+    sensor
+        Camera that took the frames; None if it is not known.
+    late
+        Lateness of the frames; None if it is not known.
+    """
     fits = [patch.fit for patch in report.patches if isinstance(patch.fit, FittedDecay)]
     software = list(_software(report))
     return Methods(
@@ -207,6 +245,7 @@ def methods(report: DecayReport, sensor: Sensor | None, late: Lateness | None) -
 
 
 def _model(report: DecayReport) -> str:
+    """Return the sentence on the decay model."""
     channel = "" if len(report.patches[0].series.channels) == 1 else " in channel c"
     return (
         f"The signal{channel} of an exposure from t to t + T after lamp off was modelled, after "
@@ -215,6 +254,7 @@ def _model(report: DecayReport) -> str:
 
 
 def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
+    """Yield the sentences on the fit."""
     offset = (
         "an offset b_c, constrained by the uncertainty of the dark level"
         if any(any(fit.offsets_sigma) for fit in fits)
@@ -229,7 +269,7 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
         yield f"Here k_i are the rates and a_i the amplitudes; there are w_c = 1 and {offset}."
     yield "All parameters were fitted together by weighted nonlinear least squares."
     yield f"The weights follow the photon and read noise found in the frames{_flicker(fits)}."
-    states = [str(one) for one in sorted({fit.n_states for fit in fits})]
+    states = [str(number) for number in sorted({fit.n_states for fit in fits})]
     number = f"n = {states[0]}" if len(states) == 1 else f"n = {' or '.join(states)} by patch"
     if report.states is not None:
         yield f"The number of states was set to {report.states}."
@@ -245,7 +285,7 @@ def _analysis(report: DecayReport, fits: list[FittedDecay]) -> Iterator[str]:
 
 
 def _flicker(fits: list[FittedDecay]) -> str:
-    """Patches of a frame share their flicker, so that the one which knows it best tells it."""
+    """Return the statement on flicker, which patches share; the value of smallest σ is given."""
     measured = [fit for fit in fits if fit.flicker_sigma > 0]
     best = min(measured, key=lambda fit: fit.flicker_sigma, default=fits[0])
     if best.flicker == 0:
@@ -256,7 +296,11 @@ def _flicker(fits: list[FittedDecay]) -> str:
 
 
 def _software(report: DecayReport) -> Iterator[str]:
+    """Yield the sentence on the software and its versions."""
     versions = dict(report.about.libraries)
-    used = [text.format(versions[name]) for name, text in _SOFTWARE.items() if name in versions]
-    with_them = f" with {listed(used)}" if used else ""
-    yield f"Recording and analysis were done by labrig {report.about.labrig_version}{with_them}."
+    libraries = [
+        text.format(versions[name]) for name, text in _SOFTWARE.items() if name in versions
+    ]
+    with_libraries = f" with {listed(libraries)}" if libraries else ""
+    version = report.about.labrig_version
+    yield f"Recording and analysis were done by labrig {version}{with_libraries}."

@@ -1,9 +1,9 @@
-"""The report of a run: one HTML file that needs nothing else, and its figures for print beside it.
+"""Report of a run as one self-contained HTML file, with its figures in a folder beside it.
 
 Each figure is drawn for the page and as SVG file, and is a page of a PDF. On the page, colours are
-CSS variables with the light scheme's colour as fallback, so that one figure serves the light
-scheme, the dark one and print. Text stays text: on the page it takes the page's font and can be
-searched, in the files it can be edited.
+CSS variables with the colour of the light scheme as fallback, so that one figure serves the light
+scheme, the dark scheme and print. Text remains text: on the page it takes the page's font and can
+be searched, in the files it can be edited.
 """
 
 import html
@@ -33,13 +33,13 @@ from labrig.report.sections import Section
 from labrig.written_numbers import plus_minus, rounded
 
 FOLDER, PDF = "figures", "figures.pdf"
-#: Fonts of the SVG files: as drawn, then what is as wide on computers without it.
+#: Fonts of the SVG files: the font of the figures, then fonts of the same width.
 _FONTS = "'DejaVu Sans', Verdana, Arial, sans-serif"
 _GROUND = '<rect width="100%" height="100%" fill="#ffffff"/>'
 _TAG = re.compile(r"<[^>]*>")
-#: Digits beyond a hundredth of a point.
+#: Pattern of the digits beyond a hundredth of a point.
 _TOO_FINE = re.compile(r"(?<=\.\d\d)\d+")
-#: Markers of one look; each carries the look by itself.
+#: Pattern of a group of markers that have the same style, each with its own style attribute.
 _MARKERS = re.compile(
     r'<g( [^>]*)?>((?:<use [^>]*style="([^"]*)"/>)(?:<use [^>]*style="\3"/>)*)</g>'
 )
@@ -48,14 +48,14 @@ _LONGEST_SLUG = 40
 
 @dataclass(frozen=True)
 class FigureFile:
-    """A figure of the report.
+    """Figure of the report.
 
-    Parameters
+    Attributes
     ----------
     element
-        For the page: `<svg>` in the page's colours.
+        Element `<svg>` in the colours of the page.
     svg_link, pdf_link
-        The files beside the page: the figure alone, and its page in the PDF of all figures.
+        Links to the SVG file of the figure, and to its page in the PDF of all figures.
     """
 
     element: Markup
@@ -64,20 +64,20 @@ class FigureFile:
 
 
 class FigureFiles:
-    """Collects the figures of one report; within `figure_style`.
+    """Collection of the figures of one report, to be used within `figure_style`.
 
     Parameters
     ----------
     title
-        Of the PDF.
+        Title of the PDF.
     """
 
     def __init__(self, title: str) -> None:
         self._files: dict[str, str] = {}
         self._buffer = BytesIO()
         # Without dates and versions the same figures give the same bytes.
-        about = {"Title": title, "Creator": "labrig", "Producer": None, "CreationDate": None}
-        self._pdf = PdfPages(self._buffer, metadata=about)
+        metadata = {"Title": title, "Creator": "labrig", "Producer": None, "CreationDate": None}
+        self._pdf = PdfPages(self._buffer, metadata=metadata)
 
     def __enter__(self) -> Self:
         return self
@@ -91,22 +91,24 @@ class FigureFiles:
         self._pdf.close()  # type: ignore[no-untyped-call]
 
     def add(self, figure: Figure, name: str, described: str) -> FigureFile:
-        """Draw `figure`.
+        """Draw a figure and add it to the files.
 
         Parameters
         ----------
+        figure
+            Figure that is drawn; its background becomes white.
         name
-            Unique in the report; begins its file's name and the ids of its parts.
+            Name, unique in the report; it begins the name of the file and the ids of its elements.
         described
-            What it shows, for those who cannot see it.
+            Description for screen readers.
         """
         name = _slug(name)
-        drawn = _svg(figure)
-        self._files[f"{name}.svg"] = _file(drawn)
+        svg = _svg(figure)
+        self._files[f"{name}.svg"] = _file(svg)
         figure.patch.set(visible=True, facecolor="white")
         self._pdf.savefig(figure)  # type: ignore[no-untyped-call]
         return FigureFile(
-            element=Markup(_element(drawn, figure, name, described)),
+            element=Markup(_element(svg, figure, name, described)),
             svg_link=f"{FOLDER}/{name}.svg",
             pdf_link=f"{FOLDER}/{PDF}#page={len(self._files)}",
         )
@@ -117,46 +119,48 @@ class FigureFiles:
         Raises
         ------
         OSError
-            They cannot be written.
+            If the files cannot be written.
         """
-        place = folder / FOLDER
-        place.mkdir(exist_ok=True)
+        figures_folder = folder / FOLDER
+        figures_folder.mkdir(exist_ok=True)
         for name, text in self._files.items():
-            (place / name).write_text(text, encoding="utf-8", newline="\n")
-        (place / PDF).write_bytes(self._buffer.getvalue())
+            (figures_folder / name).write_text(text, encoding="utf-8", newline="\n")
+        (figures_folder / PDF).write_bytes(self._buffer.getvalue())
 
 
 def _slug(name: str) -> str:
-    """`name` with nothing in it that an address, a disk or an id would trip over."""
+    """Return a name with letters, digits and hyphens only, as addresses, files and ids need it."""
     return re.sub(r"[^A-Za-z0-9]+", "-", name)[:_LONGEST_SLUG].strip("-")
 
 
 def _svg(figure: Figure) -> str:
-    """The figure as SVG, from its root element on."""
+    """Return the figure as SVG, from its root element on."""
     buffer = BytesIO()
-    nothing = dict.fromkeys(("Creator", "Date", "Format", "Type"))
-    figure.savefig(buffer, format="svg", metadata=nothing)
+    no_metadata = dict.fromkeys(("Creator", "Date", "Format", "Type"))
+    figure.savefig(buffer, format="svg", metadata=no_metadata)
     text = buffer.getvalue().decode("utf-8")
     text = text[text.index("<svg") :].strip()
     text = _TAG.sub(lambda tag: _TOO_FINE.sub("", tag[0]), text)
-    return _MARKERS.sub(_styled_once, re.sub(r">\s+<", "><", text))
+    return _MARKERS.sub(_share_style, re.sub(r">\s+<", "><", text))
 
 
-def _styled_once(markers: re.Match[str]) -> str:
+def _share_style(markers: re.Match[str]) -> str:
+    """Return a group of markers with their common style at the group."""
     own, uses, style = markers.groups()
     bare = uses.replace(f' style="{style}"', "")
     return f'<g{own or ""} style="{style}">{bare}</g>'
 
 
-def _file(drawn: str) -> str:
-    """A file on a white ground."""
-    root, body = drawn.split(">", 1)
+def _file(svg: str) -> str:
+    """Return the text of an SVG file with a white background."""
+    root, body = svg.split(">", 1)
     body = re.sub(r"font-family: [^;\"]*", f"font-family: {_FONTS}", body)
     return f'<?xml version="1.0" encoding="utf-8"?>\n{root}>{_GROUND}{body}\n'
 
 
-def _element(drawn: str, figure: Figure, name: str, described: str) -> str:
-    body = drawn.split(">", 1)[1]
+def _element(svg: str, figure: Figure, name: str, description: str) -> str:
+    """Return the SVG element for the page, with its own ids and the page's colours and font."""
+    body = svg.split(">", 1)[1]
     width, height = figure.get_size_inches() * 72
     # Its style sheet would hold for the whole page, which has one of its own.
     body = re.sub(r"<defs>\s*<style.*?</style>\s*</defs>", "", body, flags=re.DOTALL)
@@ -166,7 +170,7 @@ def _element(drawn: str, figure: Figure, name: str, described: str) -> str:
     body = body.replace("url(#", f"url(#{name}-").replace('xlink:href="#', f'href="#{name}-')
     for colour, variable in VARIABLES.items():
         body = body.replace(colour, f"var(--{variable}, {colour})")
-    label = html.escape(described)
+    label = html.escape(description)
     return f'<svg viewBox="0 0 {width:g} {height:g}" role="img" aria-label="{label}">{body}'
 
 
@@ -176,15 +180,15 @@ _SYMBOL = re.compile(r"\b([a-z])_([a-z])\b")
 
 @cache
 def environment() -> Environment:
-    """Templates of this folder, with the functions that all of them use."""
-    made = Environment(
+    """Return the environment of the templates in this folder, with the functions that they use."""
+    templates = Environment(
         loader=FileSystemLoader(_FOLDER),
         autoescape=True,
         undefined=StrictUndefined,
         trim_blocks=True,
         lstrip_blocks=True,
     )
-    made.globals.update(
+    templates.globals.update(
         duration_text=duration_text,
         plus_minus=plus_minus,
         rounded=rounded,
@@ -195,56 +199,58 @@ def environment() -> Environment:
         candidate_rows=parameters.candidate_rows,
         why_so_many_states=parameters.why_so_many_states,
     )
-    made.filters["quoted"] = shlex.quote
-    made.filters["indexed"] = _indexed
-    made.filters["titled"] = _titled
-    return made
+    templates.filters["quoted"] = shlex.quote
+    templates.filters["indexed"] = _indexed
+    templates.filters["titled"] = _titled
+    return templates
 
 
 def style() -> str:
-    """The page's style sheet; labrig's own, so that it need not be escaped."""
+    """Return the style sheet of the page, which is labrig's own and needs no escaping."""
     return (_FOLDER / "report.css").read_text(encoding="utf-8")
 
 
 def script() -> str:
-    """The page's script."""
+    """Return the script of the page."""
     return (_FOLDER / "report.js").read_text(encoding="utf-8")
 
 
 def dated_notes(text: str) -> list[tuple[str, str]]:
-    """Heading and text of every note; what stands before the first heading has none."""
+    """Return heading and text of every note; text before the first heading has an empty one."""
     before, *entries = re.split(r"^## +", text, flags=re.MULTILINE)
-    split = (entry.partition("\n") for entry in entries)
-    return [("", before.strip()), *((heading.strip(), rest.strip()) for heading, _, rest in split)]
+    parts = (entry.partition("\n") for entry in entries)
+    return [("", before.strip()), *((heading.strip(), rest.strip()) for heading, _, rest in parts)]
 
 
 def _indexed(text: str) -> Markup:
-    """Symbols such as `k_i` with their index below the line."""
+    """Return text with symbols such as `k_i` set with a subscript."""
     return Markup(_SYMBOL.sub(r"<i>\1</i><sub><i>\2</i></sub>", str(escape(text))))
 
 
 def _utc(frame: FrameRecord) -> str:
-    """When the frame began."""
+    """Return the begin of a frame in UTC as text, to the millisecond."""
     start = datetime.fromtimestamp(frame.start_time, UTC)
     return start.strftime("%Y-%m-%d %H:%M:%S.%f")[:-3]
 
 
 def _titled(name: str) -> str:
-    """`Camera calibration` of `camera_calibration`."""
+    """Return the name of a protocol as title: `Camera calibration` for `camera_calibration`."""
     words = name.replace("_", " ").capitalize()
     return words.replace("Lvf", "LVF")
 
 
 @dataclass(frozen=True)
 class RenderedSection:
-    """A section whose figures are drawn; captions stand beside them.
+    """Section whose figures are drawn.
 
     Attributes
     ----------
+    section
+        Section of the report.
     figures
-        The figures with their captions, in order.
+        Figures with their captions, in order.
     by_name
-        The same by name.
+        Figures by name.
     """
 
     section: Section
@@ -253,19 +259,24 @@ class RenderedSection:
 
 
 def draw(sections: Sequence[Section], figure_files: FigureFiles) -> list[RenderedSection]:
-    """Add all figures of the sections to the page's `figure_files`."""
-    return [_drawn(number, section, figure_files) for number, section in enumerate(sections, 1)]
+    """Draw the figures of all sections and add them to `figure_files`."""
+    return [
+        _draw_section(number, section, figure_files) for number, section in enumerate(sections, 1)
+    ]
 
 
-def _drawn(number: int, section: Section, figure_files: FigureFiles) -> RenderedSection:
+def _draw_section(number: int, section: Section, figure_files: FigureFiles) -> RenderedSection:
+    """Draw the figures of the `number`-th section."""
     by_name = {
-        one.name: figure_files.add(
-            one.draw(), f"{number}-{one.name}", f"{section.title}: {one.name}"
+        picture.name: figure_files.add(
+            picture.draw(), f"{number}-{picture.name}", f"{section.title}: {picture.name}"
         )
-        for one in section.figures
+        for picture in section.figures
     }
     return RenderedSection(
-        section, tuple((by_name[one.name], one.caption) for one in section.figures), by_name
+        section,
+        tuple((by_name[picture.name], picture.caption) for picture in section.figures),
+        by_name,
     )
 
 
@@ -274,22 +285,22 @@ TEMPLATE = "report.html.j2"
 
 @dataclass(frozen=True)
 class Report:
-    """One processed run.
+    """Report of one processed run.
 
     Attributes
     ----------
     about
-        The run, its bench and what its result was made with.
+        Description of the run, its bench and the processing.
     warnings
-        Shown on top, one line each.
+        Warnings, one line each, shown on top.
     sections
-        What was found, in this order.
+        Sections with results, in order.
     methods
-        How, after what happened in the run.
+        Sections with methods, which follow notes and interruptions.
     frames
-        All of them, for the list with checksums.
+        All frames of the run, for the list with checksums.
     camera
-        Whose curves coloured the page; None if none did.
+        Camera whose responses were used for the colours; None if raw values are shown.
     """
 
     about: RunDescription
@@ -301,25 +312,47 @@ class Report:
 
 
 def write_report(path: Path, report: Report) -> None:
-    """Write `report` to `path`, its figures for print into a folder `figures` beside it.
+    """Write a report as one HTML file, and its figures for print into a folder beside it.
 
-    The same report gives the same bytes.
+    The figures are written into `figures` beside `path`, each as SVG file and all as one PDF. The
+    same report gives the same bytes.
+
+    Parameters
+    ----------
+    path
+        Path of the HTML file.
+    report
+        Report of one processed run.
 
     Raises
     ------
     DiskError
-        `path` cannot be written.
+        If `path` cannot be written.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> from labrig.record import RunDescription
+    >>> from labrig.report import Report, Section, write_report
+    >>> about = RunDescription(
+    ...     title="strontium aluminate", protocol="decay", run="2026-03-01_decay",
+    ...     started="10:00", ended="10:30", rig="darkroom", simulated=False, labrig_version="0.1.0"
+    ... )
+    >>> section = Section("Remarks", text=("The sample was at 20 °C for an hour before.",))
+    >>> write_report(Path("report.html"), Report(about, sections=(section,)))
+    >>> "<h1>strontium aluminate</h1>" in Path("report.html").read_text(encoding="utf-8")
+    True
     """
     with figure_style(), FigureFiles(f"{report.about.title}, {report.about.run}") as figure_files:
-        shown = draw((*report.sections, *report.methods), figure_files)
+        rendered = draw((*report.sections, *report.methods), figure_files)
     text = (
         environment()
         .get_template(TEMPLATE)
         .render(
             report=report,
             about=report.about,
-            found=shown[: len(report.sections)],
-            methods=shown[len(report.sections) :],
+            sections=rendered[: len(report.sections)],
+            methods=rendered[len(report.sections) :],
             notes=dated_notes(report.about.notes),
             # Style sheet and script are labrig's own; escaping them would break them.
             style=Markup(style()),

@@ -1,4 +1,4 @@
-"""What a fit found, in rows and sentences."""
+"""Results of a fitted decay as rows of tables and sentences."""
 
 import math
 from dataclasses import dataclass
@@ -8,13 +8,23 @@ from markupsafe import Markup
 from labrig.results import FittedDecay
 from labrig.written_numbers import plus_minus, rounded
 
-#: Relative σ of a rate from which its reciprocal is given without one.
+#: Relative σ of a rate from which its reciprocal is given without σ.
 WORST_FOR_LIFETIME = 0.5
 
 
 @dataclass(frozen=True)
 class Row:
-    """One line of a table: what (text or markup), its unit, and the values, one a column."""
+    """Row of a table.
+
+    Attributes
+    ----------
+    quantity
+        Name of the quantity, as text or markup.
+    unit
+        Unit of the values; empty without one.
+    values
+        Values with σ as text, one a column.
+    """
 
     quantity: str
     unit: str
@@ -23,7 +33,21 @@ class Row:
 
 @dataclass(frozen=True)
 class CandidateRow:
-    """A model that was tried: its name, reduced χ², BIC above the best one's, F-test's p."""
+    """Row of the table of decay models that were fitted.
+
+    Attributes
+    ----------
+    model
+        Name of the decay model.
+    reduced_chi2
+        Reduced χ².
+    bic_above_best
+        BIC less that of the best model.
+    p_value
+        p-value of the F-test against one state fewer.
+    chosen
+        Whether this model was chosen.
+    """
 
     model: str
     reduced_chi2: str
@@ -33,21 +57,21 @@ class CandidateRow:
 
 
 def state_rows(fit: FittedDecay) -> list[Row]:
-    """Rates, times and amplitudes, one column a state."""
+    """Return rows of rates, lifetimes, half-lives and amplitudes, with one column a state."""
     rates = [(state.k_r_per_s, state.k_r_sigma_per_s) for state in fit.states]
     lifetimes = [_lifetime(rate, sigma) for rate, sigma in rates]
     half_lives = [(math.log(2) * value, math.log(2) * sigma) for value, sigma in lifetimes]
     amplitudes = [(state.amplitude, state.amplitude_sigma) for state in fit.states]
     return [
-        Row(Markup("Rate k<sub>r</sub>"), "s⁻¹", _written(rates)),
-        Row(Markup("Lifetime 1/k<sub>r</sub>"), "s", _written(lifetimes)),
-        Row("Half-life", "s", _written(half_lives)),
-        Row("Amplitude a", "DN/s", _written(amplitudes)),
+        Row(Markup("Rate k<sub>r</sub>"), "s⁻¹", _value_texts(rates)),
+        Row(Markup("Lifetime 1/k<sub>r</sub>"), "s", _value_texts(lifetimes)),
+        Row("Half-life", "s", _value_texts(half_lives)),
+        Row("Amplitude a", "DN/s", _value_texts(amplitudes)),
     ]
 
 
 def quality_rows(fit: FittedDecay) -> list[Row]:
-    """What the states share."""
+    """Return rows of the parameters that the states share: weights, offsets, flicker and χ²."""
     rows = []
     several = len(fit.channels) > 1
     if several:
@@ -72,7 +96,7 @@ def quality_rows(fit: FittedDecay) -> list[Row]:
 
 
 def paper_rows(fit: FittedDecay) -> list[Row]:
-    """Λᵢ = aᵢ/kᵢ in each channel, as if every state had been full: rᵢ(0) = 1."""
+    """Return rows of Λᵢ = aᵢ/kᵢ in each channel, assuming that every state was full: rᵢ(0) = 1."""
     rows = []
     for name, weight, weight_sigma in zip(
         fit.channels, fit.channel_weights, fit.channel_weights_sigma, strict=True
@@ -80,88 +104,96 @@ def paper_rows(fit: FittedDecay) -> list[Row]:
         values = []
         for number, state in enumerate(fit.states):
             rate, amplitude = state.k_r_per_s, state.amplitude
-            shared = 2 * float(fit.covariance[2 * number, 2 * number + 1]) / (rate * amplitude)
+            relative_covariance = (
+                2 * float(fit.covariance[2 * number, 2 * number + 1]) / (rate * amplitude)
+            )
             relative2 = (
                 (state.k_r_sigma_per_s / rate) ** 2
                 + (state.amplitude_sigma / amplitude) ** 2
-                - (shared if math.isfinite(shared) else 0.0)
+                - (relative_covariance if math.isfinite(relative_covariance) else 0.0)
                 + ((weight_sigma / weight) ** 2 if weight > 0 else 0.0)
             )
             value = weight * amplitude / rate
             values.append((value, value * math.sqrt(max(relative2, 0.0))))
-        rows.append(Row(f"Λ in {name}", "DN", _written(values)))
+        rows.append(Row(f"Λ in {name}", "DN", _value_texts(values)))
     return rows
 
 
 def candidate_rows(fit: FittedDecay) -> list[CandidateRow]:
-    """The numbers of states tried, and the alternative models."""
+    """Return rows of the fits with each number of states, and of the alternative models."""
     bics = [candidate.bic for candidate in fit.candidates] + [
         alternative.bic for alternative in fit.alternative_models
     ]
     best = min(bics, default=math.inf)
     rows = [
         CandidateRow(
-            model=_states(candidate.n_states),
+            model=_states_text(candidate.n_states),
             reduced_chi2=rounded(candidate.reduced_chi2, 3),
-            bic_above_best=_above(candidate.bic, best),
+            bic_above_best=_bic_difference(candidate.bic, best),
             p_value="–" if candidate.f_p_value is None else _p_value(candidate.f_p_value),
             chosen=candidate.n_states == fit.n_states,
         )
         for candidate in fit.candidates
     ]
     rows += [
-        CandidateRow(alternative.name, "–", _above(alternative.bic, best), "–", False)
+        CandidateRow(alternative.name, "–", _bic_difference(alternative.bic, best), "–", False)
         for alternative in fit.alternative_models
     ]
     return rows
 
 
 def why_so_many_states(fit: FittedDecay) -> str:
-    """In a sentence or two."""
-    tried = {candidate.n_states: candidate for candidate in fit.candidates}
-    here = tried.get(fit.n_states)
-    fewer, more = tried.get(fit.n_states - 1), tried.get(fit.n_states + 1)
-    said = []
-    if here is not None and fewer is not None:
-        gain = rounded(fewer.bic - here.bic, 3)
-        said.append(f"BIC is lower by {gain} than with {_states(fewer.n_states)}.")
-    if here is not None and more is not None:
-        change = more.bic - here.bic
-        word = "raises" if change >= 0 else "lowers"
-        said.append(f"One more state {word} BIC by {rounded(abs(change), 3)}.")
+    """Return the reason for the number of states in a sentence or two."""
+    candidates = {candidate.n_states: candidate for candidate in fit.candidates}
+    chosen = candidates.get(fit.n_states)
+    fewer, more = candidates.get(fit.n_states - 1), candidates.get(fit.n_states + 1)
+    sentences = []
+    if chosen is not None and fewer is not None:
+        gain = rounded(fewer.bic - chosen.bic, 3)
+        sentences.append(f"BIC is lower by {gain} than with {_states_text(fewer.n_states)}.")
+    if chosen is not None and more is not None:
+        change = more.bic - chosen.bic
+        verb = "raises" if change >= 0 else "lowers"
+        sentences.append(f"One more state {verb} BIC by {rounded(abs(change), 3)}.")
         if more.f_p_value is not None:
-            said.append(f"Chance alone gains as much in χ² with p = {_p_value(more.f_p_value)}.")
-    if not said:
-        said.append("No other number of states was tried or supported by the data.")
+            sentences.append(
+                f"Chance alone gains as much in χ² with p = {_p_value(more.f_p_value)}."
+            )
+    if not sentences:
+        sentences.append("No other number of states was tried or supported by the data.")
     elif more is None:
-        said.append("More were not asked for, or the data do not support them.")
+        sentences.append("More were not asked for, or the data do not support them.")
     if fit.better_model is not None:
         alternative = fit.better_model
         exponent = plus_minus(alternative.exponent, alternative.exponent_sigma)
-        said.append(
+        sentences.append(
             f"A {alternative.name}, {alternative.formula}, describes the data clearly better "
             f"(exponent {exponent})."
         )
-    return " ".join(said)
+    return " ".join(sentences)
 
 
 def _lifetime(rate_per_s: float, sigma_per_s: float) -> tuple[float, float]:
-    """1/k and its σ in s; unknown where k is so uncertain that 1/k has no symmetric error."""
-    known = sigma_per_s < WORST_FOR_LIFETIME * rate_per_s
-    return 1 / rate_per_s, sigma_per_s / rate_per_s**2 if known else math.inf
+    """Return 1/k and its σ in s; σ is infinite if 1/k has no symmetric error."""
+    determined = sigma_per_s < WORST_FOR_LIFETIME * rate_per_s
+    return 1 / rate_per_s, sigma_per_s / rate_per_s**2 if determined else math.inf
 
 
-def _written(pairs: list[tuple[float, float]]) -> tuple[str, ...]:
+def _value_texts(pairs: list[tuple[float, float]]) -> tuple[str, ...]:
+    """Return values with their σ as text."""
     return tuple(plus_minus(value, sigma) for value, sigma in pairs)
 
 
-def _states(number: int) -> str:
+def _states_text(number: int) -> str:
+    """Return a number of states as text."""
     return "1 state" if number == 1 else f"{number} states"
 
 
-def _above(bic: float, best: float) -> str:
+def _bic_difference(bic: float, best: float) -> str:
+    """Return the difference of a BIC to the best one as text."""
     return "best" if bic == best else f"+{rounded(bic - best, 3)}"
 
 
 def _p_value(p: float) -> str:
+    """Return a p-value as text."""
     return "< 10⁻⁶" if p < 1e-6 else rounded(p, 2)

@@ -1,4 +1,4 @@
-"""A phosphor in a report: the material as measured, what it looks like, then every part."""
+"""Report of a phosphor: the material as measured with its photographs, then every part."""
 
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -19,26 +19,26 @@ from labrig.report.report_model import GlowPhotograph
 from labrig.report.sections import Picture, Rendered, Section, Source
 from labrig.results import DecayPatch, DecayResult, FloatArray, PhosphorResult
 
-#: Of the emission spectrum and its band.
+#: Legend entries of the emission spectrum and its band.
 NAMES = "Emission", "± 1 σ"
 
 
 @dataclass(frozen=True)
 class _Overview:
-    """What the template needs besides figures and tables.
+    """Data for the template besides figures and tables.
 
     Attributes
     ----------
     daylight
-        The sample under the lamp; None without a photograph.
+        Photograph of the sample under the lamp; None without one.
     glow
-        The sample glowing, where there is no photograph under the lamp.
+        Photograph of the glow, if there is none under the lamp; else None.
     colours
-        Of the emission as `#rrggbb`, by patch.
+        Colour of the emission as `#rrggbb`, by patch.
     contents
-        Titles of the parts that follow, by where they begin.
+        Names of the parts that follow, by link target.
     failed
-        Why a part is missing, by its name.
+        Reason why a part is missing, by its name.
     """
 
     daylight: Daylight | None
@@ -49,24 +49,28 @@ class _Overview:
 
 
 def render(result: PhosphorResult, source: Source) -> Rendered:
-    """Show a chain of protocols."""
+    """Render the material, every part of the chain, and the comparison with a reference."""
     rendered = {
         name: render_result(result.parts[name], part) for name, part in _parts(result, source)
     }
     sections = [_summary(result, source)]
-    for name, one in rendered.items():
-        sections += [replace(section, part=name) for section in one.sections]
+    for name, rendered_part in rendered.items():
+        sections += [replace(section, part=name) for section in rendered_part.sections]
     for patch, material in result.materials.items():
         sections += _comparison(patch, material)
     return Rendered(
         tuple(sections),
-        tuple(f"{name}: {line}" for name, one in rendered.items() for line in one.lines),
-        tuple(section for one in rendered.values() for section in one.methods),
+        tuple(
+            f"{name}: {line}"
+            for name, rendered_part in rendered.items()
+            for line in rendered_part.lines
+        ),
+        tuple(section for rendered_part in rendered.values() for section in rendered_part.methods),
     )
 
 
 def _parts(result: PhosphorResult, source: Source) -> Iterator[tuple[str, Source]]:
-    """What the result of every part was found in."""
+    """Yield name and source of every part of the chain that has a result."""
     for link in source.protocol.chain():
         if link.name in result.parts:
             run = source.run.part(link.name)
@@ -77,14 +81,14 @@ def _parts(result: PhosphorResult, source: Source) -> Iterator[tuple[str, Source
 
 
 def _summary(result: PhosphorResult, source: Source) -> Section:
-    """The material as measured; picture, glow, colour, spectrum; what follows."""
+    """Return the section with the material as measured, its photographs, and the list of parts."""
     figures, colours = [], {}
     for name, patch in _decays(result).items():
         figures.append(
             Picture(
                 f"glow-{name}",
                 partial(logarithmic_decay, patch.series, patch.fit),
-                f"The glow{_of(name, result)} over time, with ± 1 σ; lines are the fit.",
+                f"The glow{_patch_suffix(name, result)} over time, with ± 1 σ; lines are the fit.",
             )
         )
     for name, material in result.materials.items():
@@ -95,13 +99,13 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
                 Picture(
                     f"spectrum-{name}",
                     partial(spectrum_figure, nm, value, _band(material.spectrum), NAMES),
-                    f"Emission spectrum{_of(name, result)}, largest value 1.",
+                    f"Emission spectrum{_patch_suffix(name, result)}, largest value 1.",
                 )
             )
     frames = [frame for attempt in source.run.completed().values() for frame in attempt.frames]
     screen = screen_for(source.camera)
     daylight = daylight_picture(
-        [one for one in frames if one.role == FrameRole.DAYLIGHT], (), screen
+        [frame for frame in frames if frame.role == FrameRole.DAYLIGHT], (), screen
     )
     return Section(
         "The material as measured",
@@ -125,7 +129,7 @@ def _summary(result: PhosphorResult, source: Source) -> Section:
 def _first_glow(
     frames: Sequence[FrameRecord], result: PhosphorResult, screen: Screen
 ) -> GlowPicture | None:
-    """The first photograph of the decay."""
+    """Return the first photograph of the decay; None if there is none that can be read."""
     for patch in _decays(result).values():
         first = int(np.argmin(patch.series.t_s))
         glowing = [
@@ -138,18 +142,19 @@ def _first_glow(
 
 
 def _decays(result: PhosphorResult) -> dict[str, DecayPatch]:
-    """Of the last decay in the chain, every patch that could be fitted."""
+    """Return the patches of the last decay in the chain that have a fit, by name."""
     decays = [part for part in result.parts.values() if isinstance(part, DecayResult)]
     patches = decays[-1].patches if decays else {}
     return {name: patch for name, patch in patches.items() if patch.fit is not None}
 
 
-def _of(patch: str, result: PhosphorResult) -> str:
+def _patch_suffix(patch: str, result: PhosphorResult) -> str:
+    """Return the patch as part of a caption, empty if there is only one."""
     return f" of {patch}" if patch and len(result.materials) > 1 else ""
 
 
 def _band(spectrum: Spectrum) -> tuple[FloatArray, FloatArray] | None:
-    """The spectrum less and plus 1 σ, if that is known."""
+    """Return the spectrum less and plus 1 σ; None if σ is not known."""
     if spectrum.sigma is None:
         return None
     value, sigma = np.array(spectrum.value), np.array(spectrum.sigma)
@@ -157,11 +162,11 @@ def _band(spectrum: Spectrum) -> tuple[FloatArray, FloatArray] | None:
 
 
 def _comparison(patch: str, material: Material) -> tuple[Section, ...]:
-    """The material beside the shipped one of its name, such as of Table 1, if there is one."""
-    known = resources.names("config/materials")
-    if material.name not in known:
+    """Return the section that compares the material with the shipped one of its name, if any."""
+    references = resources.names("config/materials")
+    if material.name not in references:
         return ()
-    reference = read_material(known[material.name])
+    reference = read_material(references[material.name])
     source = reference.provenance.source if reference.provenance else "labrig"
     text = (
         f"Beside {material.name} of {source}. k_e and Λ are rescaled here, since their scales are "

@@ -1,4 +1,4 @@
-"""RAW frames as small pictures for the page."""
+"""Conversion of RAW frames to small pictures for the page."""
 
 import base64
 from collections.abc import Sequence
@@ -28,22 +28,29 @@ from labrig.written_numbers import exposure_text, rounded
 
 DAYLIGHT_WIDTH = 1000
 GLOW_WIDTH = 420
-#: Fraction of all pixels that may be saturated in a daylight photograph that counts as well
-#: exposed; for display only.
+#: Largest fraction of saturated pixels in a well exposed daylight photograph; for display only.
 CLIPPED_FRACTION = 0.002
-#: Fraction of saturated pixels from which a spot is shown as saturated; for display only.
+#: Fraction of saturated cells above which a pixel is shown as saturated; for display only.
 BLOWN_LOOKS = 0.5
-#: What is shown at full brightness: this quantile of the pixels, so that hot ones do not decide.
+#: Quantile of the pixels that is shown at full brightness, so that hot pixels have no influence.
 BRIGHT_QUANTILE = 0.995
-#: Linear level to which that is brought in a daylight photograph.
+#: Linear level to which this quantile is scaled in a daylight photograph.
 DAYLIGHT_BRIGHT = 0.8
-#: Noise brightened more than this tells nothing.
+#: Largest factor of brightening; beyond it there is only noise.
 MOST_BRIGHTENED = 4096.0
 
 
 @dataclass(frozen=True)
 class Sensor:
-    """What took the frames, as its files say: the camera's name and the frame's size in pixels."""
+    """Camera that took the frames.
+
+    Attributes
+    ----------
+    camera
+        Name of the camera, from make and model in the files.
+    width, height
+        Size of a frame in pixels.
+    """
 
     camera: str
     width: int
@@ -52,7 +59,17 @@ class Sensor:
 
 @dataclass(frozen=True)
 class RegionMark:
-    """A rectangle over a picture, in its pixels; `number` counts the patches from 1."""
+    """Rectangle around a patch in a picture.
+
+    Attributes
+    ----------
+    number
+        Number of the patch, counted from 1.
+    name
+        Name of the patch.
+    x, y, width, height
+        Position of the upper left corner and size, in pixels of the picture.
+    """
 
     number: int
     name: str
@@ -64,7 +81,19 @@ class RegionMark:
 
 @dataclass(frozen=True)
 class Daylight:
-    """The photograph under the lamp; `source` is a data URI."""
+    """Photograph of the sample under the lamp.
+
+    Attributes
+    ----------
+    source
+        Picture as data URI.
+    width, height
+        Size of the picture in pixels.
+    marks
+        Rectangles around the patches.
+    caption
+        Name, exposure and colours of the photograph.
+    """
 
     source: str
     width: int
@@ -75,9 +104,20 @@ class Daylight:
 
 @dataclass(frozen=True)
 class GlowPicture:
-    """One photograph of the glow, as it is and brightened; both are data URIs.
+    """Photograph of the glow, on the common scale and brightened.
 
-    `blown`: some of it is saturated, and shown white, since its colour is not known.
+    Attributes
+    ----------
+    t_s
+        Begin of the exposure in seconds after lamp off.
+    source
+        Picture on the common scale as data URI.
+    brightened_source
+        Brightened picture as data URI.
+    brightened
+        Factor of brightening as text.
+    blown
+        Whether parts are saturated; they are shown white, since their colour is not known.
     """
 
     t_s: float
@@ -88,7 +128,7 @@ class GlowPicture:
 
 
 def sensor_of(frames: Sequence[FrameRecord]) -> Sensor | None:
-    """As the first of `frames` says that can be read; None if none can."""
+    """Return the camera from the first frame that can be read; None if none can."""
     for frame in frames:
         raw = _read(frame.path)
         if raw is not None:
@@ -100,23 +140,23 @@ def sensor_of(frames: Sequence[FrameRecord]) -> Sensor | None:
 def daylight_picture(
     frames: Sequence[FrameRecord], patches: Sequence[PatchReport], screen: Screen
 ) -> Daylight | None:
-    """The longest exposed of `frames` that is not overexposed, with the patches marked.
+    """Return the frame of longest exposure that is not overexposed, with the patches marked.
 
-    None if there is no frame that can be read.
+    The result is None if no frame can be read.
     """
     best: tuple[FrameRecord, RawFrame] | None = None
     for frame in sorted(frames, key=lambda frame: frame.exposure_s):
         raw = _read(frame.path)
         if raw is None:
             continue
-        blown = float(LinearFrame(raw).is_saturated().mean())
-        if best is not None and blown > CLIPPED_FRACTION:
+        saturated_fraction = float(LinearFrame(raw).is_saturated().mean())
+        if best is not None and saturated_fraction > CLIPPED_FRACTION:
             break
         best = frame, raw
     if best is None:
         return None
     frame, raw = best
-    linear = into_gamut(_on_screen(raw, small(binned(raw), DAYLIGHT_WIDTH), screen.lamp_lit))
+    linear = into_gamut(_to_screen(raw, small(binned(raw), DAYLIGHT_WIDTH), screen.lamp_lit))
     # How well it was exposed does not matter here: what is bright should look bright.
     linear *= DAYLIGHT_BRIGHT / max(float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)), 1e-9)
     height, width = linear.shape[:2]
@@ -133,29 +173,31 @@ def daylight_picture(
 
 
 def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tuple[GlowPicture, ...]:
-    """Photographs of one decay on one scale of DN/s, and each brightened to be seen."""
-    shown = []
+    """Return photographs of one decay on a common scale of DN/s, and each brightened."""
+    prepared = []
     for photograph in photographs:
         raw = _read(photograph.frame.path)
         if raw is not None:
             picture = small(binned(raw), GLOW_WIDTH)
             saturated = small(saturated_cells(raw).astype(np.float32), GLOW_WIDTH)
             blown = (saturated > BLOWN_LOOKS)[..., np.newaxis]
-            gathered = _light_gathered(photograph.frame)
-            linear = into_gamut(_on_screen(raw, picture / gathered, screen.glow))
-            shown.append((photograph, linear, blown))
-    if not shown:
+            exposure_factor = _exposure_factor(photograph.frame)
+            linear = into_gamut(_to_screen(raw, picture / exposure_factor, screen.glow))
+            prepared.append((photograph, linear, blown))
+    if not prepared:
         return ()
-    levels = [float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear, _ in shown]
-    full = max(*levels, 1e-9)
+    levels = [float(np.quantile(linear.max(axis=-1), BRIGHT_QUANTILE)) for _, linear, _ in prepared]
+    full_scale = max(*levels, 1e-9)
     pictures = []
-    for (photograph, linear, blown), level in zip(shown, levels, strict=True):
-        factor = float(f"{min(full / max(level, 1e-9), MOST_BRIGHTENED):.1e}")
+    for (photograph, linear, blown), level in zip(prepared, levels, strict=True):
+        factor = float(f"{min(full_scale / max(level, 1e-9), MOST_BRIGHTENED):.1e}")
         pictures.append(
             GlowPicture(
                 t_s=photograph.t_s,
-                source=_data_uri(encoded(np.where(blown, 1.0, linear / full))),
-                brightened_source=_data_uri(encoded(np.where(blown, 1.0, linear * factor / full))),
+                source=_data_uri(encoded(np.where(blown, 1.0, linear / full_scale))),
+                brightened_source=_data_uri(
+                    encoded(np.where(blown, 1.0, linear * factor / full_scale))
+                ),
                 brightened=rounded(factor, 2),
                 blown=bool(blown.any()),
             )
@@ -164,40 +206,41 @@ def glow_pictures(photographs: Sequence[GlowPhotograph], screen: Screen) -> tupl
 
 
 def _read(path: Path) -> RawFrame | None:
-    """The frame, None if it cannot be read: a report must not fail for a picture."""
+    """Return the frame; None if it cannot be read, since a report must not fail for a picture."""
     try:
         return read_raw(path)
     except LabrigError:
         return None
 
 
-def _light_gathered(frame: FrameRecord) -> float:
-    """What a frame's values are proportional to, besides the light."""
+def _exposure_factor(frame: FrameRecord) -> float:
+    """Return the factor t · ISO / N² of a frame, to which its values are proportional."""
     return frame.exposure_s * frame.iso / (frame.f_number or 1.0) ** 2
 
 
-def _on_screen(raw: RawFrame, picture: Picture, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
-    """`picture` by the camera's colour `matrix`, or as it is where there are no colours."""
+def _to_screen(raw: RawFrame, picture: Picture, matrix: NDArray[np.float64]) -> NDArray[np.float64]:
+    """Return a picture in linear sRGB by a colour matrix; a grey one is returned unchanged."""
     return np.asarray(picture @ (np.eye(3) if is_grey(raw) else matrix).T)
 
 
 def _data_uri(rgb: NDArray[np.uint8]) -> str:
+    """Return a picture as data URI in JPEG format."""
     return "data:image/jpeg;base64," + base64.b64encode(jpeg(rgb)).decode("ascii")
 
 
 def _marks(
     patches: Sequence[PatchReport], raw: RawFrame, width: int, height: int
 ) -> tuple[RegionMark, ...]:
-    """Where the patches lie that have a place in the photograph."""
+    """Return the rectangles of the patches whose region is known."""
     marks = []
     across, down = width / raw.width, height / raw.height
     for number, patch in enumerate(patches, start=1):
         if patch.region is None:
             continue
         try:
-            x, y, wide, high = region_pixels(patch.region, raw.width, raw.height)
+            x, y, region_width, region_height = region_pixels(patch.region, raw.width, raw.height)
         except UsageError:
             continue  # photographs of another size than the measured frames
-        place = (x * across, y * down, wide * across, high * down)
-        marks.append(RegionMark(number, patch.name, *(round(value, 1) for value in place)))
+        rectangle = (x * across, y * down, region_width * across, region_height * down)
+        marks.append(RegionMark(number, patch.name, *(round(value, 1) for value in rectangle)))
     return tuple(marks)

@@ -1,4 +1,4 @@
-"""What a report shows of a decay, gathered from its result and its run."""
+"""Content of a report of a decay, from its result and its run."""
 
 from dataclasses import dataclass
 
@@ -7,7 +7,7 @@ from labrig.record import FrameRecord, RunDescription
 from labrig.region import Region
 from labrig.results import FittedDecay, NoiseBudget, Series
 
-#: What every decay measured with a camera rests on.
+#: Assumptions of every decay measured with a camera.
 DECAY_ASSUMPTIONS = (
     "The amplitudes aᵢ are what the decay measures: the signal at lamp off in the brightest "
     "channel, extrapolated. They are products aᵢ = Λᵢ kᵢ rᵢ(0) with the rate kᵢ; re-radiance Λᵢ "
@@ -25,14 +25,14 @@ DECAY_ASSUMPTIONS = (
 
 @dataclass(frozen=True)
 class GlowPhotograph:
-    """A frame of the glow that is worth showing.
+    """Frame of the glow that is shown.
 
-    Parameters
+    Attributes
     ----------
     frame
-        The frame, its file readable.
+        Frame of the decay.
     t_s
-        Start of the exposure after lamp off.
+        Begin of the exposure in seconds after lamp off.
     """
 
     frame: FrameRecord
@@ -41,20 +41,20 @@ class GlowPhotograph:
 
 @dataclass(frozen=True)
 class PatchReport:
-    """One patch of the sample.
+    """Patch of the sample.
 
-    Parameters
+    Attributes
     ----------
     name
-        As in the protocol.
+        Name of the patch in the protocol.
     region
-        Where it lies in the photographs; None if not known.
+        Region of the patch in the photographs; None if not known.
     series
-        What was measured there, DN/s.
+        Signals of the patch in DN/s.
     fit
-        The fit, or the reason why there is none.
+        Fitted decay, or the reason why there is none.
     noise
-        Where σ comes from; None where that is not told.
+        Components of σ; None if they are not known.
     """
 
     name: str
@@ -66,28 +66,28 @@ class PatchReport:
 
 @dataclass(frozen=True)
 class DecayReport:
-    """One decay.
+    """Decay as measured and fitted.
 
-    Parameters
+    Attributes
     ----------
     about
-        The run.
+        Description of the run, its bench and the processing.
     patches
-        One or more.
+        Patches of the sample, at least one.
     frames
-        All of them; those of the role `decay` tell the timing.
+        All frames of the run; those of the role `decay` are used for the timing.
     daylight
-        Photographs under the lamp, of different exposures: the best exposed one is shown.
+        Photographs under the lamp of different exposures; the best exposed one is shown.
     glow
-        Photographs of the glow by rising time, six or so, all of one decay.
+        About six photographs of the glow in one decay, by rising time.
     camera
-        Sensitivity of the camera, for colours; None if not known.
+        Spectral responses of the camera, for colours; None if not known.
     charges_s
-        How long the lamp shone before each decay, as measured.
+        Measured length of the charge before each decay in s.
     background
-        The region whose level was subtracted from each frame; None if dark frames served for that.
+        Region whose level was subtracted from each frame; None if dark frames were subtracted.
     states
-        The number of states asked for; None if the data decided.
+        Number of states that the protocol sets; None if it was chosen from the data.
     """
 
     about: RunDescription

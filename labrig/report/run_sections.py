@@ -1,4 +1,4 @@
-"""What a report says of a run whatever it measured: lamp, shield and door; the temperature."""
+"""Sections of a report that do not depend on the protocol: lamp, shield, door, temperature."""
 
 from collections.abc import Collection
 from functools import partial
@@ -25,23 +25,28 @@ from labrig.report.timing import moves_text
 FloatArray = NDArray[np.float64]
 
 HEIGHT_PT = 180.0
-#: Longer runs are shown in hours.
+#: Longest run in s whose time axis is in minutes; that of longer runs is in hours.
 LONGEST_IN_MINUTES_S = 3 * 3600.0
-#: No axis is shorter, in degrees: the noise of a steady room is to look like it.
+#: Smallest span of the temperature axis in °C, so that the noise of a steady room looks small.
 LEAST_SPAN_C = 2.0
 
 
 def temperature_figure(
     time_s: FloatArray, celsius: FloatArray, smooth: FloatArray, glow_s: FloatArray
 ) -> Figure:
-    """Readings and their smoothed course; where the glow was photographed is shaded.
+    """Draw readings of the temperature and their smoothed course.
 
     Parameters
     ----------
-    time_s, celsius, smooth
-        (N,) of the readings, rising, after the beginning of the run.
+    time_s
+        Rising times of the readings in seconds after the begin of the run, shape (n,).
+    celsius
+        Readings in °C, shape (n,).
+    smooth
+        Smoothed readings in °C, shape (n,).
     glow_s
-        (M, 2) beginning and end of what is to be shaded.
+        Begin and end of each shaded time of the glow in seconds after the begin of the run, shape
+        (m, 2).
     """
     unit_s, unit = (60.0, "min") if time_s[-1] <= LONGEST_IN_MINUTES_S else (3600.0, "h")
     figure = new_figure(HEIGHT_PT)
@@ -59,20 +64,44 @@ def temperature_figure(
 
 
 def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
-    """Whether something else switched the lamp, and whether lamp, shield and door moved on time."""
+    """Return the section on the lamp's relay and on the timing of lamp, shield and door.
+
+    The section says whether anything but labrig switched the lamp, and how much later than planned
+    lamp, shield and door moved.
+
+    Parameters
+    ----------
+    run
+        Journal of the run.
+
+    Returns
+    -------
+    tuple of Section
+        One section, or none if there is nothing to report.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.report import lamp_sections
+    >>> (section,) = lamp_sections(labrig.read_run(Path("runs/decay")))
+    >>> print(section.text[0])
+    Begun after its planned time: lamp off at most 0 ms, shield cover at most 5.2 ms (decay-1), door
+    open at most 0 ms.
+    """
     attempts = list(run.completed().values())
     text = []
-    used = [
+    reads_back = [
         attempt.start.get("lamp_reads_back")
         for attempt in attempts
         if any(action.device == "lamp" for action in attempt.actions)
     ]
-    if False in used:
+    if False in reads_back:
         text.append(
             "The lamp's relay board does not report its state: only the photographs can show "
             "whether something else switched the lamp while it charged."
         )
-    elif True in used:
+    elif True in reads_back:
         text.append(
             "The lamp's relay was read back about once a minute, and each time before it was "
             "switched: nothing else had switched it."
@@ -83,22 +112,46 @@ def lamp_sections(run: RunRecord) -> tuple[Section, ...]:
 
 
 def temperature_sections(run: RunRecord, roles: Collection[str]) -> tuple[Section, ...]:
-    """Picture and words; nothing without a thermometer. Rates rest on frames of these roles."""
+    """Return the section on the temperature during a run.
+
+    Parameters
+    ----------
+    run
+        Journal of the run.
+    roles
+        Roles of the frames from which rates are fitted; their times are shaded in the figure.
+
+    Returns
+    -------
+    tuple of Section
+        One section with a figure of the readings, or none without a thermometer.
+
+    Examples
+    --------
+    >>> from pathlib import Path
+    >>> import labrig
+    >>> from labrig.report import temperature_sections
+    >>> (section,) = temperature_sections(labrig.read_run(Path("runs/decay")), {"decay"})
+    >>> section.text[0].split(" (")[0]
+    '20.7 °C to 20.8 °C over the run'
+    """
     if not run.temperatures():
         return ()
-    course, photographs = TemperatureHistory(run), frames_in_roles(run, roles)
+    history, photographs = TemperatureHistory(run), frames_in_roles(run, roles)
     units = [list(group) for _, group in groupby(photographs, key=lambda frame: frame.unit)]
-    began = run.attempts[0].start["time"]
-    spans = [(one[0].start_time, one[-1].end_time) for one in units]
-    glow_s = np.array(spans).reshape(-1, 2) - began
+    run_start = run.attempts[0].start["time"]
+    spans = [(unit[0].start_time, unit[-1].end_time) for unit in units]
+    glow_s = np.array(spans).reshape(-1, 2) - run_start
     shaded = " Shaded: the glow from which rates are fitted." if len(glow_s) else ""
     picture = Picture(
         "temperature",
-        partial(temperature_figure, course.time - began, course.celsius, course.smooth, glow_s),
+        partial(
+            temperature_figure, history.time - run_start, history.celsius, history.smooth, glow_s
+        ),
         f"Readings, and their means over five minutes (line).{shaded}",
     )
     text = (
-        f"{degrees_text(course.smooth)} over the run ({len(course.time)} readings, smoothed over "
+        f"{degrees_text(history.smooth)} over the run ({len(history.time)} readings, smoothed over "
         f"{duration_text(SMOOTHED_S)})."
     )
     mean = glow_temperature_c(run, roles)

@@ -1,4 +1,4 @@
-"""Plateaus of the glow, levels of charge and rates after several charges in a report."""
+"""Report of saturation: plateaus of the glow, levels of charge, and rates after each charge."""
 
 from collections.abc import Iterator
 from functools import partial
@@ -37,19 +37,21 @@ from labrig.written_numbers import plus_minus, rounded
 
 
 def render(result: SaturationResult, source: Source) -> Rendered:
-    """Show every patch: how its glow saturates, in time and in level, and its rates."""
+    """Render the saturation of every patch in time and in level, and its rates."""
     several = len(result.patches) > 1
     lines = (
         f"{name}: {line}" if several else line
         for name, patch in result.patches.items()
         for line in _lines(patch)
     )
-    sections = (_section(name, one, result.weaker_light) for name, one in result.patches.items())
+    sections = (
+        _section(name, patch, result.weaker_light) for name, patch in result.patches.items()
+    )
     return Rendered(tuple(sections), tuple(lines))
 
 
 def _lines(patch: PatchSaturation) -> Iterator[str]:
-    """Saturation in time, in level, and the rates."""
+    """Yield the lines on saturation in time, saturation in level, and rates."""
     begin, end = (
         f"{_percent(growth.value)} ± {_percent(growth.sigma)}"
         for growth in (patch.growth_at_begin, patch.growth_at_end)
@@ -60,8 +62,8 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
         f"from {shorter} to {longer} of charge the glow changes by {begin} at lamp off, {end} at "
         f"the end of the decay: {patch.in_time}"
     )
-    of_states = zip(patch.levels, patch.rates.shared_per_s, strict=False)
-    for number, (level, k_per_s) in enumerate(of_states, start=1):
+    states = zip(patch.levels, patch.rates.shared_per_s, strict=False)
+    for number, (level, k_per_s) in enumerate(states, start=1):
         yield (
             f"state {number} (k = {rounded(float(k_per_s), 3)} s⁻¹): r(0) = "
             f"{plus_minus(level.r, level.sigma)}; assumption r(0) = 1: {level.assessment}"
@@ -72,6 +74,7 @@ def _lines(patch: PatchSaturation) -> Iterator[str]:
 
 
 def _rates_text(patch: PatchSaturation) -> str:
+    """Return the outcome of the test whether all decays have the same rates."""
     test = patch.rates
     if test.misfit and not test.differ:
         return (
@@ -87,6 +90,7 @@ def _rates_text(patch: PatchSaturation) -> str:
 
 
 def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Section:
+    """Return the section of a patch; `weaker` is the weaker light as fraction of the full one."""
     text = [*_lines(patch)]
     if weaker is not None:
         text.append(
@@ -119,10 +123,12 @@ def _section(name: str, patch: PatchSaturation, weaker: Measured | None) -> Sect
 
 
 def _percent(fraction: float) -> str:
+    """Return a fraction in per cent as text."""
     return f"{fraction:.1%}".replace("-", "−")
 
 
 def _rates_table(test: RatesTest, units: tuple[str, ...]) -> Table:
+    """Return the table of the rates of each decay and of the shared rates."""
     states = range(len(test.shared_per_s))
     rows = (
         (
@@ -137,7 +143,7 @@ def _rates_table(test: RatesTest, units: tuple[str, ...]) -> Table:
 
 
 def _plateau_figure(patch: PatchSaturation) -> Figure:
-    """Amplitude of every state after each charge, by light."""
+    """Draw the amplitude of every state over the length of the charge, by light."""
     figure = new_figure(256.0)
     axes = place(figure, left=LEFT_PT, bottom=38, right=12, top=30)
     entries = []
@@ -145,18 +151,18 @@ def _plateau_figure(patch: PatchSaturation) -> Figure:
     for style, light in zip(("-", DASHED), lights, strict=False):
         rows = patch.rows(light)
         minutes = patch.charge_s[rows] / 60
-        full = light == FULL_LIGHT
+        is_full = light == FULL_LIGHT
         entries.append(lined(f"{light} light", MUTED, style))
         for state in range(patch.rates.amplitude.shape[1]):
-            colour, marker = _look(state)
+            colour, marker = _colour_and_marker(state)
             y, sigma = (
-                of_all[rows, state]
-                for of_all in (patch.rates.amplitude, patch.rates.amplitude_sigma)
+                column[rows, state]
+                for column in (patch.rates.amplitude, patch.rates.amplitude_sigma)
             )
             axes.plot(minutes, y, color=colour, linestyle=style, linewidth=1.0)
             error_bars(axes, minutes, y, sigma, colour)
-            points(axes, minutes, y, marker, colour, colour if full else PAPER)
-            if full:
+            points(axes, minutes, y, marker, colour, colour if is_full else PAPER)
+            if is_full:
                 entries.append(marked(f"state {state + 1}", marker, colour))
     axes.set_xlim(0, None)
     axes.set_ylim(0, None)
@@ -167,32 +173,33 @@ def _plateau_figure(patch: PatchSaturation) -> Figure:
 
 
 def _decays_figure(patch: PatchSaturation) -> Figure:
-    """Decays over what shared rates make of their begin, and what is left of each."""
+    """Draw the decays, normalised to the fit with shared rates at lamp off, and their residuals."""
     figure = new_figure(320.0)
-    top = place(figure, left=LEFT_PT, bottom=150, right=12, top=46)
-    below = place(figure, left=LEFT_PT, bottom=38, right=12, top=190, share_x=top)
-    top.set_yscale("log", nonpositive="clip")
+    upper = place(figure, left=LEFT_PT, bottom=150, right=12, top=46)
+    lower = place(figure, left=LEFT_PT, bottom=38, right=12, top=190, share_x=upper)
+    upper.set_yscale("log", nonpositive="clip")
     entries, lowest = [], np.inf
-    for number, (name, one) in enumerate(patch.curves.items()):
-        colour, marker = _look(number)
-        start = float(patch.rates.amplitude[number].sum())
-        middle_s = one.t_s + one.exposure_s / 2
-        points(top, middle_s, one.value / start, marker, colour, colour, size=3.0)
-        points(below, middle_s, patch.rates.residuals[number], marker, colour, colour, size=3.0)
+    for number, (name, curve) in enumerate(patch.curves.items()):
+        colour, marker = _colour_and_marker(number)
+        begin_signal = float(patch.rates.amplitude[number].sum())
+        middle_s = curve.t_s + curve.exposure_s / 2
+        points(upper, middle_s, curve.value / begin_signal, marker, colour, colour, size=3.0)
+        points(lower, middle_s, patch.rates.residuals[number], marker, colour, colour, size=3.0)
         entries.append(marked(name, marker, colour))
-        least = float(np.min(one.value[one.value > 0], initial=np.inf))
-        lowest = min(lowest, least / start)
-    top.set_ylim(max(lowest / 1.5, 1e-5), 1.5)
-    mark_decades(top)
-    below.axhline(0, color=MUTED, linewidth=0.9)
-    top.set_ylabel("Over begin")
-    below.set_ylabel("Residual / σ")
-    below.set_xlabel("Time after lamp off / s")
-    top.tick_params(labelbottom=False)
+        smallest = float(np.min(curve.value[curve.value > 0], initial=np.inf))
+        lowest = min(lowest, smallest / begin_signal)
+    upper.set_ylim(max(lowest / 1.5, 1e-5), 1.5)
+    mark_decades(upper)
+    lower.axhline(0, color=MUTED, linewidth=0.9)
+    upper.set_ylabel("Over begin")
+    lower.set_ylabel("Residual / σ")
+    lower.set_xlabel("Time after lamp off / s")
+    upper.tick_params(labelbottom=False)
     legend_above(figure, entries, columns=3)
     return figure
 
 
-def _look(number: int) -> tuple[str, str]:
+def _colour_and_marker(number: int) -> tuple[str, str]:
+    """Return colour and marker of the series with index `number`."""
     colours = (INK, *OTHER_CHANNELS)
     return colours[number % len(colours)], MARKERS[number % len(MARKERS)]

@@ -1,4 +1,4 @@
-"""Parts of a report that any protocol can have: text, figures, tables."""
+"""Elements of a report: sections with text, figures and tables, and rendered results."""
 
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -13,16 +13,16 @@ from labrig.record import RunDescription, RunRecord
 
 @dataclass(frozen=True)
 class Picture:
-    """A figure.
+    """Figure of a report with its caption.
 
     Attributes
     ----------
     name
-        Of its file: lower case, unique in its section.
+        Name of its file: lower case, unique in its section.
     draw
-        Makes the figure, when it is wanted and within the page's style.
+        Function that draws the figure, called within `figure_style`.
     caption
-        What is to be seen, with units; what error bars are.
+        Description of the figure, with units and the meaning of error bars.
     """
 
     name: str
@@ -32,7 +32,19 @@ class Picture:
 
 @dataclass(frozen=True)
 class Table:
-    """A table; the first column names its row, the others are numbers."""
+    """Table of a report, whose first column names the rows; the others are numbers.
+
+    Attributes
+    ----------
+    head
+        Heads of the columns.
+    rows
+        Rows of cells, each as long as `head`.
+    caption
+        Text below the table.
+    title
+        Heading of the table; empty without one.
+    """
 
     head: tuple[str, ...]
     rows: tuple[tuple[str, ...], ...]
@@ -42,24 +54,26 @@ class Table:
 
 @dataclass(frozen=True)
 class Section:
-    """What one thing that was measured looks like in a report.
+    """Section of a report.
 
     Attributes
     ----------
     title
-        Its heading.
+        Heading of the section.
     text
-        Paragraphs.
+        Paragraphs of text.
     figures, tables
-        In this order.
+        Figures and tables, in order.
     points
-        Sentences of a list, after the text.
+        Items of a list that follows the text.
     part
-        The part of a chain that it belongs to; empty if the run is none.
+        Name of the part of a chain of protocols; empty if the run is no chain.
     anchor
-        What links to it are made to; empty if there are none.
-    template, content
-        How it is laid out, and what that needs besides the figures.
+        Target of links to the section; empty without links.
+    template
+        File name of the template of the layout.
+    content
+        Data for the template besides text, figures and tables.
     """
 
     title: str
@@ -75,22 +89,22 @@ class Section:
 
 @dataclass(frozen=True)
 class Source:
-    """What a result was found in.
+    """Source of a result: run, protocol and rig.
 
     Attributes
     ----------
     run
-        The protocol's part of the run; its photographs may be shown.
+        Part of the run that belongs to the protocol; its photographs may be shown.
     protocol
-        Its model.
+        Model of the protocol.
     rig
-        The bench as it was.
+        Rig file of the run.
     about
-        The run, its bench and what its result was made with.
+        Description of the run, its bench and the processing.
     camera
-        The camera's curves, for colours; None if they are not known.
+        Spectral responses of the camera, for colours; None if they are not known.
     anchor
-        Begins the names of places in the page that links lead to.
+        Beginning of the names of all link targets.
     """
 
     run: RunRecord
@@ -103,16 +117,16 @@ class Source:
 
 @dataclass(frozen=True)
 class Rendered:
-    """A result for people.
+    """Result as sections of a report and lines of text.
 
     Attributes
     ----------
     sections
-        Of the report, in this order.
+        Sections of the report, in order.
     lines
-        The numbers that matter, for the terminal.
+        Most important numbers, in lines for the terminal.
     methods
-        How it was done, for the end of the report.
+        Sections with methods, for the end of the report.
     """
 
     sections: tuple[Section, ...]
@@ -121,7 +135,7 @@ class Rendered:
 
 
 class Renderer(Protocol):
-    """A protocol's part of a report, registered in `labrig.reports` under the protocol's name."""
+    """Function that renders a result, registered in `labrig.reports` under the protocol's name."""
 
     def __call__(self, result: Any, source: Source, /) -> Rendered:
-        """Show a result of the protocol's own type."""
+        """Render a result of the type that belongs to the protocol."""

@@ -1,4 +1,4 @@
-"""When frames began, and what comes before them, against when they were to begin."""
+"""Lateness of frames, and of the moves of lamp, shield and door before them."""
 
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -9,17 +9,29 @@ from labrig.record import ActionRecord, FrameRecord, FrameRole
 from labrig.report.report_model import PatchReport
 from labrig.written_numbers import rounded
 
-#: Devices and what they do between a charge and its first frame.
+#: Devices and their actions between a charge and its first frame.
 MOVES = (("lamp", "off"), ("shield", "cover"), ("door", "open"))
-#: Moves that began later than this are counted; a PC alone keeps within it.
+#: Lateness in s above which moves are counted; a PC that runs nothing else keeps within it.
 LATE_MOVE_S = 0.02
-#: Nobody asks how much less late than this something was.
+#: Lateness in s below which an action counts as punctual.
 ON_TIME_S = 1e-4
 
 
 @dataclass(frozen=True)
 class FrameTiming:
-    """One frame of a decay: when after lamp off it began, and how long after its planned time."""
+    """Begin of a frame of a decay.
+
+    Attributes
+    ----------
+    frame
+        File name of the frame.
+    unit
+        Name of the unit.
+    t_s
+        Begin of the exposure in seconds after lamp off.
+    late_s
+        Begin of the exposure less its planned time in s.
+    """
 
     frame: str
     unit: str
@@ -29,7 +41,19 @@ class FrameTiming:
 
 @dataclass(frozen=True)
 class Lateness:
-    """How late frames began: half of them by less than the median, 95 % by less than `p95_s`."""
+    """Statistics of the lateness of frames.
+
+    Attributes
+    ----------
+    n_frames
+        Number of frames.
+    median_s, p95_s
+        Median and 95th percentile of the lateness in s.
+    worst_s
+        Lateness of the largest magnitude in s.
+    worst_frame
+        File name of the frame with this lateness.
+    """
 
     n_frames: int
     median_s: float
@@ -41,7 +65,7 @@ class Lateness:
 def frame_timings(
     frames: Sequence[FrameRecord], patches: Sequence[PatchReport]
 ) -> tuple[FrameTiming, ...]:
-    """Of the frames that were measured, in their order."""
+    """Return the begin of each frame of the decay that is in a series, in order of the frames."""
     t_s = {
         name: float(t)
         for patch in patches
@@ -55,7 +79,7 @@ def frame_timings(
 
 
 def lateness(timings: Sequence[FrameTiming]) -> Lateness | None:
-    """None without frames."""
+    """Return the statistics of the lateness; None without frames."""
     if not timings:
         return None
     late_s = np.array([timing.late_s for timing in timings])
@@ -70,25 +94,27 @@ def lateness(timings: Sequence[FrameTiming]) -> Lateness | None:
 
 
 def moves_text(actions: Sequence[ActionRecord]) -> str:
-    """How late lamp, shield and door were before the frames of a decay, in a sentence or two.
+    """Return the lateness of lamp, shield and door before the frames of a decay, in sentences.
 
-    Empty if there is neither shield nor door, and the lamp went off on time.
+    The text is empty if there is neither shield nor door and the lamp was switched off on time.
     """
-    moves = {move: [one for one in actions if (one.device, one.action) == move] for move in MOVES}
-    latest = [max(some, key=lambda one: one.late_s) for some in moves.values() if some]
-    if all(one.device == "lamp" and one.late_s < ON_TIME_S for one in latest):
-        return ""
-    said = [
-        f"{one.device} {one.action} at most {rounded(1e3 * one.late_s, 2)} ms"
-        + (f" ({one.unit})" if one.late_s >= ON_TIME_S else "")
-        for one in latest
+    moves = [
+        [action for action in actions if (action.device, action.action) == move] for move in MOVES
     ]
-    text = f"Begun after its planned time: {', '.join(said)}."
-    late_s = [one.late_s for some in moves.values() for one in some]
-    n_late = sum(one > LATE_MOVE_S for one in late_s)
+    latest = [max(group, key=lambda action: action.late_s) for group in moves if group]
+    if all(action.device == "lamp" and action.late_s < ON_TIME_S for action in latest):
+        return ""
+    statements = [
+        f"{action.device} {action.action} at most {rounded(1e3 * action.late_s, 2)} ms"
+        + (f" ({action.unit})" if action.late_s >= ON_TIME_S else "")
+        for action in latest
+    ]
+    text = f"Begun after its planned time: {', '.join(statements)}."
+    lateness_s = [action.late_s for group in moves for action in group]
+    n_late = sum(late_s > LATE_MOVE_S for late_s in lateness_s)
     if not n_late:
         return text
     return (
-        f"{text} {n_late} of {len(late_s)} began more than {1e3 * LATE_MOVE_S:g} ms late: the "
+        f"{text} {n_late} of {len(lateness_s)} began more than {1e3 * LATE_MOVE_S:g} ms late: the "
         "frames after may show a door that still moves, or the lamp's transient."
     )
